@@ -1,0 +1,1 @@
+"""What physically touches: a Move, and fingers that execute it and return a Trace."""

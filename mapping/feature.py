@@ -1,0 +1,116 @@
+"""Feature: a detail of the object finer than its global model, and the values that describe it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.posterior import Posterior
+
+FloatArray = NDArray[np.float64]
+
+KINDS = ("bump", "ridge", "pit", "groove", "step", "convex edge", "concave corner")
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its central 90 % interval: 5 %, 50 % and 95 % quantiles (SI units).
+
+    `censored` is True where the data only bound the value from below ("at least low").
+    """
+
+    median: float
+    low: float
+    high: float
+    censored: bool = False
+
+    @classmethod
+    def from_draws(cls, draws: FloatArray) -> Interval:
+        """The interval of posterior draws (S,)."""
+        low, median, high = np.quantile(np.asarray(draws, dtype=np.float64), [0.05, 0.5, 0.95])
+        return cls(float(median), float(low), float(high))
+
+    @classmethod
+    def normal(cls, mean: float, sd: float) -> Interval:
+        """The interval of a Gaussian; 1.6449 is its 95 % quantile."""
+        return cls(float(mean), float(mean - 1.6448536 * sd), float(mean + 1.6448536 * sd))
+
+
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """Where a feature hangs on the base mesh.
+
+    Args:
+        face: index of the base face under the feature's reference point.
+        barycentric: (3,) coordinates of that point in the face.
+        position: (3,) the point, m.
+        frame: (3, 3) rows tangent (along the axis), binormal, outward normal.
+    """
+
+    face: int
+    barycentric: FloatArray
+    position: FloatArray
+    frame: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Why the feature is believed.
+
+    Args:
+        snr: signal-to-noise ratio of all crossings together (matched filter).
+        crossings: number of crossings by sweeps.
+        algorithms: numbers of the paper's algorithms (figure 4) that report it.
+        log_odds: log Bayes factor of this kind against the next best, or None if not compared.
+    """
+
+    snr: float
+    crossings: int
+    algorithms: tuple[int, ...] = ()
+    log_odds: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """One fine surface feature on the base.
+
+    Args:
+        kind: one of KINDS.
+        axis: (K, 3) points on the base surface under the crest, m; K = 1 for bumps and pits;
+            first equals last for a closed ridge.
+        normals: (K, 3) outward unit normals of the base at the axis.
+        height: signed height of the crest over the base, m (negative for pits and grooves).
+        width: full width of the detail on the body, m.
+        length: length along the axis, m (zero-width interval at 0 for a point feature).
+        evidence: signal-to-noise and crossings.
+        curvature_feature: True if it meets definition 1 of the paper at this tip radius (finer than the
+            tip); False if it merely stands out of the noise.
+        position_sd: standard deviation of the axis across itself, m.
+        posterior: draws of the shape's parameters, or None before sampling.
+        anchor: where it hangs on the base, or None before attachment.
+        id: name within its model, "" before attachment.
+        notes: remarks for the report, for example why a value is censored.
+    """
+
+    kind: str
+    axis: FloatArray
+    normals: FloatArray
+    height: Interval
+    width: Interval
+    length: Interval
+    evidence: Evidence
+    curvature_feature: bool
+    position_sd: float
+    posterior: Posterior | None = None
+    anchor: Anchor | None = None
+    id: str = ""
+    notes: tuple[str, ...] = ()
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def closed(self) -> bool:
+        """True for a ridge or groove that returns to its beginning."""
+        return len(self.axis) > 2 and bool(np.array_equal(self.axis[0], self.axis[-1]))

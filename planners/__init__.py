@@ -1,0 +1,1 @@
+"""Where to touch next: exploratory procedures as generators of moves."""
