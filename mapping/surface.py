@@ -40,7 +40,7 @@ class Surface:
         scale = max(self.size, np.finfo(float).tiny)
         cross = np.cross((b - a) / scale, (c - a) / scale)
         length = np.linalg.norm(cross, axis=1, keepdims=True)
-        return np.divide(cross, length, out=np.zeros_like(cross), where=length > 0)
+        return np.asarray(np.divide(cross, length, out=np.zeros_like(cross), where=length > 0))
 
     @cached_property
     def face_areas(self) -> FloatArray:
@@ -67,7 +67,8 @@ def _checked_vertices(vertices: ArrayLike) -> FloatArray:
     bad = ~np.isfinite(array).all(axis=1)
     if bad.any():
         raise SurfaceError(
-            f"mesh vertices must be finite; {int(bad.sum())} of {len(array)} are not, the first is vertex {int(bad.argmax())}"
+            f"mesh vertices must be finite; {int(bad.sum())} of {len(array)} are not, "
+            f"the first is vertex {int(bad.argmax())}"
         )
     array.setflags(write=False)
     return array

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,7 +54,7 @@ class Trace:
                 self._freeze(name, (count, 3), np.float64)
 
     def _freeze(self, name: str, shape: tuple[int, ...], dtype: type) -> None:
-        array = np.array(getattr(self, name), dtype=dtype)
+        array: NDArray[Any] = np.array(getattr(self, name), dtype=dtype)
         if array.shape != shape:
             raise TraceError(f"trace field {name} must have shape {shape} to match centers; found {array.shape}")
         bad = ~np.isfinite(array.reshape(len(array), -1)).all(axis=1)
