@@ -1,0 +1,72 @@
+"""Base: the global model that fine features are found on, and the height of a trace above it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapping.nearest import NearestPoint
+from mapping.surface import Surface
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Feet:
+    """Where ball centres stand over the base.
+
+    Args:
+        points: (N, 3) foot points on the base, m.
+        normals: (N, 3) unit directions from the foot to the centre (the outward normal there).
+        height: (N,) height of the trace over the base's own trace, m: zero on the bare base, positive
+            over a bump, negative over a groove.
+        face: (N,) base face under the centre.
+        barycentric: (N, 3) coordinates of the foot in that face.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    height: FloatArray
+    face: IntArray
+    barycentric: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """The body's known or fitted shape without its fine features.
+
+    Args:
+        surface: its mesh.
+        kind: "mesh" if it was given, else the fitted family: "profile", "plane", "sphere", "cylinder",
+            "quadric", "cloud".
+        parameters: what the fit found (JSON values, SI), empty for a given mesh.
+    """
+
+    surface: Surface
+    kind: str = "mesh"
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def _nearest(self) -> NearestPoint:
+        return NearestPoint(self.surface)
+
+    def foot(self, centers: ArrayLike, tip_radius: float) -> Feet:
+        """Foot points and heights of ball centres (N, 3), m.
+
+        The trace of a body is where its distance equals the tip radius r, also over edges and corners, so
+        the height is distance - r and the base's own edges explain themselves.
+        """
+        query = np.asarray(centers, dtype=np.float64)
+        nearest = self._nearest.query(query)
+        signed = nearest.side * nearest.distance
+        away = nearest.side[:, None] * (query - nearest.points)
+        # On the surface itself the direction to the centre has no digits left; the mesh normal has.
+        clear = nearest.distance > 1e-6 * tip_radius
+        safe = np.where(clear, nearest.distance, 1.0)[:, None]
+        normals = np.where(clear[:, None], away / safe, nearest.normals)
+        return Feet(nearest.points, normals, signed - tip_radius, nearest.face, nearest.barycentric)
