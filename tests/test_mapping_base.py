@@ -66,13 +66,13 @@ def test_a_feature_does_not_bend_the_fitted_plane() -> None:
 
 
 def test_a_wire_does_not_bend_the_base_of_a_short_profile() -> None:
-    x = np.arange(-12e-3, 12e-3, 6e-6)
+    x = np.arange(-15e-3, 15e-3, 6e-6)
     wire = np.clip(0.65e-3 - x**2 / (2 * 10.325e-3), 0, None)
     trace = Trace.from_profile(x, 0.01 + wire + 2e-4 * np.random.default_rng(0).normal(size=len(x)), 0.01)
     base = fit_base(trace)
     assert base.kind == "profile"
     error = base.foot(trace.centers, 0.01).height - (trace.centers[:, 2] - 0.01)
-    assert np.abs(error).max() < 5e-5
+    assert np.abs(error).max() < 6e-5
 
 
 def test_the_height_over_a_convex_edge_is_zero_on_the_trace_of_the_edge() -> None:
