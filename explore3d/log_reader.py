@@ -1,0 +1,225 @@
+"""Reading our logs, whole or damaged: all at once (`read_log`) or in batches of bounded memory (`iter_log`)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from explore3d import log_format, point_cloud
+from explore3d.errors import UserError
+from explore3d.recording import Event, Log, merge
+from mapping.errors import TraceError
+from mapping.trace import Trace
+
+# fixed by LogWriter; needed only where the chunk that states them is damaged
+_TOPICS = {i: topic for i, (topic, _) in enumerate(log_format.EVENTS.values(), 1)}
+_TOPICS |= {len(_TOPICS) + 1: log_format.TRACE_TOPIC, len(_TOPICS) + 2: log_format.PATH_TOPIC}
+
+
+@dataclass
+class _Reading:
+    """What has been learnt of a log while its samples pass by."""
+
+    path: Path
+    tip_radius: float | None
+    start: dict[str, Any] = field(default_factory=dict)
+    events: list[Event] = field(default_factory=list)
+    samples: int = 0
+    promised: int = 0
+    messages: int = 0
+    missing: int = 0
+    damaged: int = 0
+    cut: bool = False
+    closed: bool = False
+
+    @property
+    def complete(self) -> bool:
+        return self.closed and not (self.missing or self.promised > self.samples)
+
+
+def is_log(path: Path | str) -> bool:
+    """True if the file begins as MCAP files do.
+
+    Raises:
+        UserError: the file cannot be read.
+    """
+    return _read_start(Path(path)) == log_format.MAGIC
+
+
+def read_log(path: Path | str | Sequence[Path | str], tip_radius: float | None = None) -> Log:
+    """A whole log, or several as one; of a killed or damaged one all that is intact.
+
+    Args:
+        path: the file, or several of one object and one fingertip.
+        tip_radius: m; only for a log whose beginning is destroyed. A log that states its own keeps it.
+
+    Raises:
+        UserError: no such file, not a log of ours, no intact sample, tip radii that differ.
+    """
+    if not isinstance(path, str | Path):
+        return merge([read_log(one, tip_radius) for one in path])
+    reading = _Reading(Path(path), tip_radius)
+    batches = list(_batches(reading))
+    if not batches:
+        raise UserError(f"{path}: field samples: the log holds none{_loss(reading, ', ')}")
+    trace = _trace(batches, reading)
+    with reading.path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    metadata = dict(reading.start.get("metadata", {}))
+    return Log(
+        trace=trace,
+        scene_text=reading.start.get("scene", ""),
+        events=tuple(reading.events),
+        metadata=metadata | {"started": reading.start.get("started")},
+        complete=reading.complete,
+        recovered=_loss(reading),
+        sha256=digest,
+        sources=(str(path),),
+    )
+
+
+def iter_log(path: Path | str, samples: int = 100_000, tip_radius: float | None = None) -> Iterator[Trace]:
+    """The same samples in traces of about that many, for logs too large for memory.
+
+    Raises:
+        UserError: as `read_log`, when the first trace is asked for.
+    """
+    reading = _Reading(Path(path), tip_radius)
+    batches: list[NDArray[np.void]] = []
+    given = 0
+    for batch in _batches(reading):
+        batches.append(batch)
+        if reading.samples - given >= samples:
+            yield _trace(batches, reading)
+            batches, given = [], reading.samples
+    if batches:
+        yield _trace(batches, reading)
+    if not reading.samples:
+        raise UserError(f"{path}: field samples: the log holds none{_loss(reading, ', ')}")
+
+
+def _batches(reading: _Reading) -> Iterator[NDArray[np.void]]:
+    """The messages' samples in order; everything else that is met is noted in `reading`."""
+    from mcap.records import Channel, Message
+
+    from explore3d.log_chunks import Damage, intact_chunks
+
+    damage, topics, none = Damage(), dict(_TOPICS), True
+    if not is_log(reading.path):
+        raise UserError(f"{reading.path}: is not a log: it does not begin as an MCAP file does")
+    with reading.path.open("rb") as file:
+        for records in intact_chunks(file, damage):
+            for record in records:
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                elif isinstance(record, Message):
+                    none = False
+                    batch = _take_checked(topics.get(record.channel_id, ""), record, reading)
+                    if batch is not None:
+                        yield batch
+    reading.damaged, reading.cut = damage.damaged, damage.cut
+    if none:
+        raise UserError(f"{reading.path}: holds no intact message of an explore3d log; nothing can be recovered")
+
+
+def _take_checked(topic: str, message: Any, reading: _Reading) -> NDArray[np.void] | None:
+    try:
+        return _take(topic, message, reading)
+    except UserError:
+        raise
+    except (KeyError, ValueError, TypeError) as error:
+        raise UserError(f"{reading.path}: message on {topic!r} is not of an explore3d log: {error!r}") from error
+
+
+def _take(topic: str, message: Any, reading: _Reading) -> NDArray[np.void] | None:
+    """Note an event, or return the samples of a batch."""
+    if not reading.start and topic != "/start":
+        _need_start(reading)
+    reading.missing += max(0, message.sequence - reading.messages)
+    reading.messages = message.sequence + 1
+    if topic == log_format.TRACE_TOPIC:
+        batch = point_cloud.decode(message.data)
+        reading.samples += len(batch)
+        return batch
+    if topic not in _TOPICS.values() or topic == log_format.PATH_TOPIC:
+        return None
+    data = json.loads(message.data)
+    if topic == "/start":
+        _begin(data, reading)
+    elif topic == "/move":
+        reading.promised = max(reading.promised, data["first"] + data["samples"])
+        reading.events.append(Event("move", data.pop("t"), data))
+    elif topic == "/event":
+        reading.events.append(Event(data["kind"], data["t"], data["data"]))
+    elif topic == "/end":
+        reading.closed = True
+        reading.promised = max(reading.promised, data["samples"])
+    return None
+
+
+def _begin(data: dict[str, Any], reading: _Reading) -> None:
+    if data.get("schema") != log_format.VERSION:
+        raise UserError(
+            f"{reading.path}: field schema is {data.get('schema')!r}; this version reads {log_format.VERSION!r}"
+        )
+    reading.start = data
+    reading.tip_radius = float(data["tip_radius"])
+
+
+def _need_start(reading: _Reading) -> None:
+    if reading.tip_radius is None:
+        raise UserError(
+            f"{reading.path}: field tip_radius: the log's first message, which states it, is destroyed (or this is "
+            'no explore3d log); give it with --tip-radius, for example --tip-radius "10 mm"'
+        )
+
+
+def _trace(batches: list[NDArray[np.void]], reading: _Reading) -> Trace:
+    def column(names: Sequence[str]) -> NDArray[np.float64]:
+        return np.concatenate([np.column_stack([batch[name] for name in names]) for batch in batches])
+
+    optional = {
+        group: column(names)
+        for group, names in log_format.OPTIONAL.items()
+        if all(names[0] in (batch.dtype.names or ()) for batch in batches)
+    }
+    assert reading.tip_radius is not None
+    try:
+        t, sweep = column("t")[:, 0], np.concatenate([batch["sweep"] for batch in batches])
+        return Trace(t, column("xyz"), sweep, reading.tip_radius, **optional)
+    except TraceError as error:
+        raise UserError(f"{reading.path}: {error}") from error
+
+
+def _loss(reading: _Reading, prefix: str = "") -> str:
+    """One sentence on what is missing, "" if nothing is."""
+    if reading.complete:
+        return ""
+    moves = sum(event.kind == "move" for event in reading.events)
+    parts = [f"recovered {reading.samples} samples of {moves} moves"]
+    lost = reading.promised - reading.samples
+    if lost > 0:
+        parts.append(f"{lost} further samples that the log announces are lost")
+    if reading.missing and lost <= 0:
+        parts.append(f"{reading.missing} messages are missing")
+    if reading.damaged:
+        parts.append(f"{reading.damaged} damaged chunks were left out")
+    if not reading.closed:
+        cut = "in the middle of a chunk" if reading.cut else "after a whole chunk"
+        parts.append(f"the log was never closed and ends {cut} (the program was killed, or the file was cut)")
+    return prefix + "; ".join(parts)
+
+
+def _read_start(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(8)
+    except OSError as error:
+        raise UserError(f"{path}: cannot read it: {error.strerror}") from error
