@@ -1,0 +1,224 @@
+"""Noise: the level and the correlation of the finger's error along its path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapping.errors import MappingError
+
+FloatArray = NDArray[np.float64]
+
+# The median of |x| of a standard normal variable: turns a median absolute deviation into a standard deviation.
+MEDIAN_OF_ABSOLUTE_NORMAL = 0.6744897501960817
+
+
+class NoiseError(MappingError):
+    """Noise parameters or residuals that cannot describe a noise."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """White noise plus an Ornstein-Uhlenbeck process along the arclength.
+
+    The covariance of two samples is white^2 delta_ij + correlated^2 exp(-|s_i - s_j| / length).
+
+    Args:
+        white: standard deviation of the independent part, m.
+        correlated: standard deviation of the correlated part, m.
+        length: correlation length, m; matters only where `correlated` is positive.
+
+    Raises:
+        NoiseError: a negative or non-finite value, or correlated noise without a positive length.
+
+    Reference: theory section 6.
+    """
+
+    white: float
+    correlated: float = 0.0
+    length: float = 1e-3
+
+    def __post_init__(self) -> None:
+        values = (self.white, self.correlated, self.length)
+        if not all(np.isfinite(value) and value >= 0 for value in values):
+            raise NoiseError(f"noise needs finite white, correlated and length >= 0; found {values}")
+        if self.correlated > 0 and self.length == 0:
+            raise NoiseError("correlated noise needs a positive correlation length; found 0")
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of a single sample, m."""
+        return float(np.hypot(self.white, self.correlated))
+
+    def covariance(self, s: ArrayLike) -> FloatArray:
+        """(N, N) covariance of samples at arclengths s (N,), m^2."""
+        s = np.asarray(s, dtype=np.float64)
+        return self.white**2 * np.eye(len(s)) + self.correlated**2 * np.exp(
+            -np.abs(s[:, None] - s[None, :]) / max(self.length, np.finfo(float).tiny)
+        )
+
+    def block_covariances(self, count: int, block: float, samples: float) -> FloatArray:
+        """(count,) autocovariance of means over adjoining blocks, at lags 0 to count - 1 blocks.
+
+        Args:
+            block: length of a block, m.
+            samples: number of samples in a block; may be fractional on average.
+        """
+        lags = np.arange(count)
+        x = block / max(self.length, np.finfo(float).tiny)
+        rise = -np.expm1(-x) / x
+        covariances = (self.correlated * rise) ** 2 * np.exp(-np.maximum(lags - 1, 0) * x)
+        covariances[0] = self.correlated**2 * _mean_variance(np.array(x)) + self.white**2 / samples
+        return np.asarray(covariances)
+
+    def whiten(self, values: ArrayLike, s: ArrayLike) -> tuple[FloatArray, float]:
+        """Values as seen by independent unit noise, in O(N).
+
+        The innovations of the Kalman filter of the process: W v with W^T W the inverse covariance, so that the
+        log-likelihood of a residual v is -0.5 |W v|^2 - 0.5 logdet - 0.5 N log(2 pi).
+
+        Args:
+            values: (N,) or (N, P) columns, m.
+            s: (N,) arclengths, m, increasing.
+
+        Returns:
+            The whitened columns in the shape of `values`, and the log-determinant of the covariance.
+
+        Raises:
+            NoiseError: shapes that do not match, or a noise of level zero.
+        """
+        columns = np.asarray(values, dtype=np.float64)
+        positions = np.asarray(s, dtype=np.float64)
+        if columns.shape[:1] != positions.shape:
+            raise NoiseError(f"values and s must have one length; found {columns.shape} and {positions.shape}")
+        if self.white == 0 and (self.correlated == 0 or (np.diff(positions) == 0).any()):
+            raise NoiseError("cannot whiten: the covariance is singular (no white noise and repeated or certain samples)")
+        if self.correlated == 0:
+            return columns / self.white, 2 * len(positions) * float(np.log(self.white))
+        from mapping.noise_kernels import innovations
+
+        flat = np.ascontiguousarray(columns.reshape(len(positions), -1))
+        whitened, logdet = innovations(flat, np.diff(positions), self.white, self.correlated, self.length)
+        return whitened.reshape(columns.shape), float(logdet)
+
+
+def estimate_noise(residual: ArrayLike, s: ArrayLike) -> Noise:
+    """Level and correlation of the noise in a residual that may hold features.
+
+    The difference of adjoining block means (the Allan deviation) knows no offset and little drift; its median
+    absolute value at every block length knows little of features that cover a small part of the path. The three
+    parameters are fitted to it.
+
+    Args:
+        residual: (N,) heights over the base, m; N >= 16. May be several sweeps in a row.
+        s: (N,) arclengths, m, increasing within a sweep; a jump or a decrease begins another sweep.
+
+    Raises:
+        NoiseError: different lengths, or too few samples.
+    """
+    residual, s = np.asarray(residual, dtype=np.float64), np.asarray(s, dtype=np.float64)
+    if residual.ndim != 1 or residual.shape != s.shape:
+        raise NoiseError(f"residual and s must have shape (N,); found {residual.shape} and {s.shape}")
+    if len(s) < 16:
+        raise NoiseError(f"the noise needs at least 16 samples to be estimated; found {len(s)}")
+    blocks, variances, counts, spacing = _allan_variances(residual, s)
+    return _fit_allan(blocks, variances, counts, spacing)
+
+
+def robust_sd(values: FloatArray) -> float:
+    """Standard deviation of the Gaussian core of values about zero (median absolute value)."""
+    return float(np.median(np.abs(values)) / MEDIAN_OF_ABSOLUTE_NORMAL)
+
+
+def _mean_variance(x: FloatArray) -> FloatArray:
+    """Variance of the mean of a unit OU process over x correlation lengths; series where the form cancels."""
+    safe = np.maximum(x, 1e-3)
+    return np.where(x < 1e-3, 1 - x / 3, 2 * (safe + np.expm1(-safe)) / safe**2)
+
+
+def _allan_of_ou(x: FloatArray) -> FloatArray:
+    """Half the mean square difference of adjoining means of a unit OU process over x correlation lengths."""
+    safe = np.maximum(x, 1e-3)
+    full = _mean_variance(safe) - (np.expm1(-safe) / safe) ** 2
+    return np.where(x < 1e-3, x / 3 * 2, full)
+
+
+def _allan_variances(residual: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Robust Allan variances at geometric block sizes: samples per block, variances, independent pairs, spacing."""
+    steps = np.diff(s)
+    spacing = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    begins = np.flatnonzero((steps < 0) | (steps > 20 * spacing)) + 1
+    runs = [run - run[0] for run in np.split(residual, begins) if len(run) >= 2]
+    sizes, variances, counts = [], [], []
+    size = 1
+    while True:
+        differences = [_block_differences(run, size) for run in runs if len(run) >= 2 * size]
+        together = np.concatenate(differences) if differences else np.zeros(0)
+        independent = sum(len(run) // (2 * size) for run in runs)
+        if size > 1 and independent < 12:
+            break
+        sizes.append(size)
+        variances.append(0.5 * robust_sd(together) ** 2)
+        counts.append(independent)
+        size = int(np.ceil(size * 1.6))
+    return np.array(sizes, dtype=float), np.array(variances), np.array(counts, dtype=float), spacing
+
+
+def _block_differences(run: FloatArray, size: int) -> FloatArray:
+    """Differences of adjoining means over `size` samples, at every quarter block."""
+    sums = np.concatenate([[0.0], np.cumsum(run)])
+    means = (sums[size:] - sums[:-size]) / size
+    return np.asarray(means[size:] - means[:-size])[:: max(1, size // 4)]
+
+
+def _fit_allan(sizes: FloatArray, variances: FloatArray, counts: FloatArray, spacing: float) -> Noise:
+    """Non-negative fit of white and correlated variance for every correlation length; the best of them."""
+    scale = variances.max()
+    if scale == 0:
+        return Noise(0.0)
+    # relative error of a variance from n pairs by the median is about sqrt(5.4 / n); features and drift disturb the
+    # long blocks, so none is trusted better than 3 %
+    weight = 1 / np.sqrt(5.4 / counts + 0.03**2)
+    white = 1 / sizes
+    target = variances / scale
+    best = (_misfit(target, white * _ratio(target, white, weight), weight) + 6.0, _ratio(target, white, weight), 0.0, 1.0)
+    for length in spacing * np.geomspace(2.0, max(2.5, sizes[-1]), 60):
+        correlated = _allan_of_ou(sizes * spacing / length)
+        a, b = _two_levels(target, white, correlated, weight)
+        misfit = _misfit(target, a * white + b * correlated, weight)
+        if b > 0 and misfit < best[0]:
+            best = (misfit, a, b, float(length))
+    _, a, b, length = best
+    return Noise(float(np.sqrt(a * scale)), float(np.sqrt(b * scale)), float(length) if b > 0 else spacing)
+
+
+def _ratio(target: FloatArray, shape: FloatArray, weight: FloatArray) -> float:
+    """Level of one shape in the relative sense, by reweighting with the model itself."""
+    safe = np.maximum(target, 1e-12)
+    return float(np.exp(np.average(np.log(safe / shape), weights=weight**2)))
+
+
+def _two_levels(
+    target: FloatArray, white: FloatArray, correlated: FloatArray, weight: FloatArray
+) -> tuple[float, float]:
+    """Non-negative levels of both shapes with the least weighted relative error (reweighted twice)."""
+    model = target
+    a = b = 0.0
+    for _ in range(4):
+        w = weight / np.maximum(model, 1e-9 * target.max())
+        columns = np.column_stack([white * w, correlated * w])
+        a, b = np.linalg.lstsq(columns, target * w, rcond=None)[0]
+        if a < 0:
+            a, b = 0.0, float((columns[:, 1] @ (target * w)) / (columns[:, 1] @ columns[:, 1]))
+        if b < 0:
+            a, b = float((columns[:, 0] @ (target * w)) / (columns[:, 0] @ columns[:, 0])), 0.0
+        model = np.maximum(a * white + b * correlated, 1e-9 * target.max())
+    return float(a), float(b)
+
+
+def _misfit(target: FloatArray, model: FloatArray, weight: FloatArray) -> float:
+    """Weighted square error of the logarithms: chi-square of independent relative errors."""
+    safe = np.maximum(target, 1e-12)
+    return float(np.sum((weight * np.log(safe / np.maximum(model, 1e-12))) ** 2))
