@@ -11,3 +11,7 @@ class SurfaceError(MappingError):
 
 class TraceError(MappingError):
     """A trace that is empty, malformed, or not finite."""
+
+
+class ModelError(MappingError):
+    """An annotated model that cannot be written or read: which field, and why."""
