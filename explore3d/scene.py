@@ -1,0 +1,233 @@
+"""Scene: one TOML file that says what to explore, with which finger, how finely."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    model_validator,
+)
+
+from explore3d.errors import MeshFileError, SceneError, UnitError
+from explore3d.meshes import load_mesh
+from explore3d.scene_complaint import complaint
+from explore3d.scene_text import scene_text
+from explore3d.units import (
+    parse_angle,
+    parse_force,
+    parse_length,
+    parse_rate,
+    parse_speed,
+    parse_time,
+    unit_factor,
+)
+from mapping.feature import KINDS
+from mapping.surface import Surface
+
+SCHEMA = "explore3d/scene/1"
+
+Signed = Annotated[float, BeforeValidator(parse_length)]
+Length = Annotated[float, BeforeValidator(parse_length), Field(gt=0)]
+Extent = Annotated[float, BeforeValidator(parse_length), Field(ge=0)]
+Angle = Annotated[float, BeforeValidator(parse_angle), Field(ge=0)]
+Rate = Annotated[float, BeforeValidator(parse_rate), Field(gt=0)]
+Speed = Annotated[float, BeforeValidator(parse_speed), Field(gt=0)]
+Force = Annotated[float, BeforeValidator(parse_force), Field(gt=0)]
+Time = Annotated[float, BeforeValidator(parse_time), Field(gt=0)]
+Point = tuple[Signed, Signed, Signed]
+
+
+def _known_unit(unit: str) -> str:
+    unit_factor(unit)
+    return unit
+
+
+LengthUnit = Annotated[str, AfterValidator(_known_unit)]
+
+
+class Table(BaseModel):
+    """A table of the scene file: immutable, and no key that is not known."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Tip(Table):
+    """The spherical fingertip: `radius` in metres."""
+
+    radius: Length
+
+
+class Region(Table):
+    """A box that bounds where to explore: `low` and `high` corners, m, object frame."""
+
+    low: Point
+    high: Point
+
+    @model_validator(mode="after")
+    def _has_volume(self) -> Region:
+        if not all(low < high for low, high in zip(self.low, self.high, strict=True)):
+            raise ValueError(f"low must lie below high in x, y and z; found low {self.low} and high {self.high} m")
+        return self
+
+
+class GlobalModel(Table):
+    """What is known of the object beforehand: a mesh, whose file is in `units`, or merely a region."""
+
+    mesh: Path | None = None
+    units: LengthUnit = "m"
+    region: Region | None = None
+
+    @model_validator(mode="after")
+    def _mesh_or_region(self) -> GlobalModel:
+        if self.mesh is None and self.region is None:
+            raise ValueError("give mesh, region, or both; without a mesh the base is fitted to the survey")
+        return self
+
+
+class FingerNoise(Table):
+    """Noise of the simulated finger: of the centre (white, and correlated along the path), of what it feels."""
+
+    white: Extent = 0.0
+    correlated: Extent = 0.0
+    correlation_length: Length = 1e-3
+    angle: Angle = 0.0
+    contact: Extent = 0.0
+
+
+class FingerTable(Table):
+    """The finger: the simulated one touches the mesh `object`, the truth, and samples at `rate` Hz."""
+
+    kind: Literal["simulated"] = "simulated"
+    object: Path
+    units: LengthUnit = "m"
+    rate: Rate = 5000.0
+    contact_data: bool = False
+    noise: FingerNoise = FingerNoise()
+
+
+class Survey(Table):
+    """Sweeps over the whole model: the least height to be found (m), m/s, N."""
+
+    smallest_feature: Length
+    speed: Speed = 0.03
+    force: Force = 1.0
+
+
+class Detection(Table):
+    """Which of the paper's four algorithms decides, and how many false alarms a metre may have."""
+
+    algorithm: Annotated[int, Field(ge=1, le=4)] = 3
+    false_alarms_per_metre: Annotated[float, Field(gt=0)] = 0.01
+
+
+class Exploration(Table):
+    """When to stop: `precision` of a feature's place (m), and the finger's time (s)."""
+
+    precision: Length = 1e-4
+    time_budget: Time = 600.0
+
+
+class Truth(Table):
+    """A feature that a simulated object really has: the report compares. Lengths in m, object frame."""
+
+    kind: Literal[KINDS]  # type: ignore[valid-type]
+    axis: Annotated[tuple[Point, ...], Field(min_length=1)]
+    height: Signed
+    width: Length | None = None
+    length: Extent = 0.0
+
+
+class Scene(Table):
+    """The whole file. Paths are absolute after loading; `path` is the file, `text` what stood in it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+    schema_: Literal["explore3d/scene/1"] = Field(alias="schema")
+    title: str = ""
+    seed: Annotated[int, Field(ge=0)] = 1
+    tip: Tip
+    model: GlobalModel
+    finger: FingerTable
+    survey: Survey
+    detection: Detection = Detection()
+    explore: Exploration = Exploration()
+    truth: tuple[Truth, ...] = ()
+    _path: Path = PrivateAttr(default=Path("scene.toml"))
+    _text: str = PrivateAttr(default="")
+
+    @property
+    def path(self) -> Path:
+        """The file that the scene was read from."""
+        return self._path
+
+    @property
+    def text(self) -> str:
+        """The text of that file."""
+        return self._text
+
+    @property
+    def resolved(self) -> str:
+        """The scene as TOML with every default written out, lengths in SI and paths absolute."""
+        return scene_text(self.model_dump(mode="json", by_alias=True, exclude_none=True))
+
+    def base_surface(self) -> Surface | None:
+        """The global model's mesh in metres, None if only a region is known. Raises SceneError."""
+        return None if self.model.mesh is None else self._surface("model.mesh", self.model.mesh, self.model.units)
+
+    def object_surface(self) -> Surface:
+        """The mesh that the simulated finger touches, in metres. Raises SceneError."""
+        return self._surface("finger.object", self.finger.object, self.finger.units)
+
+    def _surface(self, field: str, mesh: Path, units: str) -> Surface:
+        try:
+            return load_mesh(mesh, units)
+        except (MeshFileError, UnitError) as error:
+            raise SceneError(f"{self._path}: {field}: {error}") from error
+
+
+def load_scene(path: Path | str) -> Scene:
+    """The scene in a TOML file; its relative paths count from the file's folder.
+
+    Raises:
+        SceneError: no such file, not TOML, an unknown or missing key, a value that is not possible, or a
+            mesh file that does not exist; the message is one line that names the file and the field.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise SceneError(f"{path}: {'a folder, not a scene file' if path.is_dir() else 'no such scene file'}")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(f"{path}: not a readable scene file ({error})") from error
+    return parse_scene(text, path)
+
+
+def parse_scene(text: str, path: Path | str) -> Scene:
+    """The scene in a text that stood, or might have stood, in the file `path`. Raises SceneError."""
+    path = Path(path)
+    try:
+        scene = Scene.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{path}: not valid TOML: {error}") from error
+    except ValidationError as error:
+        raise SceneError(f"{path}: {complaint(error, Scene)}") from error
+    scene = _with_absolute_paths(scene, path.resolve().parent)
+    scene._path, scene._text = path, text
+    return scene
+
+
+def _with_absolute_paths(scene: Scene, folder: Path) -> Scene:
+    finger = scene.finger.model_copy(update={"object": (folder / scene.finger.object).resolve()})
+    model = scene.model
+    if model.mesh is not None:
+        model = model.model_copy(update={"mesh": (folder / model.mesh).resolve()})
+    return scene.model_copy(update={"finger": finger, "model": model})

@@ -1,0 +1,119 @@
+"""Units: quantities as people write them ("0.65 mm", "5 kHz") become SI numbers, here and nowhere else."""
+
+from __future__ import annotations
+
+import math
+import re
+from difflib import get_close_matches
+
+from explore3d.errors import UnitError
+
+UNITS: dict[str, dict[str, float]] = {
+    "length": {
+        "m": 1.0,
+        "km": 1e3,
+        "cm": 1e-2,
+        "mm": 1e-3,
+        "um": 1e-6,
+        "µm": 1e-6,
+        "μm": 1e-6,
+        "nm": 1e-9,
+        "in": 25.4e-3,
+    },
+    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "°": math.pi / 180.0},
+    "rate": {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6},
+    "speed": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6, "mm/min": 1e-3 / 60.0, "m/min": 1.0 / 60.0},
+    "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "uN": 1e-6},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
+}
+SI = {dimension: next(iter(units)) for dimension, units in UNITS.items()}
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
+
+
+def parse_quantity(value: object, dimension: str) -> float:
+    """A quantity in SI units.
+
+    Args:
+        value: a string of number and unit, or a number, which is SI already.
+        dimension: a key of UNITS.
+
+    Raises:
+        UnitError: not a quantity, not finite, unit missing, unknown, or of another dimension.
+    """
+    if isinstance(value, str):
+        return _parse_text(value, dimension)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise UnitError(f"expected {_example(dimension)}; found {value!r}")
+    if not math.isfinite(value):
+        raise UnitError(f"expected a finite {dimension}; found {value}")
+    return float(value)
+
+
+def _parse_text(text: str, dimension: str) -> float:
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise UnitError(f"expected {_example(dimension)}; found {text!r}")
+    number, unit = match.groups()
+    if not unit:
+        raise UnitError(f'unit missing in {text!r}; write for example "{number} {_usual(dimension)}"')
+    result = float(number) * unit_factor(unit, dimension)
+    if not math.isfinite(result):
+        raise UnitError(f"expected a finite {dimension}; found {text!r}")
+    return result
+
+
+def unit_factor(unit: str, dimension: str = "length") -> float:
+    """How many SI units one `unit` is.
+
+    Raises:
+        UnitError: the unit is unknown or measures something else.
+    """
+    units = UNITS[dimension]
+    if unit in units:
+        return units[unit]
+    for other, names in UNITS.items():
+        if unit in names:
+            raise UnitError(f"{unit!r} is a unit of {other}, not of {dimension}; possible: {', '.join(units)}")
+    near = get_close_matches(unit, units, n=1)
+    hint = f" did you mean {near[0]!r}?" if near else ""
+    raise UnitError(f"unknown unit of {dimension} {unit!r};{hint} possible: {', '.join(units)}")
+
+
+def parse_length(value: object) -> float:
+    """Metres from "0.65 mm" or from a number in metres."""
+    return parse_quantity(value, "length")
+
+
+def parse_angle(value: object) -> float:
+    """Radians from "1 deg" or from a number in radians."""
+    return parse_quantity(value, "angle")
+
+
+def parse_rate(value: object) -> float:
+    """Hertz from "5 kHz" or from a number in hertz."""
+    return parse_quantity(value, "rate")
+
+
+def parse_speed(value: object) -> float:
+    """Metres per second from "30 mm/s" or from a number in m/s."""
+    return parse_quantity(value, "speed")
+
+
+def parse_force(value: object) -> float:
+    """Newtons from "1 N" or from a number in newtons."""
+    return parse_quantity(value, "force")
+
+
+def parse_time(value: object) -> float:
+    """Seconds from "10 min" or from a number in seconds."""
+    return parse_quantity(value, "time")
+
+
+def _usual(dimension: str) -> str:
+    """The unit that a message offers as an example."""
+    return {"length": "mm", "angle": "deg", "rate": "kHz", "speed": "mm/s", "force": "N", "time": "s"}[dimension]
+
+
+def _example(dimension: str) -> str:
+    return f'a {dimension} like "1 {_usual(dimension)}" or a number in {SI[dimension]}'
