@@ -57,7 +57,8 @@ class Trace:
         array: NDArray[Any] = np.array(getattr(self, name), dtype=dtype)
         if array.shape != shape:
             raise TraceError(f"trace field {name} must have shape {shape} to match centers; found {array.shape}")
-        bad = ~np.isfinite(array.reshape(len(array), -1)).all(axis=1)
+        finite = np.isfinite(array)
+        bad = ~(finite if array.ndim == 1 else finite.all(axis=1))
         if bad.any():
             raise TraceError(
                 f"trace field {name} must be finite; {int(bad.sum())} of {len(array)} samples are not, "
