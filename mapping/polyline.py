@@ -47,3 +47,17 @@ def resample(points: FloatArray, count: int) -> FloatArray:
     out = np.column_stack([np.interp(even, s, points[:, i]) for i in range(points.shape[1])])
     out[0], out[-1] = points[0], points[-1]
     return out
+
+
+def nearest_on(points: FloatArray, polyline: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The nearest point (N, 3) of a polyline (K, 3) to each of (N, 3) points, and its arclength (N,), m."""
+    if len(polyline) == 1:
+        return np.broadcast_to(polyline[0], points.shape).copy(), np.zeros(len(points))
+    start, leg = polyline[:-1], np.diff(polyline, axis=0)
+    square = np.einsum("ij,ij->i", leg, leg)
+    along = np.einsum("nkj,kj->nk", points[:, None] - start, leg)
+    share = np.clip(along / np.where(square > 0, square, 1.0), 0.0, 1.0)
+    candidates = start + share[..., None] * leg
+    best = np.linalg.norm(points[:, None] - candidates, axis=2).argmin(axis=1)
+    row = np.arange(len(points))
+    return candidates[row, best], arclengths(polyline)[best] + share[row, best] * np.sqrt(square[best])

@@ -47,8 +47,17 @@ def ridge(far: float = 0.0) -> Feature:
 def bump(far: float = 0.0) -> Feature:
     point = Interval(0.0, 0.0, 0.0)
     size = Interval.normal(3e-4, 1e-5)
-    return Feature("bump", np.array([[0.03, 0.01, 0.0]]) + far, np.array([[0.0, 0, 1]]), size, size, point,
-                   Evidence(9.0, 3, (3,), 4.5), False, 1e-4)  # fmt: skip
+    return Feature(
+        "bump",
+        np.array([[0.03, 0.01, 0.0]]) + far,
+        np.array([[0.0, 0, 1]]),
+        size,
+        size,
+        point,
+        Evidence(9.0, 3, (3,), 4.5),
+        False,
+        1e-4,
+    )
 
 
 def model(far: float = 0.0) -> ObjectModel:
