@@ -1,0 +1,255 @@
+"""Detection: where sweeps passed over something that the base does not explain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.base import Base
+from mapping.crossing import Crossing
+from mapping.disturbance import Disturbance, find_disturbances
+from mapping.errors import MappingError
+from mapping.height_profile import HeightProfile, arclength, height_profiles
+from mapping.matched_filter import BINS_PER_HALF_WIDTH, Bank, build_bank, smallest_half_width
+from mapping.noise import Noise, estimate_noise
+from mapping.trace import Trace
+
+FloatArray = NDArray[np.float64]
+
+# Half-width of the widest disturbance that counts as fine, in tip radii.
+LARGEST = 4.0
+# Rounding of contact geometry, in tip radii: the noise is never taken to be smaller.
+ROUNDING = 1e-8
+RAW_SAMPLES = 40_000
+PROBABILITY = 0.95
+
+
+class DetectionError(MappingError):
+    """Detection asked for something that does not exist or cannot be."""
+
+
+@dataclass(frozen=True, eq=False)
+class Detections:
+    """What a trace holds beyond its base.
+
+    Args:
+        crossings: one for every place where a sweep passed over something, in the order of the trace.
+        noise: of the trace's samples.
+        algorithm: number of the paper's algorithm (figure 4) that decided `curvature_feature`.
+        detection_limit: smallest height of a sharp crest that a sweep across it detects with `probability`, m.
+        probability: 0.95.
+        threshold: signal-to-noise ratio above which a crossing is reported.
+        inspected_length: length of path inspected, m.
+        left_out: sentences naming what could not be inspected, and why.
+    """
+
+    crossings: tuple[Crossing, ...]
+    noise: Noise
+    algorithm: int
+    detection_limit: float
+    probability: float
+    threshold: float
+    inspected_length: float
+    left_out: tuple[str, ...] = ()
+
+
+def detect(
+    trace: Trace,
+    base: Base | None = None,
+    *,
+    algorithm: int = 3,
+    false_alarms_per_metre: float = 0.01,
+    noise: Noise | None = None,
+    largest: float | None = None,
+) -> Detections:
+    """Find every crossing of something that the base does not explain.
+
+    The height of the trace over the base's trace is averaged over bins that the smallest visible crest spans
+    twelve times; a bank of matched filters, whitened by the noise estimated from the same heights, looks for
+    a cap of any size at any place.
+
+    Args:
+        trace: one or many sweeps.
+        base: the known global model; None: fitted to the trace.
+        algorithm: number in figure 4 of the paper.
+        false_alarms_per_metre: expected number of false crossings per metre of path, 1/m.
+        noise: of the samples; None: estimated from the trace.
+        largest: half-width of the widest disturbance that counts as a fine feature, m; None: four tip radii.
+
+    Raises:
+        DetectionError: an unknown algorithm, no samples, or a rate that is not positive.
+
+    Reference: paper section 3 and figure 4; theory sections 3, 4 and 6.
+    """
+    if algorithm not in (1, 2, 3, 4):
+        raise DetectionError(f"unknown algorithm {algorithm!r}; the paper has 1, 2, 3 and 4")
+    if not (np.isfinite(false_alarms_per_metre) and false_alarms_per_metre > 0):
+        raise DetectionError(f"false alarms per metre must be positive and finite; found {false_alarms_per_metre}")
+    if len(trace) == 0:
+        raise DetectionError("cannot detect in a trace without samples")
+    if base is None:
+        from mapping.base_fit import fit_base
+
+        base = fit_base(trace)
+    tip = trace.tip_radius
+    sweeps = [(number, part, arclength(part, base)) for number, part in trace.sweeps()]
+    usable = [sweep for sweep in sweeps if len(sweep[1]) >= 8 and sweep[2][-1] > 0]
+    left_out = tuple(
+        f"sweep {number}: {len(part)} samples over {s[-1] if len(s) else 0:.3g} m are too few to inspect"
+        for number, part, s in sweeps
+        if len(part) < 8 or not s[-1] > 0
+    )
+    if not usable:
+        return Detections((), noise or Noise(0.0), algorithm, np.inf, PROBABILITY, np.inf, 0.0, left_out)
+    raw = float(np.median([s[-1] / (len(s) - 1) for _, _, s in usable]))
+    first = noise or _raw_noise(usable, base, raw)
+    widest = LARGEST * tip if largest is None else largest
+    profiles, bank, level, threshold = _profiles(usable, base, first, raw, tip, widest, false_alarms_per_metre)
+    for _ in range(2 if noise is None else 0):
+        found = [find_disturbances(p, bank, level, threshold, tip) for p in profiles]
+        level = _quiet_noise(profiles, found, first, tip)
+        bank, threshold = _bank(base, level, profiles[0], tip, widest, false_alarms_per_metre)
+    crossings = []
+    for profile in profiles:
+        found_here = find_disturbances(profile, bank, level, threshold, tip)
+        crossings += [c for d in found_here for c in _crossings(d, profile, base, tip)]
+    length = sum(p.length for p in profiles)
+    limit = bank.detection_limit(threshold, tip)
+    return Detections(
+        tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out
+    )
+
+
+def _raw_noise(usable: list[tuple[int, Trace, FloatArray]], base: Base, raw: float) -> Noise:
+    """Noise from stretches of raw samples that together are no more than RAW_SAMPLES."""
+    share = max(64, RAW_SAMPLES // len(usable))
+    residuals, places = [], []
+    offset = 0.0
+    for _, part, s in usable:
+        begin = max(0, (len(part) - share) // 2)
+        cut = slice(begin, begin + share)
+        residuals.append(base.foot(part.centers[cut], part.tip_radius).height)
+        places.append(s[cut] - s[cut][0] + offset)
+        offset = places[-1][-1] + 1000 * raw
+    residual, place = np.concatenate(residuals), np.concatenate(places)
+    if len(residual) < 16:
+        return Noise(float(np.std(residual)))
+    return estimate_noise(residual, place)
+
+
+def _floored(noise: Noise, tip: float) -> Noise:
+    return Noise(max(noise.white, ROUNDING * tip), noise.correlated, noise.length)
+
+
+def _profiles(
+    usable: list[tuple[int, Trace, FloatArray]],
+    base: Base,
+    noise: Noise,
+    raw: float,
+    tip: float,
+    largest: float,
+    rate: float,
+) -> tuple[list[HeightProfile], Bank, Noise, float]:
+    noise = _floored(noise, tip)
+    smallest = smallest_half_width(noise, raw, 1.0, tip, 5.0)
+    spacing = raw * max(1, int(smallest / (BINS_PER_HALF_WIDTH * raw)))
+    profiles = [p for number, part, s in usable for p in height_profiles(number, part, s, base, spacing)]
+    level = _quiet_noise(profiles, [()] * len(profiles), noise, tip)
+    bank, threshold = _bank(base, level, profiles[0], tip, largest, rate)
+    return profiles, bank, level, threshold
+
+
+def _bank(
+    base: Base, noise: Noise, profile: HeightProfile, tip: float, largest: float, rate: float
+) -> tuple[Bank, float]:
+    drift = 0 if base.kind == "mesh" else 2
+    smallest = smallest_half_width(noise, profile.spacing, profile.samples, tip, 4.5)
+    bank = build_bank(noise, profile.spacing, profile.samples, smallest, max(largest, smallest), drift)
+    return bank, bank.threshold(rate)
+
+
+def _quiet_noise(
+    profiles: list[HeightProfile], found: list[tuple[Disturbance, ...]], first: Noise, tip: float
+) -> Noise:
+    """Noise of the profiles outside of what was found; the white level of single samples."""
+    heights, places, samples = [], [], []
+    offset = 0.0
+    for profile, disturbances in zip(profiles, found, strict=True):
+        quiet = np.ones(len(profile.height), dtype=bool)
+        for d in disturbances:
+            quiet &= (profile.s < d.start) | (profile.s > d.stop)
+        heights.append(profile.height[quiet])
+        places.append(profile.s[quiet] - profile.s[0] + offset)
+        offset += profile.length + 1000 * profile.spacing
+        samples.append(profile.samples)
+    height = np.concatenate(heights)
+    if len(height) < 16:
+        return _floored(first, tip)
+    estimated = estimate_noise(height, np.concatenate(places))
+    white = estimated.white * np.sqrt(float(np.mean(samples)))
+    return _floored(Noise(white, estimated.correlated, estimated.length), tip)
+
+
+def _crossings(found: Disturbance, profile: HeightProfile, base: Base, tip: float) -> list[Crossing]:
+    """A crest as one crossing; a plateau as the step up and the step down at its ends."""
+    if found.flat == 0.0:
+        kind = "convex" if found.height > 0 else "concave"
+        return [_crossing(found, kind, found.place, found.start, found.stop, profile, base, tip)]
+    kinds = ("step up", "step down") if found.height > 0 else ("step down", "step up")
+    edges = (found.place - found.flat, found.place + found.flat)
+    low, high = profile.start + profile.spacing, profile.start + profile.length - 2 * profile.spacing
+    bounds = ((found.start, found.place), (found.place, found.stop))
+    return [
+        _crossing(found, kind, edge, *bound, profile, base, tip)
+        for kind, edge, bound, outside in zip(kinds, edges, bounds, (found.start <= low, found.stop >= high), strict=True)
+        if not outside
+    ]
+
+
+def _crossing(
+    found: Disturbance,
+    kind: str,
+    place: float,
+    start: float,
+    stop: float,
+    profile: HeightProfile,
+    base: Base,
+    tip: float,
+) -> Crossing:
+    s = profile.s
+    near = max(found.half_width - found.flat, 2 * profile.spacing)
+    low, high = np.clip(np.searchsorted(s, [place - near, place + near]), 0, len(s) - 1)
+    if high - low < 2:
+        low, high = max(0, low - 1), min(len(s) - 1, low + 2)
+    # a line through the path near the crest: the noise of single bins would throw the crest off the sweep
+    design = np.column_stack([np.ones(high - low + 1), s[low : high + 1] - place])
+    line = np.linalg.lstsq(design, profile.centers[low : high + 1], rcond=None)[0]
+    foot = base.foot(line[:1], tip)
+    normal = foot.normals[0]
+    tangent = line[1] - (line[1] @ normal) * normal
+    norm = np.linalg.norm(tangent)
+    index = np.clip(np.searchsorted(s, [start, stop]), 0, len(s) - 1)
+    # definition 1 on the trace (theory section 3): k > 1/r on the body is k_t > 1/(2 r); a dip between two rims
+    # is a kink, sharper than any curvature
+    sharp = found.curvature > 1 / (2 * tip) if found.height > 0 else found.curvature < -1 / (2 * tip)
+    if kind.startswith("step"):
+        sharp = bool(abs(found.curvature) > 1 / (2 * tip))
+    return Crossing(
+        sweep=profile.sweep,
+        t=float(np.interp(place, s, profile.t)),
+        point=foot.points[0],
+        normal=normal,
+        tangent=tangent / norm if norm > 0 else tangent,
+        kind=kind,
+        height=found.height,
+        height_sd=found.height_sd,
+        position_sd=found.place_sd,
+        half_width=found.half_width if found.flat == 0 else near,
+        trace_curvature=found.curvature,
+        snr=found.snr,
+        curvature_feature=bool(sharp),
+        start=int(profile.first[index[0]]),
+        stop=int(profile.first[min(index[1] + 1, len(s))]),
+    )

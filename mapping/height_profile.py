@@ -1,0 +1,128 @@
+"""Height profile: one sweep's height over the base, averaged over equal bins of its path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.base import Base
+from mapping.trace import Trace
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# Blocks of a sweep are long enough once doubling them shortens its length by less than this: noise zigzags,
+# the path does not.
+LENGTH_TOLERANCE = 0.01
+LARGEST_FIRST_BLOCK_COUNT = 2000
+# A gap of more than this many bins cuts a profile: nothing was touched there.
+LONGEST_GAP = 2
+
+
+@dataclass(frozen=True, eq=False)
+class HeightProfile:
+    """Heights at equal steps of arclength along one sweep.
+
+    Args:
+        sweep: number of the sweep.
+        start: arclength of the first bin's middle, m.
+        spacing: width of the bins, m.
+        height: (n,) mean height over the base in each bin, m.
+        samples: samples per bin on average.
+        first: (n + 1,) index within the sweep of the first sample of each bin.
+        t: (n,) mean times, s.
+        centers: (n, 3) mean ball centres, m.
+    """
+
+    sweep: int
+    start: float
+    spacing: float
+    height: FloatArray
+    samples: float
+    first: IntArray
+    t: FloatArray
+    centers: FloatArray
+
+    @property
+    def s(self) -> FloatArray:
+        """(n,) arclength of the bins' middles, m."""
+        return self.start + self.spacing * np.arange(len(self.height))
+
+    @property
+    def length(self) -> float:
+        """Length of path that the profile covers, m."""
+        return self.spacing * len(self.height)
+
+
+def arclength(trace: Trace, base: Base) -> FloatArray:
+    """(N,) arclength of the foot points along one sweep, m, free of the zigzag that noise adds.
+
+    The length of the polyline through block means, with blocks so long that longer ones change it little.
+    """
+    count = len(trace)
+    if count < 2:
+        return np.zeros(count)
+    size = max(1, count // LARGEST_FIRST_BLOCK_COUNT)
+    while count // (2 * size) >= 4 and _length(_block_means(trace.centers, size)) > (1 + LENGTH_TOLERANCE) * _length(
+        _block_means(trace.centers, 2 * size)
+    ):
+        size *= 2
+    means = _block_means(trace.centers, size)
+    if len(means) < 2:
+        means, size = trace.centers[[0, -1]], count - 1
+    feet = base.foot(means, trace.tip_radius).points
+    knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(feet, axis=0), axis=1))])
+    index = (np.arange(count) - 0.5 * (size - 1)) / size
+    inner = np.interp(index, np.arange(len(knots)), knots)
+    before, after = knots[1] - knots[0], knots[-1] - knots[-2]
+    inner += np.minimum(index, 0.0) * before + np.maximum(index - (len(knots) - 1), 0.0) * after
+    return np.asarray(inner - inner[0])
+
+
+def height_profiles(
+    sweep: int, trace: Trace, s: FloatArray, base: Base, spacing: float
+) -> tuple[HeightProfile, ...]:
+    """The sweep's heights in bins of the given width; more than one profile where contact was lost in between.
+
+    Args:
+        trace: the samples of one sweep.
+        s: (N,) their arclengths, m (see `arclength`), not decreasing.
+        spacing: width of the bins, m.
+    """
+    bins = np.floor((s - s[0]) / spacing).astype(np.int64)
+    first = np.flatnonzero(np.diff(bins, prepend=-1) > 0)
+    occupied = bins[first]
+    counts = np.diff(np.append(first, len(s)))
+    centers = np.add.reduceat(trace.centers, first, axis=0) / counts[:, None]
+    times = np.add.reduceat(trace.t, first) / counts
+    height = base.foot(centers, trace.tip_radius).height
+    cuts = np.flatnonzero(np.diff(occupied) > LONGEST_GAP + 1) + 1
+    profiles = []
+    for begin, end in zip([0, *cuts], [*cuts, len(occupied)], strict=True):
+        wanted = np.arange(occupied[begin], occupied[end - 1] + 1)
+        have = occupied[begin:end]
+        edges = np.append(first, len(s))[np.searchsorted(occupied, np.append(wanted, wanted[-1] + 1))]
+        profiles.append(
+            HeightProfile(
+                sweep,
+                float(s[0] + (wanted[0] + 0.5) * spacing),
+                spacing,
+                np.interp(wanted, have, height[begin:end]),
+                float(counts[begin:end].mean()),
+                edges,
+                np.interp(wanted, have, times[begin:end]),
+                np.column_stack([np.interp(wanted, have, centers[begin:end, k]) for k in range(3)]),
+            )
+        )
+    return tuple(profiles)
+
+
+def _block_means(points: FloatArray, size: int) -> FloatArray:
+    whole = len(points) // size * size
+    return points[:whole].reshape(-1, size, 3).mean(axis=1)
+
+
+def _length(points: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -1,0 +1,183 @@
+"""Matched filters: the best linear detectors of a cap of any size at any place of a noisy profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.noise import Noise
+
+FloatArray = NDArray[np.float64]
+
+# Neighbouring half-widths: a cap between two templates loses less than 2 % of its signal-to-noise.
+LADDER = 1.35
+# Bins per half-width: averaging over a bin loses less than 1 %.
+BINS_PER_HALF_WIDTH = 12
+# Metric of the cap family: -d^2 rho / d(ln w)^2 of the correlation of two caps about one centre.
+SCALE_METRIC = 1.25
+
+
+@dataclass(frozen=True, eq=False)
+class MatchedFilter:
+    """Best linear unbiased estimate of a cap's height from profile bins around a place.
+
+    Args:
+        half_width: of the cap 1 - (x/w)^2, m.
+        coarse: number of profile bins averaged into one bin of the filter.
+        weights: (2 M + 1,) of the filter's bins; applied to heights they give the cap's height.
+        edge: (M, 2 M + 1) weights where only i bins exist before the centre; rows i = 0 to M - 1.
+        sd: standard deviation of the estimate, m.
+        edge_sd: (M,) the same near the ends.
+        roughness: -rho''(0) of the output along the path, 1/m^2.
+    """
+
+    half_width: float
+    coarse: int
+    weights: FloatArray
+    edge: FloatArray
+    sd: float
+    edge_sd: FloatArray
+    roughness: float
+
+    def heights(self, profile: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Estimated height of a cap centred at each coarse bin of a profile (n,), and its standard deviation."""
+        from scipy.signal import oaconvolve
+
+        whole = len(profile) // self.coarse * self.coarse
+        bins = profile[:whole].reshape(-1, self.coarse).mean(axis=1)
+        reach = len(self.weights) // 2
+        padded = np.concatenate([np.zeros(reach), bins, np.zeros(reach)])
+        heights = np.asarray(oaconvolve(padded, self.weights[::-1], mode="valid"))
+        sd = np.full(len(bins), self.sd)
+        count = min(len(self.edge), len(bins))
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
+        heights[:count] = np.einsum("ij,ij->i", windows[:count], self.edge[:count])
+        heights[len(bins) - count :] = np.einsum("ij,ij->i", windows[::-1][:count, ::-1], self.edge[:count])[::-1]
+        sd[:count] = self.edge_sd[:count]
+        sd[len(bins) - count :] = np.maximum(sd[len(bins) - count :], self.edge_sd[:count][::-1])
+        return heights, sd
+
+
+@dataclass(frozen=True, eq=False)
+class Bank:
+    """Matched filters of growing half-width.
+
+    Args:
+        filters: the filters.
+        spacing: width of a profile bin, m.
+        drift: number of polynomial terms of the base that each filter ignores (0: the base is known).
+    """
+
+    filters: tuple[MatchedFilter, ...]
+    spacing: float
+    drift: int = field(default=0)
+
+    def false_alarms_per_metre(self, threshold: float) -> float:
+        """Expected false alarms of |height|/sd > threshold, both signs, over all widths.
+
+        The expected Euler characteristic of the excursion set of a Gaussian field over place and log width.
+        """
+        roots = np.sqrt([f.roughness for f in self.filters])
+        widths = np.log([f.half_width for f in self.filters])
+        area = float(np.sqrt(SCALE_METRIC) * np.trapezoid(roots, widths)) if len(roots) > 1 else 0.0
+        decay = np.exp(-0.5 * threshold**2)
+        inner = area * threshold * decay / (2 * np.pi) ** 1.5
+        border = 0.5 * (roots[0] + roots[-1]) * decay / (2 * np.pi)
+        return float(2 * (inner + border))
+
+    def threshold(self, false_alarms_per_metre: float) -> float:
+        """The signal-to-noise ratio whose false alarms are as frequent as asked."""
+        low, high = 1.5, 40.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.false_alarms_per_metre(middle) > false_alarms_per_metre else (low, middle)
+        return high
+
+    def detection_limit(self, threshold: float, tip_radius: float) -> float:
+        """Smallest height of a sharp crest under this tip that is detected with 95 % probability, m.
+
+        A crest of height D disturbs sqrt(2 r D) on either side; 1.645 is the 95 % quantile of the noise.
+        """
+        widths = np.array([f.half_width for f in self.filters])
+        needed = np.array([f.sd for f in self.filters]) * (threshold + 1.6448536)
+        available = widths**2 / (2 * tip_radius)
+        enough = available >= needed
+        if not enough.any():
+            return float(needed[-1])
+        first = int(enough.argmax())
+        if first == 0:
+            return float(needed[0])
+        excess = np.log(available / needed)[first - 1 : first + 1]
+        return float(np.exp(np.interp(0.0, excess, np.log(available)[first - 1 : first + 1])))
+
+
+def build_bank(
+    noise: Noise, spacing: float, samples: float, smallest: float, largest: float, drift: int = 0
+) -> Bank:
+    """A bank of filters from the smallest to the largest half-width, m.
+
+    Args:
+        noise: of single samples.
+        spacing: width of a profile bin, m.
+        samples: samples in a profile bin.
+        drift: 0 if the base is known; 2 if its offset and slope near a feature are not, 3 with its curvature.
+    """
+    count = max(1, int(np.ceil(np.log(max(largest / smallest, 1.0)) / np.log(LADDER))) + 1)
+    widths = np.geomspace(smallest, max(largest, smallest), count) if count > 1 else np.array([smallest])
+    return Bank(tuple(_build_filter(float(w), noise, spacing, samples, drift) for w in widths), spacing, drift)
+
+
+def smallest_half_width(noise: Noise, spacing: float, samples: float, tip_radius: float, threshold: float) -> float:
+    """Half-width of the smallest sharp crest that stands out of the noise, m; never under 1.5 bins.
+
+    A crest of half-width w is w^2 / (2 r) high; its estimate has the sd of the matched filter.
+    """
+    widths = np.geomspace(1.5 * spacing, 4 * tip_radius + 3 * spacing, 40)
+    # sd of the height of a cap under white noise, and not better than the correlated level averaged over the cap
+    white = noise.white * np.sqrt(15 * spacing / (16 * widths * samples))
+    correlated = noise.correlated * np.sqrt(np.minimum(1.0, 15 * noise.length / (8 * widths))) * (noise.length < widths)
+    visible = widths**2 / (2 * tip_radius) > threshold * np.hypot(white, correlated)
+    return float(widths[visible.argmax()] if visible.any() else widths[-1])
+
+
+def cap_bins(positions: FloatArray, half_width: float, spacing: float, flat: float = 0.0) -> FloatArray:
+    """Means over bins of a cap of unit height with a flat top of the given half-length and parabolic flanks."""
+
+    def integral(x: FloatArray) -> FloatArray:
+        edge = half_width - flat
+        u = np.clip((np.abs(x) - flat) / edge, 0.0, 1.0)
+        return np.asarray(np.sign(x) * (np.minimum(np.abs(x), flat) + edge * (u - u**3 / 3)))
+
+    return (integral(positions + spacing / 2) - integral(positions - spacing / 2)) / spacing
+
+
+def _build_filter(half_width: float, noise: Noise, spacing: float, samples: float, drift: int) -> MatchedFilter:
+    coarse = max(1, int(half_width / (BINS_PER_HALF_WIDTH * spacing)))
+    step = coarse * spacing
+    reach = int(np.ceil((3.5 if drift else 1.0) * half_width / step))
+    if noise.correlated > 0:
+        reach += int(min(np.ceil(2 * noise.length / step) + 1, 1.5 * half_width / step + 1))
+    x = np.arange(-reach, reach + 1) * step
+    template = cap_bins(x, half_width, step)
+    covariances = noise.block_covariances(2 * reach + 2, step, samples * coarse)
+    lags = np.subtract.outer(np.arange(2 * reach + 1), np.arange(2 * reach + 1))
+    covariance = covariances[np.abs(lags)]
+    nuisance = (x[:, None] / (reach * step)) ** np.arange(drift)[None, :]
+    weights, sd = _blue(covariance, template, nuisance)
+    edge, edge_sd = np.zeros((reach, 2 * reach + 1)), np.full(reach, np.inf)
+    for i in range(reach):
+        cut = slice(reach - i, None)
+        edge[i, cut], edge_sd[i] = _blue(covariance[cut, cut], template[cut], nuisance[cut])
+    neighbour = float(weights @ covariances[np.abs(lags + 1)] @ weights) / sd**2
+    roughness = 2 * max(1 - neighbour, 1e-9) / step**2
+    return MatchedFilter(half_width, coarse, weights, edge, sd, edge_sd, roughness)
+
+
+def _blue(covariance: FloatArray, template: FloatArray, nuisance: FloatArray) -> tuple[FloatArray, float]:
+    """Weights of the best linear unbiased estimate of the template's amplitude, and its standard deviation."""
+    columns = np.column_stack([template, nuisance])
+    solved = np.linalg.solve(covariance, columns)
+    inverse = np.linalg.pinv(columns.T @ solved, hermitian=True)
+    return solved @ inverse[:, 0], float(np.sqrt(max(inverse[0, 0], 0.0)))
