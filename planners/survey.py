@@ -1,0 +1,150 @@
+"""Survey: sweeps over the whole global model, close enough that no feature of a given height is missed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hw.moves import Move
+from mapping.base import Base
+from planners.charts import crease_charts
+from planners.coverage import Coverage, coverage
+from planners.errors import PlannerError
+from planners.isolines import Isoline, isolines
+from planners.level_field import level_field
+from planners.plan import Outcome, Plan
+from planners.pressed_path import pressed_sweep, thinned, touched_points
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Survey:
+    """Parallel sweeps along the level sets of an evenly spaced field, in boustrophedon order.
+
+    A feature of height D disturbs the trace within sqrt(2 r D) of its crest (theory section 4); a sweep
+    that passes it at the distance x still sees the height D - x^2 / (2 r). The sweeps are spaced so that
+    everywhere at least `visible` of the height D stays.
+
+    Args:
+        base: the global model.
+        tip_radius: r, m.
+        smallest: height D of the smallest feature to be found, m.
+        speed, force: of the sweeps, m/s and N.
+        region: (low, high) corners in m of the part to be inspected; everything if None.
+        visible: share of the smallest feature's height that every sweep pair must leave visible.
+    """
+
+    base: Base
+    tip_radius: float
+    smallest: float
+    speed: float = 0.03
+    force: float = 1.0
+    region: tuple[FloatArray, FloatArray] | None = None
+    visible: float = 0.35
+    _planned: dict[str, Coverage] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not 0 < self.smallest < np.inf:
+            raise PlannerError(f"the smallest feature must have a positive height in metres; found {self.smallest}")
+        if not 0 < self.visible < 1:
+            raise PlannerError(f"the visible share must lie between 0 and 1; found {self.visible}")
+
+    @property
+    def pitch(self) -> float:
+        """Distance between neighbouring sweeps, m; never more than a tip radius."""
+        seen = 2.0 * self.smallest * (1.0 - self.visible) * self.tip_radius
+        return float(min(2.0 * np.sqrt(seen), self.tip_radius))
+
+    def plan(self) -> Plan:
+        """Yield every sweep; the outcome's value is the planned Coverage."""
+        touched = []
+        for move in self.sweeps():
+            touched.append(move.path + (1.0 * self.tip_radius) * move.approach)
+            yield move
+        done = self.covered(touched)
+        detail = f"{100 * done.fraction:.1f} % of the surface lies within {1e3 * done.reach:.2f} mm of a sweep"
+        return Outcome("done" if done.fraction > 0.99 else "not all reached", detail, done)
+
+    def covered(self, paths: list[FloatArray]) -> Coverage:
+        """Coverage of the region by touched paths (each (K, 3), m)."""
+        dense = [_dense(path, 0.2 * self.pitch) for path in paths]
+        points = np.concatenate(dense) if dense else np.zeros((0, 3))
+        return coverage(self.base.surface, points, 0.55 * self.pitch, self._inside())
+
+    def sweeps(self) -> Iterator[Move]:
+        """All sweeps, each begun near the end of the one before it."""
+        surface = self.base.surface
+        here: FloatArray | None = None
+        done = np.zeros(len(surface.faces), dtype=bool)
+        for chart in crease_charts(surface, self._inside()):
+            if done[chart].all():
+                continue
+            touched = []
+            levels = level_field(surface, surface.vertices, chart)
+            for level in levels.levels(self.pitch):
+                lines = isolines(surface.vertices, surface.faces, chart, levels.values, float(level))
+                while lines:
+                    nearest = 0 if here is None else int(np.argmin([_gap(line, here) for line in lines]))
+                    line = _begun_near(lines.pop(nearest), here, self.pitch)
+                    if line.length < 0.1 * self.pitch:
+                        continue
+                    here = line.points[-1]
+                    touched.append(line.points)
+                    yield from self._pressed(line)
+            if len(chart) < len(surface.faces):
+                done |= self.covered(touched).share > 0.999
+
+    def _pressed(self, line: Isoline) -> Iterator[Move]:
+        points, normals = touched_points(line, self.base.surface)
+        points, normals = thinned(points, normals, min(0.1 * self.tip_radius, 0.5 * self.pitch))
+        reachable = self._reachable(points, normals)
+        for run in _runs(reachable):
+            if len(run) > 1:
+                yield pressed_sweep(points[run], normals[run], self.tip_radius, self.speed, self.force)
+
+    def _reachable(self, points: FloatArray, normals: FloatArray) -> NDArray[np.bool_]:
+        """(K,) False where the ball that touches here would be deep in another part of the body."""
+        return self.base.foot(points + self.tip_radius * normals, self.tip_radius).height > -0.3 * self.tip_radius
+
+    def _inside(self) -> NDArray[np.bool_] | None:
+        if self.region is None:
+            return None
+        middle = self.base.surface.vertices[self.base.surface.faces].mean(axis=1)
+        low, high = self.region
+        return np.asarray(((middle >= low) & (middle <= high)).all(axis=1))
+
+
+def _gap(line: Isoline, here: FloatArray) -> float:
+    candidates = line.points if line.closed else line.points[[0, -1]]
+    return float(np.linalg.norm(candidates - here, axis=1).min())
+
+
+def _begun_near(line: Isoline, here: FloatArray | None, overlap: float) -> Isoline:
+    """The line begun at the end (or, if closed, the point) nearest to `here`; a closed one overlaps itself."""
+    points, faces = line.points, line.faces
+    if line.closed:
+        start = 0 if here is None else int(np.linalg.norm(points[:-1] - here, axis=1).argmin())
+        points, faces = np.roll(points[:-1], -start, axis=0), np.roll(faces, -start)
+        along = np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))
+        more = 2 + int(np.searchsorted(along, overlap))
+        again = np.arange(len(points) + more) % len(points)
+        return Isoline(points[again], faces[again[:-1]])
+    if here is not None and np.linalg.norm(points[-1] - here) < np.linalg.norm(points[0] - here):
+        return Isoline(points[::-1], faces[::-1])
+    return line
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    index = np.flatnonzero(mask)
+    return np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(index) else []
+
+
+def _dense(path: FloatArray, spacing: float) -> FloatArray:
+    """The polyline (K, 3) resampled at most `spacing` apart."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    s = np.linspace(0.0, along[-1], 1 + int(np.ceil(along[-1] / spacing)))
+    return np.column_stack([np.interp(s, along, path[:, k]) for k in range(3)])
