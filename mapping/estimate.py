@@ -1,0 +1,55 @@
+"""Estimate: what a trace says about the body, and where it says nothing for certain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.errors import MappingError
+from mapping.surface import Surface
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+TOUCHED, BRIDGED, EXTRAPOLATED = 0, 1, 2
+LABELS = ("touched", "bridged", "extrapolated")
+
+
+class EnvelopeError(MappingError):
+    """A trace from which no surface can be estimated as asked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The estimated surface of a trace.
+
+    Args:
+        surface: its mesh, whose vertices are `points`, or None where there is none: a single sweep, or
+            too few samples.
+        points: (N, 3) points of the estimated surface, m; in the order of the trace, bridged points
+            inserted between the contacts that bound them.
+        normals: (N, 3) outward unit normals of the ball there: the direction from the point to `centers`.
+        centers: (N, 3) centre of the ball that bounds each point, m.
+        labels: (N,) TOUCHED: the ball's single contact, on the body; BRIDGED: the ball rests on two
+            places and the body lies somewhere below; EXTRAPOLATED: between or beyond the samples.
+        sample: (N,) index of the trace's sample that each point comes from, -1 for inserted points.
+        sweep: (N,) number of the sweep.
+    """
+
+    surface: Surface | None
+    points: FloatArray
+    normals: FloatArray
+    centers: FloatArray
+    labels: NDArray[np.int8]
+    sample: IntArray
+    sweep: IntArray
+
+    def __post_init__(self) -> None:
+        for name in ("points", "normals", "centers", "labels", "sample", "sweep"):
+            getattr(self, name).setflags(write=False)
+
+    def fraction(self, label: int) -> float:
+        """Share of the points that carry a label."""
+        return float(np.mean(self.labels == label)) if len(self.labels) else 0.0

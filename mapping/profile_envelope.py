@@ -1,0 +1,58 @@
+"""Envelope of balls under a profile: the exact morphological erosion of its trace, in O(n)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapping.estimate import EnvelopeError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def envelope_heights(
+    x: ArrayLike, z: ArrayLike, tip_radius: float, at: ArrayLike | None = None
+) -> tuple[FloatArray, IntArray]:
+    """Highest body that balls centred at (x, z) allow.
+
+    e(x') = min over i of z_i - sqrt(r^2 - (x' - x_i)^2), each ball where it reaches.
+
+    Args:
+        x, z: (N,) ball centres, m, in any order.
+        tip_radius: r, m.
+        at: (M,) abscissae x', m; None takes x.
+
+    Returns:
+        (M,) heights, +inf where no ball reaches, and (M,) indices of the balls that bound them, -1 for none.
+
+    Raises:
+        EnvelopeError: arrays of different lengths, values that are not finite, a radius that is not positive.
+
+    Reference: ISO 16610-41 (erosion by a disc); theory section 1.
+    """
+    centers = np.array([np.asarray(x, dtype=np.float64), np.asarray(z, dtype=np.float64)])
+    query = centers[0] if at is None else np.asarray(at, dtype=np.float64)
+    if centers.ndim != 2 or not np.isfinite(centers).all() or not np.isfinite(query).all():
+        raise EnvelopeError(f"a profile's envelope needs finite x and z of shape (N,); found {centers.shape[1:]}")
+    if not (np.isfinite(tip_radius) and tip_radius > 0):
+        raise EnvelopeError(f"tip radius must be a positive length in metres; found {tip_radius!r}")
+    if centers.shape[1] == 0:
+        return np.full(len(query), np.inf), np.full(len(query), -1, dtype=np.int64)
+    from mapping.envelope_kernels import envelope_at, lower_envelope
+
+    order, sorted_x, sorted_z = _sorted(centers[0], centers[1])
+    owners, starts = lower_envelope(sorted_x, sorted_z, float(tip_radius))
+    query_order, sorted_query, _ = _sorted(query, query)
+    heights, indices = np.empty(len(query)), np.empty(len(query), dtype=np.int64)
+    found, owner = envelope_at(sorted_x, sorted_z, float(tip_radius), owners, starts, sorted_query)
+    heights[query_order] = found
+    indices[query_order] = np.where(owner < 0, -1, order[owner])
+    return heights, indices
+
+
+def _sorted(x: FloatArray, z: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+    if (np.diff(x) >= 0).all():
+        return np.arange(len(x)), np.ascontiguousarray(x), np.ascontiguousarray(z)
+    order = np.argsort(x, kind="stable")
+    return order, x[order], z[order]

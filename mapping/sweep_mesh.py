@@ -1,0 +1,206 @@
+"""Meshes of sweeps: rows zippered together, anything else triangulated over a projection or by ball pivoting."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapping.errors import MappingError
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# Points whose outward directions all lie in this cone are a height field over their mean direction.
+HEIGHT_FIELD_CONE = np.cos(np.deg2rad(60.0))
+# Triangles of a triangulated cloud with an edge this many times the usual spacing span a hole.
+LONGEST_EDGE = 6.0
+
+
+class SweepMeshError(MappingError):
+    """Points that do not make a mesh."""
+
+
+def mesh_sweeps(trace: Trace, outward: ArrayLike = (0.0, 0.0, 1.0), spacing: float | None = None) -> Surface:
+    """The traced surface: one mesh through the ball centres of a trace.
+
+    Args:
+        outward: (3,) or (N, 3) directions away from the body; orients the faces.
+        spacing: distance to which samples are thinned along their sweeps, m; None takes the distance between
+            neighbouring sweeps, which makes the triangles about equilateral.
+
+    Raises:
+        SweepMeshError: fewer than three samples, or all of them on one line.
+    """
+    directions = np.broadcast_to(np.asarray(outward, dtype=np.float64), trace.centers.shape)
+    kept = thinned(trace.centers, trace.sweep, pitch(trace.centers, trace.sweep) if spacing is None else spacing)
+    points, faces = trace.centers[kept], sweep_faces(trace.centers[kept], trace.sweep[kept], directions[kept])
+    if len(faces) == 0:
+        raise SweepMeshError(f"a mesh needs samples that span an area; the {len(trace)} samples lie on one line")
+    return Surface(points, faces)
+
+
+def sweep_faces(points: FloatArray, sweep: IntArray, outward: FloatArray) -> IntArray:
+    """Counter-clockwise triangles (F, 3) over points (N, 3) of sweeps `sweep` (N,) seen from `outward` (N, 3).
+
+    Parallel sweeps are zippered row by row: O(n log n), no holes, every point a vertex. Crossing sweeps and
+    clouds are triangulated by Delaunay over the plane of the mean outward direction, over the sphere
+    if they surround a point, and else by Open3D's ball pivoting.
+    """
+    rows = parallel_rows(points, sweep)
+    if rows is not None:
+        strips = [zipper(points, first, second) for first, second in pairwise(rows)]
+        return oriented(points, np.vstack(strips), outward)
+    if len(np.unique(points, axis=0)) < 3 or len(points) < 4:
+        return np.zeros((0, 3), dtype=np.int64)
+    axis = outward.mean(axis=0)
+    length = np.linalg.norm(axis)
+    unit_outward = outward / np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-300)
+    if length > 0 and (unit_outward @ (axis / length)).min() > HEIGHT_FIELD_CONE:
+        return oriented(points, _over_plane(points, axis / length), outward)
+    arm = points - points.mean(axis=0)
+    if (np.einsum("ij,ij->i", arm, outward) > 0).all():
+        return oriented(points, _over_sphere(arm), outward)
+    return oriented(points, _ball_pivoting(points, outward), outward)
+
+
+def parallel_rows(points: FloatArray, sweep: IntArray) -> list[IntArray] | None:
+    """Indices of each sweep, neighbours next to each other, if consecutive sweeps run side by side; else None."""
+    rows = [np.flatnonzero(sweep == name) for name in _in_order(sweep)]
+    if len(rows) < 2 or min(len(row) for row in rows) < 2:
+        return None
+    for order in (rows, _across(points, rows)):
+        if all(_beside(points[first], points[second]) for first, second in pairwise(order)):
+            return order
+    return None
+
+
+def _in_order(sweep: IntArray) -> IntArray:
+    names, first = np.unique(sweep, return_index=True)
+    return np.asarray(names[np.argsort(first)])
+
+
+def _across(points: FloatArray, rows: list[IntArray]) -> list[IntArray]:
+    """Rows sorted by their middle along the direction in which the middles spread most."""
+    middles = np.array([points[row].mean(axis=0) for row in rows])
+    spread = np.linalg.svd(middles - middles.mean(axis=0), full_matrices=False)[2][0]
+    return [rows[k] for k in np.argsort(middles @ spread, kind="stable")]
+
+
+def _beside(first: FloatArray, second: FloatArray) -> bool:
+    """Whether two polylines keep about one distance and do not meet."""
+    from scipy.spatial import cKDTree
+
+    probes = first[np.linspace(0, len(first) - 1, min(len(first), 65)).astype(int)]
+    distance = cKDTree(second).query(probes)[0]
+    usual = float(np.median(distance))
+    back = cKDTree(first).query(second[np.linspace(0, len(second) - 1, min(len(second), 65)).astype(int)])[0]
+    near, far = min(distance.min(), back.min()), max(np.quantile(distance, 0.8), np.quantile(back, 0.8))
+    reach = np.linalg.norm(first[-1] - first[0])
+    return bool(usual > 0 and near > 0.2 * usual and far < 2.5 * usual and (reach == 0 or usual < 2 * reach + far))
+
+
+def zipper(points: FloatArray, first: IntArray, second: IntArray) -> IntArray:
+    """Triangles between two polylines of vertex indices that run side by side, in either sense.
+
+    Both are walked together by their place along the pair; each step spans a triangle, so nothing is
+    left open: len(first) + len(second) - 2 triangles.
+    """
+    a, b = points[first], points[second]
+    along = (a[-1] - a[0]) / max(np.linalg.norm(a[-1] - a[0]), 1e-300)
+    if (b[-1] - b[0]) @ along < 0:
+        second, b = second[::-1], b[::-1]
+    s, t = _place(a, b)
+    middle_s, middle_t = 0.5 * (s[1:] + s[:-1]), 0.5 * (t[1:] + t[:-1])
+    opposite = np.searchsorted(middle_t, middle_s, side="left")
+    lower = np.column_stack([first[:-1], first[1:], second[opposite]])
+    opposite = np.searchsorted(middle_s, middle_t, side="right")
+    upper = np.column_stack([second[1:], second[:-1], first[opposite]])
+    return np.vstack([lower, upper])
+
+
+def _place(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Increasing places of two polylines: along their common chord if both advance, else their share of length."""
+    chord = (a[-1] - a[0]) + (b[-1] - b[0])
+    s, t = a @ chord, b @ chord
+    if (np.diff(s) >= 0).all() and (np.diff(t) >= 0).all() and np.linalg.norm(chord) > 0:
+        return s, t
+    shares = []
+    for line in (a, b):
+        length = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
+        shares.append(length / max(length[-1], 1e-300))
+    return shares[0], shares[1]
+
+
+def oriented(points: FloatArray, faces: IntArray, outward: FloatArray) -> IntArray:
+    """The faces, each turned so that it faces its corners' outward direction."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    up = outward[faces].sum(axis=1)
+    away = np.einsum("ij,ij->i", np.cross(b - a, c - a), up) < 0
+    return np.where(away[:, None], faces[:, ::-1], faces)
+
+
+def _over_plane(points: FloatArray, axis: FloatArray) -> IntArray:
+    from scipy.spatial import Delaunay, QhullError
+
+    frame = np.linalg.svd(axis[None, :])[2][1:]
+    flat = (points - points.mean(axis=0)) @ frame.T
+    try:
+        faces = Delaunay(flat / max(np.abs(flat).max(), 1e-300)).simplices.astype(np.int64)
+    except QhullError as error:
+        raise SweepMeshError(f"{len(points)} points cannot be triangulated; they lie on one line") from error
+    edges = np.linalg.norm(flat[faces] - flat[np.roll(faces, 1, axis=1)], axis=2).max(axis=1)
+    return np.asarray(faces[edges <= LONGEST_EDGE * float(np.median(edges))])
+
+
+def _over_sphere(arm: FloatArray) -> IntArray:
+    from scipy.spatial import ConvexHull
+
+    return np.asarray(ConvexHull(arm / np.linalg.norm(arm, axis=1, keepdims=True)).simplices, dtype=np.int64)
+
+
+def _ball_pivoting(points: FloatArray, outward: FloatArray) -> IntArray:
+    from scipy.spatial import cKDTree
+
+    from mapping.open3d_import import open3d
+
+    o3d = open3d()
+    origin = points.mean(axis=0)
+    spacing = float(np.median(cKDTree(points).query(points, k=2)[0][:, 1]))
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector((points - origin) / spacing))
+    cloud.normals = o3d.utility.Vector3dVector(outward)
+    radii = o3d.utility.DoubleVector([1.0, 2.0, 4.0, 8.0])
+    mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, radii)
+    return np.asarray(mesh.triangles, dtype=np.int64).reshape(-1, 3)
+
+
+def pitch(points: FloatArray, sweep: IntArray) -> float:
+    """Usual distance from a sample to the nearest sample of another sweep, m; 0 for a single sweep."""
+    from scipy.spatial import cKDTree
+
+    names = _in_order(sweep)
+    if len(names) < 2:
+        return 0.0
+    distances = []
+    for name, following in pairwise(names):
+        own = points[sweep == name]
+        probes = own[np.linspace(0, len(own) - 1, min(len(own), 33)).astype(int)]
+        distances.append(float(np.median(cKDTree(points[sweep == following]).query(probes)[0])))
+    return float(np.median(distances))
+
+
+def thinned(points: FloatArray, sweep: IntArray, spacing: float, keep: NDArray[np.bool_] | None = None) -> IntArray:
+    """Indices of samples at least `spacing` apart along each sweep, with its ends and whatever `keep` marks."""
+    if spacing <= 0:
+        return np.arange(len(points))
+    steps = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1)
+    border = np.r_[True, np.diff(sweep) != 0]
+    length = np.cumsum(np.where(border, 0.0, steps))
+    # A sweep is cut into equal cells of its length; the first sample of each cell stays.
+    start = np.maximum.accumulate(np.where(border, np.arange(len(points)), 0))
+    cell = np.floor((length - length[start]) / spacing * (1 + 1e-12))
+    chosen = border | np.r_[border[1:], True] | np.r_[True, np.diff(cell) != 0]
+    return np.flatnonzero(chosen if keep is None else chosen | keep)
