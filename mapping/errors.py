@@ -15,3 +15,7 @@ class TraceError(MappingError):
 
 class ModelError(MappingError):
     """An annotated model that cannot be written or read: which field, and why."""
+
+
+class ContactError(MappingError):
+    """A contact query with an impossible ball, start or direction."""

@@ -1,0 +1,185 @@
+"""Contact: where a ball that moves towards a body first touches it (the paper's traced surface)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapping.errors import ContactError
+from mapping.press import checked_points, sample_path, unit_directions
+from mapping.surface import Surface
+
+FloatArray = NDArray[np.float64]
+
+NONE, FACE, EDGE, VERTEX = 0, 1, 2, 3
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Places where a ball rests on a body, one for each of N queries.
+
+    Args:
+        centers: (N, 3) ball centres at contact, m; NaN where there is none.
+        points: (N, 3) points of the body that the ball touches, m; NaN where there is none.
+        normals: (N, 3) unit normals there, out of the body towards the ball; NaN where there is none.
+        feature: (N,) what of the mesh is touched: NONE, FACE, EDGE or VERTEX.
+        count: (N,) number of places touched at once. 0: the ball passes by, or `overlap`. 2 or more: an
+            interference point. Places within 1e-9 radii of the ball's surface are touched; places closer
+            together than 9e-5 radii are one (a dent that narrow is shallower than that). At most 16.
+        distance: (N,) length of the way to the contact, m; inf where there is none.
+        overlap: (N,) True where the ball already overlaps the body, by more than 1e-9 radii, at its
+            start: then count and distance are 0 and there is no contact to report.
+    """
+
+    centers: FloatArray
+    points: FloatArray
+    normals: FloatArray
+    feature: NDArray[np.int8]
+    count: NDArray[np.int64]
+    distance: FloatArray
+    overlap: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        for array in vars(self).values():
+            array.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.distance)
+
+    @property
+    def interference(self) -> NDArray[np.bool_]:
+        """(N,) True at interference points: the ball touches two places or more."""
+        return np.asarray(self.count >= 2)
+
+
+class BallContact:
+    """A ball and a body prepared for contact queries, exact to float64.
+
+    The body is any triangle mesh: open or closed, welded or not, its faces touched from both sides. It is
+    dilated by the ball without ever being built: offset faces, cylinders around edges and spheres around
+    vertices are met in closed form, and a tree of boxes leaves out those that the ball surely misses.
+
+    Positions are exact to a few 1e-16 of the larger of body, ball and distance from the coordinates'
+    origin. A ball that would sink in by less than some 1e-14 of that size merely grazes, and passes.
+
+    Args:
+        surface: the body.
+        tip_radius: radius of the ball, m, positive and at least 1e-13 of the body's size.
+
+    Raises:
+        ContactError: a radius that is not positive and finite, or too small for the body.
+    """
+
+    def __init__(self, surface: Surface, tip_radius: float) -> None:
+        from mapping import bvh_kernels, contact_kernels
+
+        self.surface = surface
+        self.tip_radius = _checked_radius(tip_radius)
+        low, high = surface.bounds
+        extent = float((0.5 * high - 0.5 * low).max()) * 2.0
+        if not np.isfinite(extent) or self.tip_radius < 1e-13 * extent:
+            raise ContactError(
+                f"a ball of radius {self.tip_radius:g} m is too small for a body of {extent:g} m: "
+                "float64 tells no less than 1e-13 of the body's size apart"
+            )
+        exponent = int(np.frexp(max(extent, self.tip_radius))[1])
+        # a centre of few digits: subtracting it is exact, and a body around the origin keeps its coordinates
+        self._center = np.ldexp(np.round(np.ldexp(0.5 * low + 0.5 * high, -exponent)), exponent)
+        self._exponent = exponent
+        corners = contact_kernels.gather(self._to_body(surface.vertices), surface.faces)
+        order, boxes, links = bvh_kernels.build_tree(corners)
+        rows = contact_kernels.lay_out(corners, order)
+        size = float(np.sqrt((corners.reshape(-1, 3) ** 2).sum(axis=1).max()))
+        radius = float(np.ldexp(self.tip_radius, -exponent))
+        graze = 32 * float(np.finfo(float).eps) * (size + radius)
+        self._body = (rows, order, boxes, links, radius, size, graze)
+
+    def first_contact(self, origins: ArrayLike, directions: ArrayLike) -> Contacts:
+        """The first contact of balls that start centred at the origins and move straight along the directions.
+
+        A ball that starts in contact is stopped there (distance 0) if it presses in, and free to move
+        away. A ball that starts overlapping the body has no first contact: see `Contacts.overlap`.
+
+        Args:
+            origins: (N, 3) starting centres, m.
+            directions: (N, 3) or (3,) directions of motion, of any length but zero.
+
+        Raises:
+            ContactError: wrong shapes, values that are not finite, a direction of length zero.
+        """
+        from mapping import contact_kernels
+
+        start = checked_points(origins, "origins")
+        way = unit_directions(directions, len(start))
+        out = _empty_contacts(len(start))
+        state = np.zeros(len(start), np.int8)
+        contact_kernels.first_contacts(*self._body, self._to_body(start), way, *out.values(), state)
+        return self._contacts(out, state == contact_kernels.OVERLAPS)
+
+    def slide(self, path: ArrayLike, approach: ArrayLike, spacing: float) -> Contacts:
+        """Where the ball rests while it follows a commanded path and is pressed along the approach.
+
+        Every sample is pressed on its own, so the ball jumps over what it could not climb. From a sample
+        where the ball is free it presses on; else it first backs off against the approach, only as far
+        as it must to be free, so that a ball inside a hollow or under an overhang stays there. A centre
+        inside the body (the first face behind it turns its back) leaves the body that way first.
+
+        Args:
+            path: (K, 3) corners of the commanded path of the ball's centre, m.
+            approach: (3,) or (K, 3) directions of pressing, interpolated between the corners.
+            spacing: largest distance of neighbouring samples along the path, m.
+
+        Returns:
+            Contacts at the N samples; `distance` is measured from the commanded path along the approach,
+            negative where the ball had to back off.
+
+        Raises:
+            ContactError: wrong shapes, values that are not finite, a spacing that is not positive.
+        """
+        from mapping import retreat_kernels
+
+        commanded, way = sample_path(path, approach, spacing)
+        back = np.empty(len(commanded))
+        retreat_kernels.retreats(*self._body, self._outward, self._to_body(commanded), -way, back)
+        back = np.ldexp(back, self._exponent)
+        rest = self.first_contact(commanded - back[:, None] * way, way)
+        return replace(rest, distance=rest.distance - back)
+
+    @cached_property
+    def _outward(self) -> float:
+        """-1 for a closed body whose faces are turned inside out, else +1."""
+        a, b, c = (self._to_body(self.surface.vertices)[self.surface.faces[:, i]] for i in range(3))
+        areas = np.cross(b - a, c - a)
+        closed = np.abs(areas.sum(axis=0)).max() <= 1e-9 * np.abs(areas).sum()
+        return -1.0 if closed and np.einsum("ij,ij->", a, areas) < 0.0 else 1.0
+
+    def _to_body(self, points: FloatArray) -> FloatArray:
+        return np.asarray(np.ldexp(points - self._center, -self._exponent))
+
+    def _contacts(self, out: dict[str, Any], overlap: NDArray[np.bool_]) -> Contacts:
+        for name in ("centers", "points"):
+            out[name] = np.ldexp(out[name], self._exponent) + self._center
+        out["distance"] = np.ldexp(out["distance"], self._exponent)
+        return Contacts(**out, overlap=overlap)
+
+
+def _checked_radius(tip_radius: float) -> float:
+    radius = float(tip_radius)
+    if not (np.isfinite(radius) and radius > 0):
+        raise ContactError(f"tip radius must be a positive length in metres; found {tip_radius!r}")
+    return radius
+
+
+def _empty_contacts(count: int) -> dict[str, Any]:
+    return {
+        "centers": np.empty((count, 3)),
+        "points": np.empty((count, 3)),
+        "normals": np.empty((count, 3)),
+        "feature": np.empty(count, np.int8),
+        "count": np.empty(count, np.int64),
+        "distance": np.empty(count),
+    }
