@@ -5,16 +5,13 @@ Everything follows from the numbers below, so a second run writes the same bytes
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from triangles import FloatArray, Mesh, dome, grid_faces, height_field, together, tube, walls, welded, write_ply
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Mesh = tuple[FloatArray, IntArray]
-
+Sizes = dict[str, Any]
 FOLDER = Path(__file__).resolve().parent
 MARK = "# Truth of the simulated object, written by make_assets.py"
 
@@ -23,11 +20,14 @@ def main() -> None:
     """Write every mesh and every truth table."""
     make_plate()
     make_wire()
+    make_bump_of_revolution()
+    make_step()
+    make_mug()
 
 
 TILT = np.radians(45.0)
 PLATE = (0.200, 0.150)
-WIRE = {"diameter": 0.65e-3, "length": 0.080, "center": (0.012, -0.007), "direction": np.radians(25.0)}
+WIRE: Sizes = {"diameter": 0.65e-3, "length": 0.080, "center": (0.012, -0.007), "direction": np.radians(25.0)}
 
 
 def make_plate() -> None:
@@ -45,12 +45,127 @@ def make_wire() -> None:
     along = np.array([np.cos(WIRE["direction"]), np.sin(WIRE["direction"]), 0.0])
     ends = np.array([*WIRE["center"], 0.0]) + WIRE["length"] / 2 * np.array([[-1.0], [1.0]]) * along
     path = ends[0] + np.linspace(0, 1, 21)[:, None] * (ends[1] - ends[0])
-    wire = tube(path + np.array([0.0, 0.0, radius]), np.tile([0.0, 0.0, 1.0], (len(path), 1)), radius, sides=64)
+    wire = tube(
+        path + np.array([0.0, 0.0, radius]),
+        np.tile([0.0, 0.0, 1.0], (len(path), 1)),
+        radius,
+        2 * np.pi * np.arange(64) / 64,
+    )
     plate = height_field(u, v, np.zeros((len(u), len(v))))
     vertices, faces = together(plate, wire)
     write_mesh("wire_on_plate", (tilted(vertices), faces))
     truth = {"kind": "ridge", "axis": tilted(ends), "height": 2 * radius, "width": 2 * radius, "length": WIRE["length"]}
     write_truth("wire_on_plate", [truth])
+
+
+BUMP: Sizes = {"a": 15.0, "reach": 2.2, "plane": 3.0}
+
+
+def make_bump_of_revolution() -> None:
+    """The paper's bump z = 1/(1 + a u^2) out to u = 2.2, past the corners of its base, a square of the plane z = 0."""
+    # Rings stand closer where the profile bends more, so that all facets are about equally flat.
+    fine = np.linspace(0.0, BUMP["reach"], 20001)
+    slope = np.gradient(1.0 / (1.0 + BUMP["a"] * fine**2), fine)
+    bend = np.abs(np.gradient(slope, fine)) / (1.0 + slope**2) ** 1.5
+    density = np.cumsum(np.sqrt(bend + 0.02 * bend.max()))
+    rings = np.interp(np.linspace(density[0], density[-1], 49), density, fine)[1:]
+    write_mesh("bump_of_revolution", dome(rings, 1.0 / (1.0 + BUMP["a"] * rings**2), 1.0, sides=96))
+    edge = np.linspace(-BUMP["plane"] / 2, BUMP["plane"] / 2, 13)
+    write_mesh("square", height_field(edge, edge, np.zeros((13, 13))))
+    write_truth("bump_of_revolution", [{"kind": "bump", "axis": np.zeros((1, 3)), "height": 1.0}])
+
+
+STEP: Sizes = {"size": (0.100, 0.060), "edge": 0.007, "height": 1e-3}
+
+
+def make_step() -> None:
+    """A plate whose part x > edge stands one step higher, and the same plate without the step."""
+    low = np.linspace(-STEP["size"][0] / 2, STEP["edge"], 22)
+    high = np.linspace(STEP["edge"], STEP["size"][0] / 2, 18)
+    y = np.linspace(-STEP["size"][1] / 2, STEP["size"][1] / 2, 25)
+    x = np.concatenate([low, high])  # the edge occurs twice: the wall of the step stands between the two
+    height = np.repeat(np.concatenate([np.zeros(22), np.full(18, STEP["height"])])[:, None], 25, axis=1)
+    write_mesh("step", height_field(x, y, height))
+    write_mesh("flat", height_field(np.concatenate([low, high[1:]]), y, np.zeros((39, 25))))
+    ends = np.array([[STEP["edge"], y[0], 0.0], [STEP["edge"], y[-1], 0.0]])
+    write_truth("step", [{"kind": "step", "axis": ends, "height": STEP["height"], "length": STEP["size"][1]}])
+
+
+MUG: Sizes = {"radius": 0.040, "height": 0.100, "sides": 240}
+RIDGE: Sizes = {"radius": 0.4e-3, "turn": np.radians([20.0, 110.0]), "rise": (0.025, 0.075)}
+GROOVE: Sizes = {"angle": np.radians(200.0), "width": 3e-3, "depth": 0.25e-3, "from": 0.030, "to": 0.070}
+BUMPS: tuple[Sizes, ...] = (
+    {"angle": np.radians(150.0), "z": 0.060, "height": 1.0e-3, "radius": 1.5e-3},
+    {"angle": np.radians(280.0), "z": 0.040, "height": 0.6e-3, "radius": 2.0e-3},
+)
+
+
+def make_mug() -> None:
+    """The wall of a mug, alone, and with a helical wire, a groove and two round bumps."""
+    write_mesh("mug", mug_wall(depth=0.0))
+    crest = helix(np.linspace(0.0, 1.0, 121), MUG["radius"] + RIDGE["radius"])
+    up = crest * [1.0, 1.0, 0.0] / (MUG["radius"] + RIDGE["radius"])
+    # The ball meets the wire within 40 degrees of its crest: only there the facets must be fine.
+    angles = np.radians([*np.arange(-60, 61, 6), 105, 180, 255])
+    bumps = [cap_on_mug(bump) for bump in BUMPS]
+    write_mesh(
+        "mug_with_details", together(mug_wall(GROOVE["depth"]), tube(crest, up, RIDGE["radius"], angles), *bumps)
+    )
+    write_truth("mug", mug_truth())
+
+
+def mug_wall(depth: float) -> Mesh:
+    """The cylinder with a groove of that depth; its facets are the same for every depth but in the groove."""
+    half = np.arcsin(GROOVE["width"] / 2 / MUG["radius"])
+    rims = np.array([GROOVE["angle"] - half, GROOVE["angle"] + half])
+    angles = np.sort(np.concatenate([2 * np.pi * np.arange(MUG["sides"]) / MUG["sides"], rims]))
+    z = np.union1d(np.linspace(0.0, MUG["height"], 6), [GROOVE["from"], GROOVE["to"]])
+    angles, across = walls(angles, rims)
+    z, along = walls(z, np.array([GROOVE["from"], GROOVE["to"]]))
+    radius = MUG["radius"] - depth * np.outer(along, across)
+    points = [radius * np.cos(angles), radius * np.sin(angles), np.repeat(z[:, None], len(angles), axis=1)]
+    vertices, faces = np.stack(points, axis=-1).reshape(-1, 3), grid_faces(len(z), len(angles), closed=True)[:, ::-1]
+    return welded(vertices, faces)
+
+
+def helix(share: FloatArray, radius: float) -> FloatArray:
+    """Points of the ridge's course at a distance from the mug's axis; share 0 to 1."""
+    turn, z = (start + share * (stop - start) for start, stop in (RIDGE["turn"], RIDGE["rise"]))
+    return np.column_stack([radius * np.cos(turn), radius * np.sin(turn), z])
+
+
+def cap_on_mug(bump: Sizes) -> Mesh:
+    """A cap of a sphere whose crest stands `height` over the mug; it continues 0.3 mm into the wall."""
+    radius, height = bump["radius"], bump["height"]
+    polar = np.linspace(0.0, np.arccos(1.0 - (height + 0.3e-3) / radius), 13)[1:]
+    vertices, faces = dome(radius * np.sin(polar), height - radius * (1.0 - np.cos(polar)), height, sides=36)
+    c, s = np.cos(bump["angle"]), np.sin(bump["angle"])
+    rows = np.array([[-s, c, 0.0], [0.0, 0.0, 1.0], [c, s, 0.0]])
+    return vertices @ rows + [MUG["radius"] * c, MUG["radius"] * s, bump["z"]], faces
+
+
+def mug_truth() -> list[dict[str, object]]:
+    """The four details as features on the mug."""
+    course = helix(np.linspace(0.0, 1.0, 46), MUG["radius"])
+    length = np.hypot(MUG["radius"] * np.ptp(RIDGE["turn"]), np.ptp(RIDGE["rise"]))
+    size = 2 * RIDGE["radius"]
+    ridge = {"kind": "ridge", "axis": course, "height": size, "width": size, "length": length}
+    foot = MUG["radius"] * np.array([np.cos(GROOVE["angle"]), np.sin(GROOVE["angle"])])
+    groove = {
+        "kind": "groove",
+        "axis": np.array([[*foot, GROOVE["from"]], [*foot, GROOVE["to"]]]),
+        "height": -GROOVE["depth"],
+        "width": GROOVE["width"],
+        "length": GROOVE["to"] - GROOVE["from"],
+    }
+    return [ridge, groove, *(bump_truth(bump) for bump in BUMPS)]
+
+
+def bump_truth(bump: Sizes) -> dict[str, object]:
+    """A cap of a sphere: as wide as its circle in the plane that touches the mug."""
+    place = [MUG["radius"] * np.cos(bump["angle"]), MUG["radius"] * np.sin(bump["angle"]), bump["z"]]
+    width = 2 * np.sqrt(bump["height"] * (2 * bump["radius"] - bump["height"]))
+    return {"kind": "bump", "axis": np.array([place]), "height": bump["height"], "width": width}
 
 
 def tilted(points: FloatArray) -> FloatArray:
@@ -60,60 +175,9 @@ def tilted(points: FloatArray) -> FloatArray:
     return np.asarray(points @ rotation)
 
 
-def height_field(u: FloatArray, v: FloatArray, height: FloatArray) -> Mesh:
-    """Triangles over the grid u x v with heights (len(u), len(v)), outward up."""
-    grid = np.stack([*np.meshgrid(u, v, indexing="ij"), height], axis=-1)
-    return grid.reshape(-1, 3), grid_faces(len(u), len(v))
-
-
-def grid_faces(rows: int, columns: int, closed: bool = False) -> IntArray:
-    """Two triangles for each cell of a grid of vertices, row-major; `closed` joins the last column to the first."""
-    index = np.arange(rows * columns).reshape(rows, columns)
-    if closed:
-        index = np.column_stack([index, index[:, 0]])
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
-
-
-def tube(path: FloatArray, up: FloatArray, radius: float, sides: int) -> Mesh:
-    """A round tube about a path (K, 3), cut square at both ends; one vertex of each ring points to `up` (K, 3).
-
-    Facets lie radius * (1 - cos(pi / sides)) inside the round: 0.4 um for 0.325 mm and 64 sides.
-    """
-    tangent = np.gradient(path, axis=0)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    side = np.cross(tangent, up)
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    angle = 2 * np.pi * np.arange(sides) / sides
-    circle = np.cos(angle)[:, None] * np.cross(side, tangent)[:, None, :] + np.sin(angle)[:, None] * side[:, None, :]
-    rings = (path[:, None, :] + radius * circle).reshape(-1, 3)
-    wall = grid_faces(len(path), sides, closed=True)[:, ::-1]
-    first, last = np.arange(sides), np.arange(sides) + (len(path) - 1) * sides
-    start = np.column_stack([np.full(sides, len(rings)), np.roll(first, -1), first])
-    stop = np.column_stack([np.full(sides, len(rings) + 1), last, np.roll(last, -1)])
-    return np.vstack([rings, path[[0, -1]]]), np.vstack([wall, start, stop])
-
-
-def together(*meshes: Mesh) -> Mesh:
-    """The union as one list of triangles: a ball that touches from outside cannot tell it from a boolean union."""
-    starts = itertools.accumulate((len(vertices) for vertices, _ in meshes[:-1]), initial=0)
-    return (
-        np.vstack([vertices for vertices, _ in meshes]),
-        np.vstack([faces + start for (_, faces), start in zip(meshes, starts, strict=True)]),
-    )
-
-
 def write_mesh(name: str, mesh: Mesh) -> None:
-    """Binary PLY with double coordinates: single precision would move the wire's facets by up to 8 nm."""
-    vertices, faces = mesh
-    header = (
-        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\nproperty double x\nproperty double y\n"
-        f"property double z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    rows = np.empty(len(faces), dtype=[("count", "u1"), ("index", "<i4", 3)])
-    rows["count"], rows["index"] = 3, faces
-    path = FOLDER / "meshes" / f"{name}.ply"
-    path.write_bytes(header.encode() + np.ascontiguousarray(vertices, dtype="<f8").tobytes() + rows.tobytes())
+    """The mesh as assets/meshes/<name>.ply."""
+    write_ply(FOLDER / "meshes" / f"{name}.ply", mesh)
 
 
 def write_truth(scene: str, truths: list[dict[str, object]]) -> None:
