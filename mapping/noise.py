@@ -44,6 +44,8 @@ class Noise:
         values = (self.white, self.correlated, self.length)
         if not all(np.isfinite(value) and value >= 0 for value in values):
             raise NoiseError(f"noise needs finite white, correlated and length >= 0; found {values}")
+        for name, value in zip(("white", "correlated", "length"), values, strict=True):
+            object.__setattr__(self, name, float(value))
         if self.correlated > 0 and self.length == 0:
             raise NoiseError("correlated noise needs a positive correlation length; found 0")
 
