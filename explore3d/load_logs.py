@@ -18,7 +18,8 @@ def load_logs(paths: Sequence[Path | str], *, tip_radius: str | float | None = N
 
     Args:
         paths: MCAP logs, folders of sessions (their log is taken), CSV or TXT tables.
-        tip_radius: for tables, and for a log whose beginning is destroyed: "2 um", or a number in m.
+        tip_radius: for tables, which do not state it, and for a log whose beginning is destroyed: "2 um", or a
+            number in m. It must agree with what a log states.
         table: the other settings of read_table.
 
     Raises:

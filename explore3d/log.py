@@ -77,6 +77,7 @@ class LogWriter:
                 "metadata": notes,
             },
         )
+        self._flush()
         # the same again where tools look for it; the reader trusts the message, which a checksum covers
         self._mcap.add_attachment(0, self._epoch, "scene.toml", "application/toml", scene_text.encode())
         texts = {key: value if isinstance(value, str) else _json(value) for key, value in notes.items()}
@@ -198,19 +199,19 @@ def _move_data(move: Move) -> dict[str, Any]:
 
 
 def _poses(move: Move, time_ns: int) -> dict[str, Any]:
-    """The move as foxglove.PosesInFrame; arrows are drawn along x, so x is turned to the pressing direction."""
-    poses = []
-    for point, direction in zip(move.path, move.approach, strict=True):
-        # half-way quaternion from x to the direction; straight back it is half a turn about z
-        half = np.array([0.0, -direction[2], direction[1], 1.0 + direction[0]])
-        norm = float(np.linalg.norm(half))
-        turn = half / norm if norm > 1e-9 else np.array([0.0, 0.0, 1.0, 0.0])
-        poses.append(
-            {
-                "position": dict(zip("xyz", point.tolist(), strict=True)),
-                "orientation": dict(zip("xyzw", turn.tolist(), strict=True)),
-            }
-        )
+    """The move as foxglove.PosesInFrame; viewers draw a pose along its x, so x is turned to the pressing direction."""
+    # half-way quaternion (x, y, z, w) from x to the direction; straight back it is half a turn about z
+    a, b, c = move.approach.T
+    turns = np.column_stack([np.zeros_like(a), -c, b, 1.0 + a])
+    turns[np.linalg.norm(turns, axis=1) < 1e-9] = (0.0, 0.0, 1.0, 0.0)
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    poses = [
+        {
+            "position": dict(zip("xyz", point, strict=True)),
+            "orientation": dict(zip("xyzw", turn, strict=True)),
+        }
+        for point, turn in zip(move.path.tolist(), turns.tolist(), strict=True)
+    ]
     seconds, nanos = divmod(time_ns, 1_000_000_000)
     return {"timestamp": {"sec": seconds, "nsec": nanos}, "frame_id": log_format.FRAME, "poses": poses}
 

@@ -30,7 +30,8 @@ class _Reading:
     path: Path
     tip_radius: float | None
     start: dict[str, Any] = field(default_factory=dict)
-    events: list[Event] = field(default_factory=list)
+    events: list[Event] | None = None
+    moves: int = 0
     samples: int = 0
     promised: int = 0
     messages: int = 0
@@ -58,14 +59,14 @@ def read_log(path: Path | str | Sequence[Path | str], tip_radius: float | None =
 
     Args:
         path: the file, or several of one object and one fingertip.
-        tip_radius: m; only for a log whose beginning is destroyed. A log that states its own keeps it.
+        tip_radius: m; needed only for a log whose beginning is destroyed; must agree with what the log states.
 
     Raises:
-        UserError: no such file, not a log of ours, no intact sample, tip radii that differ.
+        UserError: no such file, not a log of ours, no intact sample, a tip radius that differs.
     """
     if not isinstance(path, str | Path):
         return merge([read_log(one, tip_radius) for one in path])
-    reading = _Reading(Path(path), tip_radius)
+    reading = _Reading(Path(path), tip_radius, events=[])
     batches = list(_batches(reading))
     if not batches:
         raise UserError(f"{path}: field samples: the log holds none{_loss(reading, ', ')}")
@@ -76,7 +77,7 @@ def read_log(path: Path | str | Sequence[Path | str], tip_radius: float | None =
     return Log(
         trace=trace,
         scene_text=reading.start.get("scene", ""),
-        events=tuple(reading.events),
+        events=tuple(reading.events or ()),
         metadata=metadata | {"started": reading.start.get("started")},
         complete=reading.complete,
         recovered=_loss(reading),
@@ -112,8 +113,7 @@ def _batches(reading: _Reading) -> Iterator[NDArray[np.void]]:
     from explore3d.log_chunks import Damage, intact_chunks
 
     damage, topics, none = Damage(), dict(_TOPICS), True
-    if not is_log(reading.path):
-        raise UserError(f"{reading.path}: is not a log: it does not begin as an MCAP file does")
+    begins = is_log(reading.path)
     with reading.path.open("rb") as file:
         for records in intact_chunks(file, damage):
             for record in records:
@@ -126,7 +126,8 @@ def _batches(reading: _Reading) -> Iterator[NDArray[np.void]]:
                         yield batch
     reading.damaged, reading.cut = damage.damaged, damage.cut
     if none:
-        raise UserError(f"{reading.path}: holds no intact message of an explore3d log; nothing can be recovered")
+        why = "" if begins else "does not begin as an MCAP log does and "
+        raise UserError(f"{reading.path}: {why}holds no intact message of an explore3d log; nothing can be recovered")
 
 
 def _take_checked(topic: str, message: Any, reading: _Reading) -> NDArray[np.void] | None:
@@ -155,13 +156,19 @@ def _take(topic: str, message: Any, reading: _Reading) -> NDArray[np.void] | Non
         _begin(data, reading)
     elif topic == "/move":
         reading.promised = max(reading.promised, data["first"] + data["samples"])
-        reading.events.append(Event("move", data.pop("t"), data))
+        reading.moves += 1
+        _keep(reading, Event("move", data.pop("t"), data))
     elif topic == "/event":
-        reading.events.append(Event(data["kind"], data["t"], data["data"]))
+        _keep(reading, Event(data["kind"], data["t"], data["data"]))
     elif topic == "/end":
         reading.closed = True
         reading.promised = max(reading.promised, data["samples"])
     return None
+
+
+def _keep(reading: _Reading, event: Event) -> None:
+    if reading.events is not None:
+        reading.events.append(event)
 
 
 def _begin(data: dict[str, Any], reading: _Reading) -> None:
@@ -169,8 +176,12 @@ def _begin(data: dict[str, Any], reading: _Reading) -> None:
         raise UserError(
             f"{reading.path}: field schema is {data.get('schema')!r}; this version reads {log_format.VERSION!r}"
         )
-    reading.start = data
-    reading.tip_radius = float(data["tip_radius"])
+    stated = float(data["tip_radius"])
+    if reading.tip_radius not in (None, stated):
+        raise UserError(
+            f"{reading.path}: field tip_radius: {reading.tip_radius:g} m is asked for, but the log states {stated:g} m"
+        )
+    reading.start, reading.tip_radius = data, stated
 
 
 def _need_start(reading: _Reading) -> None:
@@ -202,8 +213,7 @@ def _loss(reading: _Reading, prefix: str = "") -> str:
     """One sentence on what is missing, "" if nothing is."""
     if reading.complete:
         return ""
-    moves = sum(event.kind == "move" for event in reading.events)
-    parts = [f"recovered {reading.samples} samples of {moves} moves"]
+    parts = [f"recovered {reading.samples} samples of {reading.moves} moves"]
     lost = reading.promised - reading.samples
     if lost > 0:
         parts.append(f"{lost} further samples that the log announces are lost")

@@ -55,7 +55,7 @@ def length_factors(
     Raises:
         UserError: a unit that nobody states, or that the file and the user state differently.
     """
-    factors = {}
+    factors: dict[str, float] = {}
     for role in (role for role in LENGTHS if role in roles):
         stated = table.units[roles[role]]
         stated = stated if stated in UNITS["length"] else ""
@@ -80,7 +80,9 @@ def time_factor(table: TableText, roles: Mapping[str, int]) -> float:
 
 
 def _positions(table: TableText, taken: set[int]) -> dict[str, int]:
-    named = {role: index for role in POSITION if (index := _named(table, role)) is not None and index not in taken}
+    named: dict[str, int] = {
+        role: index for role in POSITION if (index := _named(table, role)) is not None and index not in taken
+    }
     if "x" in named and len(named) >= 2:
         return named
     free = [index for index in range(len(table.names)) if index not in taken]
