@@ -143,7 +143,7 @@ class Truth(Table):
     axis: Annotated[tuple[Point, ...], Field(min_length=1)]
     height: Signed
     width: Length | None = None
-    length: Extent = 0.0
+    length: Extent | None = None
 
 
 class Scene(Table):
