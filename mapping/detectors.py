@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 
 from mapping.base import Base
 from mapping.crossing import Crossing
-from mapping.disturbance import Disturbance, find_disturbances
+from mapping.disturbance import Disturbance
 from mapping.errors import MappingError
 from mapping.height_profile import HeightProfile, arclength, height_profiles
 from mapping.matched_filter import BINS_PER_HALF_WIDTH, Bank, build_bank, smallest_half_width
 from mapping.noise import Noise, estimate_noise
+from mapping.stretches import find_disturbances, quiet_bins
 from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 # Half-width of the widest disturbance that counts as fine, in tip radii.
 LARGEST = 4.0
@@ -108,8 +110,8 @@ def detect(
     widest = LARGEST * tip if largest is None else largest
     profiles, bank, level, threshold = _profiles(usable, base, first, raw, tip, widest, false_alarms_per_metre)
     for _ in range(2 if noise is None else 0):
-        found = [find_disturbances(p, bank, level, threshold, tip) for p in profiles]
-        level = _quiet_noise(profiles, found, first, tip)
+        quiet = [quiet_bins(p, bank, level, threshold, tip) for p in profiles]
+        level = _quiet_noise(profiles, quiet, first, tip)
         bank, threshold = _bank(base, level, profiles[0], tip, widest, false_alarms_per_metre)
     crossings = []
     for profile in profiles:
@@ -156,7 +158,7 @@ def _profiles(
     smallest = smallest_half_width(noise, raw, 1.0, tip, 5.0)
     spacing = raw * max(1, int(smallest / (BINS_PER_HALF_WIDTH * raw)))
     profiles = [p for number, part, s in usable for p in height_profiles(number, part, s, base, spacing)]
-    level = _quiet_noise(profiles, [()] * len(profiles), noise, tip)
+    level = _quiet_noise(profiles, [np.ones(len(p.height), dtype=bool) for p in profiles], noise, tip)
     bank, threshold = _bank(base, level, profiles[0], tip, largest, rate)
     return profiles, bank, level, threshold
 
@@ -171,17 +173,14 @@ def _bank(
 
 
 def _quiet_noise(
-    profiles: list[HeightProfile], found: list[tuple[Disturbance, ...]], first: Noise, tip: float
+    profiles: list[HeightProfile], quiet: list[BoolArray], first: Noise, tip: float
 ) -> Noise:
-    """Noise of the profiles outside of what was found; the white level of single samples."""
+    """Noise of the profiles' quiet bins; the white level of single samples."""
     heights, places, samples = [], [], []
     offset = 0.0
-    for profile, disturbances in zip(profiles, found, strict=True):
-        quiet = np.ones(len(profile.height), dtype=bool)
-        for d in disturbances:
-            quiet &= (profile.s < d.start) | (profile.s > d.stop)
-        heights.append(profile.height[quiet])
-        places.append(profile.s[quiet] - profile.s[0] + offset)
+    for profile, keep in zip(profiles, quiet, strict=True):
+        heights.append(profile.height[keep])
+        places.append(profile.s[keep] - profile.s[0] + offset)
         offset += profile.length + 1000 * profile.spacing
         samples.append(profile.samples)
     height = np.concatenate(heights)

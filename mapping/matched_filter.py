@@ -142,7 +142,9 @@ def smallest_half_width(noise: Noise, spacing: float, samples: float, tip_radius
     return float(widths[visible.argmax()] if visible.any() else widths[-1])
 
 
-def cap_bins(positions: FloatArray, half_width: float, spacing: float, flat: float = 0.0) -> FloatArray:
+def cap_bins(
+    positions: FloatArray, half_width: float | FloatArray, spacing: float, flat: float | FloatArray = 0.0
+) -> FloatArray:
     """Means over bins of a cap of unit height with a flat top of the given half-length and parabolic flanks."""
 
     def integral(x: FloatArray) -> FloatArray:
