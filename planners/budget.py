@@ -1,0 +1,47 @@
+"""Budget: finger time and path that a plan may spend."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hw.moves import Move
+from mapping.trace import Trace
+from planners.plan import Outcome, Plan
+
+
+@dataclass
+class Spent:
+    """Finger time (s) and path (m) of the moves that passed by, ways between sweeps included.
+
+    Args:
+        travel_speed: at which the finger is taken to move between sweeps, m/s.
+    """
+
+    travel_speed: float
+    seconds: float = 0.0
+    metres: float = 0.0
+    _end: np.ndarray | None = None
+
+    def count(self, move: Move) -> None:
+        """Add one move."""
+        gap = 0.0 if self._end is None else float(np.linalg.norm(move.path[0] - self._end))
+        self._end = move.path[-1]
+        self.seconds += move.duration + gap / self.travel_speed
+        self.metres += move.length + gap
+
+
+def within(plan: Plan, spent: Spent, seconds: float, metres: float = np.inf) -> Plan:
+    """The plan, ended with the reason "budget" before the first move that would overspend."""
+    trace: Trace | None = None
+    while True:
+        try:
+            move = next(plan) if trace is None else plan.send(trace)
+        except StopIteration as end:
+            return end.value if isinstance(end.value, Outcome) else Outcome("done")
+        if spent.seconds + move.duration > seconds or spent.metres + move.length > metres:
+            plan.close()
+            return Outcome("budget", f"{spent.seconds:.1f} s and {spent.metres:.3f} m of finger path spent")
+        spent.count(move)
+        trace = yield move

@@ -1,0 +1,60 @@
+"""Circuit: a small closed path around a detection; the branches that leave it decide what it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.crossing import Crossing
+from planners.plan import Outcome, Plan
+from planners.sense import Sense
+from planners.strokes import Strokes, tangential
+
+FloatArray = NDArray[np.float64]
+
+NAMES = ("bump", "end of a ridge", "ridge", "junction")
+
+
+@dataclass(frozen=True, eq=False)
+class Circuit:
+    """Goes round a detection once and counts what it crosses: 0 bump, 1 end, 2 ridge, 3 or more junction.
+
+    Args:
+        strokes, sense: how to touch and to feel.
+        radius: of the circuit on the surface, m; larger than the disturbance's half-width.
+    """
+
+    strokes: Strokes
+    sense: Sense
+    radius: float
+
+    def around(self, seed: Crossing) -> Plan:
+        """The outcome's value is a tuple of crossings, one per branch, in the order of the circuit."""
+        overlap = 1.2 * seed.half_width
+        trace = yield self.strokes.circle(seed.point, seed.tangent, self.radius, overlap)
+        sign = np.sign(seed.height)
+        found = [c for c in self.sense.crossings(trace) if sign * c.height > 0.3 * abs(seed.height)]
+        branches: list[Crossing] = []
+        for crossing in sorted(found, key=lambda c: -abs(c.height)):
+            if all(np.linalg.norm(crossing.point - other.point) > 0.35 * self.radius for other in branches):
+                branches.append(crossing)
+        count = len(branches)
+        reason = NAMES[min(count, 3)] if len(trace) else "no contact"
+        return Outcome(reason, f"the circuit crosses {count} branches", tuple(branches))
+
+
+def headings(seed: Crossing, branches: tuple[Crossing, ...]) -> list[FloatArray]:
+    """Directions (3,) in which to follow: the most nearly opposite pair of branches, or the only one.
+
+    A single branch is followed both ways, so that the end beside the seed is found as well.
+    """
+    ways = [tangential(branch.point - seed.point, seed.normal) for branch in branches]
+    if not ways:
+        return []
+    if len(ways) == 1:
+        return [ways[0], -ways[0]]
+    pairs = [(float(a @ b), i, j) for i, a in enumerate(ways) for j, b in enumerate(ways) if i < j]
+    _, i, j = min(pairs)
+    return [ways[i], ways[j]]

@@ -1,0 +1,240 @@
+"""Explore: surveys the base, then does what sharpens the features most per second, and stops when it is enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.base import Base
+from mapping.crossing import Crossing
+from mapping.detectors import detect
+from mapping.noise import Noise
+from mapping.trace import Trace
+from planners.axis_track import AxisTrack
+from planners.budget import Spent, within
+from planners.bump import BumpSize, BumpSizer
+from planners.circuit import Circuit, headings
+from planners.coverage import Coverage
+from planners.errors import PlannerError
+from planners.plan import Outcome, Plan
+from planners.ridge import RidgeFollower
+from planners.sense import Sense
+from planners.strokes import Strokes
+from planners.survey import Survey
+
+FloatArray = NDArray[np.float64]
+
+# Sweeps of the survey from which the noise is learnt, if it is not given
+NOISE_SWEEPS = 4
+# Slides off one end, at most
+MOST_SLIDES = 6
+
+
+@dataclass(frozen=True)
+class Action:
+    """One thing that could be done next: what for, what it is expected to gain (m) and take (s), how to do it."""
+
+    name: str
+    gain: float
+    seconds: float
+    start: Callable[[], Plan]
+
+
+@dataclass
+class Found:
+    """What the exploration knows so far; the outcome's value.
+
+    `actions` names everything that was done after the survey, with its outcome; `left_out` what was not.
+    """
+
+    survey: Coverage | None = None
+    noise: Noise | None = None
+    tracks: list[AxisTrack] = field(default_factory=list)
+    bumps: list[BumpSize] = field(default_factory=list)
+    crossings: list[Crossing] = field(default_factory=list)
+    tried: list[Crossing] = field(default_factory=list)
+    slides: dict[tuple[int, int], int] = field(default_factory=dict)
+    actions: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+    def unexplained(self) -> list[Crossing]:
+        """Crossings that no track or bump accounts for and that were not looked into yet, the highest first."""
+        known = [*self.tracks, *self.bumps]
+        rest = [c for c in self.crossings if not any(k.explains(c) for k in known) and not self._tried(c)]
+        return sorted(rest, key=lambda c: -abs(c.height))
+
+    def _tried(self, crossing: Crossing) -> bool:
+        return any(
+            crossing is other or np.linalg.norm(crossing.point - other.point) < 0.7 * other.half_width
+            for other in self.tried
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Explore:
+    """Survey, circle, follow, bisect, slide, stop.
+
+    After the survey the next action is always the one with the largest expected reduction of the features'
+    uncertainty per second of finger time: looking into a detection (its extent is unknown by about a survey
+    pitch) or one more slide off an end that is not precise enough. It stops when nothing is left to gain.
+
+    Args:
+        base: the global model.
+        tip_radius: m.
+        smallest: height of the smallest feature to be found, m.
+        precision: wanted standard deviation of a feature's extent, m.
+        speed, force: of the sweeps, m/s and N.
+        region: (low, high) corners (3,) of the part to be inspected, m; None: all of the base.
+        time_budget: finger time, s.
+        path_budget: finger path, m.
+        travel_speed: between sweeps, m/s.
+        false_alarms_per_metre: accepted rate of false crossings, 1/m.
+        noise: of the samples; None: learnt from the first sweeps.
+    """
+
+    base: Base
+    tip_radius: float
+    smallest: float
+    precision: float = 1e-4
+    speed: float = 0.03
+    force: float = 1.0
+    region: tuple[FloatArray, FloatArray] | None = None
+    time_budget: float = np.inf
+    path_budget: float = np.inf
+    travel_speed: float = 0.25
+    false_alarms_per_metre: float = 0.01
+    noise: Noise | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("tip_radius", "smallest", "precision", "speed", "time_budget", "travel_speed"):
+            if not getattr(self, name) > 0:
+                raise PlannerError(f"explore: {name} must be positive; found {getattr(self, name)}")
+
+    @property
+    def survey(self) -> Survey:
+        """The survey that it begins with."""
+        return Survey(
+            base=self.base,
+            tip_radius=self.tip_radius,
+            smallest=self.smallest,
+            speed=self.speed,
+            force=self.force,
+            region=self.region,
+        )
+
+    @property
+    def strokes(self) -> Strokes:
+        """Sweeps with this fingertip on this base."""
+        return Strokes(self.base, self.tip_radius, self.speed, self.force)
+
+    def plan(self, rng: np.random.Generator | None = None) -> Plan:
+        """The whole exploration; the outcome's value is a Found. Nothing in it is random: `rng` is not used."""
+        found = Found(noise=self.noise)
+        spent = Spent(self.travel_speed)
+        outcome = yield from within(self._everything(found), spent, self.time_budget, self.path_budget)
+        count = len(found.tracks) + len(found.bumps)
+        detail = f"{count} features; {spent.seconds:.1f} s, {spent.metres:.3f} m of finger path"
+        if outcome.reason == "budget":
+            found.left_out.append(f"{len(found.unexplained())} detections were not looked into: budget spent")
+        return Outcome(outcome.reason, detail, found)
+
+    def _everything(self, found: Found) -> Plan:
+        yield from self._survey(found)
+        if not found.crossings:
+            found.left_out.append("circuits, ridge following and sizing: the survey found nothing")
+            return Outcome("nothing found")
+        strokes = self.strokes
+        sense = Sense(self.base, found.noise, self.false_alarms_per_metre)
+        while actions := self._actions(found, strokes, sense):
+            best = max(actions, key=lambda action: action.gain / action.seconds)
+            outcome = yield from best.start()
+            found.actions.append(f"{best.name}: {outcome.reason}" + (f" ({outcome.detail})" if outcome.detail else ""))
+        return Outcome("done")
+
+    def _survey(self, found: Found) -> Plan:
+        """Every sweep of the survey, detected as it comes; the first ones wait until the noise is known."""
+        waiting: list[Trace] = []
+        paths = []
+        for move in self.survey.sweeps():
+            trace = yield move
+            paths.append(move.path + self.tip_radius * move.approach)
+            if len(trace) == 0:
+                found.left_out.append("a survey sweep felt no contact")
+                continue
+            waiting.append(trace)
+            if found.noise is not None or len(waiting) >= NOISE_SWEEPS:
+                self._detect(waiting, found)
+        if waiting:
+            self._detect(waiting, found)
+        found.survey = self.survey.covered(paths)
+        return Outcome("done")
+
+    def _detect(self, waiting: list[Trace], found: Found) -> None:
+        felt = detect(
+            Trace.concatenate(waiting),
+            self.base,
+            noise=found.noise,
+            false_alarms_per_metre=self.false_alarms_per_metre,
+        )
+        found.noise = felt.noise
+        found.crossings.extend(felt.crossings)
+        waiting.clear()
+
+    def _actions(self, found: Found, strokes: Strokes, sense: Sense) -> list[Action]:
+        actions = []
+        for seed in found.unexplained()[:1]:
+            pitch = self.survey.pitch
+            seconds = 2.0 * np.pi * self._circuit_radius(seed) / self.speed
+            actions.append(Action("look into", pitch, seconds, lambda: self._look_into(seed, found, strokes, sense)))
+        for index, track in enumerate(found.tracks):
+            for which, end in enumerate(track.ends):
+                done = found.slides.get((index, which), 0)
+                if end.reason == "end" and end.sd > self.precision and done < MOST_SLIDES and track.kind != "step":
+                    seconds = 3.0 * track.half_width / self.speed
+                    gain = end.sd * (1.0 - 0.5**0.5) if np.isfinite(end.sd) else self.survey.pitch
+                    actions.append(Action("slide off an end", gain, seconds, self._slide(index, which, found, sense)))
+        return actions
+
+    def _circuit_radius(self, seed: Crossing) -> float:
+        """Wide enough to go round a bump whose top lies up to half a survey pitch beside the sweep."""
+        return 1.4 * seed.half_width + 0.5 * self.survey.pitch
+
+    def _look_into(self, seed: Crossing, found: Found, strokes: Strokes, sense: Sense) -> Plan:
+        """Circle a detection, then follow the ridge or size the bump that it belongs to."""
+        found.tried.append(seed)
+        circled = yield from Circuit(strokes, sense, self._circuit_radius(seed)).around(seed)
+        branches: tuple[Crossing, ...] = circled.value
+        if not branches:
+            sized = yield from BumpSizer(strokes, sense, self.precision).size(seed)
+            if sized.value is not None:
+                found.bumps.append(sized.value)
+            return Outcome(circled.reason, sized.detail)
+        follower = self._follower(found, strokes, sense)
+        followed = yield from follower.follow(seed, headings(seed, branches))
+        found.crossings.extend(follower.aside)
+        found.crossings.extend(branches)
+        if followed.value is not None:
+            found.tracks.append(followed.value)
+        return Outcome(circled.reason, followed.detail)
+
+    def _follower(self, found: Found, strokes: Strokes, sense: Sense) -> RidgeFollower:
+        tracks = tuple(found.tracks)
+
+        def known(point: FloatArray) -> bool:
+            return any(track.distance(point) < 0.5 * track.half_width for track in tracks)
+
+        return RidgeFollower(strokes, sense, found.noise or Noise(0.0), self.precision, known=known)
+
+    def _slide(self, index: int, which: int, found: Found, sense: Sense) -> Callable[[], Plan]:
+        def start() -> Plan:
+            track = found.tracks[index]
+            follower = self._follower(found, self.strokes, sense)
+            found.slides[index, which] = found.slides.get((index, which), 0) + 1
+            end = yield from follower.slide(track.ends[which], track.height, track.half_width, track.sign)
+            found.tracks[index] = track.with_end(which, end)
+            return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")
+
+        return start

@@ -1,0 +1,234 @@
+"""Ridge following: cross, predict, cross again; where the ridge is lost, bisect, then slide off its end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hw.moves import Move
+from mapping.crossing import Crossing
+from mapping.noise import Noise
+from mapping.trace import Trace
+from planners.axis_track import AxisEnd, AxisTrack, heading_and_turn, polyline_distance
+from planners.end_fit import fit_end
+from planners.plan import Outcome, Plan
+from planners.sense import Sense
+from planners.strokes import Strokes
+
+FloatArray = NDArray[np.float64]
+Crossed = Generator[Move, Trace, Crossing | None]
+
+# A crossing lower than this share of the ridge's last heights lies beyond its end
+STILL_HIGH = 0.7
+
+
+@dataclass
+class Line:
+    """Crossings of one ridge in the order of its axis, while it is being followed one way."""
+
+    crossings: list[Crossing]
+    step: float
+
+    @property
+    def points(self) -> FloatArray:
+        """(K, 3) axis points, m."""
+        return np.array([c.point for c in self.crossings])
+
+    @property
+    def height(self) -> float:
+        """Median |height| of the last crossings, m."""
+        return float(np.median([abs(c.height) for c in self.crossings[-4:]]))
+
+    @property
+    def half_width(self) -> float:
+        """Median half-width of the disturbance, m."""
+        return float(np.median([c.half_width for c in self.crossings[-5:]]))
+
+
+@dataclass(frozen=True, eq=False)
+class RidgeFollower:
+    """Follows ridges, grooves and steps over a base.
+
+    Args:
+        strokes, sense: how to touch and to feel.
+        noise: of the samples.
+        precision: wanted standard deviation of an end, m.
+        longest_step: largest distance between two crossings, m; None: one tip radius.
+        known: tells whether a point lies on an axis found before (there the ridge joins it).
+        aside: receives crossings that belong to something else.
+    """
+
+    strokes: Strokes
+    sense: Sense
+    noise: Noise
+    precision: float
+    longest_step: float | None = None
+    known: Callable[[FloatArray], bool] = lambda point: False
+    aside: list[Crossing] = field(default_factory=list)
+
+    def follow(self, seed: Crossing, ways: list[FloatArray]) -> Plan:
+        """Follow from a seed in one or two directions (3,); the outcome's value is an AxisTrack or None."""
+        sign = float(np.sign(seed.height))
+        first = yield from self._cross(seed.point, ways[0], seed, sign, 1.2 * seed.half_width, 0.3 * abs(seed.height))
+        if first is None:
+            return Outcome("lost", "the crossing that began the ridge was not found again")
+        halves: list[tuple[Line, AxisEnd | None]] = []
+        for way in ways[:2]:
+            line = Line([first], min(0.4 * self.strokes.tip_radius, self._longest))
+            end = yield from self._one_way(line, way, sign)
+            halves.append((line, end))
+            if end is None:
+                break
+        track = _joined(halves, sign)
+        reasons = "closed" if track.closed else " and ".join(end.reason for end in track.ends)
+        return Outcome("done", f"{1e3 * track.length:.2f} mm in {len(track.points)} points: {reasons}", track)
+
+    @property
+    def _longest(self) -> float:
+        return self.strokes.tip_radius if self.longest_step is None else self.longest_step
+
+    def _one_way(self, line: Line, way: FloatArray, sign: float) -> Generator[Move, Trace, AxisEnd | None]:
+        """Extend the line until it ends; None if it closes upon itself."""
+        gone = np.inf
+        for _ in range(10_000):
+            last = line.crossings[-1]
+            heading, turn = heading_and_turn(line.points, last.normal, way)
+            step = min(line.step, 0.5 * gone)
+            walk = self.strokes.walk(last.point, heading, step, turn)
+            if walk.cut and walk.along[-1] < 0.5 * step:
+                return AxisEnd(walk.points[-1], 0.0, "edge of the model", walk.directions[-1])
+            reach = max(0.6 * line.half_width, 0.25 * step)
+            lowest = STILL_HIGH * line.height
+            found = yield from self._cross(walk.points[-1], walk.directions[-1], last, sign, reach, lowest)
+            if found is None:
+                gone = float(walk.along[-1])
+                if gone <= max(0.15 * self.strokes.tip_radius, 4.0 * self.precision):
+                    return (yield from self._end(line, heading, turn, gone, sign))
+                continue
+            gone -= float(walk.along[-1])
+            self._adapt(line, found, walk.points[-1], reach)
+            line.crossings.append(found)
+            if self.known(found.point):
+                return AxisEnd(found.point, found.position_sd, "joins another", heading)
+            if _returned(line):
+                return None
+            if gone <= 0.1 * self.strokes.tip_radius:
+                return (yield from self._end(line, heading, turn, max(gone, 0.0), sign))
+        return AxisEnd(line.points[-1], np.inf, "lost", way)
+
+    def _adapt(self, line: Line, found: Crossing, predicted: FloatArray, reach: float) -> None:
+        """A longer step after a good prediction, a shorter one after a bad one."""
+        miss = float(np.linalg.norm(found.point - predicted)) / reach
+        factor = 1.5 if miss < 0.15 else 0.6 if miss > 0.45 else 1.0
+        line.step = float(np.clip(line.step * factor, 0.2 * self.strokes.tip_radius, self._longest))
+
+    def _cross(
+        self, point: FloatArray, heading: FloatArray, like: Crossing, sign: float, reach: float, lowest: float
+    ) -> Crossed:
+        """Cross the ridge at a predicted point, square to its heading; a sweep that felt nothing is repeated once."""
+        _, normal = self.strokes.onto(point)
+        half = 1.6 * like.half_width + reach
+        move = self.strokes.line(point, np.cross(normal, heading), half, half)
+        trace = yield move
+        if len(trace) == 0:
+            trace = yield move
+        found, others = self.sense.nearest(trace, point, sign, lowest, reach)
+        self.aside.extend(others)
+        return found
+
+    def _end(
+        self, line: Line, heading: FloatArray, turn: float, gone: float, sign: float
+    ) -> Generator[Move, Trace, AxisEnd]:
+        """Slide along the crest and off the end, where the crossings have bracketed it."""
+        last = line.crossings[-1]
+        rough = AxisEnd(last.point, np.inf, "end", heading, gone)
+        if last.kind.startswith("step"):
+            return AxisEnd(last.point, 0.5 * gone, "end", heading, gone)
+        return (yield from self.slide(rough, line.height, line.half_width, sign, turn))
+
+    def slide(
+        self, end: AxisEnd, height: float, half_width: float, sign: float, turn: float = 0.0
+    ) -> Generator[Move, Trace, AxisEnd]:
+        """A better estimate of an end from one more sweep along the crest; the old one if that shows nothing."""
+        tip = self.strokes.tip_radius
+        back = self.strokes.walk(end.point, -end.heading, 1.2 * half_width, -turn)
+        ahead = self.strokes.walk(end.point, end.heading, end.reach + 1.8 * half_width, turn)
+        points = np.concatenate([back.points[:0:-1], ahead.points])
+        normals = np.concatenate([back.normals[:0:-1], ahead.normals])
+        trace = yield self.strokes.over(points, normals)
+        if len(trace) < 32:
+            return end
+        feet = self.sense.base.foot(trace.centers, tip)
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        fit = fit_end(places_along(feet.points, points, along), feet.height, sign, height, tip, self.noise)
+        if not fit.found:
+            return end if np.isfinite(end.sd) else AxisEnd(end.point, max(end.reach, 0.1 * tip), "lost", end.heading)
+        where = np.array([np.interp(fit.place, along, points[:, k]) for k in range(3)])
+        sd = fit.sd if not np.isfinite(end.sd) else (fit.sd**-2 + end.sd**-2) ** -0.5
+        if np.isfinite(end.sd):
+            weight = fit.sd**-2 / (fit.sd**-2 + end.sd**-2)
+            where = weight * where + (1.0 - weight) * end.point
+        return AxisEnd(self.strokes.onto(where)[0], float(sd), "end", end.heading, 0.0)
+
+
+def places_along(points: FloatArray, line: FloatArray, along: FloatArray) -> FloatArray:
+    """Arclengths (N,) on a polyline (K, 3) of the places nearest to points (N, 3), beyond its ends too, m."""
+    best = np.full(len(points), np.inf)
+    place = np.zeros(len(points))
+    for k in range(len(line) - 1):
+        step = line[k + 1] - line[k]
+        length = float(np.linalg.norm(step))
+        if length == 0:
+            continue
+        share = (points - line[k]) @ step / length**2
+        inner = np.clip(share, -np.inf if k == 0 else 0.0, np.inf if k == len(line) - 2 else 1.0)
+        gap = ((points - line[k] - inner[:, None] * step) ** 2).sum(axis=1)
+        closer = gap < best
+        best[closer], place[closer] = gap[closer], along[k] + inner[closer] * length
+    return place
+
+
+def _returned(line: Line) -> bool:
+    """True if the last stretch of the line passes its own beginning, after a way round."""
+    points = line.points
+    if len(points) < 5:
+        return False
+    travelled = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    last_step = float(np.linalg.norm(points[-1] - points[-2]))
+    return travelled > 3.0 * last_step and polyline_distance(points[0], points[-2:]) < 0.5 * line.half_width
+
+
+def _joined(halves: list[tuple[Line, AxisEnd | None]], sign: float) -> AxisTrack:
+    """One track of both directions; the seed's crossing is shared, and each end's point is added."""
+    line, end = halves[0]
+    crossings = list(line.crossings)
+    last_end = end
+    if end is not None and len(halves) > 1:
+        back, first_end = halves[1]
+        crossings = [*back.crossings[:0:-1], *crossings]
+    else:
+        first_end = AxisEnd(crossings[0].point, np.inf, "lost", -_first_step(crossings))
+    points = [c.point for c in crossings]
+    normals = [c.normal for c in crossings]
+    kind = "step" if crossings[0].kind.startswith("step") else crossings[0].kind
+    height = float(np.median([abs(c.height) for c in crossings]))
+    half_width = float(np.median([c.half_width for c in crossings]))
+    if last_end is None or first_end is None:
+        points.append(points[0])
+        normals.append(normals[0])
+        return AxisTrack(np.array(points), np.array(normals), sign, kind, height, half_width, ())
+    track = AxisTrack(np.array(points), np.array(normals), sign, kind, height, half_width, (first_end, last_end))
+    for index, tip in enumerate((first_end, last_end)):
+        if tip.reason in ("end", "edge of the model"):
+            track = track.with_end(index, tip)
+    return track
+
+
+def _first_step(crossings: list[Crossing]) -> FloatArray:
+    if len(crossings) < 2:
+        return crossings[0].tangent
+    step = crossings[1].point - crossings[0].point
+    return np.asarray(step / max(float(np.linalg.norm(step)), np.finfo(float).tiny))

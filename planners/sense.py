@@ -1,0 +1,53 @@
+"""Sense: what one sweep felt, while exploring."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.base import Base
+from mapping.crossing import Crossing
+from mapping.detectors import detect
+from mapping.noise import Noise
+from mapping.trace import Trace
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Sense:
+    """Detects on single sweeps over a known base.
+
+    Args:
+        base: the global model.
+        noise: of the samples; None: estimated from each sweep.
+        false_alarms_per_metre: 1/m.
+    """
+
+    base: Base
+    noise: Noise | None = None
+    false_alarms_per_metre: float = 0.01
+
+    def crossings(self, trace: Trace) -> tuple[Crossing, ...]:
+        """Crossings of one sweep; none if it felt nothing."""
+        if len(trace) < 16:
+            return ()
+        found = detect(trace, self.base, noise=self.noise, false_alarms_per_metre=self.false_alarms_per_metre)
+        return found.crossings
+
+    def nearest(
+        self, trace: Trace, point: FloatArray, sign: float, lowest: float, reach: float
+    ) -> tuple[Crossing | None, tuple[Crossing, ...]]:
+        """The crossing nearest to a point that has a sign and at least a height, and all the others.
+
+        Args:
+            sign: +1 for bumps and ridges, -1 for pits and grooves.
+            lowest: least |height|, m.
+            reach: how far from the point it may lie, m.
+        """
+        every = self.crossings(trace)
+        fits = [c for c in every if sign * c.height >= lowest and np.linalg.norm(c.point - point) <= reach]
+        best = min(fits, key=lambda c: float(np.linalg.norm(c.point - point)), default=None)
+        return best, tuple(c for c in every if c is not best)
