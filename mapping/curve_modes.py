@@ -1,0 +1,77 @@
+"""CurveModes: low-order lateral courses of an axis about its chart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CurveModes:
+    """Legendre polynomials for an open axis, Fourier modes for a closed one.
+
+    Args:
+        degree: highest degree; an open axis has degree + 1 modes, a closed one 2 degree + 1.
+        middle: distance along the chart of the stretch's middle, m.
+        reach: half its length, m (open: the modes are within +-1 there, and go on straight outside).
+        closed: True for a closed axis.
+    """
+
+    degree: int
+    middle: float
+    reach: float
+    closed: bool
+
+    @property
+    def count(self) -> int:
+        return 2 * self.degree + 1 if self.closed else self.degree + 1
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        if self.closed:
+            pairs = tuple(f"{kind} {k}" for k in range(1, self.degree + 1) for kind in ("cosine", "sine"))
+            return ("offset", *pairs)
+        return ("offset", "heading", *(f"bend {k}" for k in range(2, self.degree + 1)))[: self.count]
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return tuple("rad" if name == "heading" else "m" for name in self.names)
+
+    @property
+    def scale(self) -> FloatArray:
+        """(count,) change of each coefficient that moves the axis by one metre at most."""
+        return np.array([1.0 / self.reach if unit == "rad" else 1.0 for unit in self.units])
+
+    def lateral(self, coefficients: FloatArray, s: FloatArray) -> FloatArray:
+        """(W, K) lateral distances at the places s (K,) for coefficients (W, count), m."""
+        return np.asarray(coefficients @ self._basis(s))
+
+    def lateral_at(self, coefficients: FloatArray, s: FloatArray) -> FloatArray:
+        """(W,) lateral distances, each at its own place s (W,), m."""
+        return np.einsum("wc,cw->w", coefficients, self._basis(s))
+
+    def slope(self, coefficients: FloatArray, s: float) -> FloatArray:
+        """(W,) change of the lateral distance per metre along the chart."""
+        step = 1e-3 * self.reach
+        ends = self._basis(np.array([s - step, s + step]))
+        return np.asarray(coefficients @ (ends[:, 1] - ends[:, 0]) / (2.0 * step))
+
+    def _basis(self, s: FloatArray) -> FloatArray:
+        """(count, ...) modes at places s."""
+        x = (s - self.middle) / self.reach
+        if self.closed:
+            rows = [np.ones_like(x)]
+            for k in range(1, self.degree + 1):
+                rows += [np.cos(np.pi * k * x), np.sin(np.pi * k * x)]
+            return np.stack(rows)
+        inside = np.clip(x, -1.0, 1.0)
+        rows = [np.ones_like(x), x * self.reach]
+        for k in range(2, self.degree + 1):
+            legendre = np.polynomial.legendre.Legendre.basis(k)
+            # Straight on beyond the stretch that the data cover: a polynomial would fly off.
+            rows.append(legendre(inside) + (x - inside) * legendre.deriv()(inside))
+        return np.stack(rows[: self.count])

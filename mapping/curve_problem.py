@@ -1,0 +1,175 @@
+"""The posteriors of features along a curve: ridges, grooves and steps."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.chart import Chart, chart_along
+from mapping.curve_modes import CurveModes
+from mapping.feature import Feature
+from mapping.hollow_shape import GrooveShape
+from mapping.priors import Normal, Prior, Uniform
+from mapping.problem import Problem, Sizes, Surroundings, pose, sizes_of, window_for
+from mapping.ridge_shape import RidgeShape
+from mapping.smooth_axis import smooth_axis
+from mapping.spot_problem import height_prior, hollow_priors, radius_prior
+from mapping.step_shape import StepShape
+from mapping.target import Shape
+from mapping.window import Window
+
+FloatArray = NDArray[np.float64]
+
+# Chords of the chart may sag by this share of the feature's height.
+SAG = 0.005
+MOST_LEGS = 300
+HIGHEST_MODE = 8
+
+
+def curve_problem(feature: Feature, around: Surroundings) -> Problem:
+    """Pose the posterior of a ridge, groove or step."""
+    sizes = sizes_of(feature, around.trace.tip_radius)
+    axis, normals, crossings = _axis_of(feature, sizes, around)
+    line, degree = smooth_axis(axis, sizes.position_sd)
+    lift = _normals_along(line, axis, normals)
+    chart = _chart(line, lift, feature, sizes, crossings, degree, around)
+    ends = chart.coordinates(axis[[0, -1]])[0]
+    modes = _modes(chart, ends, degree, crossings, sizes)
+    window = window_for(_crest(chart, around.trace.tip_radius, sizes), sizes, around)
+    shape = _shape(feature.kind, window, chart, modes, ends, crossings, sizes, around)
+    return pose(feature, sizes, shape, window, around, _beginnings(shape, chart, sizes, feature.kind))
+
+
+def _axis_of(feature: Feature, sizes: Sizes, around: Surroundings) -> tuple[FloatArray, FloatArray, int]:
+    """Axis, normals and number of crossings; a single crossing gets a short axis across its sweep."""
+    axis, normals = np.asarray(feature.axis), np.asarray(feature.normals)
+    if len(axis) > 1 and np.ptp(axis, axis=0).max() > 0.0:
+        return axis, normals, max(feature.evidence.crossings, 2 if len(axis) == 2 else len(axis))
+    window = window_for(axis[:1] + around.trace.tip_radius * normals[:1], sizes, around)
+    nearest = int(np.argmin(np.linalg.norm(window.feet - axis[0], axis=1)))
+    across = np.cross(normals[0], window.tangents[nearest])
+    half = 0.5 * sizes.half_width * across / max(float(np.linalg.norm(across)), np.finfo(float).tiny)
+    return np.stack([axis[0] - half, axis[0] + half]), np.repeat(normals[:1], 2, axis=0), 1
+
+
+def _normals_along(line: FloatArray, axis: FloatArray, normals: FloatArray) -> FloatArray:
+    from scipy.spatial import cKDTree
+
+    return np.asarray(normals[cKDTree(axis).query(line)[1]])
+
+
+def _chart(
+    line: FloatArray,
+    lift: FloatArray,
+    feature: Feature,
+    sizes: Sizes,
+    crossings: int,
+    degree: int,
+    around: Surroundings,
+) -> Chart:
+    """The chart along the line, extended to where the ends may be, with legs as long as its curvature allows."""
+    length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    extension = 0.0 if feature.kind == "step" else max(6.0 * sizes.half_width, 1.5 * length / max(crossings - 1, 1))
+    tip = around.trace.tip_radius
+
+    def build(spacing: float) -> Chart:
+        return chart_along(line, lift, around.base, tip, spacing, extension, sizes.half_width)
+
+    trial = build((length + 2.0 * extension) / 64.0)
+    turn = np.linalg.norm(np.diff(trial.tangents, axis=0), axis=1).max(initial=0.0)
+    curvature = turn / (trial.length / max(len(trial.s) - 1, 1))
+    if curvature * trial.length < 1e-6 and degree == 1:
+        return build(max(length, 1e-9))
+    spacing = float(np.sqrt(8.0 * SAG * sizes.height / max(curvature, 1e-12)))
+    return build(min(max(spacing, trial.length / MOST_LEGS), trial.length / 16.0))
+
+
+def _modes(chart: Chart, ends: FloatArray, degree: int, crossings: int, sizes: Sizes) -> CurveModes:
+    if chart.closed:
+        highest = max(0, min(degree, (crossings - 1) // 2, HIGHEST_MODE // 2))
+        return CurveModes(highest, 0.5 * chart.length, 0.5 * chart.length, True)
+    reach = max(0.5 * abs(float(ends[1] - ends[0])), 0.5 * sizes.half_width)
+    highest = min(max(degree, 1), max(crossings - 1, 1), HIGHEST_MODE)
+    return CurveModes(highest, float(ends.mean()), reach, False)
+
+
+def _crest(chart: Chart, tip_radius: float, sizes: Sizes) -> FloatArray:
+    """Points along the chart one tip radius above the base, close enough together to measure distances from."""
+    count = max(2, int(np.ceil(chart.length / (0.25 * sizes.half_width))) + 1)
+    points, _, normals, _ = chart.at(np.linspace(chart.s[0], chart.s[-1], count))
+    return np.asarray(points + tip_radius * normals)
+
+
+def _shape(
+    kind: str,
+    window: Window,
+    chart: Chart,
+    modes: CurveModes,
+    ends: FloatArray,
+    crossings: int,
+    sizes: Sizes,
+    around: Surroundings,
+) -> Shape:
+    tip = around.trace.tip_radius
+    priors = list(_lateral_priors(modes, crossings, sizes))
+    start, step = [0.0] * modes.count, list(0.02 * sizes.half_width * modes.scale)
+    if kind == "step":
+        priors.append(height_prior(sizes))
+        start, step = [*start, sizes.height], [*step, 0.02 * sizes.height]
+        sides = [
+            StepShape(window, chart, modes, tip, side, tuple(priors), np.array(start), np.array(step))
+            for side in (-1.0, 1.0)
+        ]
+        return max(sides, key=lambda shape: _rough_fit(shape, around))
+    if not chart.closed:
+        low, high = float(chart.s[0]), float(chart.s[-1])
+        middle = min(max(float(ends.mean()), low + 1e-3 * (high - low)), high - 1e-3 * (high - low))
+        priors += [Uniform(low, middle), Uniform(middle, high)]
+        start, step = [*start, float(ends.min()), float(ends.max())], [*step, *[0.1 * sizes.half_width] * 2]
+    if kind == "ridge":
+        priors += [height_prior(sizes), radius_prior(sizes, tip)]
+        start, step = [*start, sizes.height, np.log(sizes.radius)], [*step, 0.02 * sizes.height, 0.1]
+        return RidgeShape(window, chart, modes, tip, tuple(priors), np.array(start), np.array(step))
+    priors += hollow_priors(sizes, tip)
+    start, step = [*start, np.log(2.0 * sizes.radius), np.log(2.0 * sizes.height)], [*step, 0.02, 0.05]
+    return GrooveShape(window, chart, modes, tip, tuple(priors), np.array(start), np.array(step))
+
+
+def _rough_fit(shape: StepShape, around: Surroundings) -> float:
+    """Correlation of a step's template with the data, each run's mean taken out."""
+    template, height = shape.templates(shape.start[None])[0], shape.window.height
+    total = 0.0
+    for start, stop in zip(shape.window.starts[:-1], shape.window.starts[1:], strict=True):
+        total += float((template[start:stop] - template[start:stop].mean()) @ height[start:stop])
+    return total
+
+
+def _lateral_priors(modes: CurveModes, crossings: int, sizes: Sizes) -> list[Prior]:
+    """Within 1.5 half widths of where it was detected; the heading of a single crossing may be anything to 60 deg."""
+    bound = 1.5 * sizes.half_width
+    priors: list[Prior] = []
+    for name in modes.names:
+        if name == "offset":
+            priors.append(Uniform(-bound, bound))
+        elif name == "heading":
+            limit = 1.7 if crossings < 2 else max(2.0 * bound / modes.reach, 0.1)
+            priors.append(Uniform(-limit, limit))
+        else:
+            priors.append(Normal(0.0, 0.5 * sizes.half_width))
+    return priors
+
+
+def _beginnings(shape: Shape, chart: Chart, sizes: Sizes, kind: str) -> FloatArray:
+    """Starts that differ in the section, and in the ends."""
+    start = shape.start
+    starts = [start]
+    if kind != "step":
+        section = start.copy()
+        section[-1] = np.log(4.0 * sizes.radius) if kind == "ridge" else np.log(sizes.height)
+        starts.append(section)
+        if not chart.closed:
+            for out in (-0.5, 0.5, 1.0):
+                moved = start.copy()
+                moved[-4:-2] += out * sizes.half_width * np.array([-1.0, 1.0])
+                starts.append(moved)
+    return np.array(starts)

@@ -1,0 +1,43 @@
+"""The closed-form trace of a found feature over given points of the base."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.feature import Feature
+from mapping.section import radius_of_cap
+from mapping.shapes import chain_height, rim_height
+
+FloatArray = NDArray[np.float64]
+
+
+def feature_trace(feature: Feature, feet: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
+    """(N,) heights that the feature's median shape leaves on the trace, m; 0 for kinds without a closed form here.
+
+    Args:
+        feature: any feature; ridges and bumps are chains of capsules, grooves and pits rest the ball on their rim.
+        feet: (N, 3) points of the base, m.
+        normals: (N, 3) outward unit normals there.
+        tip_radius: radius of the fingertip, m.
+    """
+    height, width = feature.height.median, max(feature.width.median, 1e-12)
+    if feature.kind in ("ridge", "bump") and height > 0.0:
+        radius = float(feature.extra.get("radius", radius_of_cap(height, width)))
+        return chain_height(feet, normals, feature.axis + (height - radius) * feature.normals, radius, tip_radius)
+    if feature.kind in ("groove", "pit") and height < 0.0:
+        return rim_height(0.5 * width - _distance(feet, feature.axis), tip_radius, -height)
+    return np.zeros(len(feet))
+
+
+def _distance(points: FloatArray, axis: FloatArray) -> FloatArray:
+    """(N,) distances of points from a polyline (K, 3), m."""
+    best = np.linalg.norm(points - axis[0], axis=1)
+    for start, end in itertools.pairwise(axis):
+        leg = end - start
+        square = max(float(leg @ leg), np.finfo(float).tiny)
+        share = np.clip((points - start) @ leg / square, 0.0, 1.0)
+        best = np.minimum(best, np.linalg.norm(points - start - share[:, None] * leg, axis=1))
+    return np.asarray(best)

@@ -1,0 +1,185 @@
+"""Refine: from a detected feature and the trace to its posterior, and to the feature that the draws describe."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.base import Base
+from mapping.feature import Feature
+from mapping.importance import TRUSTED_K_HAT, Importance, importance_sample
+from mapping.laplace import find_optimum, laplace
+from mapping.misfit import account_for_misfit
+from mapping.noise import Noise
+from mapping.posterior import Posterior
+from mapping.problem import Problem, Surroundings
+from mapping.psis import resample
+from mapping.sampling import WALKERS, Chain, sample_ensemble
+from mapping.summary import describe
+from mapping.trace import Trace
+from mapping.trace_noise import noise_of_trace
+
+FloatArray = NDArray[np.float64]
+
+# Kinds that have a closed-form trace here; the others are reported as detected.
+SAMPLED_KINDS = ("bump", "ridge", "pit", "groove", "step")
+KEPT_DRAWS = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A posed problem, solved.
+
+    Args:
+        problem: as it was finally posed (noise adapted to the misfit, if any).
+        posterior: draws and their trustworthiness.
+        importance: the fast answer, with its evidence.
+        chain: what emcee did, or None if it did not run.
+    """
+
+    problem: Problem
+    posterior: Posterior
+    importance: Importance
+    chain: Chain | None
+
+
+def sample_posterior(
+    feature: Feature,
+    trace: Trace,
+    rng: np.random.Generator,
+    *,
+    base: Base | None = None,
+    noise: Noise | None = None,
+    others: Sequence[Feature] = (),
+    confirm: bool = True,
+) -> Posterior:
+    """Draws of a feature's parameters given the trace.
+
+    The optimum, a Laplace approximation and adapted importance sampling give the answer in milliseconds and say by
+    k-hat whether it can be trusted; emcee confirms it (theory section 8).
+
+    Args:
+        feature: as detected: kind, axis, preliminary height and width.
+        trace: the whole trace; only the samples near the feature are used.
+        rng: all randomness comes from here: the same state gives the same draws.
+        base: the global model; fitted to the trace if None.
+        noise: level and correlation of a sample; estimated from the trace if None.
+        others: features near by, which the trace also shows (the feature itself may be among them).
+        confirm: False to stop at importance sampling where its k-hat is below 0.5.
+
+    Raises:
+        MappingError: a kind that has no closed form, or no sample near the feature.
+    """
+    return solve(feature, trace, rng, base=base, noise=noise, others=others, confirm=confirm).posterior
+
+
+def refine(
+    feature: Feature,
+    trace: Trace,
+    rng: np.random.Generator,
+    *,
+    base: Base | None = None,
+    noise: Noise | None = None,
+    others: Sequence[Feature] = (),
+    confirm: bool = True,
+) -> Feature:
+    """The feature with posterior, intervals and axis from the draws; arguments as for `sample_posterior`.
+
+    Kinds without a closed form ("convex edge", "concave corner") come back as they are, with a note.
+    """
+    if feature.kind not in SAMPLED_KINDS:
+        note = f"no posterior: a {feature.kind} has no closed-form trace"
+        return replace(feature, notes=(*feature.notes, note))
+    base = base or _fitted(trace)
+    solution = solve(feature, trace, rng, base=base, noise=noise, others=others, confirm=confirm)
+    return describe(solution.problem, solution.posterior, base)
+
+
+def solve(
+    feature: Feature,
+    trace: Trace,
+    rng: np.random.Generator,
+    *,
+    base: Base | None = None,
+    noise: Noise | None = None,
+    others: Sequence[Feature] = (),
+    confirm: bool = True,
+) -> Solution:
+    """Pose and solve a feature's posterior; arguments as for `sample_posterior`."""
+    base = base or _fitted(trace)
+    noise = noise or noise_of_trace(trace, base)
+    problem = pose_problem(feature, Surroundings(trace, base, noise, others))
+    return solve_problem(problem, rng, confirm=confirm)
+
+
+def pose_problem(feature: Feature, around: Surroundings) -> Problem:
+    """The posterior density of a feature of any kind that has a closed form."""
+    from mapping.curve_problem import curve_problem
+    from mapping.errors import MappingError
+    from mapping.spot_problem import spot_problem
+
+    if feature.kind in ("bump", "pit"):
+        return spot_problem(feature, around)
+    if feature.kind in ("ridge", "groove", "step"):
+        return curve_problem(feature, around)
+    raise MappingError(f"no posterior for a {feature.kind!r}: closed-form traces exist for {', '.join(SAMPLED_KINDS)}")
+
+
+def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool = True) -> Solution:
+    """Optimum, misfit, importance sampling, and emcee where it is wanted or needed."""
+    optimum = find_optimum(problem.target, problem.beginnings)
+    problem, optimum = account_for_misfit(problem, optimum)
+    fast = importance_sample(problem.target, laplace(problem.target, optimum), rng)
+    if not confirm and fast.k_hat < TRUSTED_K_HAT:
+        return Solution(problem, _from_importance(problem, fast, rng), fast, None)
+    walkers = max(WALKERS, 2 * (2 * len(optimum) + 1))
+    starts = _starts(problem, fast, optimum, rng, walkers)
+    chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal)
+    return Solution(problem, _from_chain(problem, fast, chain, rng), fast, chain)
+
+
+def _starts(
+    problem: Problem, fast: Importance, optimum: FloatArray, rng: np.random.Generator, walkers: int
+) -> FloatArray:
+    """Walkers at weighted draws, pulled apart a little so that no two coincide."""
+    target = problem.target
+    starts = fast.draws[resample(rng, fast.weights, walkers)]
+    jitter = 0.1 * (fast.draws[rng.permutation(len(fast.draws))[:walkers]] - fast.proposal.mean)
+    moved = np.clip(starts + jitter, target.low, target.high)
+    sound = np.isfinite(target.log_density(moved))
+    return np.where(sound[:, None], moved, starts)
+
+
+def _from_importance(problem: Problem, fast: Importance, rng: np.random.Generator) -> Posterior:
+    shape = problem.target.shape
+    samples = fast.draws[resample(rng, fast.weights, KEPT_DRAWS)]
+    reason = f"importance sampling of the Laplace approximation has k-hat {fast.k_hat:.2f} < {TRUSTED_K_HAT}"
+    nan = float("nan")
+    return Posterior(shape.names, shape.units, samples, nan, nan, "not needed", reason, fast.k_hat, fast.ess)
+
+
+def _from_chain(problem: Problem, fast: Importance, chain: Chain, rng: np.random.Generator) -> Posterior:
+    shape = problem.target.shape
+    samples = chain.samples
+    if len(samples) > 4 * KEPT_DRAWS:
+        samples = samples[np.sort(rng.permutation(len(samples))[: 4 * KEPT_DRAWS])]
+    return Posterior(
+        shape.names,
+        shape.units,
+        samples,
+        chain.tau,
+        chain.acceptance,
+        chain.status,
+        chain.reason,
+        fast.k_hat,
+        chain.ess,
+    )
+
+
+def _fitted(trace: Trace) -> Base:
+    from mapping.base_fit import fit_base
+
+    return fit_base(trace)

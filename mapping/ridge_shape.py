@@ -1,0 +1,107 @@
+"""RidgeShape: a ridge of round section along a curve on the base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.chart import Chart
+from mapping.curve_modes import CurveModes
+from mapping.priors import Prior
+from mapping.window import Window
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# Legs of the chart on either side of the nearest one that a bin looks at.
+NEIGHBOURS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class RidgeShape:
+    """Capsule chains: lateral modes of the axis, its two ends along the chart, height and log radius.
+
+    The ends are distances along one curve, each with its own range, so they cannot swap. A closed ridge has none.
+
+    Args:
+        window: the bins.
+        chart: the reference curve on the base, longer than the ridge.
+        modes: lateral course of the axis over the chart.
+        tip_radius: radius of the fingertip, m.
+        priors, start, step: as in `Shape`.
+    """
+
+    window: Window
+    chart: Chart
+    modes: CurveModes
+    tip_radius: float
+    priors: tuple[Prior, ...]
+    start: FloatArray
+    step: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        ends = () if self.chart.closed else ("start", "end")
+        return (*self.modes.names, *ends, "height", "log radius")
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        ends = () if self.chart.closed else ("m", "m")
+        return (*self.modes.units, *ends, "m", "ln m")
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights over the base's trace, m."""
+        from mapping.chain_kernels import chain_heights
+
+        window = self.window
+        radius = np.exp(theta[:, -1])
+        out = np.empty((len(theta), len(window)))
+        first, last = self._candidates
+        chain_heights(
+            window.feet,
+            window.normals,
+            window.tangents,
+            window.half,
+            first,
+            last,
+            self.chains(theta, theta[:, -2] - radius),
+            radius,
+            self.tip_radius,
+            out,
+        )
+        return out
+
+    def chains(self, theta: FloatArray, lift: FloatArray) -> FloatArray:
+        """(W, K, 3) axes at `lift` (W,) over the base, m; vertices beyond an end stand at the end."""
+        chart = self.chart
+        lateral = self.modes.lateral(theta[:, : self.modes.count], chart.s)
+        axes = _lifted(chart.points, chart.laterals, chart.normals, chart.bend, lateral, lift[:, None])
+        if not chart.closed:
+            for side, s in enumerate((theta[:, -4], theta[:, -3])):
+                points, laterals, normals, bend = chart.at(s)
+                aside = self.modes.lateral_at(theta[:, : self.modes.count], s)
+                end = _lifted(points, laterals, normals, bend, aside, lift)
+                beyond = chart.s[None, :] < s[:, None] if side == 0 else chart.s[None, :] > s[:, None]
+                axes = np.where(beyond[..., None], end[:, None, :], axes)
+        return np.ascontiguousarray(axes)
+
+    @cached_property
+    def _candidates(self) -> tuple[IntArray, IntArray]:
+        leg = self.chart.coordinates(self.window.feet)[2]
+        return np.maximum(leg - NEIGHBOURS, 0), np.minimum(leg + 1 + NEIGHBOURS, len(self.chart.s) - 1)
+
+
+def _lifted(
+    points: FloatArray,
+    laterals: FloatArray,
+    normals: FloatArray,
+    bend: FloatArray,
+    aside: FloatArray,
+    lift: FloatArray,
+) -> FloatArray:
+    """Points `aside` of the chart along the base (to second order in its bend) and `lift` above it, m."""
+    out = points + (aside * (1.0 + lift * bend))[..., None] * laterals
+    return np.asarray(out + (lift - 0.5 * bend * aside**2)[..., None] * normals)

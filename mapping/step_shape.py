@@ -1,0 +1,57 @@
+"""StepShape: an upright step along a curve on the base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.chart import Chart
+from mapping.curve_modes import CurveModes
+from mapping.hollow_shape import bin_nodes
+from mapping.priors import Prior
+from mapping.shapes import step_height
+from mapping.window import Window
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class StepShape:
+    """Steps of height h < r: lateral modes of the edge, and the height.
+
+    `high_side` is +1 if the chart's lateral side is the high one, else -1. Whether the base lies low or high does
+    not matter: the height of the base under each run is marginalised.
+    """
+
+    window: Window
+    chart: Chart
+    modes: CurveModes
+    tip_radius: float
+    high_side: float
+    priors: tuple[Prior, ...]
+    start: FloatArray
+    step: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.modes.names, "height")
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return (*self.modes.units, "m")
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights over the low side's trace, m."""
+        s, lateral = self._places
+        edge = self.modes.lateral(theta[:, : self.modes.count], s.ravel()).reshape(len(theta), *s.shape)
+        x = self.high_side * (lateral[None] - edge)
+        return np.asarray(step_height(x, theta[:, -1, None, None], self.tip_radius).mean(axis=2))
+
+    @cached_property
+    def _places(self) -> tuple[FloatArray, FloatArray]:
+        nodes = bin_nodes(self.window)
+        s, lateral, _ = self.chart.coordinates(nodes.reshape(-1, 3))
+        return s.reshape(nodes.shape[:2]), lateral.reshape(nodes.shape[:2])

@@ -1,0 +1,68 @@
+"""Compiled whitening of binned traces: one pass of a scalar Kalman filter, O(n) per template."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@njit(cache=True)
+def whiten(
+    values: FloatArray, starts: IntArray, carry: FloatArray, observe: FloatArray, gain: FloatArray, scale: FloatArray
+) -> FloatArray:
+    """Innovations over their standard deviation of W series (W, n); the filter begins anew at each of `starts`.
+
+    m' = carry m + gain v, v = y - observe m: the gains do not depend on the data.
+    """
+    walkers, n = values.shape
+    out = np.empty((walkers, n))
+    for w in range(walkers):
+        for run in range(len(starts) - 1):
+            state = 0.0
+            for i in range(starts[run], starts[run + 1]):
+                innovation = values[w, i] - observe[i] * state
+                state = carry[i] * state + gain[i] * innovation
+                out[w, i] = innovation * scale[i]
+    return out
+
+
+@njit(cache=True)
+def chi_square(white: FloatArray, starts: IntArray, basis: FloatArray, shrink: FloatArray) -> FloatArray:
+    """(W,) squared lengths of whitened series after the nuisance of each run is marginalised.
+
+    |e|^2 - sum_j g_j^2 (u_j . e)^2 with the orthonormal columns u_j of `basis` (n, Q) within each run and
+    `shrink` (runs, Q) holding g_j^2.
+    """
+    walkers = white.shape[0]
+    count = basis.shape[1]
+    total = np.zeros(walkers)
+    for w in range(walkers):
+        for run in range(len(starts) - 1):
+            for i in range(starts[run], starts[run + 1]):
+                total[w] += white[w, i] * white[w, i]
+            for j in range(count):
+                dot = 0.0
+                for i in range(starts[run], starts[run + 1]):
+                    dot += white[w, i] * basis[i, j]
+                total[w] -= shrink[run, j] * dot * dot
+    return total
+
+
+@njit(cache=True)
+def project(white: FloatArray, starts: IntArray, basis: FloatArray, shrink: FloatArray) -> None:
+    """Take the marginalised nuisance out of whitened series (W, n) in place, so that |e|^2 is `chi_square`."""
+    walkers = white.shape[0]
+    count = basis.shape[1]
+    for w in range(walkers):
+        for run in range(len(starts) - 1):
+            for j in range(count):
+                dot = 0.0
+                for i in range(starts[run], starts[run + 1]):
+                    dot += white[w, i] * basis[i, j]
+                dot *= 1.0 - np.sqrt(max(0.0, 1.0 - shrink[run, j]))
+                for i in range(starts[run], starts[run + 1]):
+                    white[w, i] -= dot * basis[i, j]

@@ -1,0 +1,200 @@
+"""Window: the binned samples of a trace near one feature, all that its posterior depends on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.base import Base
+from mapping.errors import MappingError
+from mapping.trace import Trace
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# Samples are looked at in blocks of this many: the cost of the rest of a long log is that of its boxes.
+BLOCK = 64
+
+
+class EmptyWindowError(MappingError):
+    """No sample of the trace is near the feature."""
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Bins along each run of consecutive samples near a feature.
+
+    Args:
+        feet: (n, 3) mean foot points of the bins on the base, m, smoothed along the run.
+        normals: (n, 3) unit normals of the base there.
+        tangents: (n, 3) unit directions of the sweep.
+        height: (n,) mean height of the trace over the base's trace, m.
+        count: (n,) samples in the bin.
+        place: (n,) distance along the run of the bin's middle, m.
+        last: (n,) distance along the run of the bin's last sample, m.
+        half: (n,) half of the bin's extent, m.
+        starts: (runs + 1,) first bin of each run, and n.
+        spacing: typical distance between raw samples, m.
+        samples: number of raw samples behind the bins.
+    """
+
+    feet: FloatArray
+    normals: FloatArray
+    tangents: FloatArray
+    height: FloatArray
+    count: IntArray
+    place: FloatArray
+    last: FloatArray
+    half: FloatArray
+    starts: IntArray
+    spacing: float
+    samples: int
+
+    def __len__(self) -> int:
+        return len(self.height)
+
+    @property
+    def run(self) -> IntArray:
+        """(n,) number of the run that each bin belongs to."""
+        return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
+
+
+def samples_near(trace: Trace, points: FloatArray, reach: float) -> IntArray:
+    """Indices of the samples whose centres lie within `reach` of any of the points (K, 3), in order."""
+    from scipy.spatial import cKDTree
+
+    if len(trace) == 0:
+        return np.zeros(0, dtype=np.int64)
+    cuts = np.arange(0, len(trace), BLOCK)
+    low, high = np.minimum.reduceat(trace.centers, cuts), np.maximum.reduceat(trace.centers, cuts)
+    box_low, box_high = points.min(axis=0) - reach, points.max(axis=0) + reach
+    near = np.flatnonzero(((low <= box_high) & (high >= box_low)).all(axis=1))
+    tree = cKDTree(points)
+    middle, radius = 0.5 * (low[near] + high[near]), 0.5 * np.linalg.norm(high[near] - low[near], axis=1)
+    near = near[tree.query(middle)[0] <= reach + radius]
+    index = (near[:, None] * BLOCK + np.arange(BLOCK)).ravel()
+    index = index[index < len(trace)]
+    distance = tree.query(trace.centers[index], distance_upper_bound=reach)[0]
+    return np.asarray(index[np.isfinite(distance)])
+
+
+def open_window(
+    trace: Trace, base: Base, points: FloatArray, reach: float, width: float, noise_level: float, scale: float
+) -> Window:
+    """Bin the samples near a feature.
+
+    Args:
+        trace: the whole trace; the cost beyond the window is one look at the boxes of its blocks.
+        base: the global model.
+        points: (K, 3) crest of the feature lifted to the ball's centre, densely spaced, m.
+        reach: distance from it that still counts, m.
+        width: wanted length of a bin along the sweep, m.
+        noise_level: standard deviation of a sample, m: how far the path can be trusted.
+        scale: half width of the feature's disturbance, m: the path is smooth over a small part of it.
+
+    Raises:
+        EmptyWindowError: no sample is near.
+    """
+    index = samples_near(trace, points, reach)
+    if len(index) == 0:
+        raise EmptyWindowError(
+            f"no sample of the trace ({len(trace)} in all) lies within {reach:.3g} m of the feature at "
+            f"{np.array2string(points.mean(axis=0), precision=6)} m"
+        )
+    feet = base.foot(trace.centers[index], trace.tip_radius)
+    breaks = np.flatnonzero((np.diff(trace.sweep[index]) != 0) | (np.diff(index) > 1)) + 1
+    parts, spacings = [], []
+    for start, stop in zip([0, *breaks], [*breaks, len(index)], strict=True):
+        own = slice(int(start), int(stop))
+        path = distance_along(feet.points[own], noise_level)
+        spacings.append((float(path[-1] - path[0]), len(path)))
+        parts.append(_bins(feet.points[own], feet.normals[own], feet.height[own], path, width, noise_level, scale))
+    starts = np.concatenate([[0], np.cumsum([len(part[0]) for part in parts])])
+    joined = [np.concatenate([part[i] for part in parts]) for i in range(8)]
+    length, count = sum(s for s, _ in spacings), sum(max(n - 1, 0) for _, n in spacings)
+    return Window(*joined, starts.astype(np.int64), length / max(count, 1), len(index))
+
+
+def distance_along(points: FloatArray, noise_level: float) -> FloatArray:
+    """(N,) distance travelled along one run, from means of blocks so long that noise cannot lengthen it."""
+    count = len(points)
+    chord = float(np.linalg.norm(np.ptp(points, axis=0)))
+    blocks = count
+    if noise_level > 0.0:
+        blocks = int((chord * np.sqrt(count) / (5.0 * noise_level)) ** (2.0 / 3.0))
+    blocks = min(max(blocks, 2), count)
+    if blocks < 2 or chord == 0.0:
+        return np.zeros(count)
+    edges = np.linspace(0, count, blocks + 1).astype(np.int64)
+    sizes = np.diff(edges)
+    means = np.add.reduceat(points, edges[:-1]) / sizes[:, None]
+    centre = edges[:-1] + 0.5 * (sizes - 1)
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(means, axis=0), axis=1))])
+    index = np.arange(count)
+    along = np.interp(index, centre, travelled)
+    first, final = np.diff(travelled[:2])[0], np.diff(travelled[-2:])[0]
+    along += np.minimum(index - centre[0], 0.0) * first / (centre[1] - centre[0])
+    along += np.maximum(index - centre[-1], 0.0) * final / (centre[-1] - centre[-2])
+    return np.asarray(along - along[0])
+
+
+def _bins(
+    points: FloatArray,
+    normals: FloatArray,
+    height: FloatArray,
+    path: FloatArray,
+    width: float,
+    noise_level: float,
+    scale: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray, FloatArray]:
+    cell = np.floor(path / width).astype(np.int64)
+    edges = np.flatnonzero(np.diff(cell, prepend=-1))
+    count = np.diff(np.append(edges, len(path)))
+    feet = np.add.reduceat(points, edges) / count[:, None]
+    mean_normals = np.add.reduceat(normals, edges)
+    place = np.add.reduceat(path, edges) / count
+    last = path[edges + count - 1]
+    spacing = float(path[-1]) / max(len(path) - 1, 1)
+    extent = last - path[edges] + spacing
+    if noise_level > 0.0:
+        feet, mean_normals = _smooth(feet, width, scale), _smooth(mean_normals, width, scale)
+    mean_normals = mean_normals / np.linalg.norm(mean_normals, axis=1, keepdims=True)
+    mean_height = np.add.reduceat(height, edges) / count
+    if noise_level > 0.0:
+        mean_height, count = _without_spikes(height, edges, count, mean_height, noise_level)
+    return feet, mean_normals, _tangents(feet), mean_height, count, place, last, 0.5 * extent
+
+
+def _without_spikes(
+    height: FloatArray, edges: IntArray, count: IntArray, mean: FloatArray, noise_level: float
+) -> tuple[FloatArray, IntArray]:
+    """Means and counts without single samples far outside their bin (a knock, a lost bit)."""
+    bins = np.repeat(np.arange(len(edges)), count)
+    order = np.lexsort((height, bins))
+    middle = height[order][edges + count // 2]
+    spike = (np.abs(height - middle[bins]) > 6.0 * noise_level) & (count[bins] >= 5)
+    if not spike.any():
+        return mean, count
+    kept = np.where(spike, 0.0, height)
+    left = count - np.add.reduceat(spike.astype(np.int64), edges)
+    return np.add.reduceat(kept, edges) / np.maximum(left, 1), np.maximum(left, 1)
+
+
+def _smooth(values: FloatArray, width: float, scale: float) -> FloatArray:
+    """Local parabolas over a quarter of the feature's half width: the path's own noise goes, its course stays."""
+    from scipy.signal import savgol_filter
+
+    half = min(int(0.25 * scale / width), (len(values) - 1) // 2)
+    if half < 2:
+        return values
+    return np.asarray(savgol_filter(values, 2 * half + 1, 2, axis=0))
+
+
+def _tangents(feet: FloatArray) -> FloatArray:
+    if len(feet) < 2:
+        return np.zeros_like(feet)
+    along = np.gradient(feet, axis=0)
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    return np.asarray(np.divide(along, length, out=np.zeros_like(along), where=length > 0))
