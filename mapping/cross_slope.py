@@ -5,36 +5,42 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.sweep_tangents import unit
+from mapping.sweep_tangents import lagrange, unit
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-REACH = 2
+# Rows to either side that are looked at.
+REACH = 4
+# A one-sided polynomial must be smoother than the others by this factor.
+CENTRAL = 1.25
+# A higher term must be smaller than the curvature by this factor, or it speaks of a kink.
+FALLING = 0.1
 
 
-def cross_tangents(points: FloatArray, along: FloatArray, outward: FloatArray, rows: list[IntArray]) -> FloatArray:
-    """(N, 3) unit tangents of the traced surface across the sweeps `rows`.
+def cross_tangents(
+    points: FloatArray, along: FloatArray, outward: FloatArray, rows: list[IntArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Unit tangents (N, 3) of the traced surface across the sweeps `rows`, and its curvature (N,) across, 1/m.
 
-    The surface is cut at each sample by the plane perpendicular to the sweep; the neighbouring rows cross
-    it in up to five points, whose parabolas (left, central or right, the smoothest of them; the quartic where all
-    agree) give the slope. A kink that runs along the sweeps therefore stays on its own side.
+    The surface is cut at each sample by the plane perpendicular to the sweep, which the neighbouring rows cross
+    in a few points; their interpolant gives the slope. The curvature is NaN, and the
+    tangent meaningless, where fewer than two neighbours are crossed.
     """
     across = unit(np.cross(outward, along))
     up = np.cross(along, across)
     up *= np.sign(np.einsum("ij,ij->i", up, outward))[:, None]
-    slope = np.zeros(len(points))
+    slope, bend = np.full(len(points), np.nan), np.full(len(points), np.nan)
     for j, row in enumerate(rows):
-        offsets = np.full((len(row), 2 * REACH + 1, 2), np.nan)
-        offsets[:, REACH] = 0.0
+        v, w = np.full((2, len(row), 2 * REACH + 1), np.nan)
+        v[:, REACH] = w[:, REACH] = 0.0
         for shift in range(-REACH, REACH + 1):
             if shift and 0 <= j + shift < len(rows):
-                hits = _crossings(points[row], along[row], points[rows[j + shift]])
-                arm = hits - points[row]
-                offsets[:, REACH + shift, 0] = np.einsum("ij,ij->i", arm, across[row])
-                offsets[:, REACH + shift, 1] = np.einsum("ij,ij->i", arm, up[row])
-        slope[row] = _slope(offsets)
-    return unit(across + slope[:, None] * up)
+                arm = _crossings(points[row], along[row], points[rows[j + shift]]) - points[row]
+                v[:, REACH + shift] = np.einsum("ij,ij->i", arm, across[row])
+                w[:, REACH + shift] = np.einsum("ij,ij->i", arm, up[row])
+        slope[row], bend[row] = smooth_slope(v, w)
+    return unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5
 
 
 def _crossings(points: FloatArray, normals: FloatArray, line: FloatArray) -> FloatArray:
@@ -57,26 +63,38 @@ def _crossings(points: FloatArray, normals: FloatArray, line: FloatArray) -> Flo
     return np.where((within & monotone & ~ended)[:, None], found, np.nan) + points
 
 
-def _slope(offsets: FloatArray) -> FloatArray:
-    """Derivative at zero of heights w(v) given as (N, 5, 2) offsets, NaN where a row is missing."""
-    v, w = offsets[..., 0], offsets[..., 1]
-    slopes, bends = [], []
-    with np.errstate(all="ignore"):  # missing rows are NaN, and every NaN is dealt with below
-        first = (w[:, 1:] - w[:, :-1]) / (v[:, 1:] - v[:, :-1])
-        for k in range(3):
-            second = (first[:, k + 1] - first[:, k]) / (v[:, k + 2] - v[:, k])
-            slopes.append(first[:, k] + second * (-v[:, k] - v[:, k + 1]))
-            bends.append(np.abs(second))
-        bend = np.where(np.isnan(np.stack(bends, 1)), np.inf, np.stack(bends, 1)) * np.array([3.0, 1.0, 3.0])
-        best = np.stack(slopes, 1)[np.arange(len(v)), bend.argmin(axis=1)]
-        quartic = _quartic_slope(v, w)
-        smooth = np.stack(bends, 1).max(axis=1) < 2 * np.stack(bends, 1).min(axis=1)
-        linear = np.where(np.isnan(first[:, REACH]), first[:, REACH - 1], first[:, REACH])
-    slope = np.where(smooth & np.isfinite(quartic), quartic, np.where(np.isfinite(best), best, linear))
-    return np.where(np.isfinite(slope), slope, 0.0)
+def smooth_slope(v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """First and second derivative at the middle column of heights w(v), both (N, 2 k + 1), NaN where missing.
+
+    Essentially non-oscillatory (Harten et al. 1987): of all quartics, cubics and parabolas through the middle and
+    its neighbours, the one of highest degree whose last term is small beside its curvature. A kink that runs along
+    the sweeps therefore stays outside, even where it mimics a curvature in three rows.
+    """
+    middle = v.shape[1] // 2
+    with np.errstate(invalid="ignore", divide="ignore"):  # missing rows are NaN and lose every comparison
+        table = [w]
+        for order in range(1, 5):
+            table.append(np.diff(table[-1], axis=1) / (v[:, order:] - v[:, :-order]))
+        slope, bend, _ = _polynomial(v, w, table, 2, middle)
+        for order in (3, 4):
+            candidate, curved, falling = _polynomial(v, w, table, order, middle)
+            slope, bend = np.where(falling, candidate, slope), np.where(falling, curved, bend)
+    return slope, bend
 
 
-def _quartic_slope(v: FloatArray, w: FloatArray) -> FloatArray:
-    from mapping.sweep_tangents import lagrange
-
-    return np.asarray(np.einsum("km,km->k", lagrange(v, np.zeros(len(v)))[1], w))
+def _polynomial(
+    v: FloatArray, w: FloatArray, table: list[FloatArray], order: int, middle: int
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Slope and curvature of the smoothest polynomial of that order, and whether its last term is small."""
+    index = np.arange(len(v))
+    size = np.abs(table[order][:, middle - order : middle + 1])
+    size = np.where(np.isnan(size), np.inf, size) * np.r_[CENTRAL, np.ones(order - 1), CENTRAL]
+    first = middle - order + size.argmin(axis=1)
+    nodes = first[:, None] + np.arange(order + 1)
+    at, heights = np.take_along_axis(v, nodes, 1), np.take_along_axis(w, nodes, 1)
+    slope = np.einsum("km,km->k", lagrange(at, np.zeros(len(v)))[1], heights)
+    inner = np.clip(middle - 1, first, first + order - 2)
+    bend = 2 * table[2][index, inner]
+    spacing = (at[:, -1] - at[:, 0]) / order
+    last = np.abs(table[order][index, first]) * np.abs(spacing) ** (order - 2)
+    return slope, bend, last <= FALLING * np.abs(bend)

@@ -11,7 +11,7 @@ from mapping.estimate import BRIDGED, EXTRAPOLATED, LABELS, TOUCHED, EnvelopeErr
 from mapping.noise import Noise
 from mapping.penetration import penetration
 from mapping.surface import Surface
-from mapping.sweep_mesh import parallel_rows, pitch, sweep_faces, thinned
+from mapping.sweep_mesh import pitch, sweep_faces, thinned
 from mapping.trace import Trace
 
 __all__ = ["BRIDGED", "EXTRAPOLATED", "LABELS", "TOUCHED", "EnvelopeError", "Estimate", "estimate_surface"]
@@ -60,14 +60,21 @@ def estimate_surface(
         raise EnvelopeError("cannot estimate a surface from a trace of no samples")
     if method == "contact" and trace.normals is None:
         raise EnvelopeError("method 'contact' needs recorded contact normals; this trace has positions alone")
-    slack = TOLERANCE * trace.tip_radius
+    away, slack = _outward(trace, base, outward), TOLERANCE * trace.tip_radius
+    smoothed = None
     if noise is not None and noise.sd > 0:
         from mapping.smoothing import smooth
 
-        smoothed = smooth(trace, noise)
-        trace, slack = smoothed.trace, max(slack, 4 * smoothed.sd)
-    away = _outward(trace, base, outward)
+        smoothed = smooth(trace, noise, outward=away)
+        trace, away = smoothed.trace, away[smoothed.sample]
+        slack = max(slack, 4 * smoothed.sd)
     row, sweep, sample = _contacts(trace, method, away)
+    labels = row.labels.copy()
+    if smoothed is not None:
+        # At the scale of smoothing, dents beyond half the tip's own curvature look like kinks.
+        own = sample >= 0
+        labels[own] = np.where(smoothed.curvature[sample[own]] * trace.tip_radius < -1, BRIDGED, labels[own])
+        sample = np.where(own, smoothed.sample[sample], -1)
     points = row.centers - trace.tip_radius * row.normals
     possible = penetration(points, trace.centers, trace.tip_radius) <= slack
     if not possible.any():
@@ -76,9 +83,7 @@ def estimate_surface(
     kept = np.flatnonzero(possible)
     kept = kept[thinned(row.centers[kept], sweep[kept], step, row.sample[kept] < 0)]
     surface = _mesh(row.centers[kept], points[kept], sweep[kept], row.normals[kept])
-    return Estimate(
-        surface, points[kept], row.normals[kept], row.centers[kept], row.labels[kept], sample[kept], sweep[kept]
-    )
+    return Estimate(surface, points[kept], row.normals[kept], row.centers[kept], labels[kept], sample[kept], sweep[kept])
 
 
 def _outward(trace: Trace, base: Base | None, outward: ArrayLike | None) -> FloatArray:

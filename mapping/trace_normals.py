@@ -28,17 +28,21 @@ def surface_normals(
     along = np.zeros_like(trace.centers)
     along[sample[sample >= 0]] = row.tangents[sample >= 0]
     rows = parallel_rows(trace.centers, trace.sweep)
-    if rows is not None:
-        across = cross_tangents(trace.centers, along, outward, rows)
+    if rows is None:
+        across = _fitted(trace, trace.centers, along, outward)
     else:
-        across = _fitted(trace, along, outward)
+        across, bend = cross_tangents(trace.centers, along, outward, rows)
+        lost = np.isnan(bend)
+        across[lost] = _fitted(trace, trace.centers[lost], along[lost], outward[lost])
     normals = unit(np.cross(row.tangents, across[nearest]))
     side = np.sign(np.einsum("ij,ij->i", normals, outward[nearest]))
     return np.where((side == 0)[:, None], row.normals, normals * side[:, None])
 
 
-def _fitted(trace: Trace, along: FloatArray, outward: FloatArray, neighbours: int = 24) -> FloatArray:
-    """Tangents across the sweeps from quadratic fits to the nearest samples of the thinned trace."""
+def _fitted(
+    trace: Trace, points: FloatArray, along: FloatArray, outward: FloatArray, neighbours: int = 24
+) -> FloatArray:
+    """Tangents across the sweeps at `points` from quadratic fits to the nearest samples of the thinned trace."""
     from scipy.spatial import cKDTree
 
     from mapping.sweep_mesh import pitch, thinned
@@ -49,9 +53,9 @@ def _fitted(trace: Trace, along: FloatArray, outward: FloatArray, neighbours: in
     up = unit(np.cross(along, across))
     up *= np.where(np.einsum("ij,ij->i", up, outward) < 0, -1.0, 1.0)[:, None]
     count = min(neighbours, len(cloud))
-    distance, index = cKDTree(cloud).query(trace.centers, k=count)
+    distance, index = cKDTree(cloud).query(points, k=count)
     scale = np.maximum(distance[:, -1:], 1e-300)
-    arm = (cloud[index] - trace.centers[:, None]) / scale[..., None]
+    arm = (cloud[index] - points[:, None]) / scale[..., None]
     u, v, w = (np.einsum("nkc,nc->nk", arm, axis) for axis in (along, across, up))
     columns = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=-1)
     weight = np.exp(-2.0 * (distance / scale) ** 2)[..., None]
