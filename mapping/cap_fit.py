@@ -58,6 +58,7 @@ def fit_cap(
     noise: Noise,
     drift: int,
     tip_radius: float,
+    neighbours: tuple[bool, bool] = (False, False),
 ) -> Disturbance:
     """Generalised least squares over place, half-width and flatness.
 
@@ -69,14 +70,15 @@ def fit_cap(
         noise: of single samples.
         drift: number of polynomial terms of the base that the fit must ignore.
         tip_radius: m; nothing on a trace is sharper.
+        neighbours: whether another crest begins right before and right behind: it must not pull at the fit.
     """
     low, high = bounds
-    window = _whitened(height, low, high, profile, noise, drift)
+    window = _whitened(height, low, high, profile, noise, drift, neighbours)
     spacing = profile.spacing
     half = max(0.5 * (high - low) * spacing, 1.5 * spacing)
     sharpest = float(np.sqrt(2 * tip_radius * np.abs(height[low:high]).max()))
     crest = _zoom(window, sign, low * spacing, (high - 1) * spacing, half, 0.0)
-    if half > 1.5 * sharpest:
+    if half > 1.5 * sharpest and not any(neighbours):
         flats = [_zoom(window, sign, low * spacing, (high - 1) * spacing, half, flat) for flat in (0.7, 0.85, 0.95)]
         plateau = max(flats)
         if plateau[0] > crest[0] + PLATEAU_GAIN:
@@ -102,10 +104,19 @@ def fit_cap(
 
 
 def _whitened(
-    height: FloatArray, low: int, high: int, profile: HeightProfile, noise: Noise, drift: int
+    height: FloatArray,
+    low: int,
+    high: int,
+    profile: HeightProfile,
+    noise: Noise,
+    drift: int,
+    neighbours: tuple[bool, bool],
 ) -> _Whitened:
     margin = max(4, (high - low) // (2 if drift else 4))
-    begin, end = max(0, low - margin), min(len(height), high + margin)
+    begin = low if neighbours[0] else max(0, low - margin)
+    end = high if neighbours[1] else min(len(height), high + margin)
+    if end - begin < 5:
+        begin, end = max(0, begin - 2), min(len(height), end + 2)
     merge = max(1, (end - begin) // BINS)
     count = (end - begin) // merge
     x = (begin + (np.arange(count) + 0.5) * merge - 0.5) * profile.spacing
@@ -128,7 +139,7 @@ def _zoom(
     """(gain, place, half-width, flatness) of the best cap: a grid, refined around its best point."""
     places = np.linspace(low, high, 17)
     narrowest = max(1.2 * window.step, half / 8)
-    widths = np.geomspace(narrowest, max(1.3 * half, 1.1 * narrowest), 13)
+    widths = np.geomspace(narrowest, max(2.0 * half, 1.1 * narrowest), 13)
     best = (-np.inf, 0.5 * (low + high), half, flat)
     for _ in range(ZOOM_ROUNDS):
         grid_place, grid_width = (g.ravel() for g in np.meshgrid(places, widths))

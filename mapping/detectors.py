@@ -119,9 +119,7 @@ def detect(
         crossings += [c for d in found_here for c in _crossings(d, profile, base, tip)]
     length = sum(p.length for p in profiles)
     limit = bank.detection_limit(threshold, tip)
-    return Detections(
-        tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out
-    )
+    return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out)
 
 
 def _raw_noise(usable: list[tuple[int, Trace, FloatArray]], base: Base, raw: float) -> Noise:
@@ -172,9 +170,7 @@ def _bank(
     return bank, bank.threshold(rate)
 
 
-def _quiet_noise(
-    profiles: list[HeightProfile], quiet: list[BoolArray], first: Noise, tip: float
-) -> Noise:
+def _quiet_noise(profiles: list[HeightProfile], quiet: list[BoolArray], first: Noise, tip: float) -> Noise:
     """Noise of the profiles' quiet bins; the white level of single samples."""
     heights, places, samples = [], [], []
     offset = 0.0
@@ -202,7 +198,9 @@ def _crossings(found: Disturbance, profile: HeightProfile, base: Base, tip: floa
     bounds = ((found.start, found.place), (found.place, found.stop))
     return [
         _crossing(found, kind, edge, *bound, profile, base, tip)
-        for kind, edge, bound, outside in zip(kinds, edges, bounds, (found.start <= low, found.stop >= high), strict=True)
+        for kind, edge, bound, outside in zip(
+            kinds, edges, bounds, (found.start <= low, found.stop >= high), strict=True
+        )
         if not outside
     ]
 

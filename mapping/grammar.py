@@ -13,6 +13,7 @@ from mapping.detectors import Detections
 from mapping.feature import Evidence, Feature, Interval
 from mapping.inspection import Inspection, inspect
 from mapping.linking import LONGEST_LINK, groups, order
+from mapping.runs import RunPoint, split_runs
 from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
@@ -42,16 +43,24 @@ def assemble(detections: Detections, trace: Trace, base: Base) -> tuple[Feature,
     scale = _scale(crossings, trace.tip_radius)
     inspection = None if single else inspect(trace, base, detections.noise, 0.25 * scale)
     features: list[Feature] = []
+    runs, steps = split_runs(crossings)
+    along: list[RunPoint] = []
+    for run in runs:
+        others = [c for other in runs for c in (other.first, other.last)] + steps
+        if inspection is None or run.is_band(others, inspection.pitch, trace.tip_radius):
+            steps += [run.first, run.last]
+        else:
+            along += run.points(max(min(inspection.pitch, run.length), scale), base, trace.tip_radius)
     for convex in (True, False):
         kind = "convex" if convex else "concave"
-        some = [c for c in crossings if c.kind == kind]
+        some = [c for c in [*crossings, *along] if c.kind == kind]
         if inspection is None:
             features += [_point_feature([c], NAMES[convex][0], detections) for c in some]
         elif some:
             for members in groups(some, inspection, scale):
                 features += _lines([some[i] for i in members], convex, inspection, detections, trace.tip_radius)
     features = _without_shadows(features, trace.tip_radius)
-    features += _steps([c for c in crossings if c.kind.startswith("step")], features, inspection, detections, scale)
+    features += _steps(steps, features, inspection, detections, scale)
     return tuple(sorted(features, key=lambda f: -f.evidence.snr))
 
 
@@ -66,7 +75,7 @@ def _lines(
 ) -> list[Feature]:
     """One bump, one ridge, or the arms of a junction."""
     top = float(np.quantile([abs(c.height) for c in members], 0.8))
-    full = [c for c in members if abs(c.height) >= FULL_HEIGHT * top - 2 * c.height_sd]
+    full = _across_first([c for c in members if abs(c.height) >= FULL_HEIGHT * top - 2 * c.height_sd], inspection)
     merged = _merged(full, 0.5 * float(np.sqrt(2 * tip_radius * top)))
     points = np.array([_mean_point(cluster) for cluster in merged])
     main, branches = order(points)
@@ -84,10 +93,28 @@ def _lines(
         if len(arms) == 1 and _closes(axis, top, across, inspection):
             axis, clusters = np.vstack([axis, axis[:1]]), [*clusters, clusters[0]]
         features.append(
-            _line_feature(axis, clusters, members if len(arms) == 1 else None, convex, detections, inspection, tip_radius,
-                          ("junction",) if len(arms) > 1 else ())
+            _line_feature(
+                axis,
+                clusters,
+                members if len(arms) == 1 else None,
+                convex,
+                detections,
+                inspection,
+                tip_radius,
+                ("junction",) if len(arms) > 1 else (),
+            )
         )
     return features
+
+
+def _across_first(full: list[Crossing], inspection: Inspection) -> list[Crossing]:
+    """Crossings less the points of runs that have a true crossing near: a run knows its line only within a width."""
+    true = [c for c in full if not isinstance(c, RunPoint)]
+    if not true:
+        return full
+    places = np.array([c.point for c in true])
+    reach = 1.5 * min(inspection.pitch, 1e300)
+    return [c for c in full if not isinstance(c, RunPoint) or np.linalg.norm(places - c.point, axis=1).min() > reach]
 
 
 def _merged(crossings: list[Crossing], distance: float) -> list[list[Crossing]]:
@@ -254,9 +281,7 @@ def _steps(
     free = [
         c
         for c in steps
-        if all(
-            _distances(c.point[None], f.axis).min() > 2 * np.sqrt(2 * scale**2) + c.half_width for f in features
-        )
+        if all(_distances(c.point[None], f.axis).min() > 2 * np.sqrt(2 * scale**2) + c.half_width for f in features)
     ]
     if inspection is None:
         return [_point_feature([c], "step", detections) for c in free]

@@ -81,9 +81,7 @@ def arclength(trace: Trace, base: Base) -> FloatArray:
     return np.asarray(inner - inner[0])
 
 
-def height_profiles(
-    sweep: int, trace: Trace, s: FloatArray, base: Base, spacing: float
-) -> tuple[HeightProfile, ...]:
+def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing: float) -> tuple[HeightProfile, ...]:
     """The sweep's heights in bins of the given width; more than one profile where contact was lost in between.
 
     Args:

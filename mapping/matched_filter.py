@@ -92,7 +92,9 @@ class Bank:
         low, high = 1.5, 40.0
         for _ in range(60):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if self.false_alarms_per_metre(middle) > false_alarms_per_metre else (low, middle)
+            low, high = (
+                (middle, high) if self.false_alarms_per_metre(middle) > false_alarms_per_metre else (low, middle)
+            )
         return high
 
     def detection_limit(self, threshold: float, tip_radius: float) -> float:
@@ -113,9 +115,7 @@ class Bank:
         return float(np.exp(np.interp(0.0, excess, np.log(available)[first - 1 : first + 1])))
 
 
-def build_bank(
-    noise: Noise, spacing: float, samples: float, smallest: float, largest: float, drift: int = 0
-) -> Bank:
+def build_bank(noise: Noise, spacing: float, samples: float, smallest: float, largest: float, drift: int = 0) -> Bank:
     """A bank of filters from the smallest to the largest half-width, m.
 
     Args:

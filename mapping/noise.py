@@ -96,7 +96,9 @@ class Noise:
         if columns.shape[:1] != positions.shape:
             raise NoiseError(f"values and s must have one length; found {columns.shape} and {positions.shape}")
         if self.white == 0 and (self.correlated == 0 or (np.diff(positions) == 0).any()):
-            raise NoiseError("cannot whiten: the covariance is singular (no white noise and repeated or certain samples)")
+            raise NoiseError(
+                "cannot whiten: the covariance is singular (no white noise and repeated or certain samples)"
+            )
         if self.correlated == 0:
             return columns / self.white, 2 * len(positions) * float(np.log(self.white))
         from mapping.noise_kernels import innovations
@@ -185,7 +187,12 @@ def _fit_allan(sizes: FloatArray, variances: FloatArray, counts: FloatArray, spa
     weight = 1 / np.sqrt(5.4 / counts + 0.03**2)
     white = 1 / sizes
     target = variances / scale
-    best = (_misfit(target, white * _ratio(target, white, weight), weight) + 6.0, _ratio(target, white, weight), 0.0, 1.0)
+    best = (
+        _misfit(target, white * _ratio(target, white, weight), weight) + 6.0,
+        _ratio(target, white, weight),
+        0.0,
+        1.0,
+    )
     for length in spacing * np.geomspace(2.0, max(2.5, sizes[-1]), 60):
         correlated = _allan_of_ou(sizes * spacing / length)
         a, b = _two_levels(target, white, correlated, weight)

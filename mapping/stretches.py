@@ -45,7 +45,9 @@ def find_disturbances(
     found: list[Disturbance] = []
     for height, begin, end, crest in _stretches(profile, bank, noise, threshold, tip_radius):
         for low, high in _crests(height, begin, end, crest, profile, noise, tip_radius):
-            new = fit_cap(height, (low, high), float(np.sign(crest)), profile, noise, bank.drift, tip_radius)
+            beside = (low > begin, high < end)
+            sign = float(np.sign(crest))
+            new = fit_cap(height, (low, high), sign, profile, noise, bank.drift, tip_radius, beside)
             if new.snr >= threshold and not _side_lobe(new, found, bank.drift > 0):
                 found.append(new)
     return tuple(found)
