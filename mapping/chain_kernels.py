@@ -9,24 +9,22 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+NONE = -1e300
 
-@njit(cache=True, inline="always")
-def _exit(ox, oy, oz, nx, ny, nz, total):  # type: ignore[no-untyped-def]
-    """Largest t with |o + t n| = total, or -1e300."""
-    square = nx * nx + ny * ny + nz * nz
-    along = ox * nx + oy * ny + oz * nz
-    distance = np.sqrt(ox * ox + oy * oy + oz * oz)
-    gap = (distance - total) * (distance + total)
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _last_exit(square, along, gap):  # type: ignore[no-untyped-def]
+    """Largest root of square t^2 + 2 along t + gap = 0, or NONE; for along > 0 in the form that does not cancel."""
     discriminant = along * along - square * gap
     if discriminant < 0.0 or square < 1e-300:
-        return -1e300
+        return NONE
     root = np.sqrt(discriminant)
     if along > 0.0:
         return -gap / (along + root)
     return (root - along) / square
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def chain_heights(
     feet: FloatArray,
     normals: FloatArray,
@@ -41,42 +39,64 @@ def chain_heights(
 ) -> None:
     """Heights (W, n) of W chains (W, K, 3) over n bins, averaged over each bin; written to `out`.
 
-    Bin i looks at the vertices first[i] to last[i] alone. The floor at 0 is averaged over the bin: a straight
-    flank that changes by 2 d over it gives (s + d)^2 / (4 d) where it crosses 0.
+    Bin i looks at the vertices first[i] to last[i] alone (a single one is a sphere). A capsule is convex: where the
+    ray leaves its infinite cylinder beyond an end, it leaves the capsule through that end's sphere. The floor at 0
+    is averaged over the bin: a straight flank that changes by 2 d over it gives (s + d)^2 / (4 d) where it crosses 0.
     """
     walkers, bins = out.shape
+    legs = max(chains.shape[1] - 1, 1)
+    unit, length = np.zeros((legs, 3)), np.zeros(legs)
     for w in range(walkers):
+        chain = chains[w]
         total = radii[w] + tip_radius
+        for k in range(chains.shape[1] - 1):
+            for c in range(3):
+                unit[k, c] = chain[k + 1, c] - chain[k, c]
+            length[k] = np.sqrt(unit[k, 0] ** 2 + unit[k, 1] ** 2 + unit[k, 2] ** 2)
+            if length[k] > 0.0:
+                for c in range(3):
+                    unit[k, c] /= length[k]
         for i in range(bins):
             nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
             qx = feet[i, 0] + tip_radius * nx
             qy = feet[i, 1] + tip_radius * ny
             qz = feet[i, 2] + tip_radius * nz
-            best, mx, my, mz = -1e300, 0.0, 0.0, 0.0
-            for k in range(first[i], last[i] + 1):
-                px, py, pz = chains[w, k, 0], chains[w, k, 1], chains[w, k, 2]
-                ox, oy, oz = qx - px, qy - py, qz - pz
-                t = _exit(ox, oy, oz, nx, ny, nz, total)
+            # Further out than this the trace is below the base's over the whole bin.
+            far = total * (total + 2.0 * half_bin[i])
+            best, mx, my, mz = NONE, 0.0, 0.0, 0.0
+            for k in range(first[i], max(last[i], first[i] + 1)):
+                ox, oy, oz = qx - chain[k, 0], qy - chain[k, 1], qz - chain[k, 2]
+                at_end = False
+                if k < last[i] and length[k] > 0.0:
+                    ux, uy, uz = unit[k, 0], unit[k, 1], unit[k, 2]
+                    o_along = ox * ux + oy * uy + oz * uz
+                    ax, ay, az = ox - o_along * ux, oy - o_along * uy, oz - o_along * uz
+                    n_along = nx * ux + ny * uy + nz * uz
+                    bx, by, bz = nx - n_along * ux, ny - n_along * uy, nz - n_along * uz
+                    along = ax * bx + ay * by + az * bz
+                    distance = ax * ax + ay * ay + az * az
+                    if distance > far and along > 0.0:
+                        continue
+                    distance = np.sqrt(distance)
+                    gap = (distance - total) * (distance + total)
+                    t = _last_exit(bx * bx + by * by + bz * bz, along, gap)
+                    place = o_along + max(t, -total) * n_along
+                    if place >= 0.0 and place <= length[k]:
+                        if t > best:
+                            best, mx, my, mz = t, ax + t * bx, ay + t * by, az + t * bz
+                        continue
+                    at_end = place > length[k]
+                if at_end:
+                    ox, oy, oz = qx - chain[k + 1, 0], qy - chain[k + 1, 1], qz - chain[k + 1, 2]
+                along = ox * nx + oy * ny + oz * nz
+                distance = ox * ox + oy * oy + oz * oz
+                if distance > far and along > 0.0:
+                    continue
+                distance = np.sqrt(distance)
+                t = _last_exit(1.0, along, (distance - total) * (distance + total))
                 if t > best:
                     best, mx, my, mz = t, ox + t * nx, oy + t * ny, oz + t * nz
-                if k == last[i]:
-                    break
-                ux, uy, uz = chains[w, k + 1, 0] - px, chains[w, k + 1, 1] - py, chains[w, k + 1, 2] - pz
-                length = np.sqrt(ux * ux + uy * uy + uz * uz)
-                if length < 1e-300:
-                    continue
-                ux, uy, uz = ux / length, uy / length, uz / length
-                o_along = ox * ux + oy * uy + oz * uz
-                n_along = nx * ux + ny * uy + nz * uz
-                ax, ay, az = ox - o_along * ux, oy - o_along * uy, oz - o_along * uz
-                bx, by, bz = nx - n_along * ux, ny - n_along * uy, nz - n_along * uz
-                t = _exit(ax, ay, az, bx, by, bz, total)
-                if t <= best:
-                    continue
-                place = o_along + t * n_along
-                if place >= 0.0 and place <= length:
-                    best, mx, my, mz = t, ax + t * bx, ay + t * by, az + t * bz
-            if best < -1e299:
+            if best <= -half_bin[i]:
                 out[w, i] = 0.0
                 continue
             rise = mx * nx + my * ny + mz * nz

@@ -79,7 +79,7 @@ def _chart(
     turn = np.linalg.norm(np.diff(trial.tangents, axis=0), axis=1).max(initial=0.0)
     curvature = turn / (trial.length / max(len(trial.s) - 1, 1))
     if curvature * trial.length < 1e-6 and degree == 1:
-        return build(max(length, 1e-9))
+        return build(length + extension)
     spacing = float(np.sqrt(8.0 * SAG * sizes.height / max(curvature, 1e-12)))
     return build(min(max(spacing, trial.length / MOST_LEGS), trial.length / 16.0))
 

@@ -135,7 +135,7 @@ def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool =
     fast = importance_sample(problem.target, laplace(problem.target, optimum), rng)
     if not confirm and fast.k_hat < TRUSTED_K_HAT:
         return Solution(problem, _from_importance(problem, fast, rng), fast, None)
-    walkers = max(WALKERS, 2 * (2 * len(optimum) + 1))
+    walkers = max(WALKERS, 2 * len(optimum) + 4)
     starts = _starts(problem, fast, optimum, rng, walkers)
     chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal)
     return Solution(problem, _from_chain(problem, fast, chain, rng), fast, chain)

@@ -13,7 +13,7 @@ from mapping.target import Target
 
 FloatArray = NDArray[np.float64]
 
-WALKERS = 32
+WALKERS = 20
 # A chain counts as long when it holds this many autocorrelation times, and their estimate has settled.
 TIMES = 100
 SETTLED = 0.01
