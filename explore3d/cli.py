@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from explore3d import __version__
-from explore3d.errors import UserError
+from explore3d.cli_analyze import analyze
+from explore3d.cli_doctor import doctor
+from explore3d.cli_run import plan, run
+
+ABOUT = "Find, follow and measure surface features that are finer than the fingertip that touches them."
 
 app = typer.Typer(
     name="explore3d",
-    help="Find, follow and measure surface features that are finer than the fingertip that touches them.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-Out = Annotated[Path, typer.Option("--out", "-o", help="Folder to write; made if it does not exist.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
+for command in (run, plan, analyze, doctor):
+    app.command()(command)
 
 
 def _show_version(asked: bool) -> None:
@@ -31,23 +32,24 @@ def _show_version(asked: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(help=ABOUT)
 def _common(
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and leave.")
     ] = False,
-) -> None:
-    """Find, follow and measure surface features that are finer than the fingertip that touches them."""
+) -> None: ...
 
 
 def main() -> None:
-    """Entry point: bad input ends with one line on stderr and status 2."""
+    """Entry point: what the user can mend ends with one line on stderr and status 2, never with a traceback."""
+    from explore3d.errors import UserError
     from hw.errors import FingerError, MoveError
     from mapping.errors import MappingError
+    from planners.errors import PlannerError
 
     try:
         app()
-    except (UserError, MappingError, MoveError, FingerError) as error:
+    except (UserError, MappingError, PlannerError, MoveError, FingerError) as error:
         print(f"explore3d: {' '.join(str(error).split())}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:

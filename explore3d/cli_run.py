@@ -1,0 +1,40 @@
+"""explore3d run, explore3d plan: exploring what a scene describes, or only planning it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from explore3d.cli_options import Force, Json, Out
+
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene to explore.")]
+
+
+def run(scene: SceneFile, out: Out, force: Force = None, json: Json = False) -> None:
+    """Explore the scene with its finger; write the log, the annotated model and the report.
+
+    Example: explore3d run assets/scenes/wire_on_plate.toml --out out/wire
+    """
+    from explore3d.findings import show
+    from explore3d.progress import shown
+    from explore3d.run import run as explore
+
+    with shown(quiet=json) as progress:
+        analysis = explore(scene, out, progress=progress, force=force or ())
+    show(analysis, out, json)
+
+
+def plan(
+    scene: SceneFile,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for a picture of the sweeps.")] = None,
+    json: Json = False,
+) -> None:
+    """Show the planned sweeps, their length, time and limit violations; nothing is moved.
+
+    Example: explore3d plan assets/scenes/mug.toml --out out/mug-plan
+    """
+    from explore3d.dry_run import plan_scene, show_plan
+
+    show_plan(plan_scene(scene), out, json)

@@ -1,0 +1,42 @@
+"""Findings: what a run or an analysis found, told on the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from explore3d.analysis import Analysis
+from explore3d.quantity import count_text, interval_text, length_text
+from mapping.feature import Feature, Interval
+
+
+def show(analysis: Analysis, out: Path, as_json: bool) -> None:
+    """Print the model's record as JSON, or a few lines for people."""
+    import json
+
+    if as_json:
+        print(json.dumps(analysis.model.document(), ensure_ascii=False, allow_nan=False))
+    else:
+        print("\n".join([*summary(analysis), f"report: {out / 'report.html'}"]))
+
+
+def summary(analysis: Analysis) -> list[str]:
+    """One line on the whole, one a feature."""
+    features = analysis.model.features
+    finer = sum(feature.curvature_feature for feature in features)
+    lines = [f"{count_text(len(features), 'feature')} found"]
+    if features:
+        lines[0] += f", {finer} of them finer than the tip of {length_text(analysis.trace.tip_radius)}"
+    if analysis.recovered:
+        lines.append(analysis.recovered)
+    return lines + [_line(feature) for feature in features]
+
+
+def _line(feature: Feature) -> str:
+    sizes = [("height", feature.height), ("width", feature.width), ("length", feature.length)]
+    known = [f"{name} {_text(interval)}" for name, interval in sizes if interval.median or interval.censored]
+    return f"  {feature.id}: {', '.join(known)}"
+
+
+def _text(interval: Interval) -> str:
+    median, spread = interval_text(interval)
+    return f"{median} ({spread})" if spread else median
