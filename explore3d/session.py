@@ -52,13 +52,16 @@ class Session:
 
     def __enter__(self) -> Session:
         earlier = self._check()
+        undo = self._unmake
         try:
             self._make()
             self._lock_folder()
+            undo = self._discard
             self._set_aside(earlier)
             self._mark("running")
         except OSError as error:
-            self._discard()
+            undo()
+            self._unlock()
             raise FolderError(f"{self.folder}: cannot write the output folder: {error.strerror or error}") from error
         except FolderError:
             self._unlock()
@@ -217,15 +220,20 @@ class Session:
         for name in [*self._files, MARKER]:
             if (self.folder / name).resolve() not in self._keep:
                 (self.folder / name).unlink(missing_ok=True)
-        aside = [path for path in self._aside.rglob("*") if path.is_file()] if self._aside else []
-        for path in aside:
-            assert self._aside is not None
-            os.replace(path, self.folder / path.relative_to(self._aside))
+        if self._aside is not None:
+            for path in [path for path in self._aside.rglob("*") if path.is_file()]:
+                os.replace(path, self.folder / path.relative_to(self._aside))
         self._sweep()
-        for name in self._files:  # folders within, deepest first
+        for name in self._files:
             for parent in list(Path(name).parents)[:-1]:
-                with suppress(OSError):
-                    (self.folder / parent).rmdir()
+                _remove_empty(self.folder / parent)
+        self._unmake()
+
+    def _unmake(self) -> None:
         for path in reversed(self._made):
-            with suppress(OSError):  # somebody else put something there meanwhile: that stays
-                path.rmdir()
+            _remove_empty(path)
+
+
+def _remove_empty(folder: Path) -> None:
+    with suppress(OSError):  # somebody else put something there meanwhile: that stays
+        folder.rmdir()

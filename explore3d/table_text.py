@@ -65,12 +65,13 @@ def read_text(path: Path) -> TableText:
     Raises:
         UserError: no such file, empty, not text, no rows of numbers, a row that does not fit.
     """
-    lines = _decode(path).splitlines()
+    text = _decode(path)
+    lines = text.splitlines()
     at, delimiter, decimal = _first_row(path, lines)
     columns = len(_split(lines[at], delimiter))
     numbers = [n for n in range(at, len(lines)) if lines[n].strip() and not lines[n].lstrip().startswith(COMMENTS)]
     names, units = _header(lines[:at], columns, delimiter)
-    cut = len(numbers) > 1 and len(_split(lines[numbers[-1]], delimiter)) < columns
+    cut = len(numbers) > 1 and not text.endswith("\n") and len(_cells(lines[numbers[-1]], delimiter, columns)) < columns
     if cut:
         del numbers[-1]
     rows = _numbers(path, lines, numbers, columns, (delimiter, decimal))
@@ -117,6 +118,13 @@ def _split(line: str, delimiter: str | None) -> list[str]:
     cells = [cell.strip().strip('"').strip() for cell in line.strip().split(delimiter)]
     # a delimiter at the end of the line makes no column
     return cells[:-1] if delimiter not in (None, "\t") and len(cells) > 2 and not cells[-1] else cells
+
+
+def _cells(line: str, delimiter: str | None, columns: int) -> list[str]:
+    """The cells of a line of a table with that many columns: "1;2;" is three if the table has three."""
+    cells = _split(line, delimiter)
+    missing = len(cells) == columns - 1 and delimiter is not None and line.rstrip().endswith(delimiter)
+    return [*cells, ""] if missing else cells
 
 
 def _number(cell: str, decimal: str) -> float | None:
@@ -177,9 +185,7 @@ def _numbers(
 
 
 def _row(path: Path, index: int, line: str, columns: int, dialect: tuple[str | None, str]) -> list[float]:
-    cells = _split(line, dialect[0])
-    if len(cells) == columns - 1 and dialect[0] is not None and line.rstrip().endswith(dialect[0]):
-        cells.append("")  # the last cell is the missing one
+    cells = _cells(line, dialect[0], columns)
     if len(cells) != columns:
         raise UserError(f"{path}: line {index + 1}: expected {columns} columns; found {len(cells)}: {line[:40]!r}")
     row = []
