@@ -36,7 +36,7 @@ class SimulatedFinger:
         white, correlated, correlation_length, angle, contact: see hw.noise_source.NoiseSource.
         contact_data: also return contact normals and contact points.
         seed: of all noise.
-        max_speed: fastest move that is not refused, m/s.
+        max_speed: fastest move that is not refused, m/s; None for 25 tip radii per second.
         max_force: largest force that is not refused, N.
         margin: how far the workspace reaches beyond the body's bounding box, m; None for 6 tip radii.
         stroke: travel of the finger to either side of the commanded path, m; None for 2 tip radii.
@@ -53,7 +53,7 @@ class SimulatedFinger:
     contact: float = 0.0
     contact_data: bool = False
     seed: int = 0
-    max_speed: float = 0.25
+    max_speed: float | None = None
     max_force: float = 10.0
     margin: InitVar[float | None] = None
     stroke: float | None = None
@@ -66,13 +66,16 @@ class SimulatedFinger:
     _position: FloatArray | None = field(init=False, default=None)
 
     def __post_init__(self, margin: float | None) -> None:
-        self._require_positive("tip_radius", "rate", "correlation_length", "max_speed", "max_force")
+        self._require_positive("tip_radius", "rate", "correlation_length", "max_force")
+        fastest = 25.0 * self.tip_radius if self.max_speed is None else self.max_speed
+        if not 0 < fastest < np.inf:
+            raise FingerError(f"simulated finger: max_speed must be positive; found {fastest}")
         for name in ("white", "correlated", "angle", "contact"):
             if not 0 <= getattr(self, name) < np.inf:
                 raise FingerError(f"simulated finger: {name} must be zero or positive; found {getattr(self, name)}")
         reach = 6.0 * self.tip_radius if margin is None else margin
         low, high = self.object.bounds
-        self._workspace = Workspace(low - reach, high + reach, self.max_speed, self.max_force)
+        self._workspace = Workspace(low - reach, high + reach, fastest, self.max_force)
         self._ball = BallContact(self.object, self.tip_radius)
         self._noise = NoiseSource(self.white, self.correlated, self.correlation_length, self.angle, self.contact)
 
@@ -106,7 +109,7 @@ class SimulatedFinger:
         self._refuse_what_exceeds(move)
         gap = 0.0 if self._position is None else float(np.linalg.norm(move.path[0] - self._position))
         # a plan that does not command the way between two sweeps still pays for it
-        self._clock += gap / self.max_speed
+        self._clock += gap / self._workspace.max_speed
         start, self._clock = self._clock, self._clock + move.duration
         self._position = move.path[-1]
         return self._sweep(move, start) if move.purpose == "sweep" else self._empty()
@@ -120,10 +123,9 @@ class SimulatedFinger:
                 f"the {move.purpose} leaves the workspace at {where} m; the centre may move from "
                 f"{np.round(low, 6).tolist()} to {np.round(high, 6).tolist()} m"
             )
-        if move.speed > self.max_speed:
-            raise FingerError(
-                f"the {move.purpose} asks for {move.speed} m/s; at most {self.max_speed} m/s are possible"
-            )
+        fastest = self._workspace.max_speed
+        if move.speed > fastest:
+            raise FingerError(f"the {move.purpose} asks for {move.speed} m/s; at most {fastest} m/s is possible")
         if move.force > self.max_force:
             raise FingerError(f"the {move.purpose} asks for {move.force} N; at most {self.max_force} N are possible")
 
@@ -164,7 +166,7 @@ def sampled(move: Move, rate: float) -> tuple[FloatArray, FloatArray, FloatArray
     steps = np.linalg.norm(np.diff(move.path, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     spacing = move.speed / rate
-    s = np.arange(int(along[-1] / spacing * (1 + 1e-12)) + 1) * spacing
+    s = np.asarray(np.arange(int(along[-1] / spacing * (1 + 1e-12)) + 1) * spacing, dtype=np.float64)
     path, approach = (_interpolated(s, along, values) for values in (move.path, move.approach))
     length = np.linalg.norm(approach, axis=1, keepdims=True)
     if (length < 1e-6).any():

@@ -20,19 +20,18 @@ def drive(
     *,
     check: Callable[[Move], str | None] | None = None,
     note: Callable[[str], None] | None = None,
-    empty: Callable[[], Trace] | None = None,
 ) -> tuple[list[tuple[Move, Trace]], Outcome]:
     """Carry the plan out; every executed move with what it felt, and why the plan ended.
 
     A move that the check forbids or the finger refuses is not executed: the plan is sent an empty trace in
-    its place and decides what to do without it.
+    its place and decides what to do without it. The drive gives up if the first move is refused, or too many
+    in a row are.
 
     Args:
         plan: the generator.
         execute: carries out one move, for example a Finger's execute followed by a log's write.
         check: what is wrong with a move, or None if nothing is (planners.checks.Limits.violation).
         note: told about every move that was not executed.
-        empty: makes the trace that stands for a refused move; needed if a move may be refused.
     """
     record: list[tuple[Move, Trace]] = []
     refused = 0
@@ -48,10 +47,10 @@ def drive(
                 refused += 1
                 if note:
                     note(f"{move.purpose} not executed: {reason}")
-                if refused >= PATIENCE or empty is None:
+                if refused >= PATIENCE or not record:
                     plan.close()
                     return record, Outcome("finger refuses", f"{refused} moves in a row refused; the last: {reason}")
-                trace = empty()
+                trace = record[-1][1].select(slice(0, 0))
             else:
                 refused = 0
                 record.append((move, trace))

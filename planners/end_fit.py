@@ -56,7 +56,8 @@ def fit_end(s: FloatArray, height: FloatArray, sign: float, crest: float, tip_ra
     start = min(grid, key=lambda end: float((residual(np.array([end, crest])) ** 2).sum()))
     fit = least_squares(residual, [start, crest], x_scale=[tip_radius * 0.1, crest])
     end, top = float(fit.x[0]), float(fit.x[1])
-    information = fit.jac.T @ fit.jac
+    jacobian = np.asarray(fit.jac)
+    information = jacobian.T @ jacobian
     sd = float(np.sqrt(np.linalg.pinv(information)[0, 0])) if information[0, 0] > 0 else float("inf")
     inside = place[0] < end < place[-1] - 0.5 * np.sqrt(2 * tip_radius * crest)
     return EndFit(end, sd, sign * top, bool(inside and 0 < sd < 0.2 * tip_radius and top > 0.4 * crest))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +63,7 @@ class Found:
 
     def unexplained(self) -> list[Crossing]:
         """Crossings that no track or bump accounts for and that were not looked into yet, the highest first."""
-        known = [*self.tracks, *self.bumps]
+        known: list[AxisTrack | BumpSize] = [*self.tracks, *self.bumps]
         rest = [c for c in self.crossings if not any(k.explains(c) for k in known) and not self._tried(c)]
         return sorted(rest, key=lambda c: -abs(c.height))
 
@@ -85,12 +86,12 @@ class Explore:
         base: the global model.
         tip_radius: m.
         smallest: height of the smallest feature to be found, m.
-        precision: wanted standard deviation of a feature's extent, m.
+        precision: wanted half-width of the 90 % interval of a feature's end or centre, m.
         speed, force: of the sweeps, m/s and N.
         region: (low, high) corners (3,) of the part to be inspected, m; None: all of the base.
         time_budget: finger time, s.
         path_budget: finger path, m.
-        travel_speed: between sweeps, m/s.
+        travel_speed: between sweeps, m/s; None: 25 tip radii per second.
         false_alarms_per_metre: accepted rate of false crossings, 1/m.
         noise: of the samples; None: learnt from the first sweeps.
     """
@@ -104,14 +105,19 @@ class Explore:
     region: tuple[FloatArray, FloatArray] | None = None
     time_budget: float = np.inf
     path_budget: float = np.inf
-    travel_speed: float = 0.25
+    travel_speed: float | None = None
     false_alarms_per_metre: float = 0.01
     noise: Noise | None = None
 
     def __post_init__(self) -> None:
-        for name in ("tip_radius", "smallest", "precision", "speed", "time_budget", "travel_speed"):
+        for name in ("tip_radius", "smallest", "precision", "speed", "time_budget"):
             if not getattr(self, name) > 0:
                 raise PlannerError(f"explore: {name} must be positive; found {getattr(self, name)}")
+
+    @property
+    def wanted_sd(self) -> float:
+        """Standard deviation whose 90 % interval is the wanted precision, m."""
+        return self.precision / 1.645
 
     @property
     def survey(self) -> Survey:
@@ -133,7 +139,7 @@ class Explore:
     def plan(self, rng: np.random.Generator | None = None) -> Plan:
         """The whole exploration; the outcome's value is a Found. Nothing in it is random: `rng` is not used."""
         found = Found(noise=self.noise)
-        spent = Spent(self.travel_speed)
+        spent = Spent(25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed)
         outcome = yield from within(self._everything(found), spent, self.time_budget, self.path_budget)
         count = len(found.tracks) + len(found.bumps)
         detail = f"{count} features; {spent.seconds:.1f} s, {spent.metres:.3f} m of finger path"
@@ -188,14 +194,15 @@ class Explore:
         for seed in found.unexplained()[:1]:
             pitch = self.survey.pitch
             seconds = 2.0 * np.pi * self._circuit_radius(seed) / self.speed
-            actions.append(Action("look into", pitch, seconds, lambda: self._look_into(seed, found, strokes, sense)))
+            actions.append(Action("look into", pitch, seconds, partial(self._look_into, seed, found, strokes, sense)))
         for index, track in enumerate(found.tracks):
             for which, end in enumerate(track.ends):
                 done = found.slides.get((index, which), 0)
-                if end.reason == "end" and end.sd > self.precision and done < MOST_SLIDES and track.kind != "step":
+                if end.reason == "end" and end.sd > self.wanted_sd and done < MOST_SLIDES and track.kind != "step":
                     seconds = 3.0 * track.half_width / self.speed
                     gain = end.sd * (1.0 - 0.5**0.5) if np.isfinite(end.sd) else self.survey.pitch
-                    actions.append(Action("slide off an end", gain, seconds, self._slide(index, which, found, sense)))
+                    start = partial(self._slide, index, which, found, strokes, sense)
+                    actions.append(Action("slide off an end", gain, seconds, start))
         return actions
 
     def _circuit_radius(self, seed: Crossing) -> float:
@@ -208,7 +215,7 @@ class Explore:
         circled = yield from Circuit(strokes, sense, self._circuit_radius(seed)).around(seed)
         branches: tuple[Crossing, ...] = circled.value
         if not branches:
-            sized = yield from BumpSizer(strokes, sense, self.precision).size(seed)
+            sized = yield from BumpSizer(strokes, sense, self.wanted_sd).size(seed)
             if sized.value is not None:
                 found.bumps.append(sized.value)
             return Outcome(circled.reason, sized.detail)
@@ -226,15 +233,13 @@ class Explore:
         def known(point: FloatArray) -> bool:
             return any(track.distance(point) < 0.5 * track.half_width for track in tracks)
 
-        return RidgeFollower(strokes, sense, found.noise or Noise(0.0), self.precision, known=known)
+        return RidgeFollower(strokes, sense, found.noise or Noise(0.0), self.wanted_sd, known=known)
 
-    def _slide(self, index: int, which: int, found: Found, sense: Sense) -> Callable[[], Plan]:
-        def start() -> Plan:
-            track = found.tracks[index]
-            follower = self._follower(found, self.strokes, sense)
-            found.slides[index, which] = found.slides.get((index, which), 0) + 1
-            end = yield from follower.slide(track.ends[which], track.height, track.half_width, track.sign)
-            found.tracks[index] = track.with_end(which, end)
-            return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")
-
-        return start
+    def _slide(self, index: int, which: int, found: Found, strokes: Strokes, sense: Sense) -> Plan:
+        """One more sweep off an end that is not known well enough."""
+        track = found.tracks[index]
+        found.slides[index, which] = found.slides.get((index, which), 0) + 1
+        follower = self._follower(found, strokes, sense)
+        end = yield from follower.slide(track.ends[which], track.height, track.half_width, track.sign)
+        found.tracks[index] = track.with_end(which, end)
+        return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")

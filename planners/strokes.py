@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hw.moves import Move
 from mapping.base import Base
@@ -92,7 +92,8 @@ class Strokes:
             going.append(going[-1] & ~stuck)
             track.append((near.points, near.normals, onward))
         stacked = [np.stack(parts, axis=1) for parts in zip(*track, strict=True)]
-        return [_walked(*(part[m] for part in stacked), np.stack(going)[:, m]) for m in range(len(points))]
+        where, normals, ways = stacked
+        return [_walked(where[m], normals[m], ways[m], np.stack(going)[:, m]) for m in range(len(points))]
 
     def line(self, point: FloatArray, direction: FloatArray, before: float, after: float) -> Move:
         """The sweep through a point along a direction, from `before` metres short of it to `after` beyond."""
@@ -114,7 +115,7 @@ class Strokes:
         here, normal = self.onto(point)
         first = tangential(direction, normal)
         count = 64
-        angles = 2.0 * np.pi / count * np.arange(count)
+        angles = np.arange(count) * (2.0 * np.pi / count)
         ways = turned(np.tile(first, (count, 1)), np.tile(normal, (count, 1)), angles[:, None])
         rim = self.walks(np.tile(here, (count, 1)), ways, radius)
         points = np.array([walk.points[-1] for walk in rim])
@@ -150,6 +151,6 @@ def carried(direction: FloatArray, old: FloatArray, new: FloatArray) -> FloatArr
     return np.asarray(np.where(cosine < -0.999, direction, rotated))
 
 
-def turned(direction: FloatArray, normal: FloatArray, angle: float | FloatArray) -> FloatArray:
+def turned(direction: FloatArray, normal: FloatArray, angle: ArrayLike) -> FloatArray:
     """Tangent directions (..., 3) turned about the normals by an angle, rad."""
     return np.asarray(np.cos(angle) * direction + np.sin(angle) * np.cross(normal, direction))

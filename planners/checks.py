@@ -1,0 +1,103 @@
+"""Checks of a move before it moves anything: workspace, speed, force, approach angle, collision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hw.finger import Workspace
+from hw.moves import Move
+from mapping.base import Base
+
+FloatArray = NDArray[np.float64]
+
+# The sensor's field about its axis (paper, section 4)
+FIELD = float(np.radians(75.0))
+# How far a commanded ball may sink into the base on its way through free space, in tip radii
+DEEP = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """What a move must keep to.
+
+    Args:
+        workspace: of the finger.
+        base: the global model.
+        tip_radius: m.
+        field: largest angle between the finger's axis and the base's normal in a sweep, rad.
+        stem_radius: of the straight stem behind the ball, m.
+        stem_length: of the stem that is checked, m.
+    """
+
+    workspace: Workspace
+    base: Base
+    tip_radius: float
+    field: float = FIELD
+    stem_radius: float = 0.0
+    stem_length: float = 0.0
+
+    @classmethod
+    def of(cls, workspace: Workspace, base: Base, tip_radius: float) -> Limits:
+        """Limits with a stem half as thick as the ball and three balls long."""
+        return cls(workspace, base, tip_radius, stem_radius=0.5 * tip_radius, stem_length=6.0 * tip_radius)
+
+    def violation(self, move: Move) -> str | None:
+        """What is wrong with the move, as a sentence, or None if nothing is."""
+        for check in (self._workspace, self._speed, self._field, self._collision):
+            complaint = check(move)
+            if complaint:
+                return complaint
+        return None
+
+    def _workspace(self, move: Move) -> str | None:
+        outside = ((move.path < self.workspace.low) | (move.path > self.workspace.high)).any(axis=1)
+        if not outside.any():
+            return None
+        where = np.round(move.path[outside.argmax()], 6).tolist()
+        low, high = (np.round(bound, 6).tolist() for bound in (self.workspace.low, self.workspace.high))
+        return f"the path leaves the workspace at {where} m; possible are {low} to {high} m"
+
+    def _speed(self, move: Move) -> str | None:
+        if move.speed > self.workspace.max_speed:
+            return f"the speed is {move.speed:g} m/s; at most {self.workspace.max_speed:g} m/s is possible"
+        if move.force > self.workspace.max_force:
+            return f"the force is {move.force:g} N; at most {self.workspace.max_force:g} N is possible"
+        return None
+
+    def _field(self, move: Move) -> str | None:
+        if move.purpose != "sweep":
+            return None
+        feet = self.base.foot(move.path, self.tip_radius)
+        outward = feet.normals * np.where(feet.height > -self.tip_radius, 1.0, -1.0)[:, None]
+        angle = np.arccos(np.clip(-(outward * move.approach).sum(axis=1), -1.0, 1.0))
+        if angle.max() <= self.field:
+            return None
+        return (
+            f"the finger's axis is {np.degrees(angle.max()):.0f} degrees off the surface's normal; "
+            f"the sensor's field is {np.degrees(self.field):.0f} degrees"
+        )
+
+    def _collision(self, move: Move) -> str | None:
+        if move.purpose in ("travel", "retreat"):
+            dense = _dense(move.path, 0.5 * self.tip_radius)
+            deepest = float(self.base.foot(dense, self.tip_radius).height.min())
+            if deepest < -DEEP * self.tip_radius:
+                return f"the way through free space sinks {-1e3 * deepest:.3f} mm into the body"
+        if self.stem_length > 0:
+            back = np.linspace(1.5 * self.tip_radius, self.stem_length, 6)
+            stem = (move.path[:, None, :] - back[None, :, None] * move.approach[:, None, :]).reshape(-1, 3)
+            clearance = float(self.base.foot(stem, self.stem_radius).height.min())
+            if clearance < 0:
+                return f"the stem behind the ball sinks {-1e3 * clearance:.3f} mm into the body"
+        return None
+
+
+def _dense(path: FloatArray, spacing: float) -> FloatArray:
+    if len(path) == 1:
+        return path
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    s = np.linspace(0.0, along[-1], 2 + int(along[-1] / spacing))
+    return np.column_stack([np.interp(s, along, path[:, k]) for k in range(3)])
