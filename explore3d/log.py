@@ -156,6 +156,8 @@ class LogWriter:
         self._add(name, self._log_time(self._t), _json(data).encode())
 
     def _add(self, name: str, log_time: int, data: bytes) -> None:
+        if len(data) > log_format.LARGEST_RECORD // 2:
+            raise UserError(f"{self.path}: a message of {len(data)} bytes is too large for the log")
         # one count over all channels: a gap in it tells the reader that something is missing
         with self._disk("write"):
             self._mcap.add_message(self._channels[name], log_time, data, log_time, self._sequence % 2**32)

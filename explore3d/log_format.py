@@ -17,8 +17,8 @@ REQUIRED = (("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("t", "<f8"), ("sweep", "<
 OPTIONAL = {"normals": ("nx", "ny", "nz"), "contacts": ("cx", "cy", "cz"), "force": ("fx", "fy", "fz")}
 
 SAMPLES_PER_MESSAGE = 500
-# a record larger than this is damage: our chunks stay near 1 MiB
-LARGEST_RECORD = 64 * 1024 * 1024
+# a record that says it is larger is damage; the writer makes none (chunks stay near 1 MiB, but an event may be long)
+LARGEST_RECORD = 1 << 30
 
 
 def sample_dtype(optional: tuple[str, ...] = ()) -> np.dtype[np.void]:
