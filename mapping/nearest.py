@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,13 +69,21 @@ class NearestPoint:
         return Nearest(closest, np.linalg.norm(offset, axis=1), side, normals, face, barycentric)
 
     def _closest(self, query: FloatArray) -> tuple[IntArray, FloatArray]:
+        tree, origin, vertices = self._tree
+        _, face, closest = tree.squared_distance(vertices, self._proper_faces[1], np.ascontiguousarray(query - origin))
+        return self._proper_faces[0][face], closest + origin
+
+    @cached_property
+    def _tree(self) -> tuple[Any, FloatArray, FloatArray]:
+        """A tree of boxes around the faces, the origin of its coordinates, and the vertices in them."""
         import igl
 
         # Centred first: a body far from the origin must not lose digits inside the tree.
         origin = self.surface.bounds.mean(axis=0)
-        vertices = self.surface.vertices - origin
-        _, face, closest = igl.point_mesh_squared_distance(query - origin, vertices, self._proper_faces[1])
-        return self._proper_faces[0][face], closest + origin
+        vertices = np.ascontiguousarray(self.surface.vertices - origin)
+        tree = igl.AABB()
+        tree.init(vertices, self._proper_faces[1])
+        return tree, origin, vertices
 
     @cached_property
     def _proper_faces(self) -> tuple[IntArray, IntArray]:
