@@ -9,8 +9,6 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-STATUS = Path("/var/lib/dpkg/status")
-
 
 def install(packages: list[str]) -> bool:
     """Install with apt-get as root or by passwordless sudo; False if that is not possible here."""
@@ -25,36 +23,34 @@ def install(packages: list[str]) -> bool:
 
 
 def unpack(packages: list[str]) -> Path:
-    """A temporary folder with the files of those packages, and of what they need that is not installed.
+    """A temporary folder with the files of those packages alone, without what they depend on.
 
-    The folder is empty if this is no such system or the packages cannot be fetched. apt gets a state and a
-    cache of its own, so that it needs no rights and leaves the system's untouched.
+    A package that cannot be fetched is left out; the folder is empty if this is no such system. apt gets a
+    state and a cache of its own, so that it needs no rights and leaves the system's untouched.
     """
     folder = Path(tempfile.mkdtemp(prefix="explore3d-setup-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    files, private = folder / "files", folder / "apt"
-    files.mkdir()
-    if not (shutil.which("apt-get") and shutil.which("dpkg-deb") and STATUS.is_file()):
-        return files
-    for name in ("state/lists/partial", "cache/archives/partial"):
-        (private / name).mkdir(parents=True)
+    for name in ("files", "state/lists/partial", "cache/archives/partial"):
+        (folder / name).mkdir(parents=True)
+    if not (shutil.which("apt-get") and shutil.which("dpkg-deb")):
+        return folder / "files"
     settings = {
-        "Dir::State": private / "state",
-        "Dir::State::status": STATUS,
-        "Dir::Cache": private / "cache",
+        "Dir::State": folder / "state",
+        "Dir::Cache": folder / "cache",
         "Debug::NoLocking": "1",
         "APT::Sandbox::User": "",
     }
-    command = ["apt-get", "-qq", "-y", *(f"-o{key}={value}" for key, value in settings.items())]
-    fetch = ["install", "--download-only", "--reinstall", "--no-install-recommends", *packages]
-    if _run([*command, "update"]) and _run([*command, *fetch]):
-        for package in sorted((private / "cache" / "archives").glob("*.deb")):
-            _run(["dpkg-deb", "-x", str(package), str(files)])
-    return files
+    command = ["apt-get", "-qq", *(f"-o{key}={value}" for key, value in settings.items())]
+    _run([*command, "update"])
+    for package in packages:
+        _run([*command, "download", package], folder)
+    for archive in sorted(folder.glob("*.deb")):
+        _run(["dpkg-deb", "-x", str(archive), str(folder / "files")])
+    return folder / "files"
 
 
-def _run(command: list[str]) -> bool:
+def _run(command: list[str], folder: Path | None = None) -> bool:
     try:
-        return subprocess.run(command, stdout=subprocess.DEVNULL, stdin=subprocess.DEVNULL, check=False).returncode == 0
+        return subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, stdin=subprocess.DEVNULL).returncode == 0
     except OSError:
         return False

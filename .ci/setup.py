@@ -6,6 +6,7 @@ run again at any time; what is there already is kept.
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -27,9 +28,8 @@ def main(extras: list[str]) -> None:
     make_environment()
     project = f".[{','.join(extras)}]" if extras else "."
     print(f"setup: installing {project} and what it depends on (some 1 GB; minutes the first time)", flush=True)
-    subprocess.run(
-        [*pip(), "install", "--quiet", "--disable-pip-version-check", "--editable", project], cwd=ROOT, check=True
-    )
+    quiet = {**os.environ, "PYTHONWARNINGS": "ignore", "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
+    subprocess.run([*pip(), "install", "--quiet", "--editable", project], cwd=ROOT, env=quiet, check=True)
     system_libraries.provide(PYTHON, VENV / "lib" / "explore3d-syslibs")
 
 

@@ -22,6 +22,18 @@ PACKAGES = {
     "libudev.so.1": "libudev1",
     "libidn2.so.0": "libidn2-0",
 }
+# what those need in their turn; a package manager brings it of itself
+BEHIND = {
+    "libGLdispatch.so.0": "libglvnd0",
+    "libGLX.so.0": "libglx0",
+    "libxcb.so.1": "libxcb1",
+    "libXau.so.6": "libxau6",
+    "libXdmcp.so.6": "libxdmcp6",
+    "libbsd.so.0": "libbsd0",
+    "libmd.so.0": "libmd0",
+    "libunistring.so.2": "libunistring2",
+    "libunistring.so.5": "libunistring5",
+}
 ELSEWHERE = {
     "dnf": "dnf install libglvnd-egl libglvnd-glx libX11 libusb1 systemd-libs libidn2",
     "zypper": "zypper install Mesa-libEGL1 Mesa-libGL1 libX11-6 libusb-1_0-0 libudev1 libidn2-0",
@@ -33,30 +45,36 @@ def provide(python: Path, folder: Path) -> None:
     """Make open3d importable by that Python; `folder` takes what must be unpacked."""
     if sys.platform != "linux" or open3d_loads(python):
         return
-    packages = [PACKAGES[library] for library in missing(python)]
+    packages = missing(python, PACKAGES)
     if packages:
         print(f"setup: Open3D needs {', '.join(packages)}; installing them", flush=True)
         if debian.install(packages) and open3d_loads(python):
             return
         print(f"setup: not allowed to install them; unpacking them into {folder}", flush=True)
-        unpack(packages, folder)
+        unpack(packages + missing(python, BEHIND), folder)
         if open3d_loads(python):
             return
     sys.exit(f"setup: {remedy(packages)}\n{reason(python)}")
 
 
-def missing(python: Path) -> list[str]:
-    """The libraries of PACKAGES that the dynamic linker does not find."""
+def missing(python: Path, packages: dict[str, str]) -> list[str]:
+    """The packages of those libraries that the dynamic linker does not find."""
     test = "import ctypes, sys; ctypes.CDLL(sys.argv[1])"
-    return [name for name in PACKAGES if subprocess.run([python, "-c", test, name], capture_output=True).returncode]
+
+    def found(library: str) -> bool:
+        return subprocess.run([python, "-c", test, library], capture_output=True).returncode == 0
+
+    return [package for library, package in packages.items() if not found(library)]
 
 
 def unpack(packages: list[str], folder: Path) -> None:
-    """Copy the shared libraries of those packages, and of what they need, into the folder."""
+    """Copy the shared libraries of those packages into the folder, under the names that programs ask for."""
     files = debian.unpack(packages)
-    folder.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     for library in [*files.glob("usr/lib/*/lib*.so.*"), *files.glob("lib/*/lib*.so.*")]:
-        shutil.copyfile(library, folder / library.name)
+        if library.is_symlink():
+            shutil.copyfile(library, folder / library.name)
 
 
 def open3d_loads(python: Path) -> bool:
