@@ -63,9 +63,8 @@ class BumpOfRevolution:
         inflection = 1.0 / np.sqrt(3 * self.sharpness)
         # Far out k falls off as 6 / (a u^3): beyond this distance 1 + r k is positive.
         outside = max(2 * deepest, 2 * float(np.cbrt(6 * tip_radius / self.sharpness)))
-        opening = lambda u: self._opening(u, tip_radius)  # noqa: E731
-        pair = [brentq(opening, *ends, xtol=1e-15, rtol=1e-14) for ends in ((inflection, deepest), (deepest, outside))]
-        return np.array(pair)
+        ends = ((inflection, deepest), (deepest, outside))
+        return np.array([brentq(self._opening, *pair, args=(tip_radius,), xtol=1e-15, rtol=1e-14) for pair in ends])
 
     def interference(self, tip_radius: float, tolerance: float = 1e-14) -> tuple[float, float] | None:
         """The two distances u between which the meridian's plane motion of the ball never touches, or None.
@@ -83,9 +82,8 @@ class BumpOfRevolution:
         def beyond(u: float) -> float:
             """The point of the plain whose centre stands over the centre of the flank's point u."""
             place = self.parallel(u, tip_radius)[0]
-            reach = lambda w: float(self.parallel(w, tip_radius)[0] - place)  # noqa: E731
             far = 2 * outer + tip_radius
-            return float(brentq(reach, outer, far, xtol=tolerance))
+            return float(brentq(lambda w: float(self.parallel(w, tip_radius)[0] - place), outer, far, xtol=tolerance))
 
         def gap(u: float) -> float:
             return float(self.parallel(u, tip_radius)[1] - self.parallel(beyond(u), tip_radius)[1])
@@ -120,7 +118,11 @@ class BumpOfRevolution:
         u = radius * np.arange(1, rings + 1) / rings
         v = 2 * np.pi * np.arange(sectors) / sectors
         ring = np.stack(
-            [np.outer(u, np.cos(v)), np.outer(u, np.sin(v)), np.broadcast_to(self.height(u)[:, None], (rings, sectors))],
+            [
+                np.outer(u, np.cos(v)),
+                np.outer(u, np.sin(v)),
+                np.broadcast_to(self.height(u)[:, None], (rings, sectors)),
+            ],
             axis=-1,
         ).reshape(-1, 3)
         return Surface(np.vstack([[[0.0, 0.0, 1.0]], ring]), _polar_faces(rings, sectors))

@@ -52,9 +52,7 @@ class ContactRow:
         return replace(self, normals=normals)
 
 
-def contact_row(
-    centers: FloatArray, outward: FloatArray, tip_radius: float, open_kinks: bool = True
-) -> ContactRow:
+def contact_row(centers: FloatArray, outward: FloatArray, tip_radius: float, open_kinks: bool = True) -> ContactRow:
     """The contacts of a sweep (N, 3) in the planes spanned by its tangents and `outward` (N, 3).
 
     At an interference point the ball touches with two normals. The row then holds both contacts and,
@@ -101,7 +99,15 @@ def _fan(kinks: Kinks, k: int, outward: FloatArray, tip_radius: float, usual: fl
     nearest = np.r_[np.full(half, cut - 1), np.full(inner + 2 - half, cut)]
     along = unit(kinks.before[k] * (1 - share) + kinks.after[k] * share)
     place = cut - 1 + np.linspace(0.25, 0.75, inner + 2)
-    return place, np.repeat(kinks.centers[k : k + 1], inner + 2, 0), along, normals, labels, np.full(inner + 2, -1), nearest
+    return (
+        place,
+        np.repeat(kinks.centers[k : k + 1], inner + 2, 0),
+        along,
+        normals,
+        labels,
+        np.full(inner + 2, -1),
+        nearest,
+    )
 
 
 def _turned(first: FloatArray, last: FloatArray, angle: float, share: FloatArray) -> FloatArray:

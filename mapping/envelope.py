@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mapping.base import Base
+from mapping.bridging import bridged_faces, resting_points, split
 from mapping.contact_row import ContactRow, contact_row
 from mapping.estimate import BRIDGED, EXTRAPOLATED, LABELS, TOUCHED, EnvelopeError, Estimate
 from mapping.noise import Noise
 from mapping.penetration import penetration
+from mapping.smoothing import Smoothed, smooth
 from mapping.surface import Surface
 from mapping.sweep_mesh import pitch, sweep_faces, thinned
 from mapping.trace import Trace
+from mapping.trace_normals import surface_normals
 
 __all__ = ["BRIDGED", "EXTRAPOLATED", "LABELS", "TOUCHED", "EnvelopeError", "Estimate", "estimate_surface"]
 
@@ -63,27 +68,19 @@ def estimate_surface(
     away, slack = _outward(trace, base, outward), TOLERANCE * trace.tip_radius
     smoothed = None
     if noise is not None and noise.sd > 0:
-        from mapping.smoothing import smooth
-
         smoothed = smooth(trace, noise, outward=away)
         trace, away = smoothed.trace, away[smoothed.sample]
         slack = max(slack, 4 * smoothed.sd)
-    row, sweep, sample = _contacts(trace, method, away)
-    labels = row.labels.copy()
+    points = _contacts(trace, method, away)
     if smoothed is not None:
-        # At the scale of smoothing, dents beyond half the tip's own curvature look like kinks.
-        own = sample >= 0
-        labels[own] = np.where(smoothed.curvature[sample[own]] * trace.tip_radius < -1, BRIDGED, labels[own])
-        sample = np.where(own, smoothed.sample[sample], -1)
-    points = row.centers - trace.tip_radius * row.normals
-    possible = penetration(points, trace.centers, trace.tip_radius) <= slack
+        points = _unsmoothed(points, smoothed)
+    possible = penetration(points.points, trace.centers, trace.tip_radius) <= slack
     if not possible.any():
         raise EnvelopeError("every contact lies inside another ball: the trace is no ball's path; give its noise")
+    points = points.select(np.flatnonzero(possible))
     step = pitch(trace.centers, trace.sweep) / 4 if spacing is None else spacing
-    kept = np.flatnonzero(possible)
-    kept = kept[thinned(row.centers[kept], sweep[kept], step, row.sample[kept] < 0)]
-    surface = _mesh(row.centers[kept], points[kept], sweep[kept], row.normals[kept])
-    return Estimate(surface, points[kept], row.normals[kept], row.centers[kept], labels[kept], sample[kept], sweep[kept])
+    points = points.select(thinned(points.centers, points.sweep, step, points.sample < 0))
+    return _meshed(points, trace, slack)
 
 
 def _outward(trace: Trace, base: Base | None, outward: ArrayLike | None) -> FloatArray:
@@ -97,30 +94,55 @@ def _outward(trace: Trace, base: Base | None, outward: ArrayLike | None) -> Floa
     return np.array(np.broadcast_to([0.0, 0.0, 1.0], trace.centers.shape))
 
 
-def _contacts(trace: Trace, method: str, outward: FloatArray) -> tuple[ContactRow, IntArray, IntArray]:
-    """The rows of all sweeps as one, the sweep number of each point, and its sample in the trace."""
-    from mapping.trace_normals import surface_normals
-
-    rows, sweeps, samples, nearest, start = [], [], [], [], 0
+def _contacts(trace: Trace, method: str, outward: FloatArray) -> Estimate:
+    """Contacts of every sweep, and points of the resting ball at its interference points; no mesh yet."""
+    moving = np.r_[True, (np.diff(trace.centers, axis=0) != 0).any(axis=1) | (np.diff(trace.sweep) != 0)]
+    still = np.flatnonzero(moving)  # a finger that stands still says everything once
+    trace, outward = trace.select(still), outward[still]
+    rows, sweeps, start = [], [], 0
     for number, part in trace.sweeps():
         own = slice(start, start + len(part))
         row = contact_row(part.centers, outward[own], trace.tip_radius, open_kinks=method != "normals")
-        rows.append(row)
+        rows.append(replace(row, sample=np.where(row.sample < 0, -1, row.sample + start), nearest=row.nearest + start))
         sweeps.append(np.full(len(row.centers), number))
-        samples.append(np.where(row.sample < 0, -1, row.sample + start))
-        nearest.append(row.nearest + start)
         start += len(part)
     row = ContactRow.joined(rows)
-    sweep, sample, near = np.concatenate(sweeps), np.concatenate(samples), np.concatenate(nearest)
+    normals, across = surface_normals(trace, row, outward)
     if method == "contact" and trace.normals is not None:
-        normals = np.where((sample >= 0)[:, None], trace.normals[near], row.normals)
-        return row.with_normals(normals), sweep, sample
-    return row.with_normals(surface_normals(trace, row, sample, near, outward)), sweep, sample
+        recorded = (row.sample >= 0)[:, None]
+        normals = np.where(recorded, trace.normals[row.nearest], row.normals)
+    sample = np.where(row.sample < 0, -1, still[row.sample])
+    points = row.centers - trace.tip_radius * normals
+    return Estimate(None, points, normals, row.centers, row.labels, sample, np.concatenate(sweeps), across)
 
 
-def _mesh(centers: FloatArray, points: FloatArray, sweep: IntArray, normals: FloatArray) -> Surface | None:
-    """The mesh of the contacts, joined as the centres lie: distances between centres never vanish."""
-    if len(np.unique(sweep)) < 2:
-        return None
-    faces = sweep_faces(centers, sweep, normals)
-    return Surface(points, faces) if len(faces) else None
+def _unsmoothed(points: Estimate, smoothed: Smoothed) -> Estimate:
+    """Points of a smoothed trace with the samples of the original; dents at the limit of sight are bridged.
+
+    At the scale of smoothing, dents beyond half the tip's own curvature look like kinks.
+    """
+    own = points.sample >= 0
+    dented = own & (smoothed.curvature[points.sample] * smoothed.trace.tip_radius < -1)
+    labels = np.where(dented, BRIDGED, points.labels).astype(np.int8)
+    return replace(points, labels=labels, sample=np.where(own, smoothed.sample[points.sample], -1))
+
+
+def _meshed(points: Estimate, trace: Trace, slack: float) -> Estimate:
+    """The points joined as their centres lie (those never coincide), with resting points in bridged faces."""
+    if len(np.unique(points.sweep)) < 2:
+        return points
+    faces = sweep_faces(points.centers, points.sweep, points.normals)
+    if len(faces) == 0:
+        return points
+    r = trace.tip_radius
+    flagged = bridged_faces(points.centers, points.normals, faces, r, points.across)
+    # Faces at an opened interference point hold their bridged points already.
+    chosen = np.flatnonzero(flagged & (points.sample[faces] >= 0).all(axis=1))
+    resting = resting_points(points.centers, points.normals, faces[chosen], r)
+    corners = points.centers[faces[chosen]]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
+    # Samples between the three corners lower the balls' common boundary by up to this sagitta.
+    possible = penetration(resting, trace.centers, r) <= slack + longest**2 / (2 * r)
+    chosen, resting = chosen[possible], resting[possible]
+    joined = points.with_resting(resting, faces[chosen])
+    return replace(joined, surface=Surface(joined.points, split(faces, chosen, len(points.points))))

@@ -1,13 +1,17 @@
-"""Compiled loops of the ball envelope: a profile in O(n), a height map by windows."""
+"""Compiled loops of the estimated surface: the envelope of balls, and tangents along sweeps."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 @njit(cache=True)
-def takeover(xi, zi, xj, zj, r):
+def takeover(xi: float, zi: float, xj: float, zj: float, r: float) -> float:
     """Abscissa from which the lower arc of disc j (xj > xi) lies below that of disc i.
 
     Two equal lower arcs cross at most once where both exist, for f_i - f_j grows along their common domain.
@@ -26,7 +30,7 @@ def takeover(xi, zi, xj, zj, r):
 
 
 @njit(cache=True)
-def lower_envelope(x, z, r):
+def lower_envelope(x: FloatArray, z: FloatArray, r: float) -> tuple[IntArray, FloatArray]:
     """Discs that show in the lower envelope of discs sorted by x, and where each begins to: (owners, starts).
 
     The order of the discs along the envelope is their order in x, so one stack suffices: every disc is
@@ -59,7 +63,9 @@ def lower_envelope(x, z, r):
 
 
 @njit(cache=True)
-def envelope_at(x, z, r, owners, starts, at):
+def envelope_at(
+    x: FloatArray, z: FloatArray, r: float, owners: IntArray, starts: FloatArray, at: FloatArray
+) -> tuple[FloatArray, IntArray]:
     """Height and owner of the envelope at sorted abscissae; +inf and -1 where no disc reaches."""
     height = np.full(len(at), np.inf)
     owner = np.full(len(at), -1, np.int64)
@@ -76,32 +82,17 @@ def envelope_at(x, z, r, owners, starts, at):
 
 
 @njit(cache=True)
-def erode_map(z, dx, dy, r):
-    """Lower envelope of balls of radius r centred on every finite node of a height map (M, N): (height, owner).
-
-    Nodes of the ball's footprint are visited from its middle outwards, row by row; NaN nodes hold no ball.
-    """
-    rows, columns = z.shape
-    reach_y, reach_x = int(np.floor(r / dy)), int(np.floor(r / dx))
-    height = np.full((rows, columns), np.inf)
-    owner = np.full((rows, columns), -1, np.int64)
-    for oy in range(-reach_y, reach_y + 1):
-        for ox in range(-reach_x, reach_x + 1):
-            rest = (r - abs(oy) * dy) * (r + abs(oy) * dy) - (ox * dx) ** 2
-            if rest < 0.0:
-                continue
-            drop = np.sqrt(rest)
-            for p in range(max(0, -oy), min(rows, rows - oy)):
-                for q in range(max(0, -ox), min(columns, columns - ox)):
-                    value = z[p + oy, q + ox] - drop
-                    if value < height[p, q]:
-                        height[p, q] = value
-                        owner[p, q] = (p + oy) * columns + (q + ox)
-    return height, owner
-
-
-@njit(cache=True)
-def splat_balls(x, y, z, r, x0, y0, step, rows, columns):
+def splat_balls(
+    x: FloatArray,
+    y: FloatArray,
+    z: FloatArray,
+    r: float,
+    x0: float,
+    y0: float,
+    step: float,
+    rows: int,
+    columns: int,
+) -> tuple[FloatArray, IntArray]:
     """Lower envelope on a grid of balls at scattered centres (N,): (height, owner)."""
     height = np.full((rows, columns), np.inf)
     owner = np.full((rows, columns), -1, np.int64)
@@ -120,3 +111,55 @@ def splat_balls(x, y, z, r, x0, y0, step, rows, columns):
                     height[p, q] = value
                     owner[p, q] = i
     return height, owner
+
+
+@njit(cache=True)
+def sweep_tangents(
+    points: FloatArray, s: FloatArray, begin: IntArray, end: IntArray, most: int, bias: float
+) -> FloatArray:
+    """Derivative at each point of the polynomial through up to `most` points of its piece [begin, end).
+
+    Of the windows that hold the point, the one of the smallest highest divided difference is taken; the
+    central one is kept unless another is smoother by the factor `bias`.
+    """
+    count = len(points)
+    result = np.zeros((count, 3))
+    # Highest divided difference of every full window, up to a common factor of its spacing.
+    rough = np.full(count, np.inf)
+    weight = np.empty(most)
+    for w in range(count - most + 1):
+        if begin[w] != begin[w + most - 1]:
+            continue
+        total = np.zeros(3)
+        for j in range(most):
+            product = 1.0
+            for k in range(most):
+                if k != j:
+                    product *= (s[w + j] - s[w + k]) / (s[w + most - 1] - s[w])
+            for c in range(3):
+                total[c] += (points[w + j, c] - points[w, c]) / product
+        rough[w] = np.sqrt(total[0] ** 2 + total[1] ** 2 + total[2] ** 2)
+        rough[w] /= (s[w + most - 1] - s[w]) ** (most - 1)
+    for i in range(count):
+        size = min(most, end[i] - begin[i])
+        first = min(max(i - most // 2, begin[i]), end[i] - size)
+        if size == most:
+            best = rough[first] / bias
+            for w in range(max(begin[i], i - most + 1), min(i, end[i] - most) + 1):
+                if rough[w] < best:
+                    best, first = rough[w], w
+        for j in range(size):
+            weight[j] = 0.0
+            if first + j == i:
+                continue
+            for skip in range(size):
+                if skip == j:
+                    continue
+                product = 1.0 / (s[first + j] - s[first + skip])
+                for k in range(size):
+                    if k != j and k != skip:
+                        product *= (s[i] - s[first + k]) / (s[first + j] - s[first + k])
+                weight[j] += product
+            for c in range(3):
+                result[i, c] += weight[j] * (points[first + j, c] - points[i, c])
+    return result

@@ -16,6 +16,8 @@ def penetration(points: FloatArray, centers: FloatArray, tip_radius: float) -> F
     Positive inside a ball, where no body can be; negative outside all of them. Points of a profile (all y of
     one value) are judged by the profile's envelope in O(n), others by a k-d tree.
     """
+    if len(points) == 0:
+        return np.zeros(0)
     if np.ptp(centers[:, 1]) == 0 and (points[:, 1] == centers[0, 1]).all() and (np.diff(centers[:, 0]) > 0).all():
         return _below_profile(points, centers, tip_radius)
     from scipy.spatial import cKDTree

@@ -98,7 +98,7 @@ def _beside(first: FloatArray, second: FloatArray) -> bool:
     distance = cKDTree(second).query(probes)[0]
     usual = float(np.median(distance))
     back = cKDTree(first).query(second[np.linspace(0, len(second) - 1, min(len(second), 65)).astype(int)])[0]
-    near, far = min(distance.min(), back.min()), max(np.quantile(distance, 0.8), np.quantile(back, 0.8))
+    near, far = min(np.min(distance), np.min(back)), max(np.quantile(distance, 0.8), np.quantile(back, 0.8))
     reach = np.linalg.norm(first[-1] - first[0])
     return bool(usual > 0 and near > 0.2 * usual and far < 2.5 * usual and (reach == 0 or usual < 2 * reach + far))
 
@@ -169,7 +169,7 @@ def _ball_pivoting(points: FloatArray, outward: FloatArray) -> IntArray:
 
     o3d = open3d()
     origin = points.mean(axis=0)
-    spacing = float(np.median(cKDTree(points).query(points, k=2)[0][:, 1]))
+    spacing = float(np.median(np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]))
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector((points - origin) / spacing))
     cloud.normals = o3d.utility.Vector3dVector(outward)
     radii = o3d.utility.DoubleVector([1.0, 2.0, 4.0, 8.0])

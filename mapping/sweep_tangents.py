@@ -9,6 +9,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 STENCIL = 5
+# A window of points must be smoother than the central one by this factor to displace it.
+CENTRAL = 4.0
 
 
 def chord_lengths(points: FloatArray) -> FloatArray:
@@ -39,41 +41,17 @@ def tangents(points: FloatArray, cuts: IntArray) -> FloatArray:
     (Harten et al. 1987): the central five, unless others are much smoother, so that a jump of curvature
     spoils none of them. Pieces of fewer points use what they have.
     """
+    from mapping.envelope_kernels import sweep_tangents as kernel
+
     count = len(points)
     s = chord_lengths(points)
     begin = np.repeat(np.r_[0, cuts], np.diff(np.r_[0, cuts, count]))
     end = np.repeat(np.r_[cuts, count], np.diff(np.r_[0, cuts, count]))
     result = np.zeros((count, 3))
-    size = np.minimum(end - begin, STENCIL)
-    first = np.clip(np.arange(count) - STENCIL // 2, begin, np.maximum(end - size, begin))
-    full = np.flatnonzero(size == STENCIL)
-    first[full] = _smoothest(points, s, full, begin[full], end[full])
-    for m in range(2, STENCIL + 1):
-        chosen = np.flatnonzero(size == m)
-        index = first[chosen][:, None] + np.arange(m)
-        offset = s[index] - s[chosen][:, None]
-        slope = lagrange(offset, np.zeros(len(chosen)))[1]
-        result[chosen] = np.einsum("km,kmc->kc", slope, points[index] - points[chosen][:, None])
-    for i in np.flatnonzero(size == 1):
-        result[i] = points[min(i + 1, count - 1)] - points[max(i - 1, 0)]
+    result = kernel(np.ascontiguousarray(points), s, begin, end, STENCIL, CENTRAL)
+    for i in np.flatnonzero(end - begin == 1):
+        result[i] = points[np.minimum(i + 1, count - 1)] - points[np.maximum(i - 1, 0)]
     return unit(result)
-
-
-def _smoothest(points: FloatArray, s: FloatArray, samples: IntArray, begin: IntArray, end: IntArray) -> IntArray:
-    """First index of the five points to differentiate at each sample."""
-    difference, order = points, 0
-    for order in range(1, STENCIL):
-        difference = np.diff(difference, axis=0) / (s[order:] - s[:-order])[:, None]
-    roughness = np.linalg.norm(difference, axis=1)
-    # A window must be four times smoother before it displaces the central one.
-    best = np.clip(samples - STENCIL // 2, begin, end - STENCIL)
-    score = roughness[best] / 4
-    for shift in range(STENCIL):
-        window = samples - shift
-        inside = (window >= begin) & (window + STENCIL <= end)
-        value = np.where(inside, roughness[np.clip(window, 0, len(roughness) - 1)], np.inf)
-        best, score = np.where(value < score, window, best), np.minimum(score, value)
-    return np.asarray(best)
 
 
 def unit(vectors: FloatArray) -> FloatArray:

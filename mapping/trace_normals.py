@@ -15,28 +15,27 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
-def surface_normals(
-    trace: Trace, row: ContactRow, sample: IntArray, nearest: IntArray, outward: FloatArray
-) -> FloatArray:
-    """(M, 3) outward unit normals at the points of `row`.
+def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Outward unit normals (M, 3) at the points of `row`, and the curvature (M,) across, 1/m, NaN where unknown.
 
     A single sweep knows its slope along itself only: its normals stay in the plane of tangent and outward
     direction. Parallel sweeps add the slope across; any other arrangement gets it from local fits.
     """
     if len(np.unique(trace.sweep)) < 2:
-        return row.normals
+        return row.normals, np.full(len(row.normals), np.nan)
     along = np.zeros_like(trace.centers)
-    along[sample[sample >= 0]] = row.tangents[sample >= 0]
+    own = row.sample >= 0
+    along[row.sample[own]] = row.tangents[own]
     rows = parallel_rows(trace.centers, trace.sweep)
     if rows is None:
-        across = _fitted(trace, trace.centers, along, outward)
+        across, bend = _fitted(trace, trace.centers, along, outward), np.full(len(trace), np.nan)
     else:
         across, bend = cross_tangents(trace.centers, along, outward, rows)
         lost = np.isnan(bend)
         across[lost] = _fitted(trace, trace.centers[lost], along[lost], outward[lost])
-    normals = unit(np.cross(row.tangents, across[nearest]))
-    side = np.sign(np.einsum("ij,ij->i", normals, outward[nearest]))
-    return np.where((side == 0)[:, None], row.normals, normals * side[:, None])
+    normals = unit(np.cross(row.tangents, across[row.nearest]))
+    side = np.sign(np.einsum("ij,ij->i", normals, outward[row.nearest]))
+    return np.where((side == 0)[:, None], row.normals, normals * side[:, None]), bend[row.nearest]
 
 
 def _fitted(
@@ -53,7 +52,7 @@ def _fitted(
     up = unit(np.cross(along, across))
     up *= np.where(np.einsum("ij,ij->i", up, outward) < 0, -1.0, 1.0)[:, None]
     count = min(neighbours, len(cloud))
-    distance, index = cKDTree(cloud).query(points, k=count)
+    distance, index = (np.asarray(found) for found in cKDTree(cloud).query(points, k=[*range(1, count + 1)]))
     scale = np.maximum(distance[:, -1:], 1e-300)
     arm = (cloud[index] - points[:, None]) / scale[..., None]
     u, v, w = (np.einsum("nkc,nc->nk", arm, axis) for axis in (along, across, up))
