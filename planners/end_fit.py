@@ -29,7 +29,15 @@ class EndFit:
     found: bool
 
 
-def fit_end(s: FloatArray, height: FloatArray, sign: float, crest: float, tip_radius: float, noise: Noise) -> EndFit:
+def fit_end(
+    s: FloatArray,
+    height: FloatArray,
+    sign: float,
+    crest: float,
+    tip_radius: float,
+    noise: Noise,
+    cap: float | None = None,
+) -> EndFit:
     """Generalised least squares for the end and the height of a crest that runs towards growing s.
 
     A convex crest's end is a round cap as wide as it is high; a concave one's an edge that lifts the ball
@@ -41,6 +49,7 @@ def fit_end(s: FloatArray, height: FloatArray, sign: float, crest: float, tip_ra
         sign: +1 ridge, -1 groove.
         crest: preliminary |height|, m.
         noise: of the samples.
+        cap: radius of the round cap at a convex crest's end, m; None: half of its height.
     """
     from scipy.optimize import least_squares
 
@@ -49,7 +58,7 @@ def fit_end(s: FloatArray, height: FloatArray, sign: float, crest: float, tip_ra
     white = np.linalg.solve(chol, sign * mean)
 
     def residual(p: FloatArray) -> FloatArray:
-        model = end_trace(place - p[0], max(p[1], 0.0), sign, tip_radius)
+        model = end_trace(place - p[0], max(p[1], 0.0), sign, tip_radius, cap)
         return np.asarray(np.linalg.solve(chol, model) - white)
 
     grid = np.linspace(place[0], place[-1], 80)
@@ -63,10 +72,10 @@ def fit_end(s: FloatArray, height: FloatArray, sign: float, crest: float, tip_ra
     return EndFit(end, sd, sign * top, bool(inside and 0 < sd < 0.2 * tip_radius and top > 0.4 * crest))
 
 
-def end_trace(x: FloatArray, crest: float, sign: float, tip_radius: float) -> FloatArray:
+def end_trace(x: FloatArray, crest: float, sign: float, tip_radius: float, cap: float | None = None) -> FloatArray:
     """|Height| of the trace at distance x beyond the end (x < 0: on the crest), m."""
     if sign > 0:
-        return cap_height(np.maximum(x, 0.0), crest, 0.5 * crest, tip_radius)
+        return cap_height(np.maximum(x, 0.0), crest, 0.5 * crest if cap is None else cap, tip_radius)
     inside = np.clip(-x, 0.0, np.sqrt(2.0 * tip_radius * crest))
     return np.asarray(inside**2 / (2.0 * tip_radius))
 

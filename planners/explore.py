@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -23,6 +23,7 @@ from planners.errors import PlannerError
 from planners.plan import Outcome, Plan
 from planners.ridge import RidgeFollower
 from planners.sense import Sense
+from planners.step import is_step
 from planners.strokes import Strokes
 from planners.survey import Survey
 
@@ -220,7 +221,7 @@ class Explore:
                 found.bumps.append(sized.value)
             return Outcome(circled.reason, sized.detail)
         follower = self._follower(found, strokes, sense)
-        followed = yield from follower.follow(seed, headings(seed, branches))
+        followed = yield from follower.follow(_typed(seed, branches), headings(seed, branches))
         found.crossings.extend(follower.aside)
         found.crossings.extend(branches)
         if followed.value is not None:
@@ -243,3 +244,14 @@ class Explore:
         end = yield from follower.slide(track.ends[which], track.height, track.half_width, track.sign)
         found.tracks[index] = track.with_end(which, end)
         return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")
+
+
+def _typed(seed: Crossing, branches: tuple[Crossing, ...]) -> Crossing:
+    """The seed with the kind, height and width of the circuit's branches.
+
+    A ridge swept lengthwise looks like a plateau between two steps; only a circuit crosses it squarely.
+    """
+    like = max(branches, key=lambda c: abs(c.height))
+    if is_step(seed) == is_step(like):
+        return seed
+    return replace(seed, kind=like.kind, height=like.height, half_width=like.half_width)

@@ -16,6 +16,7 @@ from planners.axis_track import AxisEnd, AxisTrack, heading_and_turn, polyline_d
 from planners.end_fit import fit_end
 from planners.plan import Outcome, Plan
 from planners.sense import Sense
+from planners.step import is_step, step_crossing
 from planners.strokes import Strokes
 
 FloatArray = NDArray[np.float64]
@@ -130,11 +131,16 @@ class RidgeFollower:
     ) -> Crossed:
         """Cross the ridge at a predicted point, square to its heading; a sweep that felt nothing is repeated once."""
         _, normal = self.strokes.onto(point)
-        half = 1.6 * like.half_width + reach
-        move = self.strokes.line(point, np.cross(normal, heading), half, half)
+        way = np.cross(normal, heading)
+        half = (2.5 if is_step(like) else 1.6) * like.half_width + reach
+        move = self.strokes.line(point, way, half, half)
         trace = yield move
         if len(trace) == 0:
             trace = yield move
+        if is_step(like):
+            edge = step_crossing(trace, self.sense.base, self.noise, point, way, like)
+            near = edge is not None and np.linalg.norm(edge.point - point) <= reach + like.half_width
+            return edge if near and edge is not None and sign * edge.height >= lowest else None
         found, others = self.sense.nearest(trace, point, sign, lowest, reach)
         self.aside.extend(others)
         return found
@@ -145,7 +151,7 @@ class RidgeFollower:
         """Slide along the crest and off the end, where the crossings have bracketed it."""
         last = line.crossings[-1]
         rough = AxisEnd(last.point, np.inf, "end", heading, gone)
-        if last.kind.startswith("step"):
+        if is_step(last):
             return AxisEnd(last.point, 0.5 * gone, "end", heading, gone)
         return (yield from self.slide(rough, line.height, line.half_width, sign, turn))
 
@@ -213,7 +219,7 @@ def _joined(halves: list[tuple[Line, AxisEnd | None]], sign: float) -> AxisTrack
         first_end = AxisEnd(crossings[0].point, np.inf, "lost", -_first_step(crossings))
     points = [c.point for c in crossings]
     normals = [c.normal for c in crossings]
-    kind = "step" if crossings[0].kind.startswith("step") else crossings[0].kind
+    kind = "step" if is_step(crossings[0]) else crossings[0].kind
     height = float(np.median([abs(c.height) for c in crossings]))
     half_width = float(np.median([c.half_width for c in crossings]))
     if last_end is None or first_end is None:
