@@ -31,8 +31,6 @@ BEHIND = {
     "libXdmcp.so.6": "libxdmcp6",
     "libbsd.so.0": "libbsd0",
     "libmd.so.0": "libmd0",
-    "libunistring.so.2": "libunistring2",
-    "libunistring.so.5": "libunistring5",
 }
 ELSEWHERE = {
     "dnf": "dnf install libglvnd-egl libglvnd-glx libX11 libusb1 systemd-libs libidn2",

@@ -1,0 +1,119 @@
+"""Dry run: what the finger would do if nothing stood out anywhere; nothing is moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from explore3d.run import explorer, known_base, scene_finger
+from explore3d.scene import load_scene
+from hw.moves import Move
+from mapping.base import Base
+from mapping.trace import Trace
+
+
+@dataclass(frozen=True, eq=False)
+class DryRun:
+    """The planned moves.
+
+    Args:
+        base: the global model.
+        tip_radius: m.
+        moves: in their order.
+        metres, seconds: finger path and time, the ways between the sweeps included.
+        covered: share of the surface that the sweeps inspect.
+        reach: distance from a sweep up to which the smallest feature is seen, m.
+        violations: (number of the move, what limit it breaks).
+    """
+
+    base: Base
+    tip_radius: float
+    moves: tuple[Move, ...]
+    metres: float
+    seconds: float
+    covered: float
+    reach: float
+    violations: tuple[tuple[int, str], ...]
+
+    def record(self) -> dict[str, Any]:
+        """The plan in JSON values: SI units."""
+        return {
+            "sweeps": sum(move.purpose == "sweep" for move in self.moves),
+            "moves": [{"purpose": move.purpose, "path": move.path.tolist()} for move in self.moves],
+            "length": self.metres,
+            "time": self.seconds,
+            "covered": self.covered,
+            "reach": self.reach,
+            "violations": [{"move": number, "what": what} for number, what in self.violations],
+        }
+
+    def lines(self) -> list[str]:
+        """The plan in words."""
+        from explore3d.quantity import count_text, length_text, seconds_text
+
+        sweeps = count_text(sum(move.purpose == "sweep" for move in self.moves), "sweep")
+        first = f"{sweeps}, {length_text(self.metres)} of finger path, {seconds_text(self.seconds)}"
+        second = f"{100 * self.covered:.1f} % of the surface lies within {length_text(self.reach)} of a sweep"
+        broken = [f"move {number}: {what}" for number, what in self.violations]
+        return [first, second, *(broken or ["no move breaks a limit"])]
+
+    def picture(self) -> bytes:
+        """PNG of the base with the planned sweeps on it."""
+        from explore3d.object_picture import object_picture
+
+        paths = [_dense(move.path, 0.05 * self.tip_radius) for move in self.moves]
+        number = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
+        centers = np.concatenate([np.zeros((0, 3)), *paths])
+        feet = self.base.foot(centers, self.tip_radius)
+        trace = Trace(np.arange(float(len(centers))), centers, number, self.tip_radius)
+        return object_picture(self.base.surface, (), trace, feet.points, feet.normals)
+
+
+def plan_scene(path: Path | str) -> DryRun:
+    """Plan the exploration of a scene, and check every move against the finger's limits.
+
+    Raises:
+        SceneError: a scene that cannot be used.
+    """
+    from planners.budget import Spent
+    from planners.checks import Limits
+    from planners.drive import dry_run
+
+    scene = load_scene(path)
+    base, finger, tip = known_base(scene), scene_finger(scene), scene.tip.radius
+    explore = explorer(scene, base)
+    moves, outcome = dry_run(explore.plan(), Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip))
+    limits = Limits.of(finger.workspace, base, tip)
+    violations = [(number, what) for number, move in enumerate(moves, 1) if (what := limits.violation(move))]
+    spent = Spent(25.0 * tip if explore.travel_speed is None else explore.travel_speed)
+    for move in moves:
+        spent.count(move)
+    survey = outcome.value.survey
+    return DryRun(
+        base, tip, tuple(moves), spent.metres, spent.seconds, survey.fraction, survey.reach, tuple(violations)
+    )
+
+
+def show_plan(plan: DryRun, out: Path | None, as_json: bool) -> None:
+    """Print the plan in words or as JSON; with a folder, write plan.json and plan.png into it."""
+    import json
+
+    from explore3d.session import Session
+
+    if out is not None:
+        with Session(out) as session:
+            session.write("plan.json", json.dumps(plan.record(), indent=1))
+            session.write("plan.png", plan.picture())
+    if as_json:
+        print(json.dumps(plan.record()))
+    else:
+        print("\n".join(plan.lines() + ([] if out is None else [f"picture: {out / 'plan.png'}"])))
+
+
+def _dense(path: np.ndarray, spacing: float) -> np.ndarray:
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    s = np.linspace(0.0, along[-1], 2 + int(along[-1] / spacing))
+    return np.column_stack([np.interp(s, along, path[:, k]) for k in range(3)])
