@@ -52,7 +52,7 @@ class CurveModes:
 
     def lateral_at(self, coefficients: FloatArray, s: FloatArray) -> FloatArray:
         """(W,) lateral distances, each at its own place s (W,), m."""
-        return np.einsum("wc,cw->w", coefficients, self._basis(s))
+        return np.asarray(np.einsum("wc,cw->w", coefficients, self._basis(s)))
 
     def slope(self, coefficients: FloatArray, s: float) -> FloatArray:
         """(W,) change of the lateral distance per metre along the chart."""

@@ -111,7 +111,7 @@ def _shape(
     around: Surroundings,
 ) -> Shape:
     tip = around.trace.tip_radius
-    priors = list(_lateral_priors(modes, crossings, sizes))
+    priors = _lateral_priors(modes, crossings, sizes)
     start, step = [0.0] * modes.count, list(0.02 * sizes.half_width * modes.scale)
     if kind == "step":
         priors.append(height_prior(sizes))
@@ -164,9 +164,10 @@ def _beginnings(shape: Shape, chart: Chart, sizes: Sizes, kind: str) -> FloatArr
     start = shape.start
     starts = [start]
     if kind != "step":
-        section = start.copy()
-        section[-1] = np.log(4.0 * sizes.radius) if kind == "ridge" else np.log(sizes.height)
-        starts.append(section)
+        for size in (4.0 * sizes.radius, 0.5 * sizes.height) if kind == "ridge" else (sizes.height,):
+            section = start.copy()
+            section[-1] = np.log(size)
+            starts.append(section)
         if not chart.closed:
             for out in (-0.5, 0.5, 1.0):
                 moved = start.copy()

@@ -9,7 +9,7 @@ from mapping.problem import Problem
 
 FloatArray = NDArray[np.float64]
 
-# An end that may as well lie at the limit of what was looked at was not seen: less than this much log density against it.
+# An end that may as well lie at the limit of what was looked at was not seen: no more log density against it.
 UNSEEN = 3.0
 
 

@@ -1,51 +1,27 @@
-"""Importance: a proposal that learns the posterior from weighted draws, and says how well it does."""
+"""Importance: weighted draws of a posterior from a proposal that learns it, and how far they can be trusted."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mapping.laplace import Laplace
+from mapping.proposal import DEGREES, Proposal, root_of
 from mapping.psis import effective_size, smooth_weights
 from mapping.target import Target
 
 FloatArray = NDArray[np.float64]
 
-DEGREES = 6.0
-ROUNDS = 10
+ROUNDS = 12
 DRAWS = 1000
 FINAL_DRAWS = 4000
 # Below this k-hat importance sampling may stand for the posterior (theory section 8).
 TRUSTED_K_HAT = 0.5
-
-
-@dataclass(frozen=True, eq=False)
-class Proposal:
-    """A multivariate Student t.
-
-    Args:
-        mean: (P,).
-        root: (P, P) Cholesky factor of the scale matrix.
-    """
-
-    mean: FloatArray
-    root: FloatArray
-
-    def draw(self, normal: FloatArray, chi_square: FloatArray) -> FloatArray:
-        """(S, P) draws from standard normal (S, P) and chi-square (S,) variates of DEGREES degrees of freedom."""
-        return np.asarray(self.mean + (normal @ self.root.T) * np.sqrt(DEGREES / chi_square)[:, None])
-
-    def log_density(self, theta: FloatArray) -> FloatArray:
-        """(S,) log densities up to a constant that is the same for all theta."""
-        from math import lgamma, log, pi
-
-        count = len(self.mean)
-        z = np.linalg.solve(self.root, (theta - self.mean).T)
-        norm = lgamma((DEGREES + count) / 2) - lgamma(DEGREES / 2) - 0.5 * count * log(DEGREES * pi)
-        norm -= float(np.log(np.diag(self.root)).sum())
-        return norm - 0.5 * (DEGREES + count) * np.log1p((z**2).sum(axis=0) / DEGREES)
+# The proposal is good enough when this share of the draws is effective.
+EFFICIENT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,24 +45,21 @@ class Importance:
     log_evidence: float
 
 
-def importance_sample(target: Target, start: Laplace, rng: np.random.Generator) -> Importance:
-    """Draws of the target, the proposal adapted from the Laplace approximation by its own weighted draws.
+def importance_sample(target: Target, modes: Sequence[Laplace], rng: np.random.Generator) -> Importance:
+    """Draws of the target, the proposal adapted from Laplace approximations by its own weighted draws.
 
     While few draws carry the weight it is tempered, so that the proposal grows towards the target instead of
     collapsing on the best draw.
 
-    Reference: Cappe, Guillin, Marin & Robert, "Population Monte Carlo", JCGS 13 (2004), with PSIS as the test.
+    Reference: Cappe et al. (2008) for the adaptation; Vehtari et al. (2024) for the test.
     """
-    proposal = Proposal(start.mean, _root(start.covariance))
+    proposal = _first_proposal(modes)
     for _ in range(ROUNDS):
         draws, ratios = _weigh(target, proposal, rng, DRAWS)
         weights, k_hat = smooth_weights(ratios)
-        if effective_size(weights) > 0.45 * DRAWS and k_hat < TRUSTED_K_HAT:
+        if effective_size(weights) > EFFICIENT * DRAWS and k_hat < TRUSTED_K_HAT:
             break
-        weights = _tempered(ratios, at_least=20.0 * len(start.mean))
-        mean = weights @ draws
-        spread = draws - mean
-        proposal = Proposal(mean, _root((spread * weights[:, None]).T @ spread * (1.0 + 1.0 / len(mean))))
+        proposal = proposal.learned(draws, _tempered(ratios, at_least=20.0 * draws.shape[1]))
     draws, ratios = _weigh(target, proposal, rng, FINAL_DRAWS)
     weights, k_hat = smooth_weights(ratios)
     top = float(ratios.max())
@@ -94,9 +67,17 @@ def importance_sample(target: Target, start: Laplace, rng: np.random.Generator) 
     return Importance(proposal, draws, weights, k_hat, effective_size(weights), log_evidence)
 
 
+def _first_proposal(modes: Sequence[Laplace]) -> Proposal:
+    """Each mode twice: as the Gaussian approximation has it, and twice as wide for what is not Gaussian about it."""
+    means = np.repeat([mode.mean for mode in modes], 2, axis=0)
+    roots = np.array([width * root_of(mode.covariance) for mode in modes for width in (1.0, 2.0)])
+    shares = np.tile([0.7, 0.3], len(modes)) / len(modes)
+    return Proposal(shares, means, roots)
+
+
 def _weigh(target: Target, proposal: Proposal, rng: np.random.Generator, size: int) -> tuple[FloatArray, FloatArray]:
-    count = len(proposal.mean)
-    draws = proposal.draw(rng.standard_normal((size, count)), rng.chisquare(DEGREES, size))
+    count = proposal.means.shape[1]
+    draws = proposal.draw(rng.random(size), rng.standard_normal((size, count)), rng.chisquare(DEGREES, size))
     return draws, target.log_density(draws) - proposal.log_density(draws)
 
 
@@ -111,12 +92,3 @@ def _tempered(ratios: FloatArray, at_least: float) -> FloatArray:
             break
         power *= 0.75
     return np.asarray(weights)
-
-
-def _root(covariance: FloatArray) -> FloatArray:
-    """Cholesky factor; directions without spread get a trace of it, in each parameter's own unit."""
-    sd = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
-    correlation = covariance / np.outer(sd, sd)
-    values, vectors = np.linalg.eigh(0.5 * (correlation + correlation.T))
-    sound = (vectors * np.maximum(values, 1e-9)) @ vectors.T
-    return np.asarray(sd[:, None] * np.linalg.cholesky(sound))

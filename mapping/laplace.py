@@ -12,6 +12,9 @@ from mapping.target import Target
 FloatArray = NDArray[np.float64]
 
 ITERATIONS = 60
+# Log density below the best optimum at which another one does not matter, and how many are kept.
+NEGLIGIBLE = 12.0
+MODES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,15 +33,20 @@ class Laplace:
     log_density: float
 
 
-def find_optimum(target: Target, starts: FloatArray) -> FloatArray:
-    """(P,) best parameters reached by Levenberg-Marquardt from each of the starts (M, P); never worse than they."""
-    best, best_value = starts[0], -np.inf
-    for start in starts:
-        theta = _descend(target, start)
-        value = float(target.log_density(theta[None])[0])
-        if value > best_value:
-            best, best_value = theta, value
-    return best
+def find_optima(target: Target, starts: FloatArray) -> list[FloatArray]:
+    """Distinct optima (P,) reached by Levenberg-Marquardt from the starts (M, P), best first.
+
+    Optima that hold a negligible share of the probability, or lie within a fraction of a step of a better one, are
+    left out; at most MODES are kept.
+    """
+    found = np.array([_descend(target, start) for start in starts])
+    values = target.log_density(found)
+    kept: list[FloatArray] = []
+    for i in np.argsort(-values, kind="stable"):
+        apart = [np.abs((found[i] - other) / target.shape.step).max() > 0.5 for other in kept]
+        if values[i] > values.max() - NEGLIGIBLE and all(apart) and len(kept) < MODES:
+            kept.append(found[i])
+    return kept or [starts[0]]
 
 
 def laplace(target: Target, optimum: FloatArray) -> Laplace:
@@ -102,7 +110,7 @@ def _widths(target: Target) -> FloatArray:
     """(P,) standard deviations of the priors where bounded, else generous multiples of the step."""
     with np.errstate(invalid="ignore"):
         width = (target.high - target.low) / np.sqrt(12.0)
-    return np.where(np.isfinite(width), width, 1e3 * target.shape.step)
+    return np.asarray(np.where(np.isfinite(width), width, 1e3 * target.shape.step))
 
 
 def _inverse(hessian: FloatArray, target: Target) -> FloatArray:

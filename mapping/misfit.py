@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.bin_filter import bin_filter
-from mapping.laplace import find_optimum
+from mapping.laplace import find_optima
 from mapping.noise import Noise
 from mapping.problem import MODEL_FLOOR, Problem
 
@@ -21,7 +21,7 @@ FEW = 0.03
 EXCESS = 5.0
 
 
-def account_for_misfit(problem: Problem, optimum: FloatArray) -> tuple[Problem, FloatArray]:
+def account_for_misfit(problem: Problem, optima: list[FloatArray]) -> tuple[Problem, list[FloatArray]]:
     """The problem with outliers trusted less and, if the residual is still too large, with noise to match.
 
     Lone wild bins get the variance that makes them ordinary (a Gaussian scale mixture, one step of its EM). A
@@ -29,19 +29,24 @@ def account_for_misfit(problem: Problem, optimum: FloatArray) -> tuple[Problem, 
     white and correlated levels that explain it are then found by maximum likelihood, so that the intervals tell of
     it (model discrepancy; Kennedy & O'Hagan 2001).
     """
-    residual = problem.target.residuals(optimum[None])[0, : len(problem.window)]
+    residual = _residual(problem, optima)
     wild = np.abs(residual) > OUTLIER
     if wild.any() and wild.mean() < FEW:
-        inflation = np.where(wild, (residual / 1.0) ** 2, 1.0)
+        inflation = np.where(wild, residual**2, 1.0)
         problem = problem.under(problem.noise, inflation)
-        optimum = find_optimum(problem.target, optimum[None])
-        residual = problem.target.residuals(optimum[None])[0, : len(problem.window)]
+        optima = find_optima(problem.target, np.array(optima))
+        residual = _residual(problem, optima)
     count = len(residual)
     if float(residual @ residual) <= count + EXCESS * np.sqrt(2.0 * count):
-        return problem, optimum
-    noise = _noise_of_residual(problem, optimum)
+        return problem, optima
+    noise = _noise_of_residual(problem, optima[0])
     problem = problem.under(noise)
-    return problem, find_optimum(problem.target, optimum[None])
+    return problem, find_optima(problem.target, np.array([*optima, *problem.beginnings]))
+
+
+def _residual(problem: Problem, optima: list[FloatArray]) -> FloatArray:
+    """(n,) whitened residual at the best optimum."""
+    return problem.target.residuals(optima[0][None])[0, : len(problem.window)]
 
 
 def _noise_of_residual(problem: Problem, optimum: FloatArray) -> Noise:

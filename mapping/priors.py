@@ -14,8 +14,11 @@ FloatArray = NDArray[np.float64]
 class Prior(Protocol):
     """A proper prior on one parameter with support [low, high]."""
 
-    low: float
-    high: float
+    @property
+    def low(self) -> float: ...
+
+    @property
+    def high(self) -> float: ...
 
     def log_density(self, x: FloatArray) -> FloatArray:
         """Normalised log density within the support."""
@@ -69,7 +72,7 @@ class StudentT:
         return np.asarray(np.sign(z) * np.sqrt((self.degrees + 1) * np.log1p(z**2 / self.degrees)))
 
     def draw(self, rng: np.random.Generator, size: int) -> FloatArray:
-        return self.center + self.scale * rng.standard_t(self.degrees, size)
+        return np.asarray(self.center + self.scale * rng.standard_t(self.degrees, size))
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ class Normal:
     high: float = np.inf
 
     def log_density(self, x: FloatArray) -> FloatArray:
-        return -0.5 * self.residual(x) ** 2 - np.log(self.sd * np.sqrt(2 * np.pi))
+        return np.asarray(-0.5 * self.residual(x) ** 2 - np.log(self.sd * np.sqrt(2 * np.pi)))
 
     def residual(self, x: FloatArray) -> FloatArray:
         return np.asarray((x - self.mean) / self.sd)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mapping.base import Base
 from mapping.feature import Feature
 from mapping.importance import TRUSTED_K_HAT, Importance, importance_sample
-from mapping.laplace import find_optimum, laplace
+from mapping.laplace import find_optima, laplace
 from mapping.misfit import account_for_misfit
 from mapping.noise import Noise
 from mapping.posterior import Posterior
@@ -130,24 +130,22 @@ def pose_problem(feature: Feature, around: Surroundings) -> Problem:
 
 def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool = True) -> Solution:
     """Optimum, misfit, importance sampling, and emcee where it is wanted or needed."""
-    optimum = find_optimum(problem.target, problem.beginnings)
-    problem, optimum = account_for_misfit(problem, optimum)
-    fast = importance_sample(problem.target, laplace(problem.target, optimum), rng)
+    optima = find_optima(problem.target, problem.beginnings)
+    problem, optima = account_for_misfit(problem, optima)
+    fast = importance_sample(problem.target, [laplace(problem.target, optimum) for optimum in optima], rng)
     if not confirm and fast.k_hat < TRUSTED_K_HAT:
         return Solution(problem, _from_importance(problem, fast, rng), fast, None)
-    walkers = max(WALKERS, 2 * len(optimum) + 4)
-    starts = _starts(problem, fast, optimum, rng, walkers)
+    walkers = max(WALKERS, 2 * fast.draws.shape[1] + 4)
+    starts = _starts(problem, fast, rng, walkers)
     chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal)
     return Solution(problem, _from_chain(problem, fast, chain, rng), fast, chain)
 
 
-def _starts(
-    problem: Problem, fast: Importance, optimum: FloatArray, rng: np.random.Generator, walkers: int
-) -> FloatArray:
+def _starts(problem: Problem, fast: Importance, rng: np.random.Generator, walkers: int) -> FloatArray:
     """Walkers at weighted draws, pulled apart a little so that no two coincide."""
     target = problem.target
     starts = fast.draws[resample(rng, fast.weights, walkers)]
-    jitter = 0.1 * (fast.draws[rng.permutation(len(fast.draws))[:walkers]] - fast.proposal.mean)
+    jitter = 0.1 * (fast.draws[rng.permutation(len(fast.draws))[:walkers]] - fast.weights @ fast.draws)
     moved = np.clip(starts + jitter, target.low, target.high)
     sound = np.isfinite(target.log_density(moved))
     return np.where(sound[:, None], moved, starts)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mapping.errors import MappingError
-from mapping.importance import DEGREES, Proposal
+from mapping.proposal import DEGREES, Proposal
 from mapping.target import Target
 
 FloatArray = NDArray[np.float64]
@@ -91,10 +93,10 @@ def sample_ensemble(
     return _chain(sampler, tau, settled)
 
 
-def _chain(sampler: object, tau: float, settled: bool) -> Chain:
-    chain: FloatArray = sampler.get_chain()  # type: ignore[attr-defined]
+def _chain(sampler: Any, tau: float, settled: bool) -> Chain:
+    chain: FloatArray = sampler.get_chain()
     steps, walkers, _ = chain.shape
-    acceptance = float(np.mean(sampler.acceptance_fraction))  # type: ignore[attr-defined]
+    acceptance = float(np.mean(sampler.acceptance_fraction))
     if not np.isfinite(tau) or acceptance < 0.01:
         status, reason = (
             "stuck",
@@ -115,22 +117,25 @@ def _chain(sampler: object, tau: float, settled: bool) -> Chain:
     return Chain(samples, tau, acceptance, status, reason, float(ess), steps)
 
 
-def _independent(proposal: Proposal):  # type: ignore[no-untyped-def]
+def _independent(
+    proposal: Proposal,
+) -> Callable[[FloatArray, np.random.RandomState], tuple[FloatArray, FloatArray]]:
     """emcee's form of a proposal that does not look at where the walker stands."""
 
     def propose(coords: FloatArray, random: np.random.RandomState) -> tuple[FloatArray, FloatArray]:
-        new = proposal.draw(random.standard_normal(coords.shape), random.chisquare(DEGREES, len(coords)))
+        count = len(coords)
+        variates = random.random_sample(count), random.standard_normal(coords.shape), random.chisquare(DEGREES, count)
+        new = proposal.draw(*variates)
         return new, proposal.log_density(coords) - proposal.log_density(new)
 
     return propose
 
 
-def _seed(sampler: object, rng: np.random.Generator) -> None:
+def _seed(sampler: Any, rng: np.random.Generator) -> None:
     """Hand the randomness over; emcee hides a state that it could not set, so it is read back."""
-    wanted = np.random.RandomState(int(rng.integers(2**32 - 1))).get_state()
-    sampler.random_state = wanted  # type: ignore[attr-defined]
-    found = sampler.random_state  # type: ignore[attr-defined]
-    if not np.array_equal(np.asarray(found[1]), np.asarray(wanted[1])):
+    wanted = np.random.RandomState(int(rng.integers(2**32 - 1))).get_state(legacy=True)
+    sampler.random_state = wanted
+    if not np.array_equal(sampler.random_state[1], np.asarray(wanted[1])):
         raise SamplerError("emcee did not take the random state that it was given; the run would not be repeatable")
 
 

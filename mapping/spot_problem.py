@@ -10,6 +10,7 @@ from mapping.feature import Feature
 from mapping.hollow_shape import PitShape
 from mapping.priors import Prior, StudentT, Uniform
 from mapping.problem import Problem, Sizes, Surroundings, pose, sizes_of, window_for
+from mapping.target import Shape
 from mapping.window import Window
 
 FloatArray = NDArray[np.float64]
@@ -29,14 +30,13 @@ def spot_problem(feature: Feature, around: Surroundings) -> Problem:
     middle = int(np.argmin(np.linalg.norm(window.feet - point, axis=1)))
     spot = spot_at(point[0], normal[0], window.tangents[middle], around.base, tip, sizes.half_width)
     free = 2 if np.ptp((window.feet - spot.point) @ spot.axes[1]) > SPREAD * sizes.half_width else 1
-    build = bump_shape if feature.kind == "bump" else pit_shape
-    shape = build(window, spot, sizes, tip, free)
+    shape: Shape = (bump_shape if feature.kind == "bump" else pit_shape)(window, spot, sizes, tip, free)
     return pose(feature, sizes, shape, window, around, _beginnings(shape.start, free, sizes, feature.kind))
 
 
 def bump_shape(window: Window, spot: Spot, sizes: Sizes, tip: float, free: int) -> BumpShape:
     """Bumps about a spot: position within 1.5 half widths, any height up to several times the detected one."""
-    place = Uniform(-1.5 * sizes.half_width, 1.5 * sizes.half_width)
+    place: Prior = Uniform(-1.5 * sizes.half_width, 1.5 * sizes.half_width)
     priors = (*(place,) * free, height_prior(sizes), radius_prior(sizes, tip))
     start = np.array([0.0] * free + [sizes.height, np.log(sizes.radius)])
     step = np.array([0.02 * sizes.half_width] * free + [0.02 * sizes.height, 0.1])
@@ -45,7 +45,7 @@ def bump_shape(window: Window, spot: Spot, sizes: Sizes, tip: float, free: int) 
 
 def pit_shape(window: Window, spot: Spot, sizes: Sizes, tip: float, free: int) -> PitShape:
     """Pits about a spot: log width and log depth equally probable over wide ranges."""
-    place = Uniform(-1.5 * sizes.half_width, 1.5 * sizes.half_width)
+    place: Prior = Uniform(-1.5 * sizes.half_width, 1.5 * sizes.half_width)
     width, depth = hollow_priors(sizes, tip)
     start = np.array([0.0] * free + [np.log(2.0 * sizes.radius), np.log(2.0 * sizes.height)])
     step = np.array([0.02 * sizes.half_width] * free + [0.02, 0.05])
@@ -81,6 +81,9 @@ def _beginnings(start: FloatArray, free: int, sizes: Sizes, kind: str) -> FloatA
         moved = start.copy()
         moved[0] += shift * sizes.half_width
         starts.append(moved)
-    other = start.copy()
-    other[free + 1] = np.log(4.0 * sizes.radius) if kind == "bump" else np.log(sizes.height)
-    return np.array([*starts, other])
+    others = (4.0 * sizes.radius, 0.5 * sizes.height) if kind == "bump" else (sizes.height,)
+    for size in others:
+        other = start.copy()
+        other[free + 1] = np.log(size)
+        starts.append(other)
+    return np.array(starts)

@@ -108,8 +108,8 @@ def _section(problem: Problem, shape: object, draws: FloatArray) -> tuple[Interv
         return Interval.from_draws(sign * draws[:, -1]), Interval(0.0, 0.0, 0.0), {}, ""
     if isinstance(shape, BumpShape | RidgeShape):
         radii = np.exp(draws[:, -1])
-        width = Interval.from_draws(width_of_cap(draws[:, -2], radii))
-        return Interval.from_draws(draws[:, -2]), width, {"radius": float(np.median(radii))}, ""
+        cap = Interval.from_draws(width_of_cap(draws[:, -2], radii))
+        return Interval.from_draws(draws[:, -2]), cap, {"radius": float(np.median(radii))}, ""
     width, depth = np.exp(draws[:, -2]), np.exp(draws[:, -1])
     tip = shape.tip_radius  # type: ignore[attr-defined]
     unhindered = -rim_height(0.5 * width, tip)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -20,11 +21,20 @@ class Shape(Protocol):
     names, units: P parameters.  priors: theirs.  start: (P,) first guess.  step: (P,) a small but visible change.
     """
 
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    priors: tuple[Prior, ...]
-    start: FloatArray
-    step: FloatArray
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    @property
+    def units(self) -> tuple[str, ...]: ...
+
+    @property
+    def priors(self) -> tuple[Prior, ...]: ...
+
+    @property
+    def start(self) -> FloatArray: ...
+
+    @property
+    def step(self) -> FloatArray: ...
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights of the trace over the base's trace for parameters (W, P), m."""
@@ -46,11 +56,11 @@ class Target:
     likelihood: Likelihood
     beside: FloatArray | None = None
 
-    @property
+    @cached_property
     def low(self) -> FloatArray:
         return np.array([prior.low for prior in self.shape.priors])
 
-    @property
+    @cached_property
     def high(self) -> FloatArray:
         return np.array([prior.high for prior in self.shape.priors])
 
@@ -65,9 +75,9 @@ class Target:
         """(W,) log posterior densities of (W, P) parameters; -inf outside the priors' support."""
         theta = np.atleast_2d(theta)
         out = np.full(len(theta), -np.inf)
-        sound = np.isfinite(theta).all(axis=1) & (theta >= self.low).all(axis=1) & (theta <= self.high).all(axis=1)
+        sound = ((theta >= self.low) & (theta <= self.high)).all(axis=1)
         if sound.any():
-            inside = theta[sound]
+            inside = theta if sound.all() else theta[sound]
             prior = sum(p.log_density(inside[:, i]) for i, p in enumerate(self.shape.priors))
             out[sound] = prior + self.likelihood.log_density(self.templates(inside))
         return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,6 @@ class Window:
         last: (n,) distance along the run of the bin's last sample, m.
         half: (n,) half of the bin's extent, m.
         starts: (runs + 1,) first bin of each run, and n.
-        spacing: typical distance between raw samples, m.
         samples: number of raw samples behind the bins.
     """
 
@@ -49,7 +49,6 @@ class Window:
     last: FloatArray
     half: FloatArray
     starts: IntArray
-    spacing: float
     samples: int
 
     def __len__(self) -> int:
@@ -105,16 +104,31 @@ def open_window(
         )
     feet = base.foot(trace.centers[index], trace.tip_radius)
     breaks = np.flatnonzero((np.diff(trace.sweep[index]) != 0) | (np.diff(index) > 1)) + 1
-    parts, spacings = [], []
+    runs = []
     for start, stop in zip([0, *breaks], [*breaks, len(index)], strict=True):
         own = slice(int(start), int(stop))
         path = distance_along(feet.points[own], noise_level)
-        spacings.append((float(path[-1] - path[0]), len(path)))
-        parts.append(_bins(feet.points[own], feet.normals[own], feet.height[own], path, width, noise_level, scale))
-    starts = np.concatenate([[0], np.cumsum([len(part[0]) for part in parts])])
-    joined = [np.concatenate([part[i] for part in parts]) for i in range(8)]
-    length, count = sum(s for s, _ in spacings), sum(max(n - 1, 0) for _, n in spacings)
-    return Window(*joined, starts.astype(np.int64), length / max(count, 1), len(index))
+        runs.append(_bin(feet.points[own], feet.normals[own], feet.height[own], path, width, noise_level, scale))
+    return _join(runs)
+
+
+def _join(runs: list[Window]) -> Window:
+    def every(name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(run, name) for run in runs])
+
+    starts = np.cumsum([0, *(len(run) for run in runs)])
+    return Window(
+        every("feet"),
+        every("normals"),
+        every("tangents"),
+        every("height"),
+        every("count"),
+        every("place"),
+        every("last"),
+        every("half"),
+        starts.astype(np.int64),
+        sum(run.samples for run in runs),
+    )
 
 
 def distance_along(points: FloatArray, noise_level: float) -> FloatArray:
@@ -140,7 +154,7 @@ def distance_along(points: FloatArray, noise_level: float) -> FloatArray:
     return np.asarray(along - along[0])
 
 
-def _bins(
+def _bin(
     points: FloatArray,
     normals: FloatArray,
     height: FloatArray,
@@ -148,7 +162,8 @@ def _bins(
     width: float,
     noise_level: float,
     scale: float,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray, FloatArray]:
+) -> Window:
+    """The window of one run."""
     cell = np.floor(path / width).astype(np.int64)
     edges = np.flatnonzero(np.diff(cell, prepend=-1))
     count = np.diff(np.append(edges, len(path)))
@@ -164,7 +179,10 @@ def _bins(
     mean_height = np.add.reduceat(height, edges) / count
     if noise_level > 0.0:
         mean_height, count = _without_spikes(height, edges, count, mean_height, noise_level)
-    return feet, mean_normals, _tangents(feet), mean_height, count, place, last, 0.5 * extent
+    whole = np.array([0, len(count)], dtype=np.int64)
+    return Window(
+        feet, mean_normals, _tangents(feet), mean_height, count, place, last, 0.5 * extent, whole, int(count.sum())
+    )
 
 
 def _without_spikes(
