@@ -1,0 +1,72 @@
+"""analyze: recordings become the annotated model and its report."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from explore3d.analysis import Analysis
+from explore3d.base_record import read_base
+from explore3d.build_model import build_model
+from explore3d.load_logs import load_logs
+from explore3d.meshes import load_mesh
+from explore3d.recording import Log
+from explore3d.scene import Scene, parse_scene
+from explore3d.session import Session
+from explore3d.stages import Progress, Stages, silent
+from mapping.base import Base
+
+
+def analyze(
+    logs: Sequence[Path | str] | Path | str,
+    out: Path | str | None = None,
+    *,
+    tip_radius: str | float | None = None,
+    model: Path | str | None = None,
+    model_units: str = "m",
+    progress: Progress = silent,
+    force: Collection[str] = (),
+    **table: Any,
+) -> Analysis:
+    """Build the annotated model of what was recorded.
+
+    Args:
+        logs: MCAP logs, folders of sessions, or tables of positions; of one object and one fingertip.
+        out: folder for model and report; None writes nothing.
+        tip_radius: of a table: "2 um", or metres.
+        model: mesh file of the global model; None takes the one in the log, else fits one.
+        model_units: of that file.
+        progress: told the stage and the share of it that is done.
+        force: stages to run although the recording does not need them.
+        table: units, columns, frame, jump, reference of a table (explore3d.table.read_table).
+
+    Raises:
+        UserError: input that cannot be used, named by file and field.
+    """
+    paths = [logs] if isinstance(logs, str | Path) else list(logs)
+    stages = Stages(progress, force)
+    with stages.stage("reading"):
+        log = load_logs(paths, tip_radius=tip_radius, **table)
+        scene = parse_scene(log.scene_text, log.sources[0]) if log.scene_text else None
+        base = Base(load_mesh(model, model_units)) if model is not None else read_base(log.events)
+    if out is None:
+        return build_model(log, scene, base, stages)
+    with Session(out, keep=log.sources) as session:
+        return conclude(session, log, scene, base, stages)
+
+
+def conclude(
+    session: Session, log: Log, scene: Scene | None, base: Base | None, stages: Stages, **about: Any
+) -> Analysis:
+    """Build the model of a log and write it, with its pictures and report, into a session's folder."""
+    from explore3d.report import write_report
+
+    analysis = replace(build_model(log, scene, base, stages), **about)
+    with session.staging() as folder:
+        with stages.stage("report"):
+            write_report(analysis, folder)
+        model = replace(analysis.model, timings=dict(stages.timings))
+        model.save(folder)
+    return replace(analysis, model=model, timings=dict(stages.timings))

@@ -1,0 +1,197 @@
+"""build_model: the paper's method, one line a stage; each stage runs only where the recording needs it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from explore3d import __version__
+from explore3d.analysis import Analysis, TipCount
+from explore3d.recording import Log
+from explore3d.stages import Stages
+from explore3d.truth import TrueFeature, compare
+from mapping.base import Base
+from mapping.feature import Feature
+from mapping.object_model import ObjectModel
+from mapping.trace import Trace
+
+if TYPE_CHECKING:
+    from explore3d.scene import Scene
+    from mapping.curvature import Curvature
+    from mapping.detectors import Detections
+    from mapping.estimate import Estimate
+
+# The report also says what a tip of this many times the radius would call finer than itself.
+OTHER_TIP = 2.5
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a recording is asked for.
+
+    Args:
+        algorithm: number in figure 4 of the paper that decides.
+        false_alarms_per_metre: expected number of invented crossings per metre of path.
+        seed: of the posterior's chains.
+    """
+
+    algorithm: int = 3
+    false_alarms_per_metre: float = 0.01
+    seed: int = 1
+
+    @classmethod
+    def of(cls, scene: Scene | None) -> Settings:
+        """The settings of a scene; the defaults without one."""
+        if scene is None:
+            return cls()
+        return cls(scene.detection.algorithm, scene.detection.false_alarms_per_metre, scene.seed)
+
+
+def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages) -> Analysis:
+    """From samples to the annotated model.
+
+    Args:
+        log: what was recorded.
+        scene: the scene that it was recorded for, or None.
+        base: the given global model, or None to have it fitted.
+        stages: the account of what runs and what is left out.
+    """
+    settings, trace = Settings.of(scene), log.trace
+    base = _base(trace, base, stages)
+    detections = _detect(trace, base, settings, stages)
+    features = _assemble(detections, trace, base, stages)
+    features = _refine(features, trace, base, detections, settings, stages)
+    estimate = _estimate(features, trace, base, detections, stages)
+    curvature = _curvature(estimate, detections, stages)
+    model = ObjectModel.attach(base, features, provenance=_provenance(log, scene, settings, detections))
+    truth = (
+        tuple(TrueFeature(t.kind, t.axis, t.height, t.width, t.length or None) for t in scene.truth) if scene else ()
+    )
+    return Analysis(
+        title=(scene.title if scene else "") or ", ".join(log.sources),
+        trace=trace,
+        base=base,
+        detections=detections,
+        model=replace(model, left_out=tuple(stages.left_out), timings=dict(stages.timings)),
+        scene=scene,
+        estimate=estimate,
+        curvature=curvature,
+        truth=truth,
+        errors=compare(model, truth, trace.tip_radius) if truth or (scene and scene.finger.kind == "simulated") else (),
+        timings=dict(stages.timings),
+        left_out=tuple(stages.left_out),
+        recovered=log.recovered,
+        tip_counts=_tip_counts(features, trace.tip_radius),
+    )
+
+
+def _base(trace: Trace, base: Base | None, stages: Stages) -> Base:
+    if base is not None:
+        stages.needed("base fit", "the global model was given")
+        return base
+    from mapping.base_fit import fit_base
+
+    with stages.stage("base fit"):
+        return fit_base(trace)
+
+
+def _detect(trace: Trace, base: Base, settings: Settings, stages: Stages) -> Detections:
+    from mapping.detectors import detect
+
+    if not trace.has_contact_data:
+        stages.needed("algorithms 1 and 2", "the log holds positions alone, no contact normals")
+    with stages.stage("detection"):
+        return detect(trace, base, algorithm=settings.algorithm, false_alarms_per_metre=settings.false_alarms_per_metre)
+
+
+def _assemble(detections: Detections, trace: Trace, base: Base, stages: Stages) -> tuple[Feature, ...]:
+    from mapping.grammar import assemble
+
+    if not stages.needed("grammar", "" if detections.crossings else "nothing was detected"):
+        return ()
+    with stages.stage("grammar"):
+        return assemble(detections, trace, base)
+
+
+def _refine(
+    features: tuple[Feature, ...],
+    trace: Trace,
+    base: Base,
+    detections: Detections,
+    settings: Settings,
+    stages: Stages,
+) -> tuple[Feature, ...]:
+    if not stages.needed("posterior", "" if features else "no feature was found, so no chain was run"):
+        return ()
+    from mapping.refine import refine
+
+    refined = []
+    with stages.stage("posterior") as share:
+        for number, feature in enumerate(features):
+            # a stream of its own for each feature: what one draws does not change the next
+            rng = np.random.default_rng([settings.seed, number])
+            refined.append(refine(feature, trace, rng, base=base, noise=detections.noise, others=features))
+            share((number + 1) / len(features))
+    return tuple(refined)
+
+
+def _estimate(
+    features: tuple[Feature, ...], trace: Trace, base: Base, detections: Detections, stages: Stages
+) -> Estimate | None:
+    from mapping.envelope import estimate_surface
+
+    if not stages.needed("estimated surface", "" if features else "no feature was found; the base is the estimate"):
+        return None
+    with stages.stage("estimated surface"):
+        return estimate_surface(trace, base=base, noise=detections.noise)
+
+
+def _curvature(estimate: Estimate | None, detections: Detections, stages: Stages) -> Curvature | None:
+    if estimate is None:
+        why_not = "there is no estimated surface to take it from"
+    elif estimate.surface is None:
+        why_not = "a single profile has no surface: its curvature is in the crossings"
+    else:
+        why_not = ""
+    from importlib.util import find_spec
+
+    if find_spec("mapping.curvature") is None:
+        return None
+    if not stages.needed("curvature", why_not) or estimate is None or estimate.surface is None:
+        return None
+    from mapping.curvature import principal_curvatures
+
+    with stages.stage("curvature"):
+        return principal_curvatures(estimate.surface)
+
+
+def _tip_counts(features: tuple[Feature, ...], tip_radius: float) -> tuple[TipCount, ...]:
+    finer = sum(feature.curvature_feature for feature in features)
+    counts = [TipCount(tip_radius, finer, len(features) - finer)]
+    crests = [feature.extra.get("trace_curvature") for feature in features]
+    if features and all(crest is not None for crest in crests):
+        other = OTHER_TIP * tip_radius
+        finer = sum(abs(float(crest)) > 1.0 / (2.0 * other) for crest in crests if crest is not None)
+        counts.append(TipCount(other, finer, len(features) - finer))
+    return tuple(counts)
+
+
+def _provenance(log: Log, scene: Scene | None, settings: Settings, detections: Detections) -> dict[str, Any]:
+    return {
+        "software": f"explore3d {__version__}",
+        "scene": scene.title if scene else None,
+        "tip_radius": log.trace.tip_radius,
+        "seed": settings.seed,
+        "log_sha256": log.sha256,
+        "samples": len(log.trace),
+        "recovered": log.recovered,
+        "noise": {
+            "white": detections.noise.white,
+            "correlated": detections.noise.correlated,
+            "length": detections.noise.length,
+        },
+        "detection_limit": detections.detection_limit,
+        "false_alarms_per_metre": settings.false_alarms_per_metre,
+    }

@@ -1,0 +1,50 @@
+"""Stages: which parts of a job ran, how long each took, which were left out and why."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from mapping.left_out import LeftOut
+
+# Told the stage's name and the share of it that is done, 0 to 1.
+Progress = Callable[[str, float], None]
+
+
+def silent(stage: str, share: float) -> None:
+    """Progress that nobody watches."""
+
+
+@dataclass
+class Stages:
+    """The account of one job.
+
+    Args:
+        progress: told what is under way.
+        forced: names of stages to run even where the scene does not need them.
+    """
+
+    progress: Progress = silent
+    forced: Collection[str] = ()
+    timings: dict[str, float] = field(default_factory=dict)
+    left_out: list[LeftOut] = field(default_factory=list)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Callable[[float], None]]:
+        """Time a stage; yields a function that reports the share done."""
+        self.progress(name, 0.0)
+        start = time.perf_counter()
+        try:
+            yield lambda share: self.progress(name, share)
+        finally:
+            self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - start
+        self.progress(name, 1.0)
+
+    def needed(self, name: str, why_not: str, saved: str = "") -> bool:
+        """True if the stage is to run: `why_not` is empty or the stage is forced; else noted as left out."""
+        if not why_not or name in self.forced:
+            return True
+        self.left_out.append(LeftOut(name, why_not, saved))
+        return False
