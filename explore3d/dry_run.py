@@ -64,7 +64,7 @@ class DryRun:
         """PNG of the base with the planned sweeps on it."""
         from explore3d.object_picture import object_picture
 
-        paths = [_dense(move.path, 0.05 * self.tip_radius) for move in self.moves]
+        paths = [_dense(move.path, 0.015 * self.tip_radius) for move in self.moves]
         number = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
         centers = np.concatenate([np.zeros((0, 3)), *paths])
         feet = self.base.foot(centers, self.tip_radius)
