@@ -63,8 +63,12 @@ class BumpOfRevolution:
         inflection = 1.0 / np.sqrt(3 * self.sharpness)
         # Far out k falls off as 6 / (a u^3): beyond this distance 1 + r k is positive.
         outside = max(2 * deepest, 2 * float(np.cbrt(6 * tip_radius / self.sharpness)))
-        ends = ((inflection, deepest), (deepest, outside))
-        return np.array([brentq(self._opening, *pair, args=(tip_radius,), xtol=1e-15, rtol=1e-14) for pair in ends])
+
+        def opening(u: float) -> float:
+            return self._opening(u, tip_radius)
+
+        inner = brentq(opening, float(inflection), deepest, xtol=1e-15, rtol=1e-14)
+        return np.array([inner, brentq(opening, deepest, outside, xtol=1e-15, rtol=1e-14)])
 
     def interference(self, tip_radius: float, tolerance: float = 1e-14) -> tuple[float, float] | None:
         """The two distances u between which the meridian's plane motion of the ball never touches, or None.

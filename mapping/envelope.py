@@ -131,7 +131,7 @@ def _meshed(points: Estimate, trace: Trace, slack: float) -> Estimate:
     """The points joined as their centres lie (those never coincide), with resting points in bridged faces."""
     if len(np.unique(points.sweep)) < 2:
         return points
-    faces = sweep_faces(points.centers, points.sweep, points.normals)
+    faces = sweep_faces(points.centers, points.sweep, points.normals, points.points)
     if len(faces) == 0:
         return points
     r = trace.tip_radius

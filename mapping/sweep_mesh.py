@@ -43,17 +43,19 @@ def mesh_sweeps(trace: Trace, outward: ArrayLike = (0.0, 0.0, 1.0), spacing: flo
     return Surface(points, faces)
 
 
-def sweep_faces(points: FloatArray, sweep: IntArray, outward: FloatArray) -> IntArray:
+def sweep_faces(points: FloatArray, sweep: IntArray, outward: FloatArray, body: FloatArray | None = None) -> IntArray:
     """Counter-clockwise triangles (F, 3) over points (N, 3) of sweeps `sweep` (N,) seen from `outward` (N, 3).
 
     Parallel sweeps are zippered row by row: O(n log n), no holes, every point a vertex. Crossing sweeps and
     clouds are triangulated by Delaunay over the plane of the mean outward direction, over the sphere
-    if they surround a point, and else by Open3D's ball pivoting.
+    if they surround a point, and else by Open3D's ball pivoting; points that coincide then leave all but one
+    of them without a face. Where centres coincide but their contacts do not, `body` (N, 3) is triangulated instead.
     """
     rows = parallel_rows(points, sweep)
     if rows is not None:
         strips = [zipper(points, first, second) for first, second in pairwise(rows)]
         return oriented(points, np.vstack(strips), outward)
+    points = points if body is None else body
     if len(np.unique(points, axis=0)) < 3 or len(points) < 4:
         return np.zeros((0, 3), dtype=np.int64)
     axis = outward.mean(axis=0)
@@ -72,10 +74,12 @@ def parallel_rows(points: FloatArray, sweep: IntArray) -> list[IntArray] | None:
     rows = [np.flatnonzero(sweep == name) for name in _in_order(sweep)]
     if len(rows) < 2 or min(len(row) for row in rows) < 2:
         return None
+    found = []
     for order in (rows, _across(points, rows)):
-        if all(_beside(points[first], points[second]) for first, second in pairwise(order)):
-            return order
-    return None
+        distances = [_distance_beside(points[first], points[second]) for first, second in pairwise(order)]
+        if not np.isnan(distances).any():
+            found.append((sum(distances) * (1 - 1e-9 * (order is rows)), order))
+    return min(found, key=lambda pair: pair[0])[1] if found else None
 
 
 def _in_order(sweep: IntArray) -> IntArray:
@@ -90,8 +94,8 @@ def _across(points: FloatArray, rows: list[IntArray]) -> list[IntArray]:
     return [rows[k] for k in np.argsort(middles @ spread, kind="stable")]
 
 
-def _beside(first: FloatArray, second: FloatArray) -> bool:
-    """Whether two polylines keep about one distance and do not meet."""
+def _distance_beside(first: FloatArray, second: FloatArray) -> float:
+    """Usual distance of two polylines that run side by side; NaN if they do not keep one distance or meet."""
     from scipy.spatial import cKDTree
 
     probes = first[np.linspace(0, len(first) - 1, min(len(first), 65)).astype(int)]
@@ -100,7 +104,8 @@ def _beside(first: FloatArray, second: FloatArray) -> bool:
     back = cKDTree(first).query(second[np.linspace(0, len(second) - 1, min(len(second), 65)).astype(int)])[0]
     near, far = min(np.min(distance), np.min(back)), max(np.quantile(distance, 0.8), np.quantile(back, 0.8))
     reach = np.linalg.norm(first[-1] - first[0])
-    return bool(usual > 0 and near > 0.2 * usual and far < 2.5 * usual and (reach == 0 or usual < 2 * reach + far))
+    beside = usual > 0 and near > 0.2 * usual and far < 2.5 * usual and (reach == 0 or usual < 2 * reach + far)
+    return usual if beside else float("nan")
 
 
 def zipper(points: FloatArray, first: IntArray, second: IntArray) -> IntArray:
