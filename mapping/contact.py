@@ -90,13 +90,14 @@ class BallContact:
         # a centre of few digits: subtracting it is exact, and a body around the origin keeps its coordinates
         self._center = np.ldexp(np.round(np.ldexp(0.5 * low + 0.5 * high, -exponent)), exponent)
         self._exponent = exponent
-        corners = contact_kernels.gather(self._to_body(surface.vertices), surface.faces)
-        order, boxes, links = bvh_kernels.build_tree(corners)
-        rows = contact_kernels.lay_out(corners, order)
-        size = float(np.sqrt((corners.reshape(-1, 3) ** 2).sum(axis=1).max()))
+        vertices = self._to_body(surface.vertices)
+        order = bvh_kernels.leaf_order(vertices, surface.faces)
+        rows = contact_kernels.lay_out(vertices, surface.faces, order)
+        self._size = float(np.sqrt((rows[:, :9].reshape(-1, 3) ** 2).sum(axis=1).max()))
         radius = float(np.ldexp(self.tip_radius, -exponent))
-        graze = 32 * float(np.finfo(float).eps) * (size + radius)
-        self._body = (rows, order, boxes, links, radius, size, graze)
+        graze = 32 * float(np.finfo(float).eps) * (self._size + radius)
+        self._ball = (radius, radius * (1.0 + contact_kernels.TOUCH) + graze, graze)
+        self._body = (rows, order, *bvh_kernels.build_boxes(rows))
 
     def first_contact(self, origins: ArrayLike, directions: ArrayLike) -> Contacts:
         """The first contact of balls that start centred at the origins and move straight along the directions.
@@ -117,7 +118,9 @@ class BallContact:
         way = unit_directions(directions, len(start))
         out = _empty_contacts(len(start))
         state = np.zeros(len(start), np.int8)
-        contact_kernels.first_contacts(*self._body, self._to_body(start), way, *out.values(), state)
+        contact_kernels.first_contacts(
+            self._body, self._ball, self._size, self._to_body(start), way, *out.values(), state
+        )
         return self._contacts(out, state == contact_kernels.OVERLAPS)
 
     def slide(self, path: ArrayLike, approach: ArrayLike, spacing: float) -> Contacts:
@@ -144,7 +147,9 @@ class BallContact:
 
         commanded, way = sample_path(path, approach, spacing)
         back = np.empty(len(commanded))
-        retreat_kernels.retreats(*self._body, self._outward, self._to_body(commanded), -way, back)
+        retreat_kernels.retreats(
+            self._body, self._ball, self._size, self._outward, self._to_body(commanded), -way, back
+        )
         back = np.ldexp(back, self._exponent)
         rest = self.first_contact(commanded - back[:, None] * way, way)
         return replace(rest, distance=rest.distance - back)

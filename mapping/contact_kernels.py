@@ -1,6 +1,9 @@
-"""The first contact of a moving ball with many triangles: a tree, and what can be left out of it (numba).
+"""The first contact of a moving ball with many triangles (numba).
 
 Lengths are in the body's own frame: centred, and scaled so that the larger of body and ball is about 1.
+A `body` is the tuple (rows (F, 13), order (F,), boxes, children, lanes): a row holds a triangle's corners, its
+unit normal and a third of its longest side squared. A `ball` is (radius, reach, graze): it touches what is
+within its reach, and passes what it would sink into by less than `graze`.
 """
 
 from __future__ import annotations
@@ -10,271 +13,263 @@ from math import inf, nan, sqrt
 import numpy as np
 from numba import njit
 
-from mapping.bvh_kernels import STACK
+from mapping.bvh_kernels import STACK, WIDTH, lane_tests
 from mapping.triangle_kernels import closest_on_triangle, sweep_triangle, unit_normal
+from mapping.vector_kernels import cross, dot, moved, scaled, sub, vector
 
 PASSES, TOUCHES, OVERLAPS = 0, 1, 2
 TOUCH = 1e-9  # relative to the radius: what lies this close to the resting ball touches it
 APART = 9e-5  # relative to the radius, sqrt(8 TOUCH): dents narrower than this are shallower than TOUCH
-NEAR = 64  # triangles kept as possible contacts before the list is sifted
 MOST = 16  # distinct contacts that are told apart
+BLOCK = 1024  # queries that share their guesses: threads that take whole blocks give the same answers
 
 
 @njit(cache=True, error_model="numpy")
-def gather(vertices, faces):  # type: ignore[no-untyped-def]
-    """(F, 3, 3) corners of the faces."""
-    corners = np.empty((len(faces), 3, 3))
-    for i in range(len(faces)):
+def lay_out(vertices, faces, order):  # type: ignore[no-untyped-def]
+    """(F, 13) rows of the faces in the given order."""
+    rows = np.empty((len(order), 13))
+    for i in range(len(order)):
         for j in range(3):
             for k in range(3):
-                corners[i, j, k] = vertices[faces[i, j], k]
-    return corners
-
-
-@njit(cache=True, error_model="numpy")
-def lay_out(corners, order):  # type: ignore[no-untyped-def]
-    """(F, 12) corners and unit normals in the order of the leaves."""
-    rows = np.empty((len(order), 12))
-    for i in range(len(order)):
-        a, b, c = corners[order[i], 0], corners[order[i], 1], corners[order[i], 2]
-        for k in range(3):
-            rows[i, k], rows[i, 3 + k], rows[i, 6 + k] = a[k], b[k], c[k]
-        rows[i, 9], rows[i, 10], rows[i, 11] = unit_normal(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2])
+                rows[i, 3 * j + k] = vertices[faces[order[i], j], k]
+        a, b, c = vector(rows[i, 0:3]), vector(rows[i, 3:6]), vector(rows[i, 6:9])
+        rows[i, 9], rows[i, 10], rows[i, 11] = unit_normal(a, b, c)
+        u, v, w = sub(b, a), sub(c, b), sub(a, c)
+        rows[i, 12] = max(dot(u, u), dot(v, v), dot(w, w)) / 3.0
     return rows
 
 
 @njit(cache=True, error_model="numpy")
-def closest(row, x, y, z):  # type: ignore[no-untyped-def]
-    """Closest point of a triangle, relative to (x, y, z)."""
-    return closest_on_triangle(
-        row[0] - x, row[1] - y, row[2] - z, row[3] - x, row[4] - y, row[5] - z, row[6] - x, row[7] - y, row[8] - z,
-        row[9], row[10], row[11],
-    )  # fmt: skip
+def corners(row, o):  # type: ignore[no-untyped-def]
+    """Corners of a triangle relative to o, and its normal."""
+    a = (row[0] - o[0], row[1] - o[1], row[2] - o[2])
+    b = (row[3] - o[0], row[4] - o[1], row[5] - o[2])
+    c = (row[6] - o[0], row[7] - o[1], row[8] - o[2])
+    return a, b, c, (row[9], row[10], row[11])
 
 
 @njit(cache=True, error_model="numpy")
-def sweep(row, x, y, z, dx, dy, dz, radius, graze):  # type: ignore[no-untyped-def]
-    """(enter, leave) of a triangle, for a ball starting at (x, y, z)."""
-    return sweep_triangle(
-        row[0] - x, row[1] - y, row[2] - z, row[3] - x, row[4] - y, row[5] - z, row[6] - x, row[7] - y, row[8] - z,
-        row[9], row[10], row[11], dx, dy, dz, radius, graze,
-    )  # fmt: skip
+def closest(row, o):  # type: ignore[no-untyped-def]
+    """Point of a triangle closest to o, relative to o."""
+    a, b, c, n = corners(row, o)
+    return closest_on_triangle(a, b, c, n)
 
 
 @njit(cache=True, error_model="numpy")
-def meet(row, x, y, z, dx, dy, dz, radius, graze):  # type: ignore[no-untyped-def]
-    """When a ball free at (x, y, z) meets the triangle: t >= 0, inf if never, -1 if it overlaps at the start."""
-    enter, leave = sweep(row, x, y, z, dx, dy, dz, radius, graze)
-    if enter >= 0.0 or leave < 0.0:
-        return inf if leave < 0.0 else enter
-    px, py, pz = closest(row, x, y, z)
-    if px * px + py * py + pz * pz < (radius * (1.0 - TOUCH) - graze) ** 2:
-        return -1.0
-    return 0.0 if px * dx + py * dy + pz * dz > 0.0 else inf  # resting on it: pressed in, or moving away
+def sweep(row, o, d, radius, graze):  # type: ignore[no-untyped-def]
+    """(enter, leave) of a triangle, for a ball that starts at o and moves along d."""
+    a, b, c, n = corners(row, o)
+    return sweep_triangle(a, b, c, n, d, radius, graze)
 
 
 @njit(cache=True, error_model="numpy")
-def box_is_missed(box, x, y, z, ex, ey, ez, dx, dy, dz, reach):  # type: ignore[no-untyped-def]
-    """True if a ball of radius `reach` on its way from (x, y, z) along d to (ex, ey, ez) surely misses a box.
+def stays_clear(row, end, d, reach):  # type: ignore[no-untyped-def]
+    """True if a ball on its way along d to `end` surely stays further than `reach` from a triangle.
 
-    Three separating planes are tried: across the closest point of the box at the end of the way, at its
-    start, and one along the way.
+    Cheap and, on fine meshes, sharp: for p = sum w_i v_i, |p|^2 = sum w_i |v_i|^2 - sum w_i w_j |v_i - v_j|^2,
+    and the last sum is at most a third of the longest side squared. Else the triangle's plane must do.
     """
-    nx = ex - min(max(ex, box[0]), box[3])
-    ny = ey - min(max(ey, box[1]), box[4])
-    nz = ez - min(max(ez, box[2]), box[5])
+    a, b, c, n = corners(row, end)
     square = reach * reach
-    if nx * dx + ny * dy + nz * dz <= 0.0:
-        return nx * nx + ny * ny + nz * nz > square
-    nx = x - min(max(x, box[0]), box[3])
-    ny = y - min(max(y, box[1]), box[4])
-    nz = z - min(max(z, box[2]), box[5])
-    if nx * dx + ny * dy + nz * dz >= 0.0:
-        return nx * nx + ny * ny + nz * nz > square
-    lx, ly, lz = x - 0.5 * (box[0] + box[3]), y - 0.5 * (box[1] + box[4]), z - 0.5 * (box[2] + box[5])
-    along = lx * dx + ly * dy + lz * dz
-    lx, ly, lz = lx - along * dx, ly - along * dy, lz - along * dz
-    size = abs(lx) * (box[3] - box[0]) + abs(ly) * (box[4] - box[1]) + abs(lz) * (box[5] - box[2])
-    lateral = lx * lx + ly * ly + lz * lz
-    gap = lateral - 0.5 * size
-    return gap > 0.0 and gap * gap > square * lateral
-
-
-@njit(cache=True, error_model="numpy")
-def triangle_is_missed(row, ex, ey, ez, dx, dy, dz, reach):  # type: ignore[no-untyped-def]
-    """True if the ball on its way to (ex, ey, ez) surely misses a triangle."""
-    nx, ny, nz = row[9], row[10], row[11]
-    height = (ex - row[0]) * nx + (ey - row[1]) * ny + (ez - row[2]) * nz
-    if abs(height) > reach and height * (dx * nx + dy * ny + dz * nz) <= 0.0:
+    if min(dot(a, d), dot(b, d), dot(c, d)) >= 0.0 and min(dot(a, a), dot(b, b), dot(c, c)) - row[12] > square:
         return True
-    px, py, pz = closest(row, ex, ey, ez)
-    return px * px + py * py + pz * pz > reach * reach and px * dx + py * dy + pz * dz >= 0.0
+    height = dot(a, n)
+    return height * height > square and height * dot(d, n) >= 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def centre_distance(box, x, y, z):  # type: ignore[no-untyped-def]
-    """Squared distance of a box's middle, times 4."""
-    return (box[0] + box[3] - 2.0 * x) ** 2 + (box[1] + box[4] - 2.0 * y) ** 2 + (box[2] + box[5] - 2.0 * z) ** 2
+def meet(row, o, d, ball):  # type: ignore[no-untyped-def]
+    """When a ball free at o meets the triangle: t >= 0, inf if never, -1 if it overlaps it at the start."""
+    radius, _, graze = ball
+    enter, leave = sweep(row, o, d, radius, graze)
+    if leave < 0.0:
+        return inf
+    if enter >= 0.0:
+        return enter
+    p = closest(row, o)
+    if sqrt(dot(p, p)) < radius * (1.0 - TOUCH) - graze:
+        return -1.0
+    return 0.0 if dot(p, d) > 0.0 else inf  # resting on it: pressed in, or moving away
 
 
 @njit(cache=True, error_model="numpy")
-def first_touch(rows, order, boxes, links, x, y, z, dx, dy, dz, far, guess, radius, graze, stack, near):  # type: ignore[no-untyped-def]
-    """Search the tree for the earliest contact before `far`.
+def first_touch(body, ball, o, d, far, guess, near, stack, missed, late):  # type: ignore[no-untyped-def]
+    """Search for the earliest contact before `far`, triangle `guess` first.
 
-    Returns (t, row of the triangle or -1, number of rows in `near` that may touch at t, or -1 if they
-    were too many to keep). t = -1: the ball overlaps the body at the start. Ties go to the face of the
-    lowest number, so that the answer does not depend on the order of the search.
+    Returns (t, triangle or -1, near, kept): near[:kept] are all triangles that may touch at t.
+    t = -1: the ball overlaps the triangle at the start.
     """
-    reach = radius * (1.0 + TOUCH) + graze
-    best, hit, kept, overflow = far, -1, 0, False
+    rows, _, boxes, children, lanes = body
+    radius, reach, graze = ball
+    best, hit, kept = far, -1, 0
     if guess >= 0:
-        t = meet(rows[guess], x, y, z, dx, dy, dz, radius, graze)
-        if t < 0.0:
-            return t, guess, 0
+        t = meet(rows[guess], o, d, ball)
         if t < best:
             best, hit = t, guess
-    ex, ey, ez = x + best * dx, y + best * dy, z + best * dz
-    stack[0] = 0
-    waiting = 1
+    end = moved(o, best, d)
+    stack[0] = len(boxes) - 1
+    waiting = 1 if best >= 0.0 else 0
     while waiting > 0:
         waiting -= 1
         node = stack[waiting]
-        if box_is_missed(boxes[node], x, y, z, ex, ey, ez, dx, dy, dz, reach):
+        lane_tests(boxes[node], o, end, d, best, reach, missed, late)
+        child = children[node]
+        if child >= 0:
+            waiting = push_in_order(stack, waiting, child, lanes[node], missed, late)
             continue
-        first, held = links[node, 0], links[node, 1]
-        if held == 0:
-            nearer = 0 if centre_distance(boxes[first], x, y, z) < centre_distance(boxes[first + 1], x, y, z) else 1
-            stack[waiting], stack[waiting + 1] = first + 1 - nearer, first + nearer
-            waiting += 2
-            continue
-        for i in range(first, first + held):
-            if triangle_is_missed(rows[i], ex, ey, ez, dx, dy, dz, reach):
+        for lane in range(lanes[node]):
+            i = lane - child - 1
+            if missed[lane] > 0.0 or stays_clear(rows[i], end, d, reach):
                 continue
-            t = meet(rows[i], x, y, z, dx, dy, dz, radius, graze)
-            if t < 0.0:
-                return t, i, 0
-            if t < best or (t == best and hit >= 0 and order[i] < order[hit]):
-                best, hit = t, i
-                ex, ey, ez = x + best * dx, y + best * dy, z + best * dz
-            if kept == len(near):
-                kept = sift(rows, near, kept, ex, ey, ez, reach)
-            if kept < len(near):
-                near[kept] = i
-                kept += 1
-            else:
-                overflow = True
-    return best, hit, -1 if overflow else kept
+            p = closest(rows[i], end)
+            gap = sqrt(dot(p, p))
+            ahead = dot(p, d) >= 0.0
+            if ahead and gap > reach:
+                continue
+            if not (ahead and gap >= radius - graze):  # else it is only just touched, or less
+                t = meet(rows[i], o, d, ball)
+                if t < best:
+                    best, hit = t, i
+                    end = moved(o, best, d)
+                    if t < 0.0:
+                        return best, hit, near, 0
+            near, kept = keep(rows, near, kept, i, end, reach)
+    return best, hit, near, kept
 
 
 @njit(cache=True, error_model="numpy")
-def sift(rows, near, kept, x, y, z, reach):  # type: ignore[no-untyped-def]
-    """Keep only the triangles within reach of (x, y, z); return their number."""
-    stay = 0
-    for i in range(kept):
-        px, py, pz = closest(rows[near[i]], x, y, z)
-        if px * px + py * py + pz * pz <= reach * reach:
-            near[stay] = near[i]
-            stay += 1
-    return stay
-
-
-@njit(cache=True, error_model="numpy")
-def tell_apart(row, x, y, z, reach, apart, found, points):  # type: ignore[no-untyped-def]
-    """Add the triangle's contact to the distinct ones if it is one and new; return their number."""
-    px, py, pz = closest(row, x, y, z)
-    if found == MOST or px * px + py * py + pz * pz > reach * reach:
-        return found
-    for i in range(found):
-        if (px - points[i, 0]) ** 2 + (py - points[i, 1]) ** 2 + (pz - points[i, 2]) ** 2 <= apart * apart:
-            return found
-    points[found, 0], points[found, 1], points[found, 2] = px, py, pz
-    return found + 1
-
-
-@njit(cache=True, error_model="numpy")
-def count_in_tree(rows, boxes, links, x, y, z, reach, apart, found, points, stack):  # type: ignore[no-untyped-def]
-    """Tell apart the contacts of a ball at rest, searching the whole tree."""
-    stack[0] = 0
-    waiting = 1
-    while waiting > 0 and found < MOST:
-        waiting -= 1
-        box = boxes[stack[waiting]]
-        nx, ny, nz = x - min(max(x, box[0]), box[3]), y - min(max(y, box[1]), box[4]), z - min(max(z, box[2]), box[5])
-        if nx * nx + ny * ny + nz * nz > reach * reach:
+def push_in_order(stack, waiting, child, lanes, missed, late):  # type: ignore[no-untyped-def]
+    """Push the lanes that are not surely missed, the earliest on top; return the new height of the stack."""
+    bottom = waiting
+    for lane in range(lanes):
+        if missed[lane] > 0.0:
             continue
-        first, held = links[stack[waiting], 0], links[stack[waiting], 1]
-        if held == 0:
-            stack[waiting], stack[waiting + 1] = first, first + 1
-            waiting += 2
-        for i in range(first, first + held):
-            found = tell_apart(rows[i], x, y, z, reach, apart, found, points)
+        place = waiting
+        while place > bottom and late[stack[place - 1] - child] < late[lane]:
+            stack[place] = stack[place - 1]
+            place -= 1
+        stack[place] = child + lane
+        waiting += 1
+    return waiting
+
+
+@njit(cache=True, error_model="numpy")
+def keep(rows, near, kept, triangle, end, reach):  # type: ignore[no-untyped-def]
+    """Append a triangle to the list of near ones; when it is full, sift it, and if that fails lengthen it."""
+    if kept == len(near):
+        stay = 0
+        for i in range(kept):
+            p = closest(rows[near[i]], end)
+            if dot(p, p) <= reach * reach:
+                near[stay] = near[i]
+                stay += 1
+        kept = stay
+        if 2 * kept > len(near):
+            near = np.concatenate((near, near))
+    near[kept] = triangle
+    return near, kept + 1
+
+
+@njit(cache=True, error_model="numpy")
+def polish(row, o, d, ball):  # type: ignore[no-untyped-def]
+    """How much further along d a ball that all but touches the triangle rests on it exactly."""
+    p = closest(row, o)
+    gap = sqrt(dot(p, p))
+    cosine = dot(p, d) / gap
+    if cosine > 0.1:
+        return (gap - ball[0]) / cosine
+    enter, _ = sweep(row, o, d, ball[0], 0.0)
+    return enter if abs(enter) <= 1e-6 * ball[0] else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def holder(body, near, kept, hit, o, ball):  # type: ignore[no-untyped-def]
+    """Of the triangles touched to rounding, the face of the lowest number: no order of search can change it."""
+    rows, order = body[0], body[1]
+    for i in range(kept):
+        if order[near[i]] < order[hit]:
+            p = closest(rows[near[i]], o)
+            if sqrt(dot(p, p)) <= ball[0] + 2.0 * ball[2]:
+                hit = near[i]
+    return hit
+
+
+@njit(cache=True, error_model="numpy")
+def count_contacts(rows, near, kept, first, o, ball, points):  # type: ignore[no-untyped-def]
+    """Number of distinct places of the near triangles that a ball at o touches, `first` (relative to o) among them."""
+    apart = APART * ball[0]
+    found = 1
+    points[0, 0], points[0, 1], points[0, 2] = first
+    for i in range(kept):
+        p = closest(rows[near[i]], o)
+        new = found < MOST and dot(p, p) <= ball[1] * ball[1]
+        for j in range(found):
+            w = sub(p, vector(points[j]))
+            new = new and dot(w, w) > apart * apart
+        if new:
+            points[found, 0], points[found, 1], points[found, 2] = p
+            found += 1
     return found
 
 
 @njit(cache=True, error_model="numpy")
-def feature_of(row, px, py, pz, near):  # type: ignore[no-untyped-def]
-    """1 face, 2 edge, 3 vertex: the smallest part of the triangle that holds the point, to rounding."""
-    square, sides = near * near, 0
-    for i in range(3):
-        a, b = row[3 * i : 3 * i + 3], row[3 * ((i + 1) % 3) : 3 * ((i + 1) % 3) + 3]
-        if (a[0] - px) ** 2 + (a[1] - py) ** 2 + (a[2] - pz) ** 2 <= square:
+def feature_of(row, o, p, rounding):  # type: ignore[no-untyped-def]
+    """1 face, 2 edge, 3 vertex: the smallest part of the triangle that holds the point p relative to o."""
+    a, b, c, _ = corners(row, o)
+    square, feature = rounding * rounding, 1
+    for u, v in ((a, b), (b, c), (c, a)):
+        w, e = sub(p, u), sub(v, u)
+        if dot(w, w) <= square:
             return 3
-        ex, ey, ez = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        wx, wy, wz = px - a[0], py - a[1], pz - a[2]
-        cx, cy, cz = ey * wz - ez * wy, ez * wx - ex * wz, ex * wy - ey * wx
-        if cx * cx + cy * cy + cz * cz <= square * (ex * ex + ey * ey + ez * ez):
-            sides += 1
-    return 2 if sides > 0 else 1
+        across = cross(e, w)
+        if dot(across, across) <= square * dot(e, e):
+            feature = 2
+    return feature
+
+
+@njit(cache=True, error_model="numpy")
+def way_to_body(o, d, around):  # type: ignore[no-untyped-def]
+    """(start, length) of the part of a ray within a sphere around the body; length < 0 if it misses it."""
+    middle = -dot(o, d)
+    lateral = moved(o, middle, d)
+    miss = sqrt(dot(lateral, lateral))
+    around += 1e-12 * abs(middle)
+    half = sqrt(max((around - miss) * (around + miss), 0.0))
+    if miss > around or middle + half < 0.0:
+        return 0.0, -1.0
+    start = max(0.0, middle - half)
+    return start, middle + half - start
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def first_contacts(  # type: ignore[no-untyped-def]
-    rows, order, boxes, links, radius, size, graze, origins, directions, centers, points, normals, feature, count,
-    distance, state
-):  # fmt: skip
-    """Fill the outputs for every query; `size` is the radius of a sphere around the body and the origin."""
-    stack, near, apart = np.empty(STACK, np.int32), np.empty(NEAR, np.int32), np.empty((MOST, 3))
-    reach = radius * (1.0 + TOUCH) + graze
+def first_contacts(body, ball, size, origins, directions, centers, points, normals, feature, count, distance, state):  # type: ignore[no-untyped-def]
+    """Fill the outputs for every query; `size` is the radius of a sphere around the body."""
+    stack, near, apart = np.empty(STACK, np.int32), np.empty(64, np.int32), np.empty((MOST, 3))
+    missed, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
     guess = -1
     for q in range(len(origins)):
-        x, y, z = origins[q, 0], origins[q, 1], origins[q, 2]
-        d = directions[q if len(directions) > 1 else 0]
-        dx, dy, dz = d[0], d[1], d[2]
+        if q % BLOCK == 0:
+            guess = -1
+        o, d = vector(origins[q]), vector(directions[q if len(directions) > 1 else 0])
         centers[q], points[q], normals[q], distance[q] = nan, nan, nan, inf
         feature[q], count[q], state[q] = 0, 0, PASSES
-        # far origins: first travel to the sphere around the body
-        middle = -(x * dx + y * dy + z * dz)
-        lateral = sqrt((x + middle * dx) ** 2 + (y + middle * dy) ** 2 + (z + middle * dz) ** 2)
-        around = 1.001 * (size + reach) + 1e-12 * abs(middle)
-        half = sqrt(max((around - lateral) * (around + lateral), 0.0))
-        if lateral > around or middle + half < 0.0:
+        start, length = way_to_body(o, d, 1.001 * (size + ball[1]))
+        if length < 0.0:
             continue
-        start = max(0.0, middle - half)
-        x, y, z = x + start * dx, y + start * dy, z + start * dz
-        t, hit, kept = first_touch(
-            rows, order, boxes, links, x, y, z, dx, dy, dz, middle + half - start, guess, radius, graze, stack, near
-        )
+        o = moved(o, start, d)  # a far origin costs no digits from here on
+        t, hit, near, kept = first_touch(body, ball, o, d, length, guess, near, stack, missed, late)
         if t < 0.0:
             state[q], distance[q] = OVERLAPS, 0.0
-            continue
-        if hit < 0:
-            continue
-        guess, state[q] = hit, TOUCHES
-        x, y, z = x + t * dx, y + t * dy, z + t * dz
-        again, _ = sweep(rows[hit], x, y, z, dx, dy, dz, radius, 0.0)  # polish: from here, the root is small
-        if abs(again) <= 1e-6 * radius:
-            t += again
-            x, y, z = x + again * dx, y + again * dy, z + again * dz
-        px, py, pz = closest(rows[hit], x, y, z)
-        length = sqrt(px * px + py * py + pz * pz)
-        centers[q, 0], centers[q, 1], centers[q, 2] = x, y, z
-        points[q, 0], points[q, 1], points[q, 2] = x + px, y + py, z + pz
-        normals[q, 0], normals[q, 1], normals[q, 2] = -px / length, -py / length, -pz / length
-        feature[q] = feature_of(rows[hit], x + px, y + py, z + pz, graze)
-        distance[q] = max(start + t, 0.0)
-        found = tell_apart(rows[hit], x, y, z, inf, 0.0, 0, apart)
-        if kept < 0:
-            found = count_in_tree(rows, boxes, links, x, y, z, reach, APART * radius, found, apart, stack)
-        for i in range(max(kept, 0)):
-            found = tell_apart(rows[near[i]], x, y, z, reach, APART * radius, found, apart)
-        count[q] = found
+        elif hit >= 0:
+            o, guess, state[q] = moved(o, t, d), hit, TOUCHES
+            hit = holder(body, near, kept, hit, o, ball)
+            row = body[0][hit]
+            more = polish(row, o, d, ball)
+            o = moved(o, more, d)
+            p = closest(row, o)
+            n, at = scaled(-1.0 / sqrt(dot(p, p)), p), moved(o, 1.0, p)
+            for k in range(3):
+                centers[q, k], points[q, k], normals[q, k] = o[k], at[k], n[k]
+            feature[q] = feature_of(row, o, p, ball[2])
+            count[q] = count_contacts(body[0], near, kept, p, o, ball, apart)
+            distance[q] = max(start + t + more, 0.0)

@@ -1,0 +1,41 @@
+"""Vectors as tuples of three floats: registers, not arrays, inside numba kernels."""
+
+from __future__ import annotations
+
+from numba import njit
+
+
+@njit(cache=True, error_model="numpy")
+def dot(a, b):  # type: ignore[no-untyped-def]
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, error_model="numpy")
+def cross(a, b):  # type: ignore[no-untyped-def]
+    """Vector product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@njit(cache=True, error_model="numpy")
+def sub(a, b):  # type: ignore[no-untyped-def]
+    """a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@njit(cache=True, error_model="numpy")
+def scaled(s, a):  # type: ignore[no-untyped-def]
+    """s a."""
+    return (s * a[0], s * a[1], s * a[2])
+
+
+@njit(cache=True, error_model="numpy")
+def moved(a, s, b):  # type: ignore[no-untyped-def]
+    """a + s b."""
+    return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2])
+
+
+@njit(cache=True, error_model="numpy")
+def vector(array):  # type: ignore[no-untyped-def]
+    """The three entries of an array."""
+    return (array[0], array[1], array[2])
