@@ -67,7 +67,7 @@ def make_bump_of_revolution() -> None:
     fine = np.linspace(0.0, BUMP["reach"], 20001)
     slope = np.gradient(1.0 / (1.0 + BUMP["a"] * fine**2), fine)
     bend = np.abs(np.gradient(slope, fine)) / (1.0 + slope**2) ** 1.5
-    density = np.cumsum(np.sqrt(bend + 0.02 * bend.max()))
+    density = np.cumsum(np.sqrt(bend + 0.01 * bend.max()) * np.sqrt(1.0 + slope**2))
     rings = np.interp(np.linspace(density[0], density[-1], 49), density, fine)[1:]
     write_mesh("bump_of_revolution", dome(rings, 1.0 / (1.0 + BUMP["a"] * rings**2), 1.0, sides=96))
     edge = np.linspace(-BUMP["plane"] / 2, BUMP["plane"] / 2, 13)
