@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mapping.anchor import tangent_frame
-from mapping.feature import Feature
+from mapping.feature import Feature, Interval
 from mapping.polyline import directions
 from mapping.surface import Surface
 
@@ -34,6 +36,17 @@ def feature_mesh(feature: Feature) -> Surface:
         return _sweep(feature, width * np.array([[0.5, LIFT], [-0.5, LIFT]]), closed=False)
     turn = np.linspace(0.0, np.pi, CORNERS)
     return _sweep(feature, np.column_stack([0.5 * width * np.cos(turn), height * np.sin(turn)]), closed=True)
+
+
+def drawn_at_least(feature: Feature, size: float) -> Feature:
+    """The feature with its width, and its height as far as it is in proportion, enlarged to `size`, m, to be seen."""
+    height, width = _size(feature)
+    extent = max(width, abs(height))
+    if extent >= size or extent == 0.0:
+        return feature
+    factor = size / extent
+    width, height = factor * width, factor * height
+    return replace(feature, width=Interval(width, width, width), height=Interval(height, height, height))
 
 
 def _size(feature: Feature) -> tuple[float, float]:

@@ -1,0 +1,67 @@
+"""Curvature maps: the two principal curvatures of the estimated surface, seen from above it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from explore3d.camera import Camera
+from explore3d.figure import new_figure, png, styled
+from explore3d.object_picture import SUPERSAMPLING, view_directions
+from explore3d.raycast import Body, Picture, render
+from mapping.surface import Surface
+
+if TYPE_CHECKING:
+    from mapping.curvature import Curvature
+
+FloatArray = NDArray[np.float64]
+
+SIZE = (900, 700)
+NOT_VALID = np.array([0.80, 0.80, 0.80])
+COLOURS = "RdBu_r"
+
+
+def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float) -> bytes:
+    """PNG of k1 and k2 in units of 1/r: red bulges out, blue bends in, grey where no value is valid.
+
+    Args:
+        surface: the estimated surface.
+        curvature: at its vertices.
+        tip_radius: r, m.
+    """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    areas = surface.face_areas[:, None]
+    direction = view_directions(surface.face_normals * areas / areas.mean(), ())[0]
+    camera = Camera.facing(surface.vertices, direction, SIZE[0] * SUPERSAMPLING, SIZE[1] * SUPERSAMPLING)
+    scaled = [np.asarray(values) * tip_radius for values in (curvature.k1, curvature.k2)]
+    norm = Normalize(*_span(scaled, curvature.valid))
+    with styled():
+        figure = new_figure(11.0, 4.8)
+        panels = figure.subplots(1, 2)
+        for axes, values, name in zip(panels, scaled, ("larger, k₁", "smaller, k₂"), strict=True):
+            colours = colormaps[COLOURS](norm(values))[:, :3]
+            colours[~curvature.valid] = NOT_VALID
+            _draw(axes, render([Body(surface, colours)], camera))
+            axes.set_title(f"Principal curvature, {name}", fontweight="bold")
+        bar = figure.colorbar(ScalarMappable(norm, COLOURS), ax=panels, shrink=0.75, aspect=28, pad=0.01)
+        bar.set_label("curvature × tip radius")
+        bar.outline.set_visible(False)
+        return png(figure)
+
+
+def _span(values: list[FloatArray], valid: NDArray[np.bool_]) -> tuple[float, float]:
+    """A symmetric range that 99 % of the values fit in, at most twice the tip's own curvature."""
+    known = np.concatenate([each[valid] for each in values])
+    known = known[np.isfinite(known)]
+    top = min(2.0, float(np.quantile(np.abs(known), 0.99))) if len(known) else 1.0
+    return -max(top, 1e-9), max(top, 1e-9)
+
+
+def _draw(axes: Any, picture: Picture) -> None:
+    axes.imshow(picture.reduced(SUPERSAMPLING), interpolation="none")
+    axes.set_axis_off()

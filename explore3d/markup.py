@@ -1,0 +1,59 @@
+"""Markup: the few pieces of HTML that the report is made of; every text is escaped here."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from html import escape
+
+Row = Sequence[str]
+
+
+class Html(str):
+    """Text that is markup already and is not escaped again."""
+
+
+def text(value: str) -> Html:
+    """The value as markup: escaped, unless it is markup."""
+    return value if isinstance(value, Html) else Html(escape(value))
+
+
+def element(name: str, *content: str, **attributes: str) -> Html:
+    """`<name attributes>content</name>`; write class_ for class."""
+    written = "".join(f' {key.rstrip("_").replace("_", "-")}="{escape(each)}"' for key, each in attributes.items())
+    return Html(f"<{name}{written}>{''.join(text(each) for each in content)}</{name}>")
+
+
+def paragraph(*content: str) -> Html:
+    """A paragraph."""
+    return element("p", *content)
+
+
+def table(head: Row, rows: Iterable[Row], *, numeric: Sequence[int] = ()) -> Html:
+    """A table that scrolls sideways on narrow screens; columns in `numeric` are aligned to the right."""
+
+    def cells(kind: str, row: Row) -> Html:
+        return element(
+            "tr",
+            *(element(kind, each, **({"class_": "number"} if i in numeric else {})) for i, each in enumerate(row)),
+        )
+
+    body = element("tbody", *(cells("td", row) for row in rows))
+    return element("div", element("table", element("thead", cells("th", head)), body), class_="table")
+
+
+def section(title: str, name: str, *content: str) -> Html:
+    """A titled section that can be linked to as #name."""
+    return element("section", element("h2", title), *content, id=name)
+
+
+def figure(png: bytes, description: str, caption: str) -> Html:
+    """A picture inside the page, with its caption."""
+    source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
+    image = Html(f'<img src="{source}" alt="{escape(description)}">')
+    return element("figure", image, element("figcaption", caption))
+
+
+def badge(content: str, kind: str) -> Html:
+    """A short remark on a coloured ground; kinds: good, bad, plain."""
+    return element("span", content, class_=f"badge {kind}")

@@ -1,0 +1,168 @@
+"""Picture of the object: its base, the sweeps over it, and the features found, seen by rays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from explore3d.camera import Camera
+from explore3d.figure import INK, new_figure, png, styled
+from explore3d.quantity import length_text
+from explore3d.raycast import Body, Picture, render
+from mapping.crossing import Crossing
+from mapping.feature import Feature
+from mapping.feature_mesh import drawn_at_least, feature_mesh
+from mapping.model_glb import COLOURS, OTHER_COLOUR
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+FloatArray = NDArray[np.float64]
+
+SIZE = (1200, 820)
+SUPERSAMPLING = 2
+BASE_COLOUR = np.array([0.86, 0.88, 0.91])
+QUIET = np.array([0.42, 0.52, 0.62])
+LOUD = np.array([0.93, 0.55, 0.13])
+# Features are drawn at least so many pixels wide, or nobody would see them.
+VISIBLE = 5.0
+# A body whose outward directions cancel more than this is round: it needs two views.
+ROUND = 0.45
+
+
+def object_picture(
+    base: Surface,
+    features: Sequence[Feature],
+    trace: Trace,
+    feet: FloatArray,
+    normals: FloatArray,
+    crossings: Sequence[Crossing] = (),
+) -> bytes:
+    """PNG of the base with sweeps and features; two opposite views of a round body.
+
+    Args:
+        base: the global model.
+        features: what was found.
+        trace: all samples.
+        feet, normals: (N, 3) points of the base under the samples, m, and its normals there.
+        crossings: detections; the samples that they cover are drawn in orange.
+    """
+    views = view_directions(normals, features)
+    noticed = _noticed(trace, crossings)
+    shown = _close_up(base, feet)
+    with styled():
+        figure = new_figure(7.5 * len(views), 5.3)
+        for axes, direction in zip(np.atleast_1d(figure.subplots(1, len(views))), views, strict=True):
+            camera = Camera.facing(shown, direction, SIZE[0] * SUPERSAMPLING, SIZE[1] * SUPERSAMPLING)
+            _draw(axes, _scene(base, features, camera, feet, normals, noticed), features)
+        return png(figure)
+
+
+def view_directions(normals: FloatArray, features: Sequence[Feature]) -> list[FloatArray]:
+    """Directions towards the camera: one, oblique, over a flat body; two opposite ones round a closed body."""
+    mean = normals.mean(axis=0) if len(normals) else np.array([0.0, 0.0, 1.0])
+    if np.linalg.norm(mean) > ROUND:
+        mean = mean / np.linalg.norm(mean)
+        across = np.cross(np.array([0.0, 0.0, 1.0]), mean)
+        across = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-3 else np.array([1.0, 0.0, 0.0])
+        down = np.cross(mean, across)
+        return [np.asarray(mean - 0.75 * down * np.sign(down[2] or 1.0) + 0.35 * across)]
+    outward = [feature.normals.mean(axis=0) for feature in features] or [np.array([1.0, -1.0, 0.0])]
+    angle = np.arctan2(outward[0][1], outward[0][0]) - 0.5
+    first = np.array([np.cos(angle), np.sin(angle), 0.45])
+    return [first, first * [-1.0, -1.0, 1.0]]
+
+
+def _close_up(base: Surface, feet: FloatArray) -> FloatArray:
+    """What the camera must show: the base, or the explored part if that is much smaller."""
+    corners = base.vertices[np.unique(base.faces)]
+    explored = np.stack([feet.min(axis=0), feet.max(axis=0)]) if len(feet) else corners
+    if np.linalg.norm(np.ptp(explored, axis=0)) > 0.4 * base.size or len(feet) == 0:
+        return corners
+    middle, reach = explored.mean(axis=0), 0.6 * np.linalg.norm(np.ptp(explored, axis=0))
+    return np.asarray(middle + reach * (np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), axis=-1).reshape(-1, 3)))
+
+
+def _noticed(trace: Trace, crossings: Sequence[Crossing]) -> NDArray[np.bool_]:
+    """(N,) True for the samples that a crossing covers."""
+    mask = np.zeros(len(trace), dtype=bool)
+    firsts = {int(number): int(first) for first, number in reversed(_runs(trace))}
+    for crossing in crossings:
+        if crossing.sweep in firsts:
+            mask[firsts[crossing.sweep] + crossing.start : firsts[crossing.sweep] + crossing.stop] = True
+    return mask
+
+
+def _runs(trace: Trace) -> list[tuple[int, int]]:
+    """(first sample, sweep number) of each run of samples."""
+    if len(trace) == 0:
+        return []
+    firsts = np.concatenate([[0], np.flatnonzero(np.diff(trace.sweep)) + 1])
+    return [(int(first), int(trace.sweep[first])) for first in firsts]
+
+
+def _scene(
+    base: Surface,
+    features: Sequence[Feature],
+    camera: Camera,
+    feet: FloatArray,
+    normals: FloatArray,
+    noticed: NDArray[np.bool_],
+) -> Picture:
+    pixel = camera.pixel * float(np.linalg.norm(camera.eye - camera.target))
+    bodies = [Body(base, BASE_COLOUR)]
+    for feature in features:
+        colour = np.array(COLOURS.get(feature.kind, OTHER_COLOUR)[:3])
+        bodies.append(Body(feature_mesh(drawn_at_least(feature, VISIBLE * SUPERSAMPLING * pixel)), colour))
+    picture = render(bodies, camera)
+    for mask, colour, radius in ((~noticed, QUIET, 1.0), (noticed, LOUD, 2.2)):
+        lifted = feet[mask] + 2.0 * pixel * normals[mask]
+        picture.splat(_thinned(lifted, pixel), colour, radius, 3.0 * pixel)
+    return picture
+
+
+def _thinned(points: FloatArray, pixel: float) -> FloatArray:
+    """The points that lie more than a quarter pixel from the one before: others would cover the same pixels."""
+    if len(points) < 2:
+        return points
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    keep = np.concatenate([[True], np.diff(np.floor(way / (0.25 * pixel))) > 0])
+    return np.asarray(points[keep])
+
+
+def _draw(axes: Any, picture: Picture, features: Sequence[Feature]) -> None:
+    """The pixels with the features' names and a scale bar."""
+    pixels = picture.reduced(SUPERSAMPLING)
+    axes.imshow(np.clip(pixels, 0.0, 1.0), interpolation="none")
+    axes.set_axis_off()
+    for feature in features:
+        reference = feature.axis[len(feature.axis) // 2] if feature.anchor is None else feature.anchor.position
+        place, depth = picture.camera.project(reference[None, :])
+        column, row = np.rint(place[0]).astype(int)
+        hidden = not (0 <= row < picture.depth.shape[0] and 0 <= column < picture.depth.shape[1])
+        if hidden or depth[0] > 1.02 * picture.depth[row, column]:
+            continue
+        axes.annotate(
+            f"{feature.id}  {length_text(feature.height.median)}",
+            place[0] / SUPERSAMPLING,
+            xytext=(14, 18),
+            textcoords="offset points",
+            fontsize=8.5,
+            color=INK,
+            arrowprops={"arrowstyle": "-", "color": INK, "linewidth": 0.6},
+            bbox={"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+        )
+    _scale_bar(axes, picture.camera, pixels.shape)
+
+
+def _scale_bar(axes: Any, camera: Camera, shape: tuple[int, ...]) -> None:
+    """A round length at the distance of the camera's target."""
+    pixel = camera.pixel * SUPERSAMPLING * float(np.linalg.norm(camera.eye - camera.target))
+    wish = 0.16 * shape[1] * pixel
+    power = 10.0 ** np.floor(np.log10(wish))
+    length = float(max(step for step in (1.0, 2.0, 5.0) if step * power <= wish) * power)
+    left, row = 0.03 * shape[1], 0.965 * shape[0]
+    axes.plot([left, left + length / pixel], [row, row], color=INK, linewidth=2.0, solid_capstyle="butt")
+    axes.text(left, row - 0.012 * shape[0], length_text(length), color=INK, fontsize=8.5, va="bottom")

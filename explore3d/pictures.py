@@ -1,0 +1,88 @@
+"""Pictures of an analysis: one PNG per figure of the report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from explore3d.analysis import Analysis
+from explore3d.cross_section import cross_section
+from explore3d.curvature_picture import curvature_picture
+from explore3d.error_picture import size_picture, time_picture
+from explore3d.object_picture import object_picture
+from explore3d.profile_picture import profile_picture
+from explore3d.section_picture import section_picture
+from mapping.base import Feet
+from mapping.feature import Feature
+from mapping.left_out import LeftOut
+from mapping.open3d_import import Open3DError
+
+# So many features get a panel of their own.
+MOST_SECTIONS = 12
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """PNG files by name ("object", "profile", "sections", "curvature", "sizes", "time"), and those left out."""
+
+    files: dict[str, bytes]
+    left_out: tuple[LeftOut, ...] = ()
+
+
+def draw_pictures(analysis: Analysis, feet: Feet) -> Pictures:
+    """Every picture that the analysis has the data for.
+
+    Args:
+        analysis: what was found.
+        feet: of all samples on the base, at the trace's tip radius.
+    """
+    files: dict[str, bytes | None] = {}
+    left_out: list[LeftOut] = []
+    profile = is_profile(analysis)
+    if profile:
+        limit = analysis.detections.detection_limit
+        files["profile"] = profile_picture(analysis.trace, feet, analysis.model.features, limit)
+    files["sections"] = _sections(analysis, feet)
+    try:
+        files |= {} if profile else _rendered(analysis, feet)
+    except Open3DError as error:
+        # The model is whole without its pictures; the report says which are missing, and why.
+        left_out.append(LeftOut("rendered pictures", str(error)))
+    files["sizes"] = size_picture(analysis.errors)
+    files["time"] = time_picture(analysis.time_curve, analysis.scene.explore.precision if analysis.scene else None)
+    return Pictures({name: data for name, data in files.items() if data is not None}, tuple(left_out))
+
+
+def is_profile(analysis: Analysis) -> bool:
+    """True if everything was recorded along one line."""
+    return analysis.base.kind == "profile"
+
+
+def shown_features(analysis: Analysis) -> tuple[Feature, ...]:
+    """The features that get a panel: those with the strongest evidence, in the order of the model."""
+    ranked = sorted(analysis.model.features, key=lambda feature: -feature.evidence.snr)[:MOST_SECTIONS]
+    names = {feature.id for feature in ranked}
+    return tuple(feature for feature in analysis.model.features if feature.id in names)
+
+
+def _sections(analysis: Analysis, feet: Feet) -> bytes | None:
+    trace, crossings = analysis.trace, analysis.detections.crossings
+    true = {row.found.id: row.true.height for row in analysis.errors if row.found and row.true}
+    sections = [
+        found
+        for feature in shown_features(analysis)
+        if (found := cross_section(feature, trace, analysis.base, feet, crossings, analysis.estimate)) is not None
+    ]
+    if not sections:
+        return None
+    return section_picture(sections, [true.get(each.feature.id) for each in sections])
+
+
+def _rendered(analysis: Analysis, feet: Feet) -> dict[str, bytes | None]:
+    surface = analysis.base.surface
+    features, crossings = analysis.model.features, analysis.detections.crossings
+    files: dict[str, bytes | None] = {
+        "object": object_picture(surface, features, analysis.trace, feet.points, feet.normals, crossings)
+    }
+    if analysis.estimate is not None and analysis.estimate.surface is not None and analysis.curvature is not None:
+        files["curvature"] = curvature_picture(analysis.estimate.surface, analysis.curvature, analysis.trace.tip_radius)
+    return files

@@ -1,0 +1,52 @@
+"""The report's last part: what was left out and why, where the time went, and where everything came from."""
+
+from __future__ import annotations
+
+import json
+
+from explore3d.analysis import Analysis
+from explore3d.markup import Html, Row, element, paragraph, section, table
+from explore3d.pictures import Pictures
+from explore3d.quantity import seconds_text
+from mapping.left_out import LeftOut
+
+
+def what_was_left_out(analysis: Analysis, pictures: Pictures) -> Html:
+    """Stages that were not needed or could not be done."""
+    silent = tuple(LeftOut("part of the trace", sentence) for sentence in analysis.detections.left_out)
+    everything = (*analysis.left_out, *silent, *pictures.left_out)
+    if not everything:
+        return section("What was left out", "left-out", paragraph("Nothing."))
+    rows = [(element("b", each.stage), each.reason, each.saved) for each in everything]
+    return section("What was left out", "left-out", table(("stage", "why", "what that saved"), rows))
+
+
+def account_of_time(analysis: Analysis) -> Html:
+    """Seconds per stage, with bars."""
+    if not analysis.timings:
+        return Html("")
+    longest = max(analysis.timings.values()) or 1.0
+    rows: list[Row] = [
+        (name, seconds_text(seconds), element("span", class_="bar", style=f"width:{14 * seconds / longest:.2f}rem"))
+        for name, seconds in analysis.timings.items()
+    ]
+    rows.append((element("b", "together"), seconds_text(sum(analysis.timings.values())), ""))
+    return section("Where the time went", "time", table(("stage", "time", ""), rows, numeric=(1,)))
+
+
+def provenance(analysis: Analysis) -> Html:
+    """Everything needed to do it again."""
+    about = json.dumps(analysis.model.document()["provenance"], indent=1, ensure_ascii=False)
+    content = [
+        paragraph(
+            "The same in numbers: ",
+            element("code", "model.json"),
+            ". In 3D for any glTF viewer: ",
+            element("code", "model.glb"),
+            ".",
+        ),
+        element("details", element("summary", "Provenance"), element("pre", about)),
+    ]
+    if analysis.scene is not None:
+        content.append(element("details", element("summary", "Scene"), element("pre", analysis.scene.resolved)))
+    return section("Where it came from", "provenance", *content)
