@@ -11,6 +11,7 @@ from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.disturbance import Disturbance
 from mapping.errors import MappingError
+from mapping.false_alarms import threshold_for
 from mapping.height_profile import HeightProfile, arclength, height_profiles
 from mapping.matched_filter import BINS_PER_HALF_WIDTH, Bank, build_bank, smallest_half_width
 from mapping.noise import Noise, estimate_noise
@@ -24,7 +25,11 @@ BoolArray = NDArray[np.bool_]
 LARGEST = 4.0
 # Rounding of contact geometry, in tip radii: the noise is never taken to be smaller.
 ROUNDING = 1e-8
+# Signal-to-noise ratio of what is certainly no noise: what exceeds it is kept out of the noise's estimate.
+CERTAIN = 5.0
 RAW_SAMPLES = 40_000
+# Height, in standard deviations of a profile, of the gentlest detail that is no roughness of an unknown base.
+ROUGHNESS = 5.0
 PROBABILITY = 0.95
 
 
@@ -108,15 +113,16 @@ def detect(
     raw = float(np.median([s[-1] / (len(s) - 1) for _, _, s in usable]))
     first = noise or _raw_noise(usable, base, raw)
     widest = LARGEST * tip if largest is None else largest
-    profiles, bank, level, threshold = _profiles(usable, base, first, raw, tip, widest, false_alarms_per_metre)
-    for _ in range(2 if noise is None else 0):
-        quiet = [quiet_bins(p, bank, level, threshold, tip) for p in profiles]
-        level = _quiet_noise(profiles, quiet, first, tip)
-        bank, threshold = _bank(base, level, profiles[0], tip, widest, false_alarms_per_metre)
+    profiles = _profiles(usable, base, first, raw, tip)
+    level, bank = _noise_and_bank(profiles, base, noise, first, tip, widest)
+    threshold = threshold_for(bank, false_alarms_per_metre)
     crossings = []
     for profile in profiles:
-        found_here = find_disturbances(profile, bank, level, threshold, tip)
-        crossings += [c for d in found_here for c in _crossings(d, profile, base, tip)]
+        disturbances = find_disturbances(profile, bank, level, threshold, tip)
+        if base.kind == "profile":
+            disturbances = tuple(d for d in disturbances if _stands_out(d, profile, level, tip))
+        for disturbance in sorted(disturbances, key=lambda d: d.place):
+            crossings += _crossings(disturbance, profile, base, tip)
     length = sum(p.length for p in profiles)
     limit = bank.detection_limit(threshold, tip)
     return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out)
@@ -144,30 +150,30 @@ def _floored(noise: Noise, tip: float) -> Noise:
 
 
 def _profiles(
-    usable: list[tuple[int, Trace, FloatArray]],
-    base: Base,
-    noise: Noise,
-    raw: float,
-    tip: float,
-    largest: float,
-    rate: float,
-) -> tuple[list[HeightProfile], Bank, Noise, float]:
-    noise = _floored(noise, tip)
-    smallest = smallest_half_width(noise, raw, 1.0, tip, 5.0)
+    usable: list[tuple[int, Trace, FloatArray]], base: Base, noise: Noise, raw: float, tip: float
+) -> list[HeightProfile]:
+    """Profiles of every sweep in bins that the smallest visible crest spans BINS_PER_HALF_WIDTH times."""
+    smallest = smallest_half_width(_floored(noise, tip), raw, 1.0, tip, CERTAIN)
     spacing = raw * max(1, int(smallest / (BINS_PER_HALF_WIDTH * raw)))
-    profiles = [p for number, part, s in usable for p in height_profiles(number, part, s, base, spacing)]
-    level = _quiet_noise(profiles, [np.ones(len(p.height), dtype=bool) for p in profiles], noise, tip)
-    bank, threshold = _bank(base, level, profiles[0], tip, largest, rate)
-    return profiles, bank, level, threshold
+    return [p for number, part, s in usable for p in height_profiles(number, part, s, base, spacing)]
 
 
-def _bank(
-    base: Base, noise: Noise, profile: HeightProfile, tip: float, largest: float, rate: float
-) -> tuple[Bank, float]:
+def _noise_and_bank(
+    profiles: list[HeightProfile], base: Base, given: Noise | None, first: Noise, tip: float, largest: float
+) -> tuple[Noise, Bank]:
+    """The noise of what is no feature, and filters for it; each improves the other twice unless it is given."""
     drift = 0 if base.kind == "mesh" else 2
-    smallest = smallest_half_width(noise, profile.spacing, profile.samples, tip, 4.5)
-    bank = build_bank(noise, profile.spacing, profile.samples, smallest, max(largest, smallest), drift)
-    return bank, bank.threshold(rate)
+    level = _floored(given or first, tip)
+    quiet = [np.ones(len(p.height), dtype=bool) for p in profiles]
+    for attempt in range(1 if given else 3):
+        if given is None:
+            level = _quiet_noise(profiles, quiet, first, tip)
+        spacing, samples = profiles[0].spacing, float(np.mean([p.samples for p in profiles]))
+        smallest = smallest_half_width(level, spacing, samples, tip, CERTAIN)
+        bank = build_bank(level, spacing, samples, smallest, max(largest, smallest), drift)
+        if given is None and attempt < 2:
+            quiet = [quiet_bins(p, bank, level, CERTAIN, tip) for p in profiles]
+    return level, bank
 
 
 def _quiet_noise(profiles: list[HeightProfile], quiet: list[BoolArray], first: Noise, tip: float) -> Noise:
@@ -185,6 +191,19 @@ def _quiet_noise(profiles: list[HeightProfile], quiet: list[BoolArray], first: N
     estimated = estimate_noise(height, np.concatenate(places))
     white = estimated.white * np.sqrt(float(np.mean(samples)))
     return _floored(Noise(white, estimated.correlated, estimated.length), tip)
+
+
+def _stands_out(found: Disturbance, profile: HeightProfile, noise: Noise, tip: float) -> bool:
+    """True unless a detail gentler than the tip hides among the samples of a profile whose base was fitted.
+
+    One profile cannot tell roughness from the base's own shape, and its shape is unknown: such a detail must
+    be higher than ROUGHNESS standard deviations of the profile at the resolution that the detail needs.
+    """
+    if abs(found.curvature) > 1 / (2 * tip):
+        return True
+    block = max(profile.spacing, found.half_width / BINS_PER_HALF_WIDTH)
+    variance = noise.block_covariances(1, block, profile.samples * block / profile.spacing)[0]
+    return bool(abs(found.height) > ROUGHNESS * np.sqrt(variance))
 
 
 def _crossings(found: Disturbance, profile: HeightProfile, base: Base, tip: float) -> list[Crossing]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +11,10 @@ from mapping.noise import Noise
 
 FloatArray = NDArray[np.float64]
 
-# Neighbouring half-widths: a cap between two templates loses less than 2 % of its signal-to-noise.
-LADDER = 1.35
+# Ratio of neighbouring half-widths: a cap between two templates loses less than 0.6 % of its signal-to-noise.
+LADDER = 1.2
 # Bins per half-width: averaging over a bin loses less than 1 %.
 BINS_PER_HALF_WIDTH = 12
-# Metric of the cap family: -d^2 rho / d(ln w)^2 of the correlation of two caps about one centre.
-SCALE_METRIC = 1.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +28,6 @@ class MatchedFilter:
         edge: (M, 2 M + 1) weights where only i bins exist before the centre; rows i = 0 to M - 1.
         sd: standard deviation of the estimate, m.
         edge_sd: (M,) the same near the ends.
-        roughness: -rho''(0) of the output along the path, 1/m^2.
     """
 
     half_width: float
@@ -39,7 +36,6 @@ class MatchedFilter:
     edge: FloatArray
     sd: float
     edge_sd: FloatArray
-    roughness: float
 
     def heights(self, profile: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Estimated height of a cap centred at each coarse bin of a profile (n,), and its standard deviation."""
@@ -67,35 +63,16 @@ class Bank:
     Args:
         filters: the filters.
         spacing: width of a profile bin, m.
+        samples: samples in a profile bin.
+        noise: of single samples.
         drift: number of polynomial terms of the base that each filter ignores (0: the base is known).
     """
 
     filters: tuple[MatchedFilter, ...]
     spacing: float
-    drift: int = field(default=0)
-
-    def false_alarms_per_metre(self, threshold: float) -> float:
-        """Expected false alarms of |height|/sd > threshold, both signs, over all widths.
-
-        The expected Euler characteristic of the excursion set of a Gaussian field over place and log width.
-        """
-        roots = np.sqrt([f.roughness for f in self.filters])
-        widths = np.log([f.half_width for f in self.filters])
-        area = float(np.sqrt(SCALE_METRIC) * np.trapezoid(roots, widths)) if len(roots) > 1 else 0.0
-        decay = np.exp(-0.5 * threshold**2)
-        inner = area * threshold * decay / (2 * np.pi) ** 1.5
-        border = 0.5 * (roots[0] + roots[-1]) * decay / (2 * np.pi)
-        return float(2 * (inner + border))
-
-    def threshold(self, false_alarms_per_metre: float) -> float:
-        """The signal-to-noise ratio whose false alarms are as frequent as asked."""
-        low, high = 1.5, 40.0
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (
-                (middle, high) if self.false_alarms_per_metre(middle) > false_alarms_per_metre else (low, middle)
-            )
-        return high
+    samples: float
+    noise: Noise
+    drift: int = 0
 
     def detection_limit(self, threshold: float, tip_radius: float) -> float:
         """Smallest height of a sharp crest under this tip that is detected with 95 % probability, m.
@@ -126,7 +103,9 @@ def build_bank(noise: Noise, spacing: float, samples: float, smallest: float, la
     """
     count = max(1, int(np.ceil(np.log(max(largest / smallest, 1.0)) / np.log(LADDER))) + 1)
     widths = np.geomspace(smallest, max(largest, smallest), count) if count > 1 else np.array([smallest])
-    return Bank(tuple(_build_filter(float(w), noise, spacing, samples, drift) for w in widths), spacing, drift)
+    return Bank(
+        tuple(_build_filter(float(w), noise, spacing, samples, drift) for w in widths), spacing, samples, noise, drift
+    )
 
 
 def smallest_half_width(noise: Noise, spacing: float, samples: float, tip_radius: float, threshold: float) -> float:
@@ -155,29 +134,37 @@ def cap_bins(
     return (integral(positions + spacing / 2) - integral(positions - spacing / 2)) / spacing
 
 
-def _build_filter(half_width: float, noise: Noise, spacing: float, samples: float, drift: int) -> MatchedFilter:
-    coarse = max(1, int(half_width / (BINS_PER_HALF_WIDTH * spacing)))
-    step = coarse * spacing
+def toeplitz(first: FloatArray) -> FloatArray:
+    """(n, n) symmetric matrix of a stationary covariance from its first row."""
+    index = np.arange(len(first))
+    return np.asarray(first[np.abs(np.subtract.outer(index, index))])
+
+
+def filter_reach(half_width: float, noise: Noise, step: float, drift: int) -> int:
+    """Bins that a filter needs on either side: the cap, a stretch to know the drift by, and what noise it shares."""
     reach = int(np.ceil((3.5 if drift else 1.0) * half_width / step))
     if noise.correlated > 0:
         reach += int(min(np.ceil(2 * noise.length / step) + 1, 1.5 * half_width / step + 1))
+    return reach
+
+
+def _build_filter(half_width: float, noise: Noise, spacing: float, samples: float, drift: int) -> MatchedFilter:
+    coarse = max(1, int(half_width / (BINS_PER_HALF_WIDTH * spacing)))
+    step = coarse * spacing
+    reach = filter_reach(half_width, noise, step, drift)
     x = np.arange(-reach, reach + 1) * step
     template = cap_bins(x, half_width, step)
-    covariances = noise.block_covariances(2 * reach + 2, step, samples * coarse)
-    lags = np.subtract.outer(np.arange(2 * reach + 1), np.arange(2 * reach + 1))
-    covariance = covariances[np.abs(lags)]
+    covariance = toeplitz(noise.block_covariances(2 * reach + 1, step, samples * coarse))
     nuisance = (x[:, None] / (reach * step)) ** np.arange(drift)[None, :]
-    weights, sd = _blue(covariance, template, nuisance)
+    weights, sd = best_linear(covariance, template, nuisance)
     edge, edge_sd = np.zeros((reach, 2 * reach + 1)), np.full(reach, np.inf)
     for i in range(reach):
         cut = slice(reach - i, None)
-        edge[i, cut], edge_sd[i] = _blue(covariance[cut, cut], template[cut], nuisance[cut])
-    neighbour = float(weights @ covariances[np.abs(lags + 1)] @ weights) / sd**2
-    roughness = 2 * max(1 - neighbour, 1e-9) / step**2
-    return MatchedFilter(half_width, coarse, weights, edge, sd, edge_sd, roughness)
+        edge[i, cut], edge_sd[i] = best_linear(covariance[cut, cut], template[cut], nuisance[cut])
+    return MatchedFilter(half_width, coarse, weights, edge, sd, edge_sd)
 
 
-def _blue(covariance: FloatArray, template: FloatArray, nuisance: FloatArray) -> tuple[FloatArray, float]:
+def best_linear(covariance: FloatArray, template: FloatArray, nuisance: FloatArray) -> tuple[FloatArray, float]:
     """Weights of the best linear unbiased estimate of the template's amplitude, and its standard deviation."""
     columns = np.column_stack([template, nuisance])
     solved = np.linalg.solve(covariance, columns)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +26,13 @@ PROMINENCE = 0.2
 PROMINENCE_SDS = 5.0
 # What is left beside a disturbance and lower than this share of it belongs to it: no feature is exactly a cap.
 SIDE_LOBE = 0.12
+# Share of the threshold that the fitted height must reach too: at the ends of a sweep the fit knows less.
+MEASURED = 0.5
 # The tip draws no cap higher than w^2 / (2 r); twice as much is no contact but a disturbance of the measurement.
 PHYSICAL = 2.0
 LARGEST_SHARE = 0.6
+# A disturbance weaker than this many thresholds hides no other: what it leaves behind are its own side lobes.
+HIDING = 1.5
 ROUNDS = 50
 
 
@@ -43,12 +49,15 @@ def find_disturbances(
         tip_radius: m.
     """
     found: list[Disturbance] = []
-    for height, begin, end, crest in _stretches(profile, bank, noise, threshold, tip_radius):
+    for height, begin, end, crest, snr in _stretches(profile, bank, noise, threshold, tip_radius):
         for low, high in _crests(height, begin, end, crest, profile, noise, tip_radius):
             beside = (low > begin, high < end)
             sign = float(np.sign(crest))
             new = fit_cap(height, (low, high), sign, profile, noise, bank.drift, tip_radius, beside)
-            if new.snr >= threshold and not _side_lobe(new, found, bank.drift > 0):
+            if not any(beside) and new.snr < snr:
+                new = replace(new, snr=snr)
+            certain = abs(new.height) >= MEASURED * threshold * new.height_sd
+            if certain and new.snr >= threshold and not _side_lobe(new, found, bank.drift > 0):
                 found.append(new)
     return tuple(found)
 
@@ -56,27 +65,31 @@ def find_disturbances(
 def quiet_bins(profile: HeightProfile, bank: Bank, noise: Noise, threshold: float, tip_radius: float) -> BoolArray:
     """(n,) True where a profile shows nothing above the threshold."""
     quiet = np.ones(len(profile.height), dtype=bool)
-    for _, begin, end, _ in _stretches(profile, bank, noise, threshold, tip_radius):
+    for _, begin, end, _, _ in _stretches(profile, bank, noise, threshold, tip_radius):
         quiet[begin:end] = False
     return quiet
 
 
 def _stretches(
     profile: HeightProfile, bank: Bank, noise: Noise, threshold: float, tip_radius: float
-) -> Iterator[tuple[FloatArray, int, int, float]]:
-    """(heights, first bin, past-last bin, crest) of each stretch; stronger stretches are removed from the heights.
+) -> Iterator[tuple[FloatArray, int, int, float, float]]:
+    """(heights, first bin, past-last bin, crest, signal-to-noise) of each stretch; stronger stretches are removed from the heights.
 
-    Each round takes the candidates that nothing stronger overlaps, removes their stretches from the profile
-    and looks again, until nothing exceeds the threshold.
+    Each round takes the candidates that nothing stronger overlaps, removes those stretches from the profile that
+    are strong enough to hide others, and looks again, until nothing new exceeds the threshold.
     """
     height = profile.height.copy()
+    weak: list[tuple[int, float]] = []
     for _ in range(ROUNDS):
-        accepted = _dominant(_candidates(height, bank, threshold, tip_radius))
+        accepted = _dominant(_candidates(height, bank, threshold, tip_radius), weak)
         if not accepted:
             return
-        for place, half_width, crest in accepted:
+        for place, half_width, crest, snr in accepted:
             begin, end = _extent(height, place, half_width, crest, profile, noise, tip_radius)
-            yield height.copy(), begin, end, crest
+            yield height.copy(), begin, end, crest, snr
+            if snr < HIDING * threshold:
+                weak.append((place, half_width))
+                continue
             shoulders = _shoulders(height, begin, end, bank.drift > 0)
             height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
 
@@ -99,13 +112,18 @@ def _candidates(
     return result
 
 
-def _dominant(candidates: list[tuple[float, int, float, float]]) -> list[tuple[int, float, float]]:
-    """Place, half-width and height of the candidates that no stronger one overlaps, the strongest first."""
-    kept: list[tuple[int, float, float]] = []
-    blocked: list[tuple[int, float]] = []
-    for _, place, half_width, crest in sorted(candidates, reverse=True):
+def _dominant(
+    candidates: list[tuple[float, int, float, float]], taken: list[tuple[int, float]]
+) -> list[tuple[int, float, float, float]]:
+    """Place, half-width, height and signal-to-noise of the candidates, the strongest first.
+
+    Candidates that overlap a stronger one or one of those taken already (place, half-width) are left out.
+    """
+    kept: list[tuple[int, float, float, float]] = []
+    blocked = list(taken)
+    for snr, place, half_width, crest in sorted(candidates, reverse=True):
         if all(abs(place - other) >= half_width + width for other, width in blocked):
-            kept.append((place, half_width, crest))
+            kept.append((place, half_width, crest, snr))
         blocked.append((place, half_width))
     return kept
 
@@ -183,7 +201,7 @@ def _crests(
         if deep or smooth[i] > smooth[top]:
             top = lowest = i
     bounds = [begin, *(begin + v for v in valleys), end]
-    return list(zip(bounds[:-1], bounds[1:], strict=True))
+    return list(itertools.pairwise(bounds))
 
 
 def _side_lobe(new: Disturbance, found: list[Disturbance], drift: bool) -> bool:
