@@ -1,5 +1,7 @@
 """Compiled heights of a ball over many capsule chains at once (the exact envelope of shapes.chain_height)."""
 
+# mypy: disable-error-code="untyped-decorator"
+
 from __future__ import annotations
 
 import numpy as np

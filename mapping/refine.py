@@ -128,10 +128,11 @@ def pose_problem(feature: Feature, around: Surroundings) -> Problem:
     raise MappingError(f"no posterior for a {feature.kind!r}: closed-form traces exist for {', '.join(SAMPLED_KINDS)}")
 
 
-def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool = True) -> Solution:
-    """Optimum, misfit, importance sampling, and emcee where it is wanted or needed."""
+def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool = True, adapt: bool = True) -> Solution:
+    """Optimum, misfit (unless `adapt` is False: the noise is known), importance sampling, and emcee where needed."""
     optima = find_optima(problem.target, problem.beginnings)
-    problem, optima = account_for_misfit(problem, optima)
+    if adapt:
+        problem, optima = account_for_misfit(problem, optima)
     fast = importance_sample(problem.target, [laplace(problem.target, optimum) for optimum in optima], rng)
     if not confirm and fast.k_hat < TRUSTED_K_HAT:
         return Solution(problem, _from_importance(problem, fast, rng), fast, None)

@@ -133,9 +133,9 @@ def _independent(
 
 def _seed(sampler: Any, rng: np.random.Generator) -> None:
     """Hand the randomness over; emcee hides a state that it could not set, so it is read back."""
-    wanted = np.random.RandomState(int(rng.integers(2**32 - 1))).get_state(legacy=True)
+    wanted: Any = np.random.RandomState(int(rng.integers(2**32 - 1))).get_state(legacy=True)
     sampler.random_state = wanted
-    if not np.array_equal(sampler.random_state[1], np.asarray(wanted[1])):
+    if not np.array_equal(sampler.random_state[1], wanted[1]):
         raise SamplerError("emcee did not take the random state that it was given; the run would not be repeatable")
 
 

@@ -1,5 +1,7 @@
 """Compiled whitening of binned traces: one pass of a scalar Kalman filter, O(n) per template."""
 
+# mypy: disable-error-code="untyped-decorator"
+
 from __future__ import annotations
 
 import numpy as np

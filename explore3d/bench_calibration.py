@@ -1,0 +1,266 @@
+"""Calibration bench: do 90 % intervals cover 90 %, and are the ranks of the truth uniform?
+
+Simulation-based calibration (Talts et al. 2018): truths are drawn from the prior, traces are simulated from them at
+the sampling rate of the apparatus and analysed by the same code as real ones; the place of each true value within its
+posterior must then be uniform. Every simulation is one line of a JSONL file: an interrupted run goes on where it
+stopped, and the same seeds give the same lines.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.base import Base
+from mapping.feature import Evidence, Feature, Interval
+from mapping.noise import Noise
+from mapping.priors import Normal, Prior, Uniform
+from mapping.problem import Problem, Surroundings
+from mapping.refine import Solution, pose_problem, solve_problem
+from mapping.ridge_shape import RidgeShape
+from mapping.shapes import chain_height, groove_height, rim_height, step_height
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+FloatArray = NDArray[np.float64]
+
+TIP_RADIUS = 10e-3
+SPACING = 6e-6
+# Wire of the paper; the other features are of sizes that the same tip feels about as well.
+HEIGHT = 0.65e-3
+NOISES = ("white", "ell 0.3 mm", "ell 1 mm", "ell 3 mm", "low white")
+KINDS = ("ridge", "bump", "groove", "pit", "step")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One simulation: which feature, which noise, which seed.
+
+    `assumed` names the noise that the analysis believes: "true", or "white" to show that the test can fail.
+    """
+
+    kind: str
+    noise: str
+    seed: int
+    method: str = "importance"
+    assumed: str = "true"
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """What came of a case: for each parameter the share of the posterior below the truth, and how it was found."""
+
+    case: Case
+    below: dict[str, float]
+    k_hat: float
+    status: str
+
+
+def noise_of(name: str, rng: np.random.Generator) -> Noise:
+    """The noise of a condition: 0.2 mm white, 0.02 to 0.2 mm (log-uniform) white, or 0.02 mm white + 0.05 mm OU."""
+    if name == "white":
+        return Noise(0.2e-3)
+    if name == "low white":
+        return Noise(float(np.exp(rng.uniform(np.log(0.02e-3), np.log(0.2e-3)))))
+    return Noise(0.05e-3, 0.05e-3, float(name.split()[1]) * 1e-3)
+
+
+def run_case(case: Case) -> Row:
+    """Simulate, analyse, and find the truth's place in the posterior."""
+    rng = np.random.default_rng([KINDS.index(case.kind), NOISES.index(case.noise), case.seed])
+    noise = noise_of(case.noise, rng)
+    feature, paths = nominal(case.kind)
+    quiet = _record(paths, np.zeros(sum(len(path) for path in paths)))
+    blank = _with_priors(pose_problem(feature, Surroundings(quiet, _plate(), noise)))
+    truth = np.array([float(prior.draw(rng, 1)[0]) for prior in blank.target.shape.priors])
+    heights = _true_heights(case.kind, blank, truth, np.concatenate(paths))
+    trace = _record(paths, heights + simulate_noise(noise, paths, rng))
+    believed = noise if case.assumed == "true" else Noise(noise.sd)
+    problem = _with_priors(pose_problem(feature, Surroundings(trace, _plate(), believed)))
+    solution = solve_problem(problem, rng, confirm=case.method == "emcee", adapt=False)
+    return Row(case, _places(solution, truth, case.method), solution.importance.k_hat, solution.posterior.status)
+
+
+def nominal(kind: str) -> tuple[Feature, list[FloatArray]]:
+    """The feature as a detector would report it, and the sweeps over it: crossings, and slides off both ends."""
+    height = {"ridge": HEIGHT, "bump": HEIGHT, "groove": -0.05e-3, "pit": -0.1e-3, "step": 0.3e-3}[kind]
+    width = {"ridge": HEIGHT, "bump": HEIGHT, "groove": 2e-3, "pit": 3e-3, "step": 0.0}[kind]
+    point = kind in ("bump", "pit")
+    axis = np.zeros((1, 3)) if point else np.array([[-12e-3, 0.0, 0.0], [12e-3, 0.0, 0.0]])
+    zero = Interval(0.0, 0.0, 0.0)
+    feature = Feature(
+        kind,
+        axis,
+        np.tile([0.0, 0.0, 1.0], (len(axis), 1)),
+        Interval.normal(height, 0.05 * abs(height)),
+        Interval(width, 0.5 * width, 1.5 * width),
+        zero if point else Interval.normal(24e-3, 1e-3),
+        Evidence(50.0, 5),
+        True,
+        0.1e-3,
+    )
+    reach = 11e-3
+    if point:
+        sweeps = [((x, -reach), (x, reach)) for x in (-1.5e-3, 0.2e-3, 1.3e-3)]
+        sweeps += [((-reach, y), (reach, y)) for y in (-1e-3, 1.2e-3)]
+    else:
+        sweeps = [((x, -reach), (x, reach)) for x in (-9e-3, -3e-3, 3e-3, 9e-3)]
+        sweeps += [((side * 6e-3, 0.0), (side * 22e-3, 0.0)) for side in (-1, 1)]
+    return feature, [_line(np.array(start), np.array(stop)) for start, stop in sweeps]
+
+
+def _line(start: FloatArray, stop: FloatArray) -> FloatArray:
+    count = int(np.linalg.norm(stop - start) / SPACING) + 1
+    return np.column_stack([np.linspace(start, stop, count), np.zeros(count)])
+
+
+def _plate() -> Base:
+    half = 0.1
+    corners = np.array([[-half, -half, 0.0], [half, -half, 0.0], [half, half, 0.0], [-half, half, 0.0]])
+    return Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
+
+
+def _record(paths: list[FloatArray], heights: FloatArray) -> Trace:
+    centers = np.concatenate(paths) + (TIP_RADIUS + heights)[:, None] * np.array([0.0, 0.0, 1.0])
+    sweep = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
+    return Trace(np.arange(len(centers)) * 2e-4, centers, sweep, TIP_RADIUS)
+
+
+def simulate_noise(noise: Noise, paths: list[FloatArray], rng: np.random.Generator) -> FloatArray:
+    """(N,) white plus Ornstein-Uhlenbeck noise along each path, m."""
+    from scipy.signal import lfilter
+
+    parts = []
+    for path in paths:
+        white = noise.white * rng.standard_normal(len(path))
+        keep = np.exp(-SPACING / noise.length)
+        kicks = np.sqrt(1.0 - keep**2) * rng.standard_normal(len(path))
+        kicks[0] = rng.standard_normal()
+        parts.append(white + noise.correlated * lfilter([1.0], [1.0, -keep], kicks))
+    return np.concatenate(parts)
+
+
+def _with_priors(problem: Problem) -> Problem:
+    """The problem under priors that truths can be drawn from: proper, and about the nominal feature."""
+    shape: Any = problem.target.shape
+    half = problem.sizes.half_width
+    named: dict[str, Callable[[float], Prior]] = {
+        "offset": lambda start: Normal(start, 0.2 * half),
+        "heading": lambda start: Normal(start, 0.03),
+        "along": lambda start: Normal(start, 0.2 * half),
+        "across": lambda start: Normal(start, 0.2 * half),
+        "start": lambda start: Uniform(start - 1.5e-3, start + 1.5e-3),
+        "end": lambda start: Uniform(start - 1.5e-3, start + 1.5e-3),
+        "height": lambda start: Uniform(0.7 * start, 1.3 * start),
+        "log radius": lambda start: Normal(start, 0.5),
+        "log width": lambda start: Normal(start, 0.15),
+        "log depth": lambda start: Normal(start, 0.5),
+    }
+    priors = tuple(named[name](float(start)) for name, start in zip(shape.names, shape.start, strict=True))
+    return replace(problem, target=replace(problem.target, shape=replace(shape, priors=priors)))
+
+
+def _true_heights(kind: str, problem: Problem, truth: FloatArray, feet: FloatArray) -> FloatArray:
+    """(N,) heights of the true feature over raw foot points on the plate, from the closed forms, not binned."""
+    shape: Any = problem.target.shape
+    up = np.tile([0.0, 0.0, 1.0], (len(feet), 1))
+    if kind == "ridge":
+        assert isinstance(shape, RidgeShape)
+        radius = float(np.exp(truth[-1]))
+        chain = shape.chains(truth[None], np.array([truth[-2] - radius]))[0]
+        return chain_height(feet, up, chain, radius, TIP_RADIUS)
+    if kind in ("bump", "pit"):
+        place = np.zeros(2)
+        place[: shape.free] = truth[: shape.free]
+        center = shape.spot.point + place @ shape.spot.axes
+        if kind == "pit":
+            rim = 0.5 * np.exp(truth[-2]) - np.linalg.norm(feet - center, axis=1)
+            return rim_height(rim, TIP_RADIUS, np.exp(truth[-1]))
+        radius = float(np.exp(truth[-1]))
+        return chain_height(feet, up, center + np.array([0.0, 0.0, truth[-2] - radius]), radius, TIP_RADIUS)
+    s, lateral, _ = shape.chart.coordinates(feet)
+    x = lateral - shape.modes.lateral(truth[None, : shape.modes.count], s)[0]
+    if kind == "step":
+        return step_height(shape.high_side * x, truth[-1], TIP_RADIUS)
+    inside = np.minimum(s - truth[-4], truth[-3] - s)
+    across = groove_height(x, np.exp(truth[-2]), TIP_RADIUS, np.exp(truth[-1]))
+    return np.maximum(across, rim_height(inside, TIP_RADIUS, np.exp(truth[-1])))
+
+
+def _places(solution: Solution, truth: FloatArray, method: str) -> dict[str, float]:
+    """Share of the posterior below the truth, for each parameter."""
+    if method == "emcee":
+        draws, weights = solution.posterior.samples, np.full(len(solution.posterior.samples), 1.0)
+    else:
+        draws, weights = solution.importance.draws, solution.importance.weights
+    below = (weights[:, None] * (draws < truth)).sum(axis=0) / weights.sum()
+    return {name: float(share) for name, share in zip(solution.posterior.names, below, strict=True)}
+
+
+def calibrate(cases: Iterator[Case], store: Path) -> list[Row]:
+    """Run the cases that the store does not hold yet; every finished one is appended at once."""
+    done = {row.case: row for row in load(store)} if store.exists() else {}
+    rows = []
+    with store.open("a", encoding="utf-8") as file:
+        for case in cases:
+            if case not in done:
+                row = run_case(case)
+                file.write(json.dumps(_as_json(row)) + "\n")
+                file.flush()
+                done[case] = row
+            rows.append(done[case])
+    return rows
+
+
+def load(store: Path) -> list[Row]:
+    """Rows of a store; a last line cut short by an interruption is left out."""
+    rows = []
+    for line in store.read_text(encoding="utf-8").splitlines():
+        try:
+            entry = json.loads(line)
+        except json.JSONDecodeError:
+            break
+        rows.append(Row(Case(**entry["case"]), entry["below"], entry["k_hat"], entry["status"]))
+    return rows
+
+
+def _as_json(row: Row) -> dict[str, Any]:
+    return {"case": row.case.__dict__, "below": row.below, "k_hat": row.k_hat, "status": row.status}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Calibration of one parameter.
+
+    Args:
+        count: simulations.
+        coverage: share of central 90 % intervals that hold the truth.
+        tolerance: two standard deviations of that share.
+        p_value: of the chi-square test that the truth's places are uniform.
+    """
+
+    count: int
+    coverage: float
+    tolerance: float
+    p_value: float
+
+
+def verdicts(rows: list[Row], bins: int = 10) -> dict[str, Verdict]:
+    """Coverage and uniformity of the truth's place, for each parameter."""
+    from scipy.stats import chi2
+
+    out = {}
+    for name in rows[0].below:
+        places = np.array([row.below[name] for row in rows])
+        covered = float(np.mean((places >= 0.05) & (places <= 0.95)))
+        counts = np.histogram(places, bins, (0.0, 1.0))[0]
+        statistic = float(((counts - len(places) / bins) ** 2).sum() / (len(places) / bins))
+        tolerance = 2.0 * float(np.sqrt(0.9 * 0.1 / len(places)))
+        out[name] = Verdict(len(places), covered, tolerance, float(chi2.sf(statistic, bins - 1)))
+    return out
