@@ -60,7 +60,7 @@ class BumpSizer:
             half = 2.5 * seed.half_width
             trace = yield self.strokes.line(point, way, half, half)
             lowest = 0.5 * abs(seed.height)
-            crossing, _ = self.sense.nearest(trace, point, sign, lowest, 1.5 * seed.half_width)
+            crossing = self.sense.nearest(trace, point, sign, lowest, 1.5 * seed.half_width)
             if crossing is None:
                 continue
             moved = float(np.linalg.norm(crossing.point - point))

@@ -19,18 +19,18 @@ from planners.budget import Spent, within
 from planners.bump import BumpSize, BumpSizer
 from planners.circuit import Circuit, headings
 from planners.coverage import Coverage
+from planners.crest import is_step
 from planners.errors import PlannerError
 from planners.plan import Outcome, Plan
 from planners.ridge import RidgeFollower
 from planners.sense import Sense
-from planners.step import is_step
 from planners.strokes import Strokes
 from planners.survey import Survey
 
 FloatArray = NDArray[np.float64]
 
-# Sweeps of the survey from which the noise is learnt, if it is not given
-NOISE_SWEEPS = 4
+# Survey sweeps that are detected together; the first batch also tells the noise, if it is not given
+BATCH = 12
 # Slides off one end, at most
 MOST_SLIDES = 6
 
@@ -162,7 +162,7 @@ class Explore:
         return Outcome("done")
 
     def _survey(self, found: Found) -> Plan:
-        """Every sweep of the survey, detected as it comes; the first ones wait until the noise is known."""
+        """Every sweep of the survey, detected in batches."""
         waiting: list[Trace] = []
         paths = []
         for move in self.survey.sweeps():
@@ -172,7 +172,7 @@ class Explore:
                 found.left_out.append("a survey sweep felt no contact")
                 continue
             waiting.append(trace)
-            if found.noise is not None or len(waiting) >= NOISE_SWEEPS:
+            if len(waiting) >= BATCH:
                 self._detect(waiting, found)
         if waiting:
             self._detect(waiting, found)
@@ -222,7 +222,6 @@ class Explore:
             return Outcome(circled.reason, sized.detail)
         follower = self._follower(found, strokes, sense)
         followed = yield from follower.follow(_typed(seed, branches), headings(seed, branches))
-        found.crossings.extend(follower.aside)
         found.crossings.extend(branches)
         if followed.value is not None:
             found.tracks.append(followed.value)
@@ -251,7 +250,8 @@ def _typed(seed: Crossing, branches: tuple[Crossing, ...]) -> Crossing:
 
     A ridge swept lengthwise looks like a plateau between two steps; only a circuit crosses it squarely.
     """
-    like = max(branches, key=lambda c: abs(c.height))
+    crests = [branch for branch in branches if not is_step(branch)]
+    like = max(crests or branches, key=lambda c: abs(c.height))
     if is_step(seed) == is_step(like):
         return seed
     return replace(seed, kind=like.kind, height=like.height, half_width=like.half_width)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,10 @@ from mapping.crossing import Crossing
 from mapping.noise import Noise
 from mapping.trace import Trace
 from planners.axis_track import AxisEnd, AxisTrack, heading_and_turn, polyline_distance
-from planners.end_fit import fit_end
+from planners.crest import is_step, seen_again
 from planners.plan import Outcome, Plan
 from planners.sense import Sense
-from planners.step import is_step, step_crossing
+from planners.shape_fit import end_shape, fit_shape
 from planners.strokes import Strokes
 
 FloatArray = NDArray[np.float64]
@@ -59,7 +59,6 @@ class RidgeFollower:
         precision: wanted standard deviation of an end, m.
         longest_step: largest distance between two crossings, m; None: one tip radius.
         known: tells whether a point lies on an axis found before (there the ridge joins it).
-        aside: receives crossings that belong to something else.
     """
 
     strokes: Strokes
@@ -68,12 +67,11 @@ class RidgeFollower:
     precision: float
     longest_step: float | None = None
     known: Callable[[FloatArray], bool] = lambda point: False
-    aside: list[Crossing] = field(default_factory=list)
 
     def follow(self, seed: Crossing, ways: list[FloatArray]) -> Plan:
         """Follow from a seed in one or two directions (3,); the outcome's value is an AxisTrack or None."""
         sign = float(np.sign(seed.height))
-        first = yield from self._cross(seed.point, ways[0], seed, sign, 1.2 * seed.half_width, 0.3 * abs(seed.height))
+        first = yield from self._first(seed, ways[0], sign)
         if first is None:
             return Outcome("lost", "the crossing that began the ridge was not found again")
         halves: list[tuple[Line, AxisEnd | None]] = []
@@ -126,6 +124,15 @@ class RidgeFollower:
         factor = 1.5 if miss < 0.15 else 0.6 if miss > 0.45 else 1.0
         line.step = float(np.clip(line.step * factor, 0.2 * self.strokes.tip_radius, self._longest))
 
+    def _first(self, seed: Crossing, heading: FloatArray, sign: float) -> Crossed:
+        """The seed crossed squarely: a sweep that met the ridge at a slant saw it too wide."""
+        half = 2.5 * seed.half_width
+        trace = yield self.strokes.line(seed.point, np.cross(seed.normal, heading), half, half)
+        found = self.sense.nearest(trace, seed.point, sign, 0.3 * abs(seed.height), 1.2 * seed.half_width)
+        if found is None or is_step(found) != is_step(seed):
+            return None if found is None and not is_step(seed) else seed
+        return found
+
     def _cross(
         self, point: FloatArray, heading: FloatArray, like: Crossing, sign: float, reach: float, lowest: float
     ) -> Crossed:
@@ -137,13 +144,8 @@ class RidgeFollower:
         trace = yield move
         if len(trace) == 0:
             trace = yield move
-        if is_step(like):
-            edge = step_crossing(trace, self.sense.base, self.noise, point, way, like)
-            near = edge is not None and np.linalg.norm(edge.point - point) <= reach + like.half_width
-            return edge if near and edge is not None and sign * edge.height >= lowest else None
-        found, others = self.sense.nearest(trace, point, sign, lowest, reach)
-        self.aside.extend(others)
-        return found
+        found = seen_again(trace, self.sense.base, self.noise, point, way, like, reach)
+        return found if found is not None and sign * found.height >= lowest else None
 
     def _end(
         self, line: Line, heading: FloatArray, turn: float, gone: float, sign: float
@@ -169,8 +171,13 @@ class RidgeFollower:
             return end
         feet = self.sense.base.foot(trace.centers, tip)
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-        fit = fit_end(places_along(feet.points, points, along), feet.height, sign, height, tip, self.noise)
-        if not fit.found:
+        place = places_along(feet.points, points, along)
+        order = np.argsort(place, kind="stable")
+        within = (0.0, float(along[-1]) - 0.5 * half_width)
+        shape = end_shape(sign, tip)
+        fit = fit_shape(place[order], feet.height[order], shape, sign, height, within, self.noise)
+        inside = 0.02 * tip < fit.place < within[1] - 0.02 * tip
+        if not inside or fit.sd > 0.2 * tip or abs(fit.height) < 0.4 * height:
             return end if np.isfinite(end.sd) else AxisEnd(end.point, max(end.reach, 0.1 * tip), "lost", end.heading)
         where = np.array([np.interp(fit.place, along, points[:, k]) for k in range(3)])
         sd = fit.sd if not np.isfinite(end.sd) else (fit.sd**-2 + end.sd**-2) ** -0.5

@@ -37,17 +37,15 @@ class Sense:
         found = detect(trace, self.base, noise=self.noise, false_alarms_per_metre=self.false_alarms_per_metre)
         return found.crossings
 
-    def nearest(
-        self, trace: Trace, point: FloatArray, sign: float, lowest: float, reach: float
-    ) -> tuple[Crossing | None, tuple[Crossing, ...]]:
-        """The crossing nearest to a point that has a sign and at least a height, and all the others.
+    def nearest(self, trace: Trace, point: FloatArray, sign: float, lowest: float, reach: float) -> Crossing | None:
+        """The crossing nearest to a point that has a sign and at least a height, or None.
 
         Args:
             sign: +1 for bumps and ridges, -1 for pits and grooves.
             lowest: least |height|, m.
             reach: how far from the point it may lie, m.
         """
-        every = self.crossings(trace)
-        fits = [c for c in every if sign * c.height >= lowest and np.linalg.norm(c.point - point) <= reach]
-        best = min(fits, key=lambda c: float(np.linalg.norm(c.point - point)), default=None)
-        return best, tuple(c for c in every if c is not best)
+        fits = [
+            c for c in self.crossings(trace) if sign * c.height >= lowest and np.linalg.norm(c.point - point) <= reach
+        ]
+        return min(fits, key=lambda c: float(np.linalg.norm(c.point - point)), default=None)
