@@ -119,7 +119,7 @@ def _whitened(
         begin, end = max(0, begin - 2), min(len(height), end + 2)
     merge = max(1, (end - begin) // BINS)
     count = (end - begin) // merge
-    x = (begin + (np.arange(count) + 0.5) * merge - 0.5) * profile.spacing
+    x = (begin + (np.arange(count, dtype=np.float64) + 0.5) * merge - 0.5) * profile.spacing
     values = height[begin : begin + count * merge].reshape(count, merge).mean(axis=1)
     step = merge * profile.spacing
     covariances = noise.block_covariances(count, step, profile.samples * merge)

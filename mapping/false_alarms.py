@@ -81,8 +81,8 @@ def _inverse_clump_size(bank: Bank, index: int, threshold: float) -> float:
 
 def _on_grid(half_width: float, reach: int, step: float, covariance: FloatArray, bank: Bank) -> FloatArray:
     """Weights, normalised to unit output noise, of the filter of a half-width in bins of the given step."""
-    x = np.arange(-reach, reach + 1) * step
-    nuisance = (x[:, None] / (reach * step)) ** np.arange(bank.drift)[None, :]
+    x = np.arange(-reach, reach + 1, dtype=np.float64) * step
+    nuisance = (x[:, None] / (reach * step)) ** np.arange(bank.drift, dtype=np.float64)
     count = len(x)
     weights, sd = best_linear(covariance[:count, :count], cap_bins(x, half_width, step), nuisance)
     return weights / sd

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -316,7 +317,7 @@ def _distances(points: FloatArray, axis: FloatArray) -> FloatArray:
     if len(axis) == 1:
         return np.asarray(np.linalg.norm(points - axis[0], axis=1))
     best = np.full(len(points), np.inf)
-    for start, stop in zip(axis[:-1], axis[1:], strict=True):
+    for start, stop in itertools.pairwise(axis):
         along = stop - start
         square = float(along @ along)
         t = np.clip((points - start) @ along / square, 0.0, 1.0) if square > 0 else np.zeros(len(points))

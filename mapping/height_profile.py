@@ -48,7 +48,7 @@ class HeightProfile:
     @property
     def s(self) -> FloatArray:
         """(n,) arclength of the bins' middles, m."""
-        return self.start + self.spacing * np.arange(len(self.height))
+        return self.start + self.spacing * np.arange(len(self.height), dtype=np.float64)
 
     @property
     def length(self) -> float:
@@ -119,7 +119,7 @@ def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing
 
 def _block_means(points: FloatArray, size: int) -> FloatArray:
     whole = len(points) // size * size
-    return points[:whole].reshape(-1, size, 3).mean(axis=1)
+    return np.asarray(points[:whole].reshape(-1, size, 3).mean(axis=1))
 
 
 def _length(points: FloatArray) -> float:

@@ -58,8 +58,8 @@ class Inspection:
     def denies(self, path: FloatArray, height: float, reach: float) -> bool:
         """True if a place within `reach` of the path (K, 3) was found clearly lower than half the height."""
         near = self._tree.query_ball_point(path, reach)
-        places = np.unique(np.concatenate([np.asarray(n, dtype=np.int64) for n in near])) if len(near) else []
-        if len(places) == 0:
+        places = sorted({place for some in near for place in some})
+        if not places:
             return False
         return bool((np.sign(height) * self.height[places] + 3 * self.sd < 0.5 * abs(height)).any())
 

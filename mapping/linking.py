@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -81,7 +82,8 @@ def order(points: FloatArray) -> tuple[list[int], list[list[int]]]:
         nearest[closer], best = new, np.minimum(best, distance[new])
     far = _farthest(neighbours, distance, 0, set())[-1]
     main = _farthest(neighbours, distance, far, set())
-    branches, used = [], set(main)
+    branches: list[list[int]] = []
+    used = set(main)
     while True:
         stems = [(i, j) for i in used for j in neighbours[i] if j not in used]
         if not stems:
@@ -108,7 +110,7 @@ def _farthest(neighbours: list[list[int]], distance: FloatArray, start: int, ban
 
 
 def _path_length(distance: FloatArray, path: list[int]) -> float:
-    return float(sum(distance[i, j] for i, j in zip(path[:-1], path[1:], strict=True)))
+    return float(sum(distance[i, j] for i, j in itertools.pairwise(path)))
 
 
 def _between(start: FloatArray, stop: FloatArray, scale: float) -> FloatArray:

@@ -152,10 +152,10 @@ def _build_filter(half_width: float, noise: Noise, spacing: float, samples: floa
     coarse = max(1, int(half_width / (BINS_PER_HALF_WIDTH * spacing)))
     step = coarse * spacing
     reach = filter_reach(half_width, noise, step, drift)
-    x = np.arange(-reach, reach + 1) * step
+    x = np.arange(-reach, reach + 1, dtype=np.float64) * step
     template = cap_bins(x, half_width, step)
     covariance = toeplitz(noise.block_covariances(2 * reach + 1, step, samples * coarse))
-    nuisance = (x[:, None] / (reach * step)) ** np.arange(drift)[None, :]
+    nuisance = (x[:, None] / (reach * step)) ** np.arange(drift, dtype=np.float64)
     weights, sd = best_linear(covariance, template, nuisance)
     edge, edge_sd = np.zeros((reach, 2 * reach + 1)), np.full(reach, np.inf)
     for i in range(reach):

@@ -57,9 +57,8 @@ class Noise:
     def covariance(self, s: ArrayLike) -> FloatArray:
         """(N, N) covariance of samples at arclengths s (N,), m^2."""
         s = np.asarray(s, dtype=np.float64)
-        return self.white**2 * np.eye(len(s)) + self.correlated**2 * np.exp(
-            -np.abs(s[:, None] - s[None, :]) / max(self.length, np.finfo(float).tiny)
-        )
+        lag = np.abs(s[:, None] - s[None, :]) / max(self.length, np.finfo(float).tiny)
+        return np.asarray(self.white**2 * np.eye(len(s)) + self.correlated**2 * np.exp(-lag))
 
     def block_covariances(self, count: int, block: float, samples: float) -> FloatArray:
         """(count,) autocovariance of means over adjoining blocks, at lags 0 to count - 1 blocks.

@@ -73,7 +73,7 @@ def quiet_bins(profile: HeightProfile, bank: Bank, noise: Noise, threshold: floa
 def _stretches(
     profile: HeightProfile, bank: Bank, noise: Noise, threshold: float, tip_radius: float
 ) -> Iterator[tuple[FloatArray, int, int, float, float]]:
-    """(heights, first bin, past-last bin, crest, signal-to-noise) of each stretch; stronger stretches are removed from the heights.
+    """(heights, first bin, past-last bin, crest, signal-to-noise) of each stretch.
 
     Each round takes the candidates that nothing stronger overlaps, removes those stretches from the profile that
     are strong enough to hide others, and looks again, until nothing new exceeds the threshold.
