@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -76,8 +77,7 @@ def run_case(case: Case) -> Row:
     rng = np.random.default_rng([KINDS.index(case.kind), NOISES.index(case.noise), case.seed])
     noise = noise_of(case.noise, rng)
     feature, paths = nominal(case.kind)
-    quiet = _record(paths, np.zeros(sum(len(path) for path in paths)))
-    blank = _with_priors(pose_problem(feature, Surroundings(quiet, _plate(), noise)))
+    blank = _blank(case.kind)
     truth = np.array([float(prior.draw(rng, 1)[0]) for prior in blank.target.shape.priors])
     heights = _true_heights(case.kind, blank, truth, np.concatenate(paths))
     trace = _record(paths, heights + simulate_noise(noise, paths, rng))
@@ -85,6 +85,14 @@ def run_case(case: Case) -> Row:
     problem = _with_priors(pose_problem(feature, Surroundings(trace, _plate(), believed)))
     solution = solve_problem(problem, rng, confirm=case.method == "emcee", adapt=False)
     return Row(case, _places(solution, truth, case.method), solution.importance.k_hat, solution.posterior.status)
+
+
+@cache
+def _blank(kind: str) -> Problem:
+    """The problem of a feature's nominal shape over a bare plate: it holds the prior and the chart."""
+    feature, paths = nominal(kind)
+    bare = _record(paths, np.zeros(sum(len(path) for path in paths)))
+    return _with_priors(pose_problem(feature, Surroundings(bare, _plate(), Noise(0.2e-3))))
 
 
 def nominal(kind: str) -> tuple[Feature, list[FloatArray]]:
@@ -127,7 +135,7 @@ def _plate() -> Base:
 
 
 def _record(paths: list[FloatArray], heights: FloatArray) -> Trace:
-    centers = np.concatenate(paths) + (TIP_RADIUS + heights)[:, None] * np.array([0.0, 0.0, 1.0])
+    centers = np.concatenate(paths) + np.outer(TIP_RADIUS + heights, [0.0, 0.0, 1.0])
     sweep = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
     return Trace(np.arange(len(centers)) * 2e-4, centers, sweep, TIP_RADIUS)
 

@@ -48,20 +48,20 @@ class CurveModes:
 
     def lateral(self, coefficients: FloatArray, s: FloatArray) -> FloatArray:
         """(W, K) lateral distances at the places s (K,) for coefficients (W, count), m."""
-        return np.asarray(coefficients @ self._basis(s))
+        return np.asarray(coefficients @ self.basis(s))
 
     def lateral_at(self, coefficients: FloatArray, s: FloatArray) -> FloatArray:
         """(W,) lateral distances, each at its own place s (W,), m."""
-        return np.asarray(np.einsum("wc,cw->w", coefficients, self._basis(s)))
+        return np.asarray(np.einsum("wc,cw->w", coefficients, self.basis(s)))
 
     def slope(self, coefficients: FloatArray, s: float) -> FloatArray:
         """(W,) change of the lateral distance per metre along the chart."""
         step = 1e-3 * self.reach
-        ends = self._basis(np.array([s - step, s + step]))
+        ends = self.basis(np.array([s - step, s + step]))
         return np.asarray(coefficients @ (ends[:, 1] - ends[:, 0]) / (2.0 * step))
 
-    def _basis(self, s: FloatArray) -> FloatArray:
-        """(count, ...) modes at places s."""
+    def basis(self, s: FloatArray) -> FloatArray:
+        """(count, ...) lateral distance of each mode's unit coefficient at places s."""
         x = (s - self.middle) / self.reach
         if self.closed:
             rows = [np.ones_like(x)]

@@ -12,7 +12,6 @@ from mapping.bump_shape import Spot
 from mapping.chart import Chart
 from mapping.curve_modes import CurveModes
 from mapping.priors import Prior
-from mapping.shapes import rim_height
 from mapping.window import Window
 
 FloatArray = NDArray[np.float64]
@@ -46,13 +45,14 @@ class PitShape:
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights (negative) over the base's trace, m."""
-        width, depth = np.exp(theta[:, self.free, None]), np.exp(theta[:, self.free + 1, None])
-        x, y = self._places
-        dx = x[None] - theta[:, 0, None, None]
-        dy = y[None] - (theta[:, 1, None, None] if self.free > 1 else 0.0)
-        rim = 0.5 * width[..., None] - np.hypot(dx, dy)
-        bend = float(self.spot.bends.mean())
-        return np.asarray(rim_height(rim, self.tip_radius, depth[..., None], bend).mean(axis=2))
+        from mapping.hollow_kernels import pit_heights
+
+        place = np.zeros((len(theta), 2))
+        place[:, : self.free] = theta[:, : self.free]
+        out = np.empty((len(theta), len(self.window)))
+        width, depth = np.exp(theta[:, -2]), np.exp(theta[:, -1])
+        pit_heights(*self._places, float(self.spot.bends.mean()), place, width, depth, self.tip_radius, out)
+        return out
 
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray]:
@@ -85,23 +85,31 @@ class GrooveShape:
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights (negative) over the base's trace, m."""
-        s, lateral, bend = self._places
-        middle = self.modes.lateral(theta[:, : self.modes.count], s.ravel()).reshape(len(theta), *s.shape)
-        rim = 0.5 * np.exp(theta[:, -2, None, None]) - np.abs(lateral[None] - middle)
-        if not self.chart.closed:
-            rim = np.minimum(rim, np.minimum(s[None] - theta[:, -4, None, None], theta[:, -3, None, None] - s[None]))
-        depth = np.exp(theta[:, -1, None, None])
-        return np.asarray(rim_height(rim, self.tip_radius, depth, bend[None]).mean(axis=2))
+        from mapping.hollow_kernels import groove_heights
+
+        ends = (
+            np.ascontiguousarray(theta[:, -4:-2])
+            if not self.chart.closed
+            else np.tile([-1e300, 1e300], (len(theta), 1))
+        )
+        courses = np.ascontiguousarray(theta[:, : self.modes.count])
+        out = np.empty((len(theta), len(self.window)))
+        width, depth = np.exp(theta[:, -2]), np.exp(theta[:, -1])
+        groove_heights(*self._places, courses, ends, width, depth, self.tip_radius, out)
+        return out
 
     @cached_property
-    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(n, nodes) distances along the chart, lateral distances, and bends of the base there."""
+    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """(n, nodes) distances along the chart, lateral distances, (m, n, nodes) modes, and bends of the base."""
         nodes = bin_nodes(self.window)
         s, lateral, leg = self.chart.coordinates(nodes.reshape(-1, 3))
         shape = nodes.shape[:2]
-        return s.reshape(shape), lateral.reshape(shape), self.chart.bend[leg].reshape(shape)
+        basis = self.modes.basis(s).reshape(-1, *shape)
+        return s.reshape(shape), lateral.reshape(shape), basis, self.chart.bend[leg].reshape(shape)
 
 
 def bin_nodes(window: Window) -> FloatArray:
     """(n, nodes, 3) places within each bin, m."""
-    return np.asarray(window.feet[:, None] + (window.half[:, None] * NODES)[..., None] * window.tangents[:, None])
+    return np.ascontiguousarray(
+        window.feet[:, None] + (window.half[:, None] * NODES)[..., None] * window.tangents[:, None]
+    )

@@ -12,7 +12,6 @@ from mapping.chart import Chart
 from mapping.curve_modes import CurveModes
 from mapping.hollow_shape import bin_nodes
 from mapping.priors import Prior
-from mapping.shapes import step_height
 from mapping.window import Window
 
 FloatArray = NDArray[np.float64]
@@ -45,13 +44,16 @@ class StepShape:
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights over the low side's trace, m."""
-        s, lateral = self._places
-        edge = self.modes.lateral(theta[:, : self.modes.count], s.ravel()).reshape(len(theta), *s.shape)
-        x = self.high_side * (lateral[None] - edge)
-        return np.asarray(step_height(x, theta[:, -1, None, None], self.tip_radius).mean(axis=2))
+        from mapping.hollow_kernels import step_heights
+
+        courses, heights = np.ascontiguousarray(theta[:, : self.modes.count]), np.ascontiguousarray(theta[:, -1])
+        out = np.empty((len(theta), len(self.window)))
+        step_heights(*self._places, courses, heights, self.high_side, self.tip_radius, out)
+        return out
 
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray]:
+        """(n, nodes) lateral distances from the chart, and the (m, n, nodes) modes there."""
         nodes = bin_nodes(self.window)
         s, lateral, _ = self.chart.coordinates(nodes.reshape(-1, 3))
-        return s.reshape(nodes.shape[:2]), lateral.reshape(nodes.shape[:2])
+        return lateral.reshape(nodes.shape[:2]), self.modes.basis(s).reshape(-1, *nodes.shape[:2])
