@@ -10,6 +10,7 @@ import typer
 from explore3d import __version__
 from explore3d.cli_analyze import analyze
 from explore3d.cli_doctor import doctor
+from explore3d.cli_figures import figures
 from explore3d.cli_run import plan, run
 
 ABOUT = "Find, follow and measure surface features that are finer than the fingertip that touches them."
@@ -22,7 +23,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, plan, analyze, doctor):
+for command in (run, plan, analyze, figures, doctor):
     app.command()(command)
 
 

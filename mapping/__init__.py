@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from mapping.base_fit import fit_base
     from mapping.contact import BallContact
     from mapping.crossing import Crossing
+    from mapping.curvature import Curvature, principal_curvatures
     from mapping.detectors import Detections, detect
     from mapping.envelope import estimate_surface
     from mapping.errors import MappingError
@@ -31,6 +32,8 @@ _PUBLIC = {
     "BallContact": "mapping.contact",
     "estimate_surface": "mapping.envelope",
     "Estimate": "mapping.estimate",
+    "principal_curvatures": "mapping.curvature",
+    "Curvature": "mapping.curvature",
     "detect": "mapping.detectors",
     "Detections": "mapping.detectors",
     "Crossing": "mapping.crossing",
@@ -47,6 +50,7 @@ __all__ = [
     "BallContact",
     "Base",
     "Crossing",
+    "Curvature",
     "Detections",
     "Estimate",
     "Feature",
@@ -60,6 +64,7 @@ __all__ = [
     "detect",
     "estimate_surface",
     "fit_base",
+    "principal_curvatures",
     "refine",
     "sample_posterior",
 ]

@@ -95,10 +95,11 @@ def test_a_folder_that_cannot_be_written_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
-    assert explore3d(monkeypatch, "run", SCENES / "empty_plate.toml", "--out", tmp_path / "file") == 2
-    error = capsys.readouterr().err.splitlines()[-1]
-    assert error.startswith(f"explore3d: {tmp_path / 'file'}: ")
-    assert (tmp_path / "file").read_text() == ""
+    for command in (["run", SCENES / "empty_plate.toml"], ["figures"]):
+        assert explore3d(monkeypatch, *command, "--out", tmp_path / "file") == 2
+        error = capsys.readouterr().err.splitlines()[-1]
+        assert error.startswith(f"explore3d: {tmp_path / 'file'}: ")
+        assert (tmp_path / "file").read_text() == ""
 
 
 @pytest.mark.parametrize(
