@@ -23,6 +23,7 @@ class AxisEnd:
         reason: "end", "edge of the model", "joins another", "closed", "lost".
         heading: (3,) direction that points off the end.
         reach: how far beyond `point` the axis was found to be gone, m.
+        turn: geodesic curvature of the axis there, towards the end, 1/m.
     """
 
     point: FloatArray
@@ -30,6 +31,7 @@ class AxisEnd:
     reason: str
     heading: FloatArray
     reach: float = 0.0
+    turn: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +82,13 @@ class AxisTrack:
         expected = self.height * (1.0 - min(near / (1.2 * self.half_width), 1.0) ** 2)
         return abs(crossing.height) < expected + slack and away < 1.3 * self.half_width
 
+    def repeats(self, other: AxisTrack) -> bool:
+        """True if all of this axis lies within another's half-width, or bridges two stretches of it."""
+        away = np.array([other.distance(point) for point in self.points])
+        joined = all(end.reason == "joins another" for end in self.ends) and bool(self.ends)
+        short = self.length < 3.0 * self.half_width
+        return bool((away < other.half_width).all() or (joined and short and (away[[0, -1]] < other.half_width).all()))
+
     def with_end(self, index: int, end: AxisEnd) -> AxisTrack:
         """The track with one end moved; points of the axis beyond the new end are dropped."""
         points, normals = self.points, self.normals
@@ -105,21 +114,43 @@ def polyline_distance(point: FloatArray, line: FloatArray) -> float:
     return float(np.linalg.norm(point - start - share[:, None] * step, axis=1).min())
 
 
-def heading_and_turn(points: FloatArray, normal: FloatArray, fallback: FloatArray) -> tuple[FloatArray, float]:
-    """Direction at the last of the points (K, 3) and the geodesic curvature (1/m) of the line through them.
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Where a line is and where it goes: `point` (3,) m, `heading` (3,) unit, `turn` geodesic curvature 1/m."""
 
-    The last two points give a direction, the last four also a curvature (least squares in the tangent plane).
+    point: FloatArray
+    heading: FloatArray
+    turn: float
+
+
+def course(points: FloatArray, normal: FloatArray, fallback: FloatArray, tip_radius: float) -> Course:
+    """The course at the last of the points (K, 3) of a line: the circle through those of the last 1.5 tip radii.
+
+    Least squares for offset, angle and curvature in the tangent plane, by arclength; curvatures above 1/r
+    are held to be unlikely, which steadies the angle while the points are few or close together.
+
+    Args:
+        normal: (3,) of the base at the last point.
+        fallback: (3,) heading while there is only one point.
     """
-    if len(points) < 2:
-        return tangential(fallback, normal), 0.0
-    recent = points[-4:] - points[-1]
-    forward = tangential(-recent[0], normal)
-    u, v = recent @ forward, recent @ np.cross(normal, forward)
-    degree = 2 if len(recent) >= 3 else 1
-    scale = float(np.abs(u).max()) or 1.0
-    design = np.vander(u / scale, degree + 1)
-    coefficients = np.linalg.lstsq(design, v, rcond=None)[0]
-    slope = float(coefficients[-2]) / scale
-    curvature = 2.0 * float(coefficients[0]) / scale**2 if degree == 2 else 0.0
-    turn = curvature / (1.0 + slope**2) ** 1.5
-    return tangential(forward + slope * np.cross(normal, forward), normal), turn
+    last = points[-1]
+    back = -np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points[::-1], axis=0), axis=1))])
+    count = max(int((back > -1.5 * tip_radius).sum()), min(4, len(points)))
+    if count < 2:
+        return Course(last, tangential(fallback, normal), 0.0)
+    recent, s = points[::-1][:count] - last, back[:count]
+    forward = tangential(-recent[-1], normal)
+    left = np.cross(normal, forward)
+    v = recent @ left
+    design = np.column_stack([np.ones(count), s, 0.5 * s**2])
+    # the crossings scatter by about a two-hundredth of the tip radius
+    prior = np.array([[0.0, 0.0, 0.005 * tip_radius**2]])
+    offset = angle = turn = 0.0
+    for _ in range(4):
+        half = 0.5 * turn * s
+        curve = offset + s * np.sin(angle + half) * np.sinc(half / np.pi)
+        rest = np.concatenate([v - curve, -prior[0, 2:] * turn])
+        change = np.linalg.lstsq(np.vstack([design, prior]), rest, rcond=None)[0]
+        offset, angle, turn = offset + change[0], float(np.clip(angle + change[1], -1.5, 1.5)), turn + change[2]
+    heading = tangential(np.cos(angle) * forward + np.sin(angle) * left, normal)
+    return Course(last + offset * left, heading, float(turn))

@@ -14,6 +14,8 @@ from planners.strokes import Strokes, tangential
 
 FloatArray = NDArray[np.float64]
 
+# Cosine of the angle between two branches of one line, at most
+OPPOSITE = -0.4
 NAMES = ("bump", "end of a ridge", "ridge", "junction")
 
 
@@ -46,15 +48,17 @@ class Circuit:
 
 
 def headings(seed: Crossing, branches: tuple[Crossing, ...]) -> list[FloatArray]:
-    """Directions (3,) in which to follow: the most nearly opposite pair of branches, or the only one.
+    """Two directions (3,) in which to follow the line through a seed: one or two of the circuit's branches.
 
-    A single branch is followed both ways, so that the end beside the seed is found as well.
+    Two opposite branches belong to one line. Otherwise the seed lies by an end, and the branch that the
+    circuit crosses most squarely (the narrowest) is its line; what the circuit only brushes is another's.
     """
     ways = [tangential(branch.point - seed.point, seed.normal) for branch in branches]
     if not ways:
         return []
-    if len(ways) == 1:
-        return [ways[0], -ways[0]]
     pairs = [(float(a @ b), i, j) for i, a in enumerate(ways) for j, b in enumerate(ways) if i < j]
-    _, i, j = min(pairs)
-    return [ways[i], ways[j]]
+    if pairs and min(pairs)[0] < OPPOSITE:
+        _, i, j = min(pairs)
+        return [ways[i], ways[j]]
+    narrowest = ways[int(np.argmin([branch.half_width for branch in branches]))]
+    return [narrowest, -narrowest]

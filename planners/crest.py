@@ -11,7 +11,7 @@ from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.noise import Noise
 from mapping.trace import Trace
-from planners.shape_fit import ShapeFit, crest_shape, edge_shape, fit_shape
+from planners.shape_fit import ShapeFit, crest_shape, dip_shape, edge_shape, fit_shape
 
 FloatArray = NDArray[np.float64]
 
@@ -45,11 +45,12 @@ def seen_again(
     place = (feet.points - point) @ way
     order = np.argsort(place, kind="stable")
     place, height, normals = place[order], feet.height[order], feet.normals[order]
-    window = np.abs(place) <= reach + (2.5 if is_step(like) else 1.2) * like.half_width
+    window = np.abs(place) <= reach + (2.5 if is_step(like) else 0.9) * like.half_width
     if window.sum() < 32:
         return None
-    fit, kind = _fitted(place[window], height[window], trace.tip_radius, noise, like, reach)
-    if fit.gain < SEEN:
+    fit, kind, half_width = _fitted(place[window], height[window], trace.tip_radius, noise, like, reach)
+    # a fit at the rim of its range follows the flank of something else
+    if fit.gain < SEEN or abs(fit.place) > 0.97 * reach:
         return None
     near = int(np.abs(place - fit.place).argmin())
     foot = base.foot((point + fit.place * way + trace.tip_radius * normals[near])[None], trace.tip_radius)
@@ -64,17 +65,36 @@ def seen_again(
         height=fit.height,
         height_sd=fit.height_sd,
         position_sd=fit.sd,
+        half_width=half_width,
         snr=float(np.sqrt(fit.gain)),
     )
 
 
 def _fitted(
     place: FloatArray, height: FloatArray, tip_radius: float, noise: Noise, like: Crossing, reach: float
-) -> tuple[ShapeFit, str]:
+) -> tuple[ShapeFit, str, float]:
+    """The fit, the kind and the half-width of the line where the sweep crosses it."""
     sign, crest = float(np.sign(like.height)), abs(like.height)
-    if not is_step(like):
-        shape = crest_shape(like.half_width, sign, tip_radius, crest)
-        return fit_shape(place, height, shape, sign, crest, (-reach, reach), noise), like.kind
+    if is_step(like):
+        fit, kind = _edge(place, height, tip_radius, noise, like, reach)
+        return fit, kind, like.half_width
+    if sign < 0:
+        fit = fit_shape(place, height, dip_shape(tip_radius), sign, crest, (-reach, reach), noise)
+        return fit, like.kind, like.half_width
+    # a wire's cap is half as high as itself; another one's follows from its width, x_c^2 = 2 (r + a) H
+    wide = max(like.half_width**2 / (2.0 * crest) - tip_radius, 0.0)
+    caps = sorted({0.5 * crest, min(wide, 10.0 * tip_radius)})
+    fits = [fit_shape(place, height, crest_shape(a, tip_radius), sign, crest, (-reach, reach), noise) for a in caps]
+    best = int(np.argmax([fit.gain for fit in fits]))
+    half_width = float(np.sqrt(2.0 * (tip_radius + caps[best]) * abs(fits[best].height)))
+    return fits[best], like.kind, half_width
+
+
+def _edge(
+    place: FloatArray, height: FloatArray, tip_radius: float, noise: Noise, like: Crossing, reach: float
+) -> tuple[ShapeFit, str]:
+    """A step is fitted from its high side: the profile is turned round where it climbs."""
+    sign, crest = float(np.sign(like.height)), abs(like.height)
     quarter = max(1, len(height) // 4)
     falls = sign * float(height[:quarter].mean() - height[-quarter:].mean()) > 0
     s, h = (place, height) if falls else (-place[::-1], height[::-1])

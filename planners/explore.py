@@ -223,8 +223,11 @@ class Explore:
         follower = self._follower(found, strokes, sense)
         followed = yield from follower.follow(_typed(seed, branches), headings(seed, branches))
         found.crossings.extend(branches)
-        if followed.value is not None:
-            found.tracks.append(followed.value)
+        track: AxisTrack | None = followed.value
+        if track is not None and any(track.repeats(other) for other in found.tracks):
+            return Outcome("known", "it lies on an axis that was followed before")
+        if track is not None:
+            found.tracks.append(track)
         return Outcome(circled.reason, followed.detail)
 
     def _follower(self, found: Found, strokes: Strokes, sense: Sense) -> RidgeFollower:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,12 @@ from hw.moves import Move
 from mapping.crossing import Crossing
 from mapping.noise import Noise
 from mapping.trace import Trace
-from planners.axis_track import AxisEnd, AxisTrack, heading_and_turn, polyline_distance
+from planners.axis_track import AxisEnd, AxisTrack, Course, course, polyline_distance
 from planners.crest import is_step, seen_again
 from planners.plan import Outcome, Plan
 from planners.sense import Sense
 from planners.shape_fit import end_shape, fit_shape
-from planners.strokes import Strokes
+from planners.strokes import Strokes, tangential
 
 FloatArray = NDArray[np.float64]
 Crossed = Generator[Move, Trace, Crossing | None]
@@ -94,9 +94,9 @@ class RidgeFollower:
         gone = np.inf
         for _ in range(10_000):
             last = line.crossings[-1]
-            heading, turn = heading_and_turn(line.points, last.normal, way)
+            ahead = course(line.points, last.normal, way, self.strokes.tip_radius)
             step = min(line.step, 0.5 * gone)
-            walk = self.strokes.walk(last.point, heading, step, turn)
+            walk = self.strokes.walk(ahead.point, ahead.heading, step, ahead.turn)
             if walk.cut and walk.along[-1] < 0.5 * step:
                 return AxisEnd(walk.points[-1], 0.0, "edge of the model", walk.directions[-1])
             reach = max(0.6 * line.half_width, 0.25 * step)
@@ -105,17 +105,17 @@ class RidgeFollower:
             if found is None:
                 gone = float(walk.along[-1])
                 if gone <= max(0.15 * self.strokes.tip_radius, 4.0 * self.precision):
-                    return (yield from self._end(line, heading, turn, gone, sign))
+                    return (yield from self._end(line, ahead, gone, sign))
                 continue
             gone -= float(walk.along[-1])
             self._adapt(line, found, walk.points[-1], reach)
             line.crossings.append(found)
             if self.known(found.point):
-                return AxisEnd(found.point, found.position_sd, "joins another", heading)
+                return AxisEnd(found.point, found.position_sd, "joins another", ahead.heading)
             if _returned(line):
                 return None
             if gone <= 0.1 * self.strokes.tip_radius:
-                return (yield from self._end(line, heading, turn, max(gone, 0.0), sign))
+                return (yield from self._end(line, ahead, max(gone, 0.0), sign))
         return AxisEnd(line.points[-1], np.inf, "lost", way)
 
     def _adapt(self, line: Line, found: Crossing, predicted: FloatArray, reach: float) -> None:
@@ -147,23 +147,20 @@ class RidgeFollower:
         found = seen_again(trace, self.sense.base, self.noise, point, way, like, reach)
         return found if found is not None and sign * found.height >= lowest else None
 
-    def _end(
-        self, line: Line, heading: FloatArray, turn: float, gone: float, sign: float
-    ) -> Generator[Move, Trace, AxisEnd]:
+    def _end(self, line: Line, ahead: Course, gone: float, sign: float) -> Generator[Move, Trace, AxisEnd]:
         """Slide along the crest and off the end, where the crossings have bracketed it."""
         last = line.crossings[-1]
-        rough = AxisEnd(last.point, np.inf, "end", heading, gone)
+        ahead = course(line.points, last.normal, ahead.heading, self.strokes.tip_radius)
         if is_step(last):
-            return AxisEnd(last.point, 0.5 * gone, "end", heading, gone)
-        return (yield from self.slide(rough, line.height, line.half_width, sign, turn))
+            return AxisEnd(last.point, 0.5 * gone, "end", ahead.heading, gone)
+        rough = AxisEnd(ahead.point, np.inf, "end", ahead.heading, gone, ahead.turn)
+        return (yield from self.slide(rough, line.height, line.half_width, sign))
 
-    def slide(
-        self, end: AxisEnd, height: float, half_width: float, sign: float, turn: float = 0.0
-    ) -> Generator[Move, Trace, AxisEnd]:
+    def slide(self, end: AxisEnd, height: float, half_width: float, sign: float) -> Generator[Move, Trace, AxisEnd]:
         """A better estimate of an end from one more sweep along the crest; the old one if that shows nothing."""
         tip = self.strokes.tip_radius
-        back = self.strokes.walk(end.point, -end.heading, 1.2 * half_width, -turn)
-        ahead = self.strokes.walk(end.point, end.heading, end.reach + 1.8 * half_width, turn)
+        back = self.strokes.walk(end.point, -end.heading, 1.2 * half_width, -end.turn)
+        ahead = self.strokes.walk(end.point, end.heading, end.reach + 1.8 * half_width, end.turn)
         points = np.concatenate([back.points[:0:-1], ahead.points])
         normals = np.concatenate([back.normals[:0:-1], ahead.normals])
         trace = yield self.strokes.over(points, normals)
@@ -178,13 +175,20 @@ class RidgeFollower:
         fit = fit_shape(place[order], feet.height[order], shape, sign, height, within, self.noise)
         inside = 0.02 * tip < fit.place < within[1] - 0.02 * tip
         if not inside or fit.sd > 0.2 * tip or abs(fit.height) < 0.4 * height:
-            return end if np.isfinite(end.sd) else AxisEnd(end.point, max(end.reach, 0.1 * tip), "lost", end.heading)
-        where = np.array([np.interp(fit.place, along, points[:, k]) for k in range(3)])
-        sd = fit.sd if not np.isfinite(end.sd) else (fit.sd**-2 + end.sd**-2) ** -0.5
-        if np.isfinite(end.sd):
-            weight = fit.sd**-2 / (fit.sd**-2 + end.sd**-2)
-            where = weight * where + (1.0 - weight) * end.point
-        return AxisEnd(self.strokes.onto(where)[0], float(sd), "end", end.heading, 0.0)
+            return end if np.isfinite(end.sd) else replace(end, sd=max(end.reach, 0.1 * tip), reason="lost")
+        sd = (fit.sd**-2 + end.sd**-2) ** -0.5
+        weight = (sd / fit.sd) ** 2
+        where, heading = _at(fit.place, along, points, normals)
+        # further slides start from the end: they must follow the same curve
+        where = weight * where + (1.0 - weight) * end.point if np.isfinite(end.sd) else where
+        return replace(end, point=self.strokes.onto(where)[0], sd=float(sd), reason="end", heading=heading, reach=0.0)
+
+
+def _at(place: float, along: FloatArray, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Point and heading (3,) at an arclength of a polyline."""
+    where = np.array([np.interp(place, along, points[:, k]) for k in range(3)])
+    k = int(np.clip(np.searchsorted(along, place), 1, len(points) - 1))
+    return where, tangential(points[k] - points[k - 1], normals[k])
 
 
 def places_along(points: FloatArray, line: FloatArray, along: FloatArray) -> FloatArray:
@@ -230,6 +234,8 @@ def _joined(halves: list[tuple[Line, AxisEnd | None]], sign: float) -> AxisTrack
     height = float(np.median([abs(c.height) for c in crossings]))
     half_width = float(np.median([c.half_width for c in crossings]))
     if last_end is None or first_end is None:
+        if _passes(points[0], points[-2], points[-1]):
+            points, normals = points[:-1], normals[:-1]
         points.append(points[0])
         normals.append(normals[0])
         return AxisTrack(np.array(points), np.array(normals), sign, kind, height, half_width, ())
@@ -238,6 +244,11 @@ def _joined(halves: list[tuple[Line, AxisEnd | None]], sign: float) -> AxisTrack
         if tip.reason in ("end", "edge of the model"):
             track = track.with_end(index, tip)
     return track
+
+
+def _passes(point: FloatArray, start: FloatArray, stop: FloatArray) -> bool:
+    """True if the stretch from start to stop leads past the point rather than up to it."""
+    return bool((point - start) @ (stop - start) < (stop - start) @ (stop - start))
 
 
 def _first_step(crossings: list[Crossing]) -> FloatArray:

@@ -82,16 +82,14 @@ def fit_shape(
     return ShapeFit(float(fit.x[0]), sd, sign * float(fit.x[1]), height_sd, gain)
 
 
-def crest_shape(half_width: float, sign: float, tip_radius: float, like_height: float) -> Shape:
-    """A ridge's crest, or a groove's dip, crossed squarely.
-
-    A crest's radius follows from its height and half-width, x_c^2 = 2 (r + a) H; a groove's dip is that of two
-    rims (theory section 4).
-    """
-    if sign < 0:
-        return lambda x, h: np.maximum(np.sqrt(2.0 * tip_radius * h) - np.abs(x), 0.0) ** 2 / (2.0 * tip_radius)
-    cap = max(half_width**2 / (2.0 * max(like_height, 1e-300)) - tip_radius, 0.0)
+def crest_shape(cap: float, tip_radius: float) -> Shape:
+    """A ridge's round crest of radius `cap` (m), crossed squarely."""
     return lambda x, h: cap_height(x, h, cap, tip_radius)
+
+
+def dip_shape(tip_radius: float) -> Shape:
+    """A groove's dip between its two rims, crossed squarely (theory section 4)."""
+    return lambda x, h: np.maximum(np.sqrt(2.0 * tip_radius * h) - np.abs(x), 0.0) ** 2 / (2.0 * tip_radius)
 
 
 def end_shape(sign: float, tip_radius: float) -> Shape:
