@@ -7,10 +7,13 @@ via the Poisson Clumping Heuristic, 1989). The size is averaged over noise drawn
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.matched_filter import Bank, best_linear, cap_bins, filter_reach, toeplitz
+from mapping.matched_filter import Bank, best_linear, build_bank, cap_bins, filter_reach, toeplitz
+from mapping.noise import Noise
 
 FloatArray = NDArray[np.float64]
 
@@ -23,9 +26,36 @@ TYPICAL_THRESHOLD = 5.0
 
 
 def threshold_for(bank: Bank, false_alarms_per_metre: float) -> float:
-    """The signal-to-noise ratio that noise alone exceeds, in either sign, as often per metre as asked."""
-    threshold = _solve(_intensities(bank, TYPICAL_THRESHOLD), false_alarms_per_metre)
-    return _solve(_intensities(bank, threshold), false_alarms_per_metre)
+    """The signal-to-noise ratio that noise alone exceeds, in either sign, as often per metre as asked.
+
+    The threshold changes by less than a thousandth where the bank changes by one per cent, so it is worked out
+    for the nearest bank of a ladder and remembered: sweep after sweep has the same one.
+    """
+    noise, widths = bank.noise, (bank.filters[0].half_width, bank.filters[-1].half_width)
+    sizes = (noise.white, noise.correlated, noise.length, bank.spacing, bank.samples, *widths)
+    return _threshold(*(_rung(size) for size in sizes), bank.drift, false_alarms_per_metre)
+
+
+def _rung(size: float) -> float:
+    """The nearest step of a ladder of 1 % steps; a power of two times a step is a step."""
+    return float(2.0 ** (np.round(64 * np.log2(size)) / 64)) if size > 0 else 0.0
+
+
+@lru_cache(maxsize=256)
+def _threshold(
+    white: float,
+    correlated: float,
+    length: float,
+    spacing: float,
+    samples: float,
+    smallest: float,
+    largest: float,
+    drift: int,
+    rate: float,
+) -> float:
+    bank = build_bank(Noise(white, correlated, length), spacing, samples, smallest, largest, drift)
+    threshold = _solve(_intensities(bank, TYPICAL_THRESHOLD), rate)
+    return _solve(_intensities(bank, threshold), rate)
 
 
 def false_alarm_rate(bank: Bank, threshold: float) -> float:
