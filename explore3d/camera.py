@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ class Camera:
 
     @classmethod
     def facing(cls, points: FloatArray, direction: FloatArray, width: int, height: int, margin: float = 1.06) -> Camera:
-        """The camera that looks against `direction` (3,) and has all points (N, 3) in view, none too small."""
+        """The camera that looks against `direction` (3,) and has all points (N, 3) in view, at most `height` high."""
         target = 0.5 * (points.min(axis=0) + points.max(axis=0))
         camera = cls(target + direction / np.linalg.norm(direction), target, _upright(direction), width, height)
         right, up, forward = camera.frame
@@ -43,7 +43,14 @@ class Camera:
             seen = local[:, :2] / (distance + local[:, 2:])
             shift = 0.5 * (seen.min(axis=0) + seen.max(axis=0)) * distance
             target = target + shift[0] * right + shift[1] * up
-        return cls(target - distance * forward, target, _upright(direction), width, height)
+        camera = cls(target - distance * forward, target, _upright(direction), width, height)
+        return camera._cropped(points, margin)
+
+    def _cropped(self, points: FloatArray, margin: float) -> Camera:
+        """The camera without the empty stripes above and below the points; pixels keep their size."""
+        rows = np.abs(self.project(points)[0][:, 1] + 0.5 - 0.5 * self.height)
+        height = min(self.height, 8 * int(np.ceil(2 * margin * float(rows.max()) / 8)))
+        return replace(self, height=height, field=2 * float(np.arctan(0.5 * height * self.pixel)))
 
     @property
     def frame(self) -> tuple[FloatArray, FloatArray, FloatArray]:

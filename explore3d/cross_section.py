@@ -212,7 +212,8 @@ def _binned(x: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, 
     count = min(BINS, max(1, len(x) // 3))
     bins = np.clip(((x - x[0]) / max(np.ptp(x), np.finfo(float).tiny) * count).astype(np.int64), 0, count - 1)
     number = np.bincount(bins, minlength=count)
-    kept = number > 0
+    # The outermost bins may hold a single stray sample.
+    kept = number > 0.25 * np.median(number)
     number = np.maximum(number, 1)
     place, mean = (np.bincount(bins, weights=v, minlength=count) / number for v in (x, height))
     spread = np.bincount(bins, weights=(height - mean[bins]) ** 2, minlength=count) / np.maximum(number - 1, 1)

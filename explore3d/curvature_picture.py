@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from explore3d.camera import Camera
-from explore3d.figure import new_figure, png, styled
-from explore3d.object_picture import SUPERSAMPLING, view_directions
-from explore3d.raycast import Body, Picture, render
+from explore3d.figure import png, styled
+from explore3d.object_picture import SUPERSAMPLING, camera_for, panels_for, view_directions
+from explore3d.raycast import Body, render
 from mapping.surface import Surface
 
 if TYPE_CHECKING:
@@ -18,13 +17,16 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-SIZE = (900, 700)
-NOT_VALID = np.array([0.80, 0.80, 0.80])
+# Values within so many standard deviations of zero are drawn flat: their colour would be noise.
+SIGNIFICANT = 3.0
+FLAT = np.array([0.95, 0.95, 0.95])
+NOT_VALID = np.array([0.75, 0.75, 0.75])
 COLOURS = "RdBu_r"
 
 
 def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float) -> bytes:
-    """PNG of k1 and k2 in units of 1/r: red bulges out, blue bends in, grey where no value is valid.
+    """PNG of k1 and k2 in units of 1/r: red bulges out, blue bends in; pale where
+    the value is within three standard deviations of zero, grey where none is valid.
 
     Args:
         surface: the estimated surface.
@@ -37,18 +39,20 @@ def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float)
 
     areas = surface.face_areas[:, None]
     direction = view_directions(surface.face_normals * areas / areas.mean(), ())[0]
-    camera = Camera.facing(surface.vertices, direction, SIZE[0] * SUPERSAMPLING, SIZE[1] * SUPERSAMPLING)
+    camera = camera_for(surface.vertices, direction)
     scaled = [np.asarray(values) * tip_radius for values in (curvature.k1, curvature.k2)]
     norm = Normalize(*_span(scaled, curvature.valid))
     with styled():
-        figure = new_figure(11.0, 4.8)
-        panels = figure.subplots(1, 2)
-        for axes, values, name in zip(panels, scaled, ("larger, k₁", "smaller, k₂"), strict=True):
+        figure, panels = panels_for([camera, camera], room=0.6)
+        for (axes, _), values, name in zip(panels, scaled, ("larger, k₁", "smaller, k₂"), strict=True):
             colours = colormaps[COLOURS](norm(values))[:, :3]
+            colours[np.abs(values) < SIGNIFICANT * curvature.sd * tip_radius] = FLAT
             colours[~curvature.valid] = NOT_VALID
-            _draw(axes, render([Body(surface, colours)], camera))
+            axes.imshow(render([Body(surface, colours)], camera).reduced(SUPERSAMPLING), interpolation="none")
             axes.set_title(f"Principal curvature, {name}", fontweight="bold")
-        bar = figure.colorbar(ScalarMappable(norm, COLOURS), ax=panels, shrink=0.75, aspect=28, pad=0.01)
+        bar = figure.colorbar(
+            ScalarMappable(norm, COLOURS), ax=[axes for axes, _ in panels], shrink=0.75, aspect=28, pad=0.01
+        )
         bar.set_label("curvature × tip radius")
         bar.outline.set_visible(False)
         return png(figure)
@@ -60,8 +64,3 @@ def _span(values: list[FloatArray], valid: NDArray[np.bool_]) -> tuple[float, fl
     known = known[np.isfinite(known)]
     top = min(2.0, float(np.quantile(np.abs(known), 0.99))) if len(known) else 1.0
     return -max(top, 1e-9), max(top, 1e-9)
-
-
-def _draw(axes: Any, picture: Picture) -> None:
-    axes.imshow(picture.reduced(SUPERSAMPLING), interpolation="none")
-    axes.set_axis_off()

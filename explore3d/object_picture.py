@@ -12,6 +12,7 @@ from explore3d.camera import Camera
 from explore3d.figure import INK, new_figure, png, styled
 from explore3d.quantity import length_text
 from explore3d.raycast import Body, Picture, render
+from explore3d.sweep_paths import SweepPath, densified, sweep_paths
 from mapping.crossing import Crossing
 from mapping.feature import Feature
 from mapping.feature_mesh import drawn_at_least, feature_mesh
@@ -23,9 +24,13 @@ FloatArray = NDArray[np.float64]
 
 SIZE = (1200, 820)
 SUPERSAMPLING = 2
+# Width of a panel, inches.
+PANEL = 7.5
 BASE_COLOUR = np.array([0.86, 0.88, 0.91])
 QUIET = np.array([0.42, 0.52, 0.62])
 LOUD = np.array([0.93, 0.55, 0.13])
+# Samples are averaged over so many pixels of the way.
+STRETCH = 3.0
 # Features are drawn at least so many pixels wide, or nobody would see them.
 VISIBLE = 5.0
 # A body whose outward directions cancel more than this is round: it needs two views.
@@ -50,14 +55,33 @@ def object_picture(
         crossings: detections; the samples that they cover are drawn in orange.
     """
     views = view_directions(normals, features)
-    noticed = _noticed(trace, crossings)
     shown = _close_up(base, feet)
     with styled():
-        figure = new_figure(7.5 * len(views), 5.3)
-        for axes, direction in zip(np.atleast_1d(figure.subplots(1, len(views))), views, strict=True):
-            camera = Camera.facing(shown, direction, SIZE[0] * SUPERSAMPLING, SIZE[1] * SUPERSAMPLING)
-            _draw(axes, _scene(base, features, camera, feet, normals, noticed), features)
+        figure, panels = panels_for([camera_for(shown, direction) for direction in views])
+        for axes, camera in panels:
+            sweeps = sweep_paths(trace, feet, normals, crossings, STRETCH * pixel_size(camera))
+            _draw(axes, _scene(base, features, camera, sweeps), features)
         return png(figure)
+
+
+def pixel_size(camera: Camera) -> float:
+    """Size of a pixel at the distance of the camera's target, m."""
+    return camera.pixel * float(np.linalg.norm(camera.eye - camera.target))
+
+
+def camera_for(points: FloatArray, direction: FloatArray) -> Camera:
+    """The camera of a panel that shows all points (N, 3) against a direction."""
+    return Camera.facing(points, direction, SIZE[0] * SUPERSAMPLING, SIZE[1] * SUPERSAMPLING)
+
+
+def panels_for(cameras: Sequence[Camera], room: float = 0.0) -> tuple[Any, list[tuple[Any, Camera]]]:
+    """A figure with one panel beside the other, each of its camera's shape, and `room` inches besides."""
+    tallest = max(camera.height / camera.width for camera in cameras)
+    figure = new_figure(PANEL * len(cameras), PANEL * tallest + room)
+    panels = np.atleast_1d(figure.subplots(1, len(cameras)))
+    for axes in panels:
+        axes.set_axis_off()
+    return figure, list(zip(panels, cameras, strict=True))
 
 
 def view_directions(normals: FloatArray, features: Sequence[Feature]) -> list[FloatArray]:
@@ -85,58 +109,28 @@ def _close_up(base: Surface, feet: FloatArray) -> FloatArray:
     return np.asarray(middle + reach * (np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), axis=-1).reshape(-1, 3)))
 
 
-def _noticed(trace: Trace, crossings: Sequence[Crossing]) -> NDArray[np.bool_]:
-    """(N,) True for the samples that a crossing covers."""
-    mask = np.zeros(len(trace), dtype=bool)
-    firsts = {int(number): int(first) for first, number in reversed(_runs(trace))}
-    for crossing in crossings:
-        if crossing.sweep in firsts:
-            mask[firsts[crossing.sweep] + crossing.start : firsts[crossing.sweep] + crossing.stop] = True
-    return mask
-
-
-def _runs(trace: Trace) -> list[tuple[int, int]]:
-    """(first sample, sweep number) of each run of samples."""
-    if len(trace) == 0:
-        return []
-    firsts = np.concatenate([[0], np.flatnonzero(np.diff(trace.sweep)) + 1])
-    return [(int(first), int(trace.sweep[first])) for first in firsts]
-
-
-def _scene(
-    base: Surface,
-    features: Sequence[Feature],
-    camera: Camera,
-    feet: FloatArray,
-    normals: FloatArray,
-    noticed: NDArray[np.bool_],
-) -> Picture:
-    pixel = camera.pixel * float(np.linalg.norm(camera.eye - camera.target))
+def _scene(base: Surface, features: Sequence[Feature], camera: Camera, sweeps: Sequence[SweepPath]) -> Picture:
+    pixel = pixel_size(camera)
     bodies = [Body(base, BASE_COLOUR)]
     for feature in features:
         colour = np.array(COLOURS.get(feature.kind, OTHER_COLOUR)[:3])
         bodies.append(Body(feature_mesh(drawn_at_least(feature, VISIBLE * SUPERSAMPLING * pixel)), colour))
     picture = render(bodies, camera)
-    for mask, colour, radius in ((~noticed, QUIET, 1.0), (noticed, LOUD, 2.2)):
-        lifted = feet[mask] + 2.0 * pixel * normals[mask]
-        picture.splat(_thinned(lifted, pixel), colour, radius, 3.0 * pixel)
+    for path in sweeps:
+        line = densified(path.points + 2.0 * pixel * path.normals, 0.5 * pixel)
+        picture.splat(line, QUIET, 1.3, 3.0 * pixel)
+    for path in sweeps:
+        for part in np.split(np.arange(len(path.points)), np.flatnonzero(np.diff(path.noticed)) + 1):
+            if path.noticed[part].all():
+                line = densified(path.points[part] + 2.0 * pixel * path.normals[part], 0.5 * pixel)
+                picture.splat(line, LOUD, 2.4, 3.0 * pixel)
     return picture
-
-
-def _thinned(points: FloatArray, pixel: float) -> FloatArray:
-    """The points that lie more than a quarter pixel from the one before: others would cover the same pixels."""
-    if len(points) < 2:
-        return points
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    keep = np.concatenate([[True], np.diff(np.floor(way / (0.25 * pixel))) > 0])
-    return np.asarray(points[keep])
 
 
 def _draw(axes: Any, picture: Picture, features: Sequence[Feature]) -> None:
     """The pixels with the features' names and a scale bar."""
     pixels = picture.reduced(SUPERSAMPLING)
     axes.imshow(np.clip(pixels, 0.0, 1.0), interpolation="none")
-    axes.set_axis_off()
     for feature in features:
         reference = feature.axis[len(feature.axis) // 2] if feature.anchor is None else feature.anchor.position
         place, depth = picture.camera.project(reference[None, :])
@@ -154,15 +148,16 @@ def _draw(axes: Any, picture: Picture, features: Sequence[Feature]) -> None:
             arrowprops={"arrowstyle": "-", "color": INK, "linewidth": 0.6},
             bbox={"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
         )
-    _scale_bar(axes, picture.camera, pixels.shape)
+    draw_scale_bar(axes, picture.camera)
 
 
-def _scale_bar(axes: Any, camera: Camera, shape: tuple[int, ...]) -> None:
+def draw_scale_bar(axes: Any, camera: Camera) -> None:
     """A round length at the distance of the camera's target."""
-    pixel = camera.pixel * SUPERSAMPLING * float(np.linalg.norm(camera.eye - camera.target))
-    wish = 0.16 * shape[1] * pixel
+    pixel = SUPERSAMPLING * pixel_size(camera)
+    height, width = camera.height / SUPERSAMPLING, camera.width / SUPERSAMPLING
+    wish = 0.16 * width * pixel
     power = 10.0 ** np.floor(np.log10(wish))
     length = float(max(step for step in (1.0, 2.0, 5.0) if step * power <= wish) * power)
-    left, row = 0.03 * shape[1], 0.965 * shape[0]
+    left, row = 0.03 * width, 0.965 * height
     axes.plot([left, left + length / pixel], [row, row], color=INK, linewidth=2.0, solid_capstyle="butt")
-    axes.text(left, row - 0.012 * shape[0], length_text(length), color=INK, fontsize=8.5, va="bottom")
+    axes.text(left, row - 0.012 * height, length_text(length), color=INK, fontsize=8.5, va="bottom")

@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 BACKGROUND = np.ones(3)
 # Creases sharper than this keep their edge; flatter ones are shaded round.
 CREASE = np.cos(np.radians(35.0))
-AMBIENT = 0.42
+AMBIENT = 0.55
 OUTLINE = 0.55
 
 
@@ -104,7 +104,7 @@ def _shade(body: Body, face: NDArray[np.uint32], uv: FloatArray, ray: FloatArray
     shine = np.clip(normal @ (light / np.linalg.norm(light)), 0.0, 1.0)
     colours = np.broadcast_to(body.colours, body.surface.vertices.shape)
     colour = (colours[corners] * weights).sum(axis=1)
-    return np.asarray(np.clip(colour * (AMBIENT + (1.08 - AMBIENT) * shine)[:, None], 0.0, 1.0))
+    return np.asarray(np.clip(colour * (AMBIENT + (1.06 - AMBIENT) * shine)[:, None], 0.0, 1.0))
 
 
 def _vertex_normals(surface: Surface) -> FloatArray:

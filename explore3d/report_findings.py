@@ -109,7 +109,7 @@ def _row(feature: Feature, analysis: Analysis) -> Row:
         detail = badge("finer than the tip", "good")
     else:
         detail = badge("gentler than the tip", "plain")
-    notes = element("small", "; ".join(feature.notes)) if feature.notes else Html("")
+    notes = element("small", "; ".join(feature.notes), class_="note") if feature.notes else Html("")
     name = Html(element("b", feature.id) + notes)
     return (name, *cells, length, _place(feature, analysis), Html(evidence), detail, _posterior(feature))
 

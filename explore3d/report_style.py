@@ -5,7 +5,7 @@ STYLE = """
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--paper); color: var(--ink);
   font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
-main { max-width: 1080px; margin: 0 auto; padding: 2.2rem 1.4rem 4rem; }
+main { max-width: 1140px; margin: 0 auto; padding: 2.2rem 1.4rem 4rem; }
 header .kind { color: var(--soft); font-size: .85rem; letter-spacing: .06em; text-transform: uppercase; margin: 0; }
 h1 { font-size: 2rem; line-height: 1.2; margin: .2rem 0 .8rem; font-weight: 650; }
 h2 { font-size: 1.25rem; margin: 0 0 .6rem; font-weight: 650; }
@@ -25,6 +25,7 @@ th { position: sticky; top: 0; background: #f5f7fa; text-align: left; font-weigh
 th, td { padding: .5rem .8rem; border-bottom: 1px solid var(--faint); vertical-align: top; }
 tr:last-child td { border-bottom: 0; }
 td.number, th.number { text-align: right; white-space: nowrap; }
+td span, td small { white-space: nowrap; } td small.note { white-space: normal; min-width: 9rem; }
 td small { display: block; color: var(--soft); font-size: .82rem; }
 .badge { display: inline-block; padding: .05rem .5rem; border-radius: 999px; font-size: .82rem; white-space: nowrap; }
 .badge.good { background: #e3f5ea; color: #14613c; }

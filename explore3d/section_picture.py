@@ -17,6 +17,8 @@ FloatArray = NDArray[np.float64]
 COLUMNS = 3
 # Dots beyond so many hide each other.
 DOTS = 1500
+# Points of the body further apart than this share of the panel are not joined.
+GAP = 0.15
 
 
 def section_picture(sections: Sequence[CrossSection], truths: Sequence[float | None]) -> bytes:
@@ -35,10 +37,9 @@ def section_picture(sections: Sequence[CrossSection], truths: Sequence[float | N
             _panel(axes, section, true)
         for axes in grid[len(sections) :]:
             axes.set_visible(False)
-        names = {
-            label: handle for axes in grid for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-        }
-        figure.legend(names.values(), names.keys(), loc="outside upper left", ncols=len(names))
+        entries = [axes.get_legend_handles_labels() for axes in grid[: len(sections)]]
+        names = {label: handle for handles, labels in entries for handle, label in zip(handles, labels, strict=True)}
+        figure.legend(names.values(), names.keys(), loc="outside upper left", ncols=3, markerscale=1.6)
         return png(figure)
 
 
@@ -75,13 +76,17 @@ def _panel(axes: Any, section: CrossSection, true: float | None) -> None:
 
 def _body(axes: Any, section: CrossSection, x_factor: float, z_factor: float) -> None:
     """The estimated surface: solid where it was touched, dotted where the tip bridged it."""
-    x, z = section.body_x / x_factor, section.body_z / z_factor
-    touched = np.where(section.bridged, np.nan, z)
+    # Nothing is known between points far apart: the line is broken there.
+    gaps = np.flatnonzero(np.diff(section.body_x) > GAP * np.ptp(section.x)) + 1
+    x = np.insert(section.body_x, gaps, np.nan) / x_factor
+    z = np.insert(section.body_z, gaps, np.nan) / z_factor
+    hidden = np.insert(section.bridged, gaps, False)
+    touched = np.where(hidden, np.nan, z)
     # A bridge is drawn up to the touched points that carry it.
-    near = section.bridged | np.roll(section.bridged, 1) | np.roll(section.bridged, -1)
+    near = hidden | np.roll(hidden, 1) | np.roll(hidden, -1)
     bridged = np.where(near, z, np.nan)
-    axes.plot(x, touched, color=INK, linewidth=1.3, zorder=5, label="estimated surface")
-    if section.bridged.any():
+    axes.plot(x, touched, ".-", markersize=3.5, color=INK, linewidth=1.3, zorder=5, label="estimated surface")
+    if hidden.any():
         axes.plot(x, bridged, color=INK, linewidth=1.1, linestyle=(0, (1, 1.6)), zorder=5, label="bridged, not touched")
 
 

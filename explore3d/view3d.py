@@ -12,6 +12,7 @@ from explore3d.figure import ESTIMATED, INK, TRACED
 from explore3d.markup import Html, element
 from explore3d.profile_picture import profile_line
 from explore3d.quantity import interval_text, length_unit
+from explore3d.sweep_paths import sweep_paths
 from mapping.base import Feet
 from mapping.feature import Feature
 from mapping.feature_mesh import drawn_at_least, feature_mesh
@@ -21,8 +22,9 @@ from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
 
+# Sweeps are averaged over this share of the explored size.
+FINEST = 0.004
 # More than this makes pages slow without showing more.
-MOST_POINTS = 60_000
 MOST_FACES = 60_000
 # Features are drawn at least this share of the base's size wide.
 VISIBLE = 0.004
@@ -41,7 +43,7 @@ def object_view(base: Surface, features: Sequence[Feature], trace: Trace, feet: 
     import plotly.graph_objects as plot
 
     factor, unit = length_unit(0.3 * base.size)
-    parts: list[Any] = [_mesh(_lighter(base), factor, "base", "#d5dae1", None, opacity=0.92)]
+    parts: list[Any] = [_mesh(_lighter(base), factor, "base", "#e4e8ee", None, opacity=1.0)]
     lines = _sweeps(trace, feet) / factor
     parts.append(
         plot.Scatter3d(
@@ -51,7 +53,7 @@ def object_view(base: Surface, features: Sequence[Feature], trace: Trace, feet: 
             mode="lines",
             name="sweeps",
             hoverinfo="skip",
-            line={"color": TRACED, "width": 2},
+            line={"color": "#486581", "width": 3},
         )
     )
     for feature in features:
@@ -131,17 +133,18 @@ def _mesh(surface: Surface, factor: float, name: str, colour: str, hover: str | 
     return plot.Mesh3d(
         x=points[:, 0], y=points[:, 1], z=points[:, 2], i=i, j=j, k=k, name=name, color=colour, opacity=opacity,
         hoverinfo="skip" if hover is None else "text", text=hover, showlegend=hover is not None, flatshading=True,
-        lighting={"ambient": 0.6, "diffuse": 0.6, "specular": 0.05, "roughness": 0.9},
+        lighting={"ambient": 0.8, "diffuse": 0.35, "specular": 0.05, "roughness": 0.9},
     )  # fmt: skip
 
 
 def _sweeps(trace: Trace, feet: Feet) -> FloatArray:
     """(M, 3) points just above the base, NaN between sweeps, few enough to draw."""
-    step = max(1, len(trace) // MOST_POINTS)
-    cuts = np.flatnonzero(np.diff(trace.sweep)) + 1
-    lifted = feet.points + 2e-3 * np.linalg.norm(np.ptp(feet.points, axis=0)) * feet.normals
+    size = float(np.linalg.norm(np.ptp(feet.points, axis=0))) if len(trace) else 0.0
     gap = np.full((1, 3), np.nan)
-    pieces = [np.vstack([part[::step], part[-1:], gap]) for part in np.split(lifted, cuts) if len(part)]
+    pieces = [
+        np.vstack([path.points + 2e-3 * size * path.normals, gap])
+        for path in sweep_paths(trace, feet.points, feet.normals, (), size * FINEST)
+    ]
     return np.vstack(pieces) if pieces else np.zeros((0, 3))
 
 
@@ -164,5 +167,5 @@ def _camera(normals: FloatArray) -> dict[str, Any]:
     from explore3d.object_picture import view_directions
 
     direction = view_directions(normals, ())[0]
-    eye = 1.7 * direction / np.linalg.norm(direction)
+    eye = 1.5 * direction / np.linalg.norm(direction)
     return {"eye": dict(zip("xyz", map(float, eye), strict=True))}
