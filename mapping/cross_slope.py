@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,19 +20,31 @@ CENTRAL = 1.25
 FALLING = 0.1
 
 
-def cross_tangents(
-    points: FloatArray, along: FloatArray, outward: FloatArray, rows: list[IntArray]
-) -> tuple[FloatArray, FloatArray]:
-    """Unit tangents (N, 3) of the traced surface across the sweeps `rows`, and its curvature (N,) across, 1/m.
+@dataclass(frozen=True, eq=False)
+class CrossSlope:
+    """The traced surface across its sweeps.
+
+    Args:
+        tangents: (N, 3) unit tangents across the sweeps; meaningless where `doubt` is NaN.
+        curvature: (N,) curvature across, 1/m, positive where it bulges out; NaN where unknown.
+        doubt: (N,) how far the slope may be off, rad; NaN where the neighbours do not tell.
+    """
+
+    tangents: FloatArray
+    curvature: FloatArray
+    doubt: FloatArray
+
+
+def cross_slope(points: FloatArray, along: FloatArray, outward: FloatArray, rows: list[IntArray]) -> CrossSlope:
+    """Slope across the parallel sweeps `rows` at their samples (N, 3) with unit tangents `along` (N, 3).
 
     The surface is cut at each sample by the plane perpendicular to the sweep, which the neighbouring rows cross
-    in a few points; their interpolant gives the slope. The curvature is NaN, and the
-    tangent meaningless, where fewer than two neighbours are crossed.
+    in a few points; their interpolant gives the slope, its last term the doubt.
     """
     across = unit(np.cross(outward, along))
     up = np.cross(along, across)
     up *= np.sign(np.einsum("ij,ij->i", up, outward))[:, None]
-    slope, bend = np.full(len(points), np.nan), np.full(len(points), np.nan)
+    slope, bend, doubt = np.full((3, len(points)), np.nan)
     for j, row in enumerate(rows):
         v, w = np.full((2, len(row), 2 * REACH + 1), np.nan)
         v[:, REACH] = w[:, REACH] = 0.0
@@ -39,8 +53,8 @@ def cross_tangents(
                 arm = _crossings(points[row], along[row], points[rows[j + shift]]) - points[row]
                 v[:, REACH + shift] = np.einsum("ij,ij->i", arm, across[row])
                 w[:, REACH + shift] = np.einsum("ij,ij->i", arm, up[row])
-        slope[row], bend[row] = smooth_slope(v, w)
-    return unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5
+        slope[row], bend[row], doubt[row] = smooth_slope(v, w)
+    return CrossSlope(unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5, doubt)
 
 
 def _crossings(points: FloatArray, normals: FloatArray, line: FloatArray) -> FloatArray:
@@ -63,8 +77,8 @@ def _crossings(points: FloatArray, normals: FloatArray, line: FloatArray) -> Flo
     return np.where((within & monotone & ~ended)[:, None], found, np.nan) + points
 
 
-def smooth_slope(v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """First and second derivative at the middle column of heights w(v), both (N, 2 k + 1), NaN where missing.
+def smooth_slope(v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Slope, second derivative and doubt of the slope at the middle column of w(v), (N, 2 k + 1), NaN where missing.
 
     Essentially non-oscillatory (Harten et al. 1987): of all quartics, cubics and parabolas through the middle and
     its neighbours, the one of highest degree whose last term is small beside its curvature. A kink that runs along
@@ -75,17 +89,19 @@ def smooth_slope(v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
         table = [w]
         for order in range(1, 5):
             table.append(np.diff(table[-1], axis=1) / (v[:, order:] - v[:, :-order]))
-        slope, bend, _ = _polynomial(v, w, table, 2, middle)
+        slope, bend, doubt, _ = _polynomial(v, w, table, 2, middle)
         for order in (3, 4):
-            candidate, curved, falling = _polynomial(v, w, table, order, middle)
+            candidate, curved, last, falling = _polynomial(v, w, table, order, middle)
+            # A cubic that is refused still tells how little the parabola knew.
+            doubt = np.where(falling, last, np.fmax(doubt, last) if order == 3 else doubt)
             slope, bend = np.where(falling, candidate, slope), np.where(falling, curved, bend)
-    return slope, bend
+    return slope, bend, doubt
 
 
 def _polynomial(
     v: FloatArray, w: FloatArray, table: list[FloatArray], order: int, middle: int
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Slope and curvature of the smoothest polynomial of that order, and whether its last term is small."""
+) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Slope and curvature of the smoothest polynomial of that order, its last term as a slope, and if that is small."""
     index = np.arange(len(v))
     size = np.abs(table[order][:, middle - order : middle + 1])
     size = np.where(np.isnan(size), np.inf, size) * np.r_[CENTRAL, np.ones(order - 1), CENTRAL]
@@ -95,6 +111,6 @@ def _polynomial(
     slope = np.einsum("km,km->k", lagrange(at, np.zeros(len(v)))[1], heights)
     inner = np.clip(middle - 1, first, first + order - 2)
     bend = 2 * table[2][index, inner]
-    spacing = (at[:, -1] - at[:, 0]) / order
-    last = np.abs(table[order][index, first]) * np.abs(spacing) ** (order - 2)
-    return slope, bend, last <= FALLING * np.abs(bend)
+    spacing = np.abs(at[:, -1] - at[:, 0]) / order
+    last = np.abs(table[order][index, first]) * spacing ** (order - 1)
+    return slope, bend, last, last <= FALLING * np.abs(bend) * spacing

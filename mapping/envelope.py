@@ -71,7 +71,7 @@ def estimate_surface(
         smoothed = smooth(trace, noise, outward=away)
         trace, away = smoothed.trace, away[smoothed.sample]
         slack = max(slack, 4 * smoothed.sd)
-    points = _contacts(trace, method, away)
+    points = _contacts(trace, method, away, slack)
     if smoothed is not None:
         points = _unsmoothed(points, smoothed)
     possible = penetration(points.points, trace.centers, trace.tip_radius) <= slack
@@ -94,7 +94,7 @@ def _outward(trace: Trace, base: Base | None, outward: ArrayLike | None) -> Floa
     return np.array(np.broadcast_to([0.0, 0.0, 1.0], trace.centers.shape))
 
 
-def _contacts(trace: Trace, method: str, outward: FloatArray) -> Estimate:
+def _contacts(trace: Trace, method: str, outward: FloatArray, slack: float) -> Estimate:
     """Contacts of every sweep, and points of the resting ball at its interference points; no mesh yet."""
     moving = np.r_[True, (np.diff(trace.centers, axis=0) != 0).any(axis=1) | (np.diff(trace.sweep) != 0)]
     still = np.flatnonzero(moving)  # a finger that stands still says everything once
@@ -107,22 +107,22 @@ def _contacts(trace: Trace, method: str, outward: FloatArray) -> Estimate:
         sweeps.append(np.full(len(row.centers), number))
         start += len(part)
     row = ContactRow.joined(rows)
-    normals, across = surface_normals(trace, row, outward)
+    normals, across, doubt = surface_normals(trace, row, outward)
     if method == "contact" and trace.normals is not None:
         recorded = (row.sample >= 0)[:, None]
-        normals = np.where(recorded, trace.normals[row.nearest], row.normals)
+        normals, doubt = np.where(recorded, trace.normals[row.nearest], row.normals), 0 * doubt
+    # A ball turned by an angle about its contact leaves the body by half of r angle^2.
+    uncertain = (row.labels == TOUCHED) & (0.5 * trace.tip_radius * doubt**2 > slack)
+    labels = np.where(uncertain, EXTRAPOLATED, row.labels).astype(np.int8)
     sample = np.where(row.sample < 0, -1, still[row.sample])
     points = row.centers - trace.tip_radius * normals
-    return Estimate(None, points, normals, row.centers, row.labels, sample, np.concatenate(sweeps), across)
+    return Estimate(None, points, normals, row.centers, labels, sample, np.concatenate(sweeps), across)
 
 
 def _unsmoothed(points: Estimate, smoothed: Smoothed) -> Estimate:
-    """Points of a smoothed trace with the samples of the original; dents at the limit of sight are bridged.
-
-    At the scale of smoothing, dents beyond half the tip's own curvature look like kinks.
-    """
+    """Points of a smoothed trace with the samples of the original; what may be a kink is bridged."""
     own = points.sample >= 0
-    dented = own & (smoothed.curvature[points.sample] * smoothed.trace.tip_radius < -1)
+    dented = own & smoothed.dented[points.sample]
     labels = np.where(dented, BRIDGED, points.labels).astype(np.int8)
     return replace(points, labels=labels, sample=np.where(own, smoothed.sample[points.sample], -1))
 

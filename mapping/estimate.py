@@ -33,7 +33,8 @@ class Estimate:
         normals: (N, 3) outward unit normals of the ball there: the direction from the point to `centers`.
         centers: (N, 3) centre of the ball that bounds each point, m.
         labels: (N,) TOUCHED: the ball's single contact, on the body; BRIDGED: the ball rests on two
-            places and the body lies somewhere below; EXTRAPOLATED: between or beyond the samples.
+            places and the body lies somewhere below; EXTRAPOLATED: between or beyond the samples, or
+            where the neighbouring sweeps are too far apart to tell where the ball touches.
         sample: (N,) index of the trace's sample that each point comes from, -1 for inserted points.
         sweep: (N,) number of the sweep.
         across: (N,) curvature of the traced surface across the sweeps, 1/m, positive where it bulges out;

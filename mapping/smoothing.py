@@ -45,6 +45,20 @@ class Smoothed:
     removed: int
     noise: Noise
 
+    @property
+    def dented(self) -> NDArray[np.bool_]:
+        """(M,) where the trace may hold a kink: within two smoothing lengths of dents beyond k_t = -1/r.
+
+        A kink that is smoothed over the length h is indistinguishable from a dent of a few h.
+        """
+        deep = np.flatnonzero(self.curvature * self.trace.tip_radius < -1)
+        reach = int(np.ceil(2 / BLOCK)) if self.scale > 0 else 0
+        near = np.zeros(len(self.trace), dtype=bool)
+        for shift in range(-reach, reach + 1):
+            beside = np.clip(deep + shift, 0, len(near) - 1)
+            near[beside[self.trace.sweep[beside] == self.trace.sweep[deep]]] = True
+        return near
+
 
 def smooth(trace: Trace, noise: Noise | None = None, *, outward: ArrayLike | None = None) -> Smoothed:
     """Remove impossible points of a trace, smooth the rest by a cubic smoothing spline over time.

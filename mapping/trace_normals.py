@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.contact_row import ContactRow
-from mapping.cross_slope import cross_tangents
+from mapping.cross_slope import CrossSlope, cross_slope
 from mapping.sweep_mesh import parallel_rows
 from mapping.sweep_tangents import unit
 from mapping.trace import Trace
@@ -15,39 +15,45 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
-def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Outward unit normals (M, 3) at the points of `row`, and the curvature (M,) across, 1/m, NaN where unknown.
+def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Outward unit normals (M, 3) at the points of `row`, curvature across (M,), 1/m, and doubt of the slope (M,), rad.
 
     A single sweep knows its slope along itself only: its normals stay in the plane of tangent and outward
-    direction. Parallel sweeps add the slope across; any other arrangement gets it from local fits.
+    direction, as of a profile. Parallel sweeps add the slope across; other arrangements take it from local fits.
     """
     if len(np.unique(trace.sweep)) < 2:
-        return row.normals, np.full(len(row.normals), np.nan)
+        return row.normals, np.full(len(row.normals), np.nan), np.zeros(len(row.normals))
     along = np.zeros_like(trace.centers)
     own = row.sample >= 0
     along[row.sample[own]] = row.tangents[own]
     rows = parallel_rows(trace.centers, trace.sweep)
-    if rows is None:
-        across, bend = _fitted(trace, trace.centers, along, outward), np.full(len(trace), np.nan)
-    else:
-        across, bend = cross_tangents(trace.centers, along, outward, rows)
-        lost = np.isnan(bend)
-        across[lost] = _fitted(trace, trace.centers[lost], along[lost], outward[lost])
-    normals = unit(np.cross(row.tangents, across[row.nearest]))
+    unknown = np.full(len(trace), np.nan)
+    slope = (
+        CrossSlope(along.copy(), unknown, unknown.copy())
+        if rows is None
+        else cross_slope(trace.centers, along, outward, rows)
+    )
+    lost = np.flatnonzero(np.isnan(slope.doubt))
+    slope.tangents[lost], slope.doubt[lost] = _fitted(trace, lost, along[lost], outward[lost])
+    normals = unit(np.cross(row.tangents, slope.tangents[row.nearest]))
     side = np.sign(np.einsum("ij,ij->i", normals, outward[row.nearest]))
-    return np.where((side == 0)[:, None], row.normals, normals * side[:, None]), bend[row.nearest]
+    normals = np.where((side == 0)[:, None], row.normals, normals * side[:, None])
+    return normals, slope.curvature[row.nearest], slope.doubt[row.nearest]
 
 
 def _fitted(
-    trace: Trace, points: FloatArray, along: FloatArray, outward: FloatArray, neighbours: int = 24
-) -> FloatArray:
-    """Tangents across the sweeps at `points` from quadratic fits to the nearest samples of the thinned trace."""
+    trace: Trace, samples: IntArray, along: FloatArray, outward: FloatArray, neighbours: int = 24
+) -> tuple[FloatArray, FloatArray]:
+    """Tangents across the sweeps, and their doubt, from quadratic fits to the nearest samples of the thinned trace.
+
+    The doubt is three times the residual over the width; it is a right angle where the neighbours lie on one line.
+    """
     from scipy.spatial import cKDTree
 
     from mapping.sweep_mesh import pitch, thinned
 
-    kept = thinned(trace.centers, trace.sweep, pitch(trace.centers, trace.sweep))
-    cloud = trace.centers[kept]
+    points = trace.centers[samples]
+    cloud = trace.centers[thinned(trace.centers, trace.sweep, pitch(trace.centers, trace.sweep))]
     across = unit(np.cross(outward, along))
     up = unit(np.cross(along, across))
     up *= np.where(np.einsum("ij,ij->i", up, outward) < 0, -1.0, 1.0)[:, None]
@@ -59,4 +65,7 @@ def _fitted(
     columns = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=-1)
     weight = np.exp(-2.0 * (distance / scale) ** 2)[..., None]
     fit = np.linalg.pinv(columns * weight, rcond=1e-9) @ (w[..., None] * weight)
-    return unit(across + fit[:, 2] * up)
+    residual = np.sqrt((weight * (w[..., None] - columns @ fit) ** 2).mean(axis=(1, 2)))
+    width = np.sqrt((weight[..., 0] * v**2).mean(axis=1))
+    doubt = np.where(width > 1e-3, 3 * residual / np.maximum(width, 1e-3), np.pi / 2)
+    return unit(across + fit[:, 2] * up), doubt

@@ -168,8 +168,11 @@ def test_sweeps_over_a_sphere_become_a_mesh_on_the_sphere(bend):
     estimate = estimate_surface(trace)
     distance = np.abs(np.linalg.norm(estimate.points - [0, 0, -3], axis=1) - 3)
     inner = (np.abs(estimate.points[:, :2]) < 1.2).all(axis=1)
-    assert (estimate.labels == TOUCHED).all()
-    assert distance[inner].max() < 1e-9
+    touched = estimate.labels == TOUCHED
+    assert touched[inner].all()
+    assert distance[touched].max() < 1e-9
+    # At the corners of the raster the neighbours lie on one side and tell less: there, and only there, it says so.
+    assert touched.mean() > 0.98
     assert distance.max() < 1e-4
     assert estimate.surface is not None
     np.testing.assert_array_equal(estimate.surface.vertices, estimate.points)
@@ -206,6 +209,22 @@ def test_a_wire_along_the_sweeps_is_bridged_between_them():
     assert bridged.sum() > 100
     assert ((y > crest) & (y < reach))[bridged].all()
     assert not ((y > crest + 1e-3) & (y < reach - 1e-3))[~bridged].any()
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.2])
+def test_a_wire_oblique_to_the_sweeps_is_touched_only_where_it_was_touched(angle):
+    height = 0.065
+
+    def across(x, y):
+        return np.cos(angle) * x + np.sin(angle) * y
+
+    estimate = estimate_surface(rows(lambda x, y: wire(across(x, y), height, 1.0)))
+    inner = (np.abs(estimate.points[:, :2]) < 1.5).all(axis=1)
+    points = estimate.points[inner & (estimate.labels == TOUCHED)]
+    error = wire_distance(np.column_stack([across(points[:, 0], points[:, 1]), 0 * points[:, 0], points[:, 2]]), height)
+    assert len(points) > 2000
+    assert np.quantile(error, 0.99) < 1e-8
+    assert (error > 1e-6).sum() <= 5
 
 
 def test_recorded_normals_give_the_contacts_themselves():
