@@ -5,5 +5,13 @@ class FingerError(RuntimeError):
     """A finger that cannot be opened, refuses a move, or lost its connection; says what to do."""
 
 
+class LinkError(FingerError):
+    """A serial connection that cannot be opened, is lost, or does not answer in time."""
+
+
+class StoppedError(FingerError):
+    """The finger was stopped while it moved, by a limit, an alarm or the operator; says by which and what to do."""
+
+
 class MoveError(ValueError):
     """A move that is malformed."""

@@ -61,7 +61,7 @@ class Finger(Protocol):
     ) -> None: ...
 
 
-FINGERS: dict[str, str] = {"simulated": "hw.simulated:SimulatedFinger"}
+FINGERS: dict[str, str] = {"simulated": "hw.simulated:SimulatedFinger", "grbl": "hw.grbl:GrblFinger"}
 
 
 def open_finger(kind: str = "simulated", **settings: Any) -> Finger:

@@ -1,0 +1,67 @@
+"""Fusion: one trace from a stage that says where it is and a sensor that says what it feels, each on its clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+def positions_at(times: FloatArray, reported: FloatArray, positions: FloatArray) -> FloatArray:
+    """(N, 3) stage positions at times (N,) s, between the reports (M,) s, (M, 3) m; NaN outside of them."""
+    inside = (times >= reported[0]) & (times <= reported[-1])
+    found = np.column_stack([np.interp(times, reported, positions[:, k]) for k in range(3)])
+    found[~inside] = np.nan
+    return found
+
+
+def rigid_centers(positions: FloatArray, forces: FloatArray, stiffness: float) -> FloatArray:
+    """(N, 3) where a rigid ball's centre would be: the tip's carrier, put back by what the tip yields (F / k)."""
+    return np.asarray(positions + forces / stiffness)
+
+
+def estimate_delay(
+    reported: FloatArray, heights: FloatArray, times: FloatArray, forces: FloatArray, threshold: float
+) -> float:
+    """How much later the force is stamped than the position, s, from going into contact and out of it again.
+
+    Contact begins and ends at the same height; a delay makes the one appear lower and the other higher. The
+    delay is the shift of the force's time axis that brings the two together.
+
+    Args:
+        reported, heights: (M,) times of the stage's reports, s, and heights along the way out of the body, m.
+        times, forces: (N,) times of the sensor's samples, s, and force along that way, N.
+        threshold: force that counts as contact, N, well above the noise.
+
+    Raises:
+        ValueError: the force does not rise above the threshold and fall below it again.
+    """
+    up, down = _crossings(times, forces, threshold)
+    way_in = heights[(reported > up - 0.1) & (reported < up)]
+    way_out = heights[(reported > down) & (reported < down + 0.1)]
+    if len(way_in) < 2 or len(way_out) < 2:
+        raise ValueError("the stage must report its position while it goes into contact and out of it")
+    speed_in, speed_out = _rate(reported, heights, up), _rate(reported, heights, down)
+    gap = float(np.interp(down, reported, heights) - np.interp(up, reported, heights))
+    return gap / (speed_out - speed_in)
+
+
+def _crossings(times: FloatArray, forces: FloatArray, threshold: float) -> tuple[float, float]:
+    above = forces > threshold
+    rising = np.flatnonzero(~above[:-1] & above[1:])
+    falling = np.flatnonzero(above[:-1] & ~above[1:])
+    if len(rising) == 0 or len(falling) == 0 or falling[-1] <= rising[0]:
+        raise ValueError(f"the force does not rise above {threshold:g} N and fall below it again")
+    at: Sequence[int] = (int(rising[0]), int(falling[-1]))
+    share = [(threshold - forces[i]) / (forces[i + 1] - forces[i]) for i in at]
+    up, down = (float(times[i] + w * (times[i + 1] - times[i])) for i, w in zip(at, share, strict=True))
+    return up, down
+
+
+def _rate(reported: FloatArray, heights: FloatArray, when: float) -> float:
+    near = np.abs(reported - when) < 0.08
+    t = reported[near] - when
+    return float(np.polyfit(t, heights[near], 1)[0])

@@ -1,0 +1,139 @@
+"""GuardedStage: a controller that moves in the object frame, inside its limits, and feels its way."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hw.errors import FingerError, LinkError, StoppedError
+from hw.force_sensor import ForceSensor
+from hw.frame import Frame
+from hw.grbl_controller import GrblController
+
+FloatArray = NDArray[np.float64]
+
+# Shorter ways are not worth a command: the controller refuses to probe towards where it stands
+STANDING = 5e-6
+# Force samples older than this are not steered by, s
+STALE = 0.15
+
+
+@dataclass(eq=False)
+class GuardedStage:
+    """Positions are tip centres (3,), m, object frame.
+
+    Args:
+        controller: an opened one.
+        frame: where the object stands on the machine.
+        bounds: (2, 3) machine coordinates that the tip centre may take, m.
+        speed: of motion through free space, m/s.
+        over_travel: how far the tip may run on after contact while it brakes, m: limits the speed of everything
+            that may touch.
+    """
+
+    controller: GrblController
+    frame: Frame
+    bounds: FloatArray
+    speed: float
+    over_travel: float
+    sensor: ForceSensor | None = None
+    touch_force: float = 0.3
+
+    @property
+    def guarded_speed(self) -> float:
+        """Fastest speed whose braking distance stays within the over-travel, m/s."""
+        acceleration = np.nanmin(np.append(self.controller.settings.acceleration, np.inf))
+        if not np.isfinite(acceleration):
+            acceleration = 0.01  # a firmware that does not say: assume a lame one
+        return float(min(self.speed, np.sqrt(2.0 * acceleration * self.over_travel)))
+
+    def position(self) -> FloatArray:
+        """Where the tip centre is now."""
+        return self.frame.to_object(self.controller.position())
+
+    def check(self, points: FloatArray, what: str) -> None:
+        """Refuse points (N, 3) outside of the machine's limits. Raises FingerError."""
+        machine = np.atleast_2d(self.frame.to_machine(points))
+        outside = ((machine < self.bounds[0] - 1e-9) | (machine > self.bounds[1] + 1e-9)).any(axis=1)
+        if outside.any():
+            where = np.round(1e3 * machine[outside.argmax()], 3).tolist()
+            low, high = np.round(1e3 * self.bounds, 3).tolist()
+            raise FingerError(f"the {what} leads to machine position {where} mm; possible are {low} to {high} mm")
+
+    def probe(self, target: FloatArray, speed: float) -> tuple[FloatArray, bool]:
+        """Towards the target until contact: (latched position, True), or (target, False) if nothing is met."""
+        self.check(target, "probing")
+        here = self.position()
+        way = float(np.linalg.norm(target - here))
+        if way < STANDING:
+            return here, False
+        speed = min(speed, self.guarded_speed)
+        if self.sensor is not None:
+            return self._feel(target, speed, self.sensor)
+        found = self.controller.probe(self.frame.to_machine(target), speed, _patience(way, speed))
+        return self.frame.to_object(found.position), found.hit
+
+    def _feel(self, target: FloatArray, speed: float, sensor: ForceSensor) -> tuple[FloatArray, bool]:
+        """Jog until the sensor feels contact; where the machine then came to rest."""
+        machine = self.frame.to_machine(target)
+        self.controller.jog(machine, speed)
+        until = time.monotonic() + _patience(float(np.linalg.norm(target - self.position())), speed)
+        hit = False
+        while not hit and self.controller.status().state == "Jog":
+            hit = sensor.wait(lambda: self._touches(sensor), 0.02)
+            if sensor.age > STALE:
+                self.controller.halt(f"no force sample for {sensor.age:.2f} s; check the sensor's cable")
+            if time.monotonic() > until:
+                raise LinkError("the guarded motion does not end; reset the controller")
+        self.controller.cancel_jog()
+        return self.position(), hit
+
+    def _touches(self, sensor: ForceSensor) -> bool:
+        return bool(np.linalg.norm(sensor.force()) > self.touch_force)
+
+    def move(self, target: FloatArray, speed: float | None = None) -> None:
+        """Straight to the target, feeling nothing: only away from contact, or where nothing can be."""
+        self.check(target, "motion")
+        way = float(np.linalg.norm(target - self.position()))
+        speed = self.speed if speed is None else min(speed, self.speed)
+        if way >= STANDING:
+            self.controller.move(self.frame.to_machine(target), speed, _patience(way, speed))
+
+    def go(self, target: FloatArray, away: FloatArray, lift: float, tries: int = 6) -> None:
+        """Straight to the target, feeling the way; where it meets something it backs off along `away` and rises.
+
+        Args:
+            away: (3,) unit direction that leaves the body.
+            lift: how far to back off the first time, m; doubled each time.
+
+        Raises:
+            StoppedError: still blocked after `tries`.
+        """
+        for _ in range(tries):
+            where, hit = self.probe(target, self.guarded_speed)
+            if not hit:
+                return
+            self.lift(away, lift)
+            # over what is in the way, then down again
+            _, hit = self.probe(self._within(target + lift * away), self.guarded_speed)
+            if hit:
+                self.lift(away, lift)
+            lift *= 2.0
+        mm = np.round(1e3 * where, 3).tolist()
+        raise StoppedError(f"the way is blocked at {mm} mm (object frame); travel round it or lift higher")
+
+    def lift(self, away: FloatArray, distance: float) -> None:
+        """Back off along `away`, as far as the limits allow; never feels, so only away from the body."""
+        here = self.position()
+        self.move(self._within(here + distance * away))
+
+    def _within(self, target: FloatArray) -> FloatArray:
+        machine = np.clip(self.frame.to_machine(target), self.bounds[0], self.bounds[1])
+        return self.frame.to_object(machine)
+
+
+def _patience(way: float, speed: float) -> float:
+    return 2.0 * way / speed + 3.0

@@ -1,0 +1,178 @@
+"""Link: a serial port that a thread of its own reads, cuts into frames and stamps with the time of arrival."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from types import TracebackType
+from typing import Any
+
+from hw.errors import LinkError
+from hw.framing import Framing
+
+Receive = Callable[[float, list[bytes]], None]
+
+
+class Link:
+    """A serial connection with time-outs on everything.
+
+    Args:
+        port: device name or pyserial URL ("/dev/ttyUSB0", "COM3", "socket://host:23").
+        framing: cuts what arrives into frames.
+        receive: called in the reading thread with the time of arrival (s, time.monotonic) and the frames.
+        baudrate: bits per second.
+        write_timeout: longest time a write may take, s.
+        lost: called once, in the reading thread, when the connection breaks.
+
+    Raises:
+        LinkError: (on open) no such port, or another program has it.
+    """
+
+    def __init__(
+        self,
+        port: str,
+        framing: Framing,
+        receive: Receive,
+        *,
+        baudrate: int = 115200,
+        write_timeout: float = 0.5,
+        lost: Callable[[], None] | None = None,
+    ) -> None:
+        self.port, self.framing = port, framing
+        self.received = 0
+        self.reconnections = 0
+        self.error: str | None = None
+        self.heard = time.monotonic()
+        self._receive, self._lost = receive, lost
+        self._baudrate, self._write_timeout = baudrate, write_timeout
+        self._writing = threading.RLock()  # a signal may strike while a write goes on, and stop the machine
+        self._serial: Any = None
+        self._reader: threading.Thread | None = None
+        self._closing = False
+
+    def open(self) -> Link:
+        """Open the port and begin to read; nothing is written."""
+        from serial import SerialException, serial_for_url
+
+        try:
+            self._serial = serial_for_url(
+                self.port,
+                do_not_open=True,
+                baudrate=self._baudrate,
+                timeout=0.05,
+                write_timeout=self._write_timeout,
+            )
+            if "://" not in self.port:
+                self._serial.exclusive = True
+            self._serial.open()
+        except (SerialException, OSError, ValueError) as error:
+            raise LinkError(f"cannot open {self.port}: {error}; {_advice(self.port)}") from error
+        self.error, self._closing = None, False
+        self.heard = time.monotonic()
+        self._reader = threading.Thread(target=self._read, name=f"link {self.port}", daemon=True)
+        self._reader.start()
+        return self
+
+    @property
+    def is_open(self) -> bool:
+        """True while bytes can be sent and received."""
+        return self._serial is not None and self.error is None
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Bytes received, good frames, garbage bytes, bad frames, reconnections."""
+        counts = self.framing.counts
+        return {
+            "bytes": self.received,
+            "frames": counts.frames,
+            "garbage": counts.garbage,
+            "bad": counts.bad,
+            "reconnections": self.reconnections,
+        }
+
+    def write(self, data: bytes) -> None:
+        """Send bytes; from any thread.
+
+        Raises:
+            LinkError: the connection is lost, or the device does not take the bytes in time.
+        """
+        from serial import SerialException
+
+        with self._writing:
+            if not self.is_open:
+                raise LinkError(self.error or f"{self.port} is not open")
+            try:
+                self._serial.write(data)
+            except (SerialException, OSError) as error:
+                self._break(f"{self.port}: cannot write ({error})")
+                raise LinkError(self.error or str(error)) from error
+
+    def reopen(self, within: float) -> bool:
+        """Try for some seconds to open the port again after it was lost; True if it is open now."""
+        until = time.monotonic() + within
+        self.close()
+        while time.monotonic() < until:
+            with suppress(LinkError):
+                self.open()
+                self.reconnections += 1
+                return True
+            time.sleep(0.05)
+        self.error = f"{self.port} did not come back within {within:g} s"
+        return False
+
+    def close(self) -> None:
+        """Let go of the port; never raises, may be called twice."""
+        self._closing = True
+        serial, self._serial = self._serial, None
+        if self._reader is not None and self._reader is not threading.current_thread():
+            self._reader.join(timeout=1.0)
+        if serial is not None:
+            with suppress(OSError):  # a port whose device is gone cannot be closed in good order
+                serial.close()
+
+    def _read(self) -> None:
+        from serial import SerialException
+
+        serial = self._serial
+        try:
+            while not self._closing:
+                data = serial.read(1)
+                if data:
+                    waiting = serial.in_waiting
+                    data += serial.read(waiting) if waiting else b""
+                    self._take(data)
+        except (SerialException, OSError, TypeError) as error:  # pyserial: TypeError if closed while it reads
+            if not self._closing:
+                self._break(f"{self.port}: connection lost ({error})")
+
+    def _take(self, data: bytes) -> None:
+        now = time.monotonic()
+        self.received += len(data)
+        frames = self.framing.feed(data)
+        if frames:
+            self.heard = now
+            self._receive(now, frames)
+
+    def _break(self, why: str) -> None:
+        first, self.error = self.error is None, self.error or f"{why}; check cable and power, then run again"
+        if first and self._lost is not None:
+            self._lost()
+
+    def __enter__(self) -> Link:
+        return self.open()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _advice(port: str) -> str:
+    from serial.tools.list_ports import comports
+
+    there = sorted(found.device for found in comports())
+    if port in there:
+        return "is another program using it, and may you read it (group dialout)?"
+    return f"ports that exist: {', '.join(there) or 'none'}"
