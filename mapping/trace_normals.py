@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from mapping.contact_row import ContactRow
 from mapping.cross_slope import CrossSlope, cross_slope
+from mapping.estimate import TOUCHED
 from mapping.sweep_mesh import parallel_rows
-from mapping.sweep_tangents import unit
+from mapping.sweep_tangents import lagrange, unit
 from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
@@ -35,10 +36,34 @@ def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple
     )
     lost = np.flatnonzero(np.isnan(slope.doubt))
     slope.tangents[lost], slope.doubt[lost] = _fitted(trace, lost, along[lost], outward[lost])
-    normals = unit(np.cross(row.tangents, slope.tangents[row.nearest]))
+    across = slope.tangents[row.nearest]
+    ends, samples, weights = _kink_sides(trace, row)
+    across[ends] = unit(np.einsum("km,kmc->kc", weights, slope.tangents[samples]))
+    normals = unit(np.cross(row.tangents, across))
     side = np.sign(np.einsum("ij,ij->i", normals, outward[row.nearest]))
     normals = np.where((side == 0)[:, None], row.normals, normals * side[:, None])
     return normals, slope.curvature[row.nearest], slope.doubt[row.nearest]
+
+
+def _kink_sides(trace: Trace, row: ContactRow) -> tuple[IntArray, IntArray, FloatArray]:
+    """How to continue a field of the samples to both sides of each interference point, from its own side.
+
+    Returns:
+        (K,) indices into the row, (K, 4) samples beside them on the same side, and (K, 4) weights.
+    """
+    ends = np.flatnonzero((row.sample < 0) & (row.labels == TOUCHED))
+    way = np.where(row.sample[ends - 1] >= 0, -1, 1)  # the first contact of a fan follows a sample
+    samples = row.nearest[ends][:, None] + way[:, None] * np.arange(4)
+    held = (samples >= 0) & (samples < len(trace))
+    samples = np.clip(samples, 0, len(trace) - 1)
+    held &= trace.sweep[samples] == trace.sweep[samples[:, :1]]
+    points = trace.centers[samples]
+    s = np.cumsum(np.linalg.norm(np.diff(points, axis=1, prepend=points[:, :1]), axis=2), axis=1)
+    before = -np.linalg.norm(row.centers[ends] - points[:, 0], axis=1)
+    # A kink beside the kink leaves too few samples: then the nearest must do.
+    straight = held.all(axis=1) & (np.abs(before) < 2 * s[:, 1]) & (np.diff(s, axis=1) > 0).all(axis=1)
+    safe = np.where(straight[:, None], s, np.arange(4.0))
+    return ends, samples, np.where(straight[:, None], lagrange(safe, before)[0], np.eye(4)[0])
 
 
 def _fitted(

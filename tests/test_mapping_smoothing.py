@@ -52,7 +52,7 @@ def test_the_noise_is_estimated_where_it_is_not_given(body):
 
 
 def test_the_predicted_noise_is_what_remains():
-    x, noisy = noisy_profile(BODIES["plane"], extent=0.3)
+    _, noisy = noisy_profile(BODIES["plane"], extent=0.3)
     smoothed = smooth(noisy, Noise(SIGMA))
     residual = smoothed.trace.centers[:, 2] - R
     inner = np.abs(smoothed.trace.centers[:, 0]) < 0.29
