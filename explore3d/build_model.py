@@ -65,10 +65,11 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
     features = _refine(features, trace, base, detections, settings, stages)
     estimate = _estimate(features, trace, base, detections, stages)
     curvature = _curvature(estimate, detections, stages)
-    model = ObjectModel.attach(base, features, provenance=_provenance(log, scene, settings, detections))
     truth = (
         tuple(TrueFeature(t.kind, t.axis, t.height, t.width, t.length or None) for t in scene.truth) if scene else ()
     )
+    model = ObjectModel.attach(base, features, provenance=_provenance(log, scene, settings, detections))
+    curve = _time_curve(model, truth, trace, detections, stages)
     return Analysis(
         title=(scene.title if scene else "") or ", ".join(log.sources),
         trace=trace,
@@ -83,6 +84,7 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
         timings=dict(stages.timings),
         left_out=tuple(stages.left_out),
         recovered=log.recovered,
+        time_curve=curve,
         tip_counts=_tip_counts(features, trace.tip_radius),
     )
 
@@ -155,16 +157,24 @@ def _curvature(estimate: Estimate | None, detections: Detections, stages: Stages
         why_not = "a single profile has no surface: its curvature is in the crossings"
     else:
         why_not = ""
-    from importlib.util import find_spec
-
-    if find_spec("mapping.curvature") is None:
-        return None
     if not stages.needed("curvature", why_not) or estimate is None or estimate.surface is None:
         return None
     from mapping.curvature import principal_curvatures
 
     with stages.stage("curvature"):
         return principal_curvatures(estimate.surface)
+
+
+def _time_curve(
+    model: ObjectModel, truth: tuple[TrueFeature, ...], trace: Trace, detections: Detections, stages: Stages
+) -> tuple[tuple[float, float], ...]:
+    why_not = "" if truth and model.features else "the truth is not known, or nothing was found"
+    if not stages.needed("error against time", why_not) or not truth or not model.features:
+        return ()
+    from explore3d.time_curve import time_curve
+
+    with stages.stage("error against time") as share:
+        return time_curve(detections, trace, model, truth, share)
 
 
 def _tip_counts(features: tuple[Feature, ...], tip_radius: float) -> tuple[TipCount, ...]:
