@@ -9,6 +9,7 @@ from mapping.chart import Chart, chart_along
 from mapping.curve_modes import CurveModes
 from mapping.feature import Feature
 from mapping.hollow_shape import GrooveShape
+from mapping.laplace import find_optima
 from mapping.priors import Normal, Prior, Uniform
 from mapping.problem import Problem, Sizes, Surroundings, pose, sizes_of, window_for
 from mapping.ridge_shape import RidgeShape
@@ -27,11 +28,40 @@ HIGHEST_MODE = 8
 
 
 def curve_problem(feature: Feature, around: Surroundings) -> Problem:
-    """Pose the posterior of a ridge, groove or step."""
+    """Pose the posterior of a ridge, groove or step.
+
+    The axis gets the freedom that its crossings ask for; if that is more than a straight course over the base, the
+    straight one is tried too and kept unless the trace itself speaks against it (BIC).
+    """
     sizes = sizes_of(feature, around.trace.tip_radius)
     axis, normals, crossings = _axis_of(feature, sizes, around)
     line, degree = smooth_axis(axis, sizes.position_sd)
-    lift = _normals_along(line, axis, normals)
+    bent = _posed(feature, sizes, axis, _normals_along(line, axis, normals), line, degree, crossings, around)
+    if degree == 1 or bool(np.array_equal(axis[0], axis[-1])):
+        return bent
+    line, _ = smooth_axis(axis, sizes.position_sd, most=1)
+    straight = _posed(feature, sizes, axis, _normals_along(line, axis, normals), line, 1, crossings, around)
+    freedom = len(bent.target.shape.start) - len(straight.target.shape.start)
+    gain = _best_fit(bent) - _best_fit(straight)
+    return bent if gain > 0.5 * max(freedom, 1) * float(np.log(len(bent.window))) else straight
+
+
+def _best_fit(problem: Problem) -> float:
+    """Log likelihood at the optimum nearest to the detection."""
+    best = find_optima(problem.target, problem.beginnings[:1])[0]
+    return float(problem.target.likelihood.log_density(problem.target.templates(best[None]))[0])
+
+
+def _posed(
+    feature: Feature,
+    sizes: Sizes,
+    axis: FloatArray,
+    lift: FloatArray,
+    line: FloatArray,
+    degree: int,
+    crossings: int,
+    around: Surroundings,
+) -> Problem:
     chart = _chart(line, lift, feature, sizes, crossings, degree, around)
     ends = chart.coordinates(axis[[0, -1]])[0]
     modes = _modes(chart, ends, degree, crossings, sizes)

@@ -17,7 +17,7 @@ from mapping.section import radius_of_cap
 from mapping.shapes import contact_half_width
 from mapping.target import Shape, Target
 from mapping.trace import Trace
-from mapping.window import Window, open_window
+from mapping.window import Window, bin_samples, gather
 
 FloatArray = NDArray[np.float64]
 
@@ -115,10 +115,11 @@ def window_for(crest: FloatArray, sizes: Sizes, around: Surroundings) -> Window:
     """The bins near a crest polyline (K, 3) on the base, lifted by the caller to the ball's centre, m."""
     width = sizes.half_width / BINS_PER_HALF_WIDTH
     reach = REACH * sizes.half_width + 2.0 * sizes.position_sd
-    window = open_window(around.trace, around.base, crest, reach, width, around.noise.sd, sizes.half_width)
+    samples = gather(around.trace, around.base, crest, reach)
+    window = bin_samples(samples, width, around.noise.sd, sizes.half_width)
     if len(window) > MOST_BINS:
         coarser = min(width * len(window) / MOST_BINS, sizes.half_width / 8.0)
-        window = open_window(around.trace, around.base, crest, reach, coarser, around.noise.sd, sizes.half_width)
+        window = bin_samples(samples, coarser, around.noise.sd, sizes.half_width)
     return window
 
 

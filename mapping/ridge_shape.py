@@ -16,8 +16,9 @@ from mapping.window import Window
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# Legs of the chart on either side of the nearest one that a bin looks at.
-NEIGHBOURS = 2
+# A bin looks at the legs of the chart within this share of a tip radius of the one nearest to it: an axis that is
+# turned a little against the chart is nearest at a place a little further along.
+LOOK_AROUND = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,8 @@ class RidgeShape:
     @cached_property
     def _candidates(self) -> tuple[IntArray, IntArray]:
         leg = self.chart.coordinates(self.window.feet)[2]
-        return np.maximum(leg - NEIGHBOURS, 0), np.minimum(leg + 1 + NEIGHBOURS, len(self.chart.s) - 1)
+        neighbours = 1 + int(LOOK_AROUND * self.tip_radius / float(np.diff(self.chart.s).mean()))
+        return np.maximum(leg - neighbours, 0), np.minimum(leg + 1 + neighbours, len(self.chart.s) - 1)
 
 
 def _lifted(

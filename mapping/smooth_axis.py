@@ -12,12 +12,13 @@ HIGHEST_DEGREE = 8
 POOR = 9.0
 
 
-def smooth_axis(axis: FloatArray, sd: float) -> tuple[FloatArray, int]:
+def smooth_axis(axis: FloatArray, sd: float, most: int = HIGHEST_DEGREE) -> tuple[FloatArray, int]:
     """A polyline (K', 3) along polynomials (closed axis: Fourier series) of the degree with the best evidence.
 
     Args:
         axis: (K, 3) crossings in order, m; first equals last if closed.
         sd: standard deviation of a crossing, m.
+        most: highest degree to try; a single one is taken whether it fits or not.
 
     Returns:
         The smoothed polyline and its degree; the axis itself and the highest degree if none fits.
@@ -25,14 +26,14 @@ def smooth_axis(axis: FloatArray, sd: float) -> tuple[FloatArray, int]:
     closed = len(axis) > 3 and bool(np.array_equal(axis[0], axis[-1]))
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1))])
     points = len(axis) - 1 if closed else len(axis)
-    most = (points - 2) // 2 if closed else points - 2
     lowest = 1
+    most = min((points - 2) // 2 if closed else points - 2, most)
     if most < lowest:
         return axis, lowest
     x = s / s[-1] * 2.0 - 1.0
     dense = np.linspace(-1.0, 1.0, max(2, 4 * len(axis), 65 if closed else 2))
     best, best_cost, best_misfit = lowest, np.inf, np.inf
-    for degree in range(lowest, min(most, HIGHEST_DEGREE) + 1):
+    for degree in range(lowest, most + 1):
         design = _design(x[:points], degree, closed)
         coefficients = np.linalg.lstsq(design, axis[:points], rcond=None)[0]
         # Two of the three coordinates are across the axis; the third is the order of the crossings, not a datum.
@@ -41,8 +42,8 @@ def smooth_axis(axis: FloatArray, sd: float) -> tuple[FloatArray, int]:
         if cost < best_cost:
             best, best_cost, best_misfit = degree, cost, misfit / (2 * points)
             curve = _design(dense, degree, closed) @ coefficients
-    if best_misfit > POOR:
-        return axis, min(most, HIGHEST_DEGREE)
+    if best_misfit > POOR and most > lowest:
+        return axis, most
     if closed:
         curve[-1] = curve[0]
     return curve, best

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.base import Base
+from mapping.base import Base, Feet
 from mapping.errors import MappingError
 from mapping.trace import Trace
 
@@ -79,19 +79,22 @@ def samples_near(trace: Trace, points: FloatArray, reach: float) -> IntArray:
     return np.asarray(index[np.isfinite(distance)])
 
 
-def open_window(
-    trace: Trace, base: Base, points: FloatArray, reach: float, width: float, noise_level: float, scale: float
-) -> Window:
-    """Bin the samples near a feature.
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """The raw samples near a feature: feet on the base, and the first sample of each run after the first."""
+
+    feet: Feet
+    breaks: IntArray
+
+
+def gather(trace: Trace, base: Base, points: FloatArray, reach: float) -> Samples:
+    """The samples near a feature; the cost of the rest of the trace is one look at the boxes of its blocks.
 
     Args:
-        trace: the whole trace; the cost beyond the window is one look at the boxes of its blocks.
+        trace: the whole trace.
         base: the global model.
         points: (K, 3) crest of the feature lifted to the ball's centre, densely spaced, m.
         reach: distance from it that still counts, m.
-        width: wanted length of a bin along the sweep, m.
-        noise_level: standard deviation of a sample, m: how far the path can be trusted.
-        scale: half width of the feature's disturbance, m: the path is smooth over a small part of it.
 
     Raises:
         EmptyWindowError: no sample is near.
@@ -102,14 +105,36 @@ def open_window(
             f"no sample of the trace ({len(trace)} in all) lies within {reach:.3g} m of the feature at "
             f"{np.array2string(points.mean(axis=0), precision=6)} m"
         )
-    feet = base.foot(trace.centers[index], trace.tip_radius)
-    breaks = np.flatnonzero((np.diff(trace.sweep[index]) != 0) | (np.diff(index) > 1)) + 1
+    index, breaks = _whole_runs(index, trace.sweep)
+    return Samples(base.foot(trace.centers[index], trace.tip_radius), breaks)
+
+
+def bin_samples(samples: Samples, width: float, noise_level: float, scale: float) -> Window:
+    """Bin samples along their runs.
+
+    Args:
+        samples: what `gather` found.
+        width: wanted length of a bin along the sweep, m.
+        noise_level: standard deviation of a sample, m: how far the path can be trusted.
+        scale: half width of the feature's disturbance, m: the path is smooth over a small part of it.
+    """
+    feet, count = samples.feet, len(samples.feet.height)
     runs = []
-    for start, stop in zip([0, *breaks], [*breaks, len(index)], strict=True):
+    for start, stop in zip([0, *samples.breaks], [*samples.breaks, count], strict=True):
         own = slice(int(start), int(stop))
         path = distance_along(feet.points[own], noise_level)
         runs.append(_bin(feet.points[own], feet.normals[own], feet.height[own], path, width, noise_level, scale))
     return _join(runs)
+
+
+def _whole_runs(index: IntArray, sweep: IntArray) -> tuple[IntArray, IntArray]:
+    """Indices with short gaps closed (noise scatters samples about the rim of a window), and where runs begin."""
+    gaps = np.flatnonzero((np.diff(index) > BLOCK) | (np.diff(sweep[index]) != 0))
+    firsts, lasts = index[np.append(0, gaps + 1)], index[np.append(gaps, len(index) - 1)]
+    sizes = lasts - firsts + 1
+    begins = np.cumsum(sizes) - sizes
+    whole = np.arange(int(sizes.sum())) + np.repeat(firsts - begins, sizes)
+    return whole, begins[1:]
 
 
 def _join(runs: list[Window]) -> Window:
@@ -201,13 +226,20 @@ def _without_spikes(
 
 
 def _smooth(values: FloatArray, width: float, scale: float) -> FloatArray:
-    """Local parabolas over a quarter of the feature's half width: the path's own noise goes, its course stays."""
-    from scipy.signal import savgol_filter
+    """Local parabolas over a quarter of the feature's half width: the path's own noise goes, its course stays.
 
+    The filter of Savitzky & Golay (1964); at both ends the parabola of the outermost stretch is read off.
+    """
     half = min(int(0.25 * scale / width), (len(values) - 1) // 2)
     if half < 2:
         return values
-    return np.asarray(savgol_filter(values, 2 * half + 1, 2, axis=0))
+    powers = np.arange(-half, half + 1)[:, None] ** np.arange(3.0)
+    fit = np.linalg.pinv(powers)
+    count = 2 * half + 1
+    middle = np.column_stack([np.convolve(column, fit[0][::-1], mode="valid") for column in values.T])
+    first = powers[:half] @ (fit @ values[:count])
+    final = powers[half + 1 :] @ (fit @ values[-count:])
+    return np.concatenate([first, middle, final])
 
 
 def _tangents(feet: FloatArray) -> FloatArray:
