@@ -10,12 +10,28 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from mapping.vector_kernels import dot, moved
+
 WIDTH = 16
 STACK = 512  # 32 bit numbers of triangles make at most 8 levels, each leaving at most 15 lanes waiting
 ROUNDING = 6e-6  # what float32 boxes and paths may be off by, in lengths of the scaled body
 NOWHERE = 1e18  # a box that no path comes near
 
 F4 = np.float32
+
+
+@njit(cache=True, error_model="numpy")
+def bounds(vertices, faces):  # type: ignore[no-untyped-def]
+    """(2, 3) smallest and largest coordinates of the vertices that faces use."""
+    box = np.empty((2, 3))
+    for k in range(3):
+        box[0, k] = box[1, k] = vertices[faces[0, 0], k]
+    for i in range(len(faces)):
+        for j in range(3):
+            for k in range(3):
+                x = vertices[faces[i, j], k]
+                box[0, k], box[1, k] = min(box[0, k], x), max(box[1, k], x)
+    return box
 
 
 @njit(cache=True, error_model="numpy")
@@ -91,8 +107,8 @@ def build_boxes(rows):  # type: ignore[no-untyped-def]
 
     Returns:
         boxes: (M, 6, WIDTH) float32, smallest and largest coordinates of each lane.
-        children: (M,) int32: the node in lane 0 (others follow); of a leaf -1 - the triangle in lane 0.
-        lanes: (M,) int32, number of lanes in use.
+        links: (M, 2) int32: node in lane 0 (the others follow) or, of a leaf, whose lanes hold triangles, -1 - the
+            first of them; number of lanes in use.
     """
     leaves = (len(rows) + WIDTH - 1) // WIDTH
     total, level = leaves, leaves
@@ -100,63 +116,106 @@ def build_boxes(rows):  # type: ignore[no-untyped-def]
         level = (level + WIDTH - 1) // WIDTH
         total += level
     boxes = np.full((total, 6, WIDTH), F4(NOWHERE))
-    children, lanes = np.empty(total, np.int32), np.empty(total, np.int32)
+    links = np.empty((total, 2), np.int32)
     for i in range(len(rows)):
         for k in range(3):
             a, b, c = rows[i, k], rows[i, 3 + k], rows[i, 6 + k]
             boxes[i // WIDTH, k, i % WIDTH], boxes[i // WIDTH, 3 + k, i % WIDTH] = min(a, b, c), max(a, b, c)
     for i in range(leaves):
-        children[i], lanes[i] = -1 - WIDTH * i, min(WIDTH, len(rows) - WIDTH * i)
+        links[i, 0], links[i, 1] = -1 - WIDTH * i, min(WIDTH, len(rows) - WIDTH * i)
     below, first, count = 0, leaves, leaves
     while count > 1:
         for i in range(count):
-            enclose(boxes[below + i], lanes[below + i], boxes[first + i // WIDTH], i % WIDTH)
+            enclose(boxes, below + i, links[below + i, 1], first + i // WIDTH, i % WIDTH)
         parents = (count + WIDTH - 1) // WIDTH
         for i in range(parents):
-            children[first + i], lanes[first + i] = below + WIDTH * i, min(WIDTH, count - WIDTH * i)
+            links[first + i, 0], links[first + i, 1] = below + WIDTH * i, min(WIDTH, count - WIDTH * i)
         below, first, count = first, first + parents, parents
-    return boxes, children, lanes
+    return boxes, links
 
 
 @njit(cache=True, error_model="numpy")
-def enclose(box, lanes, parent, lane):  # type: ignore[no-untyped-def]
+def enclose(boxes, node, lanes, parent, lane):  # type: ignore[no-untyped-def]
     """Write the box around all lanes of a node into a lane of its parent."""
     for k in range(3):
-        low, high = box[k, 0], box[3 + k, 0]
+        low, high = boxes[node, k, 0], boxes[node, 3 + k, 0]
         for i in range(1, lanes):
-            low, high = min(low, box[k, i]), max(high, box[3 + k, i])
-        parent[k, lane], parent[3 + k, lane] = low, high
+            low, high = min(low, boxes[node, k, i]), max(high, boxes[node, 3 + k, i])
+        boxes[parent, k, lane], boxes[parent, 3 + k, lane] = low, high
 
 
 @njit(cache=True, error_model="numpy")
-def lane_tests(box, start, end, d, length, reach, missed, late):  # type: ignore[no-untyped-def]
-    """Test a node's lanes against a ball on its way from `start` along the unit vector d to `end`.
+def lane_tests(boxes, node, end, d, reach, apart, late):  # type: ignore[no-untyped-def]
+    """Look from the end of a ball's way, along the unit vector d, at the boxes of a node's lanes.
 
-    missed: (WIDTH,) out, positive where the ball surely stays further than `reach` from the lane's box.
-        Three separating planes are tried: across the box's point closest to the end of the way, across
-        that closest to its start, and along the way.
+    apart: (WIDTH,) out, squared distance from `end` of a box that lies ahead, so that the rest of the way
+        is further from it still; -1 if it lies behind, and the way may have been closer to it.
     late: (WIDTH,) out, larger where the ball would meet the middle of the box later (to the second order).
     """
-    sx, sy, sz, ex, ey, ez = F4(start[0]), F4(start[1]), F4(start[2]), F4(end[0]), F4(end[1]), F4(end[2])
-    dx, dy, dz, way = F4(d[0]), F4(d[1]), F4(d[2]), F4(length)
-    reach4, zero, half = F4(reach + ROUNDING), F4(0.0), F4(0.5)
-    square = reach4 * reach4
-    for i in range(box.shape[1]):  # a count unknown to the compiler: constant ones are unrolled, not vectorised
-        ax, ay, az, bx, by, bz = box[0, i], box[1, i], box[2, i], box[3, i], box[4, i], box[5, i]
+    ex, ey, ez, dx, dy, dz = F4(end[0]), F4(end[1]), F4(end[2]), F4(d[0]), F4(d[1]), F4(d[2])
+    zero, half, twice = F4(0.0), F4(0.5), F4(2.0 * reach)
+    for i in range(boxes.shape[2]):  # a count unknown to the compiler: constant ones are unrolled, not vectorised
+        ax, ay, az = boxes[node, 0, i], boxes[node, 1, i], boxes[node, 2, i]
+        bx, by, bz = boxes[node, 3, i], boxes[node, 4, i], boxes[node, 5, i]
         nx = max(ax - ex, zero) - max(ex - bx, zero)
         ny = max(ay - ey, zero) - max(ey - by, zero)
         nz = max(az - ez, zero) - max(ez - bz, zero)
-        at_end = nx * nx + ny * ny + nz * nz if nx * dx + ny * dy + nz * dz >= zero else zero
-        nx = max(ax - sx, zero) - max(sx - bx, zero)
-        ny = max(ay - sy, zero) - max(sy - by, zero)
-        nz = max(az - sz, zero) - max(sz - bz, zero)
-        at_start = nx * nx + ny * ny + nz * nz if nx * dx + ny * dy + nz * dz <= zero else zero
+        apart[i] = nx * nx + ny * ny + nz * nz if nx * dx + ny * dy + nz * dz >= zero else F4(-1.0)
         lx, ly, lz = half * (ax + bx) - ex, half * (ay + by) - ey, half * (az + bz) - ez
         along = lx * dx + ly * dy + lz * dz
-        lx, ly, lz = lx - along * dx, ly - along * dy, lz - along * dz
-        lateral = lx * lx + ly * ly + lz * lz
-        width = half * (abs(lx) * (bx - ax) + abs(ly) * (by - ay) + abs(lz) * (bz - az))
-        gap = lateral - width - way * abs(lx * dx + ly * dy + lz * dz)  # the last term: l is across d to rounding only
-        aside = gap * gap - square * lateral if gap > zero else -square
-        missed[i] = max(max(at_end, at_start) - square, aside)
-        late[i] = (reach4 + reach4) * along + lateral
+        late[i] = lx * lx + ly * ly + lz * lz + (twice - along) * along
+
+
+@njit(cache=True, error_model="numpy")
+def passes(boxes, node, lane, start, end, d, length, reach):  # type: ignore[no-untyped-def]
+    """True if a ball on its way from `start` to `end` surely stays further than `reach` from a lane's box.
+
+    Two more separating planes are tried: across the box's point closest to the start, and along the way.
+    """
+    low = (boxes[node, 0, lane], boxes[node, 1, lane], boxes[node, 2, lane])
+    high = (boxes[node, 3, lane], boxes[node, 4, lane], boxes[node, 5, lane])
+    n = (
+        max(low[0] - start[0], 0.0) - max(start[0] - high[0], 0.0),
+        max(low[1] - start[1], 0.0) - max(start[1] - high[1], 0.0),
+        max(low[2] - start[2], 0.0) - max(start[2] - high[2], 0.0),
+    )
+    if dot(n, d) <= 0.0 and dot(n, n) > reach * reach:
+        return True
+    middle = (0.5 * (low[0] + high[0]) - end[0], 0.5 * (low[1] + high[1]) - end[1], 0.5 * (low[2] + high[2]) - end[2])
+    aside = moved(middle, -dot(middle, d), d)
+    half = 0.5 * (
+        abs(aside[0]) * (high[0] - low[0]) + abs(aside[1]) * (high[1] - low[1]) + abs(aside[2]) * (high[2] - low[2])
+    )
+    square = dot(aside, aside)
+    gap = square - half - length * abs(dot(aside, d))  # the last: aside is across d to rounding only
+    return gap > 0.0 and gap * gap > reach * reach * square
+
+
+@njit(cache=True, error_model="numpy")
+def push_lanes(boxes, links, stack, waiting, start, end, d, length, reach, apart, late):  # type: ignore[no-untyped-def]
+    """Replace the node on top of the stack by the lanes that a ball on its way may touch, the earliest on top.
+
+    Returns the new height of the stack. Numbers from 0 up are nodes; -1 - i is triangle i.
+    """
+    node = stack[waiting - 1]
+    child, lanes = links[node, 0], links[node, 1]
+    step = 1 if child >= 0 else -1
+    reach += ROUNDING
+    lane_tests(boxes, node, end, d, reach, apart, late)
+    bottom, square = waiting - 1, F4(reach * reach)
+    end_of_lanes = bottom
+    for lane in range(lanes):  # without a branch, which nobody could predict
+        stack[end_of_lanes] = lane
+        end_of_lanes += apart[lane] <= square
+    waiting = bottom
+    for i in range(bottom, end_of_lanes):
+        lane = stack[i]
+        if apart[lane] < F4(0.0) and passes(boxes, node, lane, start, end, d, length, reach):
+            continue
+        place = waiting
+        while step > 0 and place > bottom and late[stack[place - 1] - child] < late[lane]:
+            stack[place] = stack[place - 1]
+            place -= 1
+        stack[place] = child + step * lane
+        waiting += 1
+    return waiting

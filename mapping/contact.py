@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -79,7 +78,7 @@ class BallContact:
 
         self.surface = surface
         self.tip_radius = _checked_radius(tip_radius)
-        low, high = surface.bounds
+        low, high = bvh_kernels.bounds(surface.vertices, surface.faces)
         extent = float((0.5 * high - 0.5 * low).max()) * 2.0
         if not np.isfinite(extent) or self.tip_radius < 1e-13 * extent:
             raise ContactError(
@@ -93,7 +92,7 @@ class BallContact:
         vertices = self._to_body(surface.vertices)
         order = bvh_kernels.leaf_order(vertices, surface.faces)
         rows = contact_kernels.lay_out(vertices, surface.faces, order)
-        self._size = float(np.sqrt((rows[:, :9].reshape(-1, 3) ** 2).sum(axis=1).max()))
+        self._size = float(np.linalg.norm(np.abs(self._to_body(np.stack([low, high]))).max(axis=0)))
         radius = float(np.ldexp(self.tip_radius, -exponent))
         graze = 32 * float(np.finfo(float).eps) * (self._size + radius)
         self._ball = (radius, radius * (1.0 + contact_kernels.TOUCH) + graze, graze)
@@ -116,12 +115,20 @@ class BallContact:
 
         start = checked_points(origins, "origins")
         way = unit_directions(directions, len(start))
-        out = _empty_contacts(len(start))
-        state = np.zeros(len(start), np.int8)
+        where, feature = np.empty((len(start), 3, 3)), np.empty(len(start), np.int8)
+        count, distance, state = np.empty(len(start), np.int64), np.empty(len(start)), np.empty(len(start), np.int8)
         contact_kernels.first_contacts(
-            self._body, self._ball, self._size, self._to_body(start), way, *out.values(), state
+            *self._body, self._ball, self._size, self._to_body(start), way, where, feature, count, distance, state
         )
-        return self._contacts(out, state == contact_kernels.OVERLAPS)
+        return Contacts(
+            np.ldexp(where[:, 0], self._exponent) + self._center,
+            np.ldexp(where[:, 1], self._exponent) + self._center,
+            where[:, 2].copy(),
+            feature,
+            count,
+            np.ldexp(distance, self._exponent),
+            state == contact_kernels.OVERLAPS,
+        )
 
     def slide(self, path: ArrayLike, approach: ArrayLike, spacing: float) -> Contacts:
         """Where the ball rests while it follows a commanded path and is pressed along the approach.
@@ -147,8 +154,9 @@ class BallContact:
 
         commanded, way = sample_path(path, approach, spacing)
         back = np.empty(len(commanded))
+        rows, _, boxes, links = self._body
         retreat_kernels.retreats(
-            self._body, self._ball, self._size, self._outward, self._to_body(commanded), -way, back
+            rows, boxes, links, self._ball, self._size, self._outward, self._to_body(commanded), -way, back
         )
         back = np.ldexp(back, self._exponent)
         rest = self.first_contact(commanded - back[:, None] * way, way)
@@ -165,26 +173,9 @@ class BallContact:
     def _to_body(self, points: FloatArray) -> FloatArray:
         return np.asarray(np.ldexp(points - self._center, -self._exponent))
 
-    def _contacts(self, out: dict[str, Any], overlap: NDArray[np.bool_]) -> Contacts:
-        for name in ("centers", "points"):
-            out[name] = np.ldexp(out[name], self._exponent) + self._center
-        out["distance"] = np.ldexp(out["distance"], self._exponent)
-        return Contacts(**out, overlap=overlap)
-
 
 def _checked_radius(tip_radius: float) -> float:
     radius = float(tip_radius)
     if not (np.isfinite(radius) and radius > 0):
         raise ContactError(f"tip radius must be a positive length in metres; found {tip_radius!r}")
     return radius
-
-
-def _empty_contacts(count: int) -> dict[str, Any]:
-    return {
-        "centers": np.empty((count, 3)),
-        "points": np.empty((count, 3)),
-        "normals": np.empty((count, 3)),
-        "feature": np.empty(count, np.int8),
-        "count": np.empty(count, np.int64),
-        "distance": np.empty(count),
-    }

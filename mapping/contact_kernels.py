@@ -1,7 +1,7 @@
 """The first contact of a moving ball with many triangles (numba).
 
 Lengths are in the body's own frame: centred, and scaled so that the larger of body and ball is about 1.
-A `body` is the tuple (rows (F, 13), order (F,), boxes, children, lanes): a row holds a triangle's corners, its
+A Row i of `rows` (F, 13) holds a triangle's corners, its
 unit normal and a third of its longest side squared. A `ball` is (radius, reach, graze): it touches what is
 within its reach, and passes what it would sink into by less than `graze`.
 """
@@ -13,7 +13,7 @@ from math import inf, nan, sqrt
 import numpy as np
 from numba import njit
 
-from mapping.bvh_kernels import STACK, WIDTH, lane_tests
+from mapping.bvh_kernels import STACK, WIDTH, push_lanes
 from mapping.triangle_kernels import closest_on_triangle, sweep_triangle, unit_normal
 from mapping.vector_kernels import cross, dot, moved, scaled, sub, vector
 
@@ -32,7 +32,7 @@ def lay_out(vertices, faces, order):  # type: ignore[no-untyped-def]
         for j in range(3):
             for k in range(3):
                 rows[i, 3 * j + k] = vertices[faces[order[i], j], k]
-        a, b, c = vector(rows[i, 0:3]), vector(rows[i, 3:6]), vector(rows[i, 6:9])
+        a, b, c, _ = corners(rows, i, (0.0, 0.0, 0.0))
         rows[i, 9], rows[i, 10], rows[i, 11] = unit_normal(a, b, c)
         u, v, w = sub(b, a), sub(c, b), sub(a, c)
         rows[i, 12] = max(dot(u, u), dot(v, v), dot(w, w)) / 3.0
@@ -40,155 +40,115 @@ def lay_out(vertices, faces, order):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def corners(row, o):  # type: ignore[no-untyped-def]
+def corners(rows, i, o):  # type: ignore[no-untyped-def]
     """Corners of a triangle relative to o, and its normal."""
-    a = (row[0] - o[0], row[1] - o[1], row[2] - o[2])
-    b = (row[3] - o[0], row[4] - o[1], row[5] - o[2])
-    c = (row[6] - o[0], row[7] - o[1], row[8] - o[2])
-    return a, b, c, (row[9], row[10], row[11])
+    a = (rows[i, 0] - o[0], rows[i, 1] - o[1], rows[i, 2] - o[2])
+    b = (rows[i, 3] - o[0], rows[i, 4] - o[1], rows[i, 5] - o[2])
+    c = (rows[i, 6] - o[0], rows[i, 7] - o[1], rows[i, 8] - o[2])
+    return a, b, c, (rows[i, 9], rows[i, 10], rows[i, 11])
 
 
 @njit(cache=True, error_model="numpy")
-def closest(row, o):  # type: ignore[no-untyped-def]
+def closest(rows, i, o):  # type: ignore[no-untyped-def]
     """Point of a triangle closest to o, relative to o."""
-    a, b, c, n = corners(row, o)
+    a, b, c, n = corners(rows, i, o)
     return closest_on_triangle(a, b, c, n)
 
 
 @njit(cache=True, error_model="numpy")
-def sweep(row, o, d, radius, graze):  # type: ignore[no-untyped-def]
+def sweep(rows, i, o, d, radius, graze):  # type: ignore[no-untyped-def]
     """(enter, leave) of a triangle, for a ball that starts at o and moves along d."""
-    a, b, c, n = corners(row, o)
+    a, b, c, n = corners(rows, i, o)
     return sweep_triangle(a, b, c, n, d, radius, graze)
 
 
 @njit(cache=True, error_model="numpy")
-def stays_clear(row, end, d, reach):  # type: ignore[no-untyped-def]
+def stays_clear(rows, i, end, d, reach):  # type: ignore[no-untyped-def]
     """True if a ball on its way along d to `end` surely stays further than `reach` from a triangle.
 
     Cheap and, on fine meshes, sharp: for p = sum w_i v_i, |p|^2 = sum w_i |v_i|^2 - sum w_i w_j |v_i - v_j|^2,
     and the last sum is at most a third of the longest side squared. Else the triangle's plane must do.
     """
-    a, b, c, n = corners(row, end)
+    a, b, c, n = corners(rows, i, end)
     square = reach * reach
-    if min(dot(a, d), dot(b, d), dot(c, d)) >= 0.0 and min(dot(a, a), dot(b, b), dot(c, c)) - row[12] > square:
+    if min(dot(a, d), dot(b, d), dot(c, d)) >= 0.0 and min(dot(a, a), dot(b, b), dot(c, c)) - rows[i, 12] > square:
         return True
     height = dot(a, n)
     return height * height > square and height * dot(d, n) >= 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def meet(row, o, d, ball):  # type: ignore[no-untyped-def]
+def meet(rows, i, o, d, ball):  # type: ignore[no-untyped-def]
     """When a ball free at o meets the triangle: t >= 0, inf if never, -1 if it overlaps it at the start."""
     radius, _, graze = ball
-    enter, leave = sweep(row, o, d, radius, graze)
+    enter, leave = sweep(rows, i, o, d, radius, graze)
     if leave < 0.0:
         return inf
     if enter >= 0.0:
         return enter
-    p = closest(row, o)
+    p = closest(rows, i, o)
     if sqrt(dot(p, p)) < radius * (1.0 - TOUCH) - graze:
         return -1.0
     return 0.0 if dot(p, d) > 0.0 else inf  # resting on it: pressed in, or moving away
 
 
 @njit(cache=True, error_model="numpy")
-def first_touch(body, ball, o, d, far, guess, near, stack, missed, late):  # type: ignore[no-untyped-def]
+def first_touch(rows, boxes, links, ball, o, d, far, guess, near, stack, apart, late):  # type: ignore[no-untyped-def]
     """Search for the earliest contact before `far`, triangle `guess` first.
 
-    Returns (t, triangle or -1, near, kept): near[:kept] are all triangles that may touch at t.
+    Returns (t, triangle or -1, kept): near[:kept] are all triangles that may touch at t.
     t = -1: the ball overlaps the triangle at the start.
     """
-    rows, _, boxes, children, lanes = body
     radius, reach, graze = ball
     best, hit, kept = far, -1, 0
     if guess >= 0:
-        t = meet(rows[guess], o, d, ball)
+        t = meet(rows, guess, o, d, ball)
         if t < best:
             best, hit = t, guess
     end = moved(o, best, d)
     stack[0] = len(boxes) - 1
-    waiting = 1 if best >= 0.0 else 0
-    while waiting > 0:
+    waiting = 1
+    while waiting > 0 and best >= 0.0:
+        i = -1 - stack[waiting - 1]
+        if i < 0:
+            waiting = push_lanes(boxes, links, stack, waiting, o, end, d, best, reach, apart, late)
+            continue
         waiting -= 1
-        node = stack[waiting]
-        lane_tests(boxes[node], o, end, d, best, reach, missed, late)
-        child = children[node]
-        if child >= 0:
-            waiting = push_in_order(stack, waiting, child, lanes[node], missed, late)
+        if stays_clear(rows, i, end, d, reach):
             continue
-        for lane in range(lanes[node]):
-            i = lane - child - 1
-            if missed[lane] > 0.0 or stays_clear(rows[i], end, d, reach):
-                continue
-            p = closest(rows[i], end)
-            gap = sqrt(dot(p, p))
-            ahead = dot(p, d) >= 0.0
-            if ahead and gap > reach:
-                continue
-            if not (ahead and gap >= radius - graze):  # else it is only just touched, or less
-                t = meet(rows[i], o, d, ball)
-                if t < best:
-                    best, hit = t, i
-                    end = moved(o, best, d)
-                    if t < 0.0:
-                        return best, hit, near, 0
-            near, kept = keep(rows, near, kept, i, end, reach)
-    return best, hit, near, kept
-
-
-@njit(cache=True, error_model="numpy")
-def push_in_order(stack, waiting, child, lanes, missed, late):  # type: ignore[no-untyped-def]
-    """Push the lanes that are not surely missed, the earliest on top; return the new height of the stack."""
-    bottom = waiting
-    for lane in range(lanes):
-        if missed[lane] > 0.0:
+        p = closest(rows, i, end)
+        gap = sqrt(dot(p, p))
+        ahead = dot(p, d) >= 0.0
+        if ahead and gap > reach:
             continue
-        place = waiting
-        while place > bottom and late[stack[place - 1] - child] < late[lane]:
-            stack[place] = stack[place - 1]
-            place -= 1
-        stack[place] = child + lane
-        waiting += 1
-    return waiting
+        if not (ahead and gap >= radius - graze):  # else it is only just touched, or less
+            t = meet(rows, i, o, d, ball)
+            if t < best:
+                best, hit = t, i
+                end = moved(o, best, d)
+        near[kept] = i
+        kept += 1
+    return best, hit, kept
 
 
 @njit(cache=True, error_model="numpy")
-def keep(rows, near, kept, triangle, end, reach):  # type: ignore[no-untyped-def]
-    """Append a triangle to the list of near ones; when it is full, sift it, and if that fails lengthen it."""
-    if kept == len(near):
-        stay = 0
-        for i in range(kept):
-            p = closest(rows[near[i]], end)
-            if dot(p, p) <= reach * reach:
-                near[stay] = near[i]
-                stay += 1
-        kept = stay
-        if 2 * kept > len(near):
-            near = np.concatenate((near, near))
-    near[kept] = triangle
-    return near, kept + 1
-
-
-@njit(cache=True, error_model="numpy")
-def polish(row, o, d, ball):  # type: ignore[no-untyped-def]
+def polish(rows, i, o, d, ball):  # type: ignore[no-untyped-def]
     """How much further along d a ball that all but touches the triangle rests on it exactly."""
-    p = closest(row, o)
+    p = closest(rows, i, o)
     gap = sqrt(dot(p, p))
     cosine = dot(p, d) / gap
     if cosine > 0.1:
         return (gap - ball[0]) / cosine
-    enter, _ = sweep(row, o, d, ball[0], 0.0)
+    enter, _ = sweep(rows, i, o, d, ball[0], 0.0)
     return enter if abs(enter) <= 1e-6 * ball[0] else 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def holder(body, near, kept, hit, o, ball):  # type: ignore[no-untyped-def]
+def holder(rows, order, near, kept, hit, o, ball):  # type: ignore[no-untyped-def]
     """Of the triangles touched to rounding, the face of the lowest number: no order of search can change it."""
-    rows, order = body[0], body[1]
     for i in range(kept):
         if order[near[i]] < order[hit]:
-            p = closest(rows[near[i]], o)
+            p = closest(rows, near[i], o)
             if sqrt(dot(p, p)) <= ball[0] + 2.0 * ball[2]:
                 hit = near[i]
     return hit
@@ -201,10 +161,10 @@ def count_contacts(rows, near, kept, first, o, ball, points):  # type: ignore[no
     found = 1
     points[0, 0], points[0, 1], points[0, 2] = first
     for i in range(kept):
-        p = closest(rows[near[i]], o)
+        p = closest(rows, near[i], o)
         new = found < MOST and dot(p, p) <= ball[1] * ball[1]
         for j in range(found):
-            w = sub(p, vector(points[j]))
+            w = sub(p, vector(points, j))
             new = new and dot(w, w) > apart * apart
         if new:
             points[found, 0], points[found, 1], points[found, 2] = p
@@ -213,9 +173,9 @@ def count_contacts(rows, near, kept, first, o, ball, points):  # type: ignore[no
 
 
 @njit(cache=True, error_model="numpy")
-def feature_of(row, o, p, rounding):  # type: ignore[no-untyped-def]
+def feature_of(rows, i, o, p, rounding):  # type: ignore[no-untyped-def]
     """1 face, 2 edge, 3 vertex: the smallest part of the triangle that holds the point p relative to o."""
-    a, b, c, _ = corners(row, o)
+    a, b, c, _ = corners(rows, i, o)
     square, feature = rounding * rounding, 1
     for u, v in ((a, b), (b, c), (c, a)):
         w, e = sub(p, u), sub(v, u)
@@ -242,34 +202,39 @@ def way_to_body(o, d, around):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def first_contacts(body, ball, size, origins, directions, centers, points, normals, feature, count, distance, state):  # type: ignore[no-untyped-def]
-    """Fill the outputs for every query; `size` is the radius of a sphere around the body."""
-    stack, near, apart = np.empty(STACK, np.int32), np.empty(64, np.int32), np.empty((MOST, 3))
-    missed, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
+def first_contacts(  # type: ignore[no-untyped-def]
+    rows, order, boxes, links, ball, size, origins, directions, where, feature, count, distance, state
+):  # fmt: skip
+    """Fill the outputs for every query: `where` (N, 3, 3) with centre, point and normal.
+
+    `size` is the radius of a sphere around the body.
+    """
+    stack, near, places = np.empty(STACK, np.int32), np.empty(len(rows), np.int32), np.empty((MOST, 3))
+    apart, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
     guess = -1
     for q in range(len(origins)):
         if q % BLOCK == 0:
             guess = -1
-        o, d = vector(origins[q]), vector(directions[q if len(directions) > 1 else 0])
-        centers[q], points[q], normals[q], distance[q] = nan, nan, nan, inf
-        feature[q], count[q], state[q] = 0, 0, PASSES
+        o, d = vector(origins, q), vector(directions, q if len(directions) > 1 else 0)
+        for k in range(3):
+            where[q, 0, k] = where[q, 1, k] = where[q, 2, k] = nan
+        feature[q], count[q], distance[q], state[q] = 0, 0, inf, PASSES
         start, length = way_to_body(o, d, 1.001 * (size + ball[1]))
         if length < 0.0:
             continue
         o = moved(o, start, d)  # a far origin costs no digits from here on
-        t, hit, near, kept = first_touch(body, ball, o, d, length, guess, near, stack, missed, late)
+        t, hit, kept = first_touch(rows, boxes, links, ball, o, d, length, guess, near, stack, apart, late)
         if t < 0.0:
             state[q], distance[q] = OVERLAPS, 0.0
         elif hit >= 0:
             o, guess, state[q] = moved(o, t, d), hit, TOUCHES
-            hit = holder(body, near, kept, hit, o, ball)
-            row = body[0][hit]
-            more = polish(row, o, d, ball)
+            i = holder(rows, order, near, kept, hit, o, ball)
+            more = polish(rows, i, o, d, ball)
             o = moved(o, more, d)
-            p = closest(row, o)
+            p = closest(rows, i, o)
             n, at = scaled(-1.0 / sqrt(dot(p, p)), p), moved(o, 1.0, p)
             for k in range(3):
-                centers[q, k], points[q, k], normals[q, k] = o[k], at[k], n[k]
-            feature[q] = feature_of(row, o, p, ball[2])
-            count[q] = count_contacts(body[0], near, kept, p, o, ball, apart)
+                where[q, 0, k], where[q, 1, k], where[q, 2, k] = o[k], at[k], n[k]
+            feature[q] = feature_of(rows, i, o, p, ball[2])
+            count[q] = count_contacts(rows, near, kept, p, o, ball, places)
             distance[q] = max(start + t + more, 0.0)

@@ -7,27 +7,27 @@ from math import inf, sqrt
 import numpy as np
 from numba import njit
 
-from mapping.bvh_kernels import STACK, WIDTH, lane_tests
-from mapping.contact_kernels import closest, corners, push_in_order, sweep, way_to_body
+from mapping.bvh_kernels import STACK, WIDTH, push_lanes
+from mapping.contact_kernels import closest, corners, sweep, way_to_body
 from mapping.triangle_kernels import holds
 from mapping.vector_kernels import dot, moved, scaled, vector
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def retreats(body, ball, size, outward, centers, backward, distance):  # type: ignore[no-untyped-def]
+def retreats(rows, boxes, links, ball, size, outward, centers, backward, distance):  # type: ignore[no-untyped-def]
     """Write how far each ball backs off until it overlaps nothing and its centre is outside.
 
     `outward` is +1 if the normals of the faces point out of the body, -1 if they point into it.
     """
     stack = np.empty(STACK, np.int32)
-    missed, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
+    apart, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
     for q in range(len(centers)):
-        o, d = vector(centers[q]), vector(backward[q])
+        o, d = vector(centers, q), vector(backward, q)
         start, length = way_to_body(o, d, 1.001 * (size + ball[1]))
         away, inside = start, length >= 0.0 and start == 0.0
         while inside:
-            away += leave_overlap(body, ball, moved(o, away, d), d, stack, missed, late)
-            t, facing = first_face(body, moved(o, away, d), d, length - away, stack, missed, late)
+            away += leave_overlap(rows, boxes, links, ball, moved(o, away, d), d, stack, apart, late)
+            t, facing = first_face(rows, boxes, links, moved(o, away, d), d, length - away, stack, apart, late)
             inside = facing * outward > 0.0
             if inside:
                 away += t
@@ -35,70 +35,57 @@ def retreats(body, ball, size, outward, centers, backward, distance):  # type: i
 
 
 @njit(cache=True, error_model="numpy")
-def leave_overlap(body, ball, o, d, stack, missed, late):  # type: ignore[no-untyped-def]
+def leave_overlap(rows, boxes, links, ball, o, d, stack, apart, late):  # type: ignore[no-untyped-def]
     """How far the ball at o moves along d until it overlaps nothing."""
     away, step = 0.0, inf
     while step > ball[2]:
-        step = overlap_ahead(body, ball, moved(o, away, d), d, stack, missed, late)
+        step = overlap_ahead(rows, boxes, links, ball, moved(o, away, d), d, stack, apart, late)
         away += step
     return away
 
 
 @njit(cache=True, error_model="numpy")
-def overlap_ahead(body, ball, o, d, stack, missed, late):  # type: ignore[no-untyped-def]
+def overlap_ahead(rows, boxes, links, ball, o, d, stack, apart, late):  # type: ignore[no-untyped-def]
     """How far the ball at o moves along d to leave every triangle that it overlaps now."""
-    rows, _, boxes, children, lanes = body
     radius, _, graze = ball
     step = 0.0
     stack[0] = len(boxes) - 1
     waiting = 1
     while waiting > 0:
-        waiting -= 1
-        node = stack[waiting]
-        lane_tests(boxes[node], o, o, d, 0.0, radius, missed, late)
-        child = children[node]
-        if child >= 0:
-            waiting = push_in_order(stack, waiting, child, lanes[node], missed, late)
+        i = -1 - stack[waiting - 1]
+        if i < 0:
+            waiting = push_lanes(boxes, links, stack, waiting, o, o, d, 0.0, radius, apart, late)
             continue
-        for lane in range(lanes[node]):
-            if missed[lane] > 0.0:
-                continue
-            row = rows[lane - child - 1]
-            p = closest(row, o)
-            if sqrt(dot(p, p)) < radius - graze:
-                _, leave = sweep(row, o, d, radius, graze)
-                step = max(step, leave)
+        waiting -= 1
+        p = closest(rows, i, o)
+        if sqrt(dot(p, p)) < radius - graze:
+            _, leave = sweep(rows, i, o, d, radius, graze)
+            step = max(step, leave)
     return step
 
 
 @njit(cache=True, error_model="numpy")
-def first_face(body, o, d, length, stack, missed, late):  # type: ignore[no-untyped-def]
+def first_face(rows, boxes, links, o, d, length, stack, apart, late):  # type: ignore[no-untyped-def]
     """First face that the ray from o along d crosses: (t, cosine of its normal and d); (inf, 0) if none."""
-    rows, _, boxes, children, lanes = body
     best, facing = length, 0.0
     stack[0] = len(boxes) - 1
     waiting = 1 if length > 0.0 else 0
     while waiting > 0:
-        waiting -= 1
-        node = stack[waiting]
-        lane_tests(boxes[node], o, moved(o, best, d), d, best, 0.0, missed, late)
-        child = children[node]
-        if child >= 0:
-            waiting = push_in_order(stack, waiting, child, lanes[node], missed, late)
+        i = -1 - stack[waiting - 1]
+        if i < 0:
+            waiting = push_lanes(boxes, links, stack, waiting, o, moved(o, best, d), d, best, 0.0, apart, late)
             continue
-        for lane in range(lanes[node]):
-            if missed[lane] > 0.0:
-                continue
-            t, cosine = crossing(rows[lane - child - 1], o, d)
-            if t < best or (t == best and abs(cosine) > abs(facing)):
-                best, facing = t, cosine
+        waiting -= 1
+        t, cosine = crossing(rows, i, o, d)
+        if t < best or (t == best and abs(cosine) > abs(facing)):
+            best, facing = t, cosine
     return best, facing
 
 
 @njit(cache=True, error_model="numpy")
-def crossing(row, o, d):  # type: ignore[no-untyped-def]
+def crossing(rows, i, o, d):  # type: ignore[no-untyped-def]
     """(t >= 0, cosine) where the ray crosses a face, its border included; (inf, 0) if it does not."""
-    a, b, c, n = corners(row, o)
+    a, b, c, n = corners(rows, i, o)
     cosine = dot(n, d)
     if cosine == 0.0:
         return inf, 0.0

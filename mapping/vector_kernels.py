@@ -36,6 +36,6 @@ def moved(a, s, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def vector(array):  # type: ignore[no-untyped-def]
-    """The three entries of an array."""
-    return (array[0], array[1], array[2])
+def vector(array, i):  # type: ignore[no-untyped-def]
+    """Row i of an (N, 3) array."""
+    return (array[i, 0], array[i, 1], array[i, 2])
