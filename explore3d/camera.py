@@ -49,7 +49,7 @@ class Camera:
     def _cropped(self, points: FloatArray, margin: float) -> Camera:
         """The camera without the empty stripes above and below the points; pixels keep their size."""
         rows = np.abs(self.project(points)[0][:, 1] + 0.5 - 0.5 * self.height)
-        height = min(self.height, 8 * int(np.ceil(2 * margin * float(rows.max()) / 8)))
+        height = min(self.height - self.height % 8, 8 * int(np.ceil(2 * margin * float(rows.max()) / 8)))
         return replace(self, height=height, field=2 * float(np.arctan(0.5 * height * self.pixel)))
 
     @property

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.base import Base, Feet
+from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.estimate import BRIDGED, Estimate
 from mapping.feature import Feature, Interval
@@ -62,7 +62,6 @@ def cross_section(
     feature: Feature,
     trace: Trace,
     base: Base,
-    feet: Feet,
     crossings: Sequence[Crossing],
     estimate: Estimate | None = None,
 ) -> CrossSection | None:
@@ -72,22 +71,21 @@ def cross_section(
         feature: what was found.
         trace: all samples.
         base: the global model.
-        feet: of all samples on the base, at the trace's tip radius.
         crossings: detections on the trace.
         estimate: the estimated surface of the same trace.
     """
     crossing = _nearest_crossing(feature, trace.tip_radius, crossings)
-    window = _window(feature, crossing, trace, feet)
+    window = _window(feature, crossing, trace)
     if len(window) == 0:
         return None
-    x, beside = _place(feature, feet.points[window], feet.normals[window])
+    feet = base.foot(trace.centers[window], trace.tip_radius)
+    x, beside = _place(feature, feet.points, feet.normals)
     half = max(half_width(feature, trace.tip_radius), 0.0 if crossing is None else crossing.half_width)
     near = (np.abs(x) < REACH * half) & (beside < half)
-    index, x = window[near], x[near]
+    index = np.flatnonzero(near)[np.argsort(x[near], kind="stable")]
     if len(index) < 3:
         return None
-    order = np.argsort(x, kind="stable")
-    index, x = index[order], x[order]
+    x = x[index]
     grid = np.linspace(x[0], x[-1], GRID)
     points, normals = (_interpolated(grid, x, getattr(feet, name)[index]) for name in ("points", "normals"))
     sizes = [feature.height.median, feature.height.low, feature.height.high]
@@ -95,7 +93,7 @@ def cross_section(
     bins = _binned(x, feet.height[index])
     if feature.kind == "step":
         curves = _aligned(curves, np.interp(grid, x, feet.height[index]))
-    sweep = int(trace.sweep[index[0]])
+    sweep = int(trace.sweep[window[0]])
     return CrossSection(
         feature,
         sweep,
@@ -132,11 +130,11 @@ def _nearest_crossing(feature: Feature, tip_radius: float, crossings: Sequence[C
     return min(close, key=lambda crossing: float(np.linalg.norm(crossing.point - reference)), default=None)
 
 
-def _window(feature: Feature, crossing: Crossing | None, trace: Trace, feet: Feet) -> NDArray[np.int64]:
+def _window(feature: Feature, crossing: Crossing | None, trace: Trace) -> NDArray[np.int64]:
     """Samples of the sweep around the crossing; without one, of the sweep that passes nearest to the middle."""
     if crossing is None:
-        reference, _ = middle(feature.axis)
-        nearest = int(np.linalg.norm(feet.points - reference, axis=1).argmin())
+        above = middle(feature.axis)[0] + trace.tip_radius * feature.normals[len(feature.axis) // 2]
+        nearest = int(np.linalg.norm(trace.centers - above, axis=1).argmin())
         return np.flatnonzero(trace.sweep == trace.sweep[nearest])
     own = np.flatnonzero(trace.sweep == crossing.sweep)
     # A sweep may cross a feature many times: what is far from this crossing is another one.

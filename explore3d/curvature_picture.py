@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explore3d.figure import png, styled
-from explore3d.object_picture import SUPERSAMPLING, camera_for, panels_for, view_directions
+from explore3d.object_picture import SUPERSAMPLING, cameras_for, panels_for, view_directions
 from explore3d.raycast import Body, render
 from mapping.surface import Surface
 
@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 
 # Values within so many standard deviations of zero are drawn flat: their colour would be noise.
 SIGNIFICANT = 3.0
-FLAT = np.array([0.95, 0.95, 0.95])
+FLAT = np.array([0.93, 0.93, 0.93])
 NOT_VALID = np.array([0.75, 0.75, 0.75])
 COLOURS = "RdBu_r"
 
@@ -39,12 +39,12 @@ def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float)
 
     areas = surface.face_areas[:, None]
     direction = view_directions(surface.face_normals * areas / areas.mean(), ())[0]
-    camera = camera_for(surface.vertices, direction)
+    cameras = cameras_for(surface.vertices, [direction, direction])
     scaled = [np.asarray(values) * tip_radius for values in (curvature.k1, curvature.k2)]
     norm = Normalize(*_span(scaled, curvature.valid))
     with styled():
-        figure, panels = panels_for([camera, camera], room=0.6)
-        for (axes, _), values, name in zip(panels, scaled, ("larger, k₁", "smaller, k₂"), strict=True):
+        figure, panels = panels_for(cameras, room=0.6)
+        for (axes, camera), values, name in zip(panels, scaled, ("larger, k₁", "smaller, k₂"), strict=True):
             colours = colormaps[COLOURS](norm(values))[:, :3]
             colours[np.abs(values) < SIGNIFICANT * curvature.sd * tip_radius] = FLAT
             colours[~curvature.valid] = NOT_VALID

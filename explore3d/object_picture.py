@@ -9,57 +9,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explore3d.camera import Camera
-from explore3d.figure import INK, new_figure, png, styled
+from explore3d.figure import DPI, INK, new_figure, png, styled
 from explore3d.quantity import length_text
 from explore3d.raycast import Body, Picture, render
-from explore3d.sweep_paths import SweepPath, densified, sweep_paths
-from mapping.crossing import Crossing
+from explore3d.sweep_paths import SweepPath, densified
 from mapping.feature import Feature
 from mapping.feature_mesh import drawn_at_least, feature_mesh
 from mapping.model_glb import COLOURS, OTHER_COLOUR
 from mapping.surface import Surface
-from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
 
-SIZE = (1200, 820)
+# Width of a picture of one panel, and of each of two, pixels; and the most that a panel is high for its width.
+WIDTHS = {1: 1080, 2: 760}
+TALLEST = 0.8
 SUPERSAMPLING = 2
-# Width of a panel, inches.
-PANEL = 7.5
 BASE_COLOUR = np.array([0.86, 0.88, 0.91])
 QUIET = np.array([0.42, 0.52, 0.62])
 LOUD = np.array([0.93, 0.55, 0.13])
-# Samples are averaged over so many pixels of the way.
-STRETCH = 3.0
 # Features are drawn at least so many pixels wide, or nobody would see them.
 VISIBLE = 5.0
 # A body whose outward directions cancel more than this is round: it needs two views.
 ROUND = 0.45
 
 
-def object_picture(
-    base: Surface,
-    features: Sequence[Feature],
-    trace: Trace,
-    feet: FloatArray,
-    normals: FloatArray,
-    crossings: Sequence[Crossing] = (),
-) -> bytes:
+def object_picture(base: Surface, features: Sequence[Feature], sweeps: Sequence[SweepPath]) -> bytes:
     """PNG of the base with sweeps and features; two opposite views of a round body.
 
-    Args:
-        base: the global model.
-        features: what was found.
-        trace: all samples.
-        feet, normals: (N, 3) points of the base under the samples, m, and its normals there.
-        crossings: detections; the samples that they cover are drawn in orange.
+    What the sweeps noticed is drawn in orange.
     """
-    views = view_directions(normals, features)
-    shown = _close_up(base, feet)
+    normals = np.concatenate([np.zeros((0, 3)), *(path.normals for path in sweeps)])
+    shown = _close_up(base, np.concatenate([np.zeros((0, 3)), *(path.points for path in sweeps)]))
     with styled():
-        figure, panels = panels_for([camera_for(shown, direction) for direction in views])
+        figure, panels = panels_for(cameras_for(shown, view_directions(normals, features)))
         for axes, camera in panels:
-            sweeps = sweep_paths(trace, feet, normals, crossings, STRETCH * pixel_size(camera))
             _draw(axes, _scene(base, features, camera, sweeps), features)
         return png(figure)
 
@@ -69,15 +52,16 @@ def pixel_size(camera: Camera) -> float:
     return camera.pixel * float(np.linalg.norm(camera.eye - camera.target))
 
 
-def camera_for(points: FloatArray, direction: FloatArray) -> Camera:
-    """The camera of a panel that shows all points (N, 3) against a direction."""
-    return Camera.facing(points, direction, SIZE[0] * SUPERSAMPLING, SIZE[1] * SUPERSAMPLING)
+def cameras_for(points: FloatArray, directions: Sequence[FloatArray]) -> list[Camera]:
+    """One camera a panel, each against a direction, that show all points (N, 3)."""
+    width = WIDTHS[len(directions)] * SUPERSAMPLING
+    return [Camera.facing(points, each, width, round(TALLEST * width)) for each in directions]
 
 
 def panels_for(cameras: Sequence[Camera], room: float = 0.0) -> tuple[Any, list[tuple[Any, Camera]]]:
     """A figure with one panel beside the other, each of its camera's shape, and `room` inches besides."""
-    tallest = max(camera.height / camera.width for camera in cameras)
-    figure = new_figure(PANEL * len(cameras), PANEL * tallest + room)
+    tallest = max(camera.height for camera in cameras) / SUPERSAMPLING / DPI
+    figure = new_figure(sum(camera.width for camera in cameras) / SUPERSAMPLING / DPI, tallest + room)
     panels = np.atleast_1d(figure.subplots(1, len(cameras)))
     for axes in panels:
         axes.set_axis_off()
@@ -141,7 +125,7 @@ def _draw(axes: Any, picture: Picture, features: Sequence[Feature]) -> None:
         axes.annotate(
             f"{feature.id}  {length_text(feature.height.median)}",
             place[0] / SUPERSAMPLING,
-            xytext=(14, 18),
+            xytext=(22, 44),
             textcoords="offset points",
             fontsize=8.5,
             color=INK,

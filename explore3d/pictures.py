@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from explore3d.analysis import Analysis
@@ -11,7 +12,7 @@ from explore3d.error_picture import size_picture, time_picture
 from explore3d.object_picture import object_picture
 from explore3d.profile_picture import profile_picture
 from explore3d.section_picture import section_picture
-from mapping.base import Feet
+from explore3d.sweep_paths import SweepPath
 from mapping.feature import Feature
 from mapping.left_out import LeftOut
 from mapping.open3d_import import Open3DError
@@ -28,22 +29,22 @@ class Pictures:
     left_out: tuple[LeftOut, ...] = ()
 
 
-def draw_pictures(analysis: Analysis, feet: Feet) -> Pictures:
+def draw_pictures(analysis: Analysis, sweeps: Sequence[SweepPath]) -> Pictures:
     """Every picture that the analysis has the data for.
 
     Args:
         analysis: what was found.
-        feet: of all samples on the base, at the trace's tip radius.
+        sweeps: the sweeps as lines on the base.
     """
     files: dict[str, bytes | None] = {}
     left_out: list[LeftOut] = []
     profile = is_profile(analysis)
     if profile:
         limit = analysis.detections.detection_limit
-        files["profile"] = profile_picture(analysis.trace, feet, analysis.model.features, limit)
-    files["sections"] = _sections(analysis, feet)
+        files["profile"] = profile_picture(analysis.trace, analysis.base, analysis.model.features, limit)
+    files["sections"] = _sections(analysis)
     try:
-        files |= {} if profile else _rendered(analysis, feet)
+        files |= {} if profile else _rendered(analysis, sweeps)
     except Open3DError as error:
         # The model is whole without its pictures; the report says which are missing, and why.
         left_out.append(LeftOut("rendered pictures", str(error)))
@@ -64,25 +65,22 @@ def shown_features(analysis: Analysis) -> tuple[Feature, ...]:
     return tuple(feature for feature in analysis.model.features if feature.id in names)
 
 
-def _sections(analysis: Analysis, feet: Feet) -> bytes | None:
+def _sections(analysis: Analysis) -> bytes | None:
     trace, crossings = analysis.trace, analysis.detections.crossings
     true = {row.found.id: row.true.height for row in analysis.errors if row.found and row.true}
     sections = [
         found
         for feature in shown_features(analysis)
-        if (found := cross_section(feature, trace, analysis.base, feet, crossings, analysis.estimate)) is not None
+        if (found := cross_section(feature, trace, analysis.base, crossings, analysis.estimate)) is not None
     ]
     if not sections:
         return None
     return section_picture(sections, [true.get(each.feature.id) for each in sections])
 
 
-def _rendered(analysis: Analysis, feet: Feet) -> dict[str, bytes | None]:
-    surface = analysis.base.surface
-    features, crossings = analysis.model.features, analysis.detections.crossings
-    files: dict[str, bytes | None] = {
-        "object": object_picture(surface, features, analysis.trace, feet.points, feet.normals, crossings)
-    }
+def _rendered(analysis: Analysis, sweeps: Sequence[SweepPath]) -> dict[str, bytes | None]:
+    picture = object_picture(analysis.base.surface, analysis.model.features, sweeps)
+    files: dict[str, bytes | None] = {"object": picture}
     if analysis.estimate is not None and analysis.estimate.surface is not None and analysis.curvature is not None:
         files["curvature"] = curvature_picture(analysis.estimate.surface, analysis.curvature, analysis.trace.tip_radius)
     return files

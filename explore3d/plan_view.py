@@ -12,7 +12,7 @@ from explore3d.figure import ESTIMATED, INK, MUTED, png, styled
 from explore3d.object_picture import (
     BASE_COLOUR,
     SUPERSAMPLING,
-    camera_for,
+    cameras_for,
     draw_scale_bar,
     panels_for,
     pixel_size,
@@ -48,7 +48,7 @@ def plan_picture(base: Base, moves: Sequence[Move], tip_radius: float, violation
     corners = np.stack(np.meshgrid(*np.stack([shown.min(axis=0), shown.max(axis=0)]).T), axis=-1).reshape(-1, 3)
     times = np.concatenate([[0.0], np.cumsum([move.duration for move in moves])])
     with styled():
-        figure, panels = panels_for([camera_for(corners, direction) for direction in views], room=0.5)
+        figure, panels = panels_for(cameras_for(corners, views), room=0.5)
         for axes, camera in panels:
             picture = render([Body(base.surface, BASE_COLOUR)], camera)
             for number, move in enumerate(moves):

@@ -10,22 +10,23 @@ from numpy.typing import NDArray
 
 from explore3d.figure import ESTIMATED, INK, MUTED, TRACED, new_figure, png, styled
 from explore3d.quantity import length_text, length_unit
-from mapping.base import Feet
+from mapping.base import Base
 from mapping.feature import Feature
 from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
 
 
-def profile_picture(trace: Trace, feet: Feet, features: Sequence[Feature], limit: float) -> bytes:
+def profile_picture(trace: Trace, base: Base, features: Sequence[Feature], limit: float) -> bytes:
     """PNG of two panels over one abscissa.
 
     Args:
         trace: one profile.
-        feet: of all samples on the base, at the trace's tip radius.
+        base: the global model.
         features: what was found.
         limit: detection limit, m; drawn if finite.
     """
+    feet = base.foot(trace.centers, trace.tip_radius)
     origin, heading = profile_line(trace)
     x = (trace.centers - origin) @ heading
     up = feet.normals.mean(axis=0)

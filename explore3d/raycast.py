@@ -89,22 +89,26 @@ def render(bodies: Sequence[Body], camera: Camera) -> Picture:
 
 def _shade(body: Body, face: NDArray[np.uint32], uv: FloatArray, ray: FloatArray, camera: Camera) -> FloatArray:
     """Colours (N, 3) of the hits: Lambert's law for a light to the upper left behind the camera."""
-    corners = body.surface.faces[face]
-    weights = np.column_stack([1.0 - uv.sum(axis=1), uv])[:, :, None]
-    flat = body.surface.face_normals[face]
-    bent = _vertex_normals(body.surface)[corners]
-    smooth = (bent * weights).sum(axis=1)
-    smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), np.finfo(float).tiny)
-    round_enough = (np.einsum("ij,ikj->ik", flat, bent) > CREASE).all(axis=1)
-    normal = np.where(round_enough[:, None], smooth, flat)
+    surface = body.surface
+    weights = np.column_stack([1.0 - uv.sum(axis=1), uv])
+    flat = surface.face_normals[face]
+    bent = _vertex_normals(surface)
+    rounded = (np.einsum("fj,fkj->fk", surface.face_normals, bent[surface.faces]) > CREASE).all(axis=1)[face]
+    normal = flat.copy()
+    normal[rounded] = _mixed(bent, surface.faces[face[rounded]], weights[rounded])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
     # Open surfaces are seen from both sides.
     normal = np.where(np.einsum("ij,ij->i", flat, ray)[:, None] > 0, -normal, normal)
     right, up, forward = camera.frame
     light = -forward - 0.45 * right + 0.65 * up
     shine = np.clip(normal @ (light / np.linalg.norm(light)), 0.0, 1.0)
-    colours = np.broadcast_to(body.colours, body.surface.vertices.shape)
-    colour = (colours[corners] * weights).sum(axis=1)
+    colour = body.colours if body.colours.ndim == 1 else _mixed(body.colours, surface.faces[face], weights)
     return np.asarray(np.clip(colour * (AMBIENT + (1.06 - AMBIENT) * shine)[:, None], 0.0, 1.0))
+
+
+def _mixed(values: FloatArray, corners: NDArray[np.int64], weights: FloatArray) -> FloatArray:
+    """(N, 3) values at the corners (N, 3) of faces, weighted by barycentric coordinates (N, 3)."""
+    return np.asarray(sum(values[corners[:, i]] * weights[:, i, None] for i in range(3)))
 
 
 def _vertex_normals(surface: Surface) -> FloatArray:

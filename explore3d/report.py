@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from explore3d.analysis import Analysis
@@ -11,8 +12,8 @@ from explore3d.report_account import account_of_time, provenance, what_was_left_
 from explore3d.report_evidence import compared_with_truth, cross_sections, curvature_maps
 from explore3d.report_findings import facts, headline, what_was_found
 from explore3d.report_style import STYLE
+from explore3d.sweep_paths import SweepPath, sweep_paths
 from explore3d.view3d import object_view, plotly_script, profile_view
-from mapping.base import Feet
 from mapping.whole_file import write_whole
 
 REPORT = "report.html"
@@ -34,21 +35,21 @@ def write_report(analysis: Analysis, folder: Path | str) -> Path:
         OSError: the folder cannot be written.
     """
     place = Path(folder)
-    feet = analysis.base.foot(analysis.trace.centers, analysis.trace.tip_radius)
-    pictures = draw_pictures(analysis, feet)
-    page = report_page(analysis, pictures, feet)
+    sweeps = sweep_paths(analysis.trace, analysis.base, analysis.detections.crossings)
+    pictures = draw_pictures(analysis, sweeps)
+    page = report_page(analysis, pictures, sweeps)
     (place / PICTURES).mkdir(parents=True, exist_ok=True)
     for name, png in pictures.files.items():
         write_whole(place / PICTURES / f"{name}.png", png)
     return write_whole(place / REPORT, page)
 
 
-def report_page(analysis: Analysis, pictures: Pictures, feet: Feet) -> str:
+def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPath]) -> str:
     """The whole page as HTML."""
     if is_profile(analysis):
-        view = profile_view(analysis.trace, feet, analysis.model.features)
+        view = profile_view(analysis.trace, analysis.base, analysis.model.features)
     else:
-        view = object_view(analysis.base.surface, analysis.model.features, analysis.trace, feet)
+        view = object_view(analysis.base.surface, analysis.model.features, sweeps)
     content = element(
         "main",
         headline(analysis),

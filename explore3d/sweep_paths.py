@@ -9,12 +9,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.polyline import arclengths
 from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
 
+# Samples are averaged over this share of the explored size: about three pixels of a picture.
+FINEST = 0.0025
 # Blocks from which the true length of a noisy path is taken.
 COARSE = 64
 
@@ -28,26 +31,29 @@ class SweepPath:
     noticed: NDArray[np.bool_]
 
 
-def sweep_paths(
-    trace: Trace, feet: FloatArray, normals: FloatArray, crossings: Sequence[Crossing], spacing: float
-) -> list[SweepPath]:
-    """Every sweep, averaged over stretches of about `spacing`.
+def sweep_paths(trace: Trace, base: Base, crossings: Sequence[Crossing] = ()) -> list[SweepPath]:
+    """Every sweep on the base, averaged over stretches that the eye cannot tell apart.
 
     Args:
         trace: all samples.
-        feet, normals: (N, 3) points of the base under them, m, and the outward normals there.
+        base: the global model.
         crossings: detections; the samples that they cover count as noticed.
-        spacing: m; what is finer cannot be seen.
     """
+    if len(trace) == 0:
+        return []
+    spacing = FINEST * float(np.linalg.norm(np.ptp(trace.centers, axis=0)))
     marked = _noticed(trace, crossings)
-    paths = []
+    means, middles = [], []
     for start, stop in _runs(trace):
-        firsts = np.arange(start, stop, _block(feet[start:stop], spacing))
-        count = np.diff(np.append(firsts, stop))[:, None]
-        mean = np.add.reduceat(feet[:stop], firsts, axis=0) / count
-        middle = firsts + count[:, 0] // 2
-        paths.append(SweepPath(mean, normals[middle], marked[middle]))
-    return paths
+        firsts = np.arange(start, stop, _block(trace.centers[start:stop], spacing))
+        count = np.diff(np.append(firsts, stop))
+        means.append(np.add.reduceat(trace.centers[:stop], firsts, axis=0) / count[:, None])
+        middles.append(firsts + count // 2)
+    feet = base.foot(np.concatenate(means), trace.tip_radius)
+    cuts = np.cumsum([len(each) for each in means])[:-1]
+    noticed = marked[np.concatenate(middles)]
+    parts = (np.split(array, cuts) for array in (feet.points, feet.normals, noticed))
+    return [SweepPath(*each) for each in zip(*parts, strict=True)]
 
 
 def _block(points: FloatArray, spacing: float) -> int:

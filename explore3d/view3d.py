@@ -12,8 +12,8 @@ from explore3d.figure import ESTIMATED, INK, TRACED
 from explore3d.markup import Html, element
 from explore3d.profile_picture import profile_line
 from explore3d.quantity import interval_text, length_unit
-from explore3d.sweep_paths import sweep_paths
-from mapping.base import Feet
+from explore3d.sweep_paths import SweepPath
+from mapping.base import Base
 from mapping.feature import Feature
 from mapping.feature_mesh import drawn_at_least, feature_mesh
 from mapping.model_glb import COLOURS, OTHER_COLOUR
@@ -22,8 +22,6 @@ from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
 
-# Sweeps are averaged over this share of the explored size.
-FINEST = 0.004
 # More than this makes pages slow without showing more.
 MOST_FACES = 60_000
 # Features are drawn at least this share of the base's size wide.
@@ -38,13 +36,13 @@ def plotly_script() -> Html:
     return Html(f"<script>{get_plotlyjs()}</script>")
 
 
-def object_view(base: Surface, features: Sequence[Feature], trace: Trace, feet: Feet) -> Html:
+def object_view(base: Surface, features: Sequence[Feature], sweeps: Sequence[SweepPath]) -> Html:
     """The base, the sweeps and the features, to be turned by hand; hover texts tell each feature's record."""
     import plotly.graph_objects as plot
 
     factor, unit = length_unit(0.3 * base.size)
-    parts: list[Any] = [_mesh(_lighter(base), factor, "base", "#e4e8ee", None, opacity=1.0)]
-    lines = _sweeps(trace, feet) / factor
+    parts: list[Any] = [_mesh(_lighter(base), factor, "base", "#f4f6f9", None, opacity=1.0)]
+    lines = _lines(sweeps, 1e-3 * base.size) / factor
     parts.append(
         plot.Scatter3d(
             x=lines[:, 0],
@@ -68,23 +66,24 @@ def object_view(base: Surface, features: Sequence[Feature], trace: Trace, feet: 
         legend={"x": 0.01, "y": 0.99, "bgcolor": "rgba(255,255,255,0.8)"},
         font={"family": "system-ui, sans-serif", "color": INK},
     )
-    drawing.update_scenes(camera=_camera(feet.normals))
+    drawing.update_scenes(camera=_camera(sweeps))
     return _inlined(drawing, "view")
 
 
-def profile_view(trace: Trace, feet: Feet, features: Sequence[Feature]) -> Html:
+def profile_view(trace: Trace, base: Base, features: Sequence[Feature]) -> Html:
     """The height over the base along a profile, to be zoomed by hand, with the features marked."""
     import plotly.graph_objects as plot
 
+    height = base.foot(trace.centers, trace.tip_radius).height
     origin, heading = profile_line(trace)
     x = (trace.centers - origin) @ heading
     x_factor, x_unit = length_unit(float(np.abs(x).max()))
-    factor, unit = length_unit(float(np.abs(feet.height).max()))
+    factor, unit = length_unit(float(np.abs(height).max()))
     marks = np.array([(each.axis[0] - origin) @ heading for each in features]) / x_factor
     drawing = plot.Figure(
         [
             plot.Scatter(
-                x=x / x_factor, y=feet.height / factor, mode="lines", name="height over the base",
+                x=x / x_factor, y=height / factor, mode="lines", name="height over the base",
                 line={"color": TRACED, "width": 1}, hoverinfo="skip",
             ),
             plot.Scatter(
@@ -133,19 +132,15 @@ def _mesh(surface: Surface, factor: float, name: str, colour: str, hover: str | 
     return plot.Mesh3d(
         x=points[:, 0], y=points[:, 1], z=points[:, 2], i=i, j=j, k=k, name=name, color=colour, opacity=opacity,
         hoverinfo="skip" if hover is None else "text", text=hover, showlegend=hover is not None, flatshading=True,
-        lighting={"ambient": 0.8, "diffuse": 0.35, "specular": 0.05, "roughness": 0.9},
+        lighting={"ambient": 0.85, "diffuse": 0.35, "specular": 0.05, "roughness": 0.9},
     )  # fmt: skip
 
 
-def _sweeps(trace: Trace, feet: Feet) -> FloatArray:
-    """(M, 3) points just above the base, NaN between sweeps, few enough to draw."""
-    size = float(np.linalg.norm(np.ptp(feet.points, axis=0))) if len(trace) else 0.0
+def _lines(sweeps: Sequence[SweepPath], lift: float) -> FloatArray:
+    """(M, 3) points just above the base, NaN between sweeps."""
     gap = np.full((1, 3), np.nan)
-    pieces = [
-        np.vstack([path.points + 2e-3 * size * path.normals, gap])
-        for path in sweep_paths(trace, feet.points, feet.normals, (), size * FINEST)
-    ]
-    return np.vstack(pieces) if pieces else np.zeros((0, 3))
+    pieces = [np.vstack([path.points + lift * path.normals, gap]) for path in sweeps]
+    return np.concatenate([np.zeros((0, 3)), *pieces])
 
 
 def _lighter(surface: Surface) -> Surface:
@@ -163,9 +158,9 @@ def _lighter(surface: Surface) -> Surface:
     return Surface(np.asarray(simpler.vertices) + origin, np.asarray(simpler.triangles))
 
 
-def _camera(normals: FloatArray) -> dict[str, Any]:
+def _camera(sweeps: Sequence[SweepPath]) -> dict[str, Any]:
     from explore3d.object_picture import view_directions
 
-    direction = view_directions(normals, ())[0]
-    eye = 1.5 * direction / np.linalg.norm(direction)
+    direction = view_directions(np.concatenate([np.zeros((0, 3)), *(path.normals for path in sweeps)]), ())[0]
+    eye = 1.7 * direction / np.linalg.norm(direction)
     return {"eye": dict(zip("xyz", map(float, eye), strict=True))}
