@@ -20,6 +20,7 @@ def main() -> None:
     """Write every mesh and every truth table."""
     make_plate()
     make_wire()
+    make_tile()
     make_bump_of_revolution()
     make_step()
     make_mug()
@@ -56,6 +57,26 @@ def make_wire() -> None:
     write_mesh("wire_on_plate", (tilted(vertices), faces))
     truth = {"kind": "ridge", "axis": tilted(ends), "height": 2 * radius, "width": 2 * radius, "length": WIRE["length"]}
     write_truth("wire_on_plate", [truth])
+
+
+TILE: Sizes = {"size": (0.060, 0.040), "diameter": 0.65e-3, "length": 0.028, "center": (0.004, -0.002)}
+
+
+def make_tile() -> None:
+    """A small level tile and a short straight wire on it, for stages with little travel and no time."""
+    u, v = (np.linspace(-size / 2, size / 2, 13) for size in TILE["size"])
+    radius = TILE["diameter"] / 2
+    along = np.array([np.cos(np.radians(35.0)), np.sin(np.radians(35.0)), 0.0])
+    ends = np.array([*TILE["center"], 0.0]) + TILE["length"] / 2 * np.array([[-1.0], [1.0]]) * along
+    path = ends[0] + np.linspace(0, 1, 15)[:, None] * (ends[1] - ends[0])
+    lifted = path + np.array([0.0, 0.0, radius])
+    wire = tube(lifted, np.tile([0.0, 0.0, 1.0], (len(path), 1)), radius, 2 * np.pi * np.arange(64) / 64)
+    tile = height_field(u, v, np.zeros((len(u), len(v))))
+    write_mesh("tile", tile)
+    write_mesh("wire_on_tile", together(tile, wire))
+    truth = {"kind": "ridge", "axis": ends, "height": 2 * radius, "width": 2 * radius, "length": TILE["length"]}
+    for scene in ("grbl_peck", "grbl_slide"):
+        write_truth(scene, [truth])
 
 
 BUMP: Sizes = {"a": 15.0, "reach": 2.2, "plane": 3.0}

@@ -12,17 +12,33 @@ from explore3d.cli_options import Force, Json, Out
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene to explore.")]
 
 
-def run(scene: SceneFile, out: Out, force: Force = None, json: Json = False) -> None:
+def run(
+    scene: SceneFile,
+    out: Out,
+    force: Force = None,
+    json: Json = False,
+    arm: Annotated[
+        bool, typer.Option("--arm", help="Let a real machine move; without it, its moves are only planned and checked.")
+    ] = False,
+) -> None:
     """Explore the scene with its finger; write the log, the annotated model and the report.
 
     Example: explore3d run assets/scenes/wire_on_plate.toml --out out/wire
     """
+    from explore3d.machine_finger import needs_arming
+    from explore3d.scene import load_scene
+
+    if not arm and needs_arming(load_scene(scene)):
+        plan(scene, out, json)
+        if not json:
+            print("dry run: connected and checked, nothing was moved; add --arm to explore with the real machine")
+        return
     from explore3d.findings import show
     from explore3d.progress import shown
     from explore3d.run import run as explore
 
     with shown(quiet=json) as progress:
-        analysis = explore(scene, out, progress=progress, force=force or ())
+        analysis = explore(scene, out, progress=progress, force=force or (), arm=arm)
     show(analysis, out, json)
 
 

@@ -32,6 +32,7 @@ def run(
     *,
     progress: Progress = silent,
     force: Collection[str] = (),
+    arm: bool = False,
 ) -> Analysis:
     """Explore, log, and build the annotated model.
 
@@ -40,6 +41,7 @@ def run(
         out: folder for the resolved scene, the log, the model and the report.
         progress: told the stage and the share of it that is done.
         force: stages to run although the scene does not need them.
+        arm: let a real machine move; without it every move is refused.
 
     Raises:
         UserError: a scene or folder that cannot be used.
@@ -49,7 +51,7 @@ def run(
     with stages.stage("setting up"):
         scene = scene if isinstance(scene, Scene) else load_scene(scene)
         base = known_base(scene)
-        finger = scene_finger(scene)
+        finger = scene_finger(scene, arm)
     with Session(out) as session:
         session.write("scene.toml", scene.resolved)
         outcome = _explore(scene, base, finger, session, stages)
@@ -65,9 +67,13 @@ def known_base(scene: Scene) -> Base:
     return Base(surface)
 
 
-def scene_finger(scene: Scene) -> Finger:
-    """The finger that the scene names, opened. Raises SceneError, FingerError."""
+def scene_finger(scene: Scene, arm: bool = False) -> Finger:
+    """The finger that the scene names; entering it connects. Raises SceneError, FingerError."""
     table = scene.finger
+    if table.machine is not None:
+        from explore3d.machine_finger import machine_finger
+
+        return machine_finger(scene, arm)
     noise = table.noise
     return open_finger(
         table.kind,
@@ -89,8 +95,8 @@ def _explore(scene: Scene, base: Base, finger: Finger, session: Session, stages:
     from planners.checks import Limits
     from planners.drive import drive
 
-    about = {"software": f"explore3d {__version__}", "seed": scene.seed, "finger": finger.info}
     with stages.stage("exploration") as share, finger:
+        about = {"software": f"explore3d {__version__}", "seed": scene.seed, "finger": finger.info}
         log = session.open_log(tip_radius=scene.tip.radius, scene_text=scene.resolved, metadata=about)
         log.event(KIND, base_event(base))
         execute = _logged(finger, log, scene.explore.time_budget, share)

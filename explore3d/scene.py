@@ -6,58 +6,30 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    PrivateAttr,
-    ValidationError,
-    model_validator,
-)
+from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from explore3d.errors import MeshFileError, SceneError, UnitError
 from explore3d.meshes import load_mesh
 from explore3d.scene_complaint import complaint
+from explore3d.scene_machine import EMULATOR, MachineTable, SensorTable
 from explore3d.scene_text import scene_text
-from explore3d.units import (
-    parse_angle,
-    parse_force,
-    parse_length,
-    parse_rate,
-    parse_speed,
-    parse_time,
-    unit_factor,
+from explore3d.scene_values import (
+    Angle,
+    Extent,
+    Force,
+    Length,
+    LengthUnit,
+    Point,
+    Rate,
+    Signed,
+    Speed,
+    Table,
+    Time,
 )
 from mapping.feature import KINDS
 from mapping.surface import Surface
 
 SCHEMA = "explore3d/scene/1"
-
-Signed = Annotated[float, BeforeValidator(parse_length)]
-Length = Annotated[float, BeforeValidator(parse_length), Field(gt=0)]
-Extent = Annotated[float, BeforeValidator(parse_length), Field(ge=0)]
-Angle = Annotated[float, BeforeValidator(parse_angle), Field(ge=0)]
-Rate = Annotated[float, BeforeValidator(parse_rate), Field(gt=0)]
-Speed = Annotated[float, BeforeValidator(parse_speed), Field(gt=0)]
-Force = Annotated[float, BeforeValidator(parse_force), Field(gt=0)]
-Time = Annotated[float, BeforeValidator(parse_time), Field(gt=0)]
-Point = tuple[Signed, Signed, Signed]
-
-
-def _known_unit(unit: str) -> str:
-    unit_factor(unit)
-    return unit
-
-
-LengthUnit = Annotated[str, AfterValidator(_known_unit)]
-
-
-class Table(BaseModel):
-    """A table of the scene file: immutable, and no key that is not known."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Tip(Table):
@@ -104,14 +76,30 @@ class FingerNoise(Table):
 
 
 class FingerTable(Table):
-    """The finger: the simulated one touches the mesh `object`, the truth, and samples at `rate` Hz."""
+    """The finger.
 
-    kind: Literal["simulated"] = "simulated"
-    object: Path
+    The simulated one touches the mesh `object`, the truth, and samples at `rate` Hz. A machine of the Grbl family
+    is described in [finger.machine], its force sensor in [finger.sensor]; an emulated one touches `object`.
+    """
+
+    kind: Literal["simulated", "grbl"] = "simulated"
+    object: Path | None = None
     units: LengthUnit = "m"
     rate: Rate = 5000.0
     contact_data: bool = False
     noise: FingerNoise = FingerNoise()
+    machine: MachineTable | None = None
+    sensor: SensorTable | None = None
+
+    @model_validator(mode="after")
+    def _has_what_its_kind_needs(self) -> FingerTable:
+        if self.kind == "grbl" and self.machine is None:
+            raise ValueError("a finger of kind grbl needs the table finger.machine; found none")
+        if self.machine is not None and self.machine.touch == "slide" and self.sensor is None:
+            raise ValueError("sliding needs a force sensor: give the table finger.sensor")
+        if self.object is None and (self.machine is None or self.machine.port == EMULATOR):
+            raise ValueError(f"object is missing: the mesh that the {self.kind} finger touches")
+        return self
 
 
 class Survey(Table):
@@ -185,6 +173,10 @@ class Scene(Table):
 
     def object_surface(self) -> Surface:
         """The mesh that the simulated finger touches, in metres. Raises SceneError."""
+        if self.finger.object is None:
+            raise SceneError(
+                f"{self._path}: finger.object: no mesh to touch is given; a real finger touches the real thing"
+            )
         return self._surface("finger.object", self.finger.object, self.finger.units)
 
     def _surface(self, field: str, mesh: Path, units: str) -> Surface:
@@ -226,7 +218,9 @@ def parse_scene(text: str, path: Path | str) -> Scene:
 
 
 def _with_absolute_paths(scene: Scene, folder: Path) -> Scene:
-    finger = scene.finger.model_copy(update={"object": (folder / scene.finger.object).resolve()})
+    finger = scene.finger
+    if finger.object is not None:
+        finger = finger.model_copy(update={"object": (folder / finger.object).resolve()})
     model = scene.model
     if model.mesh is not None:
         model = model.model_copy(update={"mesh": (folder / model.mesh).resolve()})
