@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,9 +47,9 @@ class ContactRow:
         names = [item.name for item in fields(cls)]
         return cls(*(np.concatenate([getattr(row, name) for row in rows]) for name in names))
 
-    def with_normals(self, normals: FloatArray) -> ContactRow:
-        """The same row with other normals (M, 3)."""
-        return replace(self, normals=normals)
+    def select(self, index: IntArray) -> ContactRow:
+        """The contacts of these indices."""
+        return ContactRow(*(getattr(self, item.name)[index] for item in fields(self)))
 
 
 def contact_row(centers: FloatArray, outward: FloatArray, tip_radius: float, open_kinks: bool = True) -> ContactRow:

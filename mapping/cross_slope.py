@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.sweep_curve import SweepCurve
 from mapping.sweep_tangents import lagrange, unit
 
 FloatArray = NDArray[np.float64]
@@ -35,7 +36,9 @@ class CrossSlope:
     doubt: FloatArray
 
 
-def cross_slope(points: FloatArray, along: FloatArray, outward: FloatArray, rows: list[IntArray]) -> CrossSlope:
+def cross_slope(
+    points: FloatArray, along: FloatArray, outward: FloatArray, rows: list[IntArray], curves: list[SweepCurve]
+) -> CrossSlope:
     """Slope across the parallel sweeps `rows` at their samples (N, 3) with unit tangents `along` (N, 3).
 
     The surface is cut at each sample by the plane perpendicular to the sweep, which the neighbouring rows cross
@@ -50,31 +53,11 @@ def cross_slope(points: FloatArray, along: FloatArray, outward: FloatArray, rows
         v[:, REACH] = w[:, REACH] = 0.0
         for shift in range(-REACH, REACH + 1):
             if shift and 0 <= j + shift < len(rows):
-                arm = _crossings(points[row], along[row], points[rows[j + shift]]) - points[row]
+                arm = curves[j + shift].crossings(points[row], along[row]) - points[row]
                 v[:, REACH + shift] = np.einsum("ij,ij->i", arm, across[row])
                 w[:, REACH + shift] = np.einsum("ij,ij->i", arm, up[row])
         slope[row], bend[row], doubt[row] = smooth_slope(v, w)
     return CrossSlope(unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5, doubt)
-
-
-def _crossings(points: FloatArray, normals: FloatArray, line: FloatArray) -> FloatArray:
-    """Where a polyline (M, 3) crosses the planes through `points` with `normals` (N, 3); NaN if it ends before."""
-    from scipy.spatial import cKDTree
-
-    last = len(line) - 1
-    if last < 2:
-        return np.full_like(points, np.nan)
-    middle = np.clip(cKDTree(line).query(points)[1], 1, last - 1)
-    a, b, c = (line[middle + k] - points for k in (-1, 0, 1))
-    fa, fb, fc = (np.einsum("ij,ij->i", x, normals) for x in (a, b, c))
-    # Inverse interpolation: the place as a quadratic of the distance to the plane, at distance zero.
-    spread = np.where((fa - fb) * (fb - fc) * (fc - fa) == 0, np.nan, 1.0)
-    wa, wb, wc = fb * fc / ((fa - fb) * (fa - fc)), fa * fc / ((fb - fa) * (fb - fc)), fa * fb / ((fc - fa) * (fc - fb))
-    found = (wa[:, None] * a + wb[:, None] * b + wc[:, None] * c) * spread[:, None]
-    within = np.maximum(np.abs(fa), np.abs(fc)) * 2 >= np.minimum(np.minimum(np.abs(fa), np.abs(fb)), np.abs(fc))
-    monotone = (fa - fb) * (fb - fc) > 0
-    ended = (np.sign(fa) == np.sign(fc)) & (np.abs(fb) > np.abs(fa - fc))
-    return np.where((within & monotone & ~ended)[:, None], found, np.nan) + points
 
 
 def smooth_slope(v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -101,16 +84,23 @@ def smooth_slope(v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray, 
 def _polynomial(
     v: FloatArray, w: FloatArray, table: list[FloatArray], order: int, middle: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Slope and curvature of the smoothest polynomial of that order, its last term as a slope, and if that is small."""
+    """Slope and curvature of the smoothest polynomial of an order, doubt of the slope, if its last term is small."""
     index = np.arange(len(v))
     size = np.abs(table[order][:, middle - order : middle + 1])
     size = np.where(np.isnan(size), np.inf, size) * np.r_[CENTRAL, np.ones(order - 1), CENTRAL]
-    first = middle - order + size.argmin(axis=1)
-    nodes = first[:, None] + np.arange(order + 1)
-    at, heights = np.take_along_axis(v, nodes, 1), np.take_along_axis(w, nodes, 1)
-    slope = np.einsum("km,km->k", lagrange(at, np.zeros(len(v)))[1], heights)
+    best, second = np.argsort(size, axis=1, kind="stable")[:, :2].T
+    first = middle - order + best
+    slope, other = _slope(v, w, first, order), _slope(v, w, middle - order + second, order)
     inner = np.clip(middle - 1, first, first + order - 2)
     bend = 2 * table[2][index, inner]
-    spacing = np.abs(at[:, -1] - at[:, 0]) / order
+    spacing = np.abs(v[index, first + order] - v[index, first]) / order
     last = np.abs(table[order][index, first]) * spacing ** (order - 1)
-    return slope, bend, last, last <= FALLING * np.abs(bend) * spacing
+    # Where the second smoothest window sees another slope, a kink or a jump of curvature lies beside the sample.
+    return slope, bend, np.fmax(last, np.abs(slope - other)), last <= FALLING * np.abs(bend) * spacing
+
+
+def _slope(v: FloatArray, w: FloatArray, first: IntArray, order: int) -> FloatArray:
+    """Slope at v = 0 of the polynomials through columns first to first + order."""
+    nodes = first[:, None] + np.arange(order + 1)
+    at, heights = np.take_along_axis(v, nodes, 1), np.take_along_axis(w, nodes, 1)
+    return np.asarray(np.einsum("km,km->k", lagrange(at, np.zeros(len(v)))[1], heights))

@@ -9,15 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from mapping.base import Base
 from mapping.bridging import bridged_faces, resting_points, split
-from mapping.contact_row import ContactRow, contact_row
+from mapping.contact_row import ContactRow, contact_row, in_plane
 from mapping.estimate import BRIDGED, EXTRAPOLATED, LABELS, TOUCHED, EnvelopeError, Estimate
 from mapping.noise import Noise
 from mapping.penetration import penetration
 from mapping.smoothing import Smoothed, smooth
 from mapping.surface import Surface
-from mapping.sweep_mesh import pitch, sweep_faces, thinned
+from mapping.sweep_mesh import sweep_faces
+from mapping.sweep_rows import pitch, thinned
 from mapping.trace import Trace
-from mapping.trace_normals import surface_normals
+from mapping.trace_normals import at_kinks, surface_normals
 
 __all__ = ["BRIDGED", "EXTRAPOLATED", "LABELS", "TOUCHED", "EnvelopeError", "Estimate", "estimate_surface"]
 
@@ -109,14 +110,22 @@ def _contacts(trace: Trace, method: str, outward: FloatArray, slack: float) -> E
     row = ContactRow.joined(rows)
     normals, across, doubt = surface_normals(trace, row, outward)
     if method == "contact" and trace.normals is not None:
-        recorded = (row.sample >= 0)[:, None]
-        normals, doubt = np.where(recorded, trace.normals[row.nearest], row.normals), 0 * doubt
+        normals, doubt = _recorded(trace, row), np.zeros(len(doubt))
     # A ball turned by an angle about its contact leaves the body by half of r angle^2.
     uncertain = (row.labels == TOUCHED) & (0.5 * trace.tip_radius * doubt**2 > slack)
     labels = np.where(uncertain, EXTRAPOLATED, row.labels).astype(np.int8)
     sample = np.where(row.sample < 0, -1, still[row.sample])
     points = row.centers - trace.tip_radius * normals
     return Estimate(None, points, normals, row.centers, labels, sample, np.concatenate(sweeps), across)
+
+
+def _recorded(trace: Trace, row: ContactRow) -> FloatArray:
+    """Recorded normals at the samples; at interference points they are continued, and made to fit the tangents."""
+    recorded = np.zeros_like(trace.centers) if trace.normals is None else trace.normals
+    normals = np.where((row.sample >= 0)[:, None], recorded[row.nearest], row.normals)
+    ends, continued = at_kinks(trace, row, recorded)
+    normals[ends] = in_plane(row.tangents[ends], continued)
+    return normals
 
 
 def _unsmoothed(points: Estimate, smoothed: Smoothed) -> Estimate:

@@ -26,7 +26,7 @@ def takeover(xi: float, zi: float, xj: float, zj: float, r: float) -> float:
         return right
     d = np.hypot(half_x, half_z)
     h = np.sqrt(max((r - d) * (r + d), 0.0))
-    return 0.5 * (xi + xj) + h * half_z / d
+    return float(0.5 * (xi + xj) + h * half_z / d)
 
 
 @njit(cache=True)

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from mapping.contact_row import ContactRow
 from mapping.cross_slope import CrossSlope, cross_slope
 from mapping.estimate import TOUCHED
-from mapping.sweep_mesh import parallel_rows
+from mapping.sweep_curve import SweepCurve
+from mapping.sweep_rows import parallel_rows, pitch, thinned
 from mapping.sweep_tangents import lagrange, unit
 from mapping.trace import Trace
 
@@ -32,30 +33,30 @@ def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple
     slope = (
         CrossSlope(along.copy(), unknown, unknown.copy())
         if rows is None
-        else cross_slope(trace.centers, along, outward, rows)
+        else cross_slope(trace.centers, along, outward, rows, _curves(trace, row, rows))
     )
     lost = np.flatnonzero(np.isnan(slope.doubt))
     slope.tangents[lost], slope.doubt[lost] = _fitted(trace, lost, along[lost], outward[lost])
     across = slope.tangents[row.nearest]
-    ends, samples, weights = _kink_sides(trace, row)
-    across[ends] = unit(np.einsum("km,kmc->kc", weights, slope.tangents[samples]))
+    ends, continued = at_kinks(trace, row, slope.tangents)
+    across[ends] = continued
     normals = unit(np.cross(row.tangents, across))
     side = np.sign(np.einsum("ij,ij->i", normals, outward[row.nearest]))
     normals = np.where((side == 0)[:, None], row.normals, normals * side[:, None])
     return normals, slope.curvature[row.nearest], slope.doubt[row.nearest]
 
 
-def _kink_sides(trace: Trace, row: ContactRow) -> tuple[IntArray, IntArray, FloatArray]:
-    """How to continue a field of the samples to both sides of each interference point, from its own side.
+def at_kinks(trace: Trace, row: ContactRow, directions: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Unit directions (N, 3) of the samples continued to both sides of each interference point, from its own side.
 
     Returns:
-        (K,) indices into the row, (K, 4) samples beside them on the same side, and (K, 4) weights.
+        (K,) indices of the contacts at interference points, and (K, 3) directions there.
     """
     ends = np.flatnonzero((row.sample < 0) & (row.labels == TOUCHED))
     way = np.where(row.sample[ends - 1] >= 0, -1, 1)  # the first contact of a fan follows a sample
     samples = row.nearest[ends][:, None] + way[:, None] * np.arange(4)
     held = (samples >= 0) & (samples < len(trace))
-    samples = np.clip(samples, 0, len(trace) - 1)
+    samples = np.asarray(np.clip(samples, 0, len(trace) - 1), dtype=np.int64)
     held &= trace.sweep[samples] == trace.sweep[samples[:, :1]]
     points = trace.centers[samples]
     s = np.cumsum(np.linalg.norm(np.diff(points, axis=1, prepend=points[:, :1]), axis=2), axis=1)
@@ -63,7 +64,14 @@ def _kink_sides(trace: Trace, row: ContactRow) -> tuple[IntArray, IntArray, Floa
     # A kink beside the kink leaves too few samples: then the nearest must do.
     straight = held.all(axis=1) & (np.abs(before) < 2 * s[:, 1]) & (np.diff(s, axis=1) > 0).all(axis=1)
     safe = np.where(straight[:, None], s, np.arange(4.0))
-    return ends, samples, np.where(straight[:, None], lagrange(safe, before)[0], np.eye(4)[0])
+    weights = np.where(straight[:, None], lagrange(safe, before)[0], np.eye(4)[0])
+    return np.asarray(ends, dtype=np.int64), unit(np.einsum("km,kmc->kc", weights, directions[samples]))
+
+
+def _curves(trace: Trace, row: ContactRow, rows: list[IntArray]) -> list[SweepCurve]:
+    """The curve of each of `rows`."""
+    sweep = trace.sweep[row.nearest]
+    return [SweepCurve.of(row.select(np.flatnonzero(sweep == trace.sweep[own[0]]))) for own in rows]
 
 
 def _fitted(
@@ -74,8 +82,6 @@ def _fitted(
     The doubt is three times the residual over the width; it is a right angle where the neighbours lie on one line.
     """
     from scipy.spatial import cKDTree
-
-    from mapping.sweep_mesh import pitch, thinned
 
     points = trace.centers[samples]
     cloud = trace.centers[thinned(trace.centers, trace.sweep, pitch(trace.centers, trace.sweep))]

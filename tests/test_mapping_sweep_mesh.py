@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mapping.surface import Surface
-from mapping.sweep_mesh import SweepMeshError, mesh_sweeps, parallel_rows, pitch, thinned, zipper
+from mapping.sweep_mesh import SweepMeshError, mesh_sweeps, zipper
+from mapping.sweep_rows import parallel_rows, pitch, thinned
 from mapping.trace import Trace
 
 
