@@ -9,6 +9,9 @@ from explore3d.quantity import count_text, interval_text, length_text
 from mapping.feature import Feature, Interval
 
 
+MOST = 20  # features that are listed one by one; the report has them all
+
+
 def show(analysis: Analysis, out: Path, as_json: bool) -> None:
     """Print the model's record as JSON, or a few lines for people."""
     import json
@@ -28,7 +31,8 @@ def summary(analysis: Analysis) -> list[str]:
         lines[0] += f", {finer} of them finer than the tip of {length_text(analysis.trace.tip_radius)}"
     if analysis.recovered:
         lines.append(analysis.recovered)
-    return lines + [_line(feature) for feature in features]
+    more = [f"  and {len(features) - MOST} more, see the report"] if len(features) > MOST else []
+    return lines + [_line(feature) for feature in features[:MOST]] + more
 
 
 def _line(feature: Feature) -> str:

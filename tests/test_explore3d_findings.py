@@ -42,3 +42,9 @@ def test_each_feature_has_a_line_with_its_intervals() -> None:
 
 def test_a_recovered_log_is_mentioned() -> None:
     assert "12 samples lost" in summary(analysis(recovered="12 samples lost"))
+
+
+def test_a_long_list_is_cut_and_says_so() -> None:
+    lines = summary(analysis(*(feature(f"bump-{k}", False, Interval(0.0, 0.0, 0.0)) for k in range(23))))
+    assert len(lines) == 22
+    assert lines[-1] == "  and 3 more, see the report"
