@@ -8,7 +8,6 @@ from explore3d.analysis import Analysis
 from explore3d.quantity import count_text, interval_text, length_text
 from mapping.feature import Feature, Interval
 
-
 MOST = 20  # features that are listed one by one; the report has them all
 
 
