@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from planners.errors import PlannerError
-    from planners.explore import Explore
-    from planners.plan import Outcome, Plan
-    from planners.survey import Survey
-
-# public name: where it lives; loaded when it is first asked for, so that importing the package stays light
-_PUBLIC = {
-    "Plan": "planners.plan",
-    "Outcome": "planners.plan",
-    "Survey": "planners.survey",
+_HOMES = {
     "Explore": "planners.explore",
-    "PlannerError": "planners.errors",
+    "Outcome": "planners.plan",
+    "Plan": "planners.plan",
+    "Survey": "planners.survey",
+    "drive": "planners.drive",
 }
-__all__ = ["Explore", "Outcome", "Plan", "PlannerError", "Survey"]
+__all__ = ["Explore", "Outcome", "Plan", "Survey", "drive"]
 
 
 def __getattr__(name: str) -> Any:
-    if name in _PUBLIC:
-        return getattr(import_module(_PUBLIC[name]), name)
-    raise AttributeError(f"module 'planners' has no attribute {name!r}; its public names: {', '.join(__all__)}")
-
-
-def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+    """The public names, each loaded when it is first asked for."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'planners' has no attribute {name!r}; it has {', '.join(__all__)}")
+    return getattr(import_module(_HOMES[name]), name)

@@ -14,17 +14,36 @@ from planners.strokes import Strokes
 
 FloatArray = NDArray[np.float64]
 
+# Ratio of half-widths from which a bump is taken for a short ridge
+ELONGATED = 1.25
+
 
 @dataclass(frozen=True, eq=False)
 class BumpSize:
-    """A sized bump or pit: `point`, `normal` (3,) on the base, signed `height`, `half_widths` of the disturbance
-    along and across the first sweep, standard deviation `sd` of the centre; m."""
+    """A sized bump or pit.
+
+    Args:
+        point, normal: (3,) of the base under the top, m.
+        height: signed height, m.
+        half_widths: of the disturbance along the two crossed sweeps, m.
+        ways: (2, 3) directions of these sweeps.
+        sd: standard deviation of the centre along either, m.
+    """
 
     point: FloatArray
     normal: FloatArray
     height: float
     half_widths: tuple[float, float]
+    ways: FloatArray
     sd: float
+
+    @property
+    def long_way(self) -> FloatArray | None:
+        """Direction (3,) in which it is so much longer than across that it is a short ridge, or None."""
+        first, second = self.half_widths
+        if max(first, second) < ELONGATED * min(first, second):
+            return None
+        return np.asarray(self.ways[0] if first > second else self.ways[1])
 
     def distance(self, point: FloatArray) -> float:
         """Distance of a point from the centre, m."""
@@ -79,7 +98,8 @@ class BumpSizer:
     def _sized(self, point: FloatArray, seed: Crossing, found: list[list[Crossing]]) -> BumpSize:
         best = max((c for group in found for c in group), key=lambda c: abs(c.height))
         across, along = (float(np.median([c.half_width for c in group])) for group in found)
-        return BumpSize(point, seed.normal, best.height, (along, across), max(_sd(group) for group in found))
+        ways = np.stack([seed.tangent, np.cross(seed.normal, seed.tangent)])
+        return BumpSize(point, seed.normal, best.height, (along, across), ways, max(_sd(group) for group in found))
 
 
 def _sd(group: list[Crossing]) -> float:

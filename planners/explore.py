@@ -52,6 +52,7 @@ class Found:
     `actions` names everything that was done after the survey, with its outcome; `left_out` what was not.
     """
 
+    tip_radius: float
     survey: Coverage | None = None
     noise: Noise | None = None
     tracks: list[AxisTrack] = field(default_factory=list)
@@ -63,10 +64,14 @@ class Found:
     left_out: list[str] = field(default_factory=list)
 
     def unexplained(self) -> list[Crossing]:
-        """Crossings that no track or bump accounts for and that were not looked into yet, the highest first."""
+        """Crossings that no track or bump accounts for and that were not looked into yet.
+
+        The highest come first, but those that are wider than a wire of their height would be come later: they
+        were met at a slant, or beside a neighbour.
+        """
         known: list[AxisTrack | BumpSize] = [*self.tracks, *self.bumps]
         rest = [c for c in self.crossings if not any(k.explains(c) for k in known) and not self._tried(c)]
-        return sorted(rest, key=lambda c: -abs(c.height))
+        return sorted(rest, key=lambda c: -abs(c.height) * min(1.0, slender(c, self.tip_radius)))
 
     def _tried(self, crossing: Crossing) -> bool:
         return any(
@@ -139,7 +144,7 @@ class Explore:
 
     def plan(self, rng: np.random.Generator | None = None) -> Plan:
         """The whole exploration; the outcome's value is a Found. Nothing in it is random: `rng` is not used."""
-        found = Found(noise=self.noise)
+        found = Found(self.tip_radius, noise=self.noise)
         spent = Spent(25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed)
         outcome = yield from within(self._everything(found), spent, self.time_budget, self.path_budget)
         count = len(found.tracks) + len(found.bumps)
@@ -208,20 +213,25 @@ class Explore:
 
     def _circuit_radius(self, seed: Crossing) -> float:
         """Wide enough to go round a bump whose top lies up to half a survey pitch beside the sweep."""
-        return 1.4 * seed.half_width + 0.5 * self.survey.pitch
+        half_width = seed.half_width * min(1.0, 1.3 * slender(seed, self.tip_radius))
+        return 1.4 * half_width + 0.5 * self.survey.pitch
 
     def _look_into(self, seed: Crossing, found: Found, strokes: Strokes, sense: Sense) -> Plan:
         """Circle a detection, then follow the ridge or size the bump that it belongs to."""
         found.tried.append(seed)
         circled = yield from Circuit(strokes, sense, self._circuit_radius(seed)).around(seed)
         branches: tuple[Crossing, ...] = circled.value
-        if not branches:
+        if branches:
+            seed, ways = _typed(seed, branches), headings(seed, branches)
+        else:
             sized = yield from BumpSizer(strokes, sense, self.wanted_sd).size(seed)
-            if sized.value is not None:
-                found.bumps.append(sized.value)
-            return Outcome(circled.reason, sized.detail)
-        follower = self._follower(found, strokes, sense)
-        followed = yield from follower.follow(_typed(seed, branches), headings(seed, branches))
+            bump: BumpSize | None = sized.value
+            if bump is None or bump.long_way is None:
+                found.bumps.extend([] if bump is None else [bump])
+                return Outcome(circled.reason, sized.detail)
+            ways = [bump.long_way, -bump.long_way]
+            seed = replace(seed, point=bump.point)
+        followed = yield from self._follower(found, strokes, sense).follow(seed, ways)
         found.crossings.extend(branches)
         track: AxisTrack | None = followed.value
         if track is not None and any(track.repeats(other) for other in found.tracks):
@@ -258,3 +268,8 @@ def _typed(seed: Crossing, branches: tuple[Crossing, ...]) -> Crossing:
     if is_step(seed) == is_step(like):
         return seed
     return replace(seed, kind=like.kind, height=like.height, half_width=like.half_width)
+
+
+def slender(crossing: Crossing, tip_radius: float) -> float:
+    """Half-width of a thin wire of the crossing's height, sqrt(2 r H), over the crossing's own half-width."""
+    return float(np.sqrt(2.0 * tip_radius * abs(crossing.height)) / max(crossing.half_width, np.finfo(float).tiny))

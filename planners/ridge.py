@@ -24,6 +24,7 @@ Crossed = Generator[Move, Trace, Crossing | None]
 
 # A crossing lower than this share of the ridge's last heights lies beyond its end
 STILL_HIGH = 0.7
+FALLING = 0.9
 
 
 @dataclass
@@ -107,8 +108,10 @@ class RidgeFollower:
                 if gone <= max(0.15 * self.strokes.tip_radius, 4.0 * self.precision):
                     return (yield from self._end(line, ahead, gone, sign))
                 continue
-            gone -= float(walk.along[-1])
-            self._adapt(line, found, walk.points[-1], reach)
+            missed = float(np.linalg.norm(found.point - walk.points[-1]))
+            # a crossing far beside the prediction says that the heading was wrong, not that the ridge had ended
+            gone = np.inf if missed > 0.5 * reach else gone - float(walk.along[-1])
+            self._adapt(line, missed / reach)
             line.crossings.append(found)
             if self.known(found.point):
                 return AxisEnd(found.point, found.position_sd, "joins another", ahead.heading)
@@ -118,9 +121,8 @@ class RidgeFollower:
                 return (yield from self._end(line, ahead, max(gone, 0.0), sign))
         return AxisEnd(line.points[-1], np.inf, "lost", way)
 
-    def _adapt(self, line: Line, found: Crossing, predicted: FloatArray, reach: float) -> None:
+    def _adapt(self, line: Line, miss: float) -> None:
         """A longer step after a good prediction, a shorter one after a bad one."""
-        miss = float(np.linalg.norm(found.point - predicted)) / reach
         factor = 1.5 if miss < 0.15 else 0.6 if miss > 0.45 else 1.0
         line.step = float(np.clip(line.step * factor, 0.2 * self.strokes.tip_radius, self._longest))
 
@@ -128,10 +130,20 @@ class RidgeFollower:
         """The seed crossed squarely: a sweep that met the ridge at a slant saw it too wide."""
         half = 2.5 * seed.half_width
         trace = yield self.strokes.line(seed.point, np.cross(seed.normal, heading), half, half)
-        found = self.sense.nearest(trace, seed.point, sign, 0.3 * abs(seed.height), 1.2 * seed.half_width)
-        if found is None or is_step(found) != is_step(seed):
-            return None if found is None and not is_step(seed) else seed
-        return found
+        if is_step(seed) and self._stays_high(trace, sign * abs(seed.height)):
+            return seed
+        return self.sense.nearest(trace, seed.point, sign, 0.3 * abs(seed.height), 1.2 * seed.half_width)
+
+    def _stays_high(self, trace: Trace, height: float) -> bool:
+        """True if one end of the sweep lies at least half as high as a step: a ridge comes down on both sides."""
+        edge = max(1, len(trace) // 8)
+        if len(trace) < 16:
+            return False
+        over = [
+            self.sense.base.foot(trace.centers[part], trace.tip_radius).height.mean() / height
+            for part in (slice(0, edge), slice(-edge, None))
+        ]
+        return bool(max(over) > 0.5)
 
     def _cross(
         self, point: FloatArray, heading: FloatArray, like: Crossing, sign: float, reach: float, lowest: float
@@ -149,16 +161,23 @@ class RidgeFollower:
 
     def _end(self, line: Line, ahead: Course, gone: float, sign: float) -> Generator[Move, Trace, AxisEnd]:
         """Slide along the crest and off the end, where the crossings have bracketed it."""
+        if is_step(line.crossings[-1]):
+            return AxisEnd(line.crossings[-1].point, 0.5 * gone, "end", ahead.heading, gone)
+        farthest = line.crossings[-1].point
+        # where the crest has begun to fall it has ended already, and what lies beside it pulls at the crossing
+        while len(line.crossings) > 2 and abs(line.crossings[-1].height) < FALLING * line.height:
+            line.crossings.pop()
         last = line.crossings[-1]
+        gone += float(np.linalg.norm(farthest - last.point))
         ahead = course(line.points, last.normal, ahead.heading, self.strokes.tip_radius)
-        if is_step(last):
-            return AxisEnd(last.point, 0.5 * gone, "end", ahead.heading, gone)
         rough = AxisEnd(ahead.point, np.inf, "end", ahead.heading, gone, ahead.turn)
         return (yield from self.slide(rough, line.height, line.half_width, sign))
 
     def slide(self, end: AxisEnd, height: float, half_width: float, sign: float) -> Generator[Move, Trace, AxisEnd]:
         """A better estimate of an end from one more sweep along the crest; the old one if that shows nothing."""
         tip = self.strokes.tip_radius
+        # a groove is crossed no more where its end lifts the ball, that far before the end
+        half_width = max(half_width, float(np.sqrt(2.0 * tip * height)))
         back = self.strokes.walk(end.point, -end.heading, 1.2 * half_width, -end.turn)
         ahead = self.strokes.walk(end.point, end.heading, end.reach + 1.8 * half_width, end.turn)
         points = np.concatenate([back.points[:0:-1], ahead.points])
