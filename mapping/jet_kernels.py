@@ -93,7 +93,7 @@ def _solve(a, columns, coefficients, spread):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _weingarten(coefficients, scale, out):  # type: ignore[no-untyped-def]
-    """Symmetric 2 x 2 shape operator (a, b, c) in the orthonormal basis of the fitted tangent plane, outward positive."""
+    """Symmetric 2 x 2 shape operator (a, b, c), outward positive, in an orthonormal basis of the tangent plane."""
     p, q = coefficients[1], coefficients[2]
     first = np.sqrt(1 + p * p)
     cross = p * q / first
