@@ -62,14 +62,9 @@ class DryRun:
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""
-        from explore3d.object_picture import object_picture
+        from explore3d.plan_view import plan_picture
 
-        paths = [_dense(move.path, 0.015 * self.tip_radius) for move in self.moves]
-        number = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
-        centers = np.concatenate([np.zeros((0, 3)), *paths])
-        feet = self.base.foot(centers, self.tip_radius)
-        trace = Trace(np.arange(float(len(centers))), centers, number, self.tip_radius)
-        return object_picture(self.base.surface, (), trace, feet.points, feet.normals)
+        return plan_picture(self.base, self.moves, self.tip_radius, [number - 1 for number, _ in self.violations])
 
 
 def plan_scene(path: Path | str) -> DryRun:
@@ -86,7 +81,8 @@ def plan_scene(path: Path | str) -> DryRun:
     base, finger, tip = known_base(scene), scene_finger(scene), scene.tip.radius
     explore = explorer(scene, base)
     moves, outcome = dry_run(explore.plan(), Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip))
-    limits = Limits.of(finger.workspace, base, tip)
+    with finger:
+        limits = Limits.of(finger.workspace, base, tip)
     violations = [(number, what) for number, move in enumerate(moves, 1) if (what := limits.violation(move))]
     spent = Spent(25.0 * tip if explore.travel_speed is None else explore.travel_speed)
     for move in moves:
@@ -111,9 +107,3 @@ def show_plan(plan: DryRun, out: Path | None, as_json: bool) -> None:
         print(json.dumps(plan.record()))
     else:
         print("\n".join(plan.lines() + ([] if out is None else [f"picture: {out / 'plan.png'}"])))
-
-
-def _dense(path: np.ndarray, spacing: float) -> np.ndarray:
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    s = np.linspace(0.0, along[-1], 2 + int(along[-1] / spacing))
-    return np.column_stack([np.interp(s, along, path[:, k]) for k in range(3)])
