@@ -156,7 +156,9 @@ def test_the_glb_names_each_feature_and_keeps_its_place(tmp_path: Path, far: flo
     mesh = scene.geometry["base"]
     np.testing.assert_array_equal(mesh.faces, model().base.surface.faces)
     np.testing.assert_array_equal(mesh.vertex_attributes["_REACH"].ravel(), [0, 1, 2, 2])
-    np.testing.assert_array_equal(mesh.vertex_attributes["_SIGMA"].ravel(), np.float32([1e-4, 2e-4, -1, 3e-4]))
+    np.testing.assert_array_equal(
+        mesh.vertex_attributes["_SIGMA"].ravel(), np.array([1e-4, 2e-4, -1, 3e-4], dtype=np.float32)
+    )
     _, name = scene.graph["ridge-1"]
     tube = scene.geometry[name]
     assert tube.is_watertight and tube.volume > 0
