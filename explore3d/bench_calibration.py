@@ -24,7 +24,7 @@ from mapping.noise import Noise
 from mapping.priors import Normal, Prior, Uniform
 from mapping.problem import Problem, Surroundings
 from mapping.refine import Solution, pose_problem, solve_problem
-from mapping.ridge_shape import RidgeShape
+from mapping.ridge_shape import RidgeShape, rounding_of
 from mapping.shapes import chain_height, groove_height, rim_height, step_height
 from mapping.surface import Surface
 from mapping.trace import Trace
@@ -135,7 +135,8 @@ def _plate() -> Base:
 
 
 def _record(paths: list[FloatArray], heights: FloatArray) -> Trace:
-    centers = np.concatenate(paths) + np.outer(TIP_RADIUS + heights, [0.0, 0.0, 1.0])
+    centers: FloatArray = np.concatenate(paths)
+    centers[:, 2] += TIP_RADIUS + heights
     sweep = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
     return Trace(np.arange(len(centers)) * 2e-4, centers, sweep, TIP_RADIUS)
 
@@ -163,6 +164,7 @@ def _with_priors(problem: Problem) -> Problem:
         "heading": lambda start: Normal(start, 0.03),
         "along": lambda start: Normal(start, 0.2 * half),
         "across": lambda start: Normal(start, 0.2 * half),
+        "end rounding": lambda start: Uniform(0.0, 1.0),
         "start": lambda start: Uniform(start - 1.5e-3, start + 1.5e-3),
         "end": lambda start: Uniform(start - 1.5e-3, start + 1.5e-3),
         "height": lambda start: Uniform(0.7 * start, 1.3 * start),
@@ -180,9 +182,7 @@ def _true_heights(kind: str, problem: Problem, truth: FloatArray, feet: FloatArr
     up = np.tile([0.0, 0.0, 1.0], (len(feet), 1))
     if kind == "ridge":
         assert isinstance(shape, RidgeShape)
-        radius = float(np.exp(truth[-1]))
-        chain = shape.chains(truth[None], np.array([truth[-2] - radius]))[0]
-        return chain_height(feet, up, chain, radius, TIP_RADIUS)
+        return _ridge_heights(shape, truth, feet, up)
     if kind in ("bump", "pit"):
         place = np.zeros(2)
         place[: shape.free] = truth[: shape.free]
@@ -199,6 +199,19 @@ def _true_heights(kind: str, problem: Problem, truth: FloatArray, feet: FloatArr
     inside = np.minimum(s - truth[-4], truth[-3] - s)
     across = groove_height(x, np.exp(truth[-2]), TIP_RADIUS, np.exp(truth[-1]))
     return np.maximum(across, rim_height(inside, TIP_RADIUS, np.exp(truth[-1])))
+
+
+def _ridge_heights(shape: RidgeShape, truth: FloatArray, feet: FloatArray, up: FloatArray) -> FloatArray:
+    """(N,) heights of one ridge over raw foot points: the compiled form, over points instead of bins."""
+    from mapping.chain_kernels import chain_heights
+
+    radius = np.exp(truth[-1:])
+    chain = shape.chains(truth[None], truth[-2:-1] - radius)
+    whole = np.zeros(len(feet), dtype=np.int64), np.full(len(feet), chain.shape[1] - 1, dtype=np.int64)
+    out = np.empty((1, len(feet)))
+    point = np.full(len(feet), 1e-15)
+    chain_heights(feet, up, np.zeros_like(up), point, *whole, chain, radius, rounding_of(truth[-5:-4]), TIP_RADIUS, out)
+    return np.asarray(out[0])
 
 
 def _places(solution: Solution, truth: FloatArray, method: str) -> dict[str, float]:

@@ -100,6 +100,7 @@ class BumpShape:
             zero,
             np.ascontiguousarray(centers),
             radius,
+            np.ones(len(theta)),
             self.tip_radius,
             out,
         )

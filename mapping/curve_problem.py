@@ -154,6 +154,9 @@ def _shape(
     if not chart.closed:
         low, high = float(chart.s[0]), float(chart.s[-1])
         middle = min(max(float(ends.mean()), low + 1e-3 * (high - low)), high - 1e-3 * (high - low))
+        if kind == "ridge":
+            priors.append(Uniform(0.0, 1.0))
+            start, step = [*start, 0.5], [*step, 0.2]
         priors += [Uniform(low, middle), Uniform(middle, high)]
         start, step = [*start, float(ends.min()), float(ends.max())], [*step, *[0.1 * sizes.half_width] * 2]
     if kind == "ridge":
