@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-_HOMES = {
-    "Explore": "planners.explore",
-    "Outcome": "planners.plan",
+if TYPE_CHECKING:
+    from planners.errors import PlannerError
+    from planners.explore import Explore
+    from planners.plan import Outcome, Plan
+    from planners.survey import Survey
+
+# public name: where it lives; loaded when it is first asked for, so that importing the package stays light
+_PUBLIC = {
     "Plan": "planners.plan",
+    "Outcome": "planners.plan",
     "Survey": "planners.survey",
-    "drive": "planners.drive",
+    "Explore": "planners.explore",
+    "PlannerError": "planners.errors",
 }
-__all__ = ["Explore", "Outcome", "Plan", "Survey", "drive"]
+__all__ = ["Explore", "Outcome", "Plan", "PlannerError", "Survey"]
 
 
 def __getattr__(name: str) -> Any:
-    """The public names, each loaded when it is first asked for."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'planners' has no attribute {name!r}; it has {', '.join(__all__)}")
-    return getattr(import_module(_HOMES[name]), name)
+    if name in _PUBLIC:
+        return getattr(import_module(_PUBLIC[name]), name)
+    raise AttributeError(f"module 'planners' has no attribute {name!r}; its public names: {', '.join(__all__)}")
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *__all__]

@@ -7,7 +7,6 @@ import importlib
 import json
 import subprocess
 import sys
-import time
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -118,10 +117,15 @@ def test_every_public_name_is_there_and_listed_once(package: str) -> None:
         _ = module.nonsense
 
 
-def test_help_appears_within_a_third_of_a_second() -> None:
+@pytest.mark.skipif(sys.platform == "win32", reason="processor time of children is not known there")
+def test_help_takes_less_than_a_third_of_a_second() -> None:
+    import resource
+
     def seconds() -> float:
-        start = time.perf_counter()
+        """Processor time, which a busy machine does not lengthen as it does the clock's."""
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run([sys.executable, "-m", "explore3d.cli", "--help"], capture_output=True, check=True, cwd=ROOT)
-        return time.perf_counter() - start
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
     assert min(seconds() for _ in range(5)) < 0.3
