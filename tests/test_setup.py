@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import get_args
 
 import pytest
 
@@ -94,6 +95,39 @@ def test_the_demo_and_the_tests_are_the_commands_of_the_readme() -> None:
     assert commands == ["demo", "test"]
     for command in commands:
         assert make(ROOT, "--dry-run", command)
+
+
+def test_the_readme_s_python_names_exist() -> None:
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(), re.M | re.S)
+    assert len(blocks) == 3
+    for block in blocks:
+        lines = [line for line in block.splitlines() if line.strip()]
+        assert len(lines) <= 5
+        assert lines[0].startswith("from ")
+        compile(block, "README.md", "exec")
+        exec(lines[0], {})
+
+
+def test_every_key_of_a_scene_is_documented() -> None:
+    from explore3d.scene import Scene
+    from explore3d.scene_values import Table
+
+    def keys(table: type[Table]) -> set[str]:
+        found = {info.alias or name for name, info in table.model_fields.items()}
+        for info in table.model_fields.values():
+            for kind in (info.annotation, *get_args(info.annotation)):
+                if isinstance(kind, type) and issubclass(kind, Table):
+                    found |= keys(kind)
+        return found
+
+    text = (ROOT / "docs" / "scene.md").read_text()
+    named = set(re.findall(r"[a-z_]+", " ".join(re.findall(r"`([^`]*)`", text))))
+    assert keys(Scene) <= named
+
+
+def test_every_shipped_scene_is_documented() -> None:
+    text = (ROOT / "docs" / "scene.md").read_text()
+    assert all(f"`{path.name}`" in text for path in (ROOT / "assets" / "scenes").glob("*.toml"))
 
 
 def test_the_continuous_integration_runs_make_test() -> None:
