@@ -30,7 +30,7 @@ class Coverage:
 def coverage(surface: Surface, touched: FloatArray, reach: float, region: NDArray[np.bool_] | None = None) -> Coverage:
     """Coverage of a mesh by the points (N, 3) that sweeps touched.
 
-    Every face is sampled at least as finely as `reach`; a sample is inspected if a touched point lies within
+    Every face is sampled three times as finely as `reach`; a sample is inspected if a touched point lies within
     `reach` of it in space.
 
     Args:
@@ -38,7 +38,7 @@ def coverage(surface: Surface, touched: FloatArray, reach: float, region: NDArra
     """
     from scipy.spatial import cKDTree
 
-    points, owner = face_samples(surface, reach)
+    points, owner = face_samples(surface, reach / 3.0)
     near = np.zeros(len(points), dtype=bool)
     if len(touched):
         distance, _ = cKDTree(touched).query(points, distance_upper_bound=reach)
