@@ -80,7 +80,9 @@ def estimate_surface(
         raise EnvelopeError("every contact lies inside another ball: the trace is no ball's path; give its noise")
     points = points.select(np.flatnonzero(possible))
     step = pitch(trace.centers, trace.sweep) / 4 if spacing is None else spacing
-    points = points.select(thinned(points.centers, points.sweep, step, points.sample < 0))
+    # Thinned by their own distances, and by their balls': over a sharp edge many balls share one contact.
+    at_kinks = (points.sample < 0) & (points.labels == TOUCHED)
+    points = points.select(thinned(points.points, points.sweep, step, at_kinks))
     return _meshed(points, trace, slack)
 
 

@@ -12,7 +12,7 @@ from mapping.sweep_tangents import STENCIL, chord_lengths, lagrange, unit
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# The concave turn at a kink must exceed the concave turns beside it by this factor.
+# The concave turn at a kink must exceed the turns beside it by this factor.
 OUTSTANDING = 3.0
 
 
@@ -58,7 +58,7 @@ def _outstanding_turns(points: FloatArray, outward: FloatArray) -> IntArray:
     turn = np.zeros(len(points) + 2)  # turn[i + 1] belongs to sample i; borders turn by nothing
     turn[2:-2] = side * 2 * np.arcsin(np.clip(np.linalg.norm(bend, axis=1) / 2, 0, 1))
     here = turn[1:-2] + turn[2:-1]  # both ends of gap i
-    beside = np.maximum(turn[:-3], 0.0) + np.maximum(turn[3:], 0.0)
+    beside = np.abs(turn[:-3]) + np.abs(turn[3:])
     rounding = 16 * np.finfo(float).eps * np.abs(points).max() / np.maximum(length, np.finfo(float).tiny)
     candidate = np.where(here > OUTSTANDING * beside + rounding, here, 0.0)
     padded = np.r_[0.0, candidate, 0.0]
