@@ -138,7 +138,7 @@ def _ball_pivoting(points: FloatArray, outward: FloatArray) -> IntArray:
     origin = points.mean(axis=0)
     spacing = float(np.median(np.asarray(cKDTree(points).query(points, k=2)[0])[:, 1]))
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector((points - origin) / spacing))
-    cloud.normals = o3d.utility.Vector3dVector(outward)
+    cloud.normals = o3d.utility.Vector3dVector(np.array(outward))  # Open3D refuses read-only arrays
     radii = o3d.utility.DoubleVector([1.0, 2.0, 4.0, 8.0])
     mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, radii)
     return np.asarray(mesh.triangles, dtype=np.int64).reshape(-1, 3)
