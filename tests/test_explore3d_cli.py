@@ -18,7 +18,7 @@ SCENES = Path(__file__).parents[1] / "assets" / "scenes"
 COMMANDS = [command.callback.__name__ for command in app.registered_commands if command.callback]
 
 
-def explore3d(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+def explore3d_main(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
     """Call the program in this process; its exit status."""
     monkeypatch.setattr(sys, "argv", ["explore3d", *map(str, arguments)])
     try:
@@ -29,7 +29,7 @@ def explore3d(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
 
 
 def test_the_version_is_the_packages(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    assert explore3d(monkeypatch, "--version") == 0
+    assert explore3d_main(monkeypatch, "--version") == 0
     assert capsys.readouterr().out == f"explore3d {__version__}\n"
 
 
@@ -37,12 +37,12 @@ def test_the_version_is_the_packages(monkeypatch: pytest.MonkeyPatch, capsys: py
 def test_every_commands_help_has_an_example(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
-    assert explore3d(monkeypatch, command, "--help") == 0
+    assert explore3d_main(monkeypatch, command, "--help") == 0
     assert f"Example: explore3d {command}" in " ".join(capsys.readouterr().out.split())
 
 
 def test_the_help_lists_every_command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    assert explore3d(monkeypatch, "--help") == 0
+    assert explore3d_main(monkeypatch, "--help") == 0
     out = capsys.readouterr().out
     assert all(re.search(rf"^ +{command} ", out, re.M) for command in COMMANDS)
 
@@ -84,7 +84,7 @@ def test_a_bad_scene_ends_in_one_line_and_leaves_no_folder(
         (tmp_path / "mesh.off").write_text(mesh)
     scene = variant(tmp_path, old, new)
     for command in ("run", "plan"):
-        assert explore3d(monkeypatch, command, scene, "--out", tmp_path / "out" / "deep") == 2
+        assert explore3d_main(monkeypatch, command, scene, "--out", tmp_path / "out" / "deep") == 2
         lines = capsys.readouterr().err.splitlines()
         assert lines[-1].startswith(f"explore3d: {scene}: {message}")
         assert not any("Traceback" in line for line in lines)
@@ -96,7 +96,7 @@ def test_a_folder_that_cannot_be_written_is_named(
 ) -> None:
     (tmp_path / "file").write_text("")
     for command in (["run", SCENES / "empty_plate.toml"], ["figures"]):
-        assert explore3d(monkeypatch, *command, "--out", tmp_path / "file") == 2
+        assert explore3d_main(monkeypatch, *command, "--out", tmp_path / "file") == 2
         error = capsys.readouterr().err.splitlines()[-1]
         assert error.startswith(f"explore3d: {tmp_path / 'file'}: ")
         assert (tmp_path / "file").read_text() == ""
@@ -115,7 +115,7 @@ def test_a_folder_that_cannot_be_written_is_named(
 def test_a_wrong_call_is_refused_with_status_2(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str]
 ) -> None:
-    assert explore3d(monkeypatch, *arguments) == 2
+    assert explore3d_main(monkeypatch, *arguments) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert "Traceback" not in captured.err
@@ -124,11 +124,11 @@ def test_a_wrong_call_is_refused_with_status_2(
 def test_a_plan_is_told_in_words_and_as_json(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    assert explore3d(monkeypatch, "plan", SCENES / "step.toml", "--out", tmp_path / "plan") == 0
+    assert explore3d_main(monkeypatch, "plan", SCENES / "step.toml", "--out", tmp_path / "plan") == 0
     words = capsys.readouterr().out
     assert "no move breaks a limit" in words
     assert (tmp_path / "plan" / "plan.png").read_bytes().startswith(b"\x89PNG")
-    assert explore3d(monkeypatch, "plan", SCENES / "step.toml", "--json") == 0
+    assert explore3d_main(monkeypatch, "plan", SCENES / "step.toml", "--json") == 0
     record = json.loads(capsys.readouterr().out)
     # the plate is 100 x 60 mm: sweeps whose strips are 2 x reach wide must cover it
     swept = sum(2 * record["reach"] * _length(move["path"]) for move in record["moves"])
@@ -139,3 +139,49 @@ def test_a_plan_is_told_in_words_and_as_json(
 
 def _length(path: list[list[float]]) -> float:
     return sum(math.dist(start, stop) for start, stop in itertools.pairwise(path))
+
+
+def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    import explore3d.analyze
+    import explore3d.findings
+
+    calls: list[tuple[tuple[object, ...], dict[str, object]]] = []
+    monkeypatch.setattr(explore3d.analyze, "analyze", lambda *given, **options: calls.append((given, options)))
+    monkeypatch.setattr(explore3d.findings, "show", lambda *given: None)
+    options = ["--tip-radius", "2 um", "--units", "mm", "--columns", "x=1, z=2", "--frame", "0 mm, 1 mm,5 mm"]
+    options += ["--model", "body.ply", "--model-units", "mm", "--force", "curvature"]
+    assert explore3d_main(monkeypatch, "analyze", "a.csv", "b.mcap", "--out", tmp_path, *options) == 0
+    ((given, named),) = calls
+    assert given == ([Path("a.csv"), Path("b.mcap")], tmp_path)
+    named.pop("progress")
+    assert named == {
+        "tip_radius": "2 um",
+        "units": "mm",
+        "columns": "x=1, z=2",
+        "frame": {"origin": ["0 mm", "1 mm", "5 mm"]},
+        "model": Path("body.ply"),
+        "model_units": "mm",
+        "force": ["curvature"],
+    }
+
+
+def test_a_bad_log_ends_in_one_line_and_leaves_no_folder(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(range(256)))
+    (tmp_path / "scan.csv").write_text("x,z\n1,2\n2,3\n")
+    (tmp_path / "empty.mcap").write_bytes(b"")
+    for name, options in (
+        ("picture.png", ["--tip-radius", "1 mm"]),
+        ("scan.csv", ["--units", "mm"]),
+        ("scan.csv", ["--units", "mm", "--tip-radius", "2"]),
+        ("scan.csv", ["--units", "mmm", "--tip-radius", "2 um"]),
+        ("empty.mcap", []),
+        ("absent.csv", ["--tip-radius", "1 mm"]),
+    ):
+        out = tmp_path / "out"
+        assert explore3d_main(monkeypatch, "analyze", tmp_path / name, "--out", out, *options) == 2, name
+        error = capsys.readouterr().err.splitlines()[-1]
+        assert error.startswith("explore3d: ")
+        assert name in error
+        assert not out.exists()
