@@ -103,7 +103,7 @@ class GuardedStage:
             self.controller.move(self.frame.to_machine(target), speed, _patience(way, speed))
 
     def go(self, target: FloatArray, away: FloatArray, lift: float, tries: int = 6) -> None:
-        """Straight to the target, feeling the way; where it meets something it backs off along `away` and rises.
+        """To the target, feeling the way; to a place straight above it, along `away`, if something stands before it.
 
         Args:
             away: (3,) unit direction that leaves the body.
@@ -113,14 +113,15 @@ class GuardedStage:
             StoppedError: still blocked after `tries`.
         """
         for _ in range(tries):
+            start = self.position()
             where, hit = self.probe(target, self.guarded_speed)
             if not hit:
                 return
+            # back the way it came, which is known to be free, then up; next time it goes over what is there
+            back = min(lift, float(np.linalg.norm(where - start)))
+            self.move(where - back * (target - start) / np.linalg.norm(target - start))
             self.lift(away, lift)
-            # over what is in the way, then down again
-            _, hit = self.probe(self._within(target + lift * away), self.guarded_speed)
-            if hit:
-                self.lift(away, lift)
+            target = self._within(target + lift * away)
             lift *= 2.0
         mm = np.round(1e3 * where, 3).tolist()
         raise StoppedError(f"the way is blocked at {mm} mm (object frame); travel round it or lift higher")

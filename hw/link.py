@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Callable
@@ -173,6 +174,6 @@ def _advice(port: str) -> str:
     from serial.tools.list_ports import comports
 
     there = sorted(found.device for found in comports())
-    if port in there:
+    if port in there or os.path.exists(port):
         return "is another program using it, and may you read it (group dialout)?"
     return f"ports that exist: {', '.join(there) or 'none'}"

@@ -34,6 +34,8 @@ class TouchedBody:
         self._faces = np.ascontiguousarray(surface.faces[proper])
         self._tree = igl.AABB()
         self._tree.init(self._vertices, self._faces)
+        # what is compiled on first use must not be compiled in the midst of a motion
+        self.distance(np.zeros(3), np.array([0.0, 0.0, 1.0]))
 
     def distance(self, start: FloatArray, direction: FloatArray) -> float:
         """Way (m) of the tip centre from `start` (3,), machine frame, along a unit direction to first contact."""
