@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.crossing import Crossing
+from planners.crest import slender
 from planners.plan import Outcome, Plan
 from planners.sense import Sense
 from planners.strokes import Strokes, tangential
@@ -47,18 +48,24 @@ class Circuit:
         return Outcome(reason, f"the circuit crosses {count} branches", tuple(branches))
 
 
-def headings(seed: Crossing, branches: tuple[Crossing, ...]) -> list[FloatArray]:
+def headings(seed: Crossing, branches: tuple[Crossing, ...], tip_radius: float) -> list[FloatArray]:
     """Two directions (3,) in which to follow the line through a seed: one or two of the circuit's branches.
 
-    Two opposite branches belong to one line. Otherwise the seed lies by an end, and the branch that the
-    circuit crosses most squarely (the narrowest) is its line; what the circuit only brushes is another's.
+    Two opposite branches belong to one line. Otherwise the seed lies by an end, and the best branch is its
+    line. The best are high and no wider than they must be: what the circuit only brushes is another's.
     """
     ways = [tangential(branch.point - seed.point, seed.normal) for branch in branches]
+    worth = [abs(branch.height) * min(1.0, slender(branch, tip_radius)) for branch in branches]
+    pairs = [
+        (-float(a @ b) * min(worth[i], worth[j]), i, j)
+        for i, a in enumerate(ways)
+        for j, b in enumerate(ways)
+        if i < j and float(a @ b) < OPPOSITE
+    ]
+    if pairs:
+        _, i, j = max(pairs)
+        return [ways[i], ways[j]]
     if not ways:
         return []
-    pairs = [(float(a @ b), i, j) for i, a in enumerate(ways) for j, b in enumerate(ways) if i < j]
-    if pairs and min(pairs)[0] < OPPOSITE:
-        _, i, j = min(pairs)
-        return [ways[i], ways[j]]
-    narrowest = ways[int(np.argmin([branch.half_width for branch in branches]))]
-    return [narrowest, -narrowest]
+    best = ways[int(np.argmax(worth))]
+    return [best, -best]

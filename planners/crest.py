@@ -24,6 +24,11 @@ def is_step(crossing: Crossing) -> bool:
     return crossing.kind.startswith("step")
 
 
+def slender(crossing: Crossing, tip_radius: float) -> float:
+    """Half-width of a thin wire of the crossing's height, sqrt(2 r H), over the crossing's own half-width."""
+    return float(np.sqrt(2.0 * tip_radius * abs(crossing.height)) / max(crossing.half_width, np.finfo(float).tiny))
+
+
 def seen_again(
     trace: Trace, base: Base, noise: Noise, point: FloatArray, way: FloatArray, like: Crossing, reach: float
 ) -> Crossing | None:

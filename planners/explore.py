@@ -19,7 +19,7 @@ from planners.budget import Spent, within
 from planners.bump import BumpSize, BumpSizer
 from planners.circuit import Circuit, headings
 from planners.coverage import Coverage
-from planners.crest import is_step
+from planners.crest import is_step, slender
 from planners.errors import PlannerError
 from planners.plan import Outcome, Plan
 from planners.ridge import RidgeFollower
@@ -222,7 +222,7 @@ class Explore:
         circled = yield from Circuit(strokes, sense, self._circuit_radius(seed)).around(seed)
         branches: tuple[Crossing, ...] = circled.value
         if branches:
-            seed, ways = _typed(seed, branches), headings(seed, branches)
+            seed, ways = _typed(seed, branches), headings(seed, branches, self.tip_radius)
         else:
             sized = yield from BumpSizer(strokes, sense, self.wanted_sd).size(seed)
             bump: BumpSize | None = sized.value
@@ -268,8 +268,3 @@ def _typed(seed: Crossing, branches: tuple[Crossing, ...]) -> Crossing:
     if is_step(seed) == is_step(like):
         return seed
     return replace(seed, kind=like.kind, height=like.height, half_width=like.half_width)
-
-
-def slender(crossing: Crossing, tip_radius: float) -> float:
-    """Half-width of a thin wire of the crossing's height, sqrt(2 r H), over the crossing's own half-width."""
-    return float(np.sqrt(2.0 * tip_radius * abs(crossing.height)) / max(crossing.half_width, np.finfo(float).tiny))

@@ -12,6 +12,7 @@ from mapping.crossing import Crossing
 from mapping.detectors import detect
 from mapping.noise import Noise
 from mapping.trace import Trace
+from planners.crest import is_step
 
 FloatArray = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ class Sense:
         return found.crossings
 
     def nearest(self, trace: Trace, point: FloatArray, sign: float, lowest: float, reach: float) -> Crossing | None:
-        """The crossing nearest to a point that has a sign and at least a height, or None.
+        """The crossing of a crest or dip nearest to a point, with a sign and at least a height, or None.
 
         Args:
             sign: +1 for bumps and ridges, -1 for pits and grooves.
@@ -46,6 +47,8 @@ class Sense:
             reach: how far from the point it may lie, m.
         """
         fits = [
-            c for c in self.crossings(trace) if sign * c.height >= lowest and np.linalg.norm(c.point - point) <= reach
+            c
+            for c in self.crossings(trace)
+            if not is_step(c) and sign * c.height >= lowest and np.linalg.norm(c.point - point) <= reach
         ]
         return min(fits, key=lambda c: float(np.linalg.norm(c.point - point)), default=None)
