@@ -54,7 +54,7 @@ def sweep_faces(points: FloatArray, sweep: IntArray, outward: FloatArray, body: 
     """
     rows = parallel_rows(points, sweep)
     if rows is not None:
-        strips = [zipper(points, first, second) for first, second in pairwise(rows)]
+        strips = [zipper(points, first, second) for first, second in pairwise([_looped(points, row) for row in rows])]
         return oriented(points, np.vstack(strips), outward)
     points = points if body is None else body
     if len(np.unique(points, axis=0)) < 3 or len(points) < 4:
@@ -76,9 +76,11 @@ def zipper(points: FloatArray, first: IntArray, second: IntArray) -> IntArray:
     Both are walked together by their place along the pair; each step spans a triangle, so nothing is
     left open: len(first) + len(second) - 2 triangles.
     """
+    if first[0] == first[-1] and second[0] == second[-1]:
+        second = _turned(points, first, second)
     a, b = points[first], points[second]
     along = (a[-1] - a[0]) / max(np.linalg.norm(a[-1] - a[0]), 1e-300)
-    if (b[-1] - b[0]) @ along < 0:
+    if first[0] != first[-1] and (b[-1] - b[0]) @ along < 0:
         second, b = second[::-1], b[::-1]
     s, t = _place(a, b)
     middle_s, middle_t = 0.5 * (s[1:] + s[:-1]), 0.5 * (t[1:] + t[:-1])
@@ -87,6 +89,25 @@ def zipper(points: FloatArray, first: IntArray, second: IntArray) -> IntArray:
     opposite = np.searchsorted(middle_s, middle_t, side="right")
     upper = np.column_stack([second[1:], second[:-1], first[opposite]])
     return np.vstack([lower, upper])
+
+
+def _looped(points: FloatArray, row: IntArray) -> IntArray:
+    """The row, its first vertex repeated at the end if the sweep comes back to where it began."""
+    steps = np.linalg.norm(np.diff(points[row], axis=0), axis=1)
+    back = np.linalg.norm(points[row[-1]] - points[row[0]])
+    closed = len(row) > 8 and back < 3 * np.median(steps)
+    return np.concatenate([row, row[:1]]) if closed else row
+
+
+def _turned(points: FloatArray, first: IntArray, second: IntArray) -> IntArray:
+    """A closed row begun beside the beginning of another and walked in the same sense."""
+    ring = second[:-1]
+    ring = np.roll(ring, -int(np.argmin(np.linalg.norm(points[ring] - points[first[0]], axis=1))))
+    quarter = points[first[len(first) // 4]]
+    ahead, behind = points[ring[len(ring) // 4]], points[ring[-(len(ring) // 4)]]
+    if np.linalg.norm(behind - quarter) < np.linalg.norm(ahead - quarter):
+        ring = np.roll(ring[::-1], 1)
+    return np.concatenate([ring, ring[:1]])
 
 
 def _place(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -103,6 +103,22 @@ def test_a_cloud_round_a_body_closes():
     assert (np.einsum("ij,ij->i", mesh.face_normals, mesh.vertices[mesh.faces].mean(axis=1)) > 0).all()
 
 
+def test_circles_round_a_body_are_closed_whatever_their_sense_and_beginning():
+    rng = np.random.default_rng(0)
+    circles = []
+    for k in range(9):
+        angle = 2 * np.pi * np.arange(80) / 80
+        angle = (angle if rng.random() < 0.5 else -angle) + rng.uniform(0, 6)
+        circles.append(np.column_stack([np.cos(angle), np.sin(angle), np.full(80, 0.1 * k)]))
+    points = np.vstack(circles)
+    trace = Trace(np.arange(720), points, np.repeat(np.arange(9), 80), 0.1)
+    mesh = mesh_sweeps(trace, outward=points * [1, 1, 0], spacing=0.0)
+    assert border_loops(mesh) == 2
+    middle = mesh.vertices[mesh.faces].mean(axis=1) * [1, 1, 0]
+    assert (np.einsum("ij,ij->i", mesh.face_normals, middle) > 0.9).all()
+    assert mesh.face_areas.sum() == pytest.approx(2 * np.pi * 0.8, rel=2e-3)
+
+
 @pytest.mark.parametrize("bend", [0.0, 0.2])
 def test_libigl_reads_the_right_curvature_from_the_mesh(bend):
     igl = pytest.importorskip("igl")
