@@ -67,6 +67,6 @@ def _distance(row: Comparison) -> float:
     assert row.true is not None and row.found is not None
     axes = row.true.axis, row.found.axis
     return max(
-        float(np.linalg.norm(points - nearest_on(other, points)[0], axis=1).max())
+        float(np.linalg.norm(points - nearest_on(points, other)[0], axis=1).max())
         for points, other in ((resample(axes[0], SAMPLES), axes[1]), (resample(axes[1], SAMPLES), axes[0]))
     )
