@@ -120,7 +120,8 @@ def _place(feature: Feature, analysis: Analysis) -> Html:
     factor, name = (1e-3, "mm") if analysis.base.surface.size < 10.0 else (1.0, "m")
     values = point[:1] if is_profile(analysis) else point
     text = ", ".join(f"{value / factor:.{4 if is_profile(analysis) else 2}f}" for value in values)
-    known = f"± {length_text(1.645 * feature.position_sd, 2)} across" if feature.position_sd > 0 else ""
+    where = "along" if is_profile(analysis) else "across"
+    known = f"± {length_text(1.645 * feature.position_sd, 2)} {where}" if feature.position_sd > 0 else ""
     return Html(element("span", f"{text} {name}") + element("small", known))
 
 

@@ -13,9 +13,9 @@ section { margin-top: 2.6rem; padding-top: 1.4rem; border-top: 1px solid var(--f
 p { margin: .5rem 0; max-width: 46rem; }
 p.lead { font-size: 1.2rem; line-height: 1.5; max-width: 52rem; }
 .warning { border-left: 4px solid #d97706; background: #fff8eb; padding: .6rem .9rem; max-width: 52rem; }
-.facts { display: grid; grid-template-columns: repeat(auto-fit, minmax(150px, 1fr)); gap: 1px; margin: 1.4rem 0 0;
-  background: var(--faint); border: 1px solid var(--faint); border-radius: 8px; overflow: hidden; }
-.facts div { background: var(--paper); padding: .7rem .9rem; }
+.facts { display: flex; flex-wrap: wrap; gap: 1px; margin: 1.4rem 0 0; background: var(--faint);
+  border: 1px solid var(--faint); border-radius: 8px; overflow: hidden; }
+.facts div { background: var(--paper); padding: .7rem .9rem; flex: 1 1 150px; }
 .facts b { display: block; font-size: 1.2rem; font-weight: 600; font-variant-numeric: tabular-nums; }
 .facts span { color: var(--soft); font-size: .85rem; }
 .table { overflow: auto; max-height: 34rem; margin: .8rem 0; border: 1px solid var(--faint); border-radius: 8px; }
