@@ -61,7 +61,11 @@ class Finger(Protocol):
     ) -> None: ...
 
 
-FINGERS: dict[str, str] = {"simulated": "hw.simulated:SimulatedFinger", "grbl": "hw.grbl:GrblFinger"}
+FINGERS: dict[str, str] = {
+    "simulated": "hw.simulated:SimulatedFinger",
+    "dynamic": "hw.dynamic_finger:DynamicFinger",
+    "grbl": "hw.grbl:GrblFinger",
+}
 
 
 def open_finger(kind: str = "simulated", **settings: Any) -> Finger:
