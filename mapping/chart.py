@@ -98,8 +98,7 @@ def chart_along(
     feet = base.foot(line + tip_radius * lift, tip_radius)
     points, up = feet.points, _smoothed(feet.normals, lift)
     if not closed:
-        inside = np.linalg.norm(points - line, axis=1) < 0.5 * reach + 2.0 * spacing
-        keep = _stretch_around_middle(inside)
+        keep = _on_base(points - line, up, 0.1 * reach)
         points, up = points[keep], up[keep]
     if closed:
         points[-1], up[-1] = points[0], up[0]
@@ -132,15 +131,16 @@ def _extended(line: FloatArray, lift: FloatArray, spacing: float, extension: flo
     return np.concatenate([before, line, behind]), np.concatenate(lifts)
 
 
-def _stretch_around_middle(inside: NDArray[np.bool_]) -> slice:
-    """The longest stretch about the middle whose points are on the base, at least two points."""
-    middle = len(inside) // 2
-    out = np.flatnonzero(~inside)
-    low = int(out[out < middle].max(initial=-1)) + 1
-    high = int(out[out >= middle].min(initial=len(inside)))
-    if high - low < 2:
-        return slice(max(0, middle - 1), middle + 1)
-    return slice(low, high)
+def _on_base(moved: FloatArray, up: FloatArray, tolerance: float) -> slice:
+    """The longest stretch about the middle that lies over the base, and one point more at each border.
+
+    A foot moves along its own normal where the base goes on, and sideways, back to the border, where it does not.
+    """
+    sideways = moved - np.einsum("ij,ij->i", moved, up)[:, None] * up
+    out = np.flatnonzero(np.linalg.norm(sideways, axis=1) > tolerance)
+    middle = len(moved) // 2
+    low, high = int(out[out < middle].max(initial=-1)), int(out[out >= middle].min(initial=len(moved)))
+    return slice(max(low, 0), min(high + 1, len(moved)))
 
 
 def _smoothed(normals: FloatArray, hint: FloatArray) -> FloatArray:

@@ -56,7 +56,7 @@ def sample_ensemble(
     rng: np.random.Generator,
     *,
     proposal: Proposal | None = None,
-    max_steps: int = 20000,
+    max_steps: int = 6000,
 ) -> Chain:
     """Draw from a target by an ensemble of walkers.
 
