@@ -58,8 +58,8 @@ def compared_with_truth(analysis: Analysis, pictures: Pictures) -> Html:
         content.append(figure(pictures.files["sizes"], "Errors of the sizes found", caption))
     if "time" in pictures.files:
         caption = (
-            "Worst distance between a true axis, its ends included, and the one found from what had been felt by then; the "
-            "last point is the finished model, after its posterior."
+            "Worst distance between a true axis, its ends included, and the one found from what had been felt by then; "
+            "the last point is the finished model, after its posterior."
         )
         content.append(figure(pictures.files["time"], "Error against time", caption))
     return section("Against the truth", "truth", *content)
