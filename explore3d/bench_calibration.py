@@ -138,7 +138,7 @@ def _record(paths: list[FloatArray], heights: FloatArray) -> Trace:
     centers: FloatArray = np.concatenate(paths)
     centers[:, 2] += TIP_RADIUS + heights
     sweep = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
-    return Trace(np.arange(len(centers)) * 2e-4, centers, sweep, TIP_RADIUS)
+    return Trace(2e-4 * np.arange(float(len(centers))), centers, sweep, TIP_RADIUS)
 
 
 def simulate_noise(noise: Noise, paths: list[FloatArray], rng: np.random.Generator) -> FloatArray:

@@ -130,9 +130,8 @@ def test_a_bump_is_found_in_two_dimensions():
     center, radius, height = np.array([0.4e-3, -0.3e-3, 0]), 2e-3, 0.5e-3
     paths = [line((x, -9e-3), (x, 9e-3)) for x in (-1.5e-3, 0.5e-3)] + [line((-9e-3, 0.0), (9e-3, 0.0))]
     truth = lambda feet: cap_height(np.linalg.norm(feet - center, axis=1), height, radius, TIP)  # noqa: E731
-    found = refine(
-        feature("bump", (0, 0, 0), 0.4e-3, 1e-3), record(paths, truth), np.random.default_rng(0), base=plate()
-    )
+    guess = feature("bump", (0, 0, 0), 0.4e-3, 1e-3)
+    found = refine(guess, record(paths, truth), np.random.default_rng(0), base=plate(), noise=WHITE, confirm=False)
     np.testing.assert_allclose(found.axis[0], center, atol=4 * found.position_sd)
     assert found.position_sd < 80e-6 and inside(found.height, height, 5e-6)
     assert found.length.high == 0.0
