@@ -190,6 +190,10 @@ def _quiet_noise(profiles: list[HeightProfile], quiet: list[BoolArray], first: N
         return _floored(first, tip)
     estimated = estimate_noise(height, np.concatenate(places))
     white = estimated.white * np.sqrt(float(np.mean(samples)))
+    # the raw samples are many more than the bins: their level stands unless the bins contradict it
+    error = np.sqrt(1.4 / len(height))
+    if first.white > 0 and abs(np.log(max(white, 1e-300) / first.white)) < 4 * error:
+        white = first.white
     return _floored(Noise(white, estimated.correlated, estimated.length), tip)
 
 

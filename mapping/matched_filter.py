@@ -166,6 +166,10 @@ def _build_filter(half_width: float, noise: Noise, spacing: float, samples: floa
 
 def best_linear(covariance: FloatArray, template: FloatArray, nuisance: FloatArray) -> tuple[FloatArray, float]:
     """Weights of the best linear unbiased estimate of the template's amplitude, and its standard deviation."""
+    if nuisance.shape[1] == 0:
+        alone = np.linalg.solve(covariance, template)
+        information = float(template @ alone)
+        return alone / information, 1 / float(np.sqrt(information))
     columns = np.column_stack([template, nuisance])
     solved = np.linalg.solve(covariance, columns)
     inverse = np.linalg.pinv(columns.T @ solved, hermitian=True)

@@ -1,0 +1,171 @@
+"""The paper's four algorithms (figure 4) on a single sweep, each with the threshold of the surface it stands on.
+
+| number | what it differentiates | convex | concave |
+|---|---|---|---|
+| 1 | the estimated surface from contact data | k > 1/r | k < -1/r |
+| 2 | the contact normal along the path of the centre | k_t > 1/(2r) | k_t < -1/r |
+| 3 | the traced surface | k_t > 1/(2r) | k_t < -1/r (a kink) |
+| 4 | the surface estimated from the trace by balls | k > 1/r | k < -1/r |
+
+On an estimated surface k never falls below -1/r (an unreachable hollow shows as a fillet of the tip's radius), which
+is why 1 and 4 are blind to concave features; and on a trace k_t never exceeds 1/r, which is why the paper's
+threshold 1/r finds nothing convex there (theory section 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.detectors import DetectionError
+from mapping.noise import robust_sd
+from mapping.sweep_curvature import CurvatureFeature, curvature_along, features_beyond, half_width_for, joined
+from mapping.trace import Trace
+
+FloatArray = NDArray[np.float64]
+
+# A curve is put on this many steps per fit: more only cost time.
+STEPS = 40
+
+
+def curvature_features(trace: Trace, algorithm: int = 3, noise: float | None = None) -> tuple[CurvatureFeature, ...]:
+    """Curvature features along one sweep, by arclength of the centre's path projected on the sweep's chord.
+
+    Args:
+        trace: a single sweep; algorithms 1 and 2 need its contact normals.
+        algorithm: number in figure 4 of the paper.
+        noise: standard deviation of what the algorithm differentiates (m; rad for algorithm 2), or None: estimated
+            from differences of neighbouring samples.
+
+    Raises:
+        DetectionError: an unknown algorithm, fewer than 16 samples, or no contact data where it is needed.
+
+    Reference: paper section 3.1 and figure 4.
+    """
+    if algorithm not in ALGORITHMS:
+        raise DetectionError(f"unknown algorithm {algorithm!r}; the paper has 1, 2, 3 and 4")
+    if len(trace) < 16:
+        raise DetectionError(f"curvature along a sweep needs at least 16 samples; found {len(trace)}")
+    if algorithm in (1, 2) and trace.normals is None:
+        raise DetectionError(f"algorithm {algorithm} needs contact normals; the trace has positions alone: use 3 or 4")
+    return ALGORITHMS[algorithm](trace, noise)
+
+
+def _estimated_from_contacts(trace: Trace, noise: float | None) -> tuple[CurvatureFeature, ...]:
+    normals = _given(trace.normals)
+    contacts = trace.centers - trace.tip_radius * normals if trace.contacts is None else trace.contacts
+    x, z = _planar(trace, contacts)
+    return _curve(x, z, noise, trace.tip_radius, 1 / trace.tip_radius)
+
+
+def _normal_derivative(trace: Trace, noise: float | None) -> tuple[CurvatureFeature, ...]:
+    along, outward = _frame(trace)
+    x, _ = _planar(trace, trace.centers)
+    normals = _given(trace.normals)
+    angle = np.unwrap(np.arctan2(normals @ along, normals @ outward))
+    level = robust_sd(np.diff(angle)) / np.sqrt(2) if noise is None else noise
+    spacing = float(np.ptp(x)) / (len(x) - 1)
+    # slope of a line over 2 w: sd^2 = 3 sigma^2 Delta / (2 w^3)
+    threshold = 1 / (2 * trace.tip_radius)
+    half_width = max(float((13.5 * level**2 * spacing / threshold**2) ** (1 / 3)), 4 * spacing)
+    grid, angle = _even(x, angle, half_width)
+    from scipy.signal import savgol_filter
+
+    size = min(2 * max(2, round(half_width / (grid[1] - grid[0]))) + 1, len(grid) - (len(grid) + 1) % 2)
+    slope = savgol_filter(angle, size, 1, deriv=1, delta=grid[1] - grid[0], mode="interp")
+    # the centre rises by tan(angle): its path is longer than its chord
+    return joined(features_beyond(grid, slope * np.cos(angle), threshold, -1 / trace.tip_radius), half_width)
+
+
+def _traced(trace: Trace, noise: float | None) -> tuple[CurvatureFeature, ...]:
+    x, z = _planar(trace, trace.centers)
+    return _curve(x, z, noise, trace.tip_radius, 1 / (2 * trace.tip_radius))
+
+
+def _estimated_from_trace(trace: Trace, noise: float | None) -> tuple[CurvatureFeature, ...]:
+    tip = trace.tip_radius
+    x, z = _planar(trace, trace.centers)
+    level, spacing = _level(z, noise), float(np.ptp(x)) / (len(x) - 1)
+    half_width = half_width_for(level, spacing, 1 / (2 * tip))
+    grid, z = _even(x, z, half_width)
+    step = grid[1] - grid[0]
+    # balls on raw noise are biased by its extremes (theory section 6): smooth first
+    from scipy.signal import savgol_filter
+
+    size = min(2 * max(2, round(half_width / step)) + 1, len(grid) - (len(grid) + 1) % 2)
+    smooth = savgol_filter(z, size, 2, mode="interp")
+    offsets = np.arange(-int(tip / step), int(tip / step) + 1)
+    ball = np.sqrt(np.maximum(tip**2 - (offsets * step) ** 2, 0.0))
+    padded = np.pad(smooth, len(offsets) // 2, constant_values=np.inf)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, len(offsets))
+    envelope = np.array([(window - ball).min() for window in windows])
+    curvature = curvature_along(grid, envelope, half_width)
+    return joined(features_beyond(grid, curvature, 1 / tip, -1 / tip), half_width)
+
+
+ALGORITHMS: dict[int, Callable[[Trace, float | None], tuple[CurvatureFeature, ...]]] = {
+    1: _estimated_from_contacts,
+    2: _normal_derivative,
+    3: _traced,
+    4: _estimated_from_trace,
+}
+
+
+def _curve(
+    x: FloatArray, z: FloatArray, noise: float | None, tip: float, convex: float
+) -> tuple[CurvatureFeature, ...]:
+    """Features of a curve z(x) by quadratics as wide as its noise demands."""
+    half_width = half_width_for(_level(z, noise), float(np.ptp(x)) / (len(x) - 1), convex)
+    grid, even = _even(x, z, half_width)
+    return joined(features_beyond(grid, curvature_along(grid, even, half_width), convex, -1 / tip), half_width)
+
+
+def _level(z: FloatArray, noise: float | None) -> float:
+    """Noise of single samples: second differences know no slope, and features are rare."""
+    return robust_sd(np.diff(z, 2)) / float(np.sqrt(6)) if noise is None else noise
+
+
+def _frame(trace: Trace) -> tuple[FloatArray, FloatArray]:
+    """Unit directions along the sweep and outward, perpendicular to it."""
+    along = trace.centers[-1] - trace.centers[0]
+    along = along / np.linalg.norm(along)
+    if trace.normals is not None:
+        hint = trace.normals.mean(axis=0)
+    else:
+        offset = trace.centers - trace.centers.mean(axis=0)
+        across = offset - np.outer(offset @ along, along)
+        hint = np.linalg.svd(across, full_matrices=False)[2][0]
+        hint = hint * (1.0 if hint[np.abs(hint).argmax()] > 0 else -1.0)
+        if abs(along[2]) < 0.9:
+            hint = np.array([0.0, 0.0, 1.0])
+    outward = hint - (hint @ along) * along
+    return np.asarray(along), np.asarray(outward / np.linalg.norm(outward))
+
+
+def _planar(trace: Trace, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Coordinates along the sweep's chord and outward, in the order of the sweep."""
+    along, outward = _frame(trace)
+    offset = points - trace.centers[0]
+    return np.asarray(offset @ along), np.asarray(offset @ outward)
+
+
+def _even(x: FloatArray, z: FloatArray, half_width: float) -> tuple[FloatArray, FloatArray]:
+    """Means of z over equal steps of x, STEPS of them in a half-width (never finer than the samples)."""
+    spacing = float(np.ptp(x)) / (len(x) - 1)
+    step = max(half_width / STEPS, spacing)
+    if step < 1.5 * spacing and (np.diff(x) > 0).all():
+        grid = np.linspace(x[0], x[-1], len(x))
+        return grid, np.interp(grid, x, z)
+    bins = np.floor((x - x.min()) / step).astype(np.int64)
+    counts = np.bincount(bins)
+    filled = counts > 0
+    centre = x.min() + (np.arange(len(counts)) + 0.5) * step
+    mean = np.bincount(bins, weights=z)[filled] / counts[filled]
+    return centre, np.interp(centre, centre[filled], mean)
+
+
+def _given(array: FloatArray | None) -> FloatArray:
+    assert array is not None
+    return array

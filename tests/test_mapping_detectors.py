@@ -1,0 +1,145 @@
+"""Detection on closed-form traces of wires, bumps and grooves on a plate, and on a real stylus profile."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mapping.base import Base
+from mapping.detectors import DetectionError, detect
+from mapping.false_alarms import false_alarm_rate, threshold_for
+from mapping.height_profile import HeightProfile
+from mapping.matched_filter import build_bank
+from mapping.noise import Noise
+from mapping.shapes import cap_height, groove_height, step_height
+from mapping.stretches import find_disturbances
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+TIP, SPACING = 0.01, 6e-6
+PROFILE = Path(__file__).parents[2] / "shared" / "data" / "stylus_profile_mm.csv"
+LISTED = [8.9472, 9.0975, 9.1980, 9.8167, 10.0697, 10.2975, 10.5805, 10.6180, 10.9917, 12.0632, 12.0745, 12.2570]
+LISTED += [12.9047, 12.9175, 13.0440, 13.0672, 13.4167]
+
+
+def plate() -> Base:
+    corners = 0.2 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    return Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
+
+
+def sweep(height, length: float = 0.1, white: float = 0.0, seed: int = 0) -> Trace:
+    x = np.arange(-length / 2, length / 2, SPACING)
+    rng = np.random.default_rng(seed)
+    z = TIP + height(x) + white * rng.standard_normal(len(x))
+    return Trace.from_profile(x, z, TIP, x / 0.03)
+
+
+def wire(x, diameter: float = 0.65e-3, place: float = 0.0):
+    return cap_height(x - place, diameter, diameter / 2, TIP)
+
+
+def test_without_noise_a_wire_is_measured_to_its_binning():
+    found = detect(sweep(wire), plate())
+    (crossing,) = found.crossings
+    assert crossing.kind == "convex"
+    assert crossing.curvature_feature
+    assert abs(crossing.point[0]) < 1e-6
+    np.testing.assert_allclose(crossing.height, 0.65e-3, rtol=0.02)
+    np.testing.assert_allclose(crossing.trace_curvature, 1 / (TIP + 0.325e-3), rtol=0.1)
+
+
+def test_a_wire_under_the_noise_of_the_apparatus_is_found_where_it_is():
+    errors = []
+    for seed in range(10):
+        found = detect(sweep(wire, white=2e-4, seed=seed), plate())
+        (crossing,) = found.crossings
+        errors.append(crossing.point[0])
+        assert abs(crossing.height - 0.65e-3) < 4 * crossing.height_sd
+        np.testing.assert_allclose(found.noise.white, 2e-4, rtol=0.05)
+    # the bound sigma/D sqrt(3 Delta x_c / 8) is 0.028 mm when the size is known
+    assert np.sqrt(np.mean(np.square(errors))) < 0.06e-3
+
+
+def test_a_bare_plate_holds_nothing_with_and_without_noise():
+    assert detect(sweep(np.zeros_like), plate()).crossings == ()
+    assert detect(sweep(np.zeros_like, white=2e-4), plate()).crossings == ()
+
+
+def test_wires_above_the_stated_limit_are_found_and_far_below_it_are_not():
+    limit = detect(sweep(np.zeros_like, white=2e-4), plate()).detection_limit
+    assert 0.06e-3 < limit < 0.13e-3
+    seen = [
+        len(detect(sweep(lambda x, d=factor * limit: wire(x, d), white=2e-4, seed=seed), plate()).crossings)
+        for factor in (1.3, 0.4)
+        for seed in range(6)
+    ]
+    assert sum(seen[:6]) >= 5
+    assert sum(seen[6:]) <= 1
+
+
+def test_a_groove_is_concave_and_sharp_and_a_step_goes_up_and_comes_down():
+    (groove,) = detect(sweep(lambda x: groove_height(x, 3e-3, TIP), white=1e-5), plate()).crossings
+    assert groove.kind == "concave"
+    assert groove.height < 0
+    (up,) = detect(sweep(lambda x: step_height(x, 0.4e-3, TIP), white=1e-5), plate()).crossings
+    (down,) = detect(sweep(lambda x: step_height(-x, 0.4e-3, TIP), white=1e-5), plate()).crossings
+    assert (up.kind, down.kind) == ("step up", "step down")
+    np.testing.assert_allclose(up.height, 0.4e-3, rtol=0.05)
+    assert abs(up.point[0]) < 0.5e-3
+
+
+def test_two_wires_nearer_than_their_disturbances_are_two():
+    both = sweep(lambda x: np.maximum(wire(x, place=-2e-3), wire(x, place=2.5e-3)), white=2e-5)
+    places = [c.point[0] for c in detect(both, plate()).crossings]
+    np.testing.assert_allclose(places, [-2e-3, 2.5e-3], atol=2e-4)
+
+
+def test_a_reversed_sweep_tells_the_same():
+    there = sweep(wire, white=1e-4, seed=4)
+    back = there.select(np.arange(len(there))[::-1])
+    (a,), (b,) = detect(there, plate()).crossings, detect(back, plate()).crossings
+    np.testing.assert_allclose(a.point, b.point, atol=0.3 * a.position_sd)
+    np.testing.assert_allclose(a.tangent, -b.tangent, atol=1e-2)
+
+
+@pytest.mark.parametrize("drift", [0, 2])
+def test_false_alarms_come_as_often_as_asked(drift):
+    noise, spacing, samples, rate = Noise(2e-4), 1e-4, 16.7, 1.0
+    bank = build_bank(noise, spacing, samples, 1.4e-3, 0.02, drift)
+    threshold = threshold_for(bank, rate)
+    np.testing.assert_allclose(false_alarm_rate(bank, threshold), rate, rtol=0.15)
+    rng = np.random.default_rng(7)
+    metres, found = 80, 0
+    for _ in range(metres):
+        height = rng.standard_normal(10_000) * 2e-4 / np.sqrt(samples)
+        profile = HeightProfile(
+            0, 0.0, spacing, height, samples, np.arange(10_001), np.arange(10_000.0), np.zeros((10_000, 3))
+        )
+        found += len(find_disturbances(profile, bank, noise, threshold, TIP))
+    # 99 % of a Poisson number with mean 80
+    assert 57 <= found <= 104
+
+
+def test_detection_refuses_what_it_cannot_do():
+    with pytest.raises(DetectionError, match="1, 2, 3 and 4"):
+        detect(sweep(wire), plate(), algorithm=5)
+    with pytest.raises(DetectionError, match="positive"):
+        detect(sweep(wire), plate(), false_alarms_per_metre=0.0)
+    still = Trace(np.arange(50.0), np.tile([0.0, 0, TIP], (50, 1)), np.zeros(50, dtype=int), TIP)
+    (reason,) = detect(still, plate()).left_out
+    assert "too few" in reason
+
+
+@pytest.mark.skipif(not PROFILE.exists(), reason="the real stylus profile is not beside this repository")
+@pytest.mark.parametrize("order", ["as recorded", "reversed", "every other sample"])
+def test_a_real_stylus_profile_shows_its_bumps_and_no_pits(order):
+    x, z = 1e-3 * np.genfromtxt(PROFILE, delimiter=";", skip_header=2)[:, :2].T
+    cut = {"as recorded": slice(None), "reversed": slice(None, None, -1), "every other sample": slice(None, None, 2)}
+    found = detect(Trace.from_profile(x[cut[order]], z[cut[order]], 2e-6))
+    places = 1e3 * np.array([c.point[0] for c in found.crossings])
+    seen = sum(np.abs(places - listed).min() < 2e-3 for listed in LISTED)
+    assert seen >= 15
+    assert len(places) <= 40
+    assert all(c.kind == "convex" and c.height > 4 * found.noise.sd for c in found.crossings)
