@@ -5,6 +5,7 @@ All ratios come from one run on one machine: absolute times say as much about th
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
