@@ -53,6 +53,11 @@ def curvature_features(trace: Trace, algorithm: int = 3, noise: float | None = N
     return ALGORITHMS[algorithm](trace, noise)
 
 
+def along_chord(trace: Trace, points: FloatArray) -> FloatArray:
+    """(N,) places of points (N, 3) along the sweep, in the coordinate of `curvature_features`, m."""
+    return _planar(trace, points)[0]
+
+
 def _estimated_from_contacts(trace: Trace, noise: float | None) -> tuple[CurvatureFeature, ...]:
     normals = _given(trace.normals)
     contacts = trace.centers - trace.tip_radius * normals if trace.contacts is None else trace.contacts

@@ -80,7 +80,7 @@ def _sound_faces(surface: Surface) -> IntArray:
     sound = (surface.face_areas / scale > FLATTEST_FACE) & (longest > 0)
     faces = faces[sound]
     if len(faces) == 0:
-        return faces
+        return np.asarray(faces)
     faces = faces[np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])]
     component, sizes = _components(faces, len(surface.vertices))
     wanted = sizes >= SMALLEST_COMPONENT

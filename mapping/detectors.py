@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,6 +123,8 @@ def detect(
             disturbances = tuple(d for d in disturbances if _stands_out(d, profile, level, tip))
         for disturbance in sorted(disturbances, key=lambda d: d.place):
             crossings += _crossings(disturbance, profile, base, tip)
+    if algorithm != 3:
+        crossings = _judged(crossings, usable, algorithm)
     length = sum(p.length for p in profiles)
     limit = bank.detection_limit(threshold, tip)
     return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out)
@@ -208,6 +210,21 @@ def _stands_out(found: Disturbance, profile: HeightProfile, noise: Noise, tip: f
     block = max(profile.spacing, found.half_width / BINS_PER_HALF_WIDTH)
     variance = noise.block_covariances(1, block, profile.samples * block / profile.spacing)[0]
     return bool(abs(found.height) > ROUGHNESS * np.sqrt(variance))
+
+
+def _judged(crossings: list[Crossing], usable: list[tuple[int, Trace, FloatArray]], algorithm: int) -> list[Crossing]:
+    """Crossings whose `curvature_feature` says whether the paper's algorithm reports a feature of their sign there."""
+    from mapping.algorithms import along_chord, curvature_features
+
+    judged = []
+    for number, part, _ in usable:
+        features = curvature_features(part, algorithm)
+        for c in (c for c in crossings if c.sweep == number and part.t[0] <= c.t <= part.t[-1]):
+            low, high = sorted(along_chord(part, part.centers[[c.start, min(c.stop, len(part)) - 1]]))
+            sign = 1 if c.height > 0 else -1
+            reported = any(f.sign == sign and f.start <= high and f.stop >= low for f in features)
+            judged.append(replace(c, curvature_feature=reported))
+    return judged
 
 
 def _crossings(found: Disturbance, profile: HeightProfile, base: Base, tip: float) -> list[Crossing]:

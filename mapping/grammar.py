@@ -199,7 +199,6 @@ def _closes(axis: FloatArray, height: float, across: float, inspection: Inspecti
 
 def _point_feature(members: list[Crossing], kind: str, detections: Detections) -> Feature:
     best = max(members, key=lambda c: abs(c.height))
-    total = float(np.sqrt(sum(c.snr**2 for c in members)))
     return Feature(
         kind=kind,
         axis=best.point[None],
@@ -207,7 +206,7 @@ def _point_feature(members: list[Crossing], kind: str, detections: Detections) -
         height=Interval.normal(best.height, best.height_sd),
         width=_width(best.height, best.half_width, best.trace_curvature),
         length=Interval(0.0, 0.0, 0.0),
-        evidence=Evidence(total, len(members), (detections.algorithm,)),
+        evidence=_evidence(members, detections),
         curvature_feature=bool(best.curvature_feature),
         position_sd=best.position_sd,
     )
@@ -242,11 +241,18 @@ def _line_feature(
         height=Interval.normal(height, sd),
         width=_width(height, across, curvature),
         length=Interval(length, length, length + 2 * slack),
-        evidence=Evidence(float(np.sqrt(sum(c.snr**2 for c in counted))), len(counted), (detections.algorithm,)),
+        evidence=_evidence(counted, detections),
         curvature_feature=bool(abs(curvature) > 1 / (2 * tip_radius)),
         position_sd=float(np.median([c.position_sd for c in members])),
         notes=notes,
     )
+
+
+def _evidence(members: Sequence[Crossing], detections: Detections) -> Evidence:
+    """All crossings together; the points of one run count as the one crossing that they are."""
+    runs = {(c.sweep, c.snr): c for c in members if isinstance(c, RunPoint)}
+    single = [c for c in members if not isinstance(c, RunPoint)] + list(runs.values())
+    return Evidence(float(np.sqrt(sum(c.snr**2 for c in single))), len(single), (detections.algorithm,))
 
 
 def _width(height: float, half_width: float, curvature: float) -> Interval:

@@ -169,7 +169,7 @@ def best_linear(covariance: FloatArray, template: FloatArray, nuisance: FloatArr
     if nuisance.shape[1] == 0:
         alone = np.linalg.solve(covariance, template)
         information = float(template @ alone)
-        return alone / information, 1 / float(np.sqrt(information))
+        return np.asarray(alone / information, dtype=np.float64), 1 / float(np.sqrt(information))
     columns = np.column_stack([template, nuisance])
     solved = np.linalg.solve(covariance, columns)
     inverse = np.linalg.pinv(columns.T @ solved, hermitian=True)

@@ -1,4 +1,4 @@
-"""Curvature along one sweep: local quadratics whose half-width follows from the noise, and where they pass a threshold."""
+"""Curvature along one sweep by local quadratics as wide as the noise demands, and where it passes a threshold."""
 
 from __future__ import annotations
 

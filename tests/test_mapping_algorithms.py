@@ -104,3 +104,13 @@ def test_online_finds_what_offline_finds_within_the_stated_delay():
     np.testing.assert_allclose([c.point[0] for c in found], places, atol=3e-4)
     np.testing.assert_allclose([c.point[0] for c in found], [c.point[0] for c in offline.crossings], atol=1e-4)
     assert all((t - c.t) * 0.03 <= online.delay for t, c in reports)
+
+
+def test_detection_says_what_each_algorithm_makes_of_a_crossing():
+    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    base = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
+    trace = sweep(wire, white=1e-5, angle=1e-3)
+    assert all(detect(trace, base, algorithm=n).crossings[0].curvature_feature for n in (1, 2, 3, 4))
+    hollow = sweep(groove, white=1e-5, angle=1e-3)
+    assert detect(hollow, base, algorithm=3).crossings[0].curvature_feature
+    assert not detect(hollow, base, algorithm=4).crossings[0].curvature_feature
