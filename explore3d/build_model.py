@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from explore3d import __version__
 from explore3d.analysis import Analysis, TipCount
+from explore3d.base_reach import base_reach
 from explore3d.recording import Log
 from explore3d.stages import Stages
 from explore3d.truth import TrueFeature, compare
@@ -64,14 +66,19 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
     features = _assemble(detections, trace, base, stages)
     features = _refine(features, trace, base, detections, settings, stages)
     estimate = _estimate(features, trace, base, detections, stages)
-    curvature = _curvature(estimate, detections, stages)
+    curvature = _curvature(estimate, stages)
     truth = (
         tuple(TrueFeature(t.kind, t.axis, t.height, t.width, t.length or None) for t in scene.truth) if scene else ()
     )
-    model = ObjectModel.attach(base, features, provenance=_provenance(log, scene, settings, detections))
+    model = ObjectModel.attach(
+        base,
+        features,
+        provenance=_provenance(log, scene, settings, detections),
+        reach=None if estimate is None else base_reach(base.surface, estimate),
+    )
     curve = _time_curve(model, truth, trace, detections, stages)
     return Analysis(
-        title=(scene.title if scene else "") or ", ".join(log.sources),
+        title=(scene.title if scene else "") or ", ".join(Path(source).name for source in log.sources),
         trace=trace,
         base=base,
         detections=detections,
@@ -150,7 +157,7 @@ def _estimate(
         return estimate_surface(trace, base=base, noise=detections.noise)
 
 
-def _curvature(estimate: Estimate | None, detections: Detections, stages: Stages) -> Curvature | None:
+def _curvature(estimate: Estimate | None, stages: Stages) -> Curvature | None:
     if estimate is None:
         why_not = "there is no estimated surface to take it from"
     elif estimate.surface is None:
@@ -162,7 +169,7 @@ def _curvature(estimate: Estimate | None, detections: Detections, stages: Stages
     from mapping.curvature import principal_curvatures
 
     with stages.stage("curvature"):
-        return principal_curvatures(estimate.surface)
+        return principal_curvatures(estimate.surface, noise=estimate.sd)
 
 
 def _time_curve(

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
 
 from explore3d.errors import UserError
-from explore3d.scene import Length, LengthUnit, Point, Table
 from explore3d.scene_complaint import complaint
+from explore3d.scene_values import Length, LengthUnit, Point, Table
 from explore3d.table_columns import Role
 
 Row = tuple[float, float, float]

@@ -76,7 +76,7 @@ def _roughness(points: FloatArray) -> float:
     even = (np.linalg.norm(bend, axis=1) < 0.5 * length) & (length > 0)
     if even.sum() < 8:
         return 0.0
-    return robust_scale(bend[even, 2]) / 6.0**0.5
+    return float(robust_scale(bend[even, 2]) / np.sqrt(6.0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,7 +83,8 @@ def estimate_surface(
     # Thinned by their own distances, and by their balls': over a sharp edge many balls share one contact.
     at_kinks = (points.sample < 0) & (points.labels == TOUCHED)
     points = points.select(thinned(points.points, points.sweep, step, at_kinks))
-    return _meshed(points, trace, slack)
+    estimate = _meshed(points, trace, slack)
+    return estimate if smoothed is None else replace(estimate, sd=smoothed.sd)
 
 
 def _outward(trace: Trace, base: Base | None, outward: ArrayLike | None) -> FloatArray:

@@ -39,6 +39,7 @@ class Estimate:
         sweep: (N,) number of the sweep.
         across: (N,) curvature of the traced surface across the sweeps, 1/m, positive where it bulges out;
             NaN where the neighbouring sweeps do not tell.
+        sd: standard deviation of a point along its normal, m; zero for a trace taken as exact.
     """
 
     surface: Surface | None
@@ -49,6 +50,7 @@ class Estimate:
     sample: IntArray
     sweep: IntArray
     across: FloatArray
+    sd: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("points", "normals", "centers", "labels", "sample", "sweep", "across"):

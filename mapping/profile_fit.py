@@ -82,7 +82,7 @@ def _roughness(z: FloatArray) -> float:
     """Standard deviation of values from one cell to the next, from second differences (features are rare)."""
     if len(z) < 4:
         return 0.0
-    return robust_scale(np.diff(z, 2)) / 6.0**0.5
+    return float(robust_scale(np.diff(z, 2)) / np.sqrt(6.0))
 
 
 def _design(x: FloatArray, knots: FloatArray, degree: int) -> FloatArray:
