@@ -110,7 +110,10 @@ class GrblFinger:
             raise FingerError(f"{self.port}: the controller does not state its travel ($130 to $132); give limits")
         sensor = None if self.slide is None else self.slide.sensor
         speed = self._speed_of(controller)
-        self._stage = GuardedStage(controller, self.frame, bounds, speed, self.over_travel, sensor)
+        over_travel = self.over_travel
+        if self.slide is not None:  # running on must not reach the force limit
+            over_travel = min(over_travel, 0.5 * self.max_force / self.slide.stiffness)
+        self._stage = GuardedStage(controller, self.frame, bounds, speed, over_travel, sensor)
 
     def _speed_of(self, controller: GrblController) -> float:
         return float(np.nanmin(np.append(controller.settings.max_rate, self.travel_speed)))

@@ -214,6 +214,7 @@ class GrblController:
 
     def cancel_jog(self, within: float = 2.0) -> None:
         """Stop jogging, forget what is queued, wait until the machine stands."""
+        self._settle_answers()
         self.link.write(protocol.JOG_CANCEL)
         until = time.monotonic() + within
         while (state := self.status().state) in ("Jog", "Run"):
@@ -222,6 +223,23 @@ class GrblController:
             time.sleep(0.1 * POLL)
         self._sent.clear()
         self._check()
+
+    def wait_idle(self, within: float) -> None:
+        """Wait until every jog is answered and nothing moves; an operator's hold stops the clock.
+
+        Raises:
+            FingerError: a jog was refused.
+            StoppedError, LinkError: as for `command`.
+        """
+        until = time.monotonic() + within
+        while self.status().state in ("Jog", "Run", "Hold", "Door") or self._sent:
+            self._check()
+            self._settle_answers()
+            if self.paused:
+                until = max(until, time.monotonic() + 1.0)
+            if time.monotonic() > until:
+                raise LinkError(f"{self.link.port}: the motion does not end within {within:g} s")
+            time.sleep(0.1 * POLL)
 
     def unlock(self) -> None:
         """$X: leave the alarm state without moving; the position must be trusted."""

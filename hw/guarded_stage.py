@@ -17,8 +17,10 @@ FloatArray = NDArray[np.float64]
 
 # Shorter ways are not worth a command: the controller refuses to probe towards where it stands
 STANDING = 5e-6
-# Force samples older than this are not steered by, s
-STALE = 0.15
+# A force sample older than FRESH is not steered by; a sensor that stays silent for STALE is taken for lost, s
+FRESH, STALE = 0.05, 1.0
+# How long the machine may stand still in the midst of a motion, s
+PATIENCE = 5.0
 
 
 @dataclass(eq=False)
@@ -44,11 +46,11 @@ class GuardedStage:
 
     @property
     def guarded_speed(self) -> float:
-        """Fastest speed whose braking distance stays within the over-travel, m/s."""
+        """Fastest speed whose braking distance stays within half of the over-travel, m/s."""
         acceleration = np.nanmin(np.append(self.controller.settings.acceleration, np.inf))
         if not np.isfinite(acceleration):
             acceleration = 0.01  # a firmware that does not say: assume a lame one
-        return float(min(self.speed, np.sqrt(2.0 * acceleration * self.over_travel)))
+        return float(min(self.speed, np.sqrt(acceleration * self.over_travel)))
 
     def position(self) -> FloatArray:
         """Where the tip centre is now."""
@@ -78,18 +80,40 @@ class GuardedStage:
 
     def _feel(self, target: FloatArray, speed: float, sensor: ForceSensor) -> tuple[FloatArray, bool]:
         """Jog until the sensor feels contact; where the machine then came to rest."""
-        machine = self.frame.to_machine(target)
-        self.controller.jog(machine, speed)
-        until = time.monotonic() + _patience(float(np.linalg.norm(target - self.position())), speed)
+        start = self.position()
+        way = float(np.linalg.norm(target - start))
+        # a late host makes the machine stand: never is more queued than may be run on into the body
+        step = max(0.25 * self.over_travel, STANDING)
+        count = int(np.ceil(way / step))
         hit = False
-        while not hit and self.controller.status().state == "Jog":
-            hit = sensor.wait(lambda: self._touches(sensor), 0.02)
-            if sensor.age > STALE:
-                self.controller.halt(f"no force sample for {sensor.age:.2f} s; check the sensor's cable")
-            if time.monotonic() > until:
-                raise LinkError("the guarded motion does not end; reset the controller")
+        for number in range(1, count + 1):
+            here = start + (target - start) * (number / count)
+            self.controller.jog(self.frame.to_machine(here), speed)
+            until = time.monotonic() + PATIENCE
+            while np.linalg.norm(self.position() - here) > 1.5 * way / count and not hit:
+                self.listen(sensor)
+                hit = self._touches(sensor)
+                if time.monotonic() > until:
+                    raise LinkError("the machine does not follow; is it held, or its door open?")
+            if hit:
+                break
+        if not hit:
+            self.controller.wait_idle(PATIENCE)
+            hit = self._touches(sensor)
         self.controller.cancel_jog()
         return self.position(), hit
+
+    def listen(self, sensor: ForceSensor) -> None:
+        """Go on with a fresh force sample only; meanwhile the machine runs out of jogs and stands.
+
+        Raises:
+            StoppedError: the sensor stays silent.
+        """
+        if sensor.age > FRESH and not sensor.wait(lambda: sensor.age <= FRESH, STALE):
+            self.controller.halt(
+                f"no force sample for {sensor.age:.2f} s; check the sensor's cable and power, run again"
+            )
+            raise StoppedError(self.controller.stop_reason or "stopped")
 
     def _touches(self, sensor: ForceSensor) -> bool:
         return bool(np.linalg.norm(sensor.force()) > self.touch_force)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hw.errors import StoppedError
 from hw.force_sensor import ForceSensor
 from hw.fusion import positions_at, rigid_centers
-from hw.guarded_stage import STALE, GuardedStage
+from hw.guarded_stage import PATIENCE, GuardedStage
 from hw.moves import Move
 from hw.peck import spaced
 
@@ -26,8 +26,6 @@ FloatArray = NDArray[np.float64]
 
 # Jogs that may be under way or waiting when the next is made, in control periods
 QUEUED = 2.0
-# How long the machine may stand still in the midst of a sweep, s
-PATIENCE = 5.0
 
 
 @dataclass(frozen=True)
@@ -98,9 +96,7 @@ class Slide:
         while np.linalg.norm(stage.position() - here) > QUEUED * speed * self.period:
             if time.monotonic() > until:
                 raise StoppedError("the machine does not follow; is it held, or its door open?")
-        if self.sensor.age > STALE:
-            stage.controller.halt(f"no force sample for {self.sensor.age:.2f} s; check the sensor's cable")
-            raise StoppedError(stage.controller.stop_reason or "stopped")
+        stage.listen(self.sensor)
         force = stage.frame.turn_to_object(self.sensor.force())
         return -float(force @ inwards)
 
