@@ -1,0 +1,145 @@
+"""Exploration bench: error of the found extents against finger time, for exploring and for blind baselines.
+
+Every run is one line of a JSONL file; what is already in the file is not run again.
+
+    python -m explore3d.bench_explore OUT.jsonl --seeds 3 --scenes straight,empty
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from explore3d.bench_scenes import SCENES, BenchScene
+from explore3d.truth import compare
+from hw.simulated import SimulatedFinger
+from mapping.base import Base
+from mapping.object_model import ObjectModel
+from mapping.trace import Trace
+from planners.baselines import RandomSweeps, Raster
+from planners.drive import drive
+from planners.explore import Explore
+from planners.plan import Plan
+
+TIP_RADIUS = 0.01
+SMALLEST = 0.3e-3
+# The apparatus of the paper (theory section 6)
+APPARATUS: dict[str, Any] = {"rate": 5000.0, "white": 0.2e-3, "correlated": 0.02e-3, "correlation_length": 1e-3}
+
+Strategy = Callable[[Base, np.random.Generator], Plan]
+STRATEGIES: dict[str, Strategy] = {
+    "explore": lambda base, rng: Explore(base=base, tip_radius=TIP_RADIUS, smallest=SMALLEST).plan(rng),
+    "raster 4 mm": lambda base, rng: Raster(base=base, tip_radius=TIP_RADIUS, pitch=4e-3).plan(rng),
+    "raster 2 mm": lambda base, rng: Raster(base=base, tip_radius=TIP_RADIUS, pitch=2e-3).plan(rng),
+    "raster 1 mm": lambda base, rng: Raster(base=base, tip_radius=TIP_RADIUS, pitch=1e-3).plan(rng),
+    "raster 0.5 mm": lambda base, rng: Raster(base=base, tip_radius=TIP_RADIUS, pitch=0.5e-3).plan(rng),
+    "random 90 s": lambda base, rng: RandomSweeps(base=base, tip_radius=TIP_RADIUS, seconds=90.0).plan(rng),
+    "random 360 s": lambda base, rng: RandomSweeps(base=base, tip_radius=TIP_RADIUS, seconds=360.0).plan(rng),
+}
+
+
+def bench(scenes: list[str], strategies: list[str], seeds: int, out: Path) -> Iterator[dict[str, Any]]:
+    """Run what is not yet in `out` and append it there; yields every new record."""
+    done = set()
+    if out.exists():
+        records = [json.loads(text) for text in out.read_text().splitlines()]
+        done = {(record["scene"], record["strategy"], record["seed"]) for record in records}
+    for seed in range(seeds):
+        for scene in scenes:
+            body = SCENES[scene]()
+            for strategy in strategies:
+                if (scene, strategy, seed) in done:
+                    continue
+                record = {"scene": scene, "strategy": strategy, "seed": seed} | one_run(body, strategy, seed)
+                with out.open("a") as file:
+                    file.write(json.dumps(record) + "\n")
+                yield record
+
+
+def one_run(body: BenchScene, strategy: str, seed: int) -> dict[str, Any]:
+    """Sweep the body by one strategy, build its model, and compare it with the truth."""
+    base = Base(body.base)
+    finger = SimulatedFinger(object=body.object, tip_radius=TIP_RADIUS, seed=seed, **APPARATUS)
+    clock = _Clock(finger)
+    start = perf_counter()
+    record, outcome = drive(STRATEGIES[strategy](base, np.random.default_rng(seed)), clock.execute)
+    planning = perf_counter() - start - clock.seconds
+    trace = Trace.concatenate([felt for _, felt in record if len(felt)])
+    start = perf_counter()
+    model = modelled(trace, base, seed)
+    modelling = perf_counter() - start
+    return {
+        "finger_seconds": finger.clock,
+        "planning_seconds": planning,
+        "modelling_seconds": modelling,
+        "moves": len(record),
+        "outcome": outcome.reason,
+    } | errors(model, body)
+
+
+def modelled(trace: Trace, base: Base, seed: int) -> ObjectModel:
+    """The annotated model of all samples, by the stages of `explore3d analyze`."""
+    from mapping.detectors import detect
+    from mapping.grammar import assemble
+    from mapping.refine import refine
+
+    detections = detect(trace, base)
+    features = assemble(detections, trace, base)
+    refined = [
+        refine(feature, trace, np.random.default_rng([seed, k]), base=base, noise=detections.noise, others=features)
+        for k, feature in enumerate(features)
+    ]
+    return ObjectModel.attach(base, tuple(refined), provenance={})
+
+
+def errors(model: ObjectModel, body: BenchScene) -> dict[str, Any]:
+    """Counts of found, mistaken, missed and invented features, and the largest errors of the found ones, m."""
+    pairs = compare(model, body.truth, TIP_RADIUS)
+    found = [pair for pair in pairs if pair.status == "found" and pair.true and pair.found]
+    ends = [pair.end_error for pair in found if np.isfinite(pair.end_error)]
+    return {
+        "true": len(body.truth),
+        "found": len(found),
+        "mistyped": sum(pair.true.kind != pair.found.kind for pair in found if pair.true and pair.found),
+        "missed": sum(pair.status == "missed" for pair in pairs),
+        "invented": sum(pair.status == "invented" for pair in pairs),
+        "end_error": max(ends, default=None),
+        "axis_rms": max((pair.axis_rms for pair in found), default=None),
+        "height_error": max((abs(pair.height_error) for pair in found), default=None),
+    }
+
+
+class _Clock:
+    """Counts the time that the simulation of the finger takes, which is no part of planning."""
+
+    def __init__(self, finger: SimulatedFinger) -> None:
+        self.finger = finger
+        self.seconds = 0.0
+
+    def execute(self, move: Any) -> Trace:
+        start = perf_counter()
+        trace = self.finger.execute(move)
+        self.seconds += perf_counter() - start
+        return trace
+
+
+def main() -> None:
+    """Command line: one line a run on standard output."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("out", type=Path, help="JSONL file, appended to")
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    parser.add_argument("--strategies", default=",".join(STRATEGIES))
+    given = parser.parse_args()
+    for record in bench(given.scenes.split(","), given.strategies.split(","), given.seeds, given.out):
+        print(json.dumps(record), flush=True)
+
+
+if __name__ == "__main__":
+    main()
