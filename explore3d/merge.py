@@ -1,0 +1,32 @@
+"""merge: a model meets later logs of the same object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from explore3d.build_model import build_model
+from explore3d.log_reader import read_log
+from explore3d.stages import Stages
+from mapping.merging import merge_model
+from mapping.object_model import ObjectModel
+
+
+def merge(model: Path | str, logs: Sequence[Path | str], out: Path | str, pose_sd: float = 0.0) -> ObjectModel:
+    """Analyse logs on a model's base, join what they hold with what it knows, and save the result.
+
+    Args:
+        model: folder or model.json of the known model; it is not changed.
+        logs: later logs of the same object in the same frame, each analysed on its own.
+        out: folder for the merged model; may be the model's own.
+        pose_sd: standard deviation of the pose between the logs, m.
+
+    Raises:
+        ModelError, LogError: a file that cannot be read.
+    """
+    known = ObjectModel.load(model)
+    for path in logs:
+        analysis = build_model(read_log(path), None, known.base, Stages())
+        known = merge_model(known, analysis.model.features, Path(path).name, pose_sd)
+    known.save(out)
+    return known
