@@ -11,6 +11,7 @@ from explore3d import __version__
 from explore3d.cli_analyze import analyze
 from explore3d.cli_doctor import doctor
 from explore3d.cli_figures import figures
+from explore3d.cli_hw import calibrate, emulate, selftest
 from explore3d.cli_run import plan, run
 
 ABOUT = "Find, follow and measure surface features that are finer than the fingertip that touches them."
@@ -23,7 +24,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, plan, analyze, figures, doctor):
+for command in (run, plan, analyze, figures, doctor, emulate, calibrate, selftest):
     app.command()(command)
 
 

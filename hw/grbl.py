@@ -201,6 +201,18 @@ class GrblFinger:
                 raise
         return self._trace(samples)
 
+    def measured_delay(self) -> tuple[float, float]:
+        """Delay of the force sensor behind the stage and its standard error, s, where the last sweep ended.
+
+        Raises:
+            FingerError: there is no sensor, not armed, or nothing was touched yet.
+        """
+        from hw.delay import measured_delay
+
+        if self.slide is None or self._away is None or not self.armed:
+            raise FingerError("the delay is measured with a force sensor, armed, after a first sweep")
+        return measured_delay(self.stage, self.slide.sensor, -self._away, self.slide.stiffness)
+
     def _refuse_what_exceeds(self, move: Move, stage: GuardedStage) -> None:
         stage.check(move.path, move.purpose)
         if move.force > self.max_force:
