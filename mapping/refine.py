@@ -95,7 +95,9 @@ def refine(
         return replace(feature, notes=(*feature.notes, note))
     base = base or _fitted(trace)
     solution = solve(feature, trace, rng, base=base, noise=noise, others=others, confirm=confirm)
-    return describe(solution.problem, solution.posterior, base)
+    found = describe(solution.problem, solution.posterior, base)
+    odds = odds_against_nothing(solution)
+    return replace(found, evidence=replace(found.evidence, log_odds=odds if np.isfinite(odds) else None))
 
 
 def solve(
@@ -113,6 +115,17 @@ def solve(
     noise = noise or noise_of_trace(trace, base)
     problem = pose_problem(feature, Surroundings(trace, base, noise, others))
     return solve_problem(problem, rng, confirm=confirm)
+
+
+def odds_against_nothing(solution: Solution) -> float:
+    """Log Bayes factor of a solved feature against the bare base (with the neighbours that it was posed with).
+
+    The evidence of the feature is the integral over its prior by importance sampling: a prior wider than the data
+    need costs what it should (Occam's factor). Noise, nuisance and samples are the same on both sides.
+    """
+    target = solution.problem.target
+    bare = np.zeros((1, len(solution.problem.window))) if target.beside is None else target.beside[None]
+    return solution.importance.log_evidence - float(target.likelihood.log_density(bare)[0])
 
 
 def pose_problem(feature: Feature, around: Surroundings) -> Problem:
