@@ -114,9 +114,11 @@ def smallest_half_width(noise: Noise, spacing: float, samples: float, tip_radius
     A crest of half-width w is w^2 / (2 r) high; its estimate has the sd of the matched filter.
     """
     widths = np.geomspace(1.5 * spacing, 4 * tip_radius + 3 * spacing, 40)
-    # sd of the height of a cap under white noise, and not better than the correlated level averaged over the cap
+    # information on a cap under white noise: 16 w / (15 sigma^2 Delta); under an OU process of correlation length L:
+    # the integral of (T'^2 L + T^2 / L) / (2 sigma^2) over the cap T
     white = noise.white * np.sqrt(15 * spacing / (16 * widths * samples))
-    correlated = noise.correlated * np.sqrt(np.minimum(1.0, 15 * noise.length / (8 * widths))) * (noise.length < widths)
+    length = max(noise.length, np.finfo(float).tiny)
+    correlated = noise.correlated * np.sqrt(2 / (8 * length / (3 * widths) + 16 * widths / (15 * length)))
     visible = widths**2 / (2 * tip_radius) > threshold * np.hypot(white, correlated)
     return float(widths[visible.argmax()] if visible.any() else widths[-1])
 
