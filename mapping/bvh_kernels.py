@@ -144,7 +144,7 @@ def enclose(boxes, node, lanes, parent, lane):  # type: ignore[no-untyped-def]
         boxes[parent, k, lane], boxes[parent, 3 + k, lane] = low, high
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def lane_tests(boxes, node, end, d, reach, apart, late):  # type: ignore[no-untyped-def]
     """Look from the end of a ball's way, along the unit vector d, at the boxes of a node's lanes.
 
@@ -191,7 +191,7 @@ def passes(boxes, node, lane, start, end, d, length, reach):  # type: ignore[no-
     return gap > 0.0 and gap * gap > reach * reach * square
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def push_lanes(boxes, links, stack, waiting, start, end, d, length, reach, apart, late):  # type: ignore[no-untyped-def]
     """Replace the node on top of the stack by the lanes that a ball on its way may touch, the earliest on top.
 

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from mapping.bvh_kernels import STACK, WIDTH, push_lanes
-from mapping.triangle_kernels import closest_on_triangle, sweep_triangle, unit_normal
+from mapping.triangle_kernels import closest_on_triangle, enter_triangle, leave_triangle, unit_normal
 from mapping.vector_kernels import cross, dot, moved, scaled, sub, vector
 
 PASSES, TOUCHES, OVERLAPS = 0, 1, 2
@@ -55,14 +55,7 @@ def closest(rows, i, o):  # type: ignore[no-untyped-def]
     return closest_on_triangle(a, b, c, n)
 
 
-@njit(cache=True, error_model="numpy")
-def sweep(rows, i, o, d, radius, graze):  # type: ignore[no-untyped-def]
-    """(enter, leave) of a triangle, for a ball that starts at o and moves along d."""
-    a, b, c, n = corners(rows, i, o)
-    return sweep_triangle(a, b, c, n, d, radius, graze)
-
-
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def stays_clear(rows, i, end, d, reach):  # type: ignore[no-untyped-def]
     """True if a ball on its way along d to `end` surely stays further than `reach` from a triangle.
 
@@ -81,12 +74,13 @@ def stays_clear(rows, i, end, d, reach):  # type: ignore[no-untyped-def]
 def meet(rows, i, o, d, ball):  # type: ignore[no-untyped-def]
     """When a ball free at o meets the triangle: t >= 0, inf if never, -1 if it overlaps it at the start."""
     radius, _, graze = ball
-    enter, leave = sweep(rows, i, o, d, radius, graze)
-    if leave < 0.0:
-        return inf
+    a, b, c, n = corners(rows, i, o)
+    enter = enter_triangle(a, b, c, n, d, radius, graze)
     if enter >= 0.0:
         return enter
-    p = closest(rows, i, o)
+    if leave_triangle(a, b, c, n, d, radius, graze) < 0.0:
+        return inf
+    p = closest_on_triangle(a, b, c, n)
     if sqrt(dot(p, p)) < radius * (1.0 - TOUCH) - graze:
         return -1.0
     return 0.0 if dot(p, d) > 0.0 else inf  # resting on it: pressed in, or moving away
@@ -139,7 +133,8 @@ def polish(rows, i, o, d, ball):  # type: ignore[no-untyped-def]
     cosine = dot(p, d) / gap
     if cosine > 0.1:
         return (gap - ball[0]) / cosine
-    enter, _ = sweep(rows, i, o, d, ball[0], 0.0)
+    a, b, c, n = corners(rows, i, o)
+    enter = enter_triangle(a, b, c, n, d, ball[0], 0.0)
     return enter if abs(enter) <= 1e-6 * ball[0] else 0.0
 
 

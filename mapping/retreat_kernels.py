@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 
 from mapping.bvh_kernels import STACK, WIDTH, push_lanes
-from mapping.contact_kernels import closest, corners, sweep, way_to_body
-from mapping.triangle_kernels import holds
+from mapping.contact_kernels import corners, way_to_body
+from mapping.triangle_kernels import closest_on_triangle, holds, leave_triangle
 from mapping.vector_kernels import dot, moved, scaled, vector
 
 
@@ -57,10 +57,10 @@ def overlap_ahead(rows, boxes, links, ball, o, d, stack, apart, late):  # type: 
             waiting = push_lanes(boxes, links, stack, waiting, o, o, d, 0.0, radius, apart, late)
             continue
         waiting -= 1
-        p = closest(rows, i, o)
+        a, b, c, n = corners(rows, i, o)
+        p = closest_on_triangle(a, b, c, n)
         if sqrt(dot(p, p)) < radius - graze:
-            _, leave = sweep(rows, i, o, d, radius, graze)
-            step = max(step, leave)
+            step = max(step, leave_triangle(a, b, c, n, d, radius, graze))
     return step
 
 

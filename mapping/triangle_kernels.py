@@ -73,70 +73,67 @@ def closest_on_triangle(a, b, c, n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def sweep_vertex(a, d, radius, graze):  # type: ignore[no-untyped-def]
-    """(enter, leave): when a ball moving from the origin along d overlaps the point a; (inf, -inf) if never."""
+def enter_vertex(a, d, radius, graze):  # type: ignore[no-untyped-def]
+    """When a ball moving from the origin along the unit vector d comes to touch the point a; inf if never."""
     middle = dot(a, d)
     lateral = moved(a, -middle, d)
     miss = sqrt(dot(lateral, lateral))
     if miss >= radius - graze:
-        return inf, -inf
-    half = sqrt((radius - miss) * (radius + miss))
-    return middle - half, middle + half
+        return inf
+    return middle - sqrt((radius - miss) * (radius + miss))
 
 
 @njit(cache=True, error_model="numpy")
-def sweep_edge(a, b, d, radius, graze):  # type: ignore[no-untyped-def]
-    """(enter, leave) through the mantle of the cylinder around the edge ab."""
+def enter_edge(a, b, d, radius, graze):  # type: ignore[no-untyped-def]
+    """When the ball comes to touch the edge ab between its ends; inf if never."""
     e = sub(b, a)
     length = sqrt(dot(e, e))
     if length == 0.0:
-        return inf, -inf
+        return inf
     e = scaled(1.0 / length, e)
     d_along, a_along = dot(d, e), dot(a, e)
     across, start = moved(d, -d_along, e), moved(a, -a_along, e)
     speed = dot(across, across)
     if speed == 0.0:
-        return inf, -inf
+        return inf
     middle = dot(start, across) / speed
     lateral = moved(start, -middle, across)
     miss = sqrt(dot(lateral, lateral))
     if miss >= radius - graze:
-        return inf, -inf
-    half = sqrt((radius - miss) * (radius + miss) / speed)
-    enter, leave = middle - half, middle + half
-    if not 0.0 <= enter * d_along - a_along <= length:
-        enter = inf
-    if not 0.0 <= leave * d_along - a_along <= length:
-        leave = -inf
-    return enter, leave
+        return inf
+    t = middle - sqrt((radius - miss) * (radius + miss) / speed)
+    return t if 0.0 <= t * d_along - a_along <= length else inf
 
 
 @njit(cache=True, error_model="numpy")
-def sweep_face(a, b, c, n, d, radius):  # type: ignore[no-untyped-def]
-    """(enter, leave) through the two triangles offset by the radius along the normal and against it."""
-    enter, leave = inf, -inf
-    cosine, height = dot(d, n), dot(a, n)
+def enter_face(a, b, c, n, d, radius):  # type: ignore[no-untyped-def]
+    """When the ball comes to touch the inside of the triangle, from whichever side it comes; inf if never."""
+    cosine = dot(d, n)
     if abs(cosine) <= PARALLEL:
-        return enter, leave
-    for side in (-radius, radius):
-        t = (height + side) / cosine
-        if holds(a, b, c, n, moved(scaled(t, d), -side, n)):
-            enter, leave = min(enter, t), max(leave, t)
-    return enter, leave
+        return inf
+    side = -radius if cosine > 0.0 else radius
+    t = (dot(a, n) + side) / cosine
+    return t if holds(a, b, c, n, moved(scaled(t, d), -side, n)) else inf
 
 
 @njit(cache=True, error_model="numpy")
-def sweep_triangle(a, b, c, n, d, radius, graze):  # type: ignore[no-untyped-def]
-    """(enter, leave): when a ball moving from the origin along the unit vector d overlaps the triangle.
+def enter_triangle(a, b, c, n, d, radius, graze):  # type: ignore[no-untyped-def]
+    """When a ball moving from the origin along the unit vector d comes to touch the triangle; inf if never.
 
-    The triangle dilated by the ball is convex and bounded by offset faces, cylinders and spheres, so the
-    earliest entry and the latest exit through any of them are its own. (inf, -inf) if the ball passes by
-    or would sink in by less than `graze`. Times may be negative.
+    The triangle dilated by the ball is convex and bounded by two offset faces, cylinders and spheres; the
+    earliest entry through any of them is its own. Nothing is entered before the offset faces' planes. A
+    ball that would sink in by less than `graze` passes. Times may be negative: when it entered.
     """
-    enter, leave = sweep_face(a, b, c, n, d, radius)
-    for p, q in ((a, b), (b, c), (c, a)):
-        t, u = sweep_vertex(p, d, radius, graze)
-        enter, leave = min(enter, t), max(leave, u)
-        t, u = sweep_edge(p, q, d, radius, graze)
-        enter, leave = min(enter, t), max(leave, u)
-    return enter, leave
+    t = enter_face(a, b, c, n, d, radius)
+    if t < inf:
+        return t
+    t = min(enter_vertex(a, d, radius, graze), enter_vertex(b, d, radius, graze), enter_vertex(c, d, radius, graze))
+    return min(
+        t, enter_edge(a, b, d, radius, graze), enter_edge(b, c, d, radius, graze), enter_edge(c, a, d, radius, graze)
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def leave_triangle(a, b, c, n, d, radius, graze):  # type: ignore[no-untyped-def]
+    """When the ball leaves the triangle again; -inf if it never touches it."""
+    return -enter_triangle(a, b, c, n, scaled(-1.0, d), radius, graze)
