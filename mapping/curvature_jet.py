@@ -14,8 +14,8 @@ from mapping.surface import Surface
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# Neighbourhoods from which a point chooses.
-SIZES = (24, 36, 54, 81, 122, 183, 274, 411, 616)
+# Neighbourhoods from which a point chooses; 25 is the square of a regular grid, whose symmetry cancels odd errors.
+SIZES = (25, 36, 54, 81, 122, 183, 274, 411, 616)
 CONFIDENCE = 3.0
 SAMPLE = 3000
 # Neighbour indices held at once by one thread: keeps a million points under a gigabyte.

@@ -25,8 +25,9 @@ BoolArray = NDArray[np.bool_]
 LARGEST = 4.0
 # Rounding of contact geometry, in tip radii: the noise is never taken to be smaller.
 ROUNDING = 1e-8
-# Signal-to-noise ratio of what is certainly no noise: what exceeds it is kept out of the noise's estimate.
+# Signal-to-noise ratio of the smallest crest looked for, and of what is kept out of the noise's estimate.
 CERTAIN = 5.0
+SUSPECT = 4.0
 RAW_SAMPLES = 40_000
 # Height, in standard deviations of a profile, of the gentlest detail that is no roughness of an unknown base.
 ROUGHNESS = 5.0
@@ -174,7 +175,7 @@ def _noise_and_bank(
         smallest = smallest_half_width(level, spacing, samples, tip, CERTAIN)
         bank = build_bank(level, spacing, samples, smallest, max(largest, smallest), drift)
         if given is None and attempt < 2:
-            quiet = [quiet_bins(p, bank, level, CERTAIN, tip) for p in profiles]
+            quiet = [quiet_bins(p, bank, level, SUSPECT, tip) for p in profiles]
     return level, bank
 
 
