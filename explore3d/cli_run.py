@@ -20,6 +20,9 @@ def run(
     arm: Annotated[
         bool, typer.Option("--arm", help="Let a real machine move; without it, its moves are only planned and checked.")
     ] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on where a broken-off session in that folder stopped.")
+    ] = False,
 ) -> None:
     """Explore the scene with its finger; write the log, the annotated model and the report.
 
@@ -38,7 +41,7 @@ def run(
     from explore3d.run import run as explore
 
     with shown(quiet=json) as progress:
-        analysis = explore(scene, out, progress=progress, force=force or (), arm=arm)
+        analysis = explore(scene, out, progress=progress, force=force or (), arm=arm, resume=resume)
     show(analysis, out, json)
 
 

@@ -13,6 +13,7 @@ from explore3d.base_record import KIND, base_event
 from explore3d.errors import SceneError
 from explore3d.log import LogWriter
 from explore3d.log_reader import read_log
+from explore3d.resume import EARLIER, Replay, earlier_log
 from explore3d.scene import Scene, load_scene
 from explore3d.session import LOG, Session
 from explore3d.stages import Progress, Stages, silent
@@ -33,6 +34,7 @@ def run(
     progress: Progress = silent,
     force: Collection[str] = (),
     arm: bool = False,
+    resume: bool = False,
 ) -> Analysis:
     """Explore, log, and build the annotated model.
 
@@ -42,6 +44,7 @@ def run(
         progress: told the stage and the share of it that is done.
         force: stages to run although the scene does not need them.
         arm: let a real machine move; without it every move is refused.
+        resume: go on from the log of a session that was broken off in that folder.
 
     Raises:
         UserError: a scene or folder that cannot be used.
@@ -52,9 +55,15 @@ def run(
         scene = scene if isinstance(scene, Scene) else load_scene(scene)
         base = known_base(scene)
         finger = scene_finger(scene, arm)
+    replay = None
+    if resume:
+        log, content = earlier_log(out)
+        replay = Replay(log)
     with Session(out) as session:
         session.write("scene.toml", scene.resolved)
-        outcome = _explore(scene, base, finger, session, stages)
+        if resume:
+            session.write(EARLIER, content)
+        outcome = _explore(scene, base, finger, session, stages, replay)
         log = read_log(session.folder / LOG)
         return conclude(session, log, scene, base, stages, ended=outcome.detail or outcome.reason)
 
@@ -90,7 +99,9 @@ def scene_finger(scene: Scene, arm: bool = False) -> Finger:
     )
 
 
-def _explore(scene: Scene, base: Base, finger: Finger, session: Session, stages: Stages) -> Outcome:
+def _explore(
+    scene: Scene, base: Base, finger: Finger, session: Session, stages: Stages, replay: Replay | None = None
+) -> Outcome:
     """Carry out the plan; every sample is in the session's log before the next move begins."""
     from planners.checks import Limits
     from planners.drive import drive
@@ -99,7 +110,8 @@ def _explore(scene: Scene, base: Base, finger: Finger, session: Session, stages:
         about = {"software": f"explore3d {__version__}", "seed": scene.seed, "finger": finger.info}
         log = session.open_log(tip_radius=scene.tip.radius, scene_text=scene.resolved, metadata=about)
         log.event(KIND, base_event(base))
-        execute = _logged(finger, log, scene.explore.time_budget, share)
+        touch = finger.execute if replay is None else replay.before(finger.execute)
+        execute = _logged(touch, log, scene.explore.time_budget, share)
         limits = Limits.of(finger.workspace, base, scene.tip.radius)
         _, outcome = drive(
             explorer(scene, base).plan(),
@@ -128,9 +140,11 @@ def explorer(scene: Scene, base: Base) -> Explore:
     )
 
 
-def _logged(finger: Finger, log: LogWriter, budget: float, share: Callable[[float], None]) -> Callable[[Move], Trace]:
+def _logged(
+    touch: Callable[[Move], Trace], log: LogWriter, budget: float, share: Callable[[float], None]
+) -> Callable[[Move], Trace]:
     def execute(move: Move) -> Trace:
-        trace = finger.execute(move)
+        trace = touch(move)
         log.write(move, trace)
         if len(trace):
             share(min(1.0, float(trace.t[-1]) / budget))

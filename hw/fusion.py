@@ -40,11 +40,13 @@ def estimate_delay(
         ValueError: the force does not rise above the threshold and fall below it again.
     """
     up, down = _crossings(times, forces, threshold)
-    way_in = heights[(reported > up - 0.1) & (reported < up)]
-    way_out = heights[(reported > down) & (reported < down + 0.1)]
-    if len(way_in) < 2 or len(way_out) < 2:
+    # the speeds are taken on the free side, where the way has not turned yet
+    before, after = (reported > up - 0.22) & (reported < up), (reported > down) & (reported < down + 0.22)
+    if before.sum() < 2 or after.sum() < 2:
         raise ValueError("the stage must report its position while it goes into contact and out of it")
-    speed_in, speed_out = _rate(reported, heights, up), _rate(reported, heights, down)
+    speed_in, speed_out = (
+        float(np.polyfit(reported[near] - when, heights[near], 1)[0]) for near, when in ((before, up), (after, down))
+    )
     gap = float(np.interp(down, reported, heights) - np.interp(up, reported, heights))
     return gap / (speed_out - speed_in)
 
@@ -59,9 +61,3 @@ def _crossings(times: FloatArray, forces: FloatArray, threshold: float) -> tuple
     share = [(threshold - forces[i]) / (forces[i + 1] - forces[i]) for i in at]
     up, down = (float(times[i] + w * (times[i + 1] - times[i])) for i, w in zip(at, share, strict=True))
     return up, down
-
-
-def _rate(reported: FloatArray, heights: FloatArray, when: float) -> float:
-    near = np.abs(reported - when) < 0.08
-    t = reported[near] - when
-    return float(np.polyfit(t, heights[near], 1)[0])

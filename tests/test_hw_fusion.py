@@ -1,0 +1,69 @@
+"""Clocks, delays and the joining of stage and sensor, against known clocks and delays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hw.delay import measured_delay
+from hw.force_emulators import OptoForceEmulator
+from hw.frame import Frame
+from hw.fusion import estimate_delay, positions_at, rigid_centers
+from hw.grbl_controller import GrblController
+from hw.grbl_emulator import GrblEmulator
+from hw.guarded_stage import GuardedStage
+from hw.optoforce import OptoForce
+from hw.pty_server import PtyServer
+from hw.sensor_clock import SensorClock, missing, unwrapped
+from hw.touched_body import TouchedBody
+from mapping.surface import Surface
+
+
+def test_the_sensors_clock_is_found_through_jitter_that_only_delays() -> None:
+    rng = np.random.default_rng(4)
+    ticks = np.arange(20_000.0)
+    arrivals = 5.0 + 1.0003e-3 * ticks + rng.exponential(2e-3, len(ticks))
+    clock = SensorClock.estimate(ticks, arrivals, 1e-3)
+    assert clock.period == pytest.approx(1.0003e-3, rel=2e-6)
+    assert np.abs(clock.times(ticks) - 5.0 - 1.0003e-3 * ticks).max() < 5e-5
+
+
+def test_a_counter_that_starts_anew_runs_on_and_its_gaps_are_counted() -> None:
+    counter = (65500 + np.delete(np.arange(200), [50, 51, 120])) % 65536
+    ticks = unwrapped(counter, 16)
+    assert ticks[-1] - ticks[0] == 199
+    assert missing(ticks) == 3
+
+
+def test_the_delay_is_found_from_one_touch_whatever_the_height_of_contact() -> None:
+    delay, stiffness, speed = 0.013, 1e4, 2e-3
+    t = np.arange(0.0, 2.0, 0.001)
+    height = np.abs(t - 1.0) * speed - 0.5e-3  # down to -0.5 mm and up again
+    force = stiffness * np.maximum(-0.37e-3 - height, 0.0)
+    reports = np.arange(0.0, 2.0, 0.02)
+    found = estimate_delay(reports, np.interp(reports, t, height), t + delay, force, 0.2)
+    assert found == pytest.approx(delay, abs=2e-4)
+
+
+def test_positions_between_reports_are_interpolated_and_outside_unknown() -> None:
+    stamps, places = np.array([0.0, 1.0]), np.array([[0.0, 0, 0], [1.0, 2.0, 3.0]])
+    found = positions_at(np.array([-0.1, 0.25, 1.1]), stamps, places)
+    assert found[1].tolist() == [0.25, 0.5, 0.75]
+    assert np.isnan(found[[0, 2]]).all()
+    assert rigid_centers(found[1:2], np.array([[0.0, 0.0, 2.0]]), 1e4)[0, 2] == pytest.approx(0.75 + 2e-4)
+
+
+def test_a_latency_put_into_the_emulated_sensor_is_measured_through_the_ports() -> None:
+    frame, found = Frame.of((-0.15, -0.15, -0.05)), []
+    corners = 0.02 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    body = TouchedBody(Surface(corners, [[0, 1, 2], [0, 2, 3]]), 0.005, frame, 1e4)
+    for latency in (0.0, 0.06):
+        stage = GrblEmulator(body, np.array([-0.15, -0.15, -0.042]))
+        with PtyServer([stage, OptoForceEmulator(stage, noise=0.003, latency=latency)]) as server:
+            controller = GrblController(server.ports[0]).open()
+            with OptoForce(server.ports[1], 400.0) as sensor:
+                guarded = GuardedStage(controller, frame, controller.settings.bounds, 0.03, 2e-4, sensor)
+                found.append(measured_delay(guarded, sensor, np.array([0.0, 0.0, -1.0]), 1e4)[0])
+            controller.close()
+    # the scheduling of a busy host is in both; the difference is the latency
+    assert found[1] - found[0] == pytest.approx(0.06, abs=0.02)
