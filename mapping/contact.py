@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mapping.commanded_path import CommandedPath, checked_points, unit_directions
 from mapping.errors import ContactError
-from mapping.press import checked_points, sample_path, unit_directions
 from mapping.surface import Surface
 
 FloatArray = NDArray[np.float64]
@@ -53,6 +55,10 @@ class Contacts:
     def interference(self) -> NDArray[np.bool_]:
         """(N,) True at interference points: the ball touches two places or more."""
         return np.asarray(self.count >= 2)
+
+    def select(self, index: NDArray[np.bool_] | NDArray[np.int64]) -> Contacts:
+        """The queries that a mask or an index array picks."""
+        return Contacts(**{name: array[index] for name, array in vars(self).items()})
 
 
 class BallContact:
@@ -98,7 +104,7 @@ class BallContact:
         self._ball = (radius, radius * (1.0 + contact_kernels.TOUCH) + graze, graze)
         self._body = (rows, order, *bvh_kernels.build_boxes(rows))
 
-    def first_contact(self, origins: ArrayLike, directions: ArrayLike) -> Contacts:
+    def first_contact(self, origins: ArrayLike, directions: ArrayLike, threads: int = 1) -> Contacts:
         """The first contact of balls that start centred at the origins and move straight along the directions.
 
         A ball that starts in contact is stopped there (distance 0) if it presses in, and free to move
@@ -107,6 +113,7 @@ class BallContact:
         Args:
             origins: (N, 3) starting centres, m.
             directions: (N, 3) or (3,) directions of motion, of any length but zero.
+            threads: processor cores to use; the answer is the same to the last bit.
 
         Raises:
             ContactError: wrong shapes, values that are not finite, a direction of length zero.
@@ -115,11 +122,16 @@ class BallContact:
 
         start = checked_points(origins, "origins")
         way = unit_directions(directions, len(start))
+        local = self._to_body(start)
         where, feature = np.empty((len(start), 3, 3)), np.empty(len(start), np.int8)
         count, distance, state = np.empty(len(start), np.int64), np.empty(len(start)), np.empty(len(start), np.int8)
-        contact_kernels.first_contacts(
-            *self._body, self._ball, self._size, self._to_body(start), way, where, feature, count, distance, state
-        )
+
+        def some(part: slice) -> None:
+            ways = way[part] if len(way) == len(start) else way
+            out = (where[part], feature[part], count[part], distance[part], state[part])
+            contact_kernels.first_contacts(*self._body, self._ball, self._size, local[part], ways, *out)
+
+        _in_parts(some, len(start), contact_kernels.BLOCK, threads)
         return Contacts(
             np.ldexp(where[:, 0], self._exponent) + self._center,
             np.ldexp(where[:, 1], self._exponent) + self._center,
@@ -130,13 +142,42 @@ class BallContact:
             state == contact_kernels.OVERLAPS,
         )
 
-    def slide(self, path: ArrayLike, approach: ArrayLike, spacing: float) -> Contacts:
-        """Where the ball rests while it follows a commanded path and is pressed along the approach.
+    def press(self, centers: ArrayLike, approach: ArrayLike, threads: int = 1) -> Contacts:
+        """Where balls rest that are commanded to the centres and pressed along the approach, each on its own.
 
-        Every sample is pressed on its own, so the ball jumps over what it could not climb. From a sample
-        where the ball is free it presses on; else it first backs off against the approach, only as far
-        as it must to be free, so that a ball inside a hollow or under an overhang stays there. A centre
-        inside the body (the first face behind it turns its back) leaves the body that way first.
+        A ball that is free where it is commanded to presses on. Else it first backs off against the
+        approach, only as far as it must to be free: so a ball in a hollow or under an overhang stays there.
+        A centre inside the body (the first face behind it turns its back) leaves the body that way first.
+
+        Args:
+            centers: (N, 3) commanded centres, m.
+            approach: (N, 3) or (3,) directions of pressing, of any length but zero.
+            threads: processor cores to use.
+
+        Returns:
+            Contacts whose `distance` is measured from the commanded centres along the approach: negative
+            where the ball had to back off.
+
+        Raises:
+            ContactError: wrong shapes, values that are not finite, an approach of length zero.
+        """
+        from mapping import retreat_kernels
+
+        commanded = checked_points(centers, "commanded centres")
+        way = np.broadcast_to(unit_directions(approach, len(commanded)), commanded.shape)
+        back = np.empty(len(commanded))
+        rows, _, boxes, links = self._body
+        retreat_kernels.retreats(
+            rows, boxes, links, self._ball, self._size, self._outward, self._to_body(commanded), -way, back
+        )
+        back = np.ldexp(back, self._exponent)
+        rest = self.first_contact(commanded - back[:, None] * way, way, threads)
+        return replace(rest, distance=rest.distance - back)
+
+    def slide(self, path: ArrayLike, approach: ArrayLike, spacing: float) -> Contacts:
+        """The ball's path while it follows a commanded path, pressed along the approach.
+
+        Every sample is pressed on its own (see `press`), so the ball gets over what it could not climb.
 
         Args:
             path: (K, 3) corners of the commanded path of the ball's centre, m.
@@ -144,23 +185,13 @@ class BallContact:
             spacing: largest distance of neighbouring samples along the path, m.
 
         Returns:
-            Contacts at the N samples; `distance` is measured from the commanded path along the approach,
-            negative where the ball had to back off.
+            Contacts at the N samples, the path's corners among them.
 
         Raises:
             ContactError: wrong shapes, values that are not finite, a spacing that is not positive.
         """
-        from mapping import retreat_kernels
-
-        commanded, way = sample_path(path, approach, spacing)
-        back = np.empty(len(commanded))
-        rows, _, boxes, links = self._body
-        retreat_kernels.retreats(
-            rows, boxes, links, self._ball, self._size, self._outward, self._to_body(commanded), -way, back
-        )
-        back = np.ldexp(back, self._exponent)
-        rest = self.first_contact(commanded - back[:, None] * way, way)
-        return replace(rest, distance=rest.distance - back)
+        commanded = CommandedPath(path, approach)
+        return self.press(*commanded.at(commanded.places(spacing)))
 
     @cached_property
     def _outward(self) -> float:
@@ -179,3 +210,17 @@ def _checked_radius(tip_radius: float) -> float:
     if not (np.isfinite(radius) and radius > 0):
         raise ContactError(f"tip radius must be a positive length in metres; found {tip_radius!r}")
     return radius
+
+
+def _in_parts(work: Callable[[slice], None], count: int, block: int, threads: int) -> None:
+    """Do the work on slices of whole blocks, one for each thread."""
+    if threads < 1:
+        raise ContactError(f"threads must be at least 1; found {threads}")
+    size = max(-(-count // (block * threads)), 1) * block
+    parts = [slice(first, min(first + size, count)) for first in range(0, count, size)]
+    if len(parts) <= 1:
+        for part in parts:
+            work(part)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, parts))
