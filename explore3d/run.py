@@ -83,9 +83,14 @@ def scene_finger(scene: Scene, arm: bool = False) -> Finger:
         from explore3d.machine_finger import machine_finger
 
         return machine_finger(scene, arm)
-    noise = table.noise
+    noise, inert = table.noise, {}
+    if table.dynamics is not None:
+        from hw.dynamics import Dynamics
+
+        inert = {"dynamics": Dynamics(**table.dynamics.model_dump())}
     return open_finger(
-        table.kind,
+        "dynamic" if inert else table.kind,
+        **inert,
         object=scene.object_surface(),
         tip_radius=scene.tip.radius,
         rate=table.rate,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
@@ -33,9 +33,10 @@ SCHEMA = "explore3d/scene/1"
 
 
 class Tip(Table):
-    """The spherical fingertip: `radius` in metres."""
+    """The spherical fingertip: `radius` in metres, or a `profile` of explore3d calibrate that says it."""
 
     radius: Length
+    profile: Path | None = None
 
 
 class Region(Table):
@@ -75,11 +76,20 @@ class FingerNoise(Table):
     contact: Extent = 0.0
 
 
+class DynamicsTable(Table):
+    """Inertia and stiffness of the simulated finger: mass (kg), stiffness (N/m), force gain (no unit, below 1)."""
+
+    mass: Annotated[float, Field(gt=0)] = 0.1
+    stiffness: Annotated[float, Field(gt=0)] = 1e5
+    gain: Annotated[float, Field(ge=0, lt=1)] = 0.5
+
+
 class FingerTable(Table):
     """The finger.
 
-    The simulated one touches the mesh `object`, the truth, and samples at `rate` Hz. A machine of the Grbl family
-    is described in [finger.machine], its force sensor in [finger.sensor]; an emulated one touches `object`.
+    The simulated one touches the mesh `object`, the truth, and samples at `rate` Hz; with `dynamics` it has inertia.
+    A machine of the Grbl family is described in [finger.machine], its force sensor in [finger.sensor]; an emulated
+    one touches `object`.
     """
 
     kind: Literal["simulated", "grbl"] = "simulated"
@@ -88,6 +98,7 @@ class FingerTable(Table):
     rate: Rate = 5000.0
     contact_data: bool = False
     noise: FingerNoise = FingerNoise()
+    dynamics: DynamicsTable | None = None
     machine: MachineTable | None = None
     sensor: SensorTable | None = None
 
@@ -207,7 +218,7 @@ def parse_scene(text: str, path: Path | str) -> Scene:
     """The scene in a text that stood, or might have stood, in the file `path`. Raises SceneError."""
     path = Path(path)
     try:
-        scene = Scene.model_validate(tomllib.loads(text))
+        scene = Scene.model_validate(_with_profile(tomllib.loads(text), path))
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{path}: not valid TOML: {error}") from error
     except ValidationError as error:
@@ -215,6 +226,19 @@ def parse_scene(text: str, path: Path | str) -> Scene:
     scene = _with_absolute_paths(scene, path.resolve().parent)
     scene._path, scene._text = path, text
     return scene
+
+
+def _with_profile(tables: dict[str, Any], path: Path) -> dict[str, Any]:
+    """The tables with the tip radius of the tip profile that they name."""
+    tip = tables.get("tip")
+    if not isinstance(tip, dict) or not isinstance(tip.get("profile"), str) or "radius" in tip:
+        return tables  # beside a radius the profile only says where it came from, as in a resolved scene
+    profile = path.resolve().parent / tip["profile"]
+    try:
+        radius = tomllib.loads(profile.read_text(encoding="utf-8"))["radius"]
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError) as error:
+        raise SceneError(f"{path}: tip.profile: {profile}: not a tip profile of calibrate ({error})") from error
+    return tables | {"tip": tip | {"radius": radius, "profile": str(profile)}}
 
 
 def _with_absolute_paths(scene: Scene, folder: Path) -> Scene:

@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 from explore3d.calibrate import calibrate, selftest, write_profile
+from explore3d.scene import parse_scene
 
 SCENE = """
 schema = "explore3d/scene/1"
@@ -53,6 +54,10 @@ def test_the_simulated_tip_is_found_within_its_interval_and_written_as_a_profile
     write_profile(profile, tmp_path / "tip.toml")
     kept = tomllib.loads((tmp_path / "tip.toml").read_text())
     assert kept["radius"] == profile.tip.radius and kept["schema"] == "explore3d/tip/1"
+    text = (tmp_path / "scene.toml").read_text().replace('radius = "10 mm"', 'profile = "tip.toml"')
+    named = parse_scene(text, tmp_path / "other.toml")
+    assert named.tip.radius == profile.tip.radius
+    assert parse_scene(named.resolved, tmp_path / "resolved.toml").tip.radius == profile.tip.radius
 
 
 def test_an_emulated_machine_finds_its_tip_within_ten_micrometres(tmp_path: Path) -> None:
