@@ -24,7 +24,7 @@ from planners.errors import PlannerError
 from planners.plan import Outcome, Plan
 from planners.ridge import RidgeFollower
 from planners.sense import Sense
-from planners.strokes import Strokes
+from planners.strokes import Strokes, tangential
 from planners.survey import Survey
 
 FloatArray = NDArray[np.float64]
@@ -72,6 +72,22 @@ class Found:
         known: list[AxisTrack | BumpSize] = [*self.tracks, *self.bumps]
         rest = [c for c in self.crossings if not any(k.explains(c) for k in known) and not self._tried(c)]
         return sorted(rest, key=lambda c: -abs(c.height) * min(1.0, slender(c, self.tip_radius)))
+
+    def step_heading(self, seed: Crossing, reach: float) -> FloatArray | None:
+        """Direction from a step to the nearest one on another sweep, or None if the seed is no open step.
+
+        A sweep crosses the edge of an open step once; along a ridge it goes up at one end and down at the other.
+        """
+        steps = [c for c in self.crossings if is_step(c)]
+        sweeps = [c.sweep for c in steps]
+        if not is_step(seed) or sweeps.count(seed.sweep) != 1:
+            return None
+        others = [c for c in steps if c.sweep != seed.sweep and sweeps.count(c.sweep) == 1]
+        others = [c for c in others if 0 < np.linalg.norm(c.point - seed.point) < reach]
+        if not others:
+            return None
+        nearest = min(others, key=lambda c: float(np.linalg.norm(c.point - seed.point)))
+        return tangential(nearest.point - seed.point, seed.normal)
 
     def _tried(self, crossing: Crossing) -> bool:
         return any(
@@ -219,6 +235,11 @@ class Explore:
     def _look_into(self, seed: Crossing, found: Found, strokes: Strokes, sense: Sense) -> Plan:
         """Circle a detection, then follow the ridge or size the bump that it belongs to."""
         found.tried.append(seed)
+        edge = found.step_heading(seed, 3.0 * self.survey.pitch)
+        if edge is not None:
+            followed = yield from self._follower(found, strokes, sense).follow(seed, [edge, -edge])
+            found.tracks.extend([] if followed.value is None else [followed.value])
+            return Outcome("step", followed.detail)
         circled = yield from Circuit(strokes, sense, self._circuit_radius(seed)).around(seed)
         branches: tuple[Crossing, ...] = circled.value
         if branches:
