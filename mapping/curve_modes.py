@@ -69,9 +69,19 @@ class CurveModes:
                 rows += [np.cos(np.pi * k * x), np.sin(np.pi * k * x)]
             return np.stack(rows)
         inside = np.clip(x, -1.0, 1.0)
-        rows = [np.ones_like(x), x * self.reach]
-        for k in range(2, self.degree + 1):
-            legendre = np.polynomial.legendre.Legendre.basis(k)
-            # Straight on beyond the stretch that the data cover: a polynomial would fly off.
-            rows.append(legendre(inside) + (x - inside) * legendre.deriv()(inside))
-        return np.stack(rows[: self.count])
+        value, slope = _legendre(self.degree, inside)
+        # Straight on beyond the stretch that the data cover: a polynomial would fly off.
+        bends = value[2:] + (x - inside) * slope[2:]
+        return np.concatenate([np.stack([np.ones_like(x), x * self.reach])[: self.count], bends])
+
+
+def _legendre(degree: int, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Legendre polynomials 0 to degree (at least 1) and their derivatives at x: two (degree + 1, ...) arrays.
+
+    By Bonnet's recursion: (k + 1) P_k+1 = (2 k + 1) x P_k - k P_k-1, and P'_k+1 = P'_k-1 + (2 k + 1) P_k.
+    """
+    value, slope = [np.ones_like(x), x], [np.zeros_like(x), np.ones_like(x)]
+    for k in range(1, degree):
+        value.append(((2 * k + 1) * x * value[k] - k * value[k - 1]) / (k + 1))
+        slope.append(slope[k - 1] + (2 * k + 1) * value[k])
+    return np.stack(value), np.stack(slope)
