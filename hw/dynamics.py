@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 # Halvings of the interval between two control instants, at most: 2^-30 of 6 um is below an atom
 DEEPEST = 30
 # Share of the tolerance that the rigid trace may take: an error of its slope grows while the tip flies
-SHARE = 0.02
+SHARE = 0.004
 
 
 @dataclass(frozen=True)

@@ -18,29 +18,32 @@ def ride(
     """Ride over a piecewise linear profile; how many pieces (contact or flight) were solved.
 
     In the frame of the profile the gap y (positive: off the body) obeys  m y'' + c y' + k y = -u  in contact,
-    c = 2 sqrt(k m), and  m y'' = -u  in flight. u is held between control instants: u = F0 + gain (F0 - F).
+    c = 2 sqrt(k m), and  m y'' = -u  in flight. u is held between control instants: u = F0 + gain (F0 - F), kept
+    between 0 and 2 F0: answered in proportion, the force of an impact would throw the tip off the body.
 
     Args:
         times, heights: (N,) corners of the profile: s, m.
         sampled: (N,) True at control instants, when the force is measured and the command renewed.
         out: (N, 2) gap y (m) and contact force (N) at the corners.
     """
-    omega = sqrt(stiffness / mass)
+    omega, damping = sqrt(stiffness / mass), 2.0 * sqrt(stiffness * mass)
     gap, speed, command = -force / stiffness, 0.0, force
     touching, felt, pieces = True, force, 0
     slope = 0.0
     for i in range(len(times)):
+        span = times[i + 1] - times[i] if i + 1 < len(times) else 0.0
+        new = (heights[i + 1] - heights[i]) / span if span > 0.0 else slope
+        bend = new - slope if i > 0 else 0.0
+        if touching and i > 0:
+            # at a corner of a curve drawn as chords, the mean of both slopes is that of the curve
+            felt = max(0.0, -stiffness * gap - damping * (speed - 0.5 * bend))
         out[i, 0], out[i, 1] = gap, felt
-        if i + 1 == len(times):
-            break
-        if sampled[i]:
-            command = force + gain * (force - felt)
-        span = times[i + 1] - times[i]
         if span <= 0.0:
             continue
-        new = (heights[i + 1] - heights[i]) / span
-        speed -= new - slope if i > 0 else 0.0
+        if sampled[i]:
+            command = min(max(force + gain * (force - felt), 0.0), 2.0 * force)
         slope = new
+        speed -= bend
         left = span
         while left > 0.0:
             pieces += 1
@@ -54,9 +57,7 @@ def ride(
                 speed = (b - omega * (a + b * step)) * decay
                 touching = lost > left
                 left -= step
-                felt = max(0.0, -stiffness * gap - 2.0 * sqrt(stiffness * mass) * speed) if touching else 0.0
-                if not touching and left <= 0.0:
-                    break
+                felt = 0.0
             else:
                 pull = command / mass
                 land = _lands(gap, speed, pull, left)
@@ -65,8 +66,6 @@ def ride(
                 touching = land <= left
                 left -= step
                 felt = 0.0
-                if touching and left <= 0.0:
-                    felt = max(0.0, -stiffness * gap - 2.0 * sqrt(stiffness * mass) * speed)
     return pieces
 
 
