@@ -18,8 +18,9 @@ def interference_points(ball: BallContact, path: ArrayLike, approach: ArrayLike,
 
     Between samples where the contact jumps over the body while the centre moves on, the jump is bisected
     to rounding. Of the two halves of an interval the one with the larger jump is followed; the other one
-    too while its contact moves more than half as far again as its centre. Two jumps closer together than
-    the spacing may therefore be seen as one; jumps below 1e-4 radii are not looked for.
+    too while its contact moves more than half as far again as its centre. So the spacing should be at
+    most half the width of the narrowest dent that matters: of two jumps closer together than the spacing
+    one may be overlooked. Jumps below 1e-4 radii are not looked for.
 
     Args:
         ball: the ball and the body.
