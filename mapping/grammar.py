@@ -25,6 +25,8 @@ LONGEST_BUMP = 2.4
 # Crossings lower than this share of the line's height passed beside an end.
 FULL_HEIGHT = 0.85
 NAMES = {True: ("bump", "ridge"), False: ("pit", "groove")}
+# A trace of curvature 1 / (a + r) tells the body's radius a only if that is this share of the sum.
+CLEAR_RADIUS = 0.3
 
 
 def assemble(detections: Detections, trace: Trace, base: Base) -> tuple[Feature, ...]:
@@ -56,12 +58,12 @@ def assemble(detections: Detections, trace: Trace, base: Base) -> tuple[Feature,
         kind = "convex" if convex else "concave"
         some = [c for c in [*crossings, *along] if c.kind == kind]
         if inspection is None:
-            features += [_point_feature([c], NAMES[convex][0], detections) for c in some]
+            features += [_point_feature([c], NAMES[convex][0], detections, trace.tip_radius) for c in some]
         elif some:
             for members in groups(some, inspection, scale):
                 features += _lines([some[i] for i in members], convex, inspection, detections, trace.tip_radius)
     features = _without_shadows(features, trace.tip_radius)
-    features += _steps(steps, features, inspection, detections, scale)
+    features += _steps(steps, features, inspection, detections, scale, trace.tip_radius)
     return tuple(sorted(features, key=lambda f: -f.evidence.snr))
 
 
@@ -83,9 +85,9 @@ def _lines(
     path = points[main]
     across = _across(full, path)
     if _polyline_length(path) <= LONGEST_BUMP * across and _falls_off(members, across):
-        return [_point_feature(members, NAMES[convex][0], detections)]
+        return [_point_feature(members, NAMES[convex][0], detections, tip_radius)]
     if len(main) < 2:
-        return [_point_feature(members, NAMES[convex][0], detections)]
+        return [_point_feature(members, NAMES[convex][0], detections, tip_radius)]
     arms = [main, *(b for b in branches if _polyline_length(points[b]) > 2 * across)]
     features = []
     for arm in arms:
@@ -197,18 +199,19 @@ def _closes(axis: FloatArray, height: float, across: float, inspection: Inspecti
     return not inspection.denies(arc[2:-2], height, 0.25 * across)
 
 
-def _point_feature(members: list[Crossing], kind: str, detections: Detections) -> Feature:
+def _point_feature(members: list[Crossing], kind: str, detections: Detections, tip_radius: float) -> Feature:
     best = max(members, key=lambda c: abs(c.height))
     return Feature(
         kind=kind,
         axis=best.point[None],
         normals=best.normal[None],
         height=Interval.normal(best.height, best.height_sd),
-        width=_width(best.height, best.half_width, best.trace_curvature),
+        width=_width(best.height, best.half_width, tip_radius),
         length=Interval(0.0, 0.0, 0.0),
         evidence=_evidence(members, detections),
         curvature_feature=bool(best.curvature_feature),
         position_sd=best.position_sd,
+        extra={"trace_curvature": best.trace_curvature},
     )
 
 
@@ -239,7 +242,7 @@ def _line_feature(
         axis=axis,
         normals=normals,
         height=Interval.normal(height, sd),
-        width=_width(height, across, curvature),
+        width=_width(height, across, tip_radius),
         length=Interval(length, length, length + 2 * slack),
         evidence=_evidence(counted, detections),
         curvature_feature=bool(abs(curvature) > 1 / (2 * tip_radius)),
@@ -255,10 +258,18 @@ def _evidence(members: Sequence[Crossing], detections: Detections) -> Evidence:
     return Evidence(float(np.sqrt(sum(c.snr**2 for c in single))), len(single), (detections.algorithm,))
 
 
-def _width(height: float, half_width: float, curvature: float) -> Interval:
-    """Width on the body, between nothing and the whole disturbance; a cap of the trace's curvature in between."""
-    wide = 2 * half_width
-    guess = min(max(abs(height), 0.0), wide)
+def _width(height: float, half_width: float, tip_radius: float) -> Interval:
+    """Width on the body, between nothing and the whole disturbance.
+
+    The trace of a cap of radius a is one of radius a + r. Where the disturbance is so wide that a is a good share of
+    that, a follows from it; elsewhere the trace hardly depends on a, and a body as wide as high is the guess.
+    """
+    tall, wide = abs(height), 2 * half_width
+    around = (half_width**2 + tall**2) / (2 * tall) if tall > 0 else 0.0
+    radius = around - tip_radius
+    guess = min(tall, wide)
+    if height > 0 and radius > max(CLEAR_RADIUS * around, 0.5 * tall):
+        guess = min(2 * float(np.sqrt(max(2 * radius * tall - tall**2, 0.25 * tall**2))), wide)
     return Interval(guess, 0.0, wide)
 
 
@@ -283,6 +294,7 @@ def _steps(
     inspection: Inspection | None,
     detections: Detections,
     scale: float,
+    tip_radius: float,
 ) -> list[Feature]:
     """Steps that no ridge explains; in an area at least two sweeps must agree on one."""
     free = [
@@ -291,7 +303,7 @@ def _steps(
         if all(_distances(c.point[None], f.axis).min() > 2 * np.sqrt(2 * scale**2) + c.half_width for f in features)
     ]
     if inspection is None:
-        return [_point_feature([c], "step", detections) for c in free]
+        return [_point_feature([c], "step", detections, tip_radius) for c in free]
     result = []
     for members in groups(free, inspection, scale) if free else []:
         line = [free[i] for i in members]
