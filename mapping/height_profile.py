@@ -99,6 +99,10 @@ def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing
     cuts = np.flatnonzero(np.diff(occupied) > LONGEST_GAP + 1) + 1
     profiles = []
     for begin, end in zip([0, *cuts], [*cuts, len(occupied)], strict=True):
+        # a bin that the sweep only begins or ends in is as noisy as its few samples
+        enough = 0.5 * np.median(counts[begin:end])
+        if end - begin > 2:
+            begin, end = begin + (counts[begin] < enough), end - (counts[end - 1] < enough)
         wanted = np.arange(occupied[begin], occupied[end - 1] + 1)
         have = occupied[begin:end]
         edges = np.append(first, len(s))[np.searchsorted(occupied, np.append(wanted, wanted[-1] + 1))]

@@ -10,7 +10,7 @@ import pytest
 from mapping.base import Base
 from mapping.detectors import DetectionError, detect
 from mapping.false_alarms import false_alarm_rate, threshold_for
-from mapping.height_profile import HeightProfile
+from mapping.height_profile import HeightProfile, height_profiles
 from mapping.matched_filter import build_bank
 from mapping.noise import Noise
 from mapping.shapes import cap_height, groove_height, step_height
@@ -143,3 +143,14 @@ def test_a_real_stylus_profile_shows_its_bumps_and_no_pits(order):
     assert seen >= 15
     assert len(places) <= 40
     assert all(c.kind == "convex" and c.height > 4 * found.noise.sd for c in found.crossings)
+
+
+def test_a_bin_that_a_sweep_only_ends_in_does_not_count_as_a_full_one() -> None:
+    s = np.arange(1001) * 1e-4 + 0.5e-6
+    centers = np.column_stack([s, np.zeros_like(s), np.full_like(s, 0.01)])
+    centers[-1, 2] += 0.5e-3
+    plate = Base(Surface([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]]))
+    trace = Trace(np.arange(1001.0), centers, np.zeros(1001, dtype=np.int64), 0.01)
+    (profile,) = height_profiles(0, trace, s, plate, 10e-4)
+    assert len(profile.height) == 100
+    assert np.abs(profile.height).max() < 1e-12
