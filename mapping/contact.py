@@ -100,7 +100,7 @@ class BallContact:
         rows = contact_kernels.lay_out(vertices, surface.faces, order)
         self._size = float(np.linalg.norm(np.abs(self._to_body(np.stack([low, high]))).max(axis=0)))
         radius = float(np.ldexp(self.tip_radius, -exponent))
-        graze = 32 * float(np.finfo(float).eps) * (self._size + radius)
+        graze = 8 * float(np.finfo(float).eps) * (self._size + radius)
         self._ball = (radius, radius * (1.0 + contact_kernels.TOUCH) + graze, graze)
         self._body = (rows, order, *bvh_kernels.build_boxes(rows))
 

@@ -139,14 +139,26 @@ def polish(rows, i, o, d, ball):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def holder(rows, order, near, kept, hit, o, ball):  # type: ignore[no-untyped-def]
-    """Of the triangles touched to rounding, the face of the lowest number: no order of search can change it."""
+def settle(rows, order, near, kept, hit, o, d, ball):  # type: ignore[no-untyped-def]
+    """(triangle, step): which of the near triangles stops the ball first, and how much further along d than o.
+
+    Of those that differ by rounding it is the face of the lowest number: no order of search can change that.
+    """
+    radius, _, graze = ball
+    least = polish(rows, hit, o, d, ball)
     for i in range(kept):
-        if order[near[i]] < order[hit]:
+        p = closest(rows, near[i], o)
+        if sqrt(dot(p, p)) <= radius + graze:
+            least = min(least, polish(rows, near[i], o, d, ball))
+    first, step = hit, least
+    for i in range(kept):
+        if order[near[i]] < order[first]:
             p = closest(rows, near[i], o)
-            if sqrt(dot(p, p)) <= ball[0] + 2.0 * ball[2]:
-                hit = near[i]
-    return hit
+            if sqrt(dot(p, p)) <= radius + graze:
+                further = polish(rows, near[i], o, d, ball)
+                if further <= least + 0.25 * graze:
+                    first, step = near[i], further
+    return first, step
 
 
 @njit(cache=True, error_model="numpy")
@@ -223,8 +235,7 @@ def first_contacts(  # type: ignore[no-untyped-def]
             state[q], distance[q] = OVERLAPS, 0.0
         elif hit >= 0:
             o, guess, state[q] = moved(o, t, d), hit, TOUCHES
-            i = holder(rows, order, near, kept, hit, o, ball)
-            more = polish(rows, i, o, d, ball)
+            i, more = settle(rows, order, near, kept, hit, o, d, ball)
             o = moved(o, more, d)
             p = closest(rows, i, o)
             n, at = scaled(-1.0 / sqrt(dot(p, p)), p), moved(o, 1.0, p)

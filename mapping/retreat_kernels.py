@@ -9,8 +9,8 @@ from numba import njit
 
 from mapping.bvh_kernels import STACK, WIDTH, push_lanes
 from mapping.contact_kernels import corners, way_to_body
-from mapping.triangle_kernels import closest_on_triangle, holds, leave_triangle
-from mapping.vector_kernels import dot, moved, scaled, vector
+from mapping.triangle_kernels import closest_on_triangle, leave_triangle
+from mapping.vector_kernels import dot, moved, scaled, sub, vector
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -24,14 +24,15 @@ def retreats(rows, boxes, links, ball, size, outward, centers, backward, distanc
     for q in range(len(centers)):
         o, d = vector(centers, q), vector(backward, q)
         start, length = way_to_body(o, d, 1.001 * (size + ball[1]))
-        away, inside = start, length >= 0.0 and start == 0.0
+        away, inside = 0.0, length >= 0.0
         while inside:
             away += leave_overlap(rows, boxes, links, ball, moved(o, away, d), d, stack, apart, late)
-            t, facing = first_face(rows, boxes, links, moved(o, away, d), d, length - away, stack, apart, late)
+            rest = start + length - away
+            t, facing = first_face(rows, boxes, links, moved(o, away, d), d, rest, ball[2], stack, apart, late)
             inside = facing * outward > 0.0
             if inside:
                 away += t
-        distance[q] = away if length >= 0.0 and start == 0.0 else 0.0
+        distance[q] = away
 
 
 @njit(cache=True, error_model="numpy")
@@ -65,7 +66,7 @@ def overlap_ahead(rows, boxes, links, ball, o, d, stack, apart, late):  # type: 
 
 
 @njit(cache=True, error_model="numpy")
-def first_face(rows, boxes, links, o, d, length, stack, apart, late):  # type: ignore[no-untyped-def]
+def first_face(rows, boxes, links, o, d, length, slack, stack, apart, late):  # type: ignore[no-untyped-def]
     """First face that the ray from o along d crosses: (t, cosine of its normal and d); (inf, 0) if none."""
     best, facing = length, 0.0
     stack[0] = len(boxes) - 1
@@ -76,20 +77,22 @@ def first_face(rows, boxes, links, o, d, length, stack, apart, late):  # type: i
             waiting = push_lanes(boxes, links, stack, waiting, o, moved(o, best, d), d, best, 0.0, apart, late)
             continue
         waiting -= 1
-        t, cosine = crossing(rows, i, o, d)
+        t, cosine = crossing(rows, i, o, d, slack)
         if t < best or (t == best and abs(cosine) > abs(facing)):
             best, facing = t, cosine
     return best, facing
 
 
 @njit(cache=True, error_model="numpy")
-def crossing(rows, i, o, d):  # type: ignore[no-untyped-def]
-    """(t >= 0, cosine) where the ray crosses a face, its border included; (inf, 0) if it does not."""
+def crossing(rows, i, o, d, slack):  # type: ignore[no-untyped-def]
+    """(t >= 0, cosine) where the ray crosses a face or passes its border within the slack; (inf, 0) if neither."""
     a, b, c, n = corners(rows, i, o)
     cosine = dot(n, d)
     if cosine == 0.0:
         return inf, 0.0
     t = dot(a, n) / cosine
-    if t >= 0.0 and holds(a, b, c, n, scaled(t, d)):
-        return t, cosine
-    return inf, 0.0
+    if t < 0.0 or t == inf:
+        return inf, 0.0
+    f = scaled(t, d)
+    p = closest_on_triangle(sub(a, f), sub(b, f), sub(c, f), n)
+    return (t, cosine) if dot(p, p) <= slack * slack else (inf, 0.0)

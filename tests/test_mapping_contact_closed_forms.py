@@ -18,7 +18,7 @@ X = np.concatenate([np.linspace(-3, 3, 25), np.geomspace(1e-13, 1, 14), -np.geom
 
 def heights(body: Surface, radius: float, x: np.ndarray) -> np.ndarray:
     """Heights of the centre over x (relative to the radius), in radii."""
-    start = np.column_stack([x * radius, np.full(len(x), 1e-3 * radius), np.full(len(x), 90.0 * radius)])
+    start = np.column_stack([x * radius, np.full(len(x), 1e-3 * radius), np.full(len(x), 999.0 * radius)])
     return BallContact(body, radius).first_contact(start, DOWN).centers[:, 2] / radius
 
 
