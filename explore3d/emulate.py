@@ -83,10 +83,9 @@ class Emulation:
         stage.motion.position = np.array([*middle[:2], min(0.0, above + self.tip_radius)])
         if self.sensor is None:
             return [stage]
-        noise = {"noise": self.force_noise, "seed": self.seed}
         if self.sensor == "optoforce":
-            return [stage, OptoForceEmulator(stage, self.counts_per_newton, **noise)]
-        return [stage, LineSensorEmulator(stage, **noise)]
+            return [stage, OptoForceEmulator(stage, self.counts_per_newton, noise=self.force_noise, seed=self.seed)]
+        return [stage, LineSensorEmulator(stage, noise=self.force_noise, seed=self.seed)]
 
 
 def serve(emulation: Emulation, folder: Path) -> PtyServer:

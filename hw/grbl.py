@@ -199,6 +199,9 @@ class GrblFinger:
             self._lost = str(error)
             if not samples:
                 raise
+        except FingerError:
+            if not samples:  # one line was refused, a garbled one perhaps: what was felt before it stays
+                raise
         return self._trace(samples)
 
     def measured_delay(self) -> tuple[float, float]:

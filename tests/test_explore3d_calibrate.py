@@ -60,6 +60,7 @@ def test_the_simulated_tip_is_found_within_its_interval_and_written_as_a_profile
     assert parse_scene(named.resolved, tmp_path / "resolved.toml").tip.radius == profile.tip.radius
 
 
+@pytest.mark.slow
 def test_an_emulated_machine_finds_its_tip_within_ten_micrometres(tmp_path: Path) -> None:
     profile = calibrate(scene(tmp_path, MACHINE), RADIUS, (0.0, 0.0, 0.0), lines=3)
     assert abs(profile.tip.radius - 0.01) < 1e-5

@@ -53,6 +53,7 @@ def test_positions_between_reports_are_interpolated_and_outside_unknown() -> Non
     assert rigid_centers(found[1:2], np.array([[0.0, 0.0, 2.0]]), 1e4)[0, 2] == pytest.approx(0.75 + 2e-4)
 
 
+@pytest.mark.slow
 def test_a_latency_put_into_the_emulated_sensor_is_measured_through_the_ports() -> None:
     frame, found = Frame.of((-0.15, -0.15, -0.05)), []
     corners = 0.02 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])

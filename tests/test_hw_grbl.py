@@ -227,7 +227,7 @@ def test_an_alarm_ends_the_sweep_keeps_its_samples_and_moves_nothing_more() -> N
 # sliding
 
 
-@pytest.mark.parametrize("kind", ["optoforce", "line"])
+@pytest.mark.parametrize("kind", ["optoforce", pytest.param("line", marks=pytest.mark.slow)])
 def test_sliding_follows_the_body_and_holds_the_force(kind: str) -> None:
     with machine(pace=1.0, sensor=kind) as (server, _):
         sensor = OptoForce(server.ports[1], 400.0) if kind == "optoforce" else LineSensor(server.ports[1], rate=1000.0)
@@ -269,7 +269,7 @@ with t.pecker(Port) as finger:
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
 def test_a_signal_stops_the_machine_lifts_the_tip_and_ends_the_program(number: signal.Signals) -> None:
     with machine(pace=2.0) as (server, stage):
         code = SWEEPER.format(tests=os.path.dirname(__file__))
