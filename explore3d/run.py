@@ -115,6 +115,8 @@ def _explore(
         about = {"software": f"explore3d {__version__}", "seed": scene.seed, "finger": finger.info}
         log = session.open_log(tip_radius=scene.tip.radius, scene_text=scene.resolved, metadata=about)
         log.event(KIND, base_event(base))
+        if hasattr(finger, "notice"):
+            finger.notice = log.event  # a slow sweep's samples are on disk before it ends
         touch = finger.execute if replay is None else replay.before(finger.execute)
         execute = _logged(touch, log, scene.explore.time_budget, share)
         limits = Limits.of(finger.workspace, base, scene.tip.radius)

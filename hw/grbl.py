@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field
 from types import TracebackType
@@ -43,6 +44,7 @@ class GrblFinger:
         unlock: send $X if the machine is locked on connecting (its position must be right). Moves nothing.
         home: send $H on connecting. MOVES the machine; needs `armed`.
         baudrate: of the port.
+        notice: told of every peck as it is made, (kind, JSON values): so that a log has it before the sweep ends.
         beside: a context that lives as long as the connection (an emulator).
     """
 
@@ -59,6 +61,7 @@ class GrblFinger:
     unlock: bool = False
     home: bool = False
     baudrate: int = 115200
+    notice: Callable[[str, dict[str, Any]], None] | None = None
     beside: AbstractContextManager[Any] = field(default_factory=nullcontext)
     _stage: GuardedStage | None = field(init=False, default=None, repr=False)
     _open: ExitStack = field(init=False, repr=False, default_factory=ExitStack)
@@ -240,6 +243,8 @@ class GrblFinger:
         assert touch is not None
         for sample in touch.trace(stage, move):
             samples.append(sample)
+            if self.notice is not None and self.peck is not None:
+                self.notice("peck", {"sweep": self._sweeps, "t": sample[0] - self._begun, "center": sample[1].tolist()})
         self._away = -move.approach[-1]
 
     def _trace(self, samples: list[tuple[Any, ...]]) -> Trace:

@@ -179,6 +179,14 @@ def test_pecks_are_the_latched_positions_to_a_step_of_the_motor() -> None:
         assert stage.motion.body.force(stage.motion.position).max() == 0.0
 
 
+def test_every_peck_is_told_of_as_it_is_made() -> None:
+    told: list[dict[str, object]] = []
+    with machine() as (server, _), pecker(server, notice=lambda kind, data: told.append(data)) as finger:
+        trace = finger.execute(across(x=0.003))
+    assert [data["center"] for data in told] == trace.centers.tolist()
+    assert np.allclose([data["t"] for data in told], trace.t)  # type: ignore[arg-type]
+
+
 def test_a_step_too_high_for_the_clearance_is_climbed() -> None:
     with machine() as (server, _), pecker(server, peck=Peck(2e-3, 1e-4, 0.02, R)) as finger:
         trace = finger.execute(across(x=0.015))
