@@ -8,14 +8,17 @@ import sys
 import threading
 import time
 import tty
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hw import line_sensor, optoforce
 from hw.errors import LinkError
+from hw.faults import Fault
 from hw.framing import Frames, Lines
 from hw.link import Link
+from hw.pty_server import PtyServer
 
 HEADER = b"\xaa\x07\x08\x22"
 
@@ -172,3 +175,30 @@ def test_a_minute_of_five_kilohertz_loses_nothing_and_takes_less_than_a_third_of
     seen, share = sustain(60.0)
     assert seen == list(range(300_000))
     assert share < 0.30
+
+
+def test_a_port_that_comes_back_is_opened_again_and_that_is_counted(tmp_path: Path) -> None:
+    class Echo:
+        """Sends back what it gets."""
+
+        def __init__(self) -> None:
+            self.out = bytearray()
+
+        def receive(self, data: bytes, now: float) -> None:
+            self.out += data
+
+        def advance(self, now: float) -> None:
+            """Nothing happens by itself."""
+
+    gone, heard = threading.Event(), threading.Event()
+    fault = Fault("disconnect", at=0.3, duration=0.5)
+    with (
+        PtyServer([Echo()], links=[tmp_path / "port"], faults=[fault]) as server,
+        Link(server.ports[0], Lines(), lambda now, lines: heard.set(), lost=gone.set) as link,
+    ):
+        assert gone.wait(3.0)
+        assert link.reopen(3.0)
+        link.write(b"hello\n")
+        assert heard.wait(2.0)
+        assert link.counters["reconnections"] == 1
+        assert not Link(str(tmp_path / "nowhere"), Lines(), lambda now, lines: None).reopen(0.2)
