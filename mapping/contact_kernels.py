@@ -20,6 +20,7 @@ from mapping.vector_kernels import cross, dot, moved, scaled, sub, vector
 PASSES, TOUCHES, OVERLAPS = 0, 1, 2
 TOUCH = 1e-9  # relative to the radius: what lies this close to the resting ball touches it
 APART = 9e-5  # relative to the radius, sqrt(8 TOUCH): dents narrower than this are shallower than TOUCH
+GLANCING = 1e-3  # cosine below which a step along the way says little about the gap
 MOST = 16  # distinct contacts that are told apart
 BLOCK = 1024  # queries that share their guesses: threads that take whole blocks give the same answers
 
@@ -126,39 +127,39 @@ def first_touch(rows, boxes, links, ball, o, d, far, guess, near, stack, apart, 
 
 
 @njit(cache=True, error_model="numpy")
-def polish(rows, i, o, d, ball):  # type: ignore[no-untyped-def]
-    """How much further along d a ball that all but touches the triangle rests on it exactly."""
-    p = closest(rows, i, o)
+def further(p, d, radius):  # type: ignore[no-untyped-def]
+    """How much further along d a ball rests on the point p that it all but touches; inf if it slides along it."""
     gap = sqrt(dot(p, p))
     cosine = dot(p, d) / gap
-    if cosine > 0.1:
-        return (gap - ball[0]) / cosine
-    a, b, c, n = corners(rows, i, o)
-    enter = enter_triangle(a, b, c, n, d, ball[0], 0.0)
-    return enter if abs(enter) <= 1e-6 * ball[0] else 0.0
+    return (gap - radius) / cosine if cosine > GLANCING else inf
 
 
 @njit(cache=True, error_model="numpy")
 def settle(rows, order, near, kept, hit, o, d, ball):  # type: ignore[no-untyped-def]
-    """(triangle, step): which of the near triangles stops the ball first, and how much further along d than o.
+    """(triangle, step, kept): which of the near triangles stops the ball first, and how much further along d than o.
 
     Of those that differ by rounding it is the face of the lowest number: no order of search can change that.
+    near[:kept] shrinks to the triangles within reach.
     """
-    radius, _, graze = ball
-    least = polish(rows, hit, o, d, ball)
+    radius, reach, graze = ball
+    least = further(closest(rows, hit, o), d, radius)
+    if least == inf:
+        a, b, c, n = corners(rows, hit, o)
+        again = enter_triangle(a, b, c, n, d, radius, 0.0)
+        least = again if abs(again) <= 1e-6 * radius else 0.0
+    stay = 0
     for i in range(kept):
         p = closest(rows, near[i], o)
-        if sqrt(dot(p, p)) <= radius + graze:
-            least = min(least, polish(rows, near[i], o, d, ball))
-    first, step = hit, least
-    for i in range(kept):
-        if order[near[i]] < order[first]:
-            p = closest(rows, near[i], o)
-            if sqrt(dot(p, p)) <= radius + graze:
-                further = polish(rows, near[i], o, d, ball)
-                if further <= least + 0.25 * graze:
-                    first, step = near[i], further
-    return first, step
+        if dot(p, p) <= reach * reach:
+            near[stay] = near[i]
+            stay += 1
+            least = min(least, further(p, d, radius))
+    first = -1
+    for i in range(stay):
+        lower = first < 0 or order[near[i]] < order[first]
+        if lower and further(closest(rows, near[i], o), d, radius) <= least + 0.25 * graze:
+            first = near[i]
+    return first if first >= 0 else hit, least, stay
 
 
 @njit(cache=True, error_model="numpy")
@@ -235,7 +236,7 @@ def first_contacts(  # type: ignore[no-untyped-def]
             state[q], distance[q] = OVERLAPS, 0.0
         elif hit >= 0:
             o, guess, state[q] = moved(o, t, d), hit, TOUCHES
-            i, more = settle(rows, order, near, kept, hit, o, d, ball)
+            i, more, kept = settle(rows, order, near, kept, hit, o, d, ball)
             o = moved(o, more, d)
             p = closest(rows, i, o)
             n, at = scaled(-1.0 / sqrt(dot(p, p)), p), moved(o, 1.0, p)

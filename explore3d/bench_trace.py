@@ -1,0 +1,176 @@
+"""Trace bench: ball centres per second over the paper's bump, beside OpenCAMLib's drop cutter if it is installed.
+
+Every case runs in a process of its own on one core, with the same queries for every method. The clock (processor
+time) covers all from the mesh in memory to the answers: the tree, the queries. Not covered: importing, and
+compiling the kernels, which happens once per machine.
+
+    python -m explore3d.bench_trace --triangles 20000,200000 --peers
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import resource
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from time import process_time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.contact import BallContact
+from mapping.surface import Surface
+
+FloatArray = NDArray[np.float64]
+
+STEEPNESS = 15.0  # a of the paper's bump, figure 3
+SIZE = 2.0  # side of the square under it
+TRIANGLES = (20_000, 200_000, 2_000_000)
+RATIOS = (0.05, 0.5)
+LAYOUTS = ("grid", "scattered")
+PEER_SECONDS = 10.0  # a slow method answers only as many of the queries as fit in here
+
+Tracer = Callable[[Surface, float, FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class TraceTiming:
+    """One method on one case.
+
+    Args:
+        method: "explore3d" or a peer's name.
+        triangles: of the mesh.
+        ratio: ball radius over the size of the body.
+        layout: "grid" (row by row) or "scattered" queries.
+        queries: answered.
+        seconds: processor time, preparation included.
+        memory: largest resident memory of the process, bytes.
+        error: largest difference of heights from explore3d's, in radii.
+    """
+
+    method: str
+    triangles: int
+    ratio: float
+    layout: str
+    queries: int
+    seconds: float
+    memory: int
+    error: float
+
+    @property
+    def rate(self) -> float:
+        """Points per second."""
+        return self.queries / self.seconds
+
+
+def bench_trace(
+    triangles: Sequence[int] = TRIANGLES,
+    ratios: Sequence[float] = RATIOS,
+    layouts: Sequence[str] = LAYOUTS,
+    side: int = 256,
+    peers: bool = True,
+) -> Iterator[TraceTiming]:
+    """Time every case, one after the other; queries are side x side.
+
+    Peers that are not installed are left out (`pip install explore3d[peers]`).
+    """
+    methods = [name for name, module in METHODS.items() if peers or not module]
+    methods = [name for name in methods if not METHODS[name] or importlib.util.find_spec(METHODS[name])]
+    cases = [(m, n, ratio, layout, side) for n in triangles for ratio in ratios for layout in layouts for m in methods]
+    for case in cases:
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+            yield pool.submit(_timed, *case).result()
+
+
+def bump_mesh(triangles: int) -> Surface:
+    """The paper's bump over a square, as a height field of about so many triangles."""
+    cells = max(round(np.sqrt(triangles / 2)), 1)
+    x = np.linspace(-SIZE / 2, SIZE / 2, cells + 1)
+    u, v = np.meshgrid(x, x, indexing="ij")
+    points = np.column_stack([u.ravel(), v.ravel(), (1.0 / (1.0 + STEEPNESS * (u * u + v * v))).ravel()])
+    n = np.arange(len(points), dtype=np.int64).reshape(u.shape)
+    a, b, c, d = n[:-1, :-1].ravel(), n[1:, :-1].ravel(), n[1:, 1:].ravel(), n[:-1, 1:].ravel()
+    return Surface(points, np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])]))
+
+
+def query_points(side: int, layout: str) -> FloatArray:
+    """(side^2, 3) starting centres above the bump."""
+    if layout == "scattered":
+        xy = np.random.default_rng(0).uniform(-0.49 * SIZE, 0.49 * SIZE, (side * side, 2))
+    else:
+        x = np.linspace(-0.49 * SIZE, 0.49 * SIZE, side)
+        xy = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1).reshape(-1, 2)
+    return np.column_stack([xy, np.full(len(xy), 2.0 * SIZE)])
+
+
+def _timed(method: str, triangles: int, ratio: float, layout: str, side: int) -> TraceTiming:
+    radius, mesh, start = ratio * SIZE, bump_mesh(triangles), query_points(side, layout)
+    _by_explore3d(bump_mesh(8), radius, start[:2])  # loads the kernels
+    tracer: Tracer = _by_explore3d if not METHODS[method] else _by_opencamlib
+    begin = process_time()
+    heights = tracer(mesh, radius, start)
+    seconds = process_time() - begin
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    own = _by_explore3d(mesh, radius, start[: len(heights)])
+    error = float(np.abs(heights - own).max()) / radius
+    return TraceTiming(method, len(mesh.faces), ratio, layout, len(heights), seconds, memory, error)
+
+
+def _by_explore3d(mesh: Surface, radius: float, start: FloatArray) -> FloatArray:
+    return np.asarray(BallContact(mesh, radius).first_contact(start, [0.0, 0.0, -1.0]).centers[:, 2])
+
+
+def _by_opencamlib(mesh: Surface, radius: float, start: FloatArray) -> FloatArray:
+    """OpenCAMLib's exact drop cutter, in batches until its time is up."""
+    ocl: Any = importlib.import_module("opencamlib")
+    begin = process_time()
+    body = ocl.STLSurf()
+    for corners in mesh.vertices[mesh.faces].tolist():
+        body.addTriangle(ocl.Triangle(*[ocl.Point(*corner) for corner in corners]))
+    cutter = ocl.BallCutter(2.0 * radius, 10.0 * (SIZE + radius))  # OpenCAMLib keeps no reference to it
+    heights: list[float] = []
+    batch = 16
+    while len(heights) < len(start) and process_time() - begin < PEER_SECONDS:
+        drop = ocl.BatchDropCutter()
+        drop.setSTL(body)
+        drop.setThreads(1)
+        drop.setCutter(cutter)
+        for x, y, _ in start[len(heights) : len(heights) + batch].tolist():
+            drop.appendPoint(ocl.CLPoint(x, y, -10.0 * (SIZE + radius)))
+        drop.run()
+        heights += [point.z + radius for point in drop.getCLPoints()]
+        batch *= 2
+    return np.array(heights)
+
+
+# What must be installed for a method
+METHODS = {"explore3d": "", "OpenCAMLib BallCutter": "opencamlib"}
+
+
+def table(timings: Iterator[TraceTiming]) -> Iterator[str]:
+    """One line for each timing as it comes."""
+    yield f"{'method':24}{'triangles':>10}{'r/L':>6}  {'layout':10}{'points/s':>11}{'s':>8}{'MB':>6}{'error/r':>10}"
+    for t in timings:
+        yield (
+            f"{t.method:24}{t.triangles:10}{t.ratio:6g}  {t.layout:10}{t.rate:11.0f}"
+            f"{t.seconds:8.2f}{t.memory / 1e6:6.0f}{t.error:10.1e}"
+        )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--triangles", default=",".join(map(str, TRIANGLES)))
+    parser.add_argument("--side", type=int, default=256)
+    parser.add_argument("--peers", action="store_true")
+    options = parser.parse_args()
+    sizes = [int(n) for n in options.triangles.split(",")]
+    for line in table(bench_trace(sizes, side=options.side, peers=options.peers)):
+        print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()
