@@ -2,12 +2,11 @@
 
 Every run is one line of a JSONL file; what is already in the file is not run again.
 
-    python -m explore3d.bench_explore OUT.jsonl --seeds 3 --scenes straight,empty
+    explore3d bench explore --store OUT.jsonl --seeds 3 --scenes straight,empty
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -127,19 +126,3 @@ class _Clock:
         trace = self.finger.execute(move)
         self.seconds += perf_counter() - start
         return trace
-
-
-def main() -> None:
-    """Command line: one line a run on standard output."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("out", type=Path, help="JSONL file, appended to")
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--scenes", default=",".join(SCENES))
-    parser.add_argument("--strategies", default=",".join(STRATEGIES))
-    given = parser.parse_args()
-    for record in bench(given.scenes.split(","), given.strategies.split(","), given.seeds, given.out):
-        print(json.dumps(record), flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -9,9 +9,11 @@ import typer
 
 from explore3d import __version__
 from explore3d.cli_analyze import analyze
+from explore3d.cli_bench import bench
 from explore3d.cli_doctor import doctor
 from explore3d.cli_figures import figures
 from explore3d.cli_hw import calibrate, emulate, selftest
+from explore3d.cli_merge import merge
 from explore3d.cli_run import plan, run
 
 ABOUT = "Find, follow and measure surface features that are finer than the fingertip that touches them."
@@ -24,8 +26,9 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, plan, analyze, figures, doctor, emulate, calibrate, selftest):
+for command in (run, plan, analyze, merge, figures, doctor, emulate, calibrate, selftest):
     app.command()(command)
+app.add_typer(bench, name="bench")
 
 
 def _show_version(asked: bool) -> None:

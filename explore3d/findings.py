@@ -31,10 +31,11 @@ def summary(analysis: Analysis) -> list[str]:
     if analysis.recovered:
         lines.append(analysis.recovered)
     more = [f"  and {len(features) - MOST} more, see the report"] if len(features) > MOST else []
-    return lines + [_line(feature) for feature in features[:MOST]] + more
+    return lines + [feature_line(feature) for feature in features[:MOST]] + more
 
 
-def _line(feature: Feature) -> str:
+def feature_line(feature: Feature) -> str:
+    """A feature's name and its sizes with their intervals, in one line."""
     sizes = [("height", feature.height), ("width", feature.width), ("length", feature.length)]
     known = [f"{name} {_text(interval)}" for name, interval in sizes if interval.median or interval.censored]
     return f"  {feature.id}: {', '.join(known)}"

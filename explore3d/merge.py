@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from explore3d.build_model import build_model
+from explore3d.errors import FolderError
 from explore3d.log_reader import read_log
 from explore3d.stages import Stages
 from mapping.merging import merge_model
@@ -22,11 +23,15 @@ def merge(model: Path | str, logs: Sequence[Path | str], out: Path | str, pose_s
         pose_sd: standard deviation of the pose between the logs, m.
 
     Raises:
-        ModelError, LogError: a file that cannot be read.
+        ModelError: a model that cannot be read.
+        UserError: a log that cannot be read, or a folder that cannot be written.
     """
     known = ObjectModel.load(model)
     for path in logs:
         analysis = build_model(read_log(path), None, known.base, Stages())
         known = merge_model(known, analysis.model.features, Path(path).name, pose_sd)
-    known.save(out)
+    try:
+        known.save(out)
+    except OSError as error:
+        raise FolderError(f"{out}: cannot write the merged model: {error.strerror or error}") from error
     return known

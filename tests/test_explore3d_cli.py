@@ -13,9 +13,11 @@ import pytest
 
 from explore3d import __version__
 from explore3d.cli import app, main
+from explore3d.cli_bench import bench
 
 SCENES = Path(__file__).parents[1] / "assets" / "scenes"
 COMMANDS = [command.callback.__name__ for command in app.registered_commands if command.callback]
+BENCHES = [command.callback.__name__ for command in bench.registered_commands if command.callback]
 
 
 def explore3d_main(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
@@ -33,11 +35,11 @@ def test_the_version_is_the_packages(monkeypatch: pytest.MonkeyPatch, capsys: py
     assert capsys.readouterr().out == f"explore3d {__version__}\n"
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [*COMMANDS, *(f"bench {name}" for name in BENCHES)])
 def test_every_commands_help_has_an_example(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
-    assert explore3d_main(monkeypatch, command, "--help") == 0
+    assert explore3d_main(monkeypatch, *command.split(), "--help") == 0
     assert f"Example: explore3d {command}" in " ".join(capsys.readouterr().out.split())
 
 
@@ -185,3 +187,27 @@ def test_a_bad_log_ends_in_one_line_and_leaves_no_folder(
         assert error.startswith("explore3d: ")
         assert name in error
         assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["bench", "trace", "--triangles", "many"], "--triangles: expected whole numbers"),
+        (["bench", "explore", "--store", "s.jsonl", "--scenes", "moon"], "--scenes: unknown 'moon'; possible: "),
+        (["bench", "calibration", "--store", "s.jsonl", "--method", "luck"], "--method: expected importance or emcee"),
+        (["merge", "absent", "log.mcap", "--out", "m"], "absent"),
+    ],
+)
+def test_benches_and_merging_refuse_what_they_do_not_know(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    arguments: list[str],
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert explore3d_main(monkeypatch, *arguments) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert len(error.splitlines()) == 1
+    assert not list(tmp_path.iterdir())

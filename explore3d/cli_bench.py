@@ -1,0 +1,126 @@
+"""explore3d bench: error and speed against run time, for one stage at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from explore3d.errors import UserError
+
+bench = typer.Typer(help="Measure error and speed against run time, one stage at a time.", no_args_is_help=True)
+
+Store = Annotated[Path, typer.Option("--store", help="JSONL file of finished runs; what it holds is not run again.")]
+
+
+@bench.command()
+def trace(
+    triangles: Annotated[str, typer.Option(help="Sizes of the mesh, separated by commas.")] = "20000,200000,2000000",
+    side: Annotated[int, typer.Option(min=2, help="Queries along each side of the grid.")] = 256,
+    peers: Annotated[bool, typer.Option(help="Time OpenCAMLib as well, if it is installed.")] = False,
+) -> None:
+    """Ball centres per second over the paper's bump, on one core, preparation included.
+
+    Example: explore3d bench trace --triangles 20000,200000 --peers
+    """
+    from explore3d.bench_trace import bench_trace, table
+
+    _print(table(bench_trace([int(n) for n in _numbers(triangles)], side=side, peers=peers)))
+
+
+@bench.command()
+def posterior() -> None:
+    """Effective draws per second, beside emcee's default settings.
+
+    Example: explore3d bench posterior
+    """
+    from explore3d.bench_posterior import Timing
+    from explore3d.bench_posterior import bench as run
+
+    def line(timing: Timing) -> None:
+        print(
+            f"{timing.name:40}{timing.samples:9} samples{timing.bins:7} bins{timing.seconds:9.2f} s"
+            f"{timing.rate:10.0f} draws/s  {timing.status}",
+            flush=True,
+        )
+
+    run(line)
+
+
+@bench.command()
+def calibration(
+    store: Store,
+    seeds: Annotated[int, typer.Option(min=1, help="Simulations of each shape and noise.")] = 12,
+    method: Annotated[str, typer.Option(help="importance (the fast path) or emcee.")] = "importance",
+) -> None:
+    """Do 90 % intervals cover 90 %? Simulates features from their priors and analyses them.
+
+    Example: explore3d bench calibration --store calibration.jsonl --seeds 100
+    """
+    from explore3d.bench_calibration import KINDS, NOISES, Case, calibrate, verdicts
+
+    if method not in ("importance", "emcee"):
+        raise UserError(f"--method: expected importance or emcee; found {method!r}")
+    for kind in KINDS:
+        cases = (Case(kind, noise, seed, method) for seed in range(seeds) for noise in NOISES)
+        for name, verdict in verdicts(calibrate(cases, store)).items():
+            print(
+                f"{kind:8}{name:14}{verdict.count:6} simulations, {100 * verdict.coverage:5.1f} % covered"
+                f" (90 +- {100 * verdict.tolerance:.1f} %), uniform with p = {verdict.p_value:.2f}",
+                flush=True,
+            )
+
+
+@bench.command()
+def explore(
+    store: Store,
+    scenes: Annotated[str | None, typer.Option(help="Scenes, separated by commas; all if left out.")] = None,
+    strategies: Annotated[str | None, typer.Option(help="Strategies, separated by commas; all if left out.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds of the noise.")] = 3,
+) -> None:
+    """Error of the found extents against finger time: exploring beside rasters and random sweeps.
+
+    Example: explore3d bench explore --store explore.jsonl --scenes straight,empty --seeds 1
+    """
+    import json
+
+    from explore3d.bench_explore import STRATEGIES
+    from explore3d.bench_explore import bench as run
+    from explore3d.bench_scenes import SCENES
+
+    chosen = _names(scenes, "--scenes", list(SCENES)), _names(strategies, "--strategies", list(STRATEGIES))
+    _print(json.dumps(record) for record in run(*chosen, seeds, store))
+
+
+@bench.command()
+def dynamics() -> None:
+    """Computing time and error of stiff contact over the stiffness, as CSV.
+
+    Example: explore3d bench dynamics
+    """
+    from explore3d.bench_dynamics import dynamics_curve, table
+
+    print(table(dynamics_curve()), end="")
+
+
+def _print(lines: Iterable[str]) -> None:
+    for line in lines:
+        print(line, flush=True)
+
+
+def _numbers(text: str) -> list[str]:
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    wrong = [part for part in parts if not part.isdigit() or int(part) < 2]
+    if wrong or not parts:
+        raise UserError(f"--triangles: expected whole numbers from 2, separated by commas; found {text!r}")
+    return parts
+
+
+def _names(text: str | None, option: str, possible: list[str]) -> list[str]:
+    chosen = possible if text is None else [part.strip() for part in text.split(",")]
+    wrong = [name for name in chosen if name not in possible]
+    if wrong:
+        raise UserError(f"{option}: unknown {wrong[0]!r}; possible: {', '.join(possible)}")
+    return chosen
