@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from mapping.commanded_path import CommandedPath, checked_points, unit_directions
 from mapping.errors import ContactError
 from mapping.surface import Surface
+from mapping.triangle_tree import TriangleTree
 
 FloatArray = NDArray[np.float64]
 
@@ -80,29 +81,19 @@ class BallContact:
     """
 
     def __init__(self, surface: Surface, tip_radius: float) -> None:
-        from mapping import bvh_kernels, contact_kernels
+        from mapping import contact_kernels
 
         self.surface = surface
         self.tip_radius = _checked_radius(tip_radius)
-        low, high = bvh_kernels.bounds(surface.vertices, surface.faces)
-        extent = float((0.5 * high - 0.5 * low).max()) * 2.0
-        if not np.isfinite(extent) or self.tip_radius < 1e-13 * extent:
+        self._tree = tree = TriangleTree(surface, self.tip_radius)
+        if not np.isfinite(tree.extent) or self.tip_radius < 1e-13 * tree.extent:
             raise ContactError(
-                f"a ball of radius {self.tip_radius:g} m is too small for a body of {extent:g} m: "
+                f"a ball of radius {self.tip_radius:g} m is too small for a body of {tree.extent:g} m: "
                 "float64 tells no less than 1e-13 of the body's size apart"
             )
-        exponent = int(np.frexp(max(extent, self.tip_radius))[1])
-        # a centre of few digits: subtracting it is exact, and a body around the origin keeps its coordinates
-        self._center = np.ldexp(np.round(np.ldexp(0.5 * low + 0.5 * high, -exponent)), exponent)
-        self._exponent = exponent
-        vertices = self._to_body(surface.vertices)
-        order = bvh_kernels.leaf_order(vertices, surface.faces)
-        rows = contact_kernels.lay_out(vertices, surface.faces, order)
-        self._size = float(np.linalg.norm(np.abs(self._to_body(np.stack([low, high]))).max(axis=0)))
-        radius = float(np.ldexp(self.tip_radius, -exponent))
-        graze = 8 * float(np.finfo(float).eps) * (self._size + radius)
+        radius = float(tree.scale_in(self.tip_radius))
+        graze = 8 * float(np.finfo(float).eps) * (tree.size + radius)
         self._ball = (radius, radius * (1.0 + contact_kernels.TOUCH) + graze, graze)
-        self._body = (rows, order, *bvh_kernels.build_boxes(rows))
 
     def first_contact(self, origins: ArrayLike, directions: ArrayLike, threads: int = 1) -> Contacts:
         """The first contact of balls that start centred at the origins and move straight along the directions.
@@ -122,23 +113,25 @@ class BallContact:
 
         start = checked_points(origins, "origins")
         way = unit_directions(directions, len(start))
-        local = self._to_body(start)
+        local, tree = self._tree.into(start), self._tree
         where, feature = np.empty((len(start), 3, 3)), np.empty(len(start), np.int8)
         count, distance, state = np.empty(len(start), np.int64), np.empty(len(start)), np.empty(len(start), np.int8)
 
         def some(part: slice) -> None:
             ways = way[part] if len(way) == len(start) else way
-            out = (where[part], feature[part], count[part], distance[part], state[part])
-            contact_kernels.first_contacts(*self._body, self._ball, self._size, local[part], ways, *out)
+            contact_kernels.first_contacts(
+                tree.rows, tree.order, tree.boxes, tree.links, self._ball, tree.size, local[part], ways,
+                where[part], feature[part], count[part], distance[part], state[part],
+            )  # fmt: skip
 
         _in_parts(some, len(start), contact_kernels.BLOCK, threads)
         return Contacts(
-            np.ldexp(where[:, 0], self._exponent) + self._center,
-            np.ldexp(where[:, 1], self._exponent) + self._center,
+            tree.out(where[:, 0]),
+            tree.out(where[:, 1]),
             where[:, 2].copy(),
             feature,
             count,
-            np.ldexp(distance, self._exponent),
+            tree.scale_out(distance),
             state == contact_kernels.OVERLAPS,
         )
 
@@ -166,11 +159,11 @@ class BallContact:
         commanded = checked_points(centers, "commanded centres")
         way = np.broadcast_to(unit_directions(approach, len(commanded)), commanded.shape)
         back = np.empty(len(commanded))
-        rows, _, boxes, links = self._body
+        tree = self._tree
         retreat_kernels.retreats(
-            rows, boxes, links, self._ball, self._size, self._outward, self._to_body(commanded), -way, back
+            tree.rows, tree.boxes, tree.links, self._ball, tree.size, self._outward, tree.into(commanded), -way, back
         )
-        back = np.ldexp(back, self._exponent)
+        back = tree.scale_out(back)
         rest = self.first_contact(commanded - back[:, None] * way, way, threads)
         return replace(rest, distance=rest.distance - back)
 
@@ -196,13 +189,10 @@ class BallContact:
     @cached_property
     def _outward(self) -> float:
         """-1 for a closed body whose faces are turned inside out, else +1."""
-        a, b, c = (self._to_body(self.surface.vertices)[self.surface.faces[:, i]] for i in range(3))
+        a, b, c = (self._tree.into(self.surface.vertices)[self.surface.faces[:, i]] for i in range(3))
         areas = np.cross(b - a, c - a)
         closed = np.abs(areas.sum(axis=0)).max() <= 1e-9 * np.abs(areas).sum()
         return -1.0 if closed and np.einsum("ij,ij->", a, areas) < 0.0 else 1.0
-
-    def _to_body(self, points: FloatArray) -> FloatArray:
-        return np.asarray(np.ldexp(points - self._center, -self._exponent))
 
 
 def _checked_radius(tip_radius: float) -> float:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mapping.errors import MappingError
 from mapping.surface import Surface
+from mapping.triangle_tree import TriangleTree
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -69,28 +69,19 @@ class NearestPoint:
         return Nearest(closest, np.linalg.norm(offset, axis=1), side, normals, face, barycentric)
 
     def _closest(self, query: FloatArray) -> tuple[IntArray, FloatArray]:
-        tree, origin, vertices = self._tree
-        _, face, closest = tree.squared_distance(vertices, self._proper_faces[1], np.ascontiguousarray(query - origin))
-        return self._proper_faces[0][face], closest + origin
+        from mapping.nearest_kernels import nearest_points
+
+        index, tree = self._tree
+        points, face = np.empty(query.shape), np.empty(len(query), dtype=np.int64)
+        nearest_points(tree.rows, tree.order, tree.boxes, tree.links, tree.into(query), points, face)
+        return index[face], tree.out(points)
 
     @cached_property
-    def _tree(self) -> tuple[Any, FloatArray, FloatArray]:
-        """A tree of boxes around the faces, the origin of its coordinates, and the vertices in them."""
-        import igl
-
-        # Centred first: a body far from the origin must not lose digits inside the tree.
-        origin = self.surface.bounds.mean(axis=0)
-        vertices = np.ascontiguousarray(self.surface.vertices - origin)
-        tree = igl.AABB()
-        tree.init(vertices, self._proper_faces[1])
-        return tree, origin, vertices
-
-    @cached_property
-    def _proper_faces(self) -> tuple[IntArray, IntArray]:
-        """Indices and corners of the faces that have an area; all faces if none has."""
+    def _tree(self) -> tuple[IntArray, TriangleTree]:
+        """Indices of the faces that have an area, all faces if none has, and their tree."""
         proper = np.flatnonzero((self.surface.face_normals != 0).any(axis=1))
         index = proper if len(proper) else np.arange(len(self.surface.faces))
-        return index, np.ascontiguousarray(self.surface.faces[index])
+        return index, TriangleTree(Surface(self.surface.vertices, self.surface.faces[index]))
 
     def _barycentric(self, points: FloatArray, face: IntArray) -> FloatArray:
         a, b, c = (self.surface.vertices[self.surface.faces[face, i]] for i in range(3))

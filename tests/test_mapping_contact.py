@@ -52,7 +52,7 @@ def test_contact_agrees_with_every_face_edge_and_vertex(name: str, ratio: float)
 def test_no_contact_is_missed_and_nothing_penetrated_in_many_queries(name: str, ratio: float) -> None:
     body = BODIES[name]()
     radius = ratio * body.size
-    origins, d = rays(body, radius, 10_000, seed=1)
+    origins, d = rays(body, radius, 100_000, seed=1)
     contacts = BallContact(body, radius).first_contact(origins, d)
     assert_free_until(body, radius, origins, d, contacts)
 
