@@ -175,5 +175,8 @@ def best_linear(covariance: FloatArray, template: FloatArray, nuisance: FloatArr
 
     columns = np.column_stack([template, nuisance])
     solved = solve_toeplitz(covariance[0], columns, check_finite=False)
+    if nuisance.shape[1] == 0:
+        information = float(template @ solved[:, 0])
+        return solved[:, 0] / information, 1 / float(np.sqrt(information))
     inverse = np.linalg.pinv(columns.T @ solved, hermitian=True)
     return solved @ inverse[:, 0], float(np.sqrt(max(inverse[0, 0], 0.0)))
