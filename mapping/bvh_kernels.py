@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mapping.vector_kernels import dot, moved
+from mapping.vector_kernels import dot, moved, sub
 
 WIDTH = 16
 STACK = 512  # 32 bit numbers of triangles make at most 8 levels, each leaving at most 15 lanes waiting
@@ -102,50 +102,105 @@ def part(keys, order, first, end, cut, axis):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def build_boxes(rows):  # type: ignore[no-untyped-def]
-    """The tree over triangles (F, >= 9) in leaf order; its last node is the root.
+def build_tree(rows):  # type: ignore[no-untyped-def]
+    """The tree over triangles (F, >= 9) in leaf order. Nodes count from the leaves; the last one is the root.
 
     Returns:
-        boxes: (M, 6, WIDTH) float32, smallest and largest coordinates of each lane.
-        links: (M, 2) int32: node in lane 0 (the others follow) or, of a leaf, whose lanes hold triangles, -1 - the
-            first of them; number of lanes in use.
+        leaves: (L, 10, WIDTH) float32, of each lane's triangle the nine coordinates of its corners and a third of
+            its longest side squared.
+        boxes: (M, 6, WIDTH) float32, of each lane of the other nodes the smallest and largest coordinates.
+        links: (L + M, 2) int32: node in lane 0 (the others follow) or, of a leaf, -1 - triangle in lane 0; number
+            of lanes in use.
     """
-    leaves = (len(rows) + WIDTH - 1) // WIDTH
-    total, level = leaves, leaves
+    count = (len(rows) + WIDTH - 1) // WIDTH
+    others, level = 0, count
     while level > 1:
         level = (level + WIDTH - 1) // WIDTH
-        total += level
-    boxes = np.full((total, 6, WIDTH), F4(NOWHERE))
-    links = np.empty((total, 2), np.int32)
+        others += level
+    leaves = np.full((count, 10, WIDTH), F4(NOWHERE))
+    boxes = np.full((others, 6, WIDTH), F4(NOWHERE))
+    links = np.empty((count + others, 2), np.int32)
     for i in range(len(rows)):
-        for k in range(3):
-            a, b, c = rows[i, k], rows[i, 3 + k], rows[i, 6 + k]
-            boxes[i // WIDTH, k, i % WIDTH], boxes[i // WIDTH, 3 + k, i % WIDTH] = min(a, b, c), max(a, b, c)
-    for i in range(leaves):
+        for k in range(9):
+            leaves[i // WIDTH, k, i % WIDTH] = rows[i, k]
+        leaves[i // WIDTH, 9, i % WIDTH] = longest_square(rows, i) / 3.0
+    for i in range(count):
         links[i, 0], links[i, 1] = -1 - WIDTH * i, min(WIDTH, len(rows) - WIDTH * i)
-    below, first, count = 0, leaves, leaves
+    below, first = 0, count
     while count > 1:
-        for i in range(count):
-            enclose(boxes, below + i, links[below + i, 1], first + i // WIDTH, i % WIDTH)
         parents = (count + WIDTH - 1) // WIDTH
+        for i in range(count):
+            enclose(leaves, boxes, links, below + i, first + i // WIDTH - len(leaves), i % WIDTH)
         for i in range(parents):
             links[first + i, 0], links[first + i, 1] = below + WIDTH * i, min(WIDTH, count - WIDTH * i)
         below, first, count = first, first + parents, parents
-    return boxes, links
+    return leaves, boxes, links
 
 
 @njit(cache=True, error_model="numpy")
-def enclose(boxes, node, lanes, parent, lane):  # type: ignore[no-untyped-def]
-    """Write the box around all lanes of a node into a lane of its parent."""
-    for k in range(3):
-        low, high = boxes[node, k, 0], boxes[node, 3 + k, 0]
-        for i in range(1, lanes):
-            low, high = min(low, boxes[node, k, i]), max(high, boxes[node, 3 + k, i])
-        boxes[parent, k, lane], boxes[parent, 3 + k, lane] = low, high
+def longest_square(rows, i):  # type: ignore[no-untyped-def]
+    """Longest side of a triangle, squared."""
+    a, b = (rows[i, 0], rows[i, 1], rows[i, 2]), (rows[i, 3], rows[i, 4], rows[i, 5])
+    c = (rows[i, 6], rows[i, 7], rows[i, 8])
+    u, v, w = sub(b, a), sub(c, b), sub(a, c)
+    return max(dot(u, u), dot(v, v), dot(w, w))
+
+
+@njit(cache=True, error_model="numpy")
+def lane_box(leaves, boxes, node, lane):  # type: ignore[no-untyped-def]
+    """(low, high): corners of the box of a lane."""
+    i = node - len(leaves)
+    if i >= 0:
+        low, high = (boxes[i, 0, lane], boxes[i, 1, lane], boxes[i, 2, lane]), (
+            boxes[i, 3, lane], boxes[i, 4, lane], boxes[i, 5, lane],
+        )  # fmt: skip
+        return low, high
+    a = (leaves[node, 0, lane], leaves[node, 1, lane], leaves[node, 2, lane])
+    b = (leaves[node, 3, lane], leaves[node, 4, lane], leaves[node, 5, lane])
+    c = (leaves[node, 6, lane], leaves[node, 7, lane], leaves[node, 8, lane])
+    low = (min(a[0], b[0], c[0]), min(a[1], b[1], c[1]), min(a[2], b[2], c[2]))
+    return low, (max(a[0], b[0], c[0]), max(a[1], b[1], c[1]), max(a[2], b[2], c[2]))
+
+
+@njit(cache=True, error_model="numpy")
+def enclose(leaves, boxes, links, node, parent, lane):  # type: ignore[no-untyped-def]
+    """Write the box around all lanes of a node into a lane of its parent (its number among `boxes`)."""
+    for i in range(links[node, 1]):
+        low, high = lane_box(leaves, boxes, node, i)
+        for k in range(3):
+            if i == 0 or low[k] < boxes[parent, k, lane]:
+                boxes[parent, k, lane] = low[k]
+            if i == 0 or high[k] > boxes[parent, 3 + k, lane]:
+                boxes[parent, 3 + k, lane] = high[k]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def lane_tests(boxes, node, end, d, reach, apart, late):  # type: ignore[no-untyped-def]
+def leaf_tests(leaves, node, end, d, reach, apart):  # type: ignore[no-untyped-def]
+    """`box_tests` for the triangles of a leaf.
+
+    On fine meshes sharper than their boxes: for a point p = sum w_i v_i of a triangle, |p|^2 is
+    sum w_i |v_i|^2 - sum w_i w_j |v_i - v_j|^2, and the last sum is at most a third of the longest side squared.
+    """
+    ex, ey, ez, dx, dy, dz = F4(end[0]), F4(end[1]), F4(end[2]), F4(d[0]), F4(d[1]), F4(d[2])
+    zero, behind, square = F4(0.0), F4(-1.0), F4(reach * reach)
+    for i in range(leaves.shape[2]):
+        ax, ay, az = leaves[node, 0, i] - ex, leaves[node, 1, i] - ey, leaves[node, 2, i] - ez
+        bx, by, bz = leaves[node, 3, i] - ex, leaves[node, 4, i] - ey, leaves[node, 5, i] - ez
+        cx, cy, cz = leaves[node, 6, i] - ex, leaves[node, 7, i] - ey, leaves[node, 8, i] - ez
+        nx = max(min(min(ax, bx), cx), zero) + min(max(max(ax, bx), cx), zero)
+        ny = max(min(min(ay, by), cy), zero) + min(max(max(ay, by), cy), zero)
+        nz = max(min(min(az, bz), cz), zero) + min(max(max(az, bz), cz), zero)
+        box = nx * nx + ny * ny + nz * nz if nx * dx + ny * dy + nz * dz >= zero else behind
+        ahead = min(min(ax * dx + ay * dy + az * dz, bx * dx + by * dy + bz * dz), cx * dx + cy * dy + cz * dz)
+        near = min(min(ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz), cx * cx + cy * cy + cz * cz)
+        third = leaves[node, 9, i]
+        near = near - third if ahead >= zero else behind
+        near = near if third <= square else behind  # else the difference has too few digits
+        apart[i] = max(box, near)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def box_tests(boxes, node, end, d, reach, apart, late):  # type: ignore[no-untyped-def]
     """Look from the end of a ball's way, along the unit vector d, at the boxes of a node's lanes.
 
     apart: (WIDTH,) out, squared distance from `end` of a box that lies ahead, so that the rest of the way
@@ -167,13 +222,12 @@ def lane_tests(boxes, node, end, d, reach, apart, late):  # type: ignore[no-unty
 
 
 @njit(cache=True, error_model="numpy")
-def passes(boxes, node, lane, start, end, d, length, reach):  # type: ignore[no-untyped-def]
+def passes(leaves, boxes, node, lane, start, end, d, length, reach):  # type: ignore[no-untyped-def]
     """True if a ball on its way from `start` to `end` surely stays further than `reach` from a lane's box.
 
     Two more separating planes are tried: across the box's point closest to the start, and along the way.
     """
-    low = (boxes[node, 0, lane], boxes[node, 1, lane], boxes[node, 2, lane])
-    high = (boxes[node, 3, lane], boxes[node, 4, lane], boxes[node, 5, lane])
+    low, high = lane_box(leaves, boxes, node, lane)
     n = (
         max(low[0] - start[0], 0.0) - max(start[0] - high[0], 0.0),
         max(low[1] - start[1], 0.0) - max(start[1] - high[1], 0.0),
@@ -192,7 +246,7 @@ def passes(boxes, node, lane, start, end, d, length, reach):  # type: ignore[no-
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def push_lanes(boxes, links, stack, waiting, start, end, d, length, reach, apart, late):  # type: ignore[no-untyped-def]
+def push_lanes(leaves, boxes, links, stack, waiting, start, end, d, length, reach, apart, late):  # type: ignore[no-untyped-def]
     """Replace the node on top of the stack by the lanes that a ball on its way may touch, the earliest on top.
 
     Returns the new height of the stack. Numbers from 0 up are nodes; -1 - i is triangle i.
@@ -201,7 +255,10 @@ def push_lanes(boxes, links, stack, waiting, start, end, d, length, reach, apart
     child, lanes = links[node, 0], links[node, 1]
     step = 1 if child >= 0 else -1
     reach += ROUNDING
-    lane_tests(boxes, node, end, d, reach, apart, late)
+    if child >= 0:
+        box_tests(boxes, node - len(leaves), end, d, reach, apart, late)
+    else:
+        leaf_tests(leaves, node, end, d, reach, apart)
     bottom, square = waiting - 1, F4(reach * reach)
     end_of_lanes = bottom
     for lane in range(lanes):  # without a branch, which nobody could predict
@@ -210,7 +267,7 @@ def push_lanes(boxes, links, stack, waiting, start, end, d, length, reach, apart
     waiting = bottom
     for i in range(bottom, end_of_lanes):
         lane = stack[i]
-        if apart[lane] < F4(0.0) and passes(boxes, node, lane, start, end, d, length, reach):
+        if apart[lane] < F4(0.0) and passes(leaves, boxes, node, lane, start, end, d, length, reach):
             continue
         place = waiting
         while step > 0 and place > bottom and late[stack[place - 1] - child] < late[lane]:

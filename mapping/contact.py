@@ -120,7 +120,7 @@ class BallContact:
         def some(part: slice) -> None:
             ways = way[part] if len(way) == len(start) else way
             contact_kernels.first_contacts(
-                tree.rows, tree.order, tree.boxes, tree.links, self._ball, tree.size, local[part], ways,
+                tree.rows, tree.order, tree.leaves, tree.boxes, tree.links, self._ball, tree.size, local[part], ways,
                 where[part], feature[part], count[part], distance[part], state[part],
             )  # fmt: skip
 
@@ -161,7 +161,16 @@ class BallContact:
         back = np.empty(len(commanded))
         tree = self._tree
         retreat_kernels.retreats(
-            tree.rows, tree.boxes, tree.links, self._ball, tree.size, self._outward, tree.into(commanded), -way, back
+            tree.rows,
+            tree.leaves,
+            tree.boxes,
+            tree.links,
+            self._ball,
+            tree.size,
+            self._outward,
+            tree.into(commanded),
+            -way,
+            back,
         )
         back = tree.scale_out(back)
         rest = self.first_contact(commanded - back[:, None] * way, way, threads)

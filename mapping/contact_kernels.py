@@ -1,9 +1,8 @@
 """The first contact of a moving ball with many triangles (numba).
 
 Lengths are in the body's own frame: centred, and scaled so that the larger of body and ball is about 1.
-A Row i of `rows` (F, 13) holds a triangle's corners, its
-unit normal and a third of its longest side squared. A `ball` is (radius, reach, graze): it touches what is
-within its reach, and passes what it would sink into by less than `graze`.
+A Row i of `rows` (F, 12) holds a triangle's corners and its unit normal. A `ball` is (radius, reach, graze): it
+touches what is within its reach, and passes what it would sink into by less than `graze`.
 """
 
 from __future__ import annotations
@@ -27,16 +26,14 @@ BLOCK = 1024  # queries that share their guesses: threads that take whole blocks
 
 @njit(cache=True, error_model="numpy")
 def lay_out(vertices, faces, order):  # type: ignore[no-untyped-def]
-    """(F, 13) rows of the faces in the given order."""
-    rows = np.empty((len(order), 13))
+    """(F, 12) rows of the faces in the given order."""
+    rows = np.empty((len(order), 12))
     for i in range(len(order)):
         for j in range(3):
             for k in range(3):
                 rows[i, 3 * j + k] = vertices[faces[order[i], j], k]
         a, b, c, _ = corners(rows, i, (0.0, 0.0, 0.0))
         rows[i, 9], rows[i, 10], rows[i, 11] = unit_normal(a, b, c)
-        u, v, w = sub(b, a), sub(c, b), sub(a, c)
-        rows[i, 12] = max(dot(u, u), dot(v, v), dot(w, w)) / 3.0
     return rows
 
 
@@ -57,18 +54,11 @@ def closest(rows, i, o):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def stays_clear(rows, i, end, d, reach):  # type: ignore[no-untyped-def]
-    """True if a ball on its way along d to `end` surely stays further than `reach` from a triangle.
-
-    Cheap and, on fine meshes, sharp: for p = sum w_i v_i, |p|^2 = sum w_i |v_i|^2 - sum w_i w_j |v_i - v_j|^2,
-    and the last sum is at most a third of the longest side squared. Else the triangle's plane must do.
-    """
-    a, b, c, n = corners(rows, i, end)
-    square = reach * reach
-    if min(dot(a, d), dot(b, d), dot(c, d)) >= 0.0 and min(dot(a, a), dot(b, b), dot(c, c)) - rows[i, 12] > square:
-        return True
-    height = dot(a, n)
-    return height * height > square and height * dot(d, n) >= 0.0
+def stays_above(rows, i, end, d, reach):  # type: ignore[no-untyped-def]
+    """True if a ball on its way along d to `end` stays further than `reach` from a triangle's plane."""
+    n = (rows[i, 9], rows[i, 10], rows[i, 11])
+    height = n[0] * (rows[i, 0] - end[0]) + n[1] * (rows[i, 1] - end[1]) + n[2] * (rows[i, 2] - end[2])
+    return abs(height) > reach and height * dot(d, n) >= 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -88,7 +78,7 @@ def meet(rows, i, o, d, ball):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def first_touch(rows, boxes, links, ball, o, d, far, guess, near, stack, apart, late):  # type: ignore[no-untyped-def]
+def first_touch(rows, leaves, boxes, links, ball, o, d, far, guess, near, stack, apart, late):  # type: ignore[no-untyped-def]
     """Search for the earliest contact before `far`, triangle `guess` first.
 
     Returns (t, triangle or -1, kept): near[:kept] are all triangles that may touch at t.
@@ -101,15 +91,15 @@ def first_touch(rows, boxes, links, ball, o, d, far, guess, near, stack, apart, 
         if t < best:
             best, hit = t, guess
     end = moved(o, best, d)
-    stack[0] = len(boxes) - 1
+    stack[0] = len(links) - 1
     waiting = 1
     while waiting > 0 and best >= 0.0:
         i = -1 - stack[waiting - 1]
         if i < 0:
-            waiting = push_lanes(boxes, links, stack, waiting, o, end, d, best, reach, apart, late)
+            waiting = push_lanes(leaves, boxes, links, stack, waiting, o, end, d, best, reach, apart, late)
             continue
         waiting -= 1
-        if stays_clear(rows, i, end, d, reach):
+        if stays_above(rows, i, end, d, reach):
             continue
         p = closest(rows, i, end)
         gap = sqrt(dot(p, p))
@@ -211,7 +201,7 @@ def way_to_body(o, d, around):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def first_contacts(  # type: ignore[no-untyped-def]
-    rows, order, boxes, links, ball, size, origins, directions, where, feature, count, distance, state
+    rows, order, leaves, boxes, links, ball, size, origins, directions, where, feature, count, distance, state
 ):  # fmt: skip
     """Fill the outputs for every query: `where` (N, 3, 3) with centre, point and normal.
 
@@ -231,7 +221,7 @@ def first_contacts(  # type: ignore[no-untyped-def]
         if length < 0.0:
             continue
         o = moved(o, start, d)  # a far origin costs no digits from here on
-        t, hit, kept = first_touch(rows, boxes, links, ball, o, d, length, guess, near, stack, apart, late)
+        t, hit, kept = first_touch(rows, leaves, boxes, links, ball, o, d, length, guess, near, stack, apart, late)
         if t < 0.0:
             state[q], distance[q] = OVERLAPS, 0.0
         elif hit >= 0:

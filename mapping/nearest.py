@@ -73,7 +73,7 @@ class NearestPoint:
 
         index, tree = self._tree
         points, face = np.empty(query.shape), np.empty(len(query), dtype=np.int64)
-        nearest_points(tree.rows, tree.order, tree.boxes, tree.links, tree.into(query), points, face)
+        nearest_points(tree.rows, tree.order, tree.leaves, tree.boxes, tree.links, tree.into(query), points, face)
         return index[face], tree.out(points)
 
     @cached_property

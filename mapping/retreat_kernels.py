@@ -14,7 +14,7 @@ from mapping.vector_kernels import dot, moved, scaled, sub, vector
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def retreats(rows, boxes, links, ball, size, outward, centers, backward, distance):  # type: ignore[no-untyped-def]
+def retreats(rows, leaves, boxes, links, ball, size, outward, centers, backward, distance):  # type: ignore[no-untyped-def]
     """Write how far each ball backs off until it overlaps nothing and its centre is outside.
 
     `outward` is +1 if the normals of the faces point out of the body, -1 if they point into it.
@@ -26,9 +26,9 @@ def retreats(rows, boxes, links, ball, size, outward, centers, backward, distanc
         start, length = way_to_body(o, d, 1.001 * (size + ball[1]))
         away, inside = 0.0, length >= 0.0
         while inside:
-            away += leave_overlap(rows, boxes, links, ball, moved(o, away, d), d, stack, apart, late)
+            away += leave_overlap(rows, leaves, boxes, links, ball, moved(o, away, d), d, stack, apart, late)
             rest = start + length - away
-            t, facing = first_face(rows, boxes, links, moved(o, away, d), d, rest, ball[2], stack, apart, late)
+            t, facing = first_face(rows, leaves, boxes, links, moved(o, away, d), d, rest, ball[2], stack, apart, late)
             inside = facing * outward > 0.0
             if inside:
                 away += t
@@ -36,26 +36,26 @@ def retreats(rows, boxes, links, ball, size, outward, centers, backward, distanc
 
 
 @njit(cache=True, error_model="numpy")
-def leave_overlap(rows, boxes, links, ball, o, d, stack, apart, late):  # type: ignore[no-untyped-def]
+def leave_overlap(rows, leaves, boxes, links, ball, o, d, stack, apart, late):  # type: ignore[no-untyped-def]
     """How far the ball at o moves along d until it overlaps nothing."""
     away, step = 0.0, inf
     while step > ball[2]:
-        step = overlap_ahead(rows, boxes, links, ball, moved(o, away, d), d, stack, apart, late)
+        step = overlap_ahead(rows, leaves, boxes, links, ball, moved(o, away, d), d, stack, apart, late)
         away += step
     return away
 
 
 @njit(cache=True, error_model="numpy")
-def overlap_ahead(rows, boxes, links, ball, o, d, stack, apart, late):  # type: ignore[no-untyped-def]
+def overlap_ahead(rows, leaves, boxes, links, ball, o, d, stack, apart, late):  # type: ignore[no-untyped-def]
     """How far the ball at o moves along d to leave every triangle that it overlaps now."""
     radius, _, graze = ball
     step = 0.0
-    stack[0] = len(boxes) - 1
+    stack[0] = len(links) - 1
     waiting = 1
     while waiting > 0:
         i = -1 - stack[waiting - 1]
         if i < 0:
-            waiting = push_lanes(boxes, links, stack, waiting, o, o, d, 0.0, radius, apart, late)
+            waiting = push_lanes(leaves, boxes, links, stack, waiting, o, o, d, 0.0, radius, apart, late)
             continue
         waiting -= 1
         a, b, c, n = corners(rows, i, o)
@@ -66,15 +66,15 @@ def overlap_ahead(rows, boxes, links, ball, o, d, stack, apart, late):  # type: 
 
 
 @njit(cache=True, error_model="numpy")
-def first_face(rows, boxes, links, o, d, length, slack, stack, apart, late):  # type: ignore[no-untyped-def]
+def first_face(rows, leaves, boxes, links, o, d, length, slack, stack, apart, late):  # type: ignore[no-untyped-def]
     """First face that the ray from o along d crosses: (t, cosine of its normal and d); (inf, 0) if none."""
     best, facing = length, 0.0
-    stack[0] = len(boxes) - 1
+    stack[0] = len(links) - 1
     waiting = 1 if length > 0.0 else 0
     while waiting > 0:
         i = -1 - stack[waiting - 1]
         if i < 0:
-            waiting = push_lanes(boxes, links, stack, waiting, o, moved(o, best, d), d, best, 0.0, apart, late)
+            waiting = push_lanes(leaves, boxes, links, stack, waiting, o, moved(o, best, d), d, best, 0.0, apart, late)
             continue
         waiting -= 1
         t, cosine = crossing(rows, i, o, d, slack)

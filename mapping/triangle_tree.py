@@ -31,7 +31,7 @@ class TriangleTree:
         vertices = self.into(surface.vertices)
         self.order: NDArray[np.int32] = bvh_kernels.leaf_order(vertices, surface.faces)
         self.rows: FloatArray = contact_kernels.lay_out(vertices, surface.faces, self.order)
-        self.boxes, self.links = bvh_kernels.build_boxes(self.rows)
+        self.leaves, self.boxes, self.links = bvh_kernels.build_tree(self.rows)
         self.size = float(np.linalg.norm(np.abs(self.into(np.stack([low, high]))).max(axis=0)))
 
     def into(self, points: FloatArray) -> FloatArray:
