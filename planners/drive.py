@@ -49,7 +49,7 @@ def drive(
                     note(f"{move.purpose} not executed: {reason}")
                 if refused >= PATIENCE or not record:
                     plan.close()
-                    return record, Outcome("finger refuses", f"{refused} moves in a row refused; the last: {reason}")
+                    return record, Outcome("finger refuses", f"{_moves(refused)} refused: {reason}")
                 trace = record[-1][1].select(slice(0, 0))
             else:
                 refused = 0
@@ -58,6 +58,10 @@ def drive(
     except StopIteration as end:
         outcome = end.value if isinstance(end.value, Outcome) else Outcome("done")
         return record, outcome
+
+
+def _moves(refused: int) -> str:
+    return "the first move was" if refused == 1 else f"{refused} moves in a row were"
 
 
 def dry_run(plan: Plan, empty: Trace, limit: int = 100_000) -> tuple[list[Move], Outcome]:

@@ -163,11 +163,19 @@ class Explore:
         found = Found(self.tip_radius, noise=self.noise)
         spent = Spent(25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed)
         outcome = yield from within(self._everything(found), spent, self.time_budget, self.path_budget)
-        count = len(found.tracks) + len(found.bumps)
-        detail = f"{count} features; {spent.seconds:.1f} s, {spent.metres:.3f} m of finger path"
         if outcome.reason == "budget":
-            found.left_out.append(f"{len(found.unexplained())} detections were not looked into: budget spent")
-        return Outcome(outcome.reason, detail, found)
+            found.left_out.append(f"{_counted(len(found.unexplained()), 'detection')} not looked into: budget spent")
+        why = f"{self._why(outcome.reason, found)}, after {spent.seconds:.0f} s and {spent.metres:.3g} m of finger path"
+        return Outcome(outcome.reason, why, found)
+
+    @staticmethod
+    def _why(reason: str, found: Found) -> str:
+        """Why it ended, in words."""
+        if reason == "budget":
+            return f"the budget was spent, with {_counted(len(found.unexplained()), 'detection')} not looked into"
+        if reason == "nothing found":
+            return "the survey found nothing to look into"
+        return "every detection was looked into and nothing was left to sharpen"
 
     def _everything(self, found: Found) -> Plan:
         yield from self._survey(found)
@@ -277,6 +285,10 @@ class Explore:
         end = yield from follower.slide(track.ends[which], track.height, track.half_width, track.sign)
         found.tracks[index] = track.with_end(which, end)
         return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
 def _typed(seed: Crossing, branches: tuple[Crossing, ...]) -> Crossing:
