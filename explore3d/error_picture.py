@@ -68,8 +68,8 @@ def time_picture(curve: Sequence[tuple[float, float]], precision: float | None) 
         if precision is not None:
             axes.axhline(precision / factor, color=MUTED, linestyle=(0, (4, 3)), linewidth=1.0)
             axes.annotate(
-                "asked for", (1.0, precision / factor), xycoords=("axes fraction", "data"), xytext=(-4, 4),
-                textcoords="offset points", ha="right", fontsize=8.5, color=INK,
+                "asked for", (0.0, precision / factor), xycoords=("axes fraction", "data"), xytext=(4, 4),
+                textcoords="offset points", ha="left", fontsize=8.5, color=INK,
             )  # fmt: skip
         if points[:, 1].min() > 0 and points[:, 1].max() > 8 * points[:, 1].min():
             axes.set_yscale("log")

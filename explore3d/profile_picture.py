@@ -84,7 +84,11 @@ def _heights(
             limit / factor, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)),
             label=f"detection limit of a sharp crest, {length_text(limit)}",
         )  # fmt: skip
+    named: list[float] = []
     for number in np.argsort(-np.abs(crests))[:8]:
+        if any(abs(places[number] - place) < 0.05 * np.ptp(x) for place in named):
+            continue  # its name would run into that of a higher one
+        named.append(float(places[number]))
         axes.annotate(
             features[number].id, (places[number], crests[number]), xytext=(0, 7), textcoords="offset points",
             ha="center", fontsize=7.5,

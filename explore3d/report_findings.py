@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from math import isfinite
 
 from explore3d.analysis import Analysis
 from explore3d.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.pictures import Pictures, is_profile
-from explore3d.quantity import count_text, interval_text, length_text
+from explore3d.quantity import UNKNOWN, count_text, interval_text, length_text
 from mapping.feature import Feature, Interval
 from mapping.polyline import arclengths
 
@@ -69,10 +70,12 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
     content: list[str] = [_counts(analysis)]
     if features:
         head = ("feature", "height", "width", "length", "place", "evidence", "kind of detail", "posterior")
-        content.append(table(head, [_row(feature, analysis) for feature in features]))
+        shared = _shared_notes(features)
+        content.append(table(head, [_row(feature, analysis, shared) for feature in features]))
+        content.extend(paragraph(f"All of them: {note}.") for note in shared)
         content.append(paragraph("Ranges are central 90 % intervals. ", limit_sentence(analysis)))
     if analysis.ended:
-        content.append(paragraph(f"Why the exploration ended: {analysis.ended}"))
+        content.append(paragraph(f"Why the exploration ended: {analysis.ended.rstrip('.')}."))
     picture = "profile" if is_profile(analysis) else "object"
     if picture in pictures.files:
         content.append(figure(pictures.files[picture], f"Picture of the {picture}", _caption(analysis)))
@@ -99,7 +102,14 @@ def _counts(analysis: Analysis) -> Html:
     return Html(intro + table(head, rows, numeric=(1, 2)))
 
 
-def _row(feature: Feature, analysis: Analysis) -> Row:
+def _shared_notes(features: Sequence[Feature]) -> tuple[str, ...]:
+    """Notes that every one of several features has: said once, below the table."""
+    if len(features) < 2:
+        return ()
+    return tuple(note for note in features[0].notes if all(note in feature.notes for feature in features))
+
+
+def _row(feature: Feature, analysis: Analysis, shared: Sequence[str]) -> Row:
     cells = [_with_range(getattr(feature, name)) for name in ("height", "width")]
     length = _with_range(feature.length) if len(feature.axis) > 1 else Html("point")
     evidence = element("span", f"S/N {feature.evidence.snr:.0f}") + element(
@@ -109,7 +119,8 @@ def _row(feature: Feature, analysis: Analysis) -> Row:
         detail = badge("finer than the tip", "good")
     else:
         detail = badge("gentler than the tip", "plain")
-    notes = element("small", "; ".join(feature.notes), class_="note") if feature.notes else Html("")
+    own = [note for note in feature.notes if note not in shared]
+    notes = element("small", "; ".join(own), class_="note") if own else Html("")
     name = Html(element("b", feature.id) + notes)
     return (name, *cells, length, _place(feature, analysis), Html(evidence), detail, _posterior(feature))
 
@@ -134,6 +145,8 @@ def _posterior(feature: Feature) -> Html:
 
 
 def _with_range(interval: Interval) -> Html:
+    if not interval.high and not interval.low:
+        return Html(UNKNOWN)  # the kind has no such size: a step has no width
     median, span = interval_text(interval)
     return Html(element("span", median) + (element("small", span) if span else ""))
 

@@ -25,7 +25,7 @@ th { position: sticky; top: 0; background: #f5f7fa; text-align: left; font-weigh
 th, td { padding: .5rem .8rem; border-bottom: 1px solid var(--faint); vertical-align: top; }
 tr:last-child td { border-bottom: 0; }
 td.number, th.number { text-align: right; white-space: nowrap; }
-td span, td small { white-space: nowrap; } td small.note { white-space: normal; min-width: 9rem; }
+td b, td span, td small { white-space: nowrap; } td small.note { white-space: normal; min-width: 9rem; }
 td small { display: block; color: var(--soft); font-size: .82rem; }
 .badge { display: inline-block; padding: .05rem .5rem; border-radius: 999px; font-size: .82rem; white-space: nowrap; }
 .badge.good { background: #e3f5ea; color: #14613c; }

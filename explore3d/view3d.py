@@ -27,6 +27,8 @@ MOST_FACES = 60_000
 # Features are drawn at least this share of the base's size wide.
 VISIBLE = 0.004
 VIEW = "view"
+# Diagonal of what is drawn, in units of the scene; the camera stands 1.7 of them off.
+SEEN = 1.6
 
 
 def plotly_script() -> Html:
@@ -60,8 +62,13 @@ def object_view(base: Surface, features: Sequence[Feature], sweeps: Sequence[Swe
         parts.append(_mesh(shape, factor, feature.id, colour, hover_text(feature), opacity=1.0))
     axes = {"showbackground": False, "gridcolor": "#e4e7eb", "zeroline": False}
     drawing = plot.Figure(parts)
+    low, high = _box(parts)
+    ratio = SEEN * (high - low) / np.linalg.norm(high - low)
+    scene: dict[str, Any] = {"aspectmode": "manual", "aspectratio": dict(zip("xyz", map(float, ratio), strict=True))}
+    for axis, *ends in zip("xyz", map(float, low), map(float, high), strict=True):
+        scene[f"{axis}axis"] = axes | {"title": f"{axis} ({unit})", "range": ends}
     drawing.update_layout(
-        scene={"aspectmode": "data"} | {f"{each}axis": axes | {"title": f"{each} ({unit})"} for each in "xyz"},
+        scene=scene,
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
         legend={"x": 0.01, "y": 0.99, "bgcolor": "rgba(255,255,255,0.8)"},
         font={"family": "system-ui, sans-serif", "color": INK},
@@ -134,6 +141,14 @@ def _mesh(surface: Surface, factor: float, name: str, colour: str, hover: str | 
         hoverinfo="skip" if hover is None else "text", text=hover, showlegend=hover is not None, flatshading=True,
         lighting={"ambient": 0.85, "diffuse": 0.35, "specular": 0.05, "roughness": 0.9},
     )  # fmt: skip
+
+
+def _box(parts: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest (3,) of all that is drawn, and a little air: axes of one scale over it, however flat it is."""
+    points = np.concatenate([np.column_stack([part[axis] for axis in "xyz"]) for part in parts])
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    air = 0.02 * float((high - low).max())
+    return low - air, high + air
 
 
 def _lines(sweeps: Sequence[SweepPath], lift: float) -> FloatArray:
