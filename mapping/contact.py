@@ -70,7 +70,7 @@ class BallContact:
     vertices are met in closed form, and a tree of boxes leaves out those that the ball surely misses.
 
     Positions are exact to a few 1e-16 of the larger of body, ball and distance from the coordinates'
-    origin. A ball that would sink in by less than some 1e-14 of that size merely grazes, and passes.
+    origin. A ball that would sink in by less than 2e-15 of body and ball merely grazes, and passes.
 
     Args:
         surface: the body.
