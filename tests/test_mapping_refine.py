@@ -148,6 +148,18 @@ def test_a_lone_profile_gives_a_crest_not_a_place_in_space():
     assert any("single sweep" in note for note in found.notes)
 
 
+def test_a_bump_that_no_cap_fits_says_so_and_a_cap_does_not():
+    cap = lambda feet: cap_height(feet[:, 0], 0.5e-3, 3e-3, TIP)  # noqa: E731
+    bell = lambda feet: 0.5e-3 / (1.0 + (feet[:, 0] / 3e-3) ** 2)  # noqa: E731
+
+    def notes(truth):
+        trace = record([line((-10e-3, 0), (10e-3, 0))], truth, Noise(10e-6))
+        guess = feature("bump", (0, 0, 0), 0.4e-3, 1e-3)
+        return " ".join(refine(guess, trace, np.random.default_rng(0), base=plate(), noise=Noise(10e-6)).notes)
+
+    assert "no ideal bump fits" in notes(bell) and "no ideal" not in notes(cap)
+
+
 def test_a_groove_and_its_hidden_bottom():
     width = 3e-3
     ends = np.array([-14e-3, 15e-3])
