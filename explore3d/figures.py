@@ -167,7 +167,7 @@ def noisy_trace() -> Any:
     under.axhspan(0.5, 1.0, color=BAND, lw=0, label="convex: 1/(2r) < k_t < 1/r")
     under.plot(place, smoothed.curvature * TIP, color=INK, label="k_t of the smoothed trace")
     for k, crossing in enumerate(detect(noisy, noise=noise, largest=1.5 * TIP).crossings):
-        name = f"bump found: {crossing.height:.3f} ± {crossing.height_sd:.3f} high"
+        name = f"bump found: {crossing.height:.2f} high"
         under.axvline(crossing.point[0], color=ESTIMATED, lw=1.4, label=name if k == 0 else "")
     under.set_xlabel("x, in heights of the bump")
     under.set_ylabel("k_t times r")

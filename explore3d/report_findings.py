@@ -72,7 +72,7 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
         head = ("feature", "height", "width", "length", "place", "evidence", "kind of detail", "posterior")
         shared = _shared_notes(features)
         content.append(table(head, [_row(feature, analysis, shared) for feature in features]))
-        content.extend(paragraph(f"All of them: {note}.") for note in shared)
+        content.extend(paragraph(f"{_capital(note)} (all of them).") for note in shared)
         content.append(paragraph("Ranges are central 90 % intervals. ", limit_sentence(analysis)))
     if analysis.ended:
         content.append(paragraph(f"Why the exploration ended: {analysis.ended.rstrip('.')}."))
