@@ -28,7 +28,7 @@ MOST_FACES = 60_000
 VISIBLE = 0.004
 VIEW = "view"
 # Diagonal of what is drawn, in units of the scene; the camera stands 1.7 of them off.
-SEEN = 1.6
+SEEN = 1.4
 
 
 def plotly_script() -> Html:
