@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Annotated
 
@@ -52,6 +53,8 @@ def main() -> None:
     from mapping.errors import MappingError
     from planners.errors import PlannerError
 
+    # Our matrices are small: more threads of linear algebra only wait for each other, for minutes on a busy machine.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         app()
     except (UserError, MappingError, PlannerError, MoveError, FingerError) as error:
