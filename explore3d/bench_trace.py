@@ -4,12 +4,11 @@ Every case runs in a process of its own on one core, with the same queries for e
 time) covers all from the mesh in memory to the answers: the tree, the queries. Not covered: importing, and
 compiling the kernels, which happens once per machine.
 
-    python -m explore3d.bench_trace --triangles 20000,200000 --peers
+    explore3d bench trace --triangles 20000,200000 --peers
 """
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
 import resource
 from collections.abc import Callable, Iterator, Sequence
@@ -159,18 +158,3 @@ def table(timings: Iterator[TraceTiming]) -> Iterator[str]:
             f"{t.method:24}{t.triangles:10}{t.ratio:6g}  {t.layout:10}{t.rate:11.0f}"
             f"{t.seconds:8.2f}{t.memory / 1e6:6.0f}{t.error:10.1e}"
         )
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--triangles", default=",".join(map(str, TRIANGLES)))
-    parser.add_argument("--side", type=int, default=256)
-    parser.add_argument("--peers", action="store_true")
-    options = parser.parse_args()
-    sizes = [int(n) for n in options.triangles.split(",")]
-    for line in table(bench_trace(sizes, side=options.side, peers=options.peers)):
-        print(line, flush=True)
-
-
-if __name__ == "__main__":
-    main()

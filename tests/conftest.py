@@ -1,4 +1,4 @@
-"""One thread of linear algebra for each test process: our matrices are small, and idle threads spin on busy machines."""
+"""One thread of linear algebra a test process: our matrices are small, and idle threads spin on busy machines."""
 
 import os
 
