@@ -216,7 +216,7 @@ class Session:
         os.replace(part, self.folder / MARKER)
 
     def _discard(self) -> None:
-        """Undo what this session did: its files go, those of the earlier session come back."""
+        """Undo everything: the files written so far go, those that were set aside come back."""
         for name in [*self._files, MARKER]:
             if (self.folder / name).resolve() not in self._keep:
                 (self.folder / name).unlink(missing_ok=True)
