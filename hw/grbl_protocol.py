@@ -16,7 +16,6 @@ FloatArray = NDArray[np.float64]
 
 STATUS, HOLD, RESUME, RESET, DOOR, JOG_CANCEL = b"?", b"!", b"~", b"\x18", b"\x84", b"\x85"
 RECEIVE_BUFFER = 128  # bytes
-LONGEST_LINE = 80  # characters; Grbl's own limit, the others take more
 
 ERRORS = {
     1: "a word has no letter",

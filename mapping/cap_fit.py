@@ -14,8 +14,6 @@ from mapping.noise import Noise
 
 FloatArray = NDArray[np.float64]
 
-# A top flat over more than this share of the half-width is a plateau (two steps), not a crest.
-FLAT_TOP = 0.6
 # Improvement in twice the log-likelihood that a plateau must bring over a cap.
 PLATEAU_GAIN = 12.0
 # Averaging a stretch to this many bins costs its fit less than 1 % of its information.
