@@ -9,7 +9,8 @@ stopped, and the same seeds give the same lines.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -25,6 +26,7 @@ from mapping.priors import Normal, Prior, Uniform
 from mapping.problem import Problem, Surroundings
 from mapping.refine import Solution, pose_problem, solve_problem
 from mapping.ridge_shape import RidgeShape, rounding_of
+from mapping.section import width_of_cap
 from mapping.shapes import chain_height, groove_height, rim_height, step_height
 from mapping.surface import Surface
 from mapping.trace import Trace
@@ -83,8 +85,8 @@ def run_case(case: Case) -> Row:
     trace = _record(paths, heights + simulate_noise(noise, paths, rng))
     believed = noise if case.assumed == "true" else Noise(noise.sd)
     problem = _with_priors(pose_problem(feature, Surroundings(trace, _plate(), believed)))
-    solution = solve_problem(problem, rng, confirm=case.method == "emcee", adapt=False)
-    return Row(case, _places(solution, truth, case.method), solution.importance.k_hat, solution.posterior.status)
+    solution = solve_problem(problem, rng, confirm=case.method == "emcee")
+    return Row(case, _places(solution, truth), solution.importance.k_hat, solution.posterior.status)
 
 
 @cache
@@ -214,74 +216,69 @@ def _ridge_heights(shape: RidgeShape, truth: FloatArray, feet: FloatArray, up: F
     return np.asarray(out[0])
 
 
-def _places(solution: Solution, truth: FloatArray, method: str) -> dict[str, float]:
-    """Share of the posterior below the truth, for each parameter."""
-    if method == "emcee":
-        draws, weights = solution.posterior.samples, np.full(len(solution.posterior.samples), 1.0)
-    else:
+def _places(solution: Solution, truth: FloatArray) -> dict[str, float]:
+    """Share of the posterior below the truth, for each parameter and for what follows from them.
+
+    From the chain where one ran (asked for, or because importance sampling could not be trusted), else from all
+    weighted draws.
+    """
+    names = solution.posterior.names
+    if solution.chain is None:
         draws, weights = solution.importance.draws, solution.importance.weights
-    below = (weights[:, None] * (draws < truth)).sum(axis=0) / weights.sum()
-    return {name: float(share) for name, share in zip(solution.posterior.names, below, strict=True)}
+    else:
+        draws, weights = solution.posterior.samples, np.full(len(solution.posterior.samples), 1.0)
+    values, true = _with_derived(names, draws), _with_derived(names, truth[None])
+    return {name: float(weights @ (values[name] < true[name]) / weights.sum()) for name in values}
 
 
-def calibrate(cases: Iterator[Case], store: Path) -> list[Row]:
-    """Run the cases that the store does not hold yet; every finished one is appended at once."""
+def _with_derived(names: tuple[str, ...], draws: FloatArray) -> dict[str, FloatArray]:
+    """Draws (S,) by name, with the length between two ends and the width of a round section."""
+    values = {name: draws[:, i] for i, name in enumerate(names)}
+    if "start" in values:
+        values["length"] = values["end"] - values["start"]
+    if "log radius" in values:
+        values["width"] = width_of_cap(values["height"], np.exp(values["log radius"]))
+    return values
+
+
+def campaign(kinds: Sequence[str], seeds: int, method: str = "importance", assumed: str = "true") -> list[Case]:
+    """Every shape under every noise, `seeds` times: interrupted anywhere, all have had about as many."""
+    noises = NOISES if assumed == "true" else [noise for noise in NOISES if noise.startswith("ell")]
+    return [Case(kind, noise, seed, method, assumed) for seed in range(seeds) for kind in kinds for noise in noises]
+
+
+def calibrate(cases: Iterable[Case], store: Path, seconds: float = float("inf")) -> list[Row]:
+    """Run the cases that the store does not hold yet; every finished one is appended at once.
+
+    After `seconds` no further case is begun; those that the store holds count all the same.
+    """
     done = {row.case: row for row in load(store)} if store.exists() else {}
-    rows = []
+    rows, end = [], time.monotonic() + seconds
+    cut_short = bool(done) and not store.read_bytes().endswith(b"\n")
     with store.open("a", encoding="utf-8") as file:
+        file.write("\n" if cut_short else "")
         for case in cases:
             if case not in done:
-                row = run_case(case)
+                if time.monotonic() > end:
+                    continue
+                done[case] = row = run_case(case)
                 file.write(json.dumps(_as_json(row)) + "\n")
                 file.flush()
-                done[case] = row
             rows.append(done[case])
     return rows
 
 
 def load(store: Path) -> list[Row]:
-    """Rows of a store; a last line cut short by an interruption is left out."""
+    """Rows of a store; lines cut short by an interruption are left out."""
     rows = []
     for line in store.read_text(encoding="utf-8").splitlines():
         try:
             entry = json.loads(line)
         except json.JSONDecodeError:
-            break
+            continue
         rows.append(Row(Case(**entry["case"]), entry["below"], entry["k_hat"], entry["status"]))
     return rows
 
 
 def _as_json(row: Row) -> dict[str, Any]:
     return {"case": row.case.__dict__, "below": row.below, "k_hat": row.k_hat, "status": row.status}
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Calibration of one parameter.
-
-    Args:
-        count: simulations.
-        coverage: share of central 90 % intervals that hold the truth.
-        tolerance: two standard deviations of that share.
-        p_value: of the chi-square test that the truth's places are uniform.
-    """
-
-    count: int
-    coverage: float
-    tolerance: float
-    p_value: float
-
-
-def verdicts(rows: list[Row], bins: int = 10) -> dict[str, Verdict]:
-    """Coverage and uniformity of the truth's place, for each parameter."""
-    from scipy.stats import chi2
-
-    out = {}
-    for name in rows[0].below:
-        places = np.array([row.below[name] for row in rows])
-        covered = float(np.mean((places >= 0.05) & (places <= 0.95)))
-        counts = np.histogram(places, bins, (0.0, 1.0))[0]
-        statistic = float(((counts - len(places) / bins) ** 2).sum() / (len(places) / bins))
-        tolerance = 2.0 * float(np.sqrt(0.9 * 0.1 / len(places)))
-        out[name] = Verdict(len(places), covered, tolerance, float(chi2.sf(statistic, bins - 1)))
-    return out

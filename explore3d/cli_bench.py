@@ -12,6 +12,8 @@ from explore3d.errors import UserError
 
 bench = typer.Typer(help="Measure error and speed against run time, one stage at a time.", no_args_is_help=True)
 
+METHODS = ("importance", "emcee")
+
 Store = Annotated[Path, typer.Option("--store", help="JSONL file of finished runs; what it holds is not run again.")]
 
 
@@ -54,23 +56,35 @@ def calibration(
     store: Store,
     seeds: Annotated[int, typer.Option(min=1, help="Simulations of each shape and noise.")] = 12,
     method: Annotated[str, typer.Option(help="importance (the fast path) or emcee.")] = "importance",
+    shapes: Annotated[str | None, typer.Option(help="Shapes, separated by commas; all if left out.")] = None,
+    believed: Annotated[str, typer.Option(help="true; white: correlated noise taken for white.")] = "true",
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+    ranks: Annotated[Path | None, typer.Option(help="PNG for the rank histograms.")] = None,
+    record: Annotated[Path | None, typer.Option(help="JSON for all verdicts.")] = None,
 ) -> None:
     """Do 90 % intervals cover 90 %? Simulates features from their priors and analyses them.
 
     Example: explore3d bench calibration --store calibration.jsonl --seeds 100
     """
-    from explore3d.bench_calibration import KINDS, NOISES, Case, calibrate, verdicts
+    from explore3d.bench_calibration import KINDS, calibrate, campaign
+    from explore3d.calibration_verdicts import by_kind, draw_ranks, verdicts, write_record
 
-    if method not in ("importance", "emcee"):
-        raise UserError(f"--method: expected importance or emcee; found {method!r}")
-    for kind in KINDS:
-        cases = (Case(kind, noise, seed, method) for seed in range(seeds) for noise in NOISES)
-        for name, verdict in verdicts(calibrate(cases, store)).items():
+    for option, found, possible in (("--method", method, METHODS), ("--believed", believed, ("true", "white"))):
+        if found not in possible:
+            raise UserError(f"{option}: expected {' or '.join(possible)}; found {found!r}")
+    chosen = _names(shapes, "--shapes", list(KINDS))
+    rows = calibrate(campaign(chosen, seeds, method, believed), store, seconds)
+    for kind, group in by_kind(rows).items():
+        for name, verdict in verdicts(group).items():
             print(
                 f"{kind:8}{name:14}{verdict.count:6} simulations, {100 * verdict.coverage:5.1f} % covered"
                 f" (90 +- {100 * verdict.tolerance:.1f} %), uniform with p = {verdict.p_value:.2f}",
                 flush=True,
             )
+    if ranks and rows:
+        draw_ranks(rows, ranks)
+    if record and rows:
+        write_record(rows, record)
 
 
 @bench.command()

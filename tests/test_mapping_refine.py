@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explore3d.bench_calibration import NOISES, Case, noise_of, run_case, verdicts
+from explore3d.bench_calibration import NOISES, Case, noise_of, run_case
+from explore3d.calibration_verdicts import verdicts
 from mapping.base import Base
 from mapping.feature import Evidence, Feature, Interval
 from mapping.noise import Noise
