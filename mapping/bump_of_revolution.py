@@ -61,20 +61,20 @@ class BumpOfRevolution:
         if self._opening(deepest, tip_radius) >= 0:
             return np.zeros(0)
         inflection = 1.0 / np.sqrt(3 * self.sharpness)
-        # Far out k falls off as 6 / (a u^3): beyond this distance 1 + r k is positive.
-        outside = max(2 * deepest, 2 * float(np.cbrt(6 * tip_radius / self.sharpness)))
+        # Far out k falls off as 6 / (a u^4): beyond this distance 1 + r k is positive.
+        outside = max(2 * deepest, 2 * float((6 * tip_radius / self.sharpness) ** 0.25))
 
         def opening(u: float) -> float:
             return self._opening(u, tip_radius)
 
-        inner = brentq(opening, float(inflection), deepest, xtol=1e-15, rtol=1e-14)
-        return np.array([inner, brentq(opening, deepest, outside, xtol=1e-15, rtol=1e-14)])
+        inner = brentq(opening, float(inflection), deepest, xtol=1e-15 * deepest, rtol=1e-14)
+        return np.array([inner, brentq(opening, deepest, outside, xtol=1e-15 * deepest, rtol=1e-14)])
 
     def interference(self, tip_radius: float, tolerance: float = 1e-14) -> tuple[float, float] | None:
         """The two distances u between which the meridian's plane motion of the ball never touches, or None.
 
         For the convex crest over a plane there is none: the ball skips the foot between a point of the
-        flank and a point of the plain whose parallel curves cross.
+        flank and a point of the plain whose parallel curves cross. `tolerance` is relative.
         """
         from scipy.optimize import brentq
 
@@ -82,20 +82,23 @@ class BumpOfRevolution:
         if len(pair) == 0:
             return None
         inner, outer = pair
+        within = tolerance * float(inner)
 
         def beyond(u: float) -> float:
             """The point of the plain whose centre stands over the centre of the flank's point u."""
             place = self.parallel(u, tip_radius)[0]
             far = 2 * outer + tip_radius
-            return float(brentq(lambda w: float(self.parallel(w, tip_radius)[0] - place), outer, far, xtol=tolerance))
+            if self.parallel(outer, tip_radius)[0] >= place:  # at the start of the flank both are one, but for rounding
+                return float(outer)
+            return float(brentq(lambda w: float(self.parallel(w, tip_radius)[0] - place), outer, far, xtol=within))
 
         def gap(u: float) -> float:
             return float(self.parallel(u, tip_radius)[1] - self.parallel(beyond(u), tip_radius)[1])
 
         # The flank's branch covers the swallowtail between its own caustic and the place of the outer caustic.
         place = float(self.parallel(outer, tip_radius)[0])
-        start = brentq(lambda u: float(self.parallel(u, tip_radius)[0] - place), 0.0, inner, xtol=tolerance)
-        flank = float(brentq(gap, start, inner, xtol=tolerance))
+        start = brentq(lambda u: float(self.parallel(u, tip_radius)[0] - place), 0.0, inner, xtol=within)
+        flank = float(brentq(gap, start, inner, xtol=within))
         return flank, beyond(flank)
 
     @property
@@ -104,8 +107,10 @@ class BumpOfRevolution:
         from scipy.optimize import minimize_scalar
 
         unit = 1.0 / np.sqrt(self.sharpness)
+        # A sharp bump is a steep needle: its foot bends where the slope is about 1, at u^3 = 2 / a.
+        bounds = (unit / np.sqrt(3), max(4 * unit, 2 * float(np.cbrt(2 / self.sharpness))))
         found = minimize_scalar(
-            lambda u: float(self.curvatures(u)[0]), bounds=(unit / np.sqrt(3), 4 * unit), options={"xatol": 1e-12}
+            lambda u: float(self.curvatures(u)[0]), bounds=bounds, options={"xatol": 1e-12 * bounds[0]}
         )
         return float(found.x)
 

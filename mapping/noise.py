@@ -14,6 +14,12 @@ FloatArray = NDArray[np.float64]
 # The median of |x| of a standard normal variable: turns a median absolute deviation into a standard deviation.
 MEDIAN_OF_ABSOLUTE_NORMAL = 0.6744897501960817
 
+# Below so many correlation lengths the closed forms cancel; their series in x, with (k + 2)! below, do not.
+SHORT = 0.5
+TERMS = np.arange(20)
+SIGNS = (-1.0) ** TERMS
+FACTORIALS = np.cumprod(np.arange(1.0, 22.0))[TERMS + 1]
+
 
 class NoiseError(MappingError):
     """Noise parameters or residuals that cannot describe a noise."""
@@ -137,15 +143,17 @@ def robust_sd(values: FloatArray) -> float:
 
 def _mean_variance(x: FloatArray) -> FloatArray:
     """Variance of the mean of a unit OU process over x correlation lengths; series where the form cancels."""
-    safe = np.maximum(x, 1e-3)
-    return np.where(x < 1e-3, 1 - x / 3, 2 * (safe + np.expm1(-safe)) / safe**2)
+    safe = np.maximum(x, SHORT)
+    series = np.polynomial.polynomial.polyval(np.minimum(x, SHORT), 2.0 * SIGNS / FACTORIALS)
+    return np.where(x < SHORT, series, 2 * (safe + np.expm1(-safe)) / safe**2)
 
 
 def _allan_of_ou(x: FloatArray) -> FloatArray:
     """Half the mean square difference of adjoining means of a unit OU process over x correlation lengths."""
-    safe = np.maximum(x, 1e-3)
+    safe = np.maximum(x, SHORT)
     full = _mean_variance(safe) - (np.expm1(-safe) / safe) ** 2
-    return np.where(x < 1e-3, x / 3 * 2, full)
+    coefficients = SIGNS * (4.0 - 2.0 ** (TERMS + 2)) / FACTORIALS
+    return np.where(x < SHORT, np.polynomial.polynomial.polyval(np.minimum(x, SHORT), coefficients), full)
 
 
 def _allan_variances(residual: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:

@@ -83,3 +83,13 @@ def test_a_sharpness_that_is_none_is_refused(a):
 def test_a_mesh_of_no_rings_is_refused():
     with pytest.raises(MappingError, match="rings"):
         BumpOfRevolution().mesh(1.0, rings=0)
+
+
+@pytest.mark.parametrize("sharpness", [1e4, 1e6, 1e9])
+@pytest.mark.parametrize("tip_radius", [0.1, 1.0])
+def test_the_kink_beside_a_needle_is_found_to_the_last_digits(sharpness: float, tip_radius: float) -> None:
+    bump = BumpOfRevolution(sharpness)
+    pair = bump.interference(tip_radius)
+    assert pair is not None
+    there, beyond = (bump.parallel(u, tip_radius) for u in pair)
+    np.testing.assert_allclose(there, beyond, rtol=1e-12)

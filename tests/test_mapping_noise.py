@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -77,3 +79,12 @@ def test_bad_noise_is_refused_by_name():
         estimate_noise(np.zeros(3), np.zeros(3))
     with pytest.raises(NoiseError, match="singular"):
         Noise(0.0).whiten(np.ones(3), np.arange(3.0))
+
+
+def test_block_variances_of_correlated_noise_keep_their_digits_at_every_length() -> None:
+    # 1 - x/3 + x^2/12 - x^3/60 + x^4/360 - ...
+    for x in (1e-9, 1e-5, 1e-3, 1e-2):
+        series = sum(2 * (-x) ** k / math.factorial(k + 2) for k in range(12))
+        assert math.isclose(Noise(0.0, 1.0, 1.0).block_covariances(1, x, 1.0)[0], series, rel_tol=1e-14)
+    below, above = (Noise(0.0, 1.0, 1.0).block_covariances(1, 0.5 * (1 + step), 1.0)[0] for step in (-1e-9, 1e-9))
+    assert math.isclose(below, above, rel_tol=2e-9)
