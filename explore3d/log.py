@@ -36,6 +36,7 @@ class LogWriter:
         scene_text: the scene file's text.
         metadata: versions, seed, what the finger is: JSON values.
         started: wall-clock time of t = 0, for a real finger; None for a simulated one.
+        resolution: step of the positions, m (mapping.trace.Trace); 0: none.
 
     Raises:
         UserError: the file exists or cannot be made.
@@ -49,6 +50,7 @@ class LogWriter:
         scene_text: str = "",
         metadata: Mapping[str, Any] | None = None,
         started: datetime | None = None,
+        resolution: float = 0.0,
     ) -> None:
         from mcap.writer import Writer
 
@@ -71,6 +73,7 @@ class LogWriter:
             {
                 "schema": log_format.VERSION,
                 "tip_radius": self._tip_radius,
+                "resolution": float(resolution),
                 "frame": log_format.FRAME,
                 "started": None if started is None else started.isoformat(),
                 "scene": scene_text,
@@ -93,6 +96,7 @@ class LogWriter:
         self._channels["trace"] = self._mcap.register_channel(log_format.TRACE_TOPIC, "protobuf", cloud)
         path = self._mcap.register_schema("foxglove.PosesInFrame", "jsonschema", log_format.PATH_SCHEMA)
         self._channels["path"] = self._mcap.register_channel(log_format.PATH_TOPIC, "json", path)
+        self._channels["felt"] = self._mcap.register_channel(log_format.FELT_TOPIC, "protobuf", cloud)
 
     def write(self, move: Move, trace: Trace) -> None:
         """Append a move and what it gave; when this returns, a kill cannot take it back.
@@ -108,16 +112,18 @@ class LogWriter:
             self._t = float(trace.t[0])
         self._message("move", {"t": self._t, **_move_data(move), "first": self.samples, "samples": len(trace)})
         self._message("path", _poses(move, self._log_time(self._t)))
-        optional = tuple(name for name in log_format.OPTIONAL if getattr(trace, name) is not None)
-        dtype, prefix = self._layout(optional)
-        samples = _pack(trace, dtype, optional, self.path)
-        for start in range(0, len(samples), log_format.SAMPLES_PER_MESSAGE):
-            batch = samples[start : start + log_format.SAMPLES_PER_MESSAGE]
-            stamp = self._log_time(float(batch["t"][0]))
-            self._add("trace", stamp, point_cloud.encode(batch, prefix, stamp))
-        self.samples += len(samples)
-        if len(samples):
-            self._t = float(samples["t"][-1])
+        self._samples("trace", trace)
+        self.samples += len(trace)
+        if len(trace):
+            self._t = float(trace.t[-1])
+        self._flush()
+
+    def felt(self, trace: Trace) -> None:
+        """Append samples of a move that is still under way, in case that its end never comes.
+
+        Readers take them only where no `write` follows, which holds the same samples.
+        """
+        self._samples("felt", trace)
         self._flush()
 
     def event(self, kind: str, data: Mapping[str, Any]) -> None:
@@ -141,6 +147,15 @@ class LogWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
     ) -> None:
         self.close("closed" if error is None else f"{type(error).__name__}: {error}")
+
+    def _samples(self, channel: str, trace: Trace) -> None:
+        optional = tuple(name for name in log_format.OPTIONAL if getattr(trace, name) is not None)
+        dtype, prefix = self._layout(optional)
+        samples = _pack(trace, dtype, optional, self.path)
+        for start in range(0, len(samples), log_format.SAMPLES_PER_MESSAGE):
+            batch = samples[start : start + log_format.SAMPLES_PER_MESSAGE]
+            stamp = self._log_time(float(batch["t"][0]))
+            self._add(channel, stamp, point_cloud.encode(batch, prefix, stamp))
 
     def _layout(self, optional: tuple[str, ...]) -> tuple[np.dtype[np.void], bytes]:
         if optional not in self._prefixes:

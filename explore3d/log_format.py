@@ -10,7 +10,7 @@ MAGIC = b"\x89MCAP0\r\n"
 VERSION = "explore3d/log/1"
 FRAME = "object"
 
-TRACE_TOPIC, PATH_TOPIC = "/trace", "/path"
+TRACE_TOPIC, PATH_TOPIC, FELT_TOPIC = "/trace", "/path", "/felt"
 
 # fields of a sample: t, centre and sweep always, the others if the finger felt them
 REQUIRED = (("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("t", "<f8"), ("sweep", "<i4"))
@@ -48,6 +48,7 @@ EVENTS = {
             {
                 "schema": {"const": VERSION},
                 "tip_radius": {"type": "number", "exclusiveMinimum": 0, "description": "radius of the fingertip, m"},
+                "resolution": {"type": "number", "minimum": 0, "description": "step of the positions, m; 0: none"},
                 "frame": {"type": "string", "description": "frame of all coordinates"},
                 "started": {"type": ["string", "null"], "description": "ISO 8601 time of t = 0; null: simulated"},
                 "scene": {"type": "string", "description": "text of the scene file; empty: none"},

@@ -20,7 +20,7 @@ from mapping.trace import Trace
 
 # fixed by LogWriter; needed only where the chunk that states them is damaged
 _TOPICS = {i: topic for i, (topic, _) in enumerate(log_format.EVENTS.values(), 1)}
-_TOPICS |= {len(_TOPICS) + 1: log_format.TRACE_TOPIC, len(_TOPICS) + 2: log_format.PATH_TOPIC}
+_TOPICS |= dict(enumerate((log_format.TRACE_TOPIC, log_format.PATH_TOPIC, log_format.FELT_TOPIC), len(_TOPICS) + 1))
 
 
 @dataclass
@@ -33,6 +33,7 @@ class _Reading:
     events: list[Event] | None = None
     moves: int = 0
     samples: int = 0
+    felt: list[NDArray[np.void]] = field(default_factory=list)
     promised: int = 0
     messages: int = 0
     missing: int = 0
@@ -125,6 +126,9 @@ def _batches(reading: _Reading) -> Iterator[NDArray[np.void]]:
                     if batch is not None:
                         yield batch
     reading.damaged, reading.cut = damage.damaged, damage.cut
+    for batch in reading.felt:  # of a move whose end never came
+        reading.samples += len(batch)
+        yield batch
     if none:
         why = "" if begins else "does not begin as an MCAP log does and "
         raise UserError(f"{reading.path}: {why}holds no intact message of an explore3d log; nothing can be recovered")
@@ -149,6 +153,9 @@ def _take(topic: str, message: Any, reading: _Reading) -> NDArray[np.void] | Non
         batch = point_cloud.decode(message.data)
         reading.samples += len(batch)
         return batch
+    if topic == log_format.FELT_TOPIC:
+        reading.felt.append(point_cloud.decode(message.data))
+        return None
     if topic not in _TOPICS.values() or topic == log_format.PATH_TOPIC:
         return None
     data = json.loads(message.data)
@@ -157,6 +164,7 @@ def _take(topic: str, message: Any, reading: _Reading) -> NDArray[np.void] | Non
     elif topic == "/move":
         reading.promised = max(reading.promised, data["first"] + data["samples"])
         reading.moves += 1
+        reading.felt.clear()
         _keep(reading, Event("move", data.pop("t"), data))
     elif topic == "/event":
         _keep(reading, Event(data["kind"], data["t"], data["data"]))
@@ -204,7 +212,8 @@ def _trace(batches: list[NDArray[np.void]], reading: _Reading) -> Trace:
     assert reading.tip_radius is not None
     try:
         t, sweep = column("t")[:, 0], np.concatenate([batch["sweep"] for batch in batches])
-        return Trace(t, column("xyz"), sweep, reading.tip_radius, **optional)
+        resolution = float(reading.start.get("resolution", 0.0))
+        return Trace(t, column("xyz"), sweep, reading.tip_radius, **optional, resolution=resolution)
     except TraceError as error:
         raise UserError(f"{reading.path}: {error}") from error
 
@@ -213,7 +222,9 @@ def _loss(reading: _Reading, prefix: str = "") -> str:
     """One sentence on what is missing, "" if nothing is."""
     if reading.complete:
         return ""
+    felt = sum(map(len, reading.felt))
     parts = [f"recovered {reading.samples} samples of {reading.moves} moves"]
+    parts += [f"{felt} of them of a move that was broken off"] if felt else []
     lost = reading.promised - reading.samples
     if lost > 0:
         parts.append(f"{lost} further samples that the log announces are lost")

@@ -113,10 +113,15 @@ def _explore(
 
     with stages.stage("exploration") as share, finger:
         about = {"software": f"explore3d {__version__}", "seed": scene.seed, "finger": finger.info}
-        log = session.open_log(tip_radius=scene.tip.radius, scene_text=scene.resolved, metadata=about)
+        log = session.open_log(
+            tip_radius=scene.tip.radius,
+            scene_text=scene.resolved,
+            metadata=about,
+            resolution=finger.info.get("resolution", 0.0),
+        )
         log.event(KIND, base_event(base))
         if hasattr(finger, "notice"):
-            finger.notice = log.event  # a slow sweep's samples are on disk before it ends
+            finger.notice = log.felt  # a slow sweep's samples are on disk before it ends
         touch = finger.execute if replay is None else replay.before(finger.execute)
         execute = _logged(touch, log, scene.explore.time_budget, share)
         limits = Limits.of(finger.workspace, base, scene.tip.radius)

@@ -6,6 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from itertools import takewhile
 from types import TracebackType
 from typing import Any
 
@@ -21,6 +22,8 @@ FloatArray = NDArray[np.float64]
 
 # Samples that are kept: a minute at 5 kHz
 KEPT = 300_000
+# Before the samples asked for, the clock is known by those of so many seconds
+HISTORY = 10.0
 
 
 class ForceSensor:
@@ -123,17 +126,18 @@ class ForceSensor:
     def recorded(self, since: float = -np.inf) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """Ticks (N,), arrivals (N,) s and raw forces (N, 3) N of the samples that arrived after `since`."""
         with self._news:
-            kept = [sample for sample in self._samples if sample[0] >= since]
+            kept = list(takewhile(lambda sample: sample[0] >= since, reversed(self._samples)))[::-1]
         table = np.array([(s[0], s[2], s[3], s[4]) for s in kept], dtype=np.float64).reshape(-1, 4)
         return unwrapped(np.array([s[1] for s in kept], dtype=np.int64), self.bits), table[:, 0], table[:, 1:]
 
     def timed(self, since: float) -> tuple[FloatArray, FloatArray]:
         """Host times (N,) s at which the samples since then were taken, and their forces (N, 3) N, zero taken off."""
-        ticks, arrivals, forces = self.recorded(since)
+        ticks, arrivals, forces = self.recorded(since - HISTORY)
         if len(ticks) == 0:
             return np.zeros(0), np.zeros((0, 3))
         clock = SensorClock.estimate(ticks.astype(float), arrivals, self.tick)
-        return clock.times(ticks.astype(float)), forces - self.zero
+        recent = arrivals >= since
+        return clock.times(ticks[recent].astype(float)), forces[recent] - self.zero
 
     def _hear(self, now: float, frames: list[bytes]) -> None:
         decoded = [self.decode(frame) for frame in frames]

@@ -18,7 +18,7 @@ from hw.frame import Frame
 from hw.grbl_controller import GrblController
 from hw.guarded_stage import GuardedStage
 from hw.moves import Move
-from hw.peck import Peck
+from hw.peck import Peck, Touched
 from hw.safety import StopOnSignal
 from hw.slide import Slide
 from mapping.trace import Trace
@@ -44,7 +44,7 @@ class GrblFinger:
         unlock: send $X if the machine is locked on connecting (its position must be right). Moves nothing.
         home: send $H on connecting. MOVES the machine; needs `armed`.
         baudrate: of the port.
-        notice: told of every peck as it is made, (kind, JSON values): so that a log has it before the sweep ends.
+        notice: told of what was touched within a second of it: so that a log has it before the sweep ends.
         beside: a context that lives as long as the connection (an emulator).
     """
 
@@ -61,7 +61,7 @@ class GrblFinger:
     unlock: bool = False
     home: bool = False
     baudrate: int = 115200
-    notice: Callable[[str, dict[str, Any]], None] | None = None
+    notice: Callable[[Trace], None] | None = None
     beside: AbstractContextManager[Any] = field(default_factory=nullcontext)
     _stage: GuardedStage | None = field(init=False, default=None, repr=False)
     _open: ExitStack = field(init=False, repr=False, default_factory=ExitStack)
@@ -175,6 +175,7 @@ class GrblFinger:
             "touch": "peck" if self.slide is None else "slide",
             "port": self.port,
             "tip_radius": self.tip_radius,
+            "resolution": controller.settings.resolution,
             "firmware": controller.version,
             "settings": {f"${code}": value for code, value in controller.settings.values.items()},
             "origin": self.frame.origin.tolist(),
@@ -194,18 +195,18 @@ class GrblFinger:
         if self._lost is not None:
             raise FingerError(self._lost)
         self._refuse_what_exceeds(move, stage)
-        samples: list[tuple[Any, ...]] = []
+        touched: list[Trace] = []
         try:
-            self._carry_out(move, stage, samples)
+            self._carry_out(move, stage, touched)
         except (LinkError, StoppedError) as error:
             stage.controller.halt(str(error))
             self._lost = str(error)
-            if not samples:
+            if not touched:
                 raise
         except FingerError:
-            if not samples:  # one line was refused, a garbled one perhaps: what was felt before it stays
+            if not touched:  # one line was refused, a garbled one perhaps: what was felt before it stays
                 raise
-        return self._trace(samples)
+        return Trace.concatenate(touched or [self._trace(Touched(np.zeros(0), np.zeros((0, 3))))])
 
     def measured_delay(self) -> tuple[float, float]:
         """Delay of the force sensor behind the stage and its standard error, s, where the last sweep ended.
@@ -226,7 +227,7 @@ class GrblFinger:
         if move.speed > stage.speed * (1 + 1e-9):
             raise FingerError(f"the {move.purpose} asks for {move.speed} m/s; at most {stage.speed} m/s is possible")
 
-    def _carry_out(self, move: Move, stage: GuardedStage, samples: list[tuple[Any, ...]]) -> None:
+    def _carry_out(self, move: Move, stage: GuardedStage, touched: list[Trace]) -> None:
         away = -move.approach[0]
         lift = 0.5 * self.tip_radius
         if self._away is not None:
@@ -241,17 +242,23 @@ class GrblFinger:
         stage.go(move.path[0] + lift * away, away, lift)
         touch = self.peck if self.slide is None else self.slide
         assert touch is not None
-        for sample in touch.trace(stage, move):
-            samples.append(sample)
-            if self.notice is not None and self.peck is not None:
-                self.notice("peck", {"sweep": self._sweeps, "t": sample[0] - self._begun, "center": sample[1].tolist()})
+        for batch in touch.trace(stage, move):
+            touched.append(self._trace(batch))
+            if self.notice is not None and len(batch.times):
+                self.notice(touched[-1])
         self._away = -move.approach[-1]
 
-    def _trace(self, samples: list[tuple[Any, ...]]) -> Trace:
-        t = np.array([sample[0] for sample in samples]) - self._begun
-        centers = np.array([sample[1] for sample in samples]).reshape(-1, 3)
-        force = np.array([sample[2] for sample in samples]).reshape(-1, 3) if self.slide and samples else None
-        normals = None
-        if force is not None:
-            normals = force / np.linalg.norm(force, axis=1, keepdims=True)
-        return Trace(t, centers, np.full(len(t), self._sweeps), self.tip_radius, normals=normals, force=force)
+    def _trace(self, batch: Touched) -> Trace:
+        force = batch.forces
+        if force is None and self.slide is not None:
+            force = np.zeros((0, 3))
+        normals = None if force is None else force / np.linalg.norm(force, axis=1, keepdims=True)
+        return Trace(
+            batch.times - self._begun,
+            batch.centers,
+            np.full(len(batch.times), self._sweeps),
+            self.tip_radius,
+            normals=normals,
+            force=force,
+            resolution=self.stage.controller.settings.resolution,
+        )

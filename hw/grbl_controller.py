@@ -7,6 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,6 +142,11 @@ class GrblController:
 
     def _fresh(self, since: float) -> bool:
         return bool(self.reports) and self.reports[-1][0] > since
+
+    def reported(self, since: float) -> list[tuple[float, Status]]:
+        """(time.monotonic, report) of what arrived since then."""
+        recent = takewhile(lambda report: report[0] >= since, reversed(list(self.reports)))
+        return list(recent)[::-1]
 
     @property
     def paused(self) -> bool:

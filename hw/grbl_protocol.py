@@ -103,6 +103,13 @@ class Settings:
         return 0.0254 if self.values.get(13, 0.0) else 1e-3
 
     @property
+    def resolution(self) -> float:
+        """Step of the reported positions, m: of the motors ($100 to $102), or of the digits if that is coarser."""
+        digits = 1e-4 if self.values.get(13, 0.0) else 1e-3
+        steps = [1e-3 / count for count in self._three(100) if count > 0]
+        return float(max([*steps, digits * self.report_scale]))
+
+    @property
     def max_rate(self) -> FloatArray:
         """(3,) fastest axis speeds, m/s; NaN where the firmware does not say."""
         return self._three(110) * (1e-3 / 60.0)

@@ -18,6 +18,22 @@ from hw.moves import Move
 
 FloatArray = NDArray[np.float64]
 
+
+@dataclass(frozen=True, eq=False)
+class Touched:
+    """Samples in contact, handed on while the sweep is under way.
+
+    Args:
+        times: (N,) time.monotonic, s.
+        centers: (N, 3) tip centres, m, object frame.
+        forces: (N, 3) on the tip, N; None for a touch probe.
+    """
+
+    times: FloatArray
+    centers: FloatArray
+    forces: FloatArray | None = None
+
+
 # Sweeps get at least so many pecks: detection needs a curve, not a few points
 FEWEST = 24
 
@@ -38,8 +54,8 @@ class Peck:
     speed: float
     stroke: float
 
-    def trace(self, stage: GuardedStage, move: Move) -> Iterator[tuple[float, FloatArray]]:
-        """(time.monotonic, latched tip centre (3,)) of each contact along the sweep."""
+    def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
+        """The latched tip centre of each contact along the sweep, as it is made."""
         path, approach = spaced(move, min(self.step, move.length / FEWEST))
         depth = -self.stroke  # of the last contact behind the commanded path, along the approach
         for point, inwards in zip(path, approach, strict=True):
@@ -48,7 +64,7 @@ class Peck:
             where, hit = stage.probe(point + self.stroke * inwards, self.speed)
             if hit:
                 depth = float((where - point) @ inwards)
-                yield time.monotonic(), where
+                yield Touched(np.array([time.monotonic()]), where[None, :])
             else:
                 depth = min(depth, 0.0)
             stage.move(where - self.clearance * inwards)

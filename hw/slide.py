@@ -14,18 +14,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hw.errors import StoppedError
+from hw.errors import LinkError, StoppedError
 from hw.force_sensor import ForceSensor
 from hw.fusion import positions_at, rigid_centers
 from hw.guarded_stage import PATIENCE, GuardedStage
 from hw.moves import Move
-from hw.peck import spaced
+from hw.peck import Touched, spaced
 
 FloatArray = NDArray[np.float64]
 
 
 # Jogs that may be under way or waiting when the next is made, in control periods
 QUEUED = 2.0
+# Samples are handed on this often, s
+BATCH = 0.5
+# Share of the wanted force that may be missing, or too much, at full tangential speed; and the slowest pace
+EASE, SLOWEST = 0.5, 0.1
 
 
 @dataclass(frozen=True)
@@ -53,26 +57,40 @@ class Slide:
     delay: float = 0.0
     contact: float = 0.1
 
-    def trace(self, stage: GuardedStage, move: Move) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-        """(time.monotonic, tip centre (3,), force on the tip (3,) N) at every sample in contact of the sweep."""
+    def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
+        """Samples in contact with their forces, about every BATCH seconds; what was felt before a stop as well."""
         self.sensor.tare()
         path, approach = spaced(move, move.speed * self.period)
         where, hit = stage.probe(path[0] + self.reach * approach[0], self.approach_speed)
         if not hit:
             return
-        begun = time.monotonic()
+        last = told = time.monotonic()
         try:
-            self._steer(stage, move, path, approach, float((where - path[0]) @ approach[0]))
+            for _ in self._steer(stage, move, path, approach, float((where - path[0]) @ approach[0])):
+                if time.monotonic() > told + BATCH:
+                    told = time.monotonic()
+                    batch = self._fused(stage, last)
+                    if len(batch.times):
+                        last = float(batch.times[-1])
+                        yield batch
+        except (StoppedError, LinkError):
+            yield self._fused(stage, last)
+            raise
         finally:
             if stage.controller.link.is_open and stage.controller.stop_reason is None:
                 stage.controller.cancel_jog()
-        yield from self._fused(stage, begun)
+        yield self._fused(stage, last)
 
-    def _steer(self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, depth: float) -> None:
+    def _steer(
+        self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, depth: float
+    ) -> Iterator[None]:
         """Along the path, one jog a period; `depth` (m) behind it along the approach follows the force."""
         controller, trend = stage.controller, 0.0
         here = path[0] + depth * approach[0]
-        for point, inwards in zip(path, approach, strict=True):
+        at, end = 0.0, len(path) - 1.0
+        while True:
+            point, inwards = _between(path, at), _between(approach, at)
+            inwards /= np.linalg.norm(inwards)
             missing = move.force - self._pressing(stage, inwards, here, move.speed)
             wanted = self.gain * missing / self.stiffness
             # the slope of the body, learnt as it comes: else a ramp leaves a lasting error
@@ -86,6 +104,10 @@ class Slide:
                 stage.check(target, "sliding")
                 controller.jog(stage.frame.to_machine(target), max(way / self.period, 1e-4))
                 here = target
+            yield
+            if at >= end:
+                return
+            at = min(end, at + _pace(missing / move.force))
 
     def _pressing(self, stage: GuardedStage, inwards: FloatArray, here: FloatArray, speed: float) -> float:
         """Force along the approach, N, as soon as at most QUEUED periods of motion are left up to `here`.
@@ -104,15 +126,33 @@ class Slide:
         most = stage.guarded_speed * self.period
         return -most, 0.5 * most
 
-    def _fused(self, stage: GuardedStage, begun: float) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-        times, forces = self.sensor.timed(begun)
-        reports = [(t, stage.controller.machine_position(status)) for t, status in list(stage.controller.reports)]
-        reports = [(t, place) for t, place in reports if t >= begun - 1.0]
+    def _fused(self, stage: GuardedStage, after: float) -> Touched:
+        """Samples in contact taken after that time, as far as the stage has reported where it was."""
+        reports = [(t, stage.controller.machine_position(status)) for t, status in stage.controller.reported(after - 1)]
+        if len(reports) < 2:
+            return Touched(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+        times, forces = self.sensor.timed(after)
         stamps = np.array([t for t, _ in reports])
         places = stage.frame.to_object(np.array([place for _, place in reports]))
         forces = stage.frame.turn_to_object(forces)
         centers = positions_at(times - self.delay, stamps, places)
         touching = (np.linalg.norm(forces, axis=1) > self.contact) & np.isfinite(centers).all(axis=1)
-        touching &= times >= begun
+        touching &= times > after
         rigid = rigid_centers(centers[touching], forces[touching], self.stiffness)
-        yield from zip(times[touching].tolist(), rigid, forces[touching], strict=True)
+        return Touched(times[touching], rigid, forces[touching])
+
+
+def _between(rows: FloatArray, at: float) -> FloatArray:
+    """(3,) at a fractional row number."""
+    low = min(int(at), len(rows) - 1)
+    high = min(low + 1, len(rows) - 1)
+    return np.asarray(rows[low] + (at - low) * (rows[high] - rows[low]))
+
+
+def _pace(error: float) -> float:
+    """Share of the tangential speed at a force error, in wanted forces: a steep flank is taken slowly.
+
+    At full speed the tip would fly off behind a ridge, and be pressed hard in front of it, since the force
+    follows the body only as fast as the guarded speed lets it.
+    """
+    return float(np.clip((1.0 - abs(error)) / (1.0 - EASE), SLOWEST, 1.0))

@@ -32,6 +32,9 @@ RAW_SAMPLES = 40_000
 # Height, in standard deviations of a profile, of the gentlest detail that is no roughness of an unknown base.
 ROUGHNESS = 5.0
 PROBABILITY = 0.95
+# Height, in steps of positions that are rounded, up to which a detail may be the rounding's: half a step to either
+# side, and half a step of motion between two reports.
+UNRESOLVED = 1.5
 
 
 class DetectionError(MappingError):
@@ -124,11 +127,23 @@ def detect(
             disturbances = tuple(d for d in disturbances if _stands_out(d, profile, level, tip))
         for disturbance in sorted(disturbances, key=lambda d: d.place):
             crossings += _crossings(disturbance, profile, base, tip)
+    crossings, unresolved = _resolved(crossings, trace.resolution)
+    left_out += unresolved
     if algorithm != 3:
         crossings = _judged(crossings, usable, algorithm)
     length = sum(p.length for p in profiles)
-    limit = bank.detection_limit(threshold, tip)
+    limit = max(bank.detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
     return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out)
+
+
+def _resolved(crossings: list[Crossing], resolution: float) -> tuple[list[Crossing], tuple[str, ...]]:
+    """Without those that the rounding of the positions can make, which no model of noise describes."""
+    kept = [c for c in crossings if abs(c.height) > UNRESOLVED * resolution]
+    lost = len(crossings) - len(kept)
+    if not lost:
+        return kept, ()
+    low = UNRESOLVED * resolution
+    return kept, (f"{lost} details of at most {low:.3g} m may be rounding: the positions come in steps",)
 
 
 def _raw_noise(usable: list[tuple[int, Trace, FloatArray]], base: Base, raw: float) -> Noise:

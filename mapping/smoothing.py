@@ -150,6 +150,7 @@ class _Sweep:
             None if normals is None else unit(normals),
             mean(trace.contacts),
             mean(trace.force),
+            trace.resolution,
         )
 
     def _blocks(self, scale: float) -> IntArray:

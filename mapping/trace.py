@@ -27,9 +27,11 @@ class Trace:
         normals: (N, 3) outward contact normals (unit), or None: the log has positions alone.
         contacts: (N, 3) contact points, m, or None.
         force: (N, 3) contact force, N, or None.
+        resolution: step of the positions, m: of a stage that counts steps or rounds what it reports. 0: none.
 
     Raises:
-        TraceError: arrays of different length, values that are not finite, a radius that is not positive.
+        TraceError: arrays of different length, values that are not finite, a radius that is not positive, a
+            resolution that is negative.
     """
 
     t: FloatArray
@@ -39,12 +41,15 @@ class Trace:
     normals: FloatArray | None = field(default=None)
     contacts: FloatArray | None = field(default=None)
     force: FloatArray | None = field(default=None)
+    resolution: float = 0.0
 
     def __post_init__(self) -> None:
         radius = float(self.tip_radius)
         if not (np.isfinite(radius) and radius > 0):
             raise TraceError(f"tip radius must be a positive length in metres; found {self.tip_radius!r}")
         object.__setattr__(self, "tip_radius", radius)
+        if not 0.0 <= self.resolution < np.inf:
+            raise TraceError(f"the positions' resolution must be a length in metres, or 0; found {self.resolution!r}")
         count = len(np.asarray(self.centers))
         self._freeze("t", (count,), np.float64)
         self._freeze("centers", (count, 3), np.float64)
@@ -87,7 +92,8 @@ class Trace:
 
     @classmethod
     def concatenate(cls, traces: Sequence[Trace]) -> Trace:
-        """One trace of all samples, in the given order; optional fields survive if all parts have them.
+        """One trace of all samples, in the given order; optional fields survive if all parts have them; the
+        coarsest resolution counts.
 
         Raises:
             TraceError: no traces, or different tip radii.
@@ -107,6 +113,7 @@ class Trace:
             np.concatenate([trace.sweep for trace in traces]),
             traces[0].tip_radius,
             **parts,
+            resolution=max(trace.resolution for trace in traces),
         )
 
     def select(self, index: ArrayLike | slice) -> Trace:
@@ -124,6 +131,7 @@ class Trace:
             pick(self.normals),
             pick(self.contacts),
             pick(self.force),
+            self.resolution,
         )
 
     def sweeps(self) -> Iterator[tuple[int, Trace]]:

@@ -93,6 +93,23 @@ def test_a_closed_log_comes_back_whole_with_scene_events_and_moves(tmp_path: Pat
     assert log.sha256 == hashlib.sha256((tmp_path / "log.mcap").read_bytes()).hexdigest()
 
 
+def test_what_was_felt_of_a_move_that_never_ended_is_recovered(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    with LogWriter(path, tip_radius=RADIUS, resolution=4e-6) as log:
+        for first in (0, 10):
+            log.felt(trace_of(first, 10))
+        log.write(MOVE, trace_of(0, 20))
+        assert len(read_log(path).trace) == 20  # what a whole move felt is not there twice
+        log.felt(trace_of(20, 10, 1))
+        log.event("note", {})
+        log.felt(trace_of(30, 5, 1))
+        broken = read_log(path)
+    assert_same_samples(broken.trace, np.arange(35))
+    assert "15 of them of a move that was broken off" in broken.recovered
+    assert broken.trace.resolution == 4e-6
+    assert sum(map(len, iter_log(path, samples=10))) == 35
+
+
 def test_the_same_samples_give_the_same_bytes(tmp_path: Path) -> None:
     one = write_log(tmp_path / "one.mcap").read_bytes()
     time.sleep(0.6)  # longer than the period of syncing

@@ -30,6 +30,7 @@ from hw.slide import Slide
 from hw.touched_body import TouchedBody
 from mapping.contact import BallContact
 from mapping.surface import Surface
+from mapping.trace import Trace
 
 R = 0.005
 FRAME = Frame.of((-0.15, -0.15, -0.05), (0.0, 0.0, 0.4))
@@ -180,11 +181,18 @@ def test_pecks_are_the_latched_positions_to_a_step_of_the_motor() -> None:
 
 
 def test_every_peck_is_told_of_as_it_is_made() -> None:
-    told: list[dict[str, object]] = []
-    with machine() as (server, _), pecker(server, notice=lambda kind, data: told.append(data)) as finger:
+    told: list[Trace] = []
+    with machine() as (server, _), pecker(server, notice=told.append) as finger:
         trace = finger.execute(across(x=0.003))
-    assert [data["center"] for data in told] == trace.centers.tolist()
-    assert np.allclose([data["t"] for data in told], trace.t)  # type: ignore[arg-type]
+    assert [len(batch) for batch in told] == [1] * len(trace)
+    assert np.array_equal(Trace.concatenate(told).centers, trace.centers)
+    assert np.array_equal(Trace.concatenate(told).t, trace.t)
+
+
+def test_a_trace_knows_the_step_of_the_motors() -> None:
+    with machine() as (server, _), pecker(server) as finger:
+        trace = finger.execute(across(x=0.003))
+        assert trace.resolution == finger.info["resolution"] == pytest.approx(4e-6)
 
 
 def test_a_step_too_high_for_the_clearance_is_climbed() -> None:
@@ -241,7 +249,12 @@ def test_sliding_follows_the_body_and_holds_the_force(kind: str) -> None:
         sensor = OptoForce(server.ports[1], 400.0) if kind == "optoforce" else LineSensor(server.ports[1], rate=1000.0)
         slide = Slide(sensor, 1e4, approach_speed=5e-3)
         with pecker(server, peck=None, slide=slide) as finger:
+            told: list[tuple[float, Trace]] = []
+            finger.notice = lambda batch: told.append((time.monotonic() - finger._begun, batch))
             trace = finger.execute(across(x=0.004, y=0.002, speed=0.008))
+            assert len(told) > 1 and np.array_equal(Trace.concatenate([batch for _, batch in told]).t, trace.t)
+            assert (np.diff(trace.t) > 0).all()
+            assert max(when - batch.t[0] for when, batch in told) < 1.0
             assert trace.force is not None and trace.normals is not None
             assert np.abs(off_the_body(trace.centers)).std() < 1.5e-5
             assert np.median(np.linalg.norm(trace.force, axis=1)) == pytest.approx(1.0, abs=0.3)

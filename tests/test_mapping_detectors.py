@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -154,3 +155,22 @@ def test_a_bin_that_a_sweep_only_ends_in_does_not_count_as_a_full_one() -> None:
     (profile,) = height_profiles(0, trace, s, plate, 10e-4)
     assert len(profile.height) == 100
     assert np.abs(profile.height).max() < 1e-12
+
+
+def test_rounding_of_the_positions_is_no_feature_but_a_wire_beneath_it_is() -> None:
+    step = 4e-6
+
+    def rounded(height) -> Trace:
+        trace = sweep(lambda x: height(x) + 1e-4 * np.exp(-((x + 0.05) / 0.02)), white=2e-7)
+        leftover = trace.centers[:, 2] % step - step / 2
+        centers = trace.centers.copy()
+        centers[:, 2] = TIP + height(centers[:, 0]) + leftover
+        return Trace(trace.t, centers, trace.sweep, TIP, resolution=step)
+
+    flat = rounded(lambda x: 0.0 * x)
+    assert detect(replace(flat, resolution=0.0), plate()).crossings
+    silent = detect(flat, plate())
+    assert not silent.crossings and "rounding" in silent.left_out[-1]
+    assert silent.detection_limit >= step
+    (crossing,) = detect(rounded(wire), plate()).crossings
+    np.testing.assert_allclose(crossing.height, 0.65e-3, rtol=0.03)
