@@ -55,6 +55,11 @@ class Base:
     def _nearest(self) -> NearestPoint:
         return NearestPoint(self.surface)
 
+    @property
+    def edge_normals(self) -> FloatArray:
+        """(F, 3, 3) mean normal of the faces on either side of the edge opposite to each corner of a face."""
+        return self._nearest.edge_normals
+
     def foot(self, centers: ArrayLike, tip_radius: float) -> Feet:
         """Foot points and heights of ball centres (N, 3), m.
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.cells import Cells
 from mapping.profile_fit import SHORTEST_BEND
 from mapping.robust import OUTLIER, robust_fit, robust_scale
 from mapping.surface import Surface
@@ -39,15 +40,10 @@ class Cloud:
     @classmethod
     def of(cls, trace: Trace, most: int) -> Cloud:
         """The thinned cloud of a trace: means of consecutive samples, at most `most` of them."""
-        group = np.arange(len(trace)) * most // max(len(trace), most)
-        group = np.unique(np.column_stack([trace.sweep, group]), axis=0, return_inverse=True)[1].ravel()
-        order = np.argsort(group, kind="stable")
-        starts = np.flatnonzero(np.diff(group[order], prepend=-1))
-        counts = np.diff(np.append(starts, len(trace)))[:, None]
-        means = np.add.reduceat(trace.centers[order], starts) / counts
+        cells = Cells.of(trace, most)
+        means, normals = cells.centers, cells.normals
         origin = means.mean(axis=0)
         axes = np.linalg.svd(means - origin, full_matrices=False)[2]
-        normals = None if trace.normals is None else np.add.reduceat(trace.normals[order], starts) / counts
         hint = np.array([0.0, 0.0, 1.0]) if normals is None else normals.mean(axis=0)
         if axes[2] @ hint < 0:
             axes = np.stack([axes[0], -axes[1], -axes[2]])

@@ -99,14 +99,14 @@ class NearestPoint:
         zero = barycentric < ON_BORDER
         normals = self.surface.face_normals[face].copy()
         on_edge = np.flatnonzero(zero.sum(axis=1) == 1)
-        normals[on_edge] = self._edge_normals[face[on_edge], zero[on_edge].argmax(axis=1)]
+        normals[on_edge] = self.edge_normals[face[on_edge], zero[on_edge].argmax(axis=1)]
         on_vertex = np.flatnonzero(zero.sum(axis=1) == 2)
         corner = barycentric[on_vertex].argmax(axis=1)
         normals[on_vertex] = self._vertex_normals[self.surface.faces[face[on_vertex], corner]]
         return normals
 
     @cached_property
-    def _edge_normals(self) -> FloatArray:
+    def edge_normals(self) -> FloatArray:
         """(F, 3, 3): of the edge opposite to each corner, the mean normal of the faces that share it."""
         faces = self.surface.faces
         edges = np.sort(np.stack([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]], axis=1), axis=2)

@@ -1,0 +1,39 @@
+"""Cells: the mean ball centres of short stretches of sweeps: what fits of the whole body are made to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.trace import Trace
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Means over consecutive samples of one sweep.
+
+    Args:
+        centers: (C, 3) mean ball centres in the order of time, m.
+        sweep: (C,) sweep of each.
+        normals: (C, 3) mean contact normals, or None.
+    """
+
+    centers: FloatArray
+    sweep: NDArray[np.int64]
+    normals: FloatArray | None
+
+    @classmethod
+    def of(cls, trace: Trace, most: int) -> Cells:
+        """At most about `most` cells of equally many samples each; no cell spans two sweeps."""
+        group = np.arange(len(trace)) * most // max(len(trace), most)
+        group = np.unique(np.column_stack([trace.sweep, group]), axis=0, return_inverse=True)[1].ravel()
+        order = np.argsort(group, kind="stable")
+        starts = np.flatnonzero(np.diff(group[order], prepend=-1))
+        counts = np.diff(np.append(starts, len(trace)))[:, None]
+        centers = np.add.reduceat(trace.centers[order], starts) / counts
+        normals = None if trace.normals is None else np.add.reduceat(trace.normals[order], starts) / counts
+        return cls(centers, trace.sweep[order][starts], normals)
