@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.base import Base
+from mapping.onto_base import onto_base
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -95,8 +96,7 @@ def chart_along(
     line, lift = _resampled(axis, normals, spacing)
     if not closed and extension > 0.0:
         line, lift = _extended(line, lift, spacing, extension)
-    feet = base.foot(line + tip_radius * lift, tip_radius)
-    points, up = feet.points, _smoothed(feet.normals, lift)
+    points, up = onto_base(line, lift, base, tip_radius, smooth=int(0.5 * reach / spacing))
     if not closed:
         keep = _on_base(points - line, up, 0.1 * reach)
         points, up = points[keep], up[keep]
@@ -141,12 +141,6 @@ def _on_base(moved: FloatArray, up: FloatArray, tolerance: float) -> slice:
     middle = len(moved) // 2
     low, high = int(out[out < middle].max(initial=-1)), int(out[out >= middle].min(initial=len(moved)))
     return slice(max(low, 0), min(high + 1, len(moved)))
-
-
-def _smoothed(normals: FloatArray, hint: FloatArray) -> FloatArray:
-    """Foot normals, turned to the hint's side: the direction to the centre flips where it lies below the base."""
-    sign = np.where(np.einsum("ij,ij->i", normals, hint) < 0.0, -1.0, 1.0)
-    return np.asarray(normals * sign[:, None])
 
 
 def _tangents(points: FloatArray, closed: bool) -> FloatArray:

@@ -12,6 +12,7 @@ from mapping.bump_shape import BumpShape
 from mapping.extent import explored
 from mapping.feature import Feature, Interval
 from mapping.hollow_shape import GrooveShape, PitShape
+from mapping.onto_base import onto_base
 from mapping.posterior import Posterior
 from mapping.problem import Problem
 from mapping.ridge_shape import RidgeShape
@@ -50,7 +51,7 @@ def _describe_spot(problem: Problem, shape: BumpShape | PitShape, posterior: Pos
     place = np.zeros((1, 2))
     place[0, : shape.free] = np.median(draws[:, : shape.free], axis=0)
     point = shape.spot.lifted(place, np.zeros(1))
-    axis, normals = _on_base(point, shape.spot.normal[None], base, shape.tip_radius)
+    axis, normals = onto_base(point, shape.spot.normal[None], base, shape.tip_radius)
     sd = float(np.sqrt((draws[:, : shape.free].std(axis=0) ** 2).mean()))
     height, width, radius, note = _section(problem, shape, draws)
     notes = [note] if note else []
@@ -83,7 +84,7 @@ def _describe_curve(
     courses = modes.lateral(draws[:, : modes.count], s)
     aside = np.median(courses, axis=0)
     points = points + aside[:, None] * laterals - (0.5 * bend * aside**2)[:, None] * normals
-    axis, normals = _on_base(points, normals, base, shape.tip_radius)
+    axis, normals = onto_base(points, normals, base, shape.tip_radius)
     if chart.closed:
         axis[-1], normals[-1] = axis[0], normals[0]
     height, width, radius, note = _section(problem, shape, draws)
@@ -144,9 +145,3 @@ def _length(
         return interval, []
     note = f"the axis goes on beyond what was explored at its {' and its '.join(open_ends)} point: at least this long"
     return replace(interval, censored=True), [note]
-
-
-def _on_base(points: FloatArray, normals: FloatArray, base: Base, tip: float) -> tuple[FloatArray, FloatArray]:
-    feet = base.foot(points + tip * normals, tip)
-    sign = np.where(np.einsum("ij,ij->i", feet.normals, normals) < 0.0, -1.0, 1.0)
-    return feet.points.copy(), feet.normals * sign[:, None]
