@@ -89,7 +89,9 @@ def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing
         s: (N,) their arclengths, m (see `arclength`), not decreasing.
         spacing: width of the bins, m.
     """
-    bins = np.floor((s - s[0]) / spacing).astype(np.int64)
+    # half a step off: evenly spaced samples would sit on the bins' borders, where rounding decides
+    step = (s[-1] - s[0]) / max(len(s) - 1, 1)
+    bins = np.floor((s - s[0] + 0.5 * step) / spacing).astype(np.int64)
     first = np.flatnonzero(np.diff(bins, prepend=-1) > 0)
     occupied = bins[first]
     counts = np.diff(np.append(first, len(s)))
@@ -109,7 +111,7 @@ def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing
         profiles.append(
             HeightProfile(
                 sweep,
-                float(s[0] + (wanted[0] + 0.5) * spacing),
+                float(s[0] + (wanted[0] + 0.5) * spacing - 0.5 * step),
                 spacing,
                 np.interp(wanted, have, height[begin:end]),
                 float(counts[begin:end].mean()),
