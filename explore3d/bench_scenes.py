@@ -1,4 +1,4 @@
-"""Bodies for the exploration bench: a plate, and on it wires of known axes or balls of known centres."""
+"""Scenes of the exploration bench: a global model, what the finger really touches, and the features that differ."""
 
 from __future__ import annotations
 
@@ -8,112 +8,166 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from explore3d.bench_bodies import (
+    Mesh,
+    blob,
+    blob_normals,
+    cylinder,
+    folded,
+    joined,
+    plate,
+    slotted_plate,
+    sphere_mesh,
+    tube,
+)
 from explore3d.truth import TrueFeature
 from mapping.surface import Surface
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Mesh = tuple[FloatArray, IntArray]
 
 WIRE = 0.65e-3
+UP = np.array([0.0, 0.0, 1.0])
 LONG, SHORT = 0.1, 0.08
+# The span that no ridge on these bodies falls short of, m
+SPAN = 0.025
 
 
 @dataclass(frozen=True, eq=False)
 class BenchScene:
-    """A body to explore: its global model, what the finger really touches, and the features on it."""
+    """A body to explore.
+
+    Args:
+        base: the global model.
+        object: what the finger touches.
+        truth: the features by which they differ.
+        shortest_ridge: the survey's setting, m; None where there may be bumps.
+        smallest: height of the smallest feature that the survey must find, m.
+    """
 
     base: Surface
     object: Surface
     truth: tuple[TrueFeature, ...]
+    shortest_ridge: float | None = SPAN
+    smallest: float = 0.3e-3
 
 
-def tube(axis: FloatArray, up: FloatArray, radius: float, sides: int = 24, rings: int = 6) -> Mesh:
-    """A tube with round caps around a polyline (K, 3); `up` (K, 3) is nowhere along it."""
-    along = np.gradient(axis, axis=0)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    side = np.cross(along, up)
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    lift = np.arange(1, rings + 1) * (0.5 * np.pi / (rings + 0.5))
-    first, last = ([np.cos(a), w * np.sin(a)] for a, w in ((lift, -1.0), (lift, 1.0)))
-    frames = [*((0, c, s) for c, s in np.transpose(first)[::-1])]
-    frames += [(k, 1.0, 0.0) for k in range(len(axis))]
-    frames += [(len(axis) - 1, c, s) for c, s in np.transpose(last)]
-    angle = 2 * np.pi * np.arange(sides) / sides
-    stack = []
-    for k, shrink, shift in frames:
-        circle = np.outer(np.cos(angle), np.cross(side[k], along[k])) + np.outer(np.sin(angle), side[k])
-        stack.append(axis[k] + radius * (shrink * circle + shift * along[k]))
-    ring, i = (grid.ravel() for grid in np.meshgrid(np.arange(len(stack) - 1), np.arange(sides), indexing="ij"))
-    a, b = ring * sides + i, ring * sides + (i + 1) % sides
-    faces = np.concatenate([np.column_stack([a, b, b + sides]), np.column_stack([a, b + sides, a + sides])])
-    return np.concatenate(stack), faces
-
-
-def joined(*meshes: Mesh) -> Surface:
-    """One surface of several meshes, side by side."""
-    vertices, faces, count = [], [], 0
-    for points, triangles in meshes:
-        vertices.append(points)
-        faces.append(triangles + count)
-        count += len(points)
-    return Surface(np.concatenate(vertices), np.concatenate(faces))
-
-
-def plate() -> Mesh:
-    """A rectangle in the plane z = 0."""
-    corners = np.array([[0, 0, 0], [LONG, 0, 0], [LONG, SHORT, 0], [0, SHORT, 0]], dtype=np.float64)
-    return corners, np.array([[0, 1, 2], [0, 2, 3]])
-
-
-def folded(points: FloatArray, angle: float) -> FloatArray:
-    """Points bent down about the line x = LONG / 2, z = 0."""
-    x, z = points[:, 0] - 0.5 * LONG, points[:, 2]
-    bent = points.copy()
-    bent[:, 0] = 0.5 * LONG + np.where(x > 0, x * np.cos(angle) + z * np.sin(angle), x)
-    bent[:, 2] = np.where(x > 0, z * np.cos(angle) - x * np.sin(angle), z)
-    return bent
-
-
-def wires(*axes: FloatArray, bend: float = 0.0) -> BenchScene:
+def wires(
+    *axes: FloatArray, size: tuple[float, float] = (LONG, SHORT), bend: float = 0.0, span: float = SPAN
+) -> BenchScene:
     """Wires that lie on a plate, which may be folded under them."""
-    base, faces = plate()
-    if bend:
-        half = np.array([[0.5 * LONG, 0, 0], [0.5 * LONG, SHORT, 0]])
-        base = np.concatenate([base, half])
-        faces = np.array([[0, 4, 5], [0, 5, 3], [4, 1, 2], [4, 2, 5]])
-    up = np.array([0.0, 0.0, 1.0])
-    parts = [tube(axis + 0.5 * WIRE * up, np.tile(up, (len(axis), 1)), 0.5 * WIRE) for axis in axes]
-    meshes = [(folded(points, bend), triangles) for points, triangles in [(base, faces), *parts]]
+    parts = [tube(axis + 0.5 * WIRE * UP, np.tile(UP, (len(axis), 1)), 0.5 * WIRE) for axis in axes]
+    meshes: list[Mesh] = [(folded(points, bend), faces) for points, faces in [plate(*size), *parts]]
     truth = tuple(TrueFeature("ridge", folded(axis, bend), WIRE, WIRE) for axis in axes)
-    return BenchScene(Surface(*meshes[0]), joined(*meshes), truth)
+    return BenchScene(Surface(*meshes[0]), joined(*meshes), truth, span)
 
 
-def line(start: tuple[float, float], stop: tuple[float, float], count: int = 60) -> FloatArray:
-    """(count, 3) points of a straight axis on the plate, m."""
-    return np.linspace([*start, 0.0], [*stop, 0.0], count)
+def placed(axis: FloatArray, rng: np.random.Generator, shift: float = 0.006) -> FloatArray:
+    """Points of a plate turned by any angle about its middle and shifted by at most `shift` (m)."""
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    c, s = np.cos(angle), np.sin(angle)
+    moved = axis @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(moved + np.append(rng.uniform(-shift, shift, 2), 0.0))
 
 
-def arc(radius: float, begin: float, end: float, count: int = 121) -> FloatArray:
+def line(length: float, beside: float = 0.0, count: int = 60) -> FloatArray:
+    """(count, 3) points of a straight axis through the plate's middle, or beside it, m."""
+    return np.linspace([-0.5 * length, beside, 0.0], [0.5 * length, beside, 0.0], count)
+
+
+def arc(radius: float, angle: float, count: int = 121) -> FloatArray:
     """(count, 3) points of a circle about the plate's middle, m."""
-    angle = np.linspace(begin, end, count)
-    circle = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
-    return np.asarray(np.array([0.5 * LONG, 0.5 * SHORT, 0.0]) + radius * circle)
+    turn = np.linspace(0.0, angle, count)
+    circle = radius * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    return np.vstack([circle[:-1], circle[:1]]) if angle >= 2.0 * np.pi else circle
 
 
-def junction() -> BenchScene:
-    """Three arms that meet in the middle of the plate."""
-    middle = np.array([0.5 * LONG, 0.5 * SHORT])
-    tips = [middle + 0.028 * np.array([np.cos(a), np.sin(a)]) for a in (0.1, 2.2, 4.3)]
-    return wires(*(line((middle[0], middle[1]), (tip[0], tip[1])) for tip in tips))
+def straight(rng: np.random.Generator) -> BenchScene:
+    """One wire on a plate of 200 x 150 mm."""
+    return wires(placed(line(0.08), rng, 0.025), size=(0.2, 0.15), span=0.04)
 
 
-SCENES: dict[str, Callable[[], BenchScene]] = {
-    "straight": lambda: wires(line((0.02, 0.03), (0.078, 0.052))),
-    "curved": lambda: wires(arc(0.015, 0.2, 2.9)),
-    "o-ring": lambda: wires(arc(0.018, 0.0, 2.0 * np.pi)),
+def two(rng: np.random.Generator) -> BenchScene:
+    """Two parallel wires 8 mm apart."""
+    both = placed(np.concatenate([line(0.06, -0.004), line(0.06, 0.004)]), rng)
+    return wires(both[:60], both[60:])
+
+
+def junction(rng: np.random.Generator) -> BenchScene:
+    """Three arms that meet."""
+    angles = np.array([0.0, 2.1, 4.2]) + rng.uniform(-0.15, 0.15, 3)
+    arms = [np.linspace(0.0, 0.028, 60)[:, None] * [np.cos(a), np.sin(a), 0.0] for a in angles]
+    together = placed(np.concatenate(arms), rng)
+    return wires(*np.split(together, 3))
+
+
+def edge(rng: np.random.Generator) -> BenchScene:
+    """A wire that crosses a fold of 40 degrees."""
+    angle = rng.uniform(-0.6, 0.6)
+    way = np.array([np.cos(angle), np.sin(angle), 0.0])
+    start, stop = rng.uniform(-0.036, -0.028), rng.uniform(0.028, 0.036)
+    middle = np.array([0.0, rng.uniform(-0.012, 0.012), 0.0])
+    return wires(middle + np.linspace(start, stop, 400)[:, None] * way, bend=float(np.radians(40.0)))
+
+
+def helix(rng: np.random.Generator) -> BenchScene:
+    """A wire wound round a cylinder."""
+    radius, rise = 0.02, 0.05
+    angle = rng.uniform(0.0, 2.0 * np.pi) + np.linspace(0.0, 1.2 * np.pi, 240)
+    outward = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+    height = np.linspace(-0.5 * rise, 0.5 * rise, len(angle)) + rng.uniform(-0.006, 0.006)
+    axis = radius * outward + height[:, None] * UP
+    base = cylinder(radius, 0.08)
+    truth = TrueFeature("ridge", axis, WIRE, WIRE)
+    return BenchScene(Surface(*base), joined(base, tube(axis + 0.5 * WIRE * outward, outward, 0.5 * WIRE)), (truth,))
+
+
+def groove(rng: np.random.Generator) -> BenchScene:
+    """A rectangular groove, 2 mm wide and 1 mm deep: under the ball a dip of 0.05 mm."""
+    width, length, depth, tip = 2e-3, 0.06, 1e-3, 0.01
+    middle = rng.uniform(-0.006, 0.006, 2)
+    half = 0.5 * np.array([length, width])
+    turn = rng.uniform(0.0, 2.0 * np.pi)
+    c, s = np.cos(turn), np.sin(turn)
+    rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    vertices, faces = slotted_plate(LONG, SHORT, middle - half, middle + half, depth)
+    base, few = plate(LONG, SHORT)
+    dip = -(tip - np.sqrt(tip**2 - 0.25 * width**2))
+    truth = TrueFeature("groove", (line(length) + np.append(middle, 0.0)) @ rotation, dip, width)
+    scene = Surface(base @ rotation, few), Surface(vertices @ rotation, faces)
+    return BenchScene(*scene, (truth,), smallest=-0.8 * dip)
+
+
+def free_form(rng: np.random.Generator, subdivisions: int = 6) -> BenchScene:
+    """A bunny-sized free-form body with two ridges and three bumps."""
+    unit, faces = sphere_mesh(subdivisions)
+    rotation = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    ways = np.array([[1.0, 0.3, 0.2], [-0.6, 0.7, -0.2], [-0.2, -0.9, 0.4], [0.1, 0.2, 1.0], [0.2, -0.1, -1.0]])
+    ways = ways @ rotation
+    parts, truth = [(blob(unit), faces)], []
+    for k, way in enumerate(ways[:2]):
+        across = np.cross(way, ways[k + 2])
+        turn = np.linspace(-0.4, 0.4, 160)[:, None]
+        course = np.cos(turn) * way / np.linalg.norm(way) + np.sin(turn) * across / np.linalg.norm(across)
+        axis, up = blob(course), blob_normals(course)
+        parts.append(tube(axis + 0.5 * WIRE * up, up, 0.5 * WIRE))
+        truth.append(TrueFeature("ridge", axis, WIRE, WIRE))
+    ball, some = sphere_mesh(4)
+    for way in ways[2:]:
+        point = blob(way[None])
+        parts.append((point + 1e-3 * ball, some))
+        truth.append(TrueFeature("bump", point, 1e-3, 2e-3))
+    return BenchScene(Surface(*parts[0]), joined(*parts), tuple(truth), shortest_ridge=None, smallest=0.5e-3)
+
+
+SCENES: dict[str, Callable[[np.random.Generator], BenchScene]] = {
+    "straight": straight,
+    "curved": lambda rng: wires(placed(arc(0.015, 2.7), rng)),
+    "helix": helix,
+    "o-ring": lambda rng: wires(placed(arc(0.018, 2.0 * np.pi), rng)),
     "junction": junction,
-    "two": lambda: wires(line((0.02, 0.036), (0.08, 0.036)), line((0.02, 0.044), (0.08, 0.044))),
-    "edge": lambda: wires(line((0.02, 0.03), (0.085, 0.055), 400), bend=float(np.radians(40.0))),
-    "empty": lambda: wires(),
+    "two": two,
+    "groove": groove,
+    "edge": edge,
+    "free form": free_form,
+    "empty": lambda rng: wires(),
 }

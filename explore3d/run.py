@@ -144,6 +144,7 @@ def explorer(scene: Scene, base: Base) -> Explore:
         base=base,
         tip_radius=scene.tip.radius,
         smallest=scene.survey.smallest_feature,
+        shortest_ridge=scene.survey.shortest_ridge,
         precision=scene.explore.precision,
         time_budget=scene.explore.time_budget,
         speed=scene.survey.speed,

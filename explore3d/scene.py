@@ -114,9 +114,13 @@ class FingerTable(Table):
 
 
 class Survey(Table):
-    """Sweeps over the whole model: the least height to be found (m), m/s, N."""
+    """Sweeps over the whole model: the least height to be found (m), the least span of a ridge (m), m/s, N.
+
+    Without `shortest_ridge` nothing of that height is missed, bumps included; with it, ridges that span less may be.
+    """
 
     smallest_feature: Length
+    shortest_ridge: Length | None = None
     speed: Speed = 0.03
     force: Force = 1.0
 

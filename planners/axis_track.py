@@ -14,6 +14,23 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class Slides:
+    """What `count` sweeps off an end felt: `points` (N, 3) of the base and `heights` (N,) over it, m."""
+
+    points: FloatArray
+    heights: FloatArray
+    count: int
+
+    @classmethod
+    def joined(cls, before: Slides | None, points: FloatArray, heights: FloatArray) -> Slides:
+        """One more sweep."""
+        if before is None:
+            return cls(points, heights, 1)
+        points = np.concatenate([before.points, points])
+        return cls(points, np.concatenate([before.heights, heights]), before.count + 1)
+
+
+@dataclass(frozen=True, eq=False)
 class AxisEnd:
     """An end of an axis.
 
@@ -24,6 +41,7 @@ class AxisEnd:
         heading: (3,) direction that points off the end.
         reach: how far beyond `point` the axis was found to be gone, m.
         turn: geodesic curvature of the axis there, towards the end, 1/m.
+        felt: what the sweeps off it felt.
     """
 
     point: FloatArray
@@ -32,6 +50,7 @@ class AxisEnd:
     heading: FloatArray
     reach: float = 0.0
     turn: float = 0.0
+    felt: Slides | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +61,7 @@ class AxisTrack:
         points, normals: (K, 3) on the base, in order along the axis, ends included.
         sign: +1 for ridges, -1 for grooves.
         kind: kind of its crossings ("convex", "concave" or "step").
-        height: median |height| of its crossings, m.
+        height, height_sd: median |height| of its crossings, and its standard deviation, m.
         half_width: median half-width of the disturbance, m.
         ends: of the first and the last point; none if closed.
     """
@@ -52,6 +71,7 @@ class AxisTrack:
     sign: float
     kind: str
     height: float
+    height_sd: float
     half_width: float
     ends: tuple[AxisEnd, ...]
 

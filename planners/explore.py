@@ -23,6 +23,7 @@ from planners.crest import is_step, slender
 from planners.errors import PlannerError
 from planners.plan import Outcome, Plan
 from planners.ridge import RidgeFollower
+from planners.ridge_end import Crest, EndFinder
 from planners.sense import Sense
 from planners.strokes import Strokes, tangential
 from planners.survey import Survey
@@ -32,7 +33,7 @@ FloatArray = NDArray[np.float64]
 # Survey sweeps that are detected together; the first batch also tells the noise, if it is not given
 BATCH = 12
 # Slides off one end, at most
-MOST_SLIDES = 6
+MOST_SLIDES = 60
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,7 @@ class Explore:
         smallest: height of the smallest feature to be found, m.
         precision: wanted half-width of the 90 % interval of a feature's end or centre, m.
         speed, force: of the sweeps, m/s and N.
+        shortest_ridge: distance between the ends of the shortest ridge to be found, m; None: bumps as well.
         region: (low, high) corners (3,) of the part to be inspected, m; None: all of the base.
         time_budget: finger time, s.
         path_budget: finger path, m.
@@ -124,6 +126,7 @@ class Explore:
     precision: float = 1e-4
     speed: float = 0.03
     force: float = 1.0
+    shortest_ridge: float | None = None
     region: tuple[FloatArray, FloatArray] | None = None
     time_budget: float = np.inf
     path_budget: float = np.inf
@@ -150,6 +153,7 @@ class Explore:
             smallest=self.smallest,
             speed=self.speed,
             force=self.force,
+            shortest_ridge=self.shortest_ridge,
             region=self.region,
         )
 
@@ -206,6 +210,11 @@ class Explore:
         if waiting:
             self._detect(waiting, found)
         found.survey = self.survey.covered(paths)
+        if self.survey.slices is not None:
+            found.left_out.append(
+                f"features smaller than a ridge that spans {1e3 * (self.shortest_ridge or 0.0):g} mm: "
+                f"{100 * found.survey.fraction:.0f} % of the surface lies near enough to a sweep to see them"
+            )
         return Outcome("done")
 
     def _detect(self, waiting: list[Trace], found: Found) -> None:
@@ -229,9 +238,11 @@ class Explore:
             for which, end in enumerate(track.ends):
                 done = found.slides.get((index, which), 0)
                 if end.reason == "end" and end.sd > self.wanted_sd and done < MOST_SLIDES and track.kind != "step":
-                    seconds = 3.0 * track.half_width / self.speed
-                    gain = end.sd * (1.0 - 0.5**0.5) if np.isfinite(end.sd) else self.survey.pitch
-                    start = partial(self._slide, index, which, found, strokes, sense)
+                    seconds = 1.65 * track.half_width / self.speed
+                    # the n-th slide leaves sqrt((n - 1) / n) of the uncertainty
+                    left = float(np.sqrt((done + 1.0) / (done + 2.0)))
+                    gain = end.sd * (1.0 - left) if np.isfinite(end.sd) else self.survey.pitch
+                    start = partial(self._slide, index, which, found, strokes)
                     actions.append(Action("slide off an end", gain, seconds, start))
         return actions
 
@@ -277,12 +288,13 @@ class Explore:
 
         return RidgeFollower(strokes, sense, found.noise or Noise(0.0), self.wanted_sd, known=known)
 
-    def _slide(self, index: int, which: int, found: Found, strokes: Strokes, sense: Sense) -> Plan:
+    def _slide(self, index: int, which: int, found: Found, strokes: Strokes) -> Plan:
         """One more sweep off an end that is not known well enough."""
         track = found.tracks[index]
         found.slides[index, which] = found.slides.get((index, which), 0) + 1
-        follower = self._follower(found, strokes, sense)
-        end = yield from follower.slide(track.ends[which], track.height, track.half_width, track.sign)
+        finder = EndFinder(strokes, self.base, found.noise or Noise(0.0))
+        crest = Crest(track.height, track.height_sd, track.half_width, track.sign)
+        end = yield from finder.slide(track.ends[which], crest)
         found.tracks[index] = track.with_end(which, end)
         return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")
 

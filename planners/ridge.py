@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,9 @@ from mapping.trace import Trace
 from planners.axis_track import AxisEnd, AxisTrack, Course, course, polyline_distance
 from planners.crest import is_step, seen_again
 from planners.plan import Outcome, Plan
+from planners.ridge_end import Crest, EndFinder
 from planners.sense import Sense
-from planners.shape_fit import end_shape, fit_shape
-from planners.strokes import Strokes, tangential
+from planners.strokes import Strokes
 
 FloatArray = NDArray[np.float64]
 Crossed = Generator[Move, Trace, Crossing | None]
@@ -171,60 +171,10 @@ class RidgeFollower:
         gone += float(np.linalg.norm(farthest - last.point))
         ahead = course(line.points, last.normal, ahead.heading, self.strokes.tip_radius)
         rough = AxisEnd(ahead.point, np.inf, "end", ahead.heading, gone, ahead.turn)
-        return (yield from self.slide(rough, line.height, line.half_width, sign))
-
-    def slide(self, end: AxisEnd, height: float, half_width: float, sign: float) -> Generator[Move, Trace, AxisEnd]:
-        """A better estimate of an end from one more sweep along the crest; the old one if that shows nothing."""
-        tip = self.strokes.tip_radius
-        # a groove is crossed no more where its end lifts the ball, that far before the end
-        half_width = max(half_width, float(np.sqrt(2.0 * tip * height)))
-        back = self.strokes.walk(end.point, -end.heading, 1.2 * half_width, -end.turn)
-        ahead = self.strokes.walk(end.point, end.heading, end.reach + 1.8 * half_width, end.turn)
-        points = np.concatenate([back.points[:0:-1], ahead.points])
-        normals = np.concatenate([back.normals[:0:-1], ahead.normals])
-        trace = yield self.strokes.over(points, normals)
-        if len(trace) < 32:
-            return end
-        feet = self.sense.base.foot(trace.centers, tip)
-        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-        place = places_along(feet.points, points, along)
-        order = np.argsort(place, kind="stable")
-        within = (0.0, float(along[-1]) - 0.5 * half_width)
-        shape = end_shape(sign, tip)
-        fit = fit_shape(place[order], feet.height[order], shape, sign, height, within, self.noise)
-        inside = 0.02 * tip < fit.place < within[1] - 0.02 * tip
-        if not inside or fit.sd > 0.2 * tip or abs(fit.height) < 0.4 * height:
-            return end if np.isfinite(end.sd) else replace(end, sd=max(end.reach, 0.1 * tip), reason="lost")
-        sd = (fit.sd**-2 + end.sd**-2) ** -0.5
-        weight = (sd / fit.sd) ** 2
-        where, heading = _at(fit.place, along, points, normals)
-        # further slides start from the end: they must follow the same curve
-        where = weight * where + (1.0 - weight) * end.point if np.isfinite(end.sd) else where
-        return replace(end, point=self.strokes.onto(where)[0], sd=float(sd), reason="end", heading=heading, reach=0.0)
-
-
-def _at(place: float, along: FloatArray, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Point and heading (3,) at an arclength of a polyline."""
-    where = np.array([np.interp(place, along, points[:, k]) for k in range(3)])
-    k = int(np.clip(np.searchsorted(along, place), 1, len(points) - 1))
-    return where, tangential(points[k] - points[k - 1], normals[k])
-
-
-def places_along(points: FloatArray, line: FloatArray, along: FloatArray) -> FloatArray:
-    """Arclengths (N,) on a polyline (K, 3) of the places nearest to points (N, 3), beyond its ends too, m."""
-    best = np.full(len(points), np.inf)
-    place = np.zeros(len(points))
-    for k in range(len(line) - 1):
-        step = line[k + 1] - line[k]
-        length = float(np.linalg.norm(step))
-        if length == 0:
-            continue
-        share = (points - line[k]) @ step / length**2
-        inner = np.clip(share, -np.inf if k == 0 else 0.0, np.inf if k == len(line) - 2 else 1.0)
-        gap = ((points - line[k] - inner[:, None] * step) ** 2).sum(axis=1)
-        closer = gap < best
-        best[closer], place[closer] = gap[closer], along[k] + inner[closer] * length
-    return place
+        finder = EndFinder(self.strokes, self.sense.base, self.noise)
+        # the last crossing may lie beyond the end already
+        height, sd = mean_height(line.crossings[:-1] or line.crossings)
+        return (yield from finder.slide(rough, Crest(height, sd, line.half_width, sign)))
 
 
 def _returned(line: Line) -> bool:
@@ -250,19 +200,28 @@ def _joined(halves: list[tuple[Line, AxisEnd | None]], sign: float) -> AxisTrack
     points = [c.point for c in crossings]
     normals = [c.normal for c in crossings]
     kind = "step" if is_step(crossings[0]) else crossings[0].kind
-    height = float(np.median([abs(c.height) for c in crossings]))
+    height, sd = mean_height(crossings[1:-1] or crossings)
     half_width = float(np.median([c.half_width for c in crossings]))
     if last_end is None or first_end is None:
         if _passes(points[0], points[-2], points[-1]):
             points, normals = points[:-1], normals[:-1]
         points.append(points[0])
         normals.append(normals[0])
-        return AxisTrack(np.array(points), np.array(normals), sign, kind, height, half_width, ())
-    track = AxisTrack(np.array(points), np.array(normals), sign, kind, height, half_width, (first_end, last_end))
-    for index, tip in enumerate((first_end, last_end)):
+        return AxisTrack(np.array(points), np.array(normals), sign, kind, height, sd, half_width, ())
+    ends = (first_end, last_end)
+    track = AxisTrack(np.array(points), np.array(normals), sign, kind, height, sd, half_width, ends)
+    for index, tip in enumerate(ends):
         if tip.reason in ("end", "edge of the model"):
             track = track.with_end(index, tip)
     return track
+
+
+def mean_height(crossings: list[Crossing]) -> tuple[float, float]:
+    """Median |height| of a line and its standard deviation, m: by the crossings' scatter if they claim less."""
+    heights = np.array([abs(c.height) for c in crossings])
+    claimed = float(np.median([c.height_sd for c in crossings]))
+    # the median of normal variables scatters by a quarter more than their mean
+    return float(np.median(heights)), 1.25 * max(claimed, float(heights.std())) / float(np.sqrt(len(heights)))
 
 
 def _passes(point: FloatArray, start: FloatArray, stop: FloatArray) -> bool:

@@ -42,6 +42,8 @@ def fit_shape(
     crest: float,
     within: tuple[float, float],
     noise: Noise,
+    *,
+    crest_sd: float = np.inf,
 ) -> ShapeFit:
     """The best place within an interval and the best height.
 
@@ -53,6 +55,7 @@ def fit_shape(
         crest: preliminary |height|, m.
         within: interval of possible places, m.
         noise: of the samples.
+        crest_sd: standard deviation of `crest` if it is known from elsewhere, m.
     """
     from scipy.linalg import solve_triangular
     from scipy.optimize import least_squares
@@ -66,7 +69,8 @@ def fit_shape(
     data = whitened(sign * mean)
 
     def residual(p: FloatArray) -> FloatArray:
-        return np.asarray(whitened(shape(place - p[0], max(float(p[1]), 0.0))) - data)
+        misfit = whitened(shape(place - p[0], max(float(p[1]), 0.0))) - data
+        return np.append(misfit, (p[1] - crest) / crest_sd)
 
     starts = np.linspace(*within, STARTS)
     templates = whitened(np.stack([shape(place - start, crest) for start in starts], axis=1))

@@ -1,9 +1,10 @@
-"""Survey: sweeps over the whole global model, close enough that no feature of a given height is missed."""
+"""Survey: sweeps over the whole global model, close enough that no feature asked for is missed."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,23 +18,28 @@ from planners.isolines import Isoline, isolines
 from planners.level_field import level_field
 from planners.plan import Outcome, Plan
 from planners.pressed_path import pressed_sweep, thinned, touched_points
+from planners.slices import Slices, slices_for
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Survey:
-    """Parallel sweeps along the level sets of an evenly spaced field, in boustrophedon order.
+    """Parallel sweeps that meet every bump of a height, or crossed ones that meet every ridge of a span.
 
     A feature of height D disturbs the trace within sqrt(2 r D) of its crest (theory section 4); a sweep
-    that passes it at the distance x still sees the height D - x^2 / (2 r). The sweeps are spaced so that
-    everywhere at least `visible` of the height D stays.
+    that passes it at the distance x still sees the height D - x^2 / (2 r). Bumps need strips: sweeps along the
+    level sets of an evenly spaced field, so close that everywhere at least `visible` of the height D stays. Where
+    only ridges of a span must not be missed, crossed families of plane sections do with far less path
+    (planners.slices).
 
     Args:
         base: the global model.
         tip_radius: r, m.
         smallest: height D of the smallest feature to be found, m.
         speed, force: of the sweeps, m/s and N.
+        shortest_ridge: distance between the ends of the shortest ridge to be found, m; None: bumps as well.
         region: (low, high) corners in m of the part to be inspected; everything if None.
         visible: share of the smallest feature's height that every sweep pair must leave visible.
     """
@@ -43,19 +49,21 @@ class Survey:
     smallest: float
     speed: float = 0.03
     force: float = 1.0
+    shortest_ridge: float | None = None
     region: tuple[FloatArray, FloatArray] | None = None
     visible: float = 0.35
-    _planned: dict[str, Coverage] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not 0 < self.smallest < np.inf:
             raise PlannerError(f"the smallest feature must have a positive height in metres; found {self.smallest}")
+        if self.shortest_ridge is not None and not 0 < self.shortest_ridge < np.inf:
+            raise PlannerError(f"the shortest ridge must have a positive span in metres; found {self.shortest_ridge}")
         if not 0 < self.visible < 1:
             raise PlannerError(f"the visible share must lie between 0 and 1; found {self.visible}")
 
     @property
     def pitch(self) -> float:
-        """Distance between neighbouring sweeps, m; never more than a tip radius."""
+        """Width of the strip in which a sweep sees the smallest feature, m; never more than a tip radius."""
         seen = 2.0 * self.smallest * (1.0 - self.visible) * self.tip_radius
         return float(min(2.0 * np.sqrt(seen), self.tip_radius))
 
@@ -75,23 +83,53 @@ class Survey:
         points = np.concatenate(dense) if dense else np.zeros((0, 3))
         return coverage(self.base.surface, points, 0.55 * self.pitch, self._inside())
 
+    @cached_property
+    def slices(self) -> Slices | None:
+        """The crossed plane sections, or None where strips are asked for or are shorter."""
+        faces = np.concatenate(self._charts) if self._charts else np.zeros(0, dtype=np.int64)
+        if self.shortest_ridge is None or len(faces) == 0:
+            return None
+        crossed = slices_for(self.base.surface, faces, self.shortest_ridge, 0.5 * self.pitch)
+        return crossed if len(crossed.axes) * self.pitch < crossed.pitch else None
+
+    @cached_property
+    def _charts(self) -> list[IntArray]:
+        return crease_charts(self.base.surface, self._inside())
+
     def sweeps(self) -> Iterator[Move]:
         """All sweeps, each begun near the end of the one before it."""
+        return self._strips() if self.slices is None else self._crossed(self.slices)
+
+    def _crossed(self, slices: Slices) -> Iterator[Move]:
+        """Sweeps along one family of plane sections after the other."""
+        surface = self.base.surface
+        used = surface.vertices[np.unique(surface.faces[np.concatenate(self._charts)])]
+        here: FloatArray | None = None
+        for axis in slices.axes:
+            values = surface.vertices @ axis
+            for level in slices.levels(axis, used):
+                lines = [
+                    line
+                    for chart in self._charts
+                    for line in isolines(surface.vertices, surface.faces, chart, values, float(level))
+                ]
+                for line in _in_turn(lines, here, self.pitch):
+                    here = line.points[-1]
+                    yield from self._pressed(line)
+
+    def _strips(self) -> Iterator[Move]:
+        """Sweeps along the level sets of one chart after the other, a pitch apart."""
         surface = self.base.surface
         here: FloatArray | None = None
         done = np.zeros(len(surface.faces), dtype=bool)
-        for chart in crease_charts(surface, self._inside()):
+        for chart in self._charts:
             if done[chart].all():
                 continue
             touched = []
             levels = level_field(surface, surface.vertices, chart)
             for level in levels.levels(self.pitch):
                 lines = isolines(surface.vertices, surface.faces, chart, levels.values, float(level))
-                while lines:
-                    nearest = 0 if here is None else int(np.argmin([_gap(line, here) for line in lines]))
-                    line = _begun_near(lines.pop(nearest), here, self.pitch)
-                    if line.length < 0.1 * self.pitch:
-                        continue
+                for line in _in_turn(lines, here, self.pitch):
                     here = line.points[-1]
                     touched.append(line.points)
                     yield from self._pressed(line)
@@ -116,6 +154,16 @@ class Survey:
         middle = self.base.surface.vertices[self.base.surface.faces].mean(axis=1)
         low, high = self.region
         return np.asarray(((middle >= low) & (middle <= high)).all(axis=1))
+
+
+def _in_turn(lines: list[Isoline], here: FloatArray | None, pitch: float) -> Iterator[Isoline]:
+    """The lines, each begun near the end of the one before, without those shorter than a tenth of the pitch."""
+    while lines:
+        nearest = 0 if here is None else int(np.argmin([_gap(line, here) for line in lines]))
+        line = _begun_near(lines.pop(nearest), here, pitch)
+        if line.length >= 0.1 * pitch:
+            here = line.points[-1]
+            yield line
 
 
 def _gap(line: Isoline, here: FloatArray) -> float:

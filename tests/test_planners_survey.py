@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -154,3 +156,53 @@ def test_a_survey_scales_with_the_world() -> None:
     for one, other in zip(big, small.sweeps(), strict=True):
         assert isinstance(one, Move)
         assert np.allclose(one.path * scale, other.path, rtol=1e-9, atol=1e-15)
+
+
+def crossed(surface: Surface, span: float) -> Survey:
+    return Survey(base=Base(surface), tip_radius=R, smallest=3e-4, shortest_ridge=span)
+
+
+def nearest_sweep(points: np.ndarray, sweeps: list[Move]) -> float:
+    """Least distance of points (N, 3) from what the sweeps touch, m."""
+    from scipy.spatial import cKDTree
+
+    dense = [np.linspace(a, b, 60) for s in sweeps for a, b in itertools.pairwise(s.path + 0.98 * R * s.approach)]
+    return float(cKDTree(np.concatenate(dense)).query(points)[0].min())
+
+
+def test_no_ridge_of_the_asked_span_slips_between_crossed_sweeps_however_it_lies() -> None:
+    plan = crossed(plate(), 0.03)
+    sweeps = list(plan.sweeps())
+    rng = np.random.default_rng(5)
+    for _ in range(300):
+        angle = rng.uniform(0, np.pi)
+        half = 0.015 * np.array([np.cos(angle), np.sin(angle), 0.0])
+        middle = np.append(rng.uniform([0.015, 0.015], [0.185, 0.135]), 0.0)
+        assert nearest_sweep(np.linspace(middle - half, middle + half, 200), sweeps) < 0.5 * plan.pitch + 2e-4
+
+
+def test_crossed_sweeps_are_several_times_shorter_than_strips() -> None:
+    strips = sum(sweep.length for sweep in survey(plate()).sweeps())
+    assert sum(sweep.length for sweep in crossed(plate(), 0.03).sweeps()) < strips / 2.5
+    assert crossed(plate(), 2e-3).slices is None  # strips are shorter there
+
+
+def test_crossed_sweeps_on_a_sphere_meet_every_arc_of_the_asked_span() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.04)
+    plan = crossed(Surface(ball.vertices, ball.faces), 0.03)
+    sweeps = list(plan.sweeps())
+    assert plan.slices is not None and len(plan.slices.axes) == 3
+    rng = np.random.default_rng(6)
+    for _ in range(100):
+        first, second = np.linalg.qr(rng.standard_normal((3, 2)))[0].T
+        half = np.arcsin(0.015 / 0.04)
+        turn = np.linspace(-half, half, 150)[:, None]
+        arc = 0.04 * (np.cos(turn) * first + np.sin(turn) * second)
+        assert nearest_sweep(arc, sweeps) < 0.5 * plan.pitch + 4e-4
+
+
+def test_a_span_that_is_no_length_is_refused() -> None:
+    for span in (0.0, -1.0, np.inf):
+        with pytest.raises(PlannerError, match="shortest ridge"):
+            crossed(plate(), span)
