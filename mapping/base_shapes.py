@@ -59,6 +59,11 @@ class Cloud:
         return np.asarray(self.origin + points @ self.axes)
 
     @property
+    def floor(self) -> float:
+        """The scale, but no less than rounding errors, m."""
+        return max(self.scale, 1e-12 * float(np.abs(self.points).max()), float(np.finfo(float).tiny))
+
+    @property
     def extent(self) -> FloatArray:
         """(2, 3) bounds of the points in the frame."""
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
@@ -77,16 +82,26 @@ def _roughness(points: FloatArray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A fitted family: its kind, its parameters (JSON values), its cost, and how to mesh it."""
+    """A fitted family: its kind, its parameters (JSON values), the misses (C,) m, their freedom, and how to mesh it."""
 
     kind: str
     parameters: dict[str, Any]
-    cost: float
-    mesh: Callable[[Cloud], Surface]
+    residual: FloatArray
+    freedom: int
+    mesh: Callable[[Cloud, float | None], Surface]
 
-    def surface(self, cloud: Cloud) -> Surface:
-        """The base's mesh in the object frame, covering the cloud."""
-        return self.mesh(cloud)
+    def cost(self, scale: float, share: float = 1.0) -> float:
+        """Truncated chi-square at a scale (m) plus the price of the parameters; lower is better.
+
+        Args:
+            share: of the cells that count as independent.
+        """
+        misfit = float(np.minimum((self.residual / scale) ** 2, OUTLIER**2).sum())
+        return share * misfit + self.freedom * float(np.log(len(self.residual)))
+
+    def surface(self, cloud: Cloud, spacing: float | None = None) -> Surface:
+        """The base's mesh in the object frame, covering the cloud; triangles no longer than `spacing` m."""
+        return self.mesh(cloud, spacing)
 
 
 def _sheet(design: Callable[[FloatArray, FloatArray], FloatArray], kind: str, cloud: Cloud) -> Fitted:
@@ -99,15 +114,22 @@ def _sheet(design: Callable[[FloatArray, FloatArray], FloatArray], kind: str, cl
 
     cells = 1 if kind == "plane" else 96
     return Fitted(
-        kind, {"coefficients": fit.coefficients.tolist()}, fit.cost, lambda cloud: _height_mesh(height, cells, cloud)
+        kind,
+        {"coefficients": fit.coefficients.tolist()},
+        fit.residual,
+        len(fit.coefficients),
+        lambda cloud, spacing: _height_mesh(height, cells, cloud, spacing),
     )
 
 
-def _height_mesh(height: Callable[[FloatArray, FloatArray], FloatArray], cells: int, cloud: Cloud) -> Surface:
+def _height_mesh(
+    height: Callable[[FloatArray, FloatArray], FloatArray], cells: int, cloud: Cloud, spacing: float | None
+) -> Surface:
     """A grid over the cloud's extent, moved one tip radius inward along the sheet's normals."""
     low, high = cloud.extent
     margin = 2.0 * cloud.tip_radius
-    u, v = (np.linspace(low[i] - margin, high[i] + margin, cells + 1) for i in range(2))
+    ends = [(float(low[i]) - margin, float(high[i]) + margin) for i in range(2)]
+    u, v = (np.linspace(*end, 1 + max(cells, _pieces(end[1] - end[0], spacing))) for end in ends)
     # Beyond the data a polynomial says nothing: the sheet goes on straight from its border.
     uu, vv = (g.ravel() for g in np.meshgrid(u, v, indexing="ij"))
     step = 1e-4 * max(float(high[0] - low[0]), float(high[1] - low[1]))
@@ -118,7 +140,11 @@ def _height_mesh(height: Callable[[FloatArray, FloatArray], FloatArray], cells: 
     normal = np.column_stack([-du, -dv, np.ones_like(du)])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     points = np.column_stack([uu, vv, w]) - cloud.tip_radius * normal
-    return Surface(cloud.world(points), _grid_faces(cells + 1, cells + 1))
+    return Surface(cloud.world(points), _grid_faces(len(u), len(v)))
+
+
+def _pieces(length: float, spacing: float | None) -> int:
+    return 1 if spacing is None else int(np.clip(np.ceil(length / spacing), 1, 500))
 
 
 def _grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
@@ -176,7 +202,7 @@ def sphere(cloud: Cloud) -> Fitted | None:
     if body > 20.0 * float(np.ptp(p, axis=0).max()):
         return None
     parameters = {"centre": cloud.world(centre[None])[0].tolist(), "radius": body}
-    return Fitted("sphere", parameters, _cost(residual(q), cloud, 4), lambda cloud: _sphere_mesh(centre, body, cloud))
+    return Fitted("sphere", parameters, residual(q), 4, lambda cloud, spacing: _sphere_mesh(centre, body, cloud))
 
 
 def _sphere_mesh(centre: FloatArray, radius: float, cloud: Cloud) -> Surface:
@@ -203,11 +229,12 @@ def cylinder(cloud: Cloud) -> Fitted | None:
 
         scale = max(cloud.scale, 1e-9 * radius)
         found = least_squares(residual, [start[0], start[1], 0.0, 0.0, radius], loss="soft_l1", f_scale=scale)
-        cost = _cost(residual(found.x), cloud, 5)
+        misses = residual(found.x)
+        cost = float(np.minimum((misses / cloud.floor) ** 2, OUTLIER**2).sum())
         if best is None or cost < best[0]:
-            best = (cost, found.x, axis, across)
+            best, missed = (cost, found.x, axis, across), misses
     assert best is not None
-    cost, q, axis, across = best
+    _, q, axis, across = best
     body = float(q[4]) - cloud.tip_radius
     if not 0.0 < body < 20.0 * float(np.ptp(p, axis=0).max()):
         return None
@@ -220,7 +247,9 @@ def cylinder(cloud: Cloud) -> Fitted | None:
         "axis": (direction @ cloud.axes).tolist(),
         "radius": body,
     }
-    return Fitted("cylinder", parameters, cost, lambda cloud: _cylinder_mesh(point, direction, body, cloud))
+    return Fitted(
+        "cylinder", parameters, missed, 5, lambda cloud, spacing: _cylinder_mesh(point, direction, body, cloud, spacing)
+    )
 
 
 def _across(p: FloatArray, q: FloatArray, axis: int, across: list[int]) -> FloatArray:
@@ -233,26 +262,26 @@ def _across(p: FloatArray, q: FloatArray, axis: int, across: list[int]) -> Float
     return np.asarray(offset - np.outer(offset @ direction, direction))
 
 
-def _cylinder_mesh(point: FloatArray, direction: FloatArray, radius: float, cloud: Cloud) -> Surface:
-    """A tube over the cloud's length; its facets stay within a millionth of the radius."""
+def _cylinder_mesh(
+    point: FloatArray, direction: FloatArray, radius: float, cloud: Cloud, spacing: float | None
+) -> Surface:
+    """A tube over the cloud's length; its facets stay within a millionth of the radius (20 with a spacing)."""
     height = (cloud.points - point) @ direction
     margin = 2.0 * cloud.tip_radius
     helper = np.eye(3)[np.abs(direction).argmin()]
     u = np.cross(direction, helper)
     u /= np.linalg.norm(u)
     v = np.cross(direction, u)
-    angle = np.linspace(0.0, 2.0 * np.pi, 2049)
+    low, high = float(height.min()) - margin, float(height.max()) + margin
+    around, along = 2048 if spacing is None else 512, _pieces(high - low, spacing)
+    angle = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
     ring = radius * (np.outer(np.cos(angle), u) + np.outer(np.sin(angle), v))
-    ends = [point + direction * h for h in (float(height.min()) - margin, float(height.max()) + margin)]
-    vertices = np.concatenate([ring + ends[0], ring + ends[1]])
-    k = np.arange(2048)
-    faces = np.concatenate([np.column_stack([k, k + 1, k + 2050]), np.column_stack([k, k + 2050, k + 2049])])
+    levels = point + np.linspace(low, high, along + 1)[:, None] * direction
+    vertices = (levels[:, None, :] + ring[None, :, :]).reshape(-1, 3)
+    level, k = (grid.ravel() for grid in np.meshgrid(np.arange(along), np.arange(around), indexing="ij"))
+    a, b = level * around + k, level * around + (k + 1) % around
+    faces = np.concatenate([np.column_stack([a, b, b + around]), np.column_stack([a, b + around, a + around])])
     return Surface(cloud.world(vertices), faces)
-
-
-def _cost(residual: FloatArray, cloud: Cloud, parameters: int) -> float:
-    floor = max(cloud.scale, 1e-12 * float(np.abs(cloud.points).max()), np.finfo(float).tiny)
-    return float(np.minimum((residual / floor) ** 2, OUTLIER**2).sum() + parameters * np.log(len(residual)))
 
 
 FAMILIES: tuple[Callable[[Cloud], Fitted | None], ...] = (plane, sphere, cylinder, quadric, sheet)

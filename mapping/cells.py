@@ -37,3 +37,8 @@ class Cells:
         centers = np.add.reduceat(trace.centers[order], starts) / counts
         normals = None if trace.normals is None else np.add.reduceat(trace.normals[order], starts) / counts
         return cls(centers, trace.sweep[order][starts], normals)
+
+    def trace(self, tip_radius: float, keep: NDArray[np.bool_]) -> Trace:
+        """Some of the cells as a trace of their own; their times count cells."""
+        normals = None if self.normals is None else self.normals[keep]
+        return Trace(np.flatnonzero(keep) * 1.0, self.centers[keep], self.sweep[keep], tip_radius, normals)

@@ -1,0 +1,73 @@
+"""The extent of a fitted base: the part that the finger felt, without what lies beyond the body's edges."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.base import Base
+from mapping.cells import Cells
+from mapping.errors import SurfaceError
+from mapping.robust import robust_scale
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+FloatArray = NDArray[np.float64]
+
+CELLS = 20_000
+# A sweep that ends this deep (tip radii) below the base rolled off the body's edge
+ROLLED_OFF = 0.05
+# A centre this far off the base's normal (rad) stands beside the base, not over it
+BESIDE = float(np.radians(5.0))
+
+
+def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray) -> Base:
+    """The faces of a base inside a box whose nearest known place was touched, not empty.
+
+    Args:
+        base: as fitted, larger than the body.
+        trace: what was felt. Where a sweep rolled off an edge counts as empty.
+        empty: (M, 3) places of ball centres where nothing was felt, m.
+        box: (2, 3) low and high corners, m.
+
+    Raises:
+        SurfaceError: nothing is left.
+    """
+    from scipy.spatial import cKDTree
+
+    cells = Cells.of(trace, CELLS)
+    feet = base.foot(cells.centers, trace.tip_radius)
+    off = rolled_off(feet.height, cells.sweep, trace.tip_radius)
+    bare = base.foot(empty, trace.tip_radius).points if len(empty) else np.zeros((0, 3))
+    places = np.concatenate([feet.points, bare])
+    touched = np.concatenate([~off, np.zeros(len(bare), dtype=bool)])
+    middle = base.surface.vertices[base.surface.faces].mean(axis=1)
+    _, nearest = cKDTree(places).query(middle)
+    keep = touched[nearest] & (middle >= box[0]).all(axis=1) & (middle <= box[1]).all(axis=1)
+    if not keep.any():
+        raise SurfaceError("no part of the fitted base lies inside the region; is the region where the body is?")
+    used, faces = np.unique(base.surface.faces[keep], return_inverse=True)
+    return replace(base, surface=Surface(base.surface.vertices[used], faces.reshape(-1, 3)))
+
+
+def rolled_off(height: FloatArray, sweep: NDArray[np.int64], tip_radius: float) -> NDArray[np.bool_]:
+    """(N,) True for the ends of sweeps that sink ever deeper: there the ball rolls off the body's edge."""
+    off = np.zeros(len(height), dtype=bool)
+    low = -3.0 * robust_scale(height) - 1e-3 * tip_radius
+    for number in np.unique(sweep):
+        own = np.flatnonzero(sweep == number)
+        for order in (own, own[::-1]):
+            below = height[order] < low
+            run = order[: len(order) if below.all() else int(np.argmin(below))]
+            if len(run) and height[run].min() < -ROLLED_OFF * tip_radius:
+                off[run] = True
+    return off
+
+
+def over_base(trace: Trace, base: Base) -> NDArray[np.bool_]:
+    """(N,) True where the ball's centre stands over the base, False where it stands beyond its border."""
+    feet = base.foot(trace.centers, trace.tip_radius)
+    straight = (feet.normals * base.surface.face_normals[feet.face]).sum(axis=1)
+    return np.asarray(np.abs(straight) > np.cos(BESIDE))
