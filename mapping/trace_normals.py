@@ -16,6 +16,9 @@ from mapping.trace import Trace
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+# Samples whose neighbourhoods are fitted together: a bound on the memory that they take
+AT_ONCE = 16_384
+
 
 def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Outward unit normals (M, 3) at the points of `row`, curvature across (M,), 1/m, and doubt of the slope (M,), rad.
@@ -83,15 +86,28 @@ def _fitted(
     """
     from scipy.spatial import cKDTree
 
-    points = trace.centers[samples]
     cloud = trace.centers[thinned(trace.centers, trace.sweep, pitch(trace.centers, trace.sweep))]
+    tree, count = cKDTree(cloud), min(neighbours, len(cloud))
+    tangents, doubt = np.empty((len(samples), 3)), np.empty(len(samples))
+    for start in range(0, len(samples), AT_ONCE):
+        part = slice(start, start + AT_ONCE)
+        distance, index = (
+            np.asarray(found) for found in tree.query(trace.centers[samples[part]], [*range(1, count + 1)])
+        )
+        arm = cloud[index] - trace.centers[samples[part], None]
+        tangents[part], doubt[part] = _across(arm, distance, along[part], outward[part])
+    return tangents, doubt
+
+
+def _across(
+    arm: FloatArray, distance: FloatArray, along: FloatArray, outward: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Tangents across and their doubt from the ways (N, K, 3) to the neighbours of each sample, and their lengths."""
     across = unit(np.cross(outward, along))
     up = unit(np.cross(along, across))
     up *= np.where(np.einsum("ij,ij->i", up, outward) < 0, -1.0, 1.0)[:, None]
-    count = min(neighbours, len(cloud))
-    distance, index = (np.asarray(found) for found in cKDTree(cloud).query(points, k=[*range(1, count + 1)]))
     scale = np.maximum(distance[:, -1:], 1e-300)
-    arm = (cloud[index] - points[:, None]) / scale[..., None]
+    arm = arm / scale[..., None]
     u, v, w = (np.einsum("nkc,nc->nk", arm, axis) for axis in (along, across, up))
     columns = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=-1)
     weight = np.exp(-2.0 * (distance / scale) ** 2)[..., None]
