@@ -1,8 +1,7 @@
-"""Linking: which crossings of different sweeps belong to one line on the base, and in which order."""
+"""Linking: which crossings of different sweeps belong to one detail on the base."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -62,55 +61,6 @@ def linked(a: Crossing, b: Crossing, inspection: Inspection, scale: float) -> bo
 def uphill(crossing: Crossing) -> FloatArray:
     """(3,) direction along the sweep in which a step rises."""
     return crossing.tangent if crossing.kind == "step up" else -crossing.tangent
-
-
-def order(points: FloatArray) -> tuple[list[int], list[list[int]]]:
-    """The longest path through the minimum spanning tree of points (K, 3), and the branches that leave it."""
-    count = len(points)
-    if count == 1:
-        return [0], []
-    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-    neighbours: list[list[int]] = [[] for _ in range(count)]
-    nearest, best = np.zeros(count, dtype=int), distance[0].copy()
-    outside = set(range(1, count))
-    while outside:
-        new = min(outside, key=lambda i: float(best[i]))
-        neighbours[new].append(int(nearest[new]))
-        neighbours[int(nearest[new])].append(new)
-        outside.remove(new)
-        closer = distance[new] < best
-        nearest[closer], best = new, np.minimum(best, distance[new])
-    far = _farthest(neighbours, distance, 0, set())[-1]
-    main = _farthest(neighbours, distance, far, set())
-    branches: list[list[int]] = []
-    used = set(main)
-    while True:
-        stems = [(i, j) for i in used for j in neighbours[i] if j not in used]
-        if not stems:
-            return main, branches
-        longest = max(
-            ([i, *_farthest(neighbours, distance, j, {i})] for i, j in stems), key=lambda p: _path_length(distance, p)
-        )
-        branches.append(longest)
-        used |= set(longest)
-
-
-def _farthest(neighbours: list[list[int]], distance: FloatArray, start: int, banned: set[int]) -> list[int]:
-    """The path from start to the node of its tree with the greatest distance along the tree."""
-    best_path, best_length = [start], 0.0
-    stack = [([start], 0.0)]
-    while stack:
-        path, length = stack.pop()
-        if length > best_length:
-            best_path, best_length = path, length
-        for node in neighbours[path[-1]]:
-            if node not in banned and (len(path) < 2 or node != path[-2]):
-                stack.append(([*path, node], length + float(distance[path[-1], node])))
-    return best_path
-
-
-def _path_length(distance: FloatArray, path: list[int]) -> float:
-    return float(sum(distance[i, j] for i, j in itertools.pairwise(path)))
 
 
 def _between(start: FloatArray, stop: FloatArray, scale: float) -> FloatArray:

@@ -1,0 +1,224 @@
+"""Branches: the smooth lines that points of one connected detail lie on, joined where lines meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+Tree = dict[int, set[int]]
+ArmEnd = tuple[int, int]
+
+# In half-widths of the disturbance: shorter twigs are scatter; meeting places nearer to each other are one; points so
+# near to one belong to no arm alone; the stretch that tells an arm's direction.
+TWIG, SAME_HUB, WITHIN_HUB, DIRECTION = 1.3, 2.0, 1.1, 3.5
+# Cosine of the angle between two arms of one line that goes straight on through a junction.
+STRAIGHT_ON = -0.85
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """One smooth line.
+
+    Args:
+        axis: (K, 3) its points in order, m, with the meeting points at which it ends.
+        free: for the first and the last point: True if the line ends there, False if it meets others.
+        junction: True if other lines meet it.
+        closed: True if it returns to its beginning (the first point is not repeated).
+    """
+
+    axis: FloatArray
+    free: tuple[bool, bool]
+    junction: bool
+    closed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class _Arm:
+    """Points (K, 3) between two hubs; `hubs` numbers those at the first and the last point, -1 for none."""
+
+    points: FloatArray
+    hubs: tuple[int, int]
+
+    def outward(self, end: int, hub: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
+        """Mean point and unit direction away from the hub of the stretch next to an end."""
+        points = self.points if end == 0 else self.points[::-1]
+        near = points[np.linalg.norm(points - points[0], axis=1) <= reach]
+        middle = near.mean(axis=0)
+        away = middle - hub
+        if len(near) > 2 or (len(near) == 2 and np.linalg.norm(near[1] - near[0]) > 0.3 * reach):
+            direction = np.linalg.svd(near - middle, full_matrices=False)[2][0]
+            away = direction * (1.0 if direction @ away > 0 else -1.0)
+        return middle, away / max(float(np.linalg.norm(away)), np.finfo(float).tiny)
+
+
+def branches(points: FloatArray, half_width: float) -> list[Branch]:
+    """Lines through points (K, 3): the arms of their minimum spanning tree, joined straight on where they meet.
+
+    Args:
+        points: on the crests, m.
+        half_width: of the disturbance, m.
+    """
+    tree = _without_twigs(spanning_tree(points), points, TWIG * half_width)
+    forks = [i for i, near in tree.items() if len(near) > 2]
+    if not forks:
+        return [Branch(points[_path(tree)], (True, True), junction=False)]
+    hubs = _clusters(forks, points, SAME_HUB * half_width)
+    arms = _arms(tree, points, hubs, WITHIN_HUB * half_width)
+    meeting, partner, crowded = _meetings(arms, points, hubs, half_width)
+    return _joined(arms, meeting, partner, crowded)
+
+
+def spanning_tree(points: FloatArray) -> Tree:
+    """Neighbours of each point in the minimum spanning tree of points (K, 3), by Prim's algorithm."""
+    tree: Tree = {i: set() for i in range(len(points))}
+    nearest = np.zeros(len(points), dtype=int)
+    best = np.linalg.norm(points - points[0], axis=1)
+    outside = np.ones(len(points), dtype=bool)
+    outside[0] = False
+    while outside.any():
+        new = int(np.where(outside, best, np.inf).argmin())
+        tree[new].add(int(nearest[new]))
+        tree[int(nearest[new])].add(new)
+        outside[new] = False
+        distance = np.linalg.norm(points - points[new], axis=1)
+        nearest[distance < best], best = new, np.minimum(best, distance)
+    return tree
+
+
+def _without_twigs(tree: Tree, points: FloatArray, shortest: float) -> Tree:
+    """The tree less its dead ends that are too short, the shortest first."""
+    tree = {i: set(near) for i, near in tree.items()}
+    while True:
+        twigs = [_twig(tree, leaf, points) for leaf, near in tree.items() if len(near) == 1]
+        short = [twig for twig in twigs if twig is not None and twig[0] < shortest]
+        if not short:
+            return tree
+        for i in min(short)[1]:
+            for j in tree.pop(i):
+                if j in tree:
+                    tree[j].discard(i)
+
+
+def _twig(tree: Tree, leaf: int, points: FloatArray) -> tuple[float, list[int]] | None:
+    """Length from a leaf to the fork that it hangs on, and its points; None if there is no fork."""
+    path, length = [leaf], 0.0
+    before, here = leaf, next(iter(tree[leaf]))
+    while True:
+        length += float(np.linalg.norm(points[here] - points[before]))
+        if len(tree[here]) > 2:
+            return length, path
+        if len(tree[here]) == 1:
+            return None
+        path.append(here)
+        before, here = here, next(i for i in tree[here] if i != before)
+
+
+def _path(tree: Tree) -> list[int]:
+    """The points of a tree without forks, from end to end."""
+    start = min(tree, key=lambda i: (len(tree[i]), i))
+    path, before = [start], -1
+    while ahead := [i for i in tree[path[-1]] if i != before]:
+        before = path[-1]
+        path.append(ahead[0])
+    return path
+
+
+def _clusters(forks: list[int], points: FloatArray, distance: float) -> list[list[int]]:
+    """Forks that are nearer to each other than the distance, directly or through others."""
+    clusters: list[list[int]] = []
+    for fork in forks:
+        near = [c for c in clusters if np.linalg.norm(points[c] - points[fork], axis=1).min() < distance]
+        clusters = [c for c in clusters if c not in near] + [[fork, *(i for c in near for i in c)]]
+    return clusters
+
+
+def _arms(tree: Tree, points: FloatArray, hubs: list[list[int]], radius: float) -> list[_Arm]:
+    """What is left of the tree outside of the hubs."""
+    home = {}
+    for i in tree:
+        gaps = [float(np.linalg.norm(points[hub] - points[i], axis=1).min()) for hub in hubs]
+        if min(gaps) < radius:
+            home[i] = int(np.argmin(gaps))
+    rest = {i: {j for j in near if j not in home} for i, near in tree.items() if i not in home}
+    arms = []
+    while rest:
+        part, waiting = set(), [next(iter(rest))]
+        while waiting:
+            i = waiting.pop()
+            part.add(i)
+            waiting += [j for j in rest[i] if j not in part]
+        path = _path({i: rest[i] for i in part})
+        for i in part:
+            del rest[i]
+        at = [[home[j] for j in tree[i] if j in home] for i in (path[0], path[-1])]
+        first = at[0][0] if at[0] else -1
+        last = (at[1][1] if len(at[1]) > 1 else -1) if len(path) == 1 else at[1][0] if at[1] else -1
+        arms.append(_Arm(points[path], (first, last)))
+    return arms
+
+
+def _meetings(
+    arms: list[_Arm], points: FloatArray, hubs: list[list[int]], half_width: float
+) -> tuple[list[FloatArray], dict[ArmEnd, ArmEnd], set[int]]:
+    """Where the arms of each hub meet, which of them go straight on into which, and where more than two meet."""
+    meeting, partner, crowded = [], {}, set()
+    for number, hub in enumerate(hubs):
+        center = points[hub].mean(axis=0)
+        ends = [(a, e) for a, arm in enumerate(arms) for e in (0, 1) if arm.hubs[e] == number]
+        seen = [arms[a].outward(e, center, DIRECTION * half_width) for a, e in ends]
+        meeting.append(_nearest_to_lines(seen, center, half_width))
+        if len(ends) > 2:
+            crowded.add(number)
+        ways = [way for _, way in seen]
+        angles = sorted((float(ways[i] @ ways[j]), i, j) for i in range(len(ends)) for j in range(i))
+        for cosine, i, j in angles:
+            opposite = cosine < STRAIGHT_ON or len(ends) == 2
+            if opposite and ends[i] not in partner and ends[j] not in partner:
+                partner[ends[i]], partner[ends[j]] = ends[j], ends[i]
+    return meeting, partner, crowded
+
+
+def _nearest_to_lines(lines: list[tuple[FloatArray, FloatArray]], center: FloatArray, half_width: float) -> FloatArray:
+    """The point that is nearest to all lines (point, direction), held to the neighbourhood of the centre."""
+    weak = 1e-3
+    left, right = weak * np.eye(3), weak * center
+    for point, way in lines:
+        across = np.eye(3) - np.outer(way, way)
+        left, right = left + across, right + across @ point
+    shift = np.linalg.solve(left, right) - center
+    return np.asarray(center + shift * min(1.0, 2.0 * half_width / max(float(np.linalg.norm(shift)), 1e-300)))
+
+
+def _joined(
+    arms: list[_Arm], meeting: list[FloatArray], partner: dict[ArmEnd, ArmEnd], crowded: set[int]
+) -> list[Branch]:
+    """Arms joined with their partners, from every end that has none; then the loops."""
+    result: list[Branch] = []
+    used: set[int] = set()
+    begins = [(a, e) for a in range(len(arms)) for e in (0, 1) if (a, e) not in partner]
+    for start in [*begins, *((a, 0) for a in range(len(arms)))]:
+        if start[0] in used:
+            continue
+        pieces, junction, here = [], False, start
+        while True:
+            arm, end = here
+            used.add(arm)
+            pieces.append(arms[arm].points if end == 0 else arms[arm].points[::-1])
+            junction |= any(hub in crowded for hub in arms[arm].hubs)
+            here = partner.get((arm, 1 - end), (-1, -1))
+            if here[0] < 0 or here[0] in used:
+                break
+        last = arms[arm].hubs[1 - end]
+        closed = here == start
+        first = -1 if start in partner else arms[start[0]].hubs[start[1]]
+        last = -1 if (arm, 1 - end) in partner else last
+        pieces = [
+            *([meeting[first][None]] if first >= 0 else []),
+            *pieces,
+            *([meeting[last][None]] if last >= 0 else []),
+        ]
+        result.append(Branch(np.concatenate(pieces), (first < 0, last < 0), junction, closed))
+    return result

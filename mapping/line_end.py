@@ -1,0 +1,80 @@
+"""Line end: how far a ridge or groove goes, from what the places beyond its last crossing felt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.crest_trace import crest_trace, misfit
+from mapping.inspection import Inspection
+from mapping.polyline import arclengths
+
+FloatArray = NDArray[np.float64]
+
+# Rise of the misfit (twice the log-likelihood) at the ends of a central 90 % interval, and where a line may be said
+# not to go on.
+INTERVAL, SEEN = 2.7, 9.0
+# In half-widths: how far back from the last crossing the end may lie, and places so far aside that tell of it.
+BACK, ASIDE = 1.2, 1.3
+STEPS = 120
+
+
+@dataclass(frozen=True, eq=False)
+class LineEnd:
+    """The end of an axis.
+
+    Args:
+        point: (3,) m.
+        low, high: how much shorter and longer the line may be than to the point, m (90 % interval).
+        seen: False if nothing was inspected that could have shown the end: the point is as far as it certainly goes.
+        dropped: number of the axis' points that lie beyond it.
+    """
+
+    point: FloatArray
+    low: float
+    high: float
+    seen: bool
+    dropped: int
+
+
+def line_end(axis: FloatArray, height: float, half_width: float, inspection: Inspection, longest: float) -> LineEnd:
+    """The last end of an axis (K, 3), K > 1.
+
+    Args:
+        axis: points of the crest in order, m.
+        height: signed height of the crest, m.
+        half_width: of the disturbance, m.
+        inspection: heights of the inspected places.
+        longest: distance beyond the last point up to which the line may go unseen, m.
+    """
+    anchor, way, length = _last_leg(axis, BACK * half_width)
+    offset = inspection.points - anchor
+    along = offset @ way
+    across = np.linalg.norm(offset - np.outer(along, way), axis=1)
+    step = (length + longest) / STEPS
+    near = (along > 0) & (along < length + longest + half_width) & (across < ASIDE * half_width)
+    reach = step * np.arange(1, STEPS + 1)
+    beyond = np.maximum(along[near][:, None] - reach, 0.0)
+    model = crest_trace(np.hypot(beyond, across[near][:, None]), height, half_width)
+    rise = misfit(inspection.height[near][:, None] - model, inspection.sd, height).sum(axis=0)
+    rise -= rise.min()
+    likely = reach[rise <= INTERVAL]
+    seen = bool(rise[-1] > SEEN)
+    best = float(0.5 * (likely[0] + likely[-1]) if seen else max(likely[0], min(length, likely[-1])))
+    beyond_end = int(((axis - anchor) @ way > best)[_index_of(axis, anchor) :].sum())
+    return LineEnd(anchor + best * way, best - float(likely[0]), float(likely[-1]) - best, seen, beyond_end)
+
+
+def _last_leg(axis: FloatArray, back: float) -> tuple[FloatArray, FloatArray, float]:
+    """The axis point at least `back` before the last one (or the first of all), the way and the distance from it."""
+    s = arclengths(axis)
+    k = max(0, int(np.searchsorted(s, s[-1] - back, side="right")) - 1)
+    leg = axis[-1] - axis[k]
+    length = float(np.linalg.norm(leg))
+    return axis[k], leg / max(length, np.finfo(float).tiny), length
+
+
+def _index_of(axis: FloatArray, point: FloatArray) -> int:
+    return int(np.linalg.norm(axis - point, axis=1).argmin())

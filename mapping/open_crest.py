@@ -1,0 +1,59 @@
+"""Open crest: a disturbance that the sweep began or ended in, which may as well be a step seen from above."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mapping.crest_trace import distances
+from mapping.crossing import Crossing
+from mapping.feature import Feature
+from mapping.inspection import Inspection
+from mapping.linking import uphill
+
+# Share of the crest at which a sweep that ends so high is still up.
+STILL_UP = 0.25
+# What is higher than this many heights of a step is more than the step.
+HIGHER = 1.3
+
+
+def is_open(crossing: Crossing, inspection: Inspection) -> bool:
+    """True if the sweep's height had not come back to the base at its first or last place."""
+    heights = np.sign(crossing.height) * inspection.height[inspection.sweep == crossing.sweep]
+    if len(heights) < 4:
+        return True
+    sides = (heights[:2].mean(), heights[-2:].mean())
+    up = max(STILL_UP * abs(crossing.height), 4 * inspection.sd)
+    # the two ends of the disturbance itself, in places of this sweep
+    place = inspection.points[inspection.sweep == crossing.sweep]
+    nearest = int(np.linalg.norm(place - crossing.point, axis=1).argmin())
+    return any(
+        side > up and bool((part > 0.5 * up).all())
+        for side, part in zip(sides, (heights[: nearest + 1], heights[nearest:]), strict=True)
+    )
+
+
+def on_a_step(crest: Crossing, edges: Sequence[Crossing], steps: Sequence[Feature]) -> bool:
+    """True if a crest is no higher than a step, and lies on its displaced side or over its edge."""
+    for step in steps:
+        if abs(crest.height) > HIGHER * step.height.median:
+            continue
+        own = [c for c in edges if distances(c.point[None], step.axis)[0] < c.half_width]
+        if not own:
+            continue
+        nearest = min(own, key=lambda c: float(np.linalg.norm(c.point - crest.point)))
+        side = np.sign(crest.height) * float((crest.point - nearest.point) @ _normal_to(step, nearest))
+        if side > -2 * nearest.half_width:
+            return True
+    return False
+
+
+def _normal_to(step: Feature, edge: Crossing) -> np.ndarray:
+    """(3,) unit direction across a step's axis near one of its crossings, uphill."""
+    k = int(np.linalg.norm(step.axis - edge.point, axis=1).argmin())
+    way = step.axis[min(k + 1, len(step.axis) - 1)] - step.axis[max(k - 1, 0)]
+    across = np.cross(edge.normal, way)
+    norm = float(np.linalg.norm(across))
+    rise = uphill(edge)
+    return rise if norm == 0 else across / norm * (1.0 if across @ rise > 0 else -1.0)
