@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 
 
 # Jogs that may be under way or waiting when the next is made, in control periods
-QUEUED = 2.0
+QUEUED = 2
 # Samples are handed on this often, s
 BATCH = 0.5
 # Share of the wanted force that may be missing, or too much, at full tangential speed; and the slowest pace
@@ -86,36 +86,38 @@ class Slide:
     ) -> Iterator[None]:
         """Along the path, one jog a period; `depth` (m) behind it along the approach follows the force."""
         controller, trend = stage.controller, 0.0
-        here = path[0] + depth * approach[0]
-        at, end = 0.0, len(path) - 1.0
+        here, at, end = path[0] + depth * approach[0], 0.0, len(path) - 1.0
+        queued = [0.0] * QUEUED  # lengths of the last jogs
         while True:
-            point, inwards = _between(path, at), _between(approach, at)
+            inwards = _between(approach, at)
             inwards /= np.linalg.norm(inwards)
-            missing = move.force - self._pressing(stage, inwards, here, move.speed)
+            missing = move.force - self._pressing(stage, inwards, here, sum(queued))
+            pace = _pace(missing / move.force)
+            at = min(end, at + pace)
             wanted = self.gain * missing / self.stiffness
             # the slope of the body, learnt as it comes: else a ramp leaves a lasting error
-            trend = float(np.clip(trend + 0.03 * wanted, *self._step_limits(stage)))
-            depth += float(np.clip(wanted + trend, *self._step_limits(stage)))
+            trend = float(np.clip(trend + 0.03 * pace * wanted, *self._step_limits(stage)))
+            depth += float(np.clip(wanted + pace * trend, *self._step_limits(stage)))
             if depth > self.reach:
                 raise StoppedError("the tip went too deep behind the commanded path: the body ends, or is elsewhere")
-            target = point + depth * inwards
+            target = _between(path, at) + depth * inwards
             way = float(np.linalg.norm(target - here))
             if way > 0:
                 stage.check(target, "sliding")
                 controller.jog(stage.frame.to_machine(target), max(way / self.period, 1e-4))
-                here = target
+                here, queued = target, [*queued[1:], way]
             yield
             if at >= end:
                 return
-            at = min(end, at + _pace(missing / move.force))
 
-    def _pressing(self, stage: GuardedStage, inwards: FloatArray, here: FloatArray, speed: float) -> float:
-        """Force along the approach, N, as soon as at most QUEUED periods of motion are left up to `here`.
+    def _pressing(self, stage: GuardedStage, inwards: FloatArray, here: FloatArray, queued: float) -> float:
+        """Force along the approach, N, as soon as at most `queued` metres of motion are left up to `here`.
 
         The machine paces the loop: a host that is late makes it stand, never run ahead.
         """
         until = time.monotonic() + PATIENCE
-        while np.linalg.norm(stage.position() - here) > QUEUED * speed * self.period:
+        left = max(queued, 1.5 * stage.controller.settings.resolution)
+        while np.linalg.norm(stage.position() - here) > left:
             if time.monotonic() > until:
                 raise StoppedError("the machine does not follow; is it held, or its door open?")
         stage.listen(self.sensor)
