@@ -117,8 +117,15 @@ def solve(
     """Pose and solve a feature's posterior; arguments as for `sample_posterior`."""
     base = base or _fitted(trace)
     noise = noise or noise_of_trace(trace, base)
-    problem = pose_problem(feature, Surroundings(trace, base, noise, others))
-    return solve_problem(problem, rng, confirm=confirm)
+    around = Surroundings(trace, base, noise, others)
+    solution = solve_problem(pose_problem(feature, around), rng, confirm=confirm)
+    if feature.kind != "bump" or solution.problem.noise == noise:
+        return solution
+    from mapping.bump_profile import better_profile
+
+    better = better_profile(solution.problem, around, rng)
+    same = isinstance(better.target.shape, type(solution.problem.target.shape))
+    return solution if same else solve_problem(better, rng, confirm=confirm)
 
 
 def odds_against_nothing(solution: Solution) -> float:

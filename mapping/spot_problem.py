@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.bell_shape import bell_shape
 from mapping.bump_shape import BumpShape, Spot, spot_at
 from mapping.feature import Feature
 from mapping.hollow_shape import PitShape
@@ -21,8 +22,8 @@ SPREAD = 0.1
 RADIUS_SCALE = 1.0
 
 
-def spot_problem(feature: Feature, around: Surroundings) -> Problem:
-    """Pose the posterior of a bump or a pit."""
+def spot_problem(feature: Feature, around: Surroundings, *, bell: bool = False) -> Problem:
+    """Pose the posterior of a bump (a cap, or with `bell` a bump with a skirt) or a pit."""
     tip = around.trace.tip_radius
     sizes = sizes_of(feature, tip)
     point, normal = feature.axis[:1], feature.normals[:1]
@@ -30,13 +31,16 @@ def spot_problem(feature: Feature, around: Surroundings) -> Problem:
     middle = int(np.argmin(np.linalg.norm(window.feet - point, axis=1)))
     spot = spot_at(point[0], normal[0], window.tangents[middle], around.base, tip, sizes.half_width)
     free = 2 if np.ptp((window.feet - spot.point) @ spot.axes[1]) > SPREAD * sizes.half_width else 1
+    if bell:
+        form: Shape = bell_shape(window, spot, sizes, tip, free, place_prior(sizes), height_prior(sizes))
+        return pose(feature, sizes, form, window, around, _bell_beginnings(form.start))
     shape: Shape = (bump_shape if feature.kind == "bump" else pit_shape)(window, spot, sizes, tip, free)
     return pose(feature, sizes, shape, window, around, _beginnings(shape.start, free, sizes, feature.kind))
 
 
 def bump_shape(window: Window, spot: Spot, sizes: Sizes, tip: float, free: int) -> BumpShape:
     """Bumps about a spot: position within 1.5 half widths, any height up to several times the detected one."""
-    place: Prior = Uniform(-1.5 * sizes.half_width, 1.5 * sizes.half_width)
+    place = place_prior(sizes)
     priors = (*(place,) * free, height_prior(sizes), radius_prior(sizes, tip))
     start = np.array([0.0] * free + [sizes.height, np.log(sizes.radius)])
     step = np.array([0.02 * sizes.half_width] * free + [0.02 * sizes.height, 0.1])
@@ -45,11 +49,16 @@ def bump_shape(window: Window, spot: Spot, sizes: Sizes, tip: float, free: int) 
 
 def pit_shape(window: Window, spot: Spot, sizes: Sizes, tip: float, free: int) -> PitShape:
     """Pits about a spot: log width and log depth equally probable over wide ranges."""
-    place: Prior = Uniform(-1.5 * sizes.half_width, 1.5 * sizes.half_width)
+    place = place_prior(sizes)
     width, depth = hollow_priors(sizes, tip)
     start = np.array([0.0] * free + [np.log(2.0 * sizes.radius), np.log(2.0 * sizes.height)])
     step = np.array([0.02 * sizes.half_width] * free + [0.02, 0.05])
     return PitShape(window, spot, tip, free, (*(place,) * free, width, depth), start, step)
+
+
+def place_prior(sizes: Sizes) -> Prior:
+    """Anywhere within 1.5 half widths of where it was detected."""
+    return Uniform(-1.5 * sizes.half_width, 1.5 * sizes.half_width)
 
 
 def height_prior(sizes: Sizes) -> Prior:
@@ -86,4 +95,15 @@ def _beginnings(start: FloatArray, free: int, sizes: Sizes, kind: str) -> FloatA
         other = start.copy()
         other[free + 1] = np.log(size)
         starts.append(other)
+    return np.array(starts)
+
+
+def _bell_beginnings(start: FloatArray) -> FloatArray:
+    """Starts from slender to wide, with a long skirt and with none."""
+    starts = []
+    for scale in (-1.5, -0.5, 0.5):
+        for exponent in (0.0, 2.0):
+            other = start.copy()
+            other[-2:] = start[-2] + scale, exponent
+            starts.append(other)
     return np.array(starts)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.base import Base
+from mapping.bell_shape import BellShape, width_at_half_height
 from mapping.bump_shape import BumpShape
 from mapping.extent import explored
 from mapping.feature import Feature, Interval
@@ -30,7 +31,7 @@ AXIS_POINTS = 64
 def describe(problem: Problem, posterior: Posterior, base: Base) -> Feature:
     """The detected feature with axis, intervals and standard deviation from the draws of its posterior."""
     shape = problem.target.shape
-    if isinstance(shape, BumpShape | PitShape):
+    if isinstance(shape, BumpShape | BellShape | PitShape):
         feature = _describe_spot(problem, shape, posterior, base)
     elif isinstance(shape, RidgeShape | GrooveShape | StepShape):
         feature = _describe_curve(problem, shape, posterior, base)
@@ -46,7 +47,9 @@ def _warnings(posterior: Posterior) -> tuple[str, ...]:
     return (f"posterior: {posterior.status}: {posterior.reason}",)
 
 
-def _describe_spot(problem: Problem, shape: BumpShape | PitShape, posterior: Posterior, base: Base) -> Feature:
+def _describe_spot(
+    problem: Problem, shape: BumpShape | BellShape | PitShape, posterior: Posterior, base: Base
+) -> Feature:
     draws = posterior.samples
     place = np.zeros((1, 2))
     place[0, : shape.free] = np.median(draws[:, : shape.free], axis=0)
@@ -111,6 +114,11 @@ def _section(problem: Problem, shape: object, draws: FloatArray) -> tuple[Interv
         radii = np.exp(draws[:, -1])
         cap = Interval.from_draws(width_of_cap(draws[:, -2], radii))
         return Interval.from_draws(draws[:, -2]), cap, {"radius": float(np.median(radii))}, ""
+    if isinstance(shape, BellShape):
+        scale, exponent = np.exp(draws[:, -2]), np.exp(draws[:, -1])
+        full = Interval.from_draws(width_at_half_height(scale, exponent))
+        extra = {"scale": float(np.median(scale)), "exponent": float(np.median(exponent))}
+        return Interval.from_draws(draws[:, -3]), full, extra, "its flank runs out in a skirt: width at half height"
     width, depth = np.exp(draws[:, -2]), np.exp(draws[:, -1])
     tip = shape.tip_radius  # type: ignore[attr-defined]
     unhindered = -rim_height(0.5 * width, tip)
