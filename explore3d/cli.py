@@ -16,6 +16,7 @@ from explore3d.cli_figures import figures
 from explore3d.cli_hw import calibrate, emulate, selftest
 from explore3d.cli_merge import merge
 from explore3d.cli_run import plan, run
+from explore3d.cli_stability import stability
 
 ABOUT = "Find, follow and measure surface features that are finer than the fingertip that touches them."
 
@@ -27,7 +28,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, plan, analyze, merge, figures, doctor, emulate, calibrate, selftest):
+for command in (run, plan, analyze, merge, figures, doctor, emulate, calibrate, selftest, stability):
     app.command()(command)
 app.add_typer(bench, name="bench")
 
