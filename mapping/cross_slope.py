@@ -57,7 +57,17 @@ def cross_slope(
                 v[:, REACH + shift] = np.einsum("ij,ij->i", arm, across[row])
                 w[:, REACH + shift] = np.einsum("ij,ij->i", arm, up[row])
         slope[row], bend[row], doubt[row] = smooth_slope(v, w)
+        # Beside an outermost sweep nothing shows whether the surface goes on as it came.
+        alone = np.isnan(v[:, REACH - 1]) | np.isnan(v[:, REACH + 1])
+        doubt[row] = shared(np.where(alone & ~np.isnan(doubt[row]), np.pi / 2, doubt[row]))
     return CrossSlope(unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5, doubt)
+
+
+def shared(doubt: FloatArray, reach: int = 2) -> FloatArray:
+    """Largest doubt (N,) of a few neighbours along a sweep: among the doubtful, one may agree with itself by chance."""
+    padded = np.pad(doubt, reach, constant_values=np.nan)
+    largest = np.fmax.reduce(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1)
+    return np.asarray(np.where(np.isnan(doubt), doubt, largest))
 
 
 def smooth_slope(v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

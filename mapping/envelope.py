@@ -28,6 +28,8 @@ IntArray = NDArray[np.int64]
 METHODS = ("envelope", "contact", "normals")
 # Balls may overlap a contact by this share of their radius before it counts as impossible.
 TOLERANCE = 1e-9
+# The doubt of a slope is an estimate, no bound: it must be this much smaller than what would be harmless.
+CAUTION = 2.0
 
 
 def estimate_surface(
@@ -115,7 +117,7 @@ def _contacts(trace: Trace, method: str, outward: FloatArray, slack: float) -> E
     if method == "contact" and trace.normals is not None:
         normals, doubt = _recorded(trace, row), np.zeros(len(doubt))
     # A ball turned by an angle about its contact leaves the body by half of r angle^2.
-    uncertain = (row.labels == TOUCHED) & (0.5 * trace.tip_radius * doubt**2 > slack)
+    uncertain = (row.labels == TOUCHED) & (0.5 * trace.tip_radius * (CAUTION * doubt) ** 2 > slack)
     labels = np.where(uncertain, EXTRAPOLATED, row.labels).astype(np.int8)
     sample = np.where(row.sample < 0, -1, still[row.sample])
     points = row.centers - trace.tip_radius * normals

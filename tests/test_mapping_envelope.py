@@ -173,8 +173,8 @@ def test_sweeps_over_a_sphere_become_a_mesh_on_the_sphere(bend):
     touched = estimate.labels == TOUCHED
     assert touched[inner].all()
     assert distance[touched].max() < 1e-9
-    # At the corners of the raster the neighbours lie on one side and tell less: there, and only there, it says so.
-    assert touched.mean() > 0.98
+    # The outermost sweeps have neighbours on one side only and cannot be sure: there, and only there, it says so.
+    assert touched.mean() > 0.9
     assert distance.max() < 1e-4
     assert estimate.surface is not None
     np.testing.assert_array_equal(estimate.surface.vertices, estimate.points)
@@ -213,7 +213,7 @@ def test_a_wire_along_the_sweeps_is_bridged_between_them():
     assert not ((y > crest + 1e-3) & (y < reach - 1e-3))[~bridged].any()
 
 
-@pytest.mark.parametrize("angle", [0.3, 1.2])
+@pytest.mark.parametrize("angle", [0.3, 0.6, 0.9, 1.2])
 def test_a_wire_oblique_to_the_sweeps_is_touched_only_where_it_was_touched(angle):
     height = 0.065
 
@@ -225,8 +225,7 @@ def test_a_wire_oblique_to_the_sweeps_is_touched_only_where_it_was_touched(angle
     points = estimate.points[inner & (estimate.labels == TOUCHED)]
     error = wire_distance(np.column_stack([across(points[:, 0], points[:, 1]), 0 * points[:, 0], points[:, 2]]), height)
     assert len(points) > 2000
-    assert error.max() < 1e-7
-    assert np.quantile(error, 0.99) < 1e-9
+    assert error.max() <= 1e-9
 
 
 def slotted_plate(width, depth, size=4.0):
@@ -259,10 +258,8 @@ def test_a_slot_in_a_plate_traced_by_exact_contact_is_bridged_from_edge_to_edge(
     estimate = estimate_surface(trace, method)
     points = estimate.points
     inside = np.abs(points[:, 0]) < width / 2 - 1e-7
-    # The outermost sweeps have neighbours on one side only, which a jump of curvature can deceive.
-    inner = (estimate.sweep > 0) & (estimate.sweep < sweeps[-1][0])
-    touched = (estimate.labels == TOUCHED) & (inner | (method == "contact"))
-    assert touched.mean() > 0.5
+    touched = estimate.labels == TOUCHED
+    assert touched.mean() > 0.4
     assert not (touched & inside).any()
     assert np.abs(points[touched, 2]).max() <= 1e-9
     assert inside.any()
