@@ -19,6 +19,9 @@ PLATEAU_GAIN = 12.0
 # Averaging a stretch to this many bins costs its fit less than 1 % of its information.
 BINS = 120
 ZOOM_ROUNDS = 5
+# Shares of a plateau's half-width that its flanks may take, and how often the best share is refined.
+FLANKS = (0.4, 0.02)
+FLANK_ROUNDS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +80,7 @@ def fit_cap(
     sharpest = float(np.sqrt(2 * tip_radius * np.abs(height[low:high]).max()))
     crest = _zoom(window, sign, low * spacing, (high - 1) * spacing, half, 0.0)
     if half > 1.5 * sharpest and not any(neighbours):
-        flats = [_zoom(window, sign, low * spacing, (high - 1) * spacing, half, flat) for flat in (0.7, 0.85, 0.95)]
-        plateau = max(flats)
+        plateau = _plateau(window, sign, low * spacing, (high - 1) * spacing, half)
         if plateau[0] > crest[0] + PLATEAU_GAIN:
             crest = plateau
     gain, place, half_width, flat = crest
@@ -129,6 +131,18 @@ def _whitened(
         basis = np.linalg.qr(root @ nuisance)[0]
         root = root - basis @ (basis.T @ root)
     return _Whitened(x, step, root, root @ values)
+
+
+def _plateau(window: _Whitened, sign: float, low: float, high: float, half: float) -> tuple[float, float, float, float]:
+    """(gain, place, half-width, flatness) of the best plateau: its flanks may be a small share of its width."""
+    flats = list(1.0 - np.geomspace(*FLANKS, 6))
+    best = max(_zoom(window, sign, low, high, half, flat) for flat in flats)
+    factor = (FLANKS[1] / FLANKS[0]) ** 0.1
+    for _ in range(FLANK_ROUNDS):
+        near = [1.0 - (1.0 - best[3]) * f for f in (1 / factor, factor)]
+        best = max(best, *(_zoom(window, sign, low, high, half, flat) for flat in near))
+        factor = factor**0.5
+    return best
 
 
 def _zoom(

@@ -13,22 +13,16 @@ from mapping.disturbance import Disturbance
 from mapping.errors import MappingError
 from mapping.false_alarms import threshold_for
 from mapping.height_profile import HeightProfile, arclength, height_profiles
-from mapping.matched_filter import BINS_PER_HALF_WIDTH, Bank, build_bank, smallest_half_width
-from mapping.noise import Noise, estimate_noise
-from mapping.stretches import find_disturbances, quiet_bins
+from mapping.matched_filter import BINS_PER_HALF_WIDTH, smallest_half_width
+from mapping.noise import Noise
+from mapping.quiet_noise import CERTAIN, background, first_noise, floored, raw_stretches
+from mapping.stretches import find_disturbances
 from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 # Half-width of the widest disturbance that counts as fine, in tip radii.
 LARGEST = 4.0
-# Rounding of contact geometry, in tip radii: the noise is never taken to be smaller.
-ROUNDING = 1e-8
-# Signal-to-noise ratio of the smallest crest looked for, and of what is kept out of the noise's estimate.
-CERTAIN = 5.0
-SUSPECT = 4.0
-RAW_SAMPLES = 40_000
 # Height, in standard deviations of a profile, of the gentlest detail that is no roughness of an unknown base.
 ROUGHNESS = 5.0
 PROBABILITY = 0.95
@@ -115,11 +109,13 @@ def detect(
     if not usable:
         return Detections((), noise or Noise(0.0), algorithm, np.inf, PROBABILITY, np.inf, 0.0, left_out)
     raw = float(np.median([s[-1] / (len(s) - 1) for _, _, s in usable]))
-    first = noise or _raw_noise(usable, base, raw)
+    stretches = [] if noise else raw_stretches(usable, base)
+    first = floored(noise, tip) if noise else first_noise(stretches, raw, tip)
     widest = LARGEST * tip if largest is None else largest
     profiles = _profiles(usable, base, first, raw, tip)
-    level, bank = _noise_and_bank(profiles, base, noise, first, tip, widest)
-    threshold = threshold_for(bank, false_alarms_per_metre)
+    behind = background(profiles, base, noise, stretches, first, tip, widest)
+    level, bank = behind.noise, behind.bank
+    threshold = threshold_for(bank, false_alarms_per_metre, behind.uncertainty)
     crossings = []
     for profile in profiles:
         disturbances = find_disturbances(profile, bank, level, threshold, tip)
@@ -146,73 +142,13 @@ def _resolved(crossings: list[Crossing], resolution: float) -> tuple[list[Crossi
     return kept, (f"{lost} details of at most {low:.3g} m may be rounding: the positions come in steps",)
 
 
-def _raw_noise(usable: list[tuple[int, Trace, FloatArray]], base: Base, raw: float) -> Noise:
-    """Noise from stretches of raw samples that together are no more than RAW_SAMPLES."""
-    share = max(64, RAW_SAMPLES // len(usable))
-    residuals, places = [], []
-    offset = 0.0
-    for _, part, s in usable:
-        begin = max(0, (len(part) - share) // 2)
-        cut = slice(begin, begin + share)
-        residuals.append(base.foot(part.centers[cut], part.tip_radius).height)
-        places.append(s[cut] - s[cut][0] + offset)
-        offset = places[-1][-1] + 1000 * raw
-    residual, place = np.concatenate(residuals), np.concatenate(places)
-    if len(residual) < 16:
-        return Noise(float(np.std(residual)))
-    return estimate_noise(residual, place)
-
-
-def _floored(noise: Noise, tip: float) -> Noise:
-    return Noise(max(noise.white, ROUNDING * tip), noise.correlated, noise.length)
-
-
 def _profiles(
     usable: list[tuple[int, Trace, FloatArray]], base: Base, noise: Noise, raw: float, tip: float
 ) -> list[HeightProfile]:
     """Profiles of every sweep in bins that the smallest visible crest spans BINS_PER_HALF_WIDTH times."""
-    smallest = smallest_half_width(_floored(noise, tip), raw, 1.0, tip, CERTAIN)
+    smallest = smallest_half_width(noise, raw, 1.0, tip, CERTAIN)
     spacing = raw * max(1, int(smallest / (BINS_PER_HALF_WIDTH * raw)))
     return [p for number, part, s in usable for p in height_profiles(number, part, s, base, spacing)]
-
-
-def _noise_and_bank(
-    profiles: list[HeightProfile], base: Base, given: Noise | None, first: Noise, tip: float, largest: float
-) -> tuple[Noise, Bank]:
-    """The noise of what is no feature, and filters for it; each improves the other twice unless it is given."""
-    drift = 0 if base.kind == "mesh" else 2
-    level = _floored(given or first, tip)
-    quiet = [np.ones(len(p.height), dtype=bool) for p in profiles]
-    for attempt in range(1 if given else 3):
-        if given is None:
-            level = _quiet_noise(profiles, quiet, first, tip)
-        spacing, samples = profiles[0].spacing, float(np.mean([p.samples for p in profiles]))
-        smallest = smallest_half_width(level, spacing, samples, tip, CERTAIN)
-        bank = build_bank(level, spacing, samples, smallest, max(largest, smallest), drift)
-        if given is None and attempt < 2:
-            quiet = [quiet_bins(p, bank, level, SUSPECT, tip) for p in profiles]
-    return level, bank
-
-
-def _quiet_noise(profiles: list[HeightProfile], quiet: list[BoolArray], first: Noise, tip: float) -> Noise:
-    """Noise of the profiles' quiet bins; the white level of single samples."""
-    heights, places, samples = [], [], []
-    offset = 0.0
-    for profile, keep in zip(profiles, quiet, strict=True):
-        heights.append(profile.height[keep])
-        places.append(profile.s[keep] - profile.s[0] + offset)
-        offset += profile.length + 1000 * profile.spacing
-        samples.append(profile.samples)
-    height = np.concatenate(heights)
-    if len(height) < 16:
-        return _floored(first, tip)
-    estimated = estimate_noise(height, np.concatenate(places))
-    white = estimated.white * np.sqrt(float(np.mean(samples)))
-    # the raw samples are many more than the bins: their level stands unless the bins contradict it
-    error = np.sqrt(1.4 / len(height))
-    if first.white > 0 and abs(np.log(max(white, 1e-300) / first.white)) < 4 * error:
-        white = first.white
-    return _floored(Noise(white, estimated.correlated, estimated.length), tip)
 
 
 def _stands_out(found: Disturbance, profile: HeightProfile, noise: Noise, tip: float) -> bool:

@@ -12,7 +12,17 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.matched_filter import Bank, best_linear, build_bank, cap_bins, filter_reach, toeplitz
+from mapping.matched_filter import (
+    LADDER,
+    Bank,
+    best_linear,
+    build_bank,
+    cap_bins,
+    colour_in_bins,
+    filter_reach,
+    rung,
+    toeplitz,
+)
 from mapping.noise import Noise
 
 FloatArray = NDArray[np.float64]
@@ -23,37 +33,41 @@ NEIGHBOURS = 8
 CLUMP = 1.5
 # Threshold at which clump sizes are measured; they change slowly with it.
 TYPICAL_THRESHOLD = 5.0
+# Relative uncertainty of the noise that changes a threshold by less than one part in a thousand.
+NEGLIGIBLE = 5e-3
 
 
-def threshold_for(bank: Bank, false_alarms_per_metre: float) -> float:
+def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float = 0.0) -> float:
     """The signal-to-noise ratio that noise alone exceeds, in either sign, as often per metre as asked.
 
     The threshold changes by less than a thousandth where the bank changes by one per cent, so it is worked out
-    for the nearest bank of a ladder and remembered: sweep after sweep has the same one.
+    for the nearest bank of a ladder of 1 % steps and remembered: sweep after sweep has the same one.
+
+    Where the level of the noise itself is uncertain, signal over estimated noise is distributed as Student's t
+    instead of normally, and noise alone exceeds a higher threshold as often.
+
+    Args:
+        bank: of filters.
+        false_alarms_per_metre: 1/m.
+        uncertainty: relative standard deviation of the filters' noise.
     """
-    noise, widths = bank.noise, (bank.filters[0].half_width, bank.filters[-1].half_width)
-    sizes = (noise.white, noise.correlated, noise.length, bank.spacing, bank.samples, *widths)
-    return _threshold(*(_rung(size) for size in sizes), bank.drift, false_alarms_per_metre)
+    colour, _ = colour_in_bins(bank.noise, bank.spacing, bank.samples)
+    sizes = (colour.correlated, colour.length if colour.correlated else 0.0, bank.filters[0].half_width / bank.spacing)
+    rate = false_alarms_per_metre * bank.spacing
+    normal = _threshold(*(rung(size, 64) for size in sizes), len(bank.filters), bank.drift, rate)
+    if uncertainty < NEGLIGIBLE:
+        return normal
+    from scipy.special import ndtr, stdtrit
 
-
-def _rung(size: float) -> float:
-    """The nearest step of a ladder of 1 % steps; a power of two times a step is a step."""
-    return float(2.0 ** (np.round(64 * np.log2(size)) / 64)) if size > 0 else 0.0
+    # the square of an estimated level with n degrees of freedom has the relative variance 2 / n
+    return float(-stdtrit(0.5 / uncertainty**2, float(ndtr(-normal))))
 
 
 @lru_cache(maxsize=256)
-def _threshold(
-    white: float,
-    correlated: float,
-    length: float,
-    spacing: float,
-    samples: float,
-    smallest: float,
-    largest: float,
-    drift: int,
-    rate: float,
-) -> float:
-    bank = build_bank(Noise(white, correlated, length), spacing, samples, smallest, largest, drift)
+def _threshold(correlated: float, length: float, smallest: float, count: int, drift: int, rate: float) -> float:
+    correlated = min(correlated, 1.0)
+    noise = Noise(float(np.sqrt(1.0 - correlated**2)), correlated, length or 1.0)
+    bank = build_bank(noise, 1.0, 1.0, smallest, smallest * LADDER ** (count - 1), drift)
     threshold = _solve(_intensities(bank, TYPICAL_THRESHOLD), rate)
     return _solve(_intensities(bank, threshold), rate)
 
@@ -87,14 +101,15 @@ def _inverse_clump_size(bank: Bank, index: int, threshold: float) -> float:
     reaches = [filter_reach(f.half_width, bank.noise, step, bank.drift) for f in near]
     reach, shift = max(reaches), int(np.ceil(CLUMP * own.half_width / step))
     count = 2 * (reach + shift) + 1
-    covariance = toeplitz(bank.noise.block_covariances(count, step, bank.samples * own.coarse))
+    correlation = bank.noise.block_covariances(count, step, bank.samples * own.coarse)
+    covariance = toeplitz(correlation)
     # A fixed seed: these draws are the nodes of a quadrature, and the same bank has one threshold.
     rng = np.random.default_rng(0)
     noise = np.linalg.cholesky(covariance + 1e-12 * covariance[0, 0] * np.eye(count)) @ rng.standard_normal(
         (count, DRAWS)
     )
     weights = {
-        f.half_width: _on_grid(f.half_width, r, step, covariance, bank) for f, r in zip(near, reaches, strict=True)
+        f.half_width: _on_grid(f.half_width, r, step, correlation, bank) for f, r in zip(near, reaches, strict=True)
     }
     centred = np.zeros(count)
     half = len(weights[own.half_width]) // 2
@@ -109,10 +124,9 @@ def _inverse_clump_size(bank: Bank, index: int, threshold: float) -> float:
     return float(np.mean(1 / np.maximum(size, 1.0)))
 
 
-def _on_grid(half_width: float, reach: int, step: float, covariance: FloatArray, bank: Bank) -> FloatArray:
+def _on_grid(half_width: float, reach: int, step: float, correlation: FloatArray, bank: Bank) -> FloatArray:
     """Weights, normalised to unit output noise, of the filter of a half-width in bins of the given step."""
     x = np.arange(-reach, reach + 1, dtype=np.float64) * step
     nuisance = (x[:, None] / (reach * step)) ** np.arange(bank.drift, dtype=np.float64)
-    count = len(x)
-    weights, sd = best_linear(covariance[:count, :count], cap_bins(x, half_width, step), nuisance)
-    return weights / sd
+    weights, sd = best_linear(correlation[: len(x)], cap_bins(x, half_width, step), nuisance)
+    return np.asarray(weights[0] / sd[0])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ FloatArray = NDArray[np.float64]
 LADDER = 1.2
 # Bins per half-width: averaging over a bin loses less than 1 %.
 BINS_PER_HALF_WIDTH = 12
+# Products up to which a convolution is summed directly.
+DIRECT = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +42,11 @@ class MatchedFilter:
 
     def heights(self, profile: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Estimated height of a cap centred at each coarse bin of a profile (n,), and its standard deviation."""
-        from scipy.signal import oaconvolve
-
         whole = len(profile) // self.coarse * self.coarse
         bins = profile[:whole].reshape(-1, self.coarse).mean(axis=1)
         reach = len(self.weights) // 2
         padded = np.concatenate([np.zeros(reach), bins, np.zeros(reach)])
-        heights = np.asarray(oaconvolve(padded, self.weights[::-1], mode="valid"))
+        heights = _filtered(padded, self.weights)
         sd = np.full(len(bins), self.sd)
         count = min(len(self.edge), len(bins))
         windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
@@ -54,6 +55,15 @@ class MatchedFilter:
         sd[:count] = self.edge_sd[:count]
         sd[len(bins) - count :] = np.maximum(sd[len(bins) - count :], self.edge_sd[:count][::-1])
         return heights, sd
+
+
+def _filtered(values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Weighted sums at every place where all weights find a value: directly if short, else by Fourier transforms."""
+    if len(values) * len(weights) < DIRECT:
+        return np.convolve(values, weights[::-1], mode="valid")
+    from scipy.signal import oaconvolve
+
+    return np.asarray(oaconvolve(values, weights[::-1], mode="valid"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +103,10 @@ class Bank:
 
 
 def build_bank(noise: Noise, spacing: float, samples: float, smallest: float, largest: float, drift: int = 0) -> Bank:
-    """A bank of filters from the smallest to the largest half-width, m.
+    """A bank of filters from the smallest half-width to the largest at least, m, LADDER between neighbours.
+
+    Filters know lengths in bins and heights in noise: one bank, remembered, serves every sweep whose noise has the
+    same colour, to within the rungs of a ladder of 0.3 %.
 
     Args:
         noise: of single samples.
@@ -101,11 +114,36 @@ def build_bank(noise: Noise, spacing: float, samples: float, smallest: float, la
         samples: samples in a profile bin.
         drift: 0 if the base is known; 2 if its offset and slope near a feature are not, 3 with its curvature.
     """
-    count = max(1, int(np.ceil(np.log(max(largest / smallest, 1.0)) / np.log(LADDER))) + 1)
-    widths = np.geomspace(smallest, max(largest, smallest), count) if count > 1 else np.array([smallest])
-    return Bank(
-        tuple(_build_filter(float(w), noise, spacing, samples, drift) for w in widths), spacing, samples, noise, drift
+    colour, level = colour_in_bins(noise, spacing, samples)
+    count = 1 + max(0, int(np.ceil(np.log(largest / smallest) / np.log(LADDER) - 1e-9)))
+    unit = _unit_filters(rung(colour.correlated), rung(colour.length), rung(smallest / spacing), count, drift)
+    filters = tuple(
+        replace(f, half_width=f.half_width * spacing, sd=f.sd * level, edge_sd=f.edge_sd * level) for f in unit
     )
+    return Bank(filters, spacing, samples, noise, drift)
+
+
+def colour_in_bins(noise: Noise, spacing: float, samples: float) -> tuple[Noise, float]:
+    """The noise with bins for length and its level in a bin's mean for height, and that level, m."""
+    level = float(np.hypot(noise.white / np.sqrt(samples), noise.correlated))
+    level = level if level > 0 else 1.0
+    return Noise(noise.white / np.sqrt(samples) / level, noise.correlated / level, noise.length / spacing), level
+
+
+def rung(size: float, octave: int = 256) -> float:
+    """The nearest step of a ladder with so many steps an octave; a power of two times a step is a step."""
+    return float(2.0 ** (np.round(octave * np.log2(size)) / octave)) if size > 0 else 0.0
+
+
+@lru_cache(maxsize=64)
+def _unit_filters(
+    correlated: float, length: float, smallest: float, count: int, drift: int
+) -> tuple[MatchedFilter, ...]:
+    """Filters for bins of unit width whose noise has unit variance."""
+    correlated = min(correlated, 1.0)
+    # a process shorter than any filter's bin is white noise; no length is needed without a process
+    noise = Noise(float(np.sqrt(1.0 - correlated**2)), correlated, length or 1.0)
+    return tuple(_build_filter(smallest * LADDER**k, noise, 1.0, 1.0, drift) for k in range(count))
 
 
 def smallest_half_width(noise: Noise, spacing: float, samples: float, tip_radius: float, threshold: float) -> float:
@@ -150,33 +188,50 @@ def filter_reach(half_width: float, noise: Noise, step: float, drift: int) -> in
     return reach
 
 
+def filter_sd(half_width: float, noise: Noise, spacing: float, samples: float, drift: int) -> float:
+    """Standard deviation of the height that the filter of a half-width estimates, m."""
+    coarse = max(1, int(half_width / (BINS_PER_HALF_WIDTH * spacing)))
+    step = coarse * spacing
+    reach = filter_reach(half_width, noise, step, drift)
+    x = np.arange(-reach, reach + 1, dtype=np.float64) * step
+    covariance = noise.block_covariances(2 * reach + 1, step, samples * coarse)
+    nuisance = (x[:, None] / (reach * step)) ** np.arange(drift, dtype=np.float64)
+    return float(best_linear(covariance, cap_bins(x, half_width, step), nuisance)[1][0])
+
+
 def _build_filter(half_width: float, noise: Noise, spacing: float, samples: float, drift: int) -> MatchedFilter:
     coarse = max(1, int(half_width / (BINS_PER_HALF_WIDTH * spacing)))
     step = coarse * spacing
     reach = filter_reach(half_width, noise, step, drift)
     x = np.arange(-reach, reach + 1, dtype=np.float64) * step
     template = cap_bins(x, half_width, step)
-    covariance = toeplitz(noise.block_covariances(2 * reach + 1, step, samples * coarse))
+    covariance = noise.block_covariances(2 * reach + 1, step, samples * coarse)
     nuisance = (x[:, None] / (reach * step)) ** np.arange(drift, dtype=np.float64)
-    weights, sd = best_linear(covariance, template, nuisance)
-    edge, edge_sd = np.zeros((reach, 2 * reach + 1)), np.full(reach, np.inf)
-    for i in range(reach):
-        cut = slice(reach - i, None)
-        edge[i, cut], edge_sd[i] = best_linear(covariance[cut, cut], template[cut], nuisance[cut])
-    return MatchedFilter(half_width, coarse, weights, edge, sd, edge_sd)
+    # counted from the far side, what exists of a window that begins i bins before its middle is a leading block
+    all_weights, all_sd = best_linear(covariance, template[::-1], nuisance[::-1], reach + 1)
+    return MatchedFilter(half_width, coarse, all_weights[-1, ::-1], all_weights[:-1, ::-1], all_sd[-1], all_sd[:-1])
 
 
-def best_linear(covariance: FloatArray, template: FloatArray, nuisance: FloatArray) -> tuple[FloatArray, float]:
-    """Weights of the best linear unbiased estimate of the template's amplitude, and its standard deviation.
+def best_linear(
+    covariance: FloatArray, template: FloatArray, nuisance: FloatArray, smallest: int | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Weights of the best linear unbiased estimates of the template's amplitude, and their standard deviations.
 
-    The covariance is symmetric and Toeplitz: Levinson's recursion takes O(n^2) steps and starts no threads.
+    Args:
+        covariance: (n,) autocovariance of the noise, at lags 0 to n - 1 bins.
+        template: (n,).
+        nuisance: (n, Q) shapes of the base that the estimate must not see.
+        smallest: estimate from the first k bins alone for every k = smallest to n; None: from all n only.
+
+    Returns:
+        (n + 1 - smallest, n) weights, zero beyond k, and (n + 1 - smallest,) standard deviations.
     """
-    from scipy.linalg import solve_toeplitz
+    from mapping.toeplitz_kernels import leading_solutions
 
     columns = np.column_stack([template, nuisance])
-    solved = solve_toeplitz(covariance[0], columns, check_finite=False)
+    solved = leading_solutions(covariance, columns, len(template) if smallest is None else smallest)
+    information = np.einsum("ip,kiq->kpq", columns, solved)
     if nuisance.shape[1] == 0:
-        information = float(template @ solved[:, 0])
-        return solved[:, 0] / information, 1 / float(np.sqrt(information))
-    inverse = np.linalg.pinv(columns.T @ solved, hermitian=True)
-    return solved @ inverse[:, 0], float(np.sqrt(max(inverse[0, 0], 0.0)))
+        return solved[..., 0] / information[..., 0], 1 / np.sqrt(information[:, 0, 0])
+    inverse = np.linalg.pinv(information, hermitian=True)
+    return np.einsum("kip,kp->ki", solved, inverse[..., 0]), np.sqrt(np.maximum(inverse[:, 0, 0], 0.0))

@@ -14,6 +14,9 @@ FloatArray = NDArray[np.float64]
 # The median of |x| of a standard normal variable: turns a median absolute deviation into a standard deviation.
 MEDIAN_OF_ABSOLUTE_NORMAL = 0.6744897501960817
 
+# A correlated part must lower chi-square by this much, or the noise counts as white.
+CORRELATED_GAIN = 6.0
+
 # Below so many correlation lengths the closed forms cancel; their series in x, with (k + 2)! below, do not.
 SHORT = 0.5
 TERMS = np.arange(20)
@@ -194,20 +197,16 @@ def _fit_allan(sizes: FloatArray, variances: FloatArray, counts: FloatArray, spa
     weight = 1 / np.sqrt(5.4 / counts + 0.03**2)
     white = 1 / sizes
     target = variances / scale
-    best = (
-        _misfit(target, white * _ratio(target, white, weight), weight) + 6.0,
-        _ratio(target, white, weight),
-        0.0,
-        1.0,
-    )
-    for length in spacing * np.geomspace(2.0, max(2.5, sizes[-1]), 60):
-        correlated = _allan_of_ou(sizes * spacing / length)
-        a, b = _two_levels(target, white, correlated, weight)
-        misfit = _misfit(target, a * white + b * correlated, weight)
-        if b > 0 and misfit < best[0]:
-            best = (misfit, a, b, float(length))
-    _, a, b, length = best
-    return Noise(float(np.sqrt(a * scale)), float(np.sqrt(b * scale)), float(length) if b > 0 else spacing)
+    level = _ratio(target, white, weight)
+    alone = float(_misfit(target, level * white, weight))
+    lengths = spacing * np.geomspace(2.0, max(2.5, sizes[-1]), 60)
+    correlated = _allan_of_ou(sizes * spacing / lengths[:, None])
+    a, b = _two_levels(target, white, correlated, weight)
+    misfit = np.where(b > 0, _misfit(target, a[:, None] * white + b[:, None] * correlated, weight), np.inf)
+    best = int(misfit.argmin())
+    if misfit[best] > alone - CORRELATED_GAIN:
+        return Noise(float(np.sqrt(level * scale)), 0.0, spacing)
+    return Noise(float(np.sqrt(a[best] * scale)), float(np.sqrt(b[best] * scale)), float(lengths[best]))
 
 
 def _ratio(target: FloatArray, shape: FloatArray, weight: FloatArray) -> float:
@@ -218,23 +217,25 @@ def _ratio(target: FloatArray, shape: FloatArray, weight: FloatArray) -> float:
 
 def _two_levels(
     target: FloatArray, white: FloatArray, correlated: FloatArray, weight: FloatArray
-) -> tuple[float, float]:
-    """Non-negative levels of both shapes with the least weighted relative error (reweighted twice)."""
-    model = target
-    a = b = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """Non-negative levels (K,) of both shapes with the least weighted relative error, reweighted by the model.
+
+    One pair for each of K correlated shapes (K, n), from the normal equations of two unknowns.
+    """
+    floor = 1e-9 * target.max()
+    model = np.broadcast_to(target, correlated.shape)
     for _ in range(4):
-        w = weight / np.maximum(model, 1e-9 * target.max())
-        columns = np.column_stack([white * w, correlated * w])
-        a, b = np.linalg.lstsq(columns, target * w, rcond=None)[0]
-        if a < 0:
-            a, b = 0.0, float((columns[:, 1] @ (target * w)) / (columns[:, 1] @ columns[:, 1]))
-        if b < 0:
-            a, b = float((columns[:, 0] @ (target * w)) / (columns[:, 0] @ columns[:, 0])), 0.0
-        model = np.maximum(a * white + b * correlated, 1e-9 * target.max())
-    return float(a), float(b)
+        w = (weight / np.maximum(model, floor)) ** 2
+        ww, wc, cc = (np.sum(w * product, axis=1) for product in (white * white, white * correlated, correlated**2))
+        wt, ct = np.sum(w * white * target, axis=1), np.sum(w * correlated * target, axis=1)
+        determinant = np.maximum(ww * cc - wc * wc, np.finfo(float).tiny)
+        a, b = (cc * wt - wc * ct) / determinant, (ww * ct - wc * wt) / determinant
+        a, b = np.where(b < 0, wt / ww, np.where(a < 0, 0.0, a)), np.where(a < 0, ct / cc, np.where(b < 0, 0.0, b))
+        model = np.maximum(a[:, None] * white + b[:, None] * correlated, floor)
+    return np.asarray(a), np.asarray(b)
 
 
-def _misfit(target: FloatArray, model: FloatArray, weight: FloatArray) -> float:
-    """Weighted square error of the logarithms: chi-square of independent relative errors."""
+def _misfit(target: FloatArray, model: FloatArray, weight: FloatArray) -> FloatArray:
+    """Weighted square errors of the logarithms: chi-square of independent relative errors."""
     safe = np.maximum(target, 1e-12)
-    return float(np.sum((weight * np.log(safe / np.maximum(model, 1e-12))) ** 2))
+    return np.asarray(np.sum((weight * np.log(safe / np.maximum(model, 1e-12))) ** 2, axis=-1))

@@ -30,3 +30,54 @@ def innovations(values, steps, white, correlated, length):  # type: ignore[no-un
         variance *= noise / total
         logdet += np.log(total)
     return out, logdet
+
+
+@njit(cache=True)
+def block_likelihood(values, steps, samples, white, correlated, length):  # type: ignore[no-untyped-def]
+    """Twice the negative log-likelihood, less N log(2 pi), of means over adjoining blocks of white + OU noise.
+
+    The state is the process at a block's end; its mean over the next block and its next value share what happens
+    within that block.
+
+    Args:
+        values: (N,) block means; NaN where nothing counts.
+        steps: (N,) lengths of the blocks, m; infinity begins a new run.
+        samples: in a block.
+        white, correlated, length: of the noise.
+    """
+    power = correlated * correlated
+    scatter = white * white / samples
+    state, variance = 0.0, power
+    last, total_before, logarithm = -1.0, -1.0, 0.0
+    decay = pull = within = shared = fresh = 0.0
+    result = 0.0
+    for i in range(len(values)):
+        step = steps[i]
+        if not np.isfinite(step):
+            state, variance = 0.0, power
+            step = last if last > 0 else length
+        if step != last:
+            x = step / length
+            decay = np.exp(-x)
+            pull = -np.expm1(-x) / x if x > 1e-8 else 1.0
+            if x < 1e-2:
+                within = power * x * (2.0 / 3.0 - x * (0.5 - 7.0 * x / 30.0))
+            else:
+                within = power * (2.0 * (x - 1.0 + decay) / (x * x) - pull * pull)
+            shared = power * pull * (1.0 - decay)
+            fresh = -power * np.expm1(-2.0 * x)
+            last = step
+        if np.isnan(values[i]):
+            state *= decay
+            variance = decay * decay * variance + fresh
+            continue
+        total = pull * pull * variance + within + scatter
+        gain = (decay * pull * variance + shared) / total
+        error = values[i] - pull * state
+        if total != total_before:
+            logarithm = np.log(total)
+            total_before = total
+        result += error * error / total + logarithm
+        state = decay * state + gain * error
+        variance = decay * decay * variance + fresh - gain * gain * total
+    return result
