@@ -87,7 +87,7 @@ def parallel_surface() -> Any:
     caustics = np.column_stack(BUMP.parallel(BUMP.caustics(TIP), TIP))
     meeting = _meeting()
     trace = section_trace().centers
-    figure = new_figure(7.2, 3.8)
+    figure = new_figure(7.2, 3.5)
     wide, close = figure.subplots(1, 2, width_ratios=(1.35, 1.0))
     for axes in (wide, close):
         _body(axes)
@@ -95,16 +95,18 @@ def parallel_surface() -> Any:
         axes.plot(trace[:, 0], trace[:, 2], color=TRACED, lw=2.2, label="traced surface")
         for sign in (-1, 1):
             names = ("caustic point, 1 + r k = 0", "interference point") if sign > 0 else ("", "")
-            axes.plot(sign * caustics[:, 0], caustics[:, 1], "D", color=ESTIMATED, ms=4.5, ls="", label=names[0])
-            axes.plot(sign * meeting[0], meeting[1], "o", color=INK, ms=5.5, ls="", label=names[1])
+            axes.plot(sign * caustics[:, 0], caustics[:, 1], "D", color=ESTIMATED, ms=3.5, ls="", label=names[0])
+            axes.plot(sign * meeting[0], meeting[1], "o", color=INK, ms=4.0, ls="", label=names[1])
     _ball(wide, meeting, FAINT)
     wide.set_title("Figure 2.  Parallel and traced surface")
-    close.set_title("the fold that the tip cannot follow")
+    close.set_title("The fold that the tip cannot follow")
     _frame(wide, (-2.1, 2.1), (-0.15, 2.75))
     corners = np.vstack([caustics, meeting[None]])
     low, high = corners.min(axis=0), corners.max(axis=0)
     pad = 0.35 * (high - low).max()
     _frame(close, (low[0] - pad, high[0] + pad), (low[1] - pad, high[1] + pad))
+    for axes in (wide, close):
+        axes.set_anchor("N")  # else their titles stand at different heights
     handles, labels = wide.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, handlelength=1.8)
     return figure
@@ -112,6 +114,8 @@ def parallel_surface() -> Any:
 
 def curvature_features() -> Any:
     """Figure 3: along the bump the curvature leaves the band of +-1/r three times: concave, convex, concave."""
+    from matplotlib.ticker import NullLocator
+
     u = np.linspace(-1.5, 1.5, 3001)
     k = BUMP.curvatures(np.abs(u))[0] * TIP
     figure = new_figure(7.2, 5.0)
@@ -127,8 +131,9 @@ def curvature_features() -> Any:
     over.set_title("Figure 3.  A bump is the sequence {-}{+}{-} of curvature features (a = 15, r = 1)")
     over.set_ylabel("height")
     over.set_ylim(-0.1, 1.25)
-    under.set_yscale("symlog", linthresh=3.0)
-    under.set_yticks([-2, -1, 0, 1, 2, 10, 30], ["-2", "-1", "0", "1", "2", "10", "30"])
+    under.set_yscale("asinh", linear_width=1.5)  # smooth, unlike symlog, whose corner looks like a feature
+    under.set_yticks([-2, -1, 0, 1, 2, 10, 30], ["−2", "−1", "0", "1", "2", "10", "30"])
+    under.yaxis.set_minor_locator(NullLocator())
     under.set_ylabel("curvature along u, times r")
     under.set_xlabel("u, in heights of the bump")
     under.legend(loc="upper right")
