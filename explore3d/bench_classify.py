@@ -97,14 +97,15 @@ def verdict(features: tuple[Feature, ...], base: Base, truth: tuple[TrueFeature,
 
 
 def _rightly_named(pair: Comparison) -> bool:
-    """True if the kind, the closing and, for lines, the course and the extent are the true ones."""
+    """True if the kind, the closing and, for lines with ends, the course and the extent are the true ones."""
     true, found = pair.true, pair.found
     assert true is not None and found is not None
     if found.kind != true.kind or found.closed != _returns(true.axis):
         return False
     if len(true.axis) == 1:
         return pair.axis_rms < ASIDE
-    return pair.axis_max < ASIDE and abs(pair.length_error) < LONGER
+    endless = true.kind in ("step", "convex edge", "concave corner")
+    return pair.axis_max < ASIDE and (endless or abs(pair.length_error) < LONGER)
 
 
 def _returns(axis: FloatArray) -> bool:

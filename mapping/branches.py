@@ -16,6 +16,9 @@ ArmEnd = tuple[int, int]
 TWIG, SAME_HUB, WITHIN_HUB, DIRECTION = 1.3, 2.0, 1.1, 3.5
 # Cosine of the angle between two arms of one line that goes straight on through a junction.
 STRAIGHT_ON = -0.85
+# Cosine of the angle between both ways from a point at which a line has a corner; longest gap between arms that go
+# straight on into each other, in half-widths.
+CORNER, LONGEST_GAP = -0.64, 7.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +57,18 @@ class _Arm:
         return middle, away / max(float(np.linalg.norm(away)), np.finfo(float).tiny)
 
 
-def branches(points: FloatArray, half_width: float) -> list[Branch]:
+def branches(points: FloatArray, half_width: float, length: FloatArray | None = None) -> list[Branch]:
     """Lines through points (K, 3): the arms of their minimum spanning tree, joined straight on where they meet.
 
     Args:
         points: on the crests, m.
         half_width: of the disturbance, m.
+        length: (K, K) length of the links between them, longer where one is less likely; None: their distances.
     """
-    tree = _without_twigs(spanning_tree(points), points, TWIG * half_width)
-    forks = [i for i, near in tree.items() if len(near) > 2]
+    if length is None:
+        length = np.linalg.norm(points[:, None] - points[None], axis=2)
+    tree = _without_twigs(spanning_tree(length), points, TWIG * half_width)
+    forks = [i for i, near in tree.items() if len(near) > 2 or _is_corner(i, tree, points, half_width)]
     if not forks:
         return [Branch(points[_path(tree)], (True, True), junction=False)]
     hubs = _clusters(forks, points, SAME_HUB * half_width)
@@ -71,20 +77,19 @@ def branches(points: FloatArray, half_width: float) -> list[Branch]:
     return _joined(arms, meeting, partner, crowded)
 
 
-def spanning_tree(points: FloatArray) -> Tree:
-    """Neighbours of each point in the minimum spanning tree of points (K, 3), by Prim's algorithm."""
-    tree: Tree = {i: set() for i in range(len(points))}
-    nearest = np.zeros(len(points), dtype=int)
-    best = np.linalg.norm(points - points[0], axis=1)
-    outside = np.ones(len(points), dtype=bool)
+def spanning_tree(length: FloatArray) -> Tree:
+    """Neighbours of each point in the minimum spanning tree of links of given lengths (K, K), by Prim's algorithm."""
+    count = len(length)
+    tree: Tree = {i: set() for i in range(count)}
+    nearest, best = np.zeros(count, dtype=int), length[0].copy()
+    outside = np.ones(count, dtype=bool)
     outside[0] = False
     while outside.any():
         new = int(np.where(outside, best, np.inf).argmin())
         tree[new].add(int(nearest[new]))
         tree[int(nearest[new])].add(new)
         outside[new] = False
-        distance = np.linalg.norm(points - points[new], axis=1)
-        nearest[distance < best], best = new, np.minimum(best, distance)
+        nearest[length[new] < best], best = new, np.minimum(best, length[new])
     return tree
 
 
@@ -160,25 +165,59 @@ def _arms(tree: Tree, points: FloatArray, hubs: list[list[int]], radius: float) 
     return arms
 
 
+def _is_corner(i: int, tree: Tree, points: FloatArray, half_width: float) -> bool:
+    """True where the line through a point turns sharply: two lines met there and the tree took the wrong turn."""
+    if len(tree[i]) != 2:
+        return False
+    ways = []
+    for first in tree[i]:
+        path = [i, first]
+        while len(tree[path[-1]]) == 2 and np.linalg.norm(points[path[-1]] - points[i]) < half_width:
+            path.append(next(j for j in tree[path[-1]] if j != path[-2]))
+        ways.append(points[path[-1]] - points[i])
+    cosine = ways[0] @ ways[1] / max(float(np.linalg.norm(ways[0]) * np.linalg.norm(ways[1])), 1e-300)
+    return bool(cosine > CORNER)
+
+
 def _meetings(
     arms: list[_Arm], points: FloatArray, hubs: list[list[int]], half_width: float
 ) -> tuple[list[FloatArray], dict[ArmEnd, ArmEnd], set[int]]:
-    """Where the arms of each hub meet, which of them go straight on into which, and where more than two meet."""
-    meeting, partner, crowded = [], {}, set()
-    for number, hub in enumerate(hubs):
-        center = points[hub].mean(axis=0)
-        ends = [(a, e) for a, arm in enumerate(arms) for e in (0, 1) if arm.hubs[e] == number]
-        seen = [arms[a].outward(e, center, DIRECTION * half_width) for a, e in ends]
-        meeting.append(_nearest_to_lines(seen, center, half_width))
-        if len(ends) > 2:
+    """Where the arms of each hub meet, which arms go straight on into which, and the hubs where lines meet."""
+    centers = [points[hub].mean(axis=0) for hub in hubs]
+    ends = [(a, e) for a, arm in enumerate(arms) for e in (0, 1) if arm.hubs[e] >= 0]
+    home = {(a, e): arms[a].hubs[e] for a, e in ends}
+    seen = {(a, e): arms[a].outward(e, centers[home[a, e]], DIRECTION * half_width) for a, e in ends}
+    partner: dict[ArmEnd, ArmEnd] = {}
+    for _, one, other in sorted(_straight_pairs(arms, seen, LONGEST_GAP * half_width)):
+        if one not in partner and other not in partner:
+            partner[one], partner[other] = other, one
+    meeting, crowded = [], set()
+    for number, center in enumerate(centers):
+        own = [end for end in ends if home[end] == number]
+        if len(own) > 2 or any(end in partner and home[partner[end]] != number for end in own):
             crowded.add(number)
-        ways = [way for _, way in seen]
-        angles = sorted((float(ways[i] @ ways[j]), i, j) for i in range(len(ends)) for j in range(i))
-        for cosine, i, j in angles:
-            opposite = cosine < STRAIGHT_ON or len(ends) == 2
-            if opposite and ends[i] not in partner and ends[j] not in partner:
-                partner[ends[i]], partner[ends[j]] = ends[j], ends[i]
+        elif len(own) == 2 and own[0] not in partner and own[1] not in partner:
+            partner[own[0]], partner[own[1]] = own[1], own[0]
+        meeting.append(_nearest_to_lines([seen[end] for end in own], center, half_width))
     return meeting, partner, crowded
+
+
+def _straight_pairs(
+    arms: list[_Arm], seen: dict[ArmEnd, tuple[FloatArray, FloatArray]], longest: float
+) -> list[tuple[float, ArmEnd, ArmEnd]]:
+    """Pairs of arm ends that continue each other over the gap between them, with how far from straight they are."""
+    pairs = []
+    for one, (_, way) in seen.items():
+        for other, (_, back) in seen.items():
+            if one >= other or one[0] == other[0]:
+                continue
+            gap = arms[other[0]].points[-other[1]] - arms[one[0]].points[-one[1]]
+            length = float(np.linalg.norm(gap))
+            over = [-way @ gap / length, back @ gap / length] if length > 0 else [1.0, 1.0]
+            straight = min(float(v) for v in (*over, -way @ back))
+            if straight > -STRAIGHT_ON and length < longest:
+                pairs.append((1.0 - straight, one, other))
+    return pairs
 
 
 def _nearest_to_lines(lines: list[tuple[FloatArray, FloatArray]], center: FloatArray, half_width: float) -> FloatArray:

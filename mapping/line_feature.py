@@ -16,6 +16,7 @@ from mapping.detectors import Detections
 from mapping.feature import Feature, Interval
 from mapping.inspection import Inspection
 from mapping.line_end import LineEnd, line_end
+from mapping.linking import FELT, LONGEST_LINK, between
 from mapping.point_feature import body_width, evidence
 from mapping.polyline import arclengths
 from mapping.runs import RunPoint
@@ -28,6 +29,8 @@ FULL_HEIGHT = 0.85
 ONE_POINT = 0.5
 # A disturbance wider than so many of the narrow ones was crossed at a slant.
 SLANT = 2.0
+# A link over a place that felt no crest is as good as one so many times as long.
+DENIED = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +52,25 @@ def line_features(members: list[Crossing], kind: str, around: Around) -> list[Fe
     if len(clusters) < 2:
         return []
     points = np.array([mean_point(cluster) for cluster in clusters])
-    lines = branches(points, half_width)
+    lines = branches(
+        points, half_width, _links(points, members[0].height, half_width, around.tip_radius, around.inspection)
+    )
     features = []
     for branch in lines:
         others = [other.axis for other in lines if other is not branch]
         own = [c for c in members if _nearest(c.point, branch.axis, others)]
         features.append(_line_feature(branch, own, kind, around))
     return features
+
+
+def _links(points: FloatArray, sign: float, half_width: float, tip_radius: float, inspection: Inspection) -> FloatArray:
+    """(K, K) distances between points of the crests, longer where a place between them was found too low."""
+    length = np.linalg.norm(points[:, None] - points[None], axis=2)
+    low = np.sign(sign) * half_width**2 / (2 * tip_radius)
+    for i, j in zip(*np.nonzero(np.triu(length < LONGEST_LINK * half_width, 1)), strict=True):
+        if inspection.denies(between(points[i], points[j], half_width), low, FELT * half_width):
+            length[i, j] = length[j, i] = DENIED * length[i, j]
+    return np.asarray(length)
 
 
 def _nearest(point: FloatArray, axis: FloatArray, others: list[FloatArray]) -> bool:

@@ -55,7 +55,7 @@ def linked(a: Crossing, b: Crossing, inspection: Inspection, scale: float) -> bo
         return False
     if a.kind.startswith("step"):
         return True
-    return not inspection.denies(_between(a.point, b.point, scale), np.sign(a.height) * low, FELT * scale)
+    return not inspection.denies(between(a.point, b.point, scale), np.sign(a.height) * low, FELT * scale)
 
 
 def uphill(crossing: Crossing) -> FloatArray:
@@ -63,7 +63,7 @@ def uphill(crossing: Crossing) -> FloatArray:
     return crossing.tangent if crossing.kind == "step up" else -crossing.tangent
 
 
-def _between(start: FloatArray, stop: FloatArray, scale: float) -> FloatArray:
+def between(start: FloatArray, stop: FloatArray, scale: float) -> FloatArray:
     """Points of the segment, half a half-width off its ends."""
     length = float(np.linalg.norm(stop - start))
     off = 0.5 * scale
