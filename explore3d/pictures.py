@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from explore3d.analysis import Analysis
+from explore3d.corner_picture import corner_picture
 from explore3d.cross_section import cross_section
 from explore3d.curvature_picture import curvature_picture
 from explore3d.error_picture import size_picture, time_picture
+from explore3d.extent_picture import extent_picture
 from explore3d.object_picture import object_picture
 from explore3d.profile_picture import profile_picture
 from explore3d.section_picture import section_picture
@@ -19,11 +21,13 @@ from mapping.open3d_import import Open3DError
 
 # So many features get a panel of their own.
 MOST_SECTIONS = 12
+# A corner plot takes a second or so.
+MOST_CORNERS = 6
 
 
 @dataclass(frozen=True)
 class Pictures:
-    """PNG files by name ("object", "profile", "sections", "curvature", "sizes", "time"), and those left out."""
+    """PNG files by name ("object", "profile", "sections", "extents", "corner-ID", ...), and those left out."""
 
     files: dict[str, bytes]
     left_out: tuple[LeftOut, ...] = ()
@@ -43,6 +47,9 @@ def draw_pictures(analysis: Analysis, sweeps: Sequence[SweepPath]) -> Pictures:
         limit = analysis.detections.detection_limit
         files["profile"] = profile_picture(analysis.trace, analysis.base, analysis.model.features, limit)
     files["sections"] = _sections(analysis)
+    files["extents"] = _extents(analysis)
+    for feature in shown_features(analysis)[:MOST_CORNERS]:
+        files[f"corner-{feature.id}"] = corner_picture(feature)
     try:
         files |= {} if profile else _rendered(analysis, sweeps)
     except Open3DError as error:
@@ -76,6 +83,12 @@ def _sections(analysis: Analysis) -> bytes | None:
     if not sections:
         return None
     return section_picture(sections, [true.get(each.feature.id) for each in sections])
+
+
+def _extents(analysis: Analysis) -> bytes | None:
+    true = {row.found.id: row.true.axis for row in analysis.errors if row.found and row.true and len(row.true.axis) > 1}
+    shown = shown_features(analysis)
+    return extent_picture(shown, [true.get(feature.id) for feature in shown])
 
 
 def _rendered(analysis: Analysis, sweeps: Sequence[SweepPath]) -> dict[str, bytes | None]:

@@ -9,7 +9,7 @@ from explore3d.analysis import Analysis
 from explore3d.markup import Html, element, text
 from explore3d.pictures import Pictures, draw_pictures, is_profile
 from explore3d.report_account import account_of_time, provenance, what_was_left_out
-from explore3d.report_evidence import compared_with_truth, cross_sections, curvature_maps
+from explore3d.report_evidence import compared_with_truth, cross_sections, curvature_maps, posteriors
 from explore3d.report_findings import facts, headline, what_was_found
 from explore3d.report_style import STYLE
 from explore3d.sweep_paths import SweepPath, sweep_paths
@@ -56,6 +56,7 @@ def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPa
         facts(analysis),
         what_was_found(analysis, pictures, view),
         cross_sections(analysis, pictures),
+        posteriors(pictures),
         curvature_maps(pictures),
         compared_with_truth(analysis, pictures),
         what_was_left_out(analysis, pictures),

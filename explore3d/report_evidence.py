@@ -30,6 +30,22 @@ def cross_sections(analysis: Analysis, pictures: Pictures) -> Html:
     return section("Traced and estimated profiles", "profiles", picture)
 
 
+def posteriors(pictures: Pictures) -> Html:
+    """Extents with their intervals, and the draws behind all intervals."""
+    content: list[str] = []
+    if "extents" in pictures.files:
+        caption = (
+            "Axes seen from above, along and across not to one scale: median and 90 % band; bars: 90 % intervals of "
+            "the ends; triangles: the axis goes on beyond what was explored."
+        )
+        content.append(figure(pictures.files["extents"], "Extents with their intervals", caption))
+    for name, picture in pictures.files.items():
+        if name.startswith("corner-"):
+            caption = "Draws of the posterior, each parameter and each pair: 90 % intervals, contours of 50 and 90 %."
+            content.append(figure(picture, f"Posterior of {name.removeprefix('corner-')}", caption))
+    return section("Posteriors", "posteriors", *content) if content else Html("")
+
+
 def curvature_maps(pictures: Pictures) -> Html:
     """Principal curvatures of the estimated surface."""
     if "curvature" not in pictures.files:

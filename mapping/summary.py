@@ -92,6 +92,11 @@ def _describe_curve(
         axis[-1], normals[-1] = axis[0], normals[0]
     height, width, radius, note = _section(problem, shape, draws)
     length, notes = _length(problem, shape, draws, has_ends)
+    # Along the axis: how well it is known across itself, and its two ends along itself (first, last).
+    known: dict[str, object] = {"axis_sd": courses.std(axis=0).tolist()}
+    if has_ends:
+        spans = np.quantile(draws[:, -4:-2], [0.05, 0.95], axis=0) - [low, high]
+        known |= {"end_intervals": spans.T.tolist(), "ends_seen": list(explored(problem, draws))}
     return replace(
         problem.feature,
         axis=axis,
@@ -101,7 +106,7 @@ def _describe_curve(
         length=length,
         position_sd=float(np.sqrt(courses.var(axis=0).mean())),
         notes=(*problem.feature.notes, *notes, *([note] if note else [])),
-        extra={**problem.feature.extra, **radius},
+        extra={**problem.feature.extra, **radius, **known},
     )
 
 
