@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mapping.alpha_shape import alpha_estimate
 from mapping.base import Base
 from mapping.bridging import bridged_faces, resting_points, split
 from mapping.contact_row import ContactRow, contact_row, in_plane
@@ -25,7 +26,7 @@ __all__ = ["BRIDGED", "EXTRAPOLATED", "LABELS", "TOUCHED", "EnvelopeError", "Est
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-METHODS = ("envelope", "contact", "normals")
+METHODS = ("envelope", "contact", "normals", "alpha")
 # Balls may overlap a contact by this share of their radius before it counts as impossible.
 TOLERANCE = 1e-9
 # The doubt of a slope is an estimate, no bound: it must be this much smaller than what would be harmless.
@@ -46,7 +47,8 @@ def estimate_surface(
     Args:
         method: "envelope": the envelope of the balls, from positions alone; "contact": centre - r normal by
             recorded contact normals; "normals": equation 12, with the normals of the traced surface itself
-            and no regard to its kinks.
+            and no regard to its kinks; "alpha": the envelope of unorganised balls, whose corners bound the body
+            but are nowhere called touched.
         base, outward: which side the finger is on: the base, or (3,) or (N, 3) directions away from the body.
             Without both, recorded normals, else +z.
         noise: if given, the trace is smoothed at the scale that this noise demands (paper, section 3.3);
@@ -74,6 +76,9 @@ def estimate_surface(
         smoothed = smooth(trace, noise, outward=away)
         trace, away = smoothed.trace, away[smoothed.sample]
         slack = max(slack, 4 * smoothed.sd)
+    if method == "alpha":
+        estimate = alpha_estimate(trace.centers, away, trace.tip_radius, trace.sweep)
+        return estimate if smoothed is None else replace(estimate, sd=smoothed.sd)
     points = _contacts(trace, method, away, slack)
     if smoothed is not None:
         points = _unsmoothed(points, smoothed)
