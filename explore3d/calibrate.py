@@ -66,7 +66,7 @@ def calibrate(
     radius: float,
     center: tuple[float, float, float],
     *,
-    lines: int = 8,
+    lines: int = 24,
     radius_sd: float = 0.0,
     arm: bool = False,
 ) -> TipProfile:

@@ -67,7 +67,7 @@ def calibrate(
     radius: Radius,
     center: Center = "0 mm, 0 mm, 0 mm",
     out: Annotated[Path, typer.Option("--out", "-o", help="Tip profile to write.")] = Path("tip.toml"),
-    lines: Annotated[int, typer.Option(help="Sweeps over the sphere.", min=2)] = 8,
+    lines: Annotated[int, typer.Option(help="Sweeps over the sphere.", min=2)] = 24,
     radius_sd: Annotated[str, typer.Option(help="Standard uncertainty of the sphere's radius.")] = "0 mm",
     arm: Arm = False,
     json: Json = False,

@@ -10,7 +10,7 @@ loss of contact and landing are found as roots of the closed forms.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,9 @@ FloatArray = NDArray[np.float64]
 
 # Halvings of the interval between two control instants, at most: 2^-30 of 6 um is below an atom
 DEEPEST = 30
-# Share of the tolerance that the rigid trace may take: an error of its slope grows while the tip flies
-SHARE = 0.004
+# Share of the tolerance that the rigid trace may take: an error of its slope grows while the tip flies, by how much
+# only a second ride can tell, over a trace FINER times as fine; below LEAST of it rounding is all that is left
+SHARE, FINER, LEAST = 0.004, 8.0, 1e-7
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,14 @@ class Ride:
         force: (N,) contact force, N; 0 in flight.
         pieces: how many pieces in closed form it took.
         corners: of the rigid trace.
+        error: largest difference of the gap to a ride over a coarser trace, m: above the error of this one.
     """
 
     gap: FloatArray
     force: FloatArray
     pieces: int
     corners: int
+    error: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -78,16 +81,25 @@ class Dynamics:
         return bool(rate * sigma <= 10.0 * speed * np.tan(kink))
 
     def ride(self, height: Callable[[FloatArray], FloatArray], times: FloatArray, force: float) -> Ride:
-        """Ride over a rigid trace.
+        """Ride over a rigid trace, ever finer until the gap keeps to the tolerance.
 
         Args:
             height: of the rigid trace at times (M,) s: (M,) m.
             times: (N,) control instants, s, increasing.
             force: to hold, N.
         """
+        share = SHARE
+        ride = self._once(height, times, force, share)
+        while ride.error > self.tolerance and share > LEAST:
+            share /= FINER
+            finer = self._once(height, times, force, share)
+            ride = replace(finer, error=float(np.abs(finer.gap - ride.gap).max(initial=0.0)))
+        return ride
+
+    def _once(self, height: Callable[[FloatArray], FloatArray], times: FloatArray, force: float, share: float) -> Ride:
         from hw.dynamics_kernels import new_out, ride
 
-        corners, heights = refined(height, times, SHARE * self.tolerance)
+        corners, heights = refined(height, times, share * self.tolerance)
         sampled = np.isin(corners, times)
         out = new_out(len(corners))
         pieces = ride(corners, heights, sampled, self.mass, self.stiffness, force, self.gain, out)
