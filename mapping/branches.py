@@ -161,7 +161,10 @@ def _arms(tree: Tree, points: FloatArray, hubs: list[list[int]], radius: float) 
         at = [[home[j] for j in tree[i] if j in home] for i in (path[0], path[-1])]
         first = at[0][0] if at[0] else -1
         last = (at[1][1] if len(at[1]) > 1 else -1) if len(path) == 1 else at[1][0] if at[1] else -1
-        arms.append(_Arm(points[path], (first, last)))
+        length = float(np.linalg.norm(np.diff(points[path], axis=0), axis=1).sum())
+        # what is short and hangs between two hubs is a part of the place where lines meet
+        if first < 0 or last < 0 or length > radius:
+            arms.append(_Arm(points[path], (first, last)))
     return arms
 
 

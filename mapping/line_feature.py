@@ -23,8 +23,10 @@ from mapping.runs import RunPoint
 
 FloatArray = NDArray[np.float64]
 
-# A crossing lower than this share of a neighbour passed beside an end, or over the flank.
-FULL_HEIGHT = 0.85
+# A crossing lower than this share of a neighbour, or of one within a half-width, passed beside an end;
+# so did the last crossing of a line if it is lower than this share of the one before.
+FULL_HEIGHT, CLOSE_HEIGHT = 0.85, 0.93
+END_HEIGHT = 0.95
 # Crossings nearer to each other than this share of the half-width are one point of the axis.
 ONE_POINT = 0.5
 # A disturbance wider than so many of the narrow ones was crossed at a slant.
@@ -82,11 +84,12 @@ def _full_height(members: list[Crossing], half_width: float, inspection: Inspect
     """Crossings less those that only met the flank of what a neighbour met at its crest."""
     points = np.array([c.point for c in members])
     heights = np.array([abs(c.height) for c in members])
-    reach = 1.5 * max(half_width, min(inspection.pitch, 2 * half_width))
+    wide = 1.5 * max(half_width, min(inspection.pitch, 2 * half_width))
     full = []
     for c in members:
-        near = np.linalg.norm(points - c.point, axis=1) < reach
-        if abs(c.height) + 2 * c.height_sd >= FULL_HEIGHT * heights[near].max():
+        gap = np.linalg.norm(points - c.point, axis=1)
+        needed = max(FULL_HEIGHT * heights[gap < wide].max(), CLOSE_HEIGHT * heights[gap < half_width].max())
+        if abs(c.height) + 2 * c.height_sd >= needed:
             full.append(c)
     return full
 
@@ -133,7 +136,7 @@ def _line_feature(branch: Branch, members: list[Crossing], kind: str, around: Ar
         axis = np.vstack([axis, axis[:1]])
         length = Interval(*(3 * [float(arclengths(axis)[-1])]))
     else:
-        axis, length = _ended(branch, height, half_width, around)
+        axis, length = _ended(branch, height, half_width, members, around)
         if length.censored:
             notes += ("runs on where nothing was inspected: its length is at least this",)
     lifted = axis + around.tip_radius * members[0].normal
@@ -170,26 +173,36 @@ def _section(axis: FloatArray, members: list[Crossing], around: Around) -> tuple
     best = (np.inf, guess, width, 0.0)
     for half_width in width * np.geomspace(0.6, 2.0, 25):
         shape = crest_trace(distance[near], np.sign(guess), half_width) * np.sign(guess)
-        square = float(shape @ shape)
-        height = float(shape @ found) / square if square > 0 else guess
-        if height * guess > 0:
-            cost = float(misfit(found - height * shape, inspection.sd, height).sum())
-            best = min(best, (cost, height, float(half_width), inspection.sd / np.sqrt(square)))
+        square = max(float(shape @ shape), np.finfo(float).tiny)
+        height = float(np.clip(shape @ found / square / guess, 0.3, 3.0)) * guess
+        cost = float(misfit(found - height * shape, inspection.sd, height).sum())
+        best = min(best, (cost, height, float(half_width), inspection.sd / float(np.sqrt(square))))
     scatter = 0.5 * float(np.std([c.height for c in highest])) / np.sqrt(len(highest))
     return best[1], best[2], float(np.hypot(best[3], scatter))
 
 
-def _ended(branch: Branch, height: float, half_width: float, around: Around) -> tuple[FloatArray, Interval]:
+def _ended(
+    branch: Branch, height: float, half_width: float, members: list[Crossing], around: Around
+) -> tuple[FloatArray, Interval]:
     """The axis up to its ends, and its length: at least so much where an end was not seen."""
     axis, ends = branch.axis, []
     longest = 3 * half_width + 2 * min(around.inspection.pitch, 3 * half_width)
     for free in branch.free[::-1]:
         if free:
+            axis = _without_low_end(axis, members)
             end = line_end(axis, height, half_width, around.inspection, longest)
             axis = np.vstack([axis[: len(axis) - end.dropped], end.point])
             ends.append(end)
         axis = axis[::-1]
     return axis, _length(axis, ends)
+
+
+def _without_low_end(axis: FloatArray, members: list[Crossing]) -> FloatArray:
+    """The axis less a last point that is lower than the one before: that crossing passed beside the end."""
+    places = np.array([c.point for c in members])
+    last, before = (members[int(np.linalg.norm(places - point, axis=1).argmin())] for point in axis[[-1, -2]])
+    low = abs(last.height) + 2 * last.height_sd < END_HEIGHT * abs(before.height)
+    return axis[:-1] if low and len(axis) > 2 else axis
 
 
 def _length(axis: FloatArray, ends: list[LineEnd]) -> Interval:
