@@ -88,8 +88,7 @@ def estimate_surface(
     points = points.select(np.flatnonzero(possible))
     step = pitch(trace.centers, trace.sweep) / 4 if spacing is None else spacing
     # Thinned by their own distances, and by their balls': over a sharp edge many balls share one contact.
-    at_kinks = (points.sample < 0) & (points.labels == TOUCHED)
-    points = points.select(thinned(points.points, points.sweep, step, at_kinks))
+    points = points.select(thinned(points.points, points.sweep, step, _bounding(points)))
     estimate = _meshed(points, trace, slack)
     return estimate if smoothed is None else replace(estimate, sd=smoothed.sd)
 
@@ -127,6 +126,12 @@ def _contacts(trace: Trace, method: str, outward: FloatArray, slack: float) -> E
     sample = np.where(row.sample < 0, -1, still[row.sample])
     points = row.centers - trace.tip_radius * normals
     return Estimate(None, points, normals, row.centers, labels, sample, np.concatenate(sweeps), across)
+
+
+def _bounding(points: Estimate) -> NDArray[np.bool_]:
+    """(N,) which points are the contacts at interference points: they bound a bridged strip, however sure they are."""
+    bridged = np.pad(points.labels == BRIDGED, 1)
+    return np.asarray((points.sample < 0) & ~bridged[1:-1] & (bridged[:-2] | bridged[2:]))
 
 
 def _recorded(trace: Trace, row: ContactRow) -> FloatArray:

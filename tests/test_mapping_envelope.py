@@ -228,6 +228,35 @@ def test_a_wire_oblique_to_the_sweeps_is_touched_only_where_it_was_touched(angle
     assert error.max() <= 1e-9
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.2, 0.4])
+@pytest.mark.parametrize(
+    ("trace_of", "low", "high"),
+    [
+        (lambda u: groove(u, 0.3, 1.0), -0.15, 0.15),
+        (lambda u: vee(u, 0.3, 1.0), -np.sin(0.3), np.sin(0.3)),
+        (lambda u: step(u, 0.2, 1.0), -0.6, 0.0),
+    ],
+    ids=["groove", "vee", "step"],
+)
+def test_strips_that_cross_the_sweeps_are_bridged_from_end_to_end(trace_of, low, high, angle):
+    def across(x, y):
+        return np.cos(angle) * x + np.sin(angle) * y
+
+    estimate = estimate_surface(rows(lambda x, y: trace_of(across(x, y))))
+    errors = []
+    for k in np.unique(estimate.sweep)[3:-3]:
+        own = np.flatnonzero(estimate.sweep == k)
+        bridged = own[estimate.labels[own] == BRIDGED]
+        ends = across(*estimate.points[[max(bridged[0] - 1, own[0]), min(bridged[-1] + 1, own[-1])], :2].T)
+        errors.append(np.abs(np.sort(ends) - [low, high]).max())
+    # Where the slope across changes faster than the rows tell, the sampling decides: never more than two pitches.
+    share, limit = (0.9, 1e-7) if angle < 0.4 else (0.5, 1e-4)
+    assert np.quantile(errors, share) <= limit
+    assert np.max(errors) <= 0.025
+    if angle == 0.0:
+        assert np.max(errors) <= 1e-9
+
+
 def slotted_plate(width, depth, size=4.0):
     """A plate at z = 0 with a slot along y, as a mesh."""
     x = np.array([-size, -width / 2, -width / 2, width / 2, width / 2, size])
