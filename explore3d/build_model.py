@@ -11,6 +11,7 @@ import numpy as np
 from explore3d import __version__
 from explore3d.analysis import Analysis, TipCount
 from explore3d.base_reach import base_reach
+from explore3d.leave_out import with_savings
 from explore3d.recording import Log
 from explore3d.stages import Stages
 from explore3d.truth import TrueFeature, compare
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 # The report also says what a tip of this many times the radius would call finer than itself.
 OTHER_TIP = 2.5
+# Less noise than this many tip radii is rounding: nothing to smooth away
+NOISE_FREE = 2e-8
 
 
 @dataclass(frozen=True)
@@ -89,7 +92,7 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
         truth=truth,
         errors=compare(model, truth, trace.tip_radius) if truth or (scene and scene.finger.kind == "simulated") else (),
         timings=dict(stages.timings),
-        left_out=tuple(stages.left_out),
+        left_out=with_savings(stages.left_out, stages.timings),
         recovered=log.recovered,
         time_curve=curve,
         tip_counts=_tip_counts(features, trace.tip_radius),
@@ -98,8 +101,8 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
 
 def _base(trace: Trace, base: Base | None, stages: Stages) -> Base:
     if base is not None:
-        stages.needed("base fit", "the global model was given")
-        return base
+        if not stages.needed("base fit", "the global model was given"):
+            return base
     from mapping.base_fit import fit_base
 
     with stages.stage("base fit"):
@@ -110,7 +113,7 @@ def _detect(trace: Trace, base: Base, settings: Settings, stages: Stages) -> Det
     from mapping.detectors import detect
 
     if not trace.has_contact_data:
-        stages.needed("algorithms 1 and 2", "the log holds positions alone, no contact normals")
+        stages.needed("algorithms 1 and 2", "the log holds positions alone, no contact normals", possible=False)
     with stages.stage("detection"):
         return detect(trace, base, algorithm=settings.algorithm, false_alarms_per_metre=settings.false_alarms_per_metre)
 
@@ -136,13 +139,17 @@ def _refine(
         return ()
     from mapping.refine import refine
 
-    refined = []
+    refined, confirm = [], stages.is_forced("long chain")
     with stages.stage("posterior") as share:
         for number, feature in enumerate(features):
             # a stream of its own for each feature: what one draws does not change the next
             rng = np.random.default_rng([settings.seed, number])
-            refined.append(refine(feature, trace, rng, base=base, noise=detections.noise, others=features))
+            around = {"base": base, "noise": detections.noise, "others": features, "confirm": confirm}
+            refined.append(refine(feature, trace, rng, **around))
             share((number + 1) / len(features))
+    regular = sum(each.posterior is not None and each.posterior.status == "not needed" for each in refined)
+    if regular:
+        stages.needed("long chain", f"the posterior of {regular} of {len(refined)} is regular (k-hat below 0.5)")
     return tuple(refined)
 
 
@@ -153,8 +160,10 @@ def _estimate(
 
     if not stages.needed("estimated surface", "" if features else "no feature was found; the base is the estimate"):
         return None
+    free = detections.noise.sd <= NOISE_FREE * trace.tip_radius
+    smooth = stages.needed("smoothing", "the trace has no noise beyond rounding" if free else "")
     with stages.stage("estimated surface"):
-        return estimate_surface(trace, base=base, noise=detections.noise)
+        return estimate_surface(trace, base=base, noise=detections.noise if smooth else None)
 
 
 def _curvature(estimate: Estimate | None, stages: Stages) -> Curvature | None:

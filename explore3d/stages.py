@@ -42,9 +42,16 @@ class Stages:
             self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - start
         self.progress(name, 1.0)
 
-    def needed(self, name: str, why_not: str, saved: str = "") -> bool:
-        """True if the stage is to run: `why_not` is empty or the stage is forced; else noted as left out."""
-        if not why_not or name in self.forced:
+    def is_forced(self, name: str) -> bool:
+        """True if the stage is to run even where it is not needed."""
+        return name in self.forced
+
+    def needed(self, name: str, why_not: str, saved: str = "", possible: bool = True) -> bool:
+        """True if the stage is to run: `why_not` is empty or the stage is forced; else noted as left out.
+
+        A stage that is not `possible` for want of what it works on stays left out even if forced.
+        """
+        if not why_not or (possible and name in self.forced):
             return True
         self.left_out.append(LeftOut(name, why_not, saved))
         return False
