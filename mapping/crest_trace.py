@@ -31,4 +31,4 @@ def crest_trace(distance: FloatArray, height: float, half_width: float) -> Float
 
 def misfit(residual: FloatArray, sd: float, height: float) -> FloatArray:
     """Squares of residuals in standard deviations, none counted as more than an outlier."""
-    return np.minimum((residual / np.hypot(sd, SHAPE_ERROR * height)) ** 2, OUTLIER**2)
+    return np.asarray(np.minimum((residual / np.hypot(sd, SHAPE_ERROR * height)) ** 2, OUTLIER**2))

@@ -11,6 +11,7 @@ from mapping.base import Base
 from mapping.crest_trace import distances
 from mapping.crossing import Crossing
 from mapping.detectors import Detections
+from mapping.faint_feature import with_faint_lines
 from mapping.feature import Feature
 from mapping.inspection import inspect
 from mapping.line_feature import Around, line_features
@@ -30,22 +31,36 @@ NAMES = {1: ("bump", "ridge"), -1: ("pit", "groove")}
 WIDEST_SPOT = 2.6
 
 
-def assemble(detections: Detections, trace: Trace, base: Base) -> tuple[Feature, ...]:
+def assemble(
+    detections: Detections, trace: Trace, base: Base, *, false_alarms_per_metre: float = 0.01
+) -> tuple[Feature, ...]:
     """Features of the base, the strongest evidence first, with preliminary intervals.
 
     Crossings of one sign are linked where no inspected place between them denies a line. A group is one bump (or pit)
     unless the heights of all places around say that it is longer: then a ridge (or groove), or several that meet,
     each with its ends, closed if it returns to its beginning. Steps are linked likewise; those that a ridge explains,
     because a sweep ran along it, are dropped, and crests that the sweep began or ended on are believed only if no step
-    explains them. In a single profile every crossing is a bump, a pit or a step.
+    explains them. Ridges and grooves too low for any one sweep are found where many sweeps agree. In a single profile
+    every crossing is a bump, a pit or a step.
+
+    Args:
+        detections: of the trace.
+        trace: any set of sweeps.
+        base: the global model.
+        false_alarms_per_metre: expected number of lines found in noise alone, 1/m of inspected path.
 
     Reference: paper definitions 2 and 3; theory section 5.
     """
     crossings = detections.crossings
-    if not crossings:
-        return ()
     if len(np.unique(trace.sweep)) == 1:
         return _strongest_first([point_feature([c], _name(c), detections, trace.tip_radius) for c in crossings])
+    features = _linked(detections, trace, base) if crossings else []
+    return _strongest_first(with_faint_lines(features, detections, trace, base, false_alarms_per_metre))
+
+
+def _linked(detections: Detections, trace: Trace, base: Base) -> list[Feature]:
+    """Features of the crossings that single sweeps detected."""
+    crossings = detections.crossings
     scale = _scale(crossings, trace.tip_radius)
     around = Around(inspect(trace, base, detections.noise, 0.2 * scale), base, detections, trace.tip_radius)
     runs, steps = split_runs(crossings)
@@ -68,7 +83,7 @@ def assemble(detections: Detections, trace: Trace, base: Base) -> tuple[Feature,
     for sign, group in doubtful:
         rest = [c for c in group if not on_a_step(c, steps, stepped)]
         details += _details(rest, sign, around) if rest else []
-    return _strongest_first([*_without_shadows(details, trace.tip_radius), *stepped])
+    return [*_without_shadows(details, trace.tip_radius), *stepped]
 
 
 def _name(crossing: Crossing) -> str:

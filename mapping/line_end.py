@@ -62,7 +62,7 @@ def line_end(axis: FloatArray, height: float, half_width: float, inspection: Ins
     rise -= rise.min()
     likely = reach[rise <= INTERVAL]
     seen = bool(rise[-1] > SEEN)
-    best = float(0.5 * (likely[0] + likely[-1]) if seen else max(likely[0], min(length, likely[-1])))
+    best = float(0.5 * (likely[0] + likely[-1]) if seen else likely[0])
     beyond_end = int(((axis - anchor) @ way > best)[_index_of(axis, anchor) :].sum())
     return LineEnd(anchor + best * way, best - float(likely[0]), float(likely[-1]) - best, seen, beyond_end)
 

@@ -130,11 +130,10 @@ def mean_point(cluster: list[Crossing]) -> FloatArray:
 def _line_feature(branch: Branch, members: list[Crossing], kind: str, around: Around) -> Feature:
     axis = branch.axis
     height, half_width, sd = _section(axis, members, around)
-    notes = ("junction",) if branch.junction else ()
-    length = Interval(*(3 * [float(arclengths(axis)[-1])]))
+    notes: tuple[str, ...] = ("junction",) if branch.junction else ()
     if branch.closed or (branch.free == (True, True) and closes(axis, height, half_width, around.inspection)):
         axis = np.vstack([axis, axis[:1]])
-        length = Interval(*(3 * [float(arclengths(axis)[-1])]))
+        length = _exactly(axis)
     else:
         axis, length = _ended(branch, height, half_width, members, around)
         if length.censored:
@@ -195,6 +194,11 @@ def _ended(
             ends.append(end)
         axis = axis[::-1]
     return axis, _length(axis, ends)
+
+
+def _exactly(axis: FloatArray) -> Interval:
+    length = float(arclengths(axis)[-1])
+    return Interval(length, length, length)
 
 
 def _without_low_end(axis: FloatArray, members: list[Crossing]) -> FloatArray:

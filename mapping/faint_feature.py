@@ -1,0 +1,93 @@
+"""Faint feature: ridges and grooves that only many sweeps together show, as features."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.base import Base
+from mapping.crest_trace import distances
+from mapping.detectors import Detections
+from mapping.faint_lines import SECTIONS, SWEEPS, FaintLine, faint_lines
+from mapping.feature import Evidence, Feature, Interval
+from mapping.inspection import Inspection, inspect
+from mapping.line_end import line_end
+from mapping.point_feature import body_width
+from mapping.polyline import arclengths
+from mapping.trace import Trace
+
+FloatArray = NDArray[np.float64]
+
+# Places to a half-width of the narrowest section looked for.
+PLACES = 2.5
+# A point feature of no more crossings, and no clearer than so many thresholds, may be a part of a faint line.
+FEW, CLEAR = 2, 2.0
+
+
+def with_faint_lines(
+    features: Sequence[Feature], detections: Detections, trace: Trace, base: Base, false_alarms_per_metre: float
+) -> list[Feature]:
+    """The features, and the lines that no single sweep showed; spots that are a part of such a line become the line.
+
+    A base that was fitted is not known well enough: its own errors run along lines too.
+    """
+    features = list(features)
+    if base.kind != "mesh" or len(np.unique(trace.sweep)) < SWEEPS or not np.isfinite(detections.detection_limit):
+        return features
+    half_width = float(np.sqrt(2 * trace.tip_radius * detections.detection_limit))
+    inspection = inspect(trace, base, detections.noise, min(SECTIONS) * half_width / PLACES)
+    normals = base.foot(inspection.points, trace.tip_radius).normals
+    weak = [f for f in features if _is_weak(f, detections)]
+    masked = np.zeros(len(inspection.points), dtype=bool)
+    for feature in features:
+        if feature not in weak:
+            reach = 1.3 * np.sqrt(2 * trace.tip_radius * abs(feature.height.median)) + 0.5 * feature.width.high
+            masked |= distances(inspection.points, feature.axis) < reach
+    alarms = false_alarms_per_metre * detections.inspected_length
+    inflation = _inflation(inspection, detections, len(trace), half_width)
+    lines = faint_lines(inspection, normals, masked, half_width, inflation, alarms)
+    for line in lines:
+        ridge = _feature(line, inspection, base, detections, trace.tip_radius)
+        features = [f for f in features if f not in weak or distances(f.axis, ridge.axis).max() > 2 * line.half_width]
+        features.append(ridge)
+    return features
+
+
+def _is_weak(feature: Feature, detections: Detections) -> bool:
+    few = feature.evidence.crossings <= FEW and feature.evidence.snr < CLEAR * detections.threshold
+    return few and len(feature.axis) == 1
+
+
+def _inflation(inspection: Inspection, detections: Detections, samples: int, half_width: float) -> float:
+    """Standard deviation of a mean over one crossing, against that of independent places."""
+    count = max(1, int(np.ceil(2 * half_width / inspection.spacing)))
+    per_place = samples / max(len(inspection.points), 1)
+    covariance = detections.noise.block_covariances(count, inspection.spacing, per_place)
+    share = 1 - np.arange(1, count) / count
+    return float(np.sqrt(1 + 2 * share @ covariance[1:] / covariance[0]))
+
+
+def _feature(line: FaintLine, inspection: Inspection, base: Base, detections: Detections, tip_radius: float) -> Feature:
+    axis, ends = line.axis, []
+    for _ in range(2):
+        end = line_end(axis, line.height, line.half_width, inspection, 8 * line.half_width)
+        axis = np.stack([end.point, axis[0]])
+        ends.append(end)
+    length = float(arclengths(axis)[-1])
+    shorter, longer = (float(np.hypot(*values)) for values in zip(*((e.low, e.high) for e in ends), strict=True))
+    feet = base.foot(axis + tip_radius * line.normal, tip_radius)
+    seen = all(end.seen for end in ends)
+    return Feature(
+        kind="ridge" if line.height > 0 else "groove",
+        axis=feet.points,
+        normals=feet.normals,
+        height=Interval.normal(line.height, line.height_sd),
+        width=body_width(line.height, line.half_width, tip_radius),
+        length=Interval(length, max(length - shorter, 0.0), length + longer, not seen),
+        evidence=Evidence(line.snr, line.sweeps, (detections.algorithm,)),
+        curvature_feature=bool(abs(2 * line.height / line.half_width**2) > 1 / (2 * tip_radius)),
+        position_sd=0.3 * line.half_width,
+        notes=("seen by no single sweep, but by all that crossed it together",),
+    )
