@@ -82,9 +82,9 @@ def run_case(case: Case) -> Row:
     blank = _blank(case.kind)
     truth = np.array([float(prior.draw(rng, 1)[0]) for prior in blank.target.shape.priors])
     heights = _true_heights(case.kind, blank, truth, np.concatenate(paths))
-    trace = _record(paths, heights + simulate_noise(noise, paths, rng))
+    trace = record(paths, heights + simulate_noise(noise, paths, rng))
     believed = noise if case.assumed == "true" else Noise(noise.sd)
-    problem = _with_priors(pose_problem(feature, Surroundings(trace, _plate(), believed)))
+    problem = _with_priors(pose_problem(feature, Surroundings(trace, plate(), believed)))
     solution = solve_problem(problem, rng, confirm=case.method == "emcee")
     return Row(case, _places(solution, truth), solution.importance.k_hat, solution.posterior.status)
 
@@ -93,8 +93,8 @@ def run_case(case: Case) -> Row:
 def _blank(kind: str) -> Problem:
     """The problem of a feature's nominal shape over a bare plate: it holds the prior and the chart."""
     feature, paths = nominal(kind)
-    bare = _record(paths, np.zeros(sum(len(path) for path in paths)))
-    return _with_priors(pose_problem(feature, Surroundings(bare, _plate(), Noise(0.2e-3))))
+    bare = record(paths, np.zeros(sum(len(path) for path in paths)))
+    return _with_priors(pose_problem(feature, Surroundings(bare, plate(), Noise(0.2e-3))))
 
 
 def nominal(kind: str) -> tuple[Feature, list[FloatArray]]:
@@ -122,21 +122,24 @@ def nominal(kind: str) -> tuple[Feature, list[FloatArray]]:
     else:
         sweeps = [((x, -reach), (x, reach)) for x in (-9e-3, -3e-3, 3e-3, 9e-3)]
         sweeps += [((side * 6e-3, 0.0), (side * 22e-3, 0.0)) for side in (-1, 1)]
-    return feature, [_line(np.array(start), np.array(stop)) for start, stop in sweeps]
+    return feature, [straight_path(start, stop) for start, stop in sweeps]
 
 
-def _line(start: FloatArray, stop: FloatArray) -> FloatArray:
-    count = int(np.linalg.norm(stop - start) / SPACING) + 1
+def straight_path(start: tuple[float, float], stop: tuple[float, float]) -> FloatArray:
+    """(N, 3) samples on a line over the plate at the apparatus' spacing, m."""
+    count = int(np.linalg.norm(np.subtract(stop, start)) / SPACING) + 1
     return np.column_stack([np.linspace(start, stop, count), np.zeros(count)])
 
 
-def _plate() -> Base:
+def plate() -> Base:
+    """A bare plate, z = 0."""
     half = 0.1
     corners = np.array([[-half, -half, 0.0], [half, -half, 0.0], [half, half, 0.0], [-half, half, 0.0]])
     return Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
 
 
-def _record(paths: list[FloatArray], heights: FloatArray) -> Trace:
+def record(paths: list[FloatArray], heights: FloatArray) -> Trace:
+    """The trace of one sweep for each path, its centres at `heights` (N,) over the plate's trace, m."""
     centers: FloatArray = np.concatenate(paths)
     centers[:, 2] += TIP_RADIUS + heights
     sweep = np.repeat(np.arange(len(paths)), [len(path) for path in paths])

@@ -10,11 +10,37 @@ import typer
 
 from explore3d.errors import UserError
 
-bench = typer.Typer(help="Measure error and speed against run time, one stage at a time.", no_args_is_help=True)
+bench = typer.Typer(invoke_without_command=True)
 
 METHODS = ("importance", "emcee")
 
 Store = Annotated[Path, typer.Option("--store", help="JSONL file of finished runs; what it holds is not run again.")]
+
+
+@bench.callback()
+def all_stages(
+    context: typer.Context,
+    quick: Annotated[bool, typer.Option("--quick", help="Few settings and repeats: under two minutes.")] = False,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for page, tables and pictures.")] = Path("out/bench"),
+    peers: Annotated[
+        bool, typer.Option("--peers", help="Measure other programs too, where they are installed.")
+    ] = False,
+) -> None:
+    """Measure error against run time: all stages, or one of them by a command of its own.
+
+    Example: explore3d bench --quick --out out/bench
+    """
+    if context.invoked_subcommand is not None:
+        return
+    from explore3d.bench import Measured, summary, write
+    from explore3d.bench import bench as run
+
+    def told(each: Measured) -> None:
+        print(f"{each.stage.name:20}{len(each.points):4} points{each.seconds:8.1f} s", flush=True)
+
+    measured = run(quick, peers, told)
+    print(f"page: {write(measured, out, quick)}")
+    print(summary(measured))
 
 
 @bench.command()
@@ -88,24 +114,74 @@ def calibration(
 
 
 @bench.command()
+def odds(
+    store: Store,
+    seeds: Annotated[int, typer.Option(min=1, help="Simulations of each pair.")] = 50,
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+) -> None:
+    """Do stated probabilities come true: bump or nothing, ridge or bump, two ridges or one?
+
+    Example: explore3d bench odds --store odds.jsonl --seeds 200
+    """
+    from explore3d.bench_odds import bench_odds, table
+
+    table(bench_odds(store, seeds, seconds), print)
+
+
+@bench.command()
 def explore(
     store: Store,
     scenes: Annotated[str | None, typer.Option(help="Scenes, separated by commas; all if left out.")] = None,
     strategies: Annotated[str | None, typer.Option(help="Strategies, separated by commas; all if left out.")] = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Seeds of the noise.")] = 3,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds of the features' places and of the noise.")] = 3,
+    noise: Annotated[str, typer.Option(help="apparatus, or correlated: over half a wire's width.")] = "apparatus",
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+    out: Annotated[Path | None, typer.Option(help="Folder for the table and the curves of all finished runs.")] = None,
 ) -> None:
-    """Error of the found extents against finger time: exploring beside rasters and random sweeps.
+    """Error of the found extents against finger time: exploring beside rasters, random and ergodic sweeps.
 
     Example: explore3d bench explore --store explore.jsonl --scenes straight,empty --seeds 1
     """
     import json
 
-    from explore3d.bench_explore import STRATEGIES
+    from explore3d.bench_explore import NOISES, STRATEGIES, records
     from explore3d.bench_explore import bench as run
     from explore3d.bench_scenes import SCENES
+    from explore3d.explore_curves import write_curves
 
     chosen = _names(scenes, "--scenes", list(SCENES)), _names(strategies, "--strategies", list(STRATEGIES))
-    _print(json.dumps(record) for record in run(*chosen, seeds, store))
+    _names(noise, "--noise", list(NOISES))
+    _print(json.dumps(record) for record in run(*chosen, seeds, store, noise, seconds))
+    if out is not None:
+        _print(str(path) for path in write_curves([r for r in records(store) if r["noise"] == noise], out))
+
+
+@bench.command()
+def detect(
+    store: Store,
+    out: Annotated[Path, typer.Option(help="Folder for the table and the pictures.")],
+    seeds: Annotated[int, typer.Option(min=1, help="Sweeps of each size and noise.")] = 20,
+    quick: Annotated[bool, typer.Option(help="Few sizes and one level of noise.")] = False,
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+    bodies: Annotated[bool, typer.Option(help="False alarms on smooth bodies instead.")] = False,
+    mesh: Annotated[Path | None, typer.Option(help="With --bodies: a mesh to sweep over as well.")] = None,
+) -> None:
+    """Recall and false alarms per metre against size and noise, for each detector of a single sweep.
+
+    Example: explore3d bench detect --store detect.jsonl --out curves --quick --seeds 2
+    """
+    from explore3d.bench_detect import all_cases, cells
+    from explore3d.bench_detect import bench as run
+    from explore3d.detect_curves import write_curves
+
+    if bodies:
+        from explore3d.bench_false_alarms import bench as count
+        from explore3d.bench_false_alarms import lines
+
+        _print(lines(count(seeds, store, seconds, mesh)))
+        return
+    records = run(all_cases(seeds, quick), store, seconds)
+    _print(str(path) for path in write_curves(cells(records), out))
 
 
 @bench.command()

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapping.importance import importance_sample
-from mapping.laplace import find_optima, laplace
+from mapping.evidence import log_evidence
 from mapping.problem import Problem, Surroundings
 from mapping.spot_problem import spot_problem
 
@@ -22,9 +21,3 @@ def better_profile(cap: Problem, around: Surroundings, rng: np.random.Generator)
     cap = cap.under(around.noise)
     evidences = [log_evidence(each, rng) for each in (cap, bell)]
     return bell if evidences[1] > evidences[0] else cap
-
-
-def log_evidence(problem: Problem, rng: np.random.Generator) -> float:
-    """Log of the integral of likelihood and prior over the parameters, by importance sampling."""
-    optima = find_optima(problem.target, problem.beginnings)
-    return importance_sample(problem.target, [laplace(problem.target, each) for each in optima], rng).log_evidence

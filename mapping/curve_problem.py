@@ -13,7 +13,7 @@ from mapping.laplace import find_optima
 from mapping.priors import Normal, Prior, Uniform
 from mapping.problem import Problem, Sizes, Surroundings, pose, sizes_of, window_for
 from mapping.ridge_shape import RidgeShape
-from mapping.smooth_axis import smooth_axis
+from mapping.smooth_axis import HIGHEST_DEGREE, smooth_axis
 from mapping.spot_problem import height_prior, hollow_priors, radius_prior
 from mapping.step_shape import StepShape
 from mapping.target import Shape
@@ -24,26 +24,35 @@ FloatArray = NDArray[np.float64]
 # Chords of the chart may sag by this share of the feature's height.
 SAG = 0.005
 MOST_LEGS = 300
+# Rings are tried as Fourier series up to this degree, whatever their crossings ask for.
+SIMPLER_RINGS = 3
 HIGHEST_MODE = 8
 
 
 def curve_problem(feature: Feature, around: Surroundings) -> Problem:
     """Pose the posterior of a ridge, groove or step.
 
-    The axis gets the freedom that its crossings ask for; if that is more than a straight course over the base, the
-    straight one is tried too and kept unless the trace itself speaks against it (BIC).
+    The axis gets the freedom that its crossings ask for; if that is more than a straight course over the base, or an
+    ellipse for a ring, simpler ones are tried too and kept unless the trace itself speaks against them (BIC).
     """
     sizes = sizes_of(feature, around.trace.tip_radius)
     axis, normals, crossings = _axis_of(feature, sizes, around)
-    line, degree = smooth_axis(axis, sizes.position_sd)
-    bent = _posed(feature, sizes, axis, _normals_along(line, axis, normals), line, degree, crossings, around)
-    if degree == 1 or bool(np.array_equal(axis[0], axis[-1])):
-        return bent
-    line, _ = smooth_axis(axis, sizes.position_sd, most=1)
-    straight = _posed(feature, sizes, axis, _normals_along(line, axis, normals), line, 1, crossings, around)
-    freedom = len(bent.target.shape.start) - len(straight.target.shape.start)
-    gain = _best_fit(bent) - _best_fit(straight)
-    return bent if gain > 0.5 * max(freedom, 1) * float(np.log(len(bent.window))) else straight
+
+    def posed(most: int, least: int = 1) -> tuple[Problem, int]:
+        line, degree = smooth_axis(axis, sizes.position_sd, most, least)
+        lift = _normals_along(line, axis, normals)
+        return _posed(feature, sizes, axis, lift, line, degree, crossings, around), degree
+
+    best, highest = posed(HIGHEST_DEGREE)
+    closed = bool(np.array_equal(axis[0], axis[-1]))
+    simpler = range(1, min(highest, SIMPLER_RINGS + 1 if closed else 2))
+    for degree in reversed(simpler):
+        other, _ = posed(degree, degree)
+        freedom = len(best.target.shape.start) - len(other.target.shape.start)
+        gain = _best_fit(best) - _best_fit(other)
+        if gain <= 0.5 * max(freedom, 1) * float(np.log(len(best.window))):
+            best = other
+    return best
 
 
 def _best_fit(problem: Problem) -> float:
@@ -116,7 +125,9 @@ def _chart(
 
 def _modes(chart: Chart, ends: FloatArray, degree: int, crossings: int, sizes: Sizes) -> CurveModes:
     if chart.closed:
-        highest = max(0, min(degree, (crossings - 1) // 2, HIGHEST_MODE // 2))
+        # Offsets of a ring whose coordinates have a degree have harmonics one higher: an ellipse differs from a
+        # circle by the second.
+        highest = max(0, min(degree + 1, (crossings - 1) // 2, HIGHEST_MODE))
         return CurveModes(highest, 0.5 * chart.length, 0.5 * chart.length, True)
     reach = max(0.5 * abs(float(ends[1] - ends[0])), 0.5 * sizes.half_width)
     highest = min(max(degree, 1), max(crossings - 1, 1), HIGHEST_MODE)

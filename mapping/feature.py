@@ -64,7 +64,7 @@ class Evidence:
         snr: signal-to-noise ratio of all crossings together (matched filter).
         crossings: number of crossings by sweeps.
         algorithms: numbers of the paper's algorithms (figure 4) that report it.
-        log_odds: log Bayes factor of this kind against the next best, or None if not compared.
+        log_odds: log Bayes factor of the feature against nothing (the bare base and its neighbours), or None.
     """
 
     snr: float

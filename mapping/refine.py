@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.base import Base
+from mapping.evidence import log_evidence_of_nothing
 from mapping.feature import Feature
 from mapping.importance import TRUSTED_K_HAT, Importance, importance_sample
 from mapping.laplace import find_optima, laplace
@@ -129,14 +130,8 @@ def solve(
 
 
 def odds_against_nothing(solution: Solution) -> float:
-    """Log Bayes factor of a solved feature against the bare base (with the neighbours that it was posed with).
-
-    The evidence of the feature is the integral over its prior by importance sampling: a prior wider than the data
-    need costs what it should (Occam's factor). Noise, nuisance and samples are the same on both sides.
-    """
-    target = solution.problem.target
-    bare = np.zeros((1, len(solution.problem.window))) if target.beside is None else target.beside[None]
-    return solution.importance.log_evidence - float(target.likelihood.log_density(bare)[0])
+    """Log Bayes factor of a solved feature against the bare base (with the neighbours that it was posed with)."""
+    return solution.importance.log_evidence - log_evidence_of_nothing(solution.problem.target)
 
 
 def pose_problem(feature: Feature, around: Surroundings) -> Problem:
