@@ -24,6 +24,8 @@ FloatArray = NDArray[np.float64]
 PLACES = 2.5
 # A point feature of no more crossings, and no clearer than so many thresholds, may be a part of a faint line.
 FEW, CLEAR = 2, 2.0
+# Standard deviations above which a single place stands out.
+PLAIN = 5.0
 
 
 def with_faint_lines(
@@ -40,7 +42,8 @@ def with_faint_lines(
     inspection = inspect(trace, base, detections.noise, min(SECTIONS) * half_width / PLACES)
     normals = base.foot(inspection.points, trace.tip_radius).normals
     weak = [f for f in features if _is_weak(f, detections)]
-    masked = np.zeros(len(inspection.points), dtype=bool)
+    # what one place alone shows is not faint
+    masked = np.abs(inspection.height) > PLAIN * inspection.sd
     for feature in features:
         if feature not in weak:
             reach = 1.3 * np.sqrt(2 * trace.tip_radius * abs(feature.height.median)) + 0.5 * feature.width.high
