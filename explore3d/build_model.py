@@ -144,8 +144,8 @@ def _refine(
         for number, feature in enumerate(features):
             # a stream of its own for each feature: what one draws does not change the next
             rng = np.random.default_rng([settings.seed, number])
-            around = {"base": base, "noise": detections.noise, "others": features, "confirm": confirm}
-            refined.append(refine(feature, trace, rng, **around))
+            noise = detections.noise
+            refined.append(refine(feature, trace, rng, base=base, noise=noise, others=features, confirm=confirm))
             share((number + 1) / len(features))
     regular = sum(each.posterior is not None and each.posterior.status == "not needed" for each in refined)
     if regular:
