@@ -12,7 +12,10 @@ from explore3d.report_style import STYLE
 
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 PACKAGES = ("numpy", "scipy", "numba", "libigl", "open3d-cpu", "open3d", "emcee", "opencamlib", "pymeshlab")
-MORE_STYLE = ".table { max-height: none; } td { min-width: 4rem; }"
+MORE_STYLE = (
+    ".table { max-height: none; } td { min-width: 5rem; } td b, td small, td span { white-space: normal; }"
+    " td.number, .badge { white-space: nowrap; }"
+)
 
 
 def page(kind: str, title: str, lead: str, *sections: str) -> str:
