@@ -17,20 +17,23 @@ import numpy as np
 
 from explore3d.bench_scenes import SCENES, BenchScene
 from explore3d.truth import compare
+from hw.moves import Move
 from hw.simulated import SimulatedFinger
 from mapping.base import Base
 from mapping.object_model import ObjectModel
 from mapping.trace import Trace
 from planners.baselines import RandomSweeps, Raster
 from planners.drive import drive
+from planners.ergodic import Ergodic
 from planners.explore import Explore
 from planners.plan import Plan
 
 TIP_RADIUS = 0.01
 # Wanted half-width of the 90 % interval of an end, m
-PRECISION = 0.04e-3
-# The apparatus of the paper (theory section 6)
+PRECISION = 0.03e-3
+# The apparatus of the paper (theory section 6), and one whose noise is correlated over as much as a wire disturbs
 APPARATUS: dict[str, Any] = {"rate": 5000.0, "white": 0.2e-3, "correlated": 0.02e-3, "correlation_length": 1e-3}
+NOISES = {"apparatus": APPARATUS, "correlated": APPARATUS | {"correlated": 0.06e-3, "correlation_length": 2e-3}}
 
 Strategy = Callable[[BenchScene, np.random.Generator], Plan]
 
@@ -53,47 +56,60 @@ def _random(seconds: float) -> Strategy:
     return lambda scene, rng: RandomSweeps(base=Base(scene.base), tip_radius=TIP_RADIUS, seconds=seconds).plan(rng)
 
 
+def _ergodic(seconds: float) -> Strategy:
+    return lambda scene, rng: Ergodic(base=Base(scene.base), tip_radius=TIP_RADIUS, seconds=seconds).plan(rng)
+
+
 STRATEGIES: dict[str, Strategy] = {
     "explore": _explore,
     **{f"raster {1e3 * pitch:g} mm": _raster(pitch) for pitch in (8e-3, 4e-3, 2e-3, 1e-3, 0.5e-3)},
     **{f"random {seconds:g} s": _random(seconds) for seconds in (90.0, 180.0, 360.0)},
+    **{f"ergodic {seconds:g} s": _ergodic(seconds) for seconds in (90.0, 180.0, 360.0)},
 }
 
 
-def bench(scenes: list[str], strategies: list[str], seeds: int, out: Path) -> Iterator[dict[str, Any]]:
-    """Run what is not yet in `out` and append it there; yields every new record."""
-    done = set()
-    if out.exists():
-        records = [json.loads(text) for text in out.read_text().splitlines()]
-        done = {(record["scene"], record["strategy"], record["seed"]) for record in records}
+def bench(
+    scenes: list[str], strategies: list[str], seeds: int, out: Path, noise: str = "apparatus", seconds: float = np.inf
+) -> Iterator[dict[str, Any]]:
+    """Run what is not yet in `out` and append it there, until so many seconds have passed; yields every new record."""
+    begin = perf_counter()
+    done = {tuple(record[key] for key in ("scene", "strategy", "noise", "seed")) for record in records(out)}
     for seed in range(seeds):
         for scene in scenes:
-            body = SCENES[scene](np.random.default_rng(seed))
             for strategy in strategies:
-                if (scene, strategy, seed) in done:
+                if (scene, strategy, noise, seed) in done:
                     continue
-                record = {"scene": scene, "strategy": strategy, "seed": seed} | one_run(body, strategy, seed)
+                if perf_counter() - begin > seconds:
+                    return
+                body = SCENES[scene](np.random.default_rng(seed))
+                record = {"scene": scene, "strategy": strategy, "noise": noise, "seed": seed}
+                record |= one_run(body, strategy, seed, noise)
                 with out.open("a") as file:
                     file.write(json.dumps(record) + "\n")
                 yield record
 
 
-def one_run(body: BenchScene, strategy: str, seed: int) -> dict[str, Any]:
+def records(store: Path) -> list[dict[str, Any]]:
+    """The finished runs in a store; none if there is no such file."""
+    return [json.loads(text) for text in store.read_text().splitlines()] if store.exists() else []
+
+
+def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus") -> dict[str, Any]:
     """Sweep the body by one strategy, build its model, and compare it with the truth."""
     base = Base(body.base)
-    finger = SimulatedFinger(object=body.object, tip_radius=TIP_RADIUS, seed=seed, **APPARATUS)
+    finger = SimulatedFinger(object=body.object, tip_radius=TIP_RADIUS, seed=seed, **NOISES[noise])
     clock = _Clock(finger)
-    start = perf_counter()
     record, outcome = drive(STRATEGIES[strategy](body, np.random.default_rng(seed)), clock.execute)
-    planning = perf_counter() - start - clock.seconds
     trace = Trace.concatenate([felt for _, felt in record if len(felt)])
     start = perf_counter()
     model = modelled(trace, base, seed)
     modelling = perf_counter() - start
     return {
         "finger_seconds": finger.clock,
-        "planning_seconds": planning,
+        "planning_seconds": float(sum(clock.waits)),
         "modelling_seconds": modelling,
+        "latency_median": float(np.median(clock.waits[1:])),
+        "latency_worst": float(max(clock.waits[1:])),
         "moves": len(record),
         "outcome": outcome.reason,
     } | errors(model, body)
@@ -108,7 +124,15 @@ def modelled(trace: Trace, base: Base, seed: int) -> ObjectModel:
     detections = detect(trace, base)
     features = assemble(detections, trace, base)
     refined = [
-        refine(feature, trace, np.random.default_rng([seed, k]), base=base, noise=detections.noise, others=features)
+        refine(
+            feature,
+            trace,
+            np.random.default_rng([seed, k]),
+            base=base,
+            noise=detections.noise,
+            others=features,
+            confirm=False,
+        )
         for k, feature in enumerate(features)
     ]
     return ObjectModel.attach(base, tuple(refined), provenance={})
@@ -132,14 +156,15 @@ def errors(model: ObjectModel, body: BenchScene) -> dict[str, Any]:
 
 
 class _Clock:
-    """Counts the time that the simulation of the finger takes, which is no part of planning."""
+    """Executes moves, and keeps how long the finger waited for each of them: the simulation is no part of planning."""
 
     def __init__(self, finger: SimulatedFinger) -> None:
         self.finger = finger
-        self.seconds = 0.0
+        self.waits: list[float] = []
+        self._idle = perf_counter()
 
-    def execute(self, move: Any) -> Trace:
-        start = perf_counter()
+    def execute(self, move: Move) -> Trace:
+        self.waits.append(perf_counter() - self._idle)
         trace = self.finger.execute(move)
-        self.seconds += perf_counter() - start
+        self._idle = perf_counter()
         return trace

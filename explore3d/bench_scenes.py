@@ -156,7 +156,7 @@ def free_form(rng: np.random.Generator, subdivisions: int = 6) -> BenchScene:
         point = blob(way[None])
         parts.append((point + 1e-3 * ball, some))
         truth.append(TrueFeature("bump", point, 1e-3, 2e-3))
-    return BenchScene(Surface(*parts[0]), joined(*parts), tuple(truth), shortest_ridge=None, smallest=0.5e-3)
+    return BenchScene(Surface(*parts[0]), joined(*parts), tuple(truth), shortest_ridge=None, smallest=0.6e-3)
 
 
 SCENES: dict[str, Callable[[np.random.Generator], BenchScene]] = {

@@ -56,6 +56,11 @@ class Base:
         return NearestPoint(self.surface)
 
     @property
+    def nearest(self) -> NearestPoint:
+        """Nearest points of the surface, with the tree that `foot` searches."""
+        return self._nearest
+
+    @property
     def edge_normals(self) -> FloatArray:
         """(F, 3, 3) mean normal of the faces on either side of the edge opposite to each corner of a face."""
         return self._nearest.edge_normals

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +30,10 @@ from planners.survey import Survey
 
 FloatArray = NDArray[np.float64]
 
-# Survey sweeps that are detected together; the first batch also tells the noise, if it is not given
-BATCH = 12
+# Path of the first survey sweeps, in tip radii, that tell the noise if it is not given; later ones are detected singly
+LEARNING = 50.0
+# Height that must stay visible between two sweeps, in detection limits
+MARGIN = 1.25
 # Slides off one end, at most
 MOST_SLIDES = 60
 
@@ -144,7 +146,7 @@ class Explore:
         """Standard deviation whose 90 % interval is the wanted precision, m."""
         return self.precision / 1.645
 
-    @property
+    @cached_property
     def survey(self) -> Survey:
         """The survey that it begins with."""
         return Survey(
@@ -195,27 +197,42 @@ class Explore:
         return Outcome("done")
 
     def _survey(self, found: Found) -> Plan:
-        """Every sweep of the survey, detected in batches."""
-        waiting: list[Trace] = []
-        paths = []
-        for move in self.survey.sweeps():
+        """Every sweep of the survey; the first ones are detected together, for they tell the noise."""
+        survey, waiting, paths, felt = self.survey, list[Trace](), list[FloatArray](), 0.0
+        if survey.slices is None and (first := next(survey.sweeps(), None)) is not None:
+            trace = yield first
+            survey = self._widened(survey, trace, found)
+        for move in survey.sweeps():
             trace = yield move
             paths.append(move.path + self.tip_radius * move.approach)
             if len(trace) == 0:
                 found.left_out.append("a survey sweep felt no contact")
                 continue
             waiting.append(trace)
-            if len(waiting) >= BATCH:
+            felt += move.length
+            if found.noise is not None or felt >= LEARNING * self.tip_radius:
                 self._detect(waiting, found)
         if waiting:
             self._detect(waiting, found)
-        found.survey = self.survey.covered(paths)
-        if self.survey.slices is not None:
+        found.survey = survey.covered(paths)
+        if survey.slices is not None:
             found.left_out.append(
                 f"features smaller than a ridge that spans {1e3 * (self.shortest_ridge or 0.0):g} mm: "
                 f"{100 * found.survey.fraction:.0f} % of the surface lies near enough to a sweep to see them"
             )
         return Outcome("done")
+
+    def _widened(self, survey: Survey, trace: Trace, found: Found) -> Survey:
+        """The survey with strips as wide as the noise of a first sweep allows its smallest feature to be seen."""
+        if len(trace) < 16:
+            return survey
+        limit = detect(trace, self.base, noise=found.noise).detection_limit
+        if limit > self.smallest:
+            found.left_out.append(
+                f"features lower than {1e3 * limit:.2g} mm: a single sweep does not show them through the noise, "
+                f"though {1e3 * self.smallest:.2g} mm were asked for"
+            )
+        return replace(survey, visible=float(np.clip(MARGIN * limit / self.smallest, 0.1, survey.visible)))
 
     def _detect(self, waiting: list[Trace], found: Found) -> None:
         felt = detect(

@@ -18,6 +18,8 @@ Shape = Callable[[FloatArray, float], FloatArray]
 # Bins that a sweep is averaged over; every shape is wider than many of them
 BINS = 160
 STARTS = 81
+# Relative change of place, height and chi-squared below which a fit has converged: far below its uncertainty
+ENOUGH = 1e-6
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ def fit_shape(
     bounds = ([within[0], 0.0], [within[1], 3.0 * crest])
     step = max(0.01 * (within[1] - within[0]), np.finfo(float).tiny)
     start = [float(np.clip(first, within[0] + 0.1 * step, within[1] - 0.1 * step)), crest]
-    fit = least_squares(residual, start, bounds=bounds, x_scale=[step, crest])
+    fit = least_squares(residual, start, bounds=bounds, x_scale=[step, crest], ftol=ENOUGH, xtol=ENOUGH, max_nfev=40)
     jacobian = np.asarray(fit.jac)
     variance = np.diag(np.linalg.pinv(jacobian.T @ jacobian))
     sd, height_sd = (float(np.sqrt(v)) if v > 0 else np.inf for v in variance)

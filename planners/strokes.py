@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hw.moves import Move
 from mapping.base import Base
-from mapping.nearest import NearestPoint
 from planners.pressed_path import pressed_sweep
 
 FloatArray = NDArray[np.float64]
@@ -51,13 +49,9 @@ class Strokes:
     speed: float = 0.03
     force: float = 1.0
 
-    @cached_property
-    def _nearest(self) -> NearestPoint:
-        return NearestPoint(self.base.surface)
-
     def onto(self, point: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Nearest point of the base (3,) and its outward normal (3,)."""
-        near = self._nearest.query(np.atleast_2d(point))
+        near = self.base.nearest.query(np.atleast_2d(point))
         return near.points[0], near.normals[0]
 
     def walk(self, point: FloatArray, direction: FloatArray, length: float, turn: float = 0.0) -> Walk:
@@ -79,12 +73,12 @@ class Strokes:
         """
         count = max(1, int(np.ceil(length / (0.08 * self.tip_radius))))
         step = length / count
-        near = self._nearest.query(points)
+        near = self.base.nearest.query(points)
         track = [(near.points, near.normals, tangential(directions, near.normals))]
         going = [np.ones(len(points), dtype=bool)]
         for _ in range(count):
             here, normal, ahead = track[-1]
-            near = self._nearest.query(here + step * ahead)
+            near = self.base.nearest.query(here + step * ahead)
             onward = tangential(carried(ahead, normal, near.normals), near.normals)
             onward = turned(onward, near.normals, turn * step)
             stuck = np.linalg.norm(near.points - here, axis=1) < 0.3 * step

@@ -44,7 +44,7 @@ def span(axis: np.ndarray) -> float:
 
 
 def test_the_bench_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench_explore, "one_run", lambda body, strategy, seed: {"finger_seconds": seed})
+    monkeypatch.setattr(bench_explore, "one_run", lambda body, strategy, seed, noise: {"finger_seconds": seed})
     out = tmp_path / "bench.jsonl"
     first = list(bench_explore.bench(["empty"], ["explore"], 2, out))
     assert [record["seed"] for record in first] == [0, 1]

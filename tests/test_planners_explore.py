@@ -146,7 +146,7 @@ def test_nothing_is_found_on_a_bare_plate_and_nothing_but_the_survey_is_done() -
     assert outcome.reason == "nothing found"
     assert not found.tracks and not found.bumps and not found.crossings
     surveyed = sum(move.duration for move in Explore(base=Base(PLATE), tip_radius=R, smallest=3e-4).survey.sweeps())
-    assert finger.clock == pytest.approx(surveyed, rel=0.05)
+    assert 0.7 * surveyed < finger.clock < 1.05 * surveyed  # strips may be wider than planned before the noise is known
     assert found.left_out
 
 
