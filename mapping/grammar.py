@@ -74,7 +74,8 @@ def _linked(detections: Detections, trace: Trace, base: Base) -> list[Feature]:
         crests = [c for c in [*crossings, *along] if c.kind == kind]
         for members in groups(crests, around.inspection, scale) if crests else []:
             group = [crests[i] for i in members]
-            if all(is_open(c, around.inspection) for c in group):
+            top = max(abs(c.height) for c in group)
+            if all(is_open(c, around.inspection) for c in group if abs(c.height) > 0.5 * top):
                 doubtful.append((sign, group))
             else:
                 details += _details(group, sign, around)
