@@ -185,6 +185,27 @@ def detect(
 
 
 @bench.command()
+def classify(
+    store: Store,
+    bodies: Annotated[str | None, typer.Option(help="Bodies, separated by commas; all if left out.")] = None,
+    noises: Annotated[str | None, typer.Option(help="none, apparatus or both, separated by a comma.")] = None,
+    sweeps: Annotated[str | None, typer.Option(help="Patterns of sweeps, separated by commas.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds of the noise and of the sweeps' placement.")] = 5,
+) -> None:
+    """Is each kind of feature found and rightly named, and nothing invented? As CSV.
+
+    Example: explore3d bench classify --store classify.jsonl --bodies bump,ridge --seeds 100
+    """
+    from explore3d.bench_classify import NOISES, SWEEPS, table
+    from explore3d.bench_classify import bench as run
+    from explore3d.bench_classify_scenes import BODIES
+
+    chosen = _names(bodies, "--bodies", list(BODIES)), _names(noises, "--noises", list(NOISES))
+    patterns = _names(sweeps, "--sweeps", list(SWEEPS))
+    print(table(list(run(*chosen, patterns, seeds, store))), end="")
+
+
+@bench.command()
 def dynamics() -> None:
     """Computing time and error of stiff contact over the stiffness, as CSV.
 
