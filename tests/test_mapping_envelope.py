@@ -228,7 +228,9 @@ def test_a_wire_oblique_to_the_sweeps_is_touched_only_where_it_was_touched(angle
     assert error.max() <= 1e-9
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.2, 0.4])
+@pytest.mark.parametrize(
+    "angle", [pytest.param(0.0, marks=pytest.mark.slow), 0.2, pytest.param(0.4, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize(
     ("trace_of", "low", "high"),
     [
