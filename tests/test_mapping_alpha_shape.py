@@ -59,7 +59,7 @@ def test_a_cloud_all_round_a_sphere_bounds_it_from_outside(scale):
     estimate = estimate_surface(cloud(1.5 * scale * arm, 0.5 * scale), "alpha", outward=arm)
     distance = np.linalg.norm(estimate.points, axis=1) / scale
     assert distance.min() >= 1 - 1e-12
-    assert distance.max() < 1.05
+    assert distance.max() < 1.1  # the largest gap between the centres
     assert np.linalg.norm(estimate.points[:, None] - 1.5 * scale * arm[None], axis=2).min() >= 0.5 * scale * (1 - 1e-9)
     assert estimate.surface is not None and border_loops(estimate.surface) == 0
 
