@@ -63,8 +63,10 @@ def line_end(axis: FloatArray, height: float, half_width: float, inspection: Ins
     likely = reach[rise <= INTERVAL]
     seen = bool(rise[-1] > SEEN)
     best = float(0.5 * (likely[0] + likely[-1]) if seen else likely[0])
-    beyond_end = int(((axis - anchor) @ way > best)[_index_of(axis, anchor) :].sum())
-    return LineEnd(anchor + best * way, best - float(likely[0]), float(likely[-1]) - best, seen, beyond_end)
+    # the ball leaves a hollow's floor line half a width before the rim at its end
+    rim = half_width if height < 0 else 0.0
+    beyond_end = int(((axis - anchor) @ way > best + rim)[_index_of(axis, anchor) :].sum())
+    return LineEnd(anchor + (best + rim) * way, best - float(likely[0]), float(likely[-1]) - best, seen, beyond_end)
 
 
 def _last_leg(axis: FloatArray, back: float) -> tuple[FloatArray, FloatArray, float]:
