@@ -13,7 +13,7 @@ from explore3d.cli_analyze import analyze
 from explore3d.cli_bench import bench
 from explore3d.cli_doctor import doctor
 from explore3d.cli_figures import figures
-from explore3d.cli_hw import calibrate, emulate, selftest
+from explore3d.cli_hw import calibrate, emulate, reprobe, selftest
 from explore3d.cli_merge import merge
 from explore3d.cli_run import plan, run
 from explore3d.cli_stability import stability
@@ -28,7 +28,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, plan, analyze, merge, figures, doctor, emulate, calibrate, selftest, stability):
+for command in (run, plan, analyze, merge, figures, doctor, emulate, calibrate, selftest, reprobe, stability):
     app.command()(command)
 app.add_typer(bench, name="bench")
 

@@ -1,4 +1,4 @@
-"""explore3d emulate, calibrate, selftest: hardware, emulated and real."""
+"""explore3d emulate, calibrate, selftest, reprobe: hardware, emulated and real."""
 
 from __future__ import annotations
 
@@ -99,6 +99,24 @@ def selftest(
     found = test(scene, parse_length(radius), _point(center), arm=arm)
     words = f"range of radii {1e3 * found['range']:.4f} mm in {found['time']:.1f} s ({found['samples']:.0f} contacts)"
     print(as_json(found) if json else words)
+
+
+def reprobe(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier session.")],
+    at: Annotated[str, typer.Option(metavar="X,Y,Z", help='A place on the body, object frame: "10 mm, 5 mm, 0 mm".')],
+    touches: Annotated[int, typer.Option(help="How often to touch it.", min=1)] = 3,
+    arm: Arm = False,
+    json: Json = False,
+) -> None:
+    """Touch one place of an earlier session again, and say how far off the record it is.
+
+    Example: explore3d reprobe out/wire --at "12 mm, 3 mm, 0 mm"
+    """
+    from explore3d.calibrate import as_json
+    from explore3d.reprobe import reprobe as touch
+
+    found = touch(folder, _point(at), touches=touches, arm=arm)
+    print(as_json(found.record()) if json else "\n".join(found.lines()))
 
 
 def _point(text: str) -> tuple[float, float, float]:

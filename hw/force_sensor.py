@@ -85,6 +85,14 @@ class ForceSensor:
     ) -> None:
         self.link.close()
 
+    def reconnect(self, within: float) -> bool:
+        """Try for some seconds to get back a sensor that was lost; True if it sends again. Tare it anew."""
+        self._samples.clear()
+        if not self.link.reopen(within):
+            return False
+        self.start()
+        return self.wait(self.fresh, 2.0)
+
     @property
     def info(self) -> dict[str, Any]:
         """Kind, port, rate, counters, clock."""

@@ -25,6 +25,9 @@ from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
 
+# How long to wait for a sensor to come back, s
+RECONNECT = 5.0
+
 
 @dataclass(kw_only=True)
 class GrblFinger:
@@ -192,7 +195,7 @@ class GrblFinger:
         stage = self.stage
         if not self.armed:
             raise FingerError("dry run: nothing is moved on a real port without --arm")
-        if self._lost is not None:
+        if self._lost is not None and not self._regained(stage):
             raise FingerError(self._lost)
         self._refuse_what_exceeds(move, stage)
         touched: list[Trace] = []
@@ -207,6 +210,16 @@ class GrblFinger:
             if not touched:  # one line was refused, a garbled one perhaps: what was felt before it stays
                 raise
         return Trace.concatenate(touched or [self._trace(Touched(np.zeros(0), np.zeros((0, 3))))])
+
+    def _regained(self, stage: GuardedStage) -> bool:
+        """True if all that was lost was the sensor, and it is back: the machine stood still and knows where it is."""
+        controller = stage.controller
+        if self.slide is None or self.slide.sensor.link.is_open or not controller.link.is_open or controller.alarm:
+            return False
+        if not self.slide.sensor.reconnect(RECONNECT) or not controller.clear():
+            return False
+        self._lost = None
+        return True
 
     def measured_delay(self) -> tuple[float, float]:
         """Delay of the force sensor behind the stage and its standard error, s, where the last sweep ended.

@@ -290,6 +290,7 @@ class GrblController:
             self._news.wait_for(lambda: self._restarts > before, timeout=within)
         status = self.status()
         self._restarts, self.stop_reason = before, None
+        self._sent.clear()  # the reset threw away what was queued: it will not be answered
         if status.state == "Alarm" or self.alarm is not None:
             self.alarm = self.alarm or "the machine is locked (state Alarm)"
             return False

@@ -107,12 +107,22 @@ class SimulatedFinger:
             FingerError: the move leaves the workspace, or is faster or harder than allowed.
         """
         self._refuse_what_exceeds(move)
+        start = self._passed(move)
+        return self._sweep(move, start) if move.purpose == "sweep" else self._empty()
+
+    def skip(self, move: Move) -> None:
+        """Take a move for made: what an earlier session felt is not felt again, but time and noise go on from it."""
+        self._passed(move)
+        self._sweeps += move.purpose == "sweep"
+
+    def _passed(self, move: Move) -> float:
+        """Advance the clock over a move; when it begins, s."""
         gap = 0.0 if self._position is None else float(np.linalg.norm(move.path[0] - self._position))
         # a plan that does not command the way between two sweeps still pays for it
         self._clock += gap / self._workspace.max_speed
         start, self._clock = self._clock, self._clock + move.duration
         self._position = move.path[-1]
-        return self._sweep(move, start) if move.purpose == "sweep" else self._empty()
+        return start
 
     def _refuse_what_exceeds(self, move: Move) -> None:
         low, high, path = self._workspace.low, self._workspace.high, move.path
