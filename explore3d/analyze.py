@@ -11,11 +11,13 @@ from explore3d.analysis import Analysis
 from explore3d.base_record import read_base
 from explore3d.build_model import build_model
 from explore3d.load_logs import load_logs
+from explore3d.log_stream import large_log
 from explore3d.meshes import load_mesh
 from explore3d.recording import Log
 from explore3d.scene import Scene, parse_scene
 from explore3d.session import Session
 from explore3d.stages import Progress, Stages, silent
+from explore3d.units import parse_length
 from mapping.base import Base
 
 
@@ -46,6 +48,12 @@ def analyze(
         UserError: input that cannot be used, named by file and field.
     """
     paths = [logs] if isinstance(logs, str | Path) else list(logs)
+    if len(paths) == 1 and (large := large_log(paths[0])) is not None:
+        from explore3d.streaming import analyze_stream
+
+        given = None if model is None else Base(load_mesh(model, model_units))
+        radius = None if tip_radius is None else parse_length(tip_radius)
+        return analyze_stream(large, out, base=given, tip_radius=radius, progress=progress, force=force)
     stages = Stages(progress, force)
     with stages.stage("reading"):
         log = load_logs(paths, tip_radius=tip_radius, **table)

@@ -65,7 +65,7 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
     """
     settings, trace = Settings.of(scene), log.trace
     base = _base(trace, base, stages)
-    detections = _detect(trace, base, settings, stages)
+    detections = log.detections or _detect(trace, base, settings, stages)
     features = _assemble(detections, trace, base, stages)
     features = _refine(features, trace, base, detections, settings, stages)
     estimate = _estimate(features, trace, base, detections, stages)

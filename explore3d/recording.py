@@ -5,10 +5,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from explore3d.errors import UserError
 from mapping.trace import Trace
+
+if TYPE_CHECKING:
+    from mapping.detectors import Detections
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,7 @@ class Log:
         recovered: one sentence on what was lost or left out, "" if nothing.
         sha256: of the file's bytes (of several files: of their digests joined by newlines).
         sources: paths of the files.
+        detections: of a log that was searched while it streamed by; `trace` is then what is left of it.
     """
 
     trace: Trace
@@ -49,6 +53,7 @@ class Log:
     recovered: str = ""
     sha256: str = ""
     sources: tuple[str, ...] = ()
+    detections: Detections | None = None
 
 
 def merge(logs: Sequence[Log]) -> Log:

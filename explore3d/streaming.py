@@ -1,0 +1,87 @@
+"""Streaming: the analysis of a log too large for memory, by whole sweeps, in bounded memory, resumable."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Collection
+from pathlib import Path
+
+from explore3d.analysis import Analysis
+from explore3d.analyze import conclude
+from explore3d.base_record import read_base
+from explore3d.build_model import Settings, build_model
+from explore3d.condense import CHUNK, KEPT, Condensed, condense
+from explore3d.log_stream import LogStream, count_samples, digest, head
+from explore3d.recording import Log
+from explore3d.scene import parse_scene
+from explore3d.session import Session
+from explore3d.stages import Progress, Stages, silent
+from mapping.base import Base
+from mapping.left_out import LeftOut
+from mapping.trace import Trace
+
+
+def analyze_stream(
+    path: Path,
+    out: Path | str | None,
+    *,
+    base: Base | None = None,
+    tip_radius: float | None = None,
+    progress: Progress = silent,
+    force: Collection[str] = (),
+    chunk: int = CHUNK,
+) -> Analysis:
+    """The annotated model of one large log; arguments and errors as for explore3d.analyze.analyze.
+
+    What came of each chunk stays in `<out>.chunks` until the whole is done: a rerun takes it from there.
+    """
+    stages = Stages(progress, force)
+    scene_text, events = head(path)
+    scene = parse_scene(scene_text, path) if scene_text else None
+    base = base or read_base(events) or _fitted(path, tip_radius, stages)
+    settings = Settings.of(scene)
+    folder = None if out is None else Path(out).with_name(Path(out).name + ".chunks")
+    stream = LogStream(path, tip_radius)
+    with stages.stage("detection") as share:
+        condensed = condense(
+            stream, base, folder, share, chunk,
+            algorithm=settings.algorithm, false_alarms_per_metre=settings.false_alarms_per_metre,
+        )  # fmt: skip
+    log = _log(stream, condensed)
+    far = condensed.samples - len(condensed.trace)
+    searched = f"all {condensed.samples:,} samples were searched; {far:,} of them, away from crossings, were not kept"
+    stages.left_out.append(LeftOut("part of the trace", searched))
+    if out is None:
+        return build_model(log, scene, base, stages)
+    with Session(out, keep=log.sources) as session:
+        analysis = conclude(session, log, scene, base, stages)
+    if folder is not None:
+        shutil.rmtree(folder, ignore_errors=True)
+    return analysis
+
+
+def _log(stream: LogStream, condensed: Condensed) -> Log:
+    return Log(
+        trace=condensed.trace,
+        scene_text=stream.scene_text,
+        events=stream.events,
+        complete=stream.complete,
+        recovered=stream.recovered,
+        sha256=digest(stream.path),
+        sources=(str(stream.path),),
+        detections=condensed.detections,
+    )
+
+
+def _fitted(path: Path, tip_radius: float | None, stages: Stages) -> Base:
+    """The base of a log that has none, from a first pass over every k-th sample."""
+    from mapping.base_fit import fit_base
+
+    every, total, done = max(1, round(count_samples(path) / KEPT)), max(count_samples(path), 1), 0
+    parts = []
+    with stages.stage("base fit") as share:
+        for trace in LogStream(path, tip_radius).sweeps(CHUNK):
+            parts.append(trace.select(slice(None, None, every)))
+            done += len(trace)
+            share(0.9 * min(1.0, done / total))
+        return fit_base(Trace.concatenate(parts))
