@@ -77,6 +77,12 @@ def branches(points: FloatArray, half_width: float, length: FloatArray | None = 
     return _joined(arms, meeting, partner, crowded)
 
 
+def main_line(points: FloatArray) -> FloatArray:
+    """The points (K, 3) that lie on one line, without branches, in order."""
+    length = np.linalg.norm(points[:, None] - points[None], axis=2)
+    return points[_path(_without_twigs(spanning_tree(length), points, np.inf))]
+
+
 def spanning_tree(length: FloatArray) -> Tree:
     """Neighbours of each point in the minimum spanning tree of links of given lengths (K, K), by Prim's algorithm."""
     count = len(length)

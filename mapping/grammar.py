@@ -1,4 +1,4 @@
-"""Grammar: crossings of sweeps become bumps, ridges, pits, grooves and steps."""
+"""Grammar: crossings of sweeps become bumps, ridges, pits, grooves, steps and edges."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from mapping.base import Base
 from mapping.crest_trace import distances
 from mapping.crossing import Crossing
 from mapping.detectors import Detections
+from mapping.edge_feature import edge_features
 from mapping.faint_feature import with_faint_lines
 from mapping.feature import Feature
 from mapping.inspection import inspect
@@ -60,9 +61,10 @@ def assemble(
 
 def _linked(detections: Detections, trace: Trace, base: Base) -> list[Feature]:
     """Features of the crossings that single sweeps detected."""
-    crossings = detections.crossings
+    crossings: Sequence[Crossing] = detections.crossings
     scale = _scale(crossings, trace.tip_radius)
     around = Around(inspect(trace, base, detections.noise, 0.2 * scale), base, detections, trace.tip_radius)
+    edges, crossings = edge_features(crossings, around)
     runs, steps = split_runs(crossings)
     lines, bands = _sorted_runs(runs, steps, around)
     steps += [edge for band in bands for edge in (band.first, band.last)]
@@ -84,7 +86,7 @@ def _linked(detections: Detections, trace: Trace, base: Base) -> list[Feature]:
     for sign, group in doubtful:
         rest = [c for c in group if not on_a_step(c, steps, stepped)]
         details += _details(rest, sign, around) if rest else []
-    return [*_without_shadows(details, trace.tip_radius), *stepped]
+    return [*_without_shadows(details, trace.tip_radius), *stepped, *edges]
 
 
 def _name(crossing: Crossing) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mapping.branches import branches
+from mapping.branches import main_line
 from mapping.crest_trace import distances
 from mapping.crossing import Crossing
 from mapping.feature import Evidence, Feature, Interval
@@ -35,7 +35,7 @@ def _explained(step: Crossing, features: Sequence[Feature], tip_radius: float) -
 def _step(line: list[Crossing], around: Around) -> Feature:
     half_width = float(np.median([c.half_width for c in line]))
     points = np.array([mean_point(cluster) for cluster in merged(line, ONE_POINT * half_width)])
-    axis = max((b.axis for b in branches(points, half_width)), key=lambda a: float(arclengths(a)[-1]))
+    axis = main_line(points)
     height = float(np.median([abs(c.height) for c in line]))
     sd = float(np.median([c.height_sd for c in line]) / np.sqrt(len(line)))
     length = float(arclengths(axis)[-1])
