@@ -24,7 +24,7 @@ class Blocks:
 
     Args:
         values: (N,) heights over the base, m; NaN where a feature is or may be.
-        steps: (N,) lengths of path that the blocks cover, m; infinity where another run begins.
+        steps: (N,) lengths of path that the blocks cover, m; negative where another run begins.
         samples: in a block.
     """
 
@@ -59,7 +59,7 @@ def fit_noise(blocks: Sequence[Blocks], start: Noise) -> NoiseFit:
         return NoiseFit(start)
     alone = np.zeros((3, 3))
     alone[0, 0] = 2.0 / count
-    longest = max(float(np.max(b.steps[np.isfinite(b.steps)], initial=0.0)) for b in blocks)
+    longest = max(float(np.abs(b.steps).max(initial=0.0)) for b in blocks)
     guess = start if start.correlated > 0 else Noise(start.white or white, 0.1 * white, 10 * longest)
     theta, covariance, misfit = _newton(blocks, _logarithms(guess, white))
     if misfit + CORRELATED_GAIN > _misfit(blocks, Noise(white)):

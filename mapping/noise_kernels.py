@@ -41,7 +41,7 @@ def block_likelihood(values, steps, samples, white, correlated, length):  # type
 
     Args:
         values: (N,) block means; NaN where nothing counts.
-        steps: (N,) lengths of the blocks, m; infinity begins a new run.
+        steps: (N,) lengths of the blocks, m; negative where another run begins.
         samples: in a block.
         white, correlated, length: of the noise.
     """
@@ -53,9 +53,9 @@ def block_likelihood(values, steps, samples, white, correlated, length):  # type
     result = 0.0
     for i in range(len(values)):
         step = steps[i]
-        if not np.isfinite(step):
+        if step < 0:
             state, variance = 0.0, power
-            step = last if last > 0 else length
+            step = -step
         if step != last:
             x = step / length
             decay = np.exp(-x)

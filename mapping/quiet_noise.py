@@ -159,10 +159,12 @@ def _raw_blocks(
         if whole < 2 * size:
             continue
         value, s = (column[:whole].reshape(-1, size).mean(axis=1) for column in (stretch.height, stretch.s))
-        step = np.diff(s, prepend=-np.inf)
+        step = np.diff(s, prepend=s[0])
         typical = float(np.median(step[1:]))
-        # what arclength adds in rounding would only cost the likelihood its shortcuts
+        # what arclength adds in rounding would only cost the likelihood its shortcuts; a gap begins another run
         step = np.where(np.abs(step - typical) < 0.2 * typical, typical, np.maximum(step, 0.01 * typical))
+        step = np.where(step > 3 * typical, -typical, step)
+        step[0] = -typical
         steps.append(step)
         values.append(np.where(_is_quiet(s, stretch.sweep, profiles, quiet), value, np.nan))
     if not values:
@@ -183,7 +185,7 @@ def _is_quiet(s: FloatArray, sweep: int, profiles: Sequence[HeightProfile], quie
 
 def _profile_blocks(profile: HeightProfile, keep: BoolArray) -> Blocks:
     steps = np.full(len(keep), profile.spacing)
-    steps[0] = np.inf
+    steps[0] = -profile.spacing
     return Blocks(np.where(keep, profile.height, np.nan), steps, profile.samples)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mapping.base import Base
-from mapping.detectors import DetectionError, detect
+from mapping.detectors import DetectionError, Detections, detect
 from mapping.false_alarms import false_alarm_rate, threshold_for
 from mapping.height_profile import HeightProfile, height_profiles
 from mapping.matched_filter import build_bank
@@ -133,17 +134,38 @@ def test_detection_refuses_what_it_cannot_do():
     assert "too few" in reason
 
 
-@pytest.mark.skipif(not PROFILE.exists(), reason="the real stylus profile is not beside this repository")
-@pytest.mark.parametrize("order", ["as recorded", "reversed", "every other sample"])
-def test_a_real_stylus_profile_shows_its_bumps_and_no_pits(order):
+ORDERS = {"as recorded": slice(None), "reversed": slice(None, None, -1), "every other sample": slice(None, None, 2)}
+needs_profile = pytest.mark.skipif(not PROFILE.exists(), reason="the real stylus profile is not beside this repository")
+
+
+@cache
+def real(order: str) -> Detections:
     x, z = 1e-3 * np.genfromtxt(PROFILE, delimiter=";", skip_header=2)[:, :2].T
-    cut = {"as recorded": slice(None), "reversed": slice(None, None, -1), "every other sample": slice(None, None, 2)}
-    found = detect(Trace.from_profile(x[cut[order]], z[cut[order]], 2e-6))
+    return detect(Trace.from_profile(x[ORDERS[order]], z[ORDERS[order]], 2e-6))
+
+
+@needs_profile
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_real_stylus_profile_shows_its_bumps_and_no_pits(order):
+    found = real(order)
     places = 1e3 * np.array([c.point[0] for c in found.crossings])
     seen = sum(np.abs(places - listed).min() < 2e-3 for listed in LISTED)
     assert seen >= 15
     assert len(places) <= 40
     assert all(c.kind == "convex" and c.height > 4 * found.noise.sd for c in found.crossings)
+
+
+@needs_profile
+@pytest.mark.parametrize("order", ["reversed", "every other sample"])
+def test_places_on_a_real_stylus_profile_do_not_depend_on_how_it_was_sampled(order):
+    one, other = real("as recorded"), real(order)
+    certain = 1.1 * max(one.detection_limit, other.detection_limit)
+    places = np.array([c.point[0] for c in other.crossings])
+    off = [np.abs(places - c.point[0]).min() for c in one.crossings if c.height > certain]
+    assert len(off) >= 20
+    # samples are 0.5 um apart
+    assert max(off) < 0.2e-6
+    assert abs(len(places) - len(one.crossings)) <= 6
 
 
 def test_a_bin_that_a_sweep_only_ends_in_does_not_count_as_a_full_one() -> None:
