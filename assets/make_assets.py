@@ -75,7 +75,7 @@ def make_tile() -> None:
     write_mesh("tile", tile)
     write_mesh("wire_on_tile", together(tile, wire))
     truth = {"kind": "ridge", "axis": ends, "height": 2 * radius, "width": 2 * radius, "length": TILE["length"]}
-    for scene in ("grbl_peck", "grbl_slide"):
+    for scene in ("grbl_peck", "grbl_slide", "unknown_plate"):
         write_truth(scene, [truth])
 
 

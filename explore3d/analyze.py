@@ -65,13 +65,11 @@ def analyze(
         return conclude(session, log, scene, base, stages)
 
 
-def conclude(
-    session: Session, log: Log, scene: Scene | None, base: Base | None, stages: Stages, **about: Any
-) -> Analysis:
+def conclude(session: Session, log: Log, scene: Scene | None, base: Base | None, stages: Stages) -> Analysis:
     """Build the model of a log and write it, with its pictures and report, into a session's folder."""
     from explore3d.report import write_report
 
-    analysis = replace(build_model(log, scene, base, stages), **about)
+    analysis = build_model(log, scene, base, stages)
     with session.staging() as folder:
         with stages.stage("report"):
             write_report(analysis, folder)

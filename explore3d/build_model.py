@@ -17,6 +17,7 @@ from explore3d.stages import Stages
 from explore3d.truth import TrueFeature, compare
 from mapping.base import Base
 from mapping.feature import Feature
+from mapping.left_out import LeftOut
 from mapping.object_model import ObjectModel
 from mapping.trace import Trace
 
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 # The report also says what a tip of this many times the radius would call finer than itself.
 OTHER_TIP = 2.5
+# A pose beyond what the scene allows by this factor is not believed
+BELIEVED = 1.25
 # Less noise than this many tip radii is rounding: nothing to smooth away
 NOISE_FREE = 2e-8
 
@@ -63,8 +66,10 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
         base: the given global model, or None to have it fitted.
         stages: the account of what runs and what is left out.
     """
-    settings, trace = Settings.of(scene), log.trace
-    base = _base(trace, base, stages)
+    settings = Settings.of(scene)
+    base = _base(log.trace, base, stages)
+    base = _placed(log.trace, base, scene, stages)
+    trace = _over(log.trace, base, stages)
     detections = log.detections or _detect(trace, base, settings, stages)
     features = _assemble(detections, trace, base, stages)
     features = _refine(features, trace, base, detections, settings, stages)
@@ -75,7 +80,7 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
     )
     model = ObjectModel.attach(
         base,
-        features,
+        in_model_frame(features, base),
         provenance=_provenance(log, scene, settings, detections),
         reach=None if estimate is None else base_reach(base.surface, estimate),
     )
@@ -94,6 +99,7 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
         timings=dict(stages.timings),
         left_out=with_savings(stages.left_out, stages.timings),
         recovered=log.recovered,
+        ended=_ended(log),
         time_curve=curve,
         tip_counts=_tip_counts(features, trace.tip_radius),
     )
@@ -101,12 +107,63 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
 
 def _base(trace: Trace, base: Base | None, stages: Stages) -> Base:
     if base is not None:
-        if not stages.needed("base fit", "the global model was given"):
+        found = base.kind not in ("mesh", "profile")
+        if not stages.needed("base fit", "it was made while exploring" if found else "the global model was given"):
             return base
     from mapping.base_fit import fit_base
 
     with stages.stage("base fit"):
         return fit_base(trace)
+
+
+def _placed(trace: Trace, base: Base, scene: Scene | None, stages: Stages) -> Base:
+    """The base where the object really stands, by everything that was felt; the first sweeps told it roughly."""
+    why_not = "" if scene is not None and scene.model.pose == "estimate" else "the model's pose was given"
+    if not stages.needed("pose", why_not) or scene is None or scene.model.pose != "estimate":
+        return base
+    from mapping.pose import Pose, estimate_pose
+
+    with stages.stage("pose"):
+        pose = estimate_pose(trace, base, shift=scene.model.shift, turn=scene.model.turn)
+    before = base.parameters.get("pose")
+    whole = pose if before is None else pose.after(Pose.read(before))
+    if whole.within(BELIEVED * scene.model.shift, BELIEVED * scene.model.turn):
+        return pose.moved(base)
+    stages.left_out.append(LeftOut("pose", "the object would stand further off its model than the scene allows"))
+    return base
+
+
+def _over(trace: Trace, base: Base, stages: Stages) -> Trace:
+    """The part of the trace over a base that was found by feeling: beyond its border nothing is known."""
+    if base.kind in ("mesh", "profile"):
+        return trace
+    from mapping.base_extent import over_base
+
+    inside = over_base(trace, base)
+    if inside.any() and not inside.all():
+        beyond = int((~inside).sum())
+        stages.left_out.append(LeftOut("part of the trace", f"{beyond} samples lie beyond the body's border"))
+        return trace.select(inside)
+    return trace
+
+
+def in_model_frame(features: tuple[Feature, ...], base: Base) -> tuple[Feature, ...]:
+    """The features with their axes also in the frame of the given mesh, where the object does not stand as given."""
+    if "pose" not in base.parameters:
+        return features
+    from mapping.pose import Pose
+
+    pose = Pose.read(base.parameters["pose"])
+    return tuple(
+        replace(feature, extra=feature.extra | {"axis_in_model_frame": pose.back(feature.axis).tolist()})
+        for feature in features
+    )
+
+
+def _ended(log: Log) -> str:
+    """Why the exploration ended, "" if the log does not say."""
+    data = next((event.data for event in reversed(log.events) if event.kind == "outcome"), {})
+    return str(data.get("detail") or data.get("reason") or "")
 
 
 def _detect(trace: Trace, base: Base, settings: Settings, stages: Stages) -> Detections:

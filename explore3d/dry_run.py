@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from explore3d.run import explorer, known_base, scene_finger
-from explore3d.scene import load_scene
+from explore3d.expedition import discoverer, explorer, known_base
+from explore3d.run import scene_finger
+from explore3d.scene import Scene, load_scene
 from hw.moves import Move
 from mapping.base import Base
+from mapping.surface import Surface
 from mapping.trace import Trace
+from planners.budget import Spent
+from planners.drive import drive, dry_run
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,17 +77,26 @@ def plan_scene(path: Path | str) -> DryRun:
     Raises:
         SceneError: a scene that cannot be used.
     """
-    from planners.budget import Spent
     from planners.checks import Limits
-    from planners.drive import dry_run
+    from planners.travel import Ways, routed
 
     scene = load_scene(path)
     base, finger, tip = known_base(scene), scene_finger(scene), scene.tip.radius
-    explore = explorer(scene, base)
-    moves, outcome = dry_run(explore.plan(), Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip))
     with finger:
-        limits = Limits.of(finger.workspace, base, tip)
-    violations = [(number, what) for number, move in enumerate(moves, 1) if (what := limits.violation(move))]
+        workspace = finger.workspace
+    if base is None:
+        first, base = imagined(scene)
+    else:
+        first = []
+    ways = Ways(base, tip, workspace.low, workspace.high, workspace.max_speed)
+    explore = explorer(scene, base)
+    plan = routed(explore.plan(), ways)
+    nothing = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip)
+    planned, outcome = dry_run(plan, nothing)
+    moves, limits = [*first, *planned], Limits.of(workspace, base, tip)
+    before: list[Move | None] = [None, *moves]
+    checked = enumerate(zip(moves, before, strict=False), 1)
+    violations = [(number, what) for number, (move, last) in checked if (what := limits.violation(move, last))]
     spent = Spent(25.0 * tip if explore.travel_speed is None else explore.travel_speed)
     for move in moves:
         spent.count(move)
@@ -91,6 +104,23 @@ def plan_scene(path: Path | str) -> DryRun:
     return DryRun(
         base, tip, tuple(moves), spent.metres, spent.seconds, survey.fraction, survey.reach, tuple(violations)
     )
+
+
+def imagined(scene: Scene) -> tuple[list[Move], Base]:
+    """How the discovery of an unknown body would go if it were a flat one in the middle of the region; its base."""
+    from hw.simulated import SimulatedFinger
+
+    discover = discoverer(scene)
+    low, high = discover.low, discover.high
+    axis = "xyz".index(discover.sides[0][1])
+    first, second = ((axis + 1) % 3, (axis + 2) % 3)[:: 1 if discover.sides[0][0] == "+" else -1]
+    corners = np.tile(0.5 * (low + high), (4, 1))
+    corners[:, first] = np.array([low, high, high, low])[:, first]
+    corners[:, second] = np.array([low, low, high, high])[:, second]
+    body = Surface(corners, [[0, 1, 2], [0, 2, 3]])
+    finger = SimulatedFinger(object=body, tip_radius=discover.tip_radius, rate=200.0, margin=float(np.ptp([low, high])))
+    record, outcome = drive(replace(discover, sides=discover.sides[:1]).plan(), finger.execute)
+    return [move for move, _ in record], outcome.value
 
 
 def show_plan(plan: DryRun, out: Path | None, as_json: bool) -> None:

@@ -41,15 +41,24 @@ class Replay:
         self._sweeps = max((int(t.sweep.max()) for _, t in self._moves if len(t)), default=0)
         self._time = max((float(t.t[-1]) for _, t in self._moves if len(t)), default=0.0) + PAUSE
 
-    def before(self, execute: Execute) -> Execute:
-        """`execute`, with the earlier log's answers in front of it."""
+    def before(self, execute: Execute, skip: Callable[[Move], None] | None = None) -> Execute:
+        """`execute`, with the earlier log's answers in front of it.
+
+        Args:
+            skip: told every move that is answered from the log, by a finger that then keeps count of sweeps and
+                time itself, as a simulated one does; without it its sweeps and times are put after the log's.
+        """
 
         def resumed(move: Move) -> Trace:
             if self._moves and _same(self._moves[0][0], move):
                 self.replayed += 1
+                if skip is not None:
+                    skip(move)
                 return self._moves.pop(0)[1]
             self._moves.clear()  # from the first difference on the plan goes another way
             trace = execute(move)
+            if skip is not None:
+                return trace
             return replace(trace, t=trace.t + self._time, sweep=trace.sweep + self._sweeps)
 
         return resumed

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from explore3d import __version__
 from explore3d.analysis import Analysis
 from explore3d.analyze import conclude
-from explore3d.base_record import KIND, base_event
-from explore3d.errors import SceneError
+from explore3d.base_record import read_base
+from explore3d.errors import UserError
+from explore3d.expedition import known_base
+from explore3d.leave_out import without_needless_dynamics
 from explore3d.log import LogWriter
 from explore3d.log_reader import read_log
 from explore3d.resume import EARLIER, Replay, earlier_log
@@ -19,12 +20,8 @@ from explore3d.session import LOG, Session
 from explore3d.stages import Progress, Stages, silent
 from hw.finger import Finger, open_finger
 from hw.moves import Move
-from mapping.base import Base
 from mapping.trace import Trace
 from planners.plan import Outcome
-
-if TYPE_CHECKING:
-    from planners.explore import Explore
 
 
 def run(
@@ -53,8 +50,8 @@ def run(
     stages = Stages(progress, force)
     with stages.stage("setting up"):
         scene = scene if isinstance(scene, Scene) else load_scene(scene)
-        base = known_base(scene)
-        finger = scene_finger(scene, arm)
+        known_base(scene)  # a mesh that cannot be used is refused before a folder is made
+        finger = scene_finger(without_needless_dynamics(scene, stages), arm)
     replay = None
     if resume:
         log, content = earlier_log(out)
@@ -63,17 +60,9 @@ def run(
         session.write("scene.toml", scene.resolved)
         if resume:
             session.write(EARLIER, content)
-        outcome = _explore(scene, base, finger, session, stages, replay)
+        _explore(scene, finger, session, stages, replay)
         log = read_log(session.folder / LOG)
-        return conclude(session, log, scene, base, stages, ended=outcome.detail or outcome.reason)
-
-
-def known_base(scene: Scene) -> Base:
-    """The global model that the scene gives. Raises SceneError."""
-    surface = scene.base_surface()
-    if surface is None:
-        raise SceneError(f"{scene.path}: model.mesh: a global mesh is needed to plan sweeps over; found none")
-    return Base(surface)
+        return conclude(session, log, scene, read_base(log.events), stages)
 
 
 def scene_finger(scene: Scene, arm: bool = False) -> Finger:
@@ -104,53 +93,23 @@ def scene_finger(scene: Scene, arm: bool = False) -> Finger:
     )
 
 
-def _explore(
-    scene: Scene, base: Base, finger: Finger, session: Session, stages: Stages, replay: Replay | None = None
-) -> Outcome:
-    """Carry out the plan; every sample is in the session's log before the next move begins."""
-    from planners.checks import Limits
-    from planners.drive import drive
+def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, replay: Replay | None = None) -> Outcome:
+    """Carry out the exploration; every sample is in the session's log before the next move begins."""
+    from explore3d.expedition import Expedition
 
     with stages.stage("exploration") as share, finger:
         about = {"software": f"explore3d {__version__}", "seed": scene.seed, "finger": finger.info}
-        log = session.open_log(
-            tip_radius=scene.tip.radius,
-            scene_text=scene.resolved,
-            metadata=about,
-            resolution=finger.info.get("resolution", 0.0),
-        )
-        log.event(KIND, base_event(base))
+        log = session.open_log(tip_radius=scene.tip.radius, scene_text=scene.resolved, metadata=about)
         if hasattr(finger, "notice"):
-            finger.notice = log.felt  # a slow sweep's samples are on disk before it ends
-        touch = finger.execute if replay is None else replay.before(finger.execute)
+            finger.notice = log.event  # a slow sweep's samples are on disk before it ends
+        touch = finger.execute if replay is None else replay.before(finger.execute, getattr(finger, "skip", None))
         execute = _logged(touch, log, scene.explore.time_budget, share)
-        limits = Limits.of(finger.workspace, base, scene.tip.radius)
-        _, outcome = drive(
-            explorer(scene, base).plan(),
-            execute,
-            check=limits.violation,
-            note=lambda text: log.event("refused", {"what": text}),
-        )
+        outcome = Expedition(scene, finger, execute, log).go()
         log.event("outcome", {"reason": outcome.reason, "detail": outcome.detail})
+        if not log.samples:
+            raise UserError(f"{session.folder}: nothing was felt: {outcome.detail or outcome.reason}")
         log.close()  # its digest goes into the model
     return outcome
-
-
-def explorer(scene: Scene, base: Base) -> Explore:
-    """The exploratory procedure with the scene's settings."""
-    from planners.explore import Explore
-
-    return Explore(
-        base=base,
-        tip_radius=scene.tip.radius,
-        smallest=scene.survey.smallest_feature,
-        shortest_ridge=scene.survey.shortest_ridge,
-        precision=scene.explore.precision,
-        time_budget=scene.explore.time_budget,
-        speed=scene.survey.speed,
-        force=scene.survey.force,
-        false_alarms_per_metre=scene.detection.false_alarms_per_metre,
-    )
 
 
 def _logged(

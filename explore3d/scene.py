@@ -53,11 +53,19 @@ class Region(Table):
 
 
 class GlobalModel(Table):
-    """What is known of the object beforehand: a mesh, whose file is in `units`, or merely a region."""
+    """What is known of the object beforehand: a mesh, whose file is in `units`, or merely a region.
+
+    With pose = "estimate" the object may stand off the mesh by up to `shift` (m) and `turn` (rad). An unknown object
+    is approached from the `sides` of the region.
+    """
 
     mesh: Path | None = None
     units: LengthUnit = "m"
     region: Region | None = None
+    pose: Literal["given", "estimate"] = "given"
+    shift: Length = 3e-3
+    turn: Annotated[Angle, Field(gt=0)] = 0.035
+    sides: Annotated[tuple[Literal["+x", "-x", "+y", "-y", "+z", "-z"], ...], Field(min_length=1)] = ("+z",)
 
     @model_validator(mode="after")
     def _mesh_or_region(self) -> GlobalModel:

@@ -81,6 +81,28 @@ class Trace:
         return self.normals is not None
 
     @classmethod
+    def of_readings(cls, t: ArrayLike, centers: ArrayLike, sweep: ArrayLike, tip_radius: float, **more: Any) -> Trace:
+        """The readings of a device, without those that are not finite: a driver keeps what a bad frame did not spoil.
+
+        Args:
+            more: the other fields.
+
+        Raises:
+            TraceError: there are readings, but not one of them is finite.
+        """
+        arrays = {"t": np.asarray(t), "centers": np.asarray(centers), "sweep": np.asarray(sweep)}
+        arrays |= {
+            name: np.asarray(more[name]) for name in ("normals", "contacts", "force") if more.get(name) is not None
+        }
+        count = len(arrays["t"])
+        good = np.ones(count, dtype=bool)
+        for array in arrays.values():
+            good &= np.isfinite(array).reshape(count, -1).all(axis=1) if count else good
+        if count and not good.any():
+            raise TraceError(f"none of {count} readings is finite; is the sensor connected?")
+        return cls(tip_radius=tip_radius, **(more | {name: array[good] for name, array in arrays.items()}))
+
+    @classmethod
     def from_profile(cls, x: ArrayLike, z: ArrayLike, tip_radius: float, t: ArrayLike | None = None) -> Trace:
         """A single profile x, z (N,) in metres as one sweep along x with z outward and y = 0."""
         x_array, z_array = np.asarray(x, dtype=np.float64), np.asarray(z, dtype=np.float64)

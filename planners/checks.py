@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from hw.finger import Workspace
 from hw.moves import Move
 from mapping.base import Base
+from planners.travel import DEEP, gap, sunk
 
 FloatArray = NDArray[np.float64]
 
 # The sensor's field about its axis (paper, section 4)
 FIELD = float(np.radians(75.0))
-# How far a commanded ball may sink into the base on its way through free space, in tip radii
-DEEP = 0.05
+# How far the commanded path of a sweep may sink into the base, in tip radii: further in it crosses a wall
+PRESSED = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +26,7 @@ class Limits:
 
     Args:
         workspace: of the finger.
-        base: the global model.
+        base: the global model; None while it is unknown: then only the workspace, speed and force are checked.
         tip_radius: m.
         field: largest angle between the finger's axis and the base's normal in a sweep, rad.
         stem_radius: of the straight stem behind the ball, m.
@@ -33,24 +34,27 @@ class Limits:
     """
 
     workspace: Workspace
-    base: Base
+    base: Base | None
     tip_radius: float
     field: float = FIELD
     stem_radius: float = 0.0
     stem_length: float = 0.0
 
     @classmethod
-    def of(cls, workspace: Workspace, base: Base, tip_radius: float) -> Limits:
+    def of(cls, workspace: Workspace, base: Base | None, tip_radius: float) -> Limits:
         """Limits with a stem half as thick as the ball and three balls long."""
         return cls(workspace, base, tip_radius, stem_radius=0.5 * tip_radius, stem_length=6.0 * tip_radius)
 
-    def violation(self, move: Move) -> str | None:
-        """What is wrong with the move, as a sentence, or None if nothing is."""
-        for check in (self._workspace, self._speed, self._field, self._collision):
-            complaint = check(move)
+    def violation(self, move: Move, before: Move | None = None) -> str | None:
+        """What is wrong with the move, and the way to it from the one before it, as a sentence; None if nothing is."""
+        for complaint in (self._workspace(move), self._speed(move)):
             if complaint:
                 return complaint
-        return None
+        if self.base is None:
+            return None
+        checks = (self._field(move, self.base), self._collision(move, self.base), self._stem(move, self.base))
+        way = None if before is None else self._way(before, move, self.base)
+        return next((complaint for complaint in (*checks, way) if complaint), None)
 
     def _workspace(self, move: Move) -> str | None:
         outside = ((move.path < self.workspace.low) | (move.path > self.workspace.high)).any(axis=1)
@@ -67,10 +71,10 @@ class Limits:
             return f"the force is {move.force:g} N; at most {self.workspace.max_force:g} N is possible"
         return None
 
-    def _field(self, move: Move) -> str | None:
+    def _field(self, move: Move, base: Base) -> str | None:
         if move.purpose != "sweep":
             return None
-        feet = self.base.foot(move.path, self.tip_radius)
+        feet = base.foot(move.path, self.tip_radius)
         outward = feet.normals * np.where(feet.height > -self.tip_radius, 1.0, -1.0)[:, None]
         angle = np.arccos(np.clip(-(outward * move.approach).sum(axis=1), -1.0, 1.0))
         if angle.max() <= self.field:
@@ -80,24 +84,27 @@ class Limits:
             f"the sensor's field is {np.degrees(self.field):.0f} degrees"
         )
 
-    def _collision(self, move: Move) -> str | None:
-        if move.purpose in ("travel", "retreat"):
-            dense = _dense(move.path, 0.5 * self.tip_radius)
-            deepest = float(self.base.foot(dense, self.tip_radius).height.min())
-            if deepest < -DEEP * self.tip_radius:
-                return f"the way through free space sinks {-1e3 * deepest:.3f} mm into the body"
-        if self.stem_length > 0:
-            back = np.linspace(1.5 * self.tip_radius, self.stem_length, 6)
-            stem = (move.path[:, None, :] - back[None, :, None] * move.approach[:, None, :]).reshape(-1, 3)
-            clearance = float(self.base.foot(stem, self.stem_radius).height.min())
-            if clearance < 0:
-                return f"the stem behind the ball sinks {-1e3 * clearance:.3f} mm into the body"
-        return None
+    def _collision(self, move: Move, base: Base) -> str | None:
+        """The ball: a sweep presses a little, any other move stays free."""
+        allowed = PRESSED if move.purpose == "sweep" else DEEP
+        deepest = sunk(move.path, base, self.tip_radius)
+        if deepest <= allowed * self.tip_radius:
+            return None
+        if move.purpose == "sweep":
+            return f"the sweep's path sinks {1e3 * deepest:.3f} mm into another part of the body"
+        return f"the way through free space sinks {1e3 * deepest:.3f} mm into the body"
 
+    def _stem(self, move: Move, base: Base) -> str | None:
+        if self.stem_length <= 0:
+            return None
+        back = np.linspace(1.5 * self.tip_radius, self.stem_length, 6)
+        stem = (move.path[:, None, :] - back[None, :, None] * move.approach[:, None, :]).reshape(-1, 3)
+        clearance = float(base.foot(stem, self.stem_radius).height.min())
+        return f"the stem behind the ball sinks {-1e3 * clearance:.3f} mm into the body" if clearance < 0 else None
 
-def _dense(path: FloatArray, spacing: float) -> FloatArray:
-    if len(path) == 1:
-        return path
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    s = np.linspace(0.0, along[-1], 2 + int(along[-1] / spacing))
-    return np.column_stack([np.interp(s, along, path[:, k]) for k in range(3)])
+    def _way(self, before: Move, move: Move, base: Base) -> str | None:
+        """The ball on its way from the end of one move to the beginning of the next."""
+        deepest = sunk(gap(before, move, self.tip_radius), base, self.tip_radius)
+        if deepest <= DEEP * self.tip_radius:
+            return None
+        return f"the way from the move before sinks {1e3 * deepest:.3f} mm into the body"

@@ -7,52 +7,60 @@ from itertools import islice
 
 from hw.errors import FingerError
 from hw.moves import Move
+from mapping.errors import TraceError
 from mapping.trace import Trace
 from planners.plan import Outcome, Plan
 
-# After so many refusals in a row the finger is taken for lost
-PATIENCE = 5
+# After so many refusals in a row the finger is taken for lost, and the plan for one that cannot be carried out
+PATIENCE, FORBIDDEN = 5, 100
+
+Check = Callable[[Move, Move | None], str | None]
 
 
 def drive(
     plan: Plan,
     execute: Callable[[Move], Trace],
     *,
-    check: Callable[[Move], str | None] | None = None,
+    check: Check | None = None,
     note: Callable[[str], None] | None = None,
+    empty: Trace | None = None,
 ) -> tuple[list[tuple[Move, Trace]], Outcome]:
     """Carry the plan out; every executed move with what it felt, and why the plan ended.
 
-    A move that the check forbids or the finger refuses is not executed: the plan is sent an empty trace in
-    its place and decides what to do without it. The drive gives up if the first move is refused, or too many
-    in a row are.
+    A move that the check forbids, that the finger refuses, or whose readings are unusable gives nothing: the plan
+    is sent an empty trace in its place and decides what to do without it. The drive gives up if too many in a row
+    fail.
 
     Args:
         plan: the generator.
         execute: carries out one move, for example a Finger's execute followed by a log's write.
-        check: what is wrong with a move, or None if nothing is (planners.checks.Limits.violation).
-        note: told about every move that was not executed.
+        check: what is wrong with a move after the last executed one (None before the first), or None if nothing
+            is (planners.checks.Limits.violation).
+        note: told about every move that gave nothing for one of these reasons.
+        empty: a trace without samples, to go on with where even the first move fails; without it that ends the plan.
     """
     record: list[tuple[Move, Trace]] = []
-    refused = 0
+    refused = forbidden = 0
     try:
         move = next(plan)
         while True:
-            reason = check(move) if check else None
-            try:
-                trace = None if reason else execute(move)
-            except FingerError as error:
-                reason, trace = str(error), None
+            last = record[-1][0] if record else None
+            reason = check(move, last) if check else None
+            forbidden = forbidden + 1 if reason else 0
+            trace = None
+            if reason is None:
+                try:
+                    trace, refused = execute(move), 0
+                except (FingerError, TraceError) as error:
+                    reason, refused = str(error), refused + 1
             if trace is None:
-                refused += 1
                 if note:
-                    note(f"{move.purpose} not executed: {reason}")
-                if refused >= PATIENCE or not record:
+                    note(f"{move.purpose} not executed: {reason}" if forbidden else f"{move.purpose} failed: {reason}")
+                if refused >= PATIENCE or forbidden >= FORBIDDEN or (not record and empty is None):
                     plan.close()
-                    return record, Outcome("finger refuses", f"{_moves(refused)} refused: {reason}")
-                trace = record[-1][1].select(slice(0, 0))
+                    return record, Outcome("finger refuses", f"{_moves(max(refused, forbidden))} refused: {reason}")
+                trace = empty if empty is not None else record[-1][1].select(slice(0, 0))
             else:
-                refused = 0
                 record.append((move, trace))
             move = plan.send(trace)
     except StopIteration as end:
