@@ -266,7 +266,7 @@ class GrblFinger:
         if force is None and self.slide is not None:
             force = np.zeros((0, 3))
         normals = None if force is None else force / np.linalg.norm(force, axis=1, keepdims=True)
-        return Trace(
+        return Trace.of_readings(
             batch.times - self._begun,
             batch.centers,
             np.full(len(batch.times), self._sweeps),
