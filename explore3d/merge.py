@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from explore3d.build_model import build_model
-from explore3d.errors import FolderError
+from explore3d.errors import FolderError, UserError
 from explore3d.log_reader import read_log
 from explore3d.stages import Stages
 from mapping.merging import merge_model
@@ -24,12 +25,19 @@ def merge(model: Path | str, logs: Sequence[Path | str], out: Path | str, pose_s
 
     Raises:
         ModelError: a model that cannot be read.
-        UserError: a log that cannot be read, or a folder that cannot be written.
+        UserError: a log that cannot be read or is in the model already (it would count twice), or a folder that
+            cannot be written.
     """
     known = ObjectModel.load(model)
     for path in logs:
-        analysis = build_model(read_log(path), None, known.base, Stages())
+        log = read_log(path)
+        seen = [known.provenance.get("log_sha256"), *known.provenance.get("merged_sha256", [])]
+        if log.sha256 in seen:
+            raise UserError(f"{path}: this log is in the model {model} already; merged twice it would count twice")
+        analysis = build_model(log, None, known.base, Stages())
         known = merge_model(known, analysis.model.features, Path(path).name, pose_sd)
+        hashes = [*known.provenance.get("merged_sha256", []), log.sha256]
+        known = replace(known, provenance={**known.provenance, "merged_sha256": hashes})
     try:
         known.save(out)
     except OSError as error:

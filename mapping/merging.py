@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mapping.feature import Evidence, Feature, Interval
 from mapping.object_model import ObjectModel
-from mapping.polyline import arclengths, resample
+from mapping.polyline import arclengths, nearest_on, resample
 
 FloatArray = NDArray[np.float64]
 
@@ -92,11 +92,12 @@ def _gaps(points: FloatArray, axis: FloatArray) -> tuple[FloatArray, NDArray[np.
 def merge_features(known: Feature, new: Feature, source: str) -> Feature:
     """One feature from two independent measurements: precisions add, and the history says what each log said.
 
-    The axis, draws and extent are those of the measurement that knows its place (or, if one saw an end that the
-    other did not, its length) better.
+    Draws, extent and the course of the axis are those of the measurement that knows its place (or, if one saw an end
+    that the other did not, its length) better; the axis moves sideways towards the other by the other's weight.
     """
     better, other = sorted((known, new), key=lambda each: (each.length.censored, each.position_sd))
-    precision = 1.0 / np.maximum([known.position_sd, new.position_sd], np.finfo(float).tiny) ** 2
+    precision = 1.0 / np.maximum([better.position_sd, other.position_sd], np.finfo(float).tiny) ** 2
+    axis = joined_axis(better.axis, other.axis, float(precision[1] / precision.sum()))
     evidence = Evidence(
         float(np.hypot(known.evidence.snr, new.evidence.snr)),
         known.evidence.crossings + new.evidence.crossings,
@@ -112,6 +113,7 @@ def merge_features(known: Feature, new: Feature, source: str) -> Feature:
     return replace(
         better,
         id=known.id,
+        axis=axis,
         height=merge_intervals(known.height, new.height),
         width=merge_intervals(known.width, new.width),
         length=merge_intervals(known.length, new.length),
@@ -121,6 +123,20 @@ def merge_features(known: Feature, new: Feature, source: str) -> Feature:
         notes=tuple(dict.fromkeys((*better.notes, *other.notes))) if better.length.censored else better.notes,
         extra={**other.extra, **better.extra, "history": [*known.extra.get("history", []), record]},
     )
+
+
+def joined_axis(axis: FloatArray, other: FloatArray, share: float) -> FloatArray:
+    """An axis (K, 3) moved sideways by a share of its distance from another; where they run apart, as next to it."""
+    inside = _gaps(axis, other)[1] if len(other) > 1 else np.ones(len(axis), dtype=bool)
+    if not inside.any():
+        return axis
+    offset = (nearest_on(axis, other)[0] if len(other) > 1 else other) - axis
+    here, known = np.arange(len(axis)), np.flatnonzero(inside)
+    smooth = np.column_stack([np.interp(here, known, offset[known, i]) for i in range(3)])
+    moved = axis + share * smooth
+    if len(axis) > 2 and np.array_equal(axis[0], axis[-1]):
+        moved[-1] = moved[0]
+    return np.asarray(moved)
 
 
 def merge_intervals(a: Interval, b: Interval) -> Interval:

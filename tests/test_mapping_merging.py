@@ -40,6 +40,16 @@ def test_the_same_ridge_is_updated_and_another_one_is_added():
     assert merged.provenance["merged"] == ["second log"]
 
 
+def test_the_merged_axis_lies_between_the_two_by_their_precisions():
+    model = ObjectModel.attach(plate(), [ridge(0.0, sd=10e-6)])
+    new = ridge(40e-6, sd=20e-6, x=(0.02, -0.01))
+    merged = merge_model(model, [new], "second log").features[0]
+    # weights 4 to 1: 8 um; where the other does not reach, as at its end
+    np.testing.assert_allclose(merged.axis[:, 1], 8e-6, atol=1e-12)
+    np.testing.assert_allclose(merged.axis[:, 0], [-0.02, 0.02])
+    assert merged.position_sd == pytest.approx(20e-6 / np.sqrt(5))
+
+
 def test_nothing_is_removed_by_an_empty_log():
     model = ObjectModel.attach(plate(), [ridge(0.0)])
     assert len(merge_model(model, [], "empty").features) == 1
