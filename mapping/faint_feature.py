@@ -26,6 +26,8 @@ PLACES = 2.5
 FEW, CLEAR = 2, 2.0
 # Standard deviations above which a single place stands out.
 PLAIN = 5.0
+# Samples to a place, below which there is no noise to be averaged away; and places that are looked through in seconds.
+LEAST_SAMPLES, MOST_PLACES = 4.0, 150_000
 
 
 def with_faint_lines(
@@ -33,13 +35,17 @@ def with_faint_lines(
 ) -> list[Feature]:
     """The features, and the lines that no single sweep showed; spots that are a part of such a line become the line.
 
-    A base that was fitted is not known well enough: its own errors run along lines too.
+    Nothing is sought over a base that was fitted, whose own errors run along lines too, nor where there is hardly
+    any noise, or more path than can be looked through in seconds.
     """
     features = list(features)
     if base.kind != "mesh" or len(np.unique(trace.sweep)) < SWEEPS or not np.isfinite(detections.detection_limit):
         return features
     half_width = float(np.sqrt(2 * trace.tip_radius * detections.detection_limit))
-    inspection = inspect(trace, base, detections.noise, min(SECTIONS) * half_width / PLACES)
+    spacing = min(SECTIONS) * half_width / PLACES
+    if detections.inspected_length > min(MOST_PLACES, len(trace) / LEAST_SAMPLES) * spacing:
+        return features
+    inspection = inspect(trace, base, detections.noise, spacing)
     normals = base.foot(inspection.points, trace.tip_radius).normals
     weak = [f for f in features if _is_weak(f, detections)]
     # what one place alone shows is not faint
