@@ -66,7 +66,7 @@ def _picture(cells: list[Cell], feature: str, kind: str) -> Any:
         for detector in DETECTORS:
             line = [c for c in own if c.detector == detector]
             # the widest first, so that curves on one another all show
-            width = 1.0 + 0.8 * (len(DETECTORS) - DETECTORS.index(detector))
+            width = 1.0 + 0.5 * (len(DETECTORS) - DETECTORS.index(detector))
             style: dict[str, Any] = {"color": COLOURS[detector], "marker": "o", "ms": 3, "lw": width, "label": detector}
             recall.plot([c.size for c in line], [c.recall for c in line], **style)
             alarms.plot([c.size for c in line], [max(c.false_alarms_per_metre, NONE) for c in line], **style)

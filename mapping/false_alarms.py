@@ -33,6 +33,8 @@ NEIGHBOURS = 8
 CLUMP = 1.5
 # Threshold at which clump sizes are measured; they change slowly with it.
 TYPICAL_THRESHOLD = 5.0
+# Steps an octave of the ladder of banks that thresholds are remembered for.
+COARSE = 16
 # Relative uncertainty of the noise that changes a threshold by less than one part in a thousand.
 NEGLIGIBLE = 5e-3
 
@@ -41,7 +43,7 @@ def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float 
     """The signal-to-noise ratio that noise alone exceeds, in either sign, as often per metre as asked.
 
     The threshold changes by less than a thousandth where the bank changes by one per cent, so it is worked out
-    for the nearest bank of a ladder of 1 % steps and remembered: sweep after sweep has the same one.
+    for the nearest bank of a ladder of 4 % steps and remembered: sweep after sweep has the same one.
 
     Where the level of the noise itself is uncertain, signal over estimated noise is distributed as Student's t
     instead of normally, and noise alone exceeds a higher threshold as often.
@@ -53,8 +55,8 @@ def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float 
     """
     colour, _ = colour_in_bins(bank.noise, bank.spacing, bank.samples)
     sizes = (colour.correlated, colour.length if colour.correlated else 0.0, bank.filters[0].half_width / bank.spacing)
-    rate = false_alarms_per_metre * bank.spacing
-    normal = _threshold(*(rung(size, 64) for size in sizes), len(bank.filters), bank.drift, rate)
+    rate = rung(false_alarms_per_metre * bank.spacing)
+    normal = _threshold(*(rung(size, COARSE) for size in sizes), len(bank.filters), bank.drift, rate)
     if uncertainty < NEGLIGIBLE:
         return normal
     from scipy.special import ndtr, stdtrit

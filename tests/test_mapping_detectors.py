@@ -11,9 +11,9 @@ import pytest
 
 from mapping.base import Base
 from mapping.detectors import DetectionError, Detections, detect
-from mapping.false_alarms import false_alarm_rate, threshold_for
+from mapping.false_alarms import _threshold, false_alarm_rate, threshold_for
 from mapping.height_profile import HeightProfile, height_profiles
-from mapping.matched_filter import build_bank
+from mapping.matched_filter import build_bank, filter_sd
 from mapping.noise import Noise
 from mapping.shapes import cap_height, groove_height, step_height
 from mapping.stretches import find_disturbances
@@ -122,6 +122,32 @@ def test_false_alarms_come_as_often_as_asked(drift):
         found += len(find_disturbances(profile, bank, noise, threshold, TIP))
     # 99 % of a Poisson number with mean 80
     assert 57 <= found <= 104
+
+
+def test_a_threshold_is_worked_out_once_for_sweeps_that_differ_little():
+    noise = Noise(2e-4, 1e-4, 1e-3)
+    first = threshold_for(build_bank(noise, 1.2e-4, 20.0, 1.45e-3, 0.04), 0.01)
+    known = _threshold.cache_info().misses
+    others = [threshold_for(build_bank(noise, 1.2e-4 * f, 20.0 * f, 1.45e-3 * f, 0.04), 0.01) for f in (0.9999, 1.0001)]
+    np.testing.assert_allclose(others, first, rtol=1e-3)
+    assert _threshold.cache_info().misses == known
+
+
+def test_a_threshold_on_uncertain_noise_is_that_of_student():
+    from scipy.stats import norm, t
+
+    bank = build_bank(Noise(2e-4), 1.2e-4, 20.0, 1.45e-3, 0.04)
+    normal = threshold_for(bank, 0.01)
+    assert threshold_for(bank, 0.01, 1e-3) == normal
+    # a level known to 10 % has 50 degrees of freedom
+    np.testing.assert_allclose(threshold_for(bank, 0.01, 0.1), t.isf(norm.sf(normal), 50), rtol=1e-9)
+
+
+def test_filters_of_a_remembered_bank_are_those_of_its_own_noise():
+    noise, spacing, samples = Noise(2e-4, 1.5e-4, 1.3e-3), 1.37e-4, 22.8
+    for f in build_bank(noise, spacing, samples, 1.5e-3, 0.04).filters:
+        np.testing.assert_allclose(f.sd, filter_sd(f.half_width, noise, spacing, samples, 0), rtol=5e-3)
+        assert f.half_width >= 1.49e-3
 
 
 def test_detection_refuses_what_it_cannot_do():
