@@ -51,12 +51,21 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """All that a feature's posterior is conditioned on beside the feature itself."""
+    """All that a feature's posterior is conditioned on beside the feature itself.
+
+    Args:
+        trace: the whole trace.
+        base: the global model.
+        noise: of a sample.
+        others: features near by.
+        tip_sd: standard deviation of the tip's radius about the trace's, m; above 0 it becomes a parameter.
+    """
 
     trace: Trace
     base: Base
     noise: Noise
     others: Sequence[Feature] = ()
+    tip_sd: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mapping.base import Base
 from mapping.evidence import log_evidence_of_nothing
 from mapping.feature import Feature
+from mapping.free_tip_shape import with_free_tip
 from mapping.importance import TRUSTED_K_HAT, Importance, importance_sample
 from mapping.laplace import find_optima, laplace
 from mapping.misfit import account_for_misfit
@@ -55,6 +56,7 @@ def sample_posterior(
     base: Base | None = None,
     noise: Noise | None = None,
     others: Sequence[Feature] = (),
+    tip_sd: float = 0.0,
     confirm: bool = True,
 ) -> Posterior:
     """Draws of a feature's parameters given the trace.
@@ -69,12 +71,13 @@ def sample_posterior(
         base: the global model; fitted to the trace if None.
         noise: level and correlation of a sample; estimated from the trace if None.
         others: features near by, which the trace also shows (the feature itself may be among them).
+        tip_sd: standard deviation of the tip's radius, m; above 0 the radius is a parameter with a Gaussian prior.
         confirm: False to stop at importance sampling where its k-hat is below 0.5.
 
     Raises:
         MappingError: a kind that has no closed form, or no sample near the feature.
     """
-    return solve(feature, trace, rng, base=base, noise=noise, others=others, confirm=confirm).posterior
+    return solve(feature, trace, rng, base=base, noise=noise, others=others, tip_sd=tip_sd, confirm=confirm).posterior
 
 
 def refine(
@@ -85,6 +88,7 @@ def refine(
     base: Base | None = None,
     noise: Noise | None = None,
     others: Sequence[Feature] = (),
+    tip_sd: float = 0.0,
     confirm: bool = True,
 ) -> Feature:
     """The feature with posterior, intervals and axis from the draws; arguments as for `sample_posterior`.
@@ -96,7 +100,7 @@ def refine(
         return replace(feature, notes=(*feature.notes, note))
     base = base or _fitted(trace)
     noise = noise or noise_of_trace(trace, base)
-    solution = solve(feature, trace, rng, base=base, noise=noise, others=others, confirm=confirm)
+    solution = solve(feature, trace, rng, base=base, noise=noise, others=others, tip_sd=tip_sd, confirm=confirm)
     found = describe(solution.problem, solution.posterior, base)
     if solution.problem.noise != noise:  # see mapping.misfit: intervals hold within the family only
         note = f"no ideal {found.kind} fits the trace within its noise: the sizes are those of the closest one"
@@ -113,20 +117,20 @@ def solve(
     base: Base | None = None,
     noise: Noise | None = None,
     others: Sequence[Feature] = (),
+    tip_sd: float = 0.0,
     confirm: bool = True,
 ) -> Solution:
     """Pose and solve a feature's posterior; arguments as for `sample_posterior`."""
     base = base or _fitted(trace)
     noise = noise or noise_of_trace(trace, base)
-    around = Surroundings(trace, base, noise, others)
+    around = Surroundings(trace, base, noise, others, tip_sd)
     solution = solve_problem(pose_problem(feature, around), rng, confirm=confirm)
     if feature.kind != "bump" or solution.problem.noise == noise:
         return solution
     from mapping.bump_profile import better_profile
 
-    better = better_profile(solution.problem, around, rng)
-    same = isinstance(better.target.shape, type(solution.problem.target.shape))
-    return solution if same else solve_problem(better, rng, confirm=confirm)
+    bell = better_profile(solution.problem, around, rng)
+    return solution if bell is None else solve_problem(bell, rng, confirm=confirm)
 
 
 def odds_against_nothing(solution: Solution) -> float:
@@ -141,10 +145,13 @@ def pose_problem(feature: Feature, around: Surroundings) -> Problem:
     from mapping.spot_problem import spot_problem
 
     if feature.kind in ("bump", "pit"):
-        return spot_problem(feature, around)
-    if feature.kind in ("ridge", "groove", "step"):
-        return curve_problem(feature, around)
-    raise MappingError(f"no posterior for a {feature.kind!r}: closed-form traces exist for {', '.join(SAMPLED_KINDS)}")
+        problem = spot_problem(feature, around)
+    elif feature.kind in ("ridge", "groove", "step"):
+        problem = curve_problem(feature, around)
+    else:
+        possible = ", ".join(SAMPLED_KINDS)
+        raise MappingError(f"no posterior for a {feature.kind!r}: closed-form traces exist for {possible}")
+    return with_free_tip(problem, around.tip_sd) if around.tip_sd > 0.0 else problem
 
 
 def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool = True, adapt: bool = True) -> Solution:

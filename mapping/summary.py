@@ -12,6 +12,7 @@ from mapping.bell_shape import BellShape, width_at_half_height
 from mapping.bump_shape import BumpShape
 from mapping.extent import explored
 from mapping.feature import Feature, Interval
+from mapping.free_tip_shape import with_nominal_tip
 from mapping.hollow_shape import GrooveShape, PitShape
 from mapping.onto_base import onto_base
 from mapping.posterior import Posterior
@@ -30,7 +31,10 @@ AXIS_POINTS = 64
 
 def describe(problem: Problem, posterior: Posterior, base: Base) -> Feature:
     """The detected feature with axis, intervals and standard deviation from the draws of its posterior."""
+    full, problem = posterior, with_nominal_tip(problem)
     shape = problem.target.shape
+    # What is described is the feature: the draws of a free tip's radius, in the last column, are left out.
+    posterior = replace(full, samples=full.samples[:, : len(shape.names)])
     if isinstance(shape, BumpShape | BellShape | PitShape):
         feature = _describe_spot(problem, shape, posterior, base)
     elif isinstance(shape, RidgeShape | GrooveShape | StepShape):
@@ -38,7 +42,7 @@ def describe(problem: Problem, posterior: Posterior, base: Base) -> Feature:
     else:
         raise TypeError(f"no description for the shape {type(shape).__name__}")
     notes = tuple(note for note in (*feature.notes, *_warnings(posterior)) if note)
-    return replace(feature, posterior=posterior, notes=tuple(dict.fromkeys(notes)))
+    return replace(feature, posterior=full, notes=tuple(dict.fromkeys(notes)))
 
 
 def _warnings(posterior: Posterior) -> tuple[str, ...]:
