@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.branches import main_line
-from mapping.crest_trace import distances
 from mapping.crossing import Crossing
 from mapping.feature import Evidence, Feature, Interval
 from mapping.inspection import Inspection
@@ -48,9 +47,10 @@ def edge_features(crossings: Sequence[Crossing], around: Around) -> tuple[list[F
     for group in _groups(hinges, SAME_EDGE * around.tip_radius):
         if len({h.crossing.sweep for h in group}) < 2:
             continue
-        edge = _edge(group, around)
+        edge, out = _edge(group, around)
         features.append(edge)
-        rest = [c for c in rest if not _beyond(c, edge, group, around.tip_radius)]
+        used = {id(h.crossing) for h in group}
+        rest = [c for c in rest if id(c) not in used and not _beyond(c, edge, out, around.tip_radius)]
     return features, rest
 
 
@@ -91,8 +91,8 @@ def _groups(hinges: list[Hinge], distance: float) -> list[list[Hinge]]:
     return groups
 
 
-def _edge(group: list[Hinge], around: Around) -> Feature:
-    """The edge through the hinges, moved by r tan(angle / 2) to where the faces of the body meet."""
+def _edge(group: list[Hinge], around: Around) -> tuple[Feature, FloatArray]:
+    """The edge through the hinges, moved by r tan(angle / 2) to where the faces of the body meet; the way out (3,)."""
     hinges = main_line(np.array([h.point for h in group]))
     chord = (hinges[-1] - hinges[0]) / max(float(np.linalg.norm(hinges[-1] - hinges[0])), 1e-300)
     normal = group[0].crossing.normal
@@ -105,7 +105,7 @@ def _edge(group: list[Hinge], around: Around) -> Feature:
     length = float(arclengths(feet.points)[-1])
     rise = around.tip_radius * float(np.tan(angle)) * (-1.0 if convex else 1.0)
     crossings = [h.crossing for h in group]
-    return Feature(
+    edge = Feature(
         kind="convex edge" if convex else "concave corner",
         axis=feet.points,
         normals=feet.normals,
@@ -118,13 +118,10 @@ def _edge(group: list[Hinge], around: Around) -> Feature:
         notes=(f"the body turns by {np.degrees(angle):.1f} degrees; its height is given one tip radius beyond",),
         extra={"angle": angle},
     )
+    return edge, out
 
 
-def _beyond(crossing: Crossing, edge: Feature, group: list[Hinge], tip_radius: float) -> bool:
-    """True for what lies past the edge, where the base is no model of the body, or within a tip radius of it."""
-    if any(h.crossing is crossing for h in group):
-        return True
-    nearest = nearest_on(crossing.point[None], edge.axis)[0][0]
-    hinge = min(group, key=lambda h: float(np.linalg.norm(h.point - nearest)))
-    past = float((crossing.point - nearest) @ hinge.way) > 0
-    return past or float(distances(crossing.point[None], edge.axis)[0]) < 0.5 * tip_radius
+def _beyond(crossing: Crossing, edge: Feature, out: FloatArray, tip_radius: float) -> bool:
+    """True for what lies past the edge, where the base is no model of the body, or within half a tip radius of it."""
+    offset = crossing.point - nearest_on(crossing.point[None], edge.axis)[0][0]
+    return bool(offset @ out > 0 or np.linalg.norm(offset) < 0.5 * tip_radius)

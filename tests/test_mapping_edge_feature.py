@@ -21,7 +21,7 @@ TIP = 0.01
 
 
 @pytest.mark.parametrize("kind", ["convex edge", "concave corner"])
-@pytest.mark.parametrize("white", [0.0, 0.2e-3])
+@pytest.mark.parametrize("white", [pytest.param(0.0, marks=pytest.mark.slow), 0.2e-3])
 def test_a_fold_is_an_edge_where_the_faces_meet(kind, white):
     (edge,) = classified(noisy(touched(kind, "two ways", 0), NoiseSource(white), 1), Base(BODIES[kind]().base))
     assert edge.kind == kind
@@ -44,7 +44,7 @@ def cube(side: float) -> Surface:
     return Surface(corners, [[q[0], q[i], q[i + 1]] for q in quads for i in (1, 2)])
 
 
-@pytest.mark.parametrize("white", [0.0, 0.2e-3])
+@pytest.mark.parametrize("white", [pytest.param(0.0, marks=pytest.mark.slow), 0.2e-3])
 def test_edges_of_a_cube_are_no_features_of_it(white):
     body = cube(0.05)
     lines = [((x, 0.0, 0.025), (0.1 * k, 1.0, 0.0)) for k, x in enumerate(np.linspace(-0.02, 0.02, 6))]
@@ -53,7 +53,7 @@ def test_edges_of_a_cube_are_no_features_of_it(white):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not (DATA / "fandisk.off").exists(), reason=f"{DATA} has no fandisk.off")
-@pytest.mark.parametrize("white", [0.0, 0.2e-3])
+@pytest.mark.parametrize("white", [pytest.param(0.0, marks=pytest.mark.slow), 0.2e-3])
 def test_edges_of_the_fandisk_are_no_features_of_it(white):
     from explore3d.meshes import load_mesh
 
