@@ -11,6 +11,7 @@ import itertools
 import json
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from time import monotonic
@@ -71,7 +72,7 @@ BODIES: dict[str, Callable[[], Surface]] = {
 
 @cache
 def swept(body: str, mesh: Path | None = None) -> tuple[Base, Trace]:
-    """The body as its own base, and noise-free sweeps of the ball over it from above."""
+    """The body as its own base, and noise-free sweeps of the ball over it from above, with contact normals."""
     surface = _scaled(mesh) if mesh else BODIES[body]()
     low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
     half = 0.4 * (high - low)
@@ -87,16 +88,16 @@ def swept(body: str, mesh: Path | None = None) -> tuple[Base, Trace]:
         cuts = np.concatenate([[0], np.flatnonzero(steps > 10 * SPACING) + 1, [len(centers)]])
         longest = int(np.diff(cuts).argmax())
         parts.append(_sweep(centers[cuts[longest] : cuts[longest + 1]], number))
-    return Base(surface), Trace.concatenate(parts)
+    base, trace = Base(surface), Trace.concatenate(parts)
+    return base, replace(trace, normals=base.foot(trace.centers, TIP).normals)
 
 
 def run_case(body: str, noise: str, seed: int, mesh: Path | None = None) -> dict[str, Any]:
     """Crossings that detection reports on one set of noisy sweeps, and the path inspected, m."""
     base, clean = swept(body, mesh)
     rng = np.random.default_rng([seed, list(NOISES).index(noise)])
-    feet = base.foot(clean.centers, TIP)
     height = simulate_noise(NOISES[noise], [clean.centers[clean.sweep == k] for k in np.unique(clean.sweep)], rng)
-    trace = Trace(clean.t, clean.centers + height[:, None] * feet.normals, clean.sweep, TIP)
+    trace = Trace(clean.t, clean.centers + height[:, None] * np.asarray(clean.normals), clean.sweep, TIP)
     found = detect(trace, base, false_alarms_per_metre=RATE)
     return {
         "found": len(found.crossings),

@@ -32,15 +32,16 @@ def drawn(noise: Noise, count: int, rng: np.random.Generator) -> np.ndarray:
     return lfilter([1.0], [1.0, -decay], kicks) + noise.white * rng.standard_normal(count)
 
 
-def passes(diameter: float, noise: Noise, seeds: int, **options):
+def passes(diameter: float, true_noise: Noise, seeds: int, **options):
     """Errors of the places (m) where a wire was found, and the number of other crossings, of passes of 100 mm."""
     errors, others = [], 0
     x = np.arange(-LENGTH / 2, LENGTH / 2, SPACING)
-    reach = np.sqrt(2 * TIP * diameter)
+    # twice its disturbance: the faintest are found by a filter that is wider than they are
+    reach = 2 * np.sqrt(2 * TIP * diameter)
     for seed in range(seeds):
         rng = np.random.default_rng(seed)
         place = rng.uniform(-0.3, 0.3) * LENGTH
-        z = TIP + cap_height(x - place, diameter, diameter / 2, TIP) + drawn(noise, len(x), rng)
+        z = TIP + cap_height(x - place, diameter, diameter / 2, TIP) + drawn(true_noise, len(x), rng)
         crossings = detect(Trace.from_profile(x, z, TIP, x / 0.03), plate(), **options).crossings
         off = [c.point[0] - place for c in crossings]
         here = [error for error in off if abs(error) < reach]
