@@ -72,7 +72,7 @@ def conclude(session: Session, log: Log, scene: Scene | None, base: Base | None,
     analysis = build_model(log, scene, base, stages)
     with session.staging() as folder:
         with stages.stage("report"):
-            write_report(analysis, folder)
+            write_report(analysis, folder, stages.is_forced("rendered pictures"))
         model = replace(analysis.model, timings=dict(stages.timings))
         model.save(folder)
     return replace(analysis, model=model, timings=dict(stages.timings))

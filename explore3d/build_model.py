@@ -213,10 +213,10 @@ def _refine(
 def _estimate(
     features: tuple[Feature, ...], trace: Trace, base: Base, detections: Detections, stages: Stages
 ) -> Estimate | None:
-    from mapping.envelope import estimate_surface
-
     if not stages.needed("estimated surface", "" if features else "no feature was found; the base is the estimate"):
         return None
+    from mapping.envelope import estimate_surface
+
     free = detections.noise.sd <= NOISE_FREE * trace.tip_radius
     smooth = stages.needed("smoothing", "the trace has no noise beyond rounding" if free else "")
     with stages.stage("estimated surface"):

@@ -59,6 +59,33 @@ def trace(
 
 
 @bench.command()
+def curvature(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for table and picture.")] = Path("out/curvature"),
+    largest: Annotated[int, typer.Option(min=10_000, help="Most vertices; tenfold steps from 10 000.")] = 100_000,
+    peers: Annotated[bool, typer.Option(help="Measure libigl, pymeshlab and a plain jet too.")] = True,
+) -> None:
+    """Error, speed and memory of principal curvatures on bodies that have them in closed form.
+
+    Example: explore3d bench curvature --largest 1000000 --out out/curvature
+    """
+    from explore3d.bench_curvature import CurvatureError, available, bench_curvature, table, write_bench
+
+    methods, missing = available()
+    if peers:
+        _print(missing)
+    sizes = [count for count in (10_000, 100_000, 1_000_000) if count <= largest]
+    lines: list[CurvatureError] = []
+
+    def kept() -> Iterable[CurvatureError]:
+        for line in bench_curvature(sizes, methods if peers else methods[:1]):
+            lines.append(line)
+            yield line
+
+    _print(table(kept()))
+    _print(map(str, write_bench(lines, out)))
+
+
+@bench.command()
 def posterior() -> None:
     """Effective draws per second, beside emcee's default settings.
 
@@ -214,6 +241,22 @@ def dynamics() -> None:
     from explore3d.bench_dynamics import dynamics_curve, table
 
     print(table(dynamics_curve()), end="")
+
+
+@bench.command()
+def scaling(
+    store: Store,
+    axes: Annotated[str | None, typer.Option(help="samples, triangles, features, separated by commas; all.")] = None,
+    huge: Annotated[bool, typer.Option("--huge", help="Up to 1e8 samples: 2 GB of disk, many minutes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="The three smallest sizes of each.")] = False,
+) -> None:
+    """Time and memory against the number of samples, triangles and features, and the exponents that fit.
+
+    Example: explore3d bench scaling --store scaling.jsonl --axes samples --quick
+    """
+    from explore3d.bench_scaling import AXES, bench_scaling, lines
+
+    _print(lines(bench_scaling(store, _names(axes, "--axes", list(AXES)), huge, quick)))
 
 
 def _print(lines: Iterable[str]) -> None:

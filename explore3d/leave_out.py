@@ -6,11 +6,17 @@ stage costs in units of that run's detection, which every analysis has done by i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from explore3d.quantity import seconds_text
 from mapping.left_out import LeftOut
+
+if TYPE_CHECKING:
+    from explore3d.scene import Scene
+    from explore3d.stages import Stages
 
 # Cost of a stage over that of detection
 RATIOS = {
@@ -40,3 +46,26 @@ def _estimate(stage: str, timings: Mapping[str, float]) -> str:
 
 def _about(seconds: float, why: str) -> str:
     return f"about {seconds_text(seconds)} (estimated: {why})" if seconds > 0 else ""
+
+
+def without_needless_dynamics(scene: Scene, stages: Stages) -> Scene:
+    """The scene without the finger's dynamics where the rigid trace says as much: lambda > 10 v tan(phi) / sigma.
+
+    The kink phi is that of the tallest true feature; a scene that names none keeps its dynamics.
+    """
+    table, tallest = scene.finger.dynamics, max((abs(true.height) for true in scene.truth), default=0.0)
+    if table is None:
+        stages.needed("dynamics", "the contact is rigid: the scene gives no stiffness", possible=False)
+        return scene
+    from hw.dynamics import Dynamics
+    from mapping.shapes import kink_angle
+
+    noise = scene.finger.noise
+    sigma, kink = math.hypot(noise.white, noise.correlated), float(kink_angle(tallest, tallest / 2, scene.tip.radius))
+    stiff = tallest > 0 and not Dynamics(**table.model_dump()).needed(scene.survey.speed, kink, sigma)
+    why_not = "the tip follows the rigid trace within the noise: lambda > 10 v tan(phi) / sigma" if stiff else ""
+    if stages.needed("dynamics", why_not):
+        return scene
+    rigid = scene.model_copy(update={"finger": scene.finger.model_copy(update={"dynamics": None})})
+    rigid._path, rigid._text = scene._path, scene._text
+    return rigid

@@ -33,12 +33,13 @@ class Pictures:
     left_out: tuple[LeftOut, ...] = ()
 
 
-def draw_pictures(analysis: Analysis, sweeps: Sequence[SweepPath]) -> Pictures:
+def draw_pictures(analysis: Analysis, sweeps: Sequence[SweepPath], rendered: bool = False) -> Pictures:
     """Every picture that the analysis has the data for.
 
     Args:
         analysis: what was found.
         sweeps: the sweeps as lines on the base.
+        rendered: render the object even where nothing was found on it.
     """
     files: dict[str, bytes | None] = {}
     left_out: list[LeftOut] = []
@@ -50,8 +51,12 @@ def draw_pictures(analysis: Analysis, sweeps: Sequence[SweepPath]) -> Pictures:
     files["extents"] = _extents(analysis)
     for feature in shown_features(analysis)[:MOST_CORNERS]:
         files[f"corner-{feature.id}"] = corner_picture(feature)
+    bare = not profile and not analysis.model.features and not rendered
+    if bare:  # nothing to see: no need to load a renderer
+        why = "nothing was found: the page's own view shows the object and the sweeps"
+        left_out.append(LeftOut("rendered pictures", why, "about 3 s (estimated: a renderer and a picture)"))
     try:
-        files |= {} if profile else _rendered(analysis, sweeps)
+        files |= {} if profile or bare else _rendered(analysis, sweeps)
     except Open3DError as error:
         # The model is whole without its pictures; the report says which are missing, and why.
         left_out.append(LeftOut("rendered pictures", str(error)))

@@ -26,17 +26,20 @@ POLICY = (
 )
 
 
-def write_report(analysis: Analysis, folder: Path | str) -> Path:
+def write_report(analysis: Analysis, folder: Path | str, rendered: bool = False) -> Path:
     """Write report.html and pictures/*.png into the folder; returns the page's path.
 
     The page's title is set when everything on it is drawn: a browser test can wait for it.
+
+    Args:
+        rendered: render the object even where nothing was found on it (the page's own view shows it too).
 
     Raises:
         OSError: the folder cannot be written.
     """
     place = Path(folder)
     sweeps = sweep_paths(analysis.trace, analysis.base, analysis.detections.crossings)
-    pictures = draw_pictures(analysis, sweeps)
+    pictures = draw_pictures(analysis, sweeps, rendered)
     page = report_page(analysis, pictures, sweeps)
     (place / PICTURES).mkdir(parents=True, exist_ok=True)
     for name, png in pictures.files.items():

@@ -228,7 +228,8 @@ def _two_levels(
         w = (weight / np.maximum(model, floor)) ** 2
         ww, wc, cc = (np.sum(w * product, axis=1) for product in (white * white, white * correlated, correlated**2))
         wt, ct = np.sum(w * white * target, axis=1), np.sum(w * correlated * target, axis=1)
-        determinant = np.maximum(ww * cc - wc * wc, np.finfo(float).tiny)
+        # two shapes that differ by rounding alone have no levels of their own: any finite ones will do
+        determinant = np.maximum(ww * cc - wc * wc, 1e-14 * ww * cc + np.finfo(float).tiny)
         a, b = (cc * wt - wc * ct) / determinant, (ww * ct - wc * wt) / determinant
         a, b = np.where(b < 0, wt / ww, np.where(a < 0, 0.0, a)), np.where(a < 0, ct / cc, np.where(b < 0, 0.0, b))
         model = np.maximum(a[:, None] * white + b[:, None] * correlated, floor)

@@ -1,0 +1,165 @@
+"""What a recording does not need is left out, said with what it saved, and changes nothing when forced back in."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from explore3d.analysis import Analysis
+from explore3d.analyze import analyze
+from explore3d.base_record import KIND, base_event
+from explore3d.leave_out import with_savings, without_needless_dynamics
+from explore3d.log import LogWriter
+from explore3d.scene import parse_scene
+from explore3d.stability_traces import DIAMETER, TIP, Heights, plate, sweeps, wire
+from explore3d.stages import Stages
+from hw.moves import Move
+from hw.simulated import SimulatedFinger
+from mapping.estimate import TOUCHED
+from mapping.left_out import LeftOut
+
+SCENE = Path(__file__).parents[1] / "assets" / "scenes" / "wire_on_plate.toml"
+Record = Callable[..., Path]
+
+
+def flat(feet: np.ndarray) -> np.ndarray:
+    return np.zeros(len(feet))
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Record:
+    """Logs of positions alone, of sweeps over a plate that the log knows."""
+
+    def write(heights: Heights, white: float, half: float = 12e-3) -> Path:
+        trace = sweeps(heights, white=white, places=(-half / 2, 0.0, half / 2), spacing=half / 500, half=half)
+        path = tmp_path_factory.mktemp("log") / "log.mcap"
+        with LogWriter(path, tip_radius=TIP) as log:
+            log.event(KIND, base_event(plate()))
+            for _, part in trace.sweeps():
+                log.write(Move(path=part.centers[[0, -1]], approach=np.array([0.0, 0.0, -1.0])), part)
+        return path
+
+    return write
+
+
+@pytest.fixture(scope="module")
+def wired(record: Record) -> tuple[Path, Analysis]:
+    path = record(wire(), 0.1e-3)
+    return path, analyze(path)
+
+
+def left(analysis: Analysis) -> dict[str, LeftOut]:
+    return {each.stage: each for each in analysis.left_out}
+
+
+def test_a_regular_posterior_needs_no_long_chain_and_one_changes_it_by_less_than_a_third_of_its_width(wired):
+    path, short = wired
+    assert "k-hat" in left(short)["long chain"].reason
+    assert "estimated" in left(short)["long chain"].saved
+    forced = analyze(path, force=["long chain"])
+    assert "long chain" not in left(forced)
+    (one,), (other,) = short.model.features, forced.model.features
+    assert (one.posterior.status, other.posterior.status) == ("not needed", "converged")
+    for name in ("height", "length"):
+        a, b = getattr(one, name), getattr(other, name)
+        assert abs(a.median - b.median) < (b.high - b.low) / 3
+
+
+def test_a_given_base_needs_no_fit_and_one_finds_the_same_feature(record):
+    path = record(wire(), 0.02e-3, half=60e-3)  # a fit tells base from detail over eight tip radii
+    given, fitted = analyze(path), analyze(path, force=["base fit"])
+    assert "base fit" in left(given)
+    assert "base fit" in fitted.timings
+    (one,), (other,) = given.model.features, fitted.model.features
+    assert abs(one.height.median - other.height.median) < 0.03e-3
+
+
+def test_a_trace_without_noise_needs_no_smoothing_and_one_moves_no_point(record):
+    path = record(wire(), 0.0)
+    raw, smoothed = analyze(path), analyze(path, force=["smoothing"])
+    assert "smoothing" in left(raw)
+    assert "smoothing" not in left(smoothed)
+    for estimate in (raw.estimate, smoothed.estimate):
+        points = estimate.points[estimate.labels == TOUCHED]
+        to_wire = np.abs(np.hypot(points[:, 1], points[:, 2] - DIAMETER / 2) - DIAMETER / 2)
+        assert np.minimum(to_wire, np.abs(points[:, 2])).max() < 1e-4 * TIP
+    assert raw.model.features[0].height == smoothed.model.features[0].height
+
+
+NOTHING = ("grammar", "posterior", "estimated surface", "curvature", "error against time")
+
+
+def test_where_nothing_is_detected_nothing_follows_and_forcing_it_finds_nothing(record):
+    path = record(flat, 0.1e-3)
+    bare, forced = analyze(path), analyze(path, force=NOTHING)
+    assert set(NOTHING) <= set(left(bare))
+    assert set(bare.timings) == {"reading", "detection"}
+    assert bare.model.features == forced.model.features == ()
+    assert not set(left(forced)) & {"grammar", "posterior", "estimated surface"}
+    assert forced.detections.threshold == bare.detections.threshold
+
+
+def test_without_contact_data_the_algorithms_that_need_it_stay_left_out_even_if_forced(wired):
+    path, plain = wired
+    forced = analyze(path, force=["algorithms 1 and 2"])
+    assert "algorithms 1 and 2" in left(plain)
+    assert "algorithms 1 and 2" in left(forced)
+    assert forced.model.features[0].height == plain.model.features[0].height
+
+
+def scene_of(stiffness: float):
+    text = SCENE.read_text() + f"\n[finger.dynamics]\nmass = 0.001\nstiffness = {stiffness}\n"
+    return parse_scene(text, SCENE)
+
+
+def test_a_tip_that_follows_within_the_noise_needs_no_dynamics():
+    stages, forced = Stages(), Stages(forced=["dynamics"])
+    assert without_needless_dynamics(scene_of(1e6), stages).finger.dynamics is None
+    assert [each.stage for each in stages.left_out] == ["dynamics"]
+    assert without_needless_dynamics(scene_of(1e6), forced).finger.dynamics is not None
+    assert without_needless_dynamics(scene_of(10.0), Stages()).finger.dynamics is not None
+
+
+def test_dynamics_forced_back_in_move_the_trace_by_less_than_the_noise():
+    from hw.dynamic_finger import DynamicFinger
+    from hw.dynamics import Dynamics
+
+    scene = scene_of(1e6)
+    common = {"object": scene.object_surface(), "tip_radius": scene.tip.radius, "rate": scene.finger.rate}
+    normal = np.array([0.0, -1.0, 1.0]) / np.sqrt(2.0)
+    middle = np.array([0.012, -0.005, -0.005])
+    across = np.array([0.0, 1.0, 1.0]) / np.sqrt(2.0)
+    path = np.array([middle - 0.012 * across, middle + 0.012 * across]) + 0.02 * normal
+    traces = []
+    for finger in (SimulatedFinger(**common), DynamicFinger(**common, dynamics=Dynamics(mass=1e-3, stiffness=1e6))):
+        traces.append(finger.execute(Move(path=path, approach=-normal, speed=scene.survey.speed)))
+    rigid, soft = (trace.centers @ normal for trace in traces)
+    assert np.ptp(rigid) > 0.5e-3  # the wire was crossed
+    assert np.sqrt(np.mean((rigid - soft) ** 2)) < scene.finger.noise.white / 10
+
+
+def test_savings_are_labelled_as_estimates_and_only_given_where_there_is_one():
+    stages = [LeftOut("estimated surface", "why"), LeftOut("pose", "why"), LeftOut("grammar", "why", "3 s (measured)")]
+    saved = [each.saved for each in with_savings(stages, {"detection": 2.0})]
+    assert saved == ["about 4.2 s (estimated: 2.1 times the detection)", "", "3 s (measured)"]
+
+
+FORBIDDEN = {
+    "nothing found": ("emcee", "matplotlib", "plotly", "open3d", "trimesh", "igl", "serial", "mapping.algorithms",
+                      "mapping.sampling", "mapping.refine", "mapping.envelope", "hw.dynamics", "hw.simulated"),
+    "a wire": ("emcee", "matplotlib", "plotly", "open3d", "serial", "mapping.algorithms", "hw.dynamics"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", list(FORBIDDEN))
+def test_positions_alone_load_nothing_that_only_contact_data_chains_or_viewers_need(record, wired, case):
+    path = record(flat, 0.1e-3) if case == "nothing found" else wired[0]
+    code = f"import sys; from explore3d.analyze import analyze; analyze({str(path)!r}); print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "mapping.detectors" in loaded
+    assert not set(FORBIDDEN[case]) & set(loaded)
