@@ -33,9 +33,13 @@ SCHEMA = "explore3d/scene/1"
 
 
 class Tip(Table):
-    """The spherical fingertip: `radius` in metres, or a `profile` of explore3d calibrate that says it."""
+    """The spherical fingertip: `radius` in metres, or a `profile` of explore3d calibrate that says it.
+
+    With a `radius_sd` (m) above 0 the radius is known only up to that, and each posterior asks for it too.
+    """
 
     radius: Length
+    radius_sd: Extent = 0.0
     profile: Path | None = None
 
 
