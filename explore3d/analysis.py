@@ -13,6 +13,7 @@ from mapping.trace import Trace
 if TYPE_CHECKING:
     from mapping.curvature import Curvature
 
+    from explore3d.inspected import Inspected
     from explore3d.scene import Scene
     from explore3d.truth import Comparison, TrueFeature
     from mapping.detectors import Detections
@@ -55,6 +56,7 @@ class Analysis:
         ended: one sentence saying why the exploration ended, "" for a log.
         time_curve: (seconds of finger time, worst error of an axis in m) while exploring, if known.
         tip_counts: counts of finer and gentler features, this tip's radius first.
+        inspected: above which height each face is free of features that were not found; None if not asked.
     """
 
     title: str
@@ -73,3 +75,4 @@ class Analysis:
     ended: str = ""
     time_curve: tuple[tuple[float, float], ...] = ()
     tip_counts: tuple[TipCount, ...] = ()
+    inspected: Inspected | None = None

@@ -11,6 +11,7 @@ import numpy as np
 from explore3d import __version__
 from explore3d.analysis import Analysis, TipCount
 from explore3d.base_reach import base_reach
+from explore3d.inspected import Inspected
 from explore3d.leave_out import with_savings
 from explore3d.recording import Log
 from explore3d.stages import Stages
@@ -43,18 +44,20 @@ class Settings:
         algorithm: number in figure 4 of the paper that decides.
         false_alarms_per_metre: expected number of invented crossings per metre of path.
         seed: of the posterior's chains.
+        tip_sd: standard deviation of the tip's radius, m.
     """
 
     algorithm: int = 3
     false_alarms_per_metre: float = 0.01
     seed: int = 1
+    tip_sd: float = 0.0
 
     @classmethod
     def of(cls, scene: Scene | None) -> Settings:
         """The settings of a scene; the defaults without one."""
         if scene is None:
             return cls()
-        return cls(scene.detection.algorithm, scene.detection.false_alarms_per_metre, scene.seed)
+        return cls(scene.detection.algorithm, scene.detection.false_alarms_per_metre, scene.seed, scene.tip.radius_sd)
 
 
 def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages) -> Analysis:
@@ -78,10 +81,12 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
     truth = (
         tuple(TrueFeature(t.kind, t.axis, t.height, t.width, t.length or None) for t in scene.truth) if scene else ()
     )
+    inspected = Inspected.of(trace, base, detections, None if scene is None else scene.survey.smallest_feature)
     model = ObjectModel.attach(
         base,
         in_model_frame(features, base),
-        provenance=_provenance(log, scene, settings, detections),
+        provenance=_provenance(log, scene, settings, detections) | {"inspection": inspected.record()},
+        inspected=inspected.height,
         reach=None if estimate is None else base_reach(base.surface, estimate),
     )
     curve = _time_curve(model, truth, trace, detections, stages)
@@ -102,6 +107,7 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
         ended=_ended(log),
         time_curve=curve,
         tip_counts=_tip_counts(features, trace.tip_radius),
+        inspected=inspected,
     )
 
 
@@ -202,7 +208,9 @@ def _refine(
             # a stream of its own for each feature: what one draws does not change the next
             rng = np.random.default_rng([settings.seed, number])
             noise = detections.noise
-            refined.append(refine(feature, trace, rng, base=base, noise=noise, others=features, confirm=confirm))
+            tip_sd = settings.tip_sd
+            found = refine(feature, trace, rng, base=base, noise=noise, others=features, tip_sd=tip_sd, confirm=confirm)
+            refined.append(found)
             share((number + 1) / len(features))
     regular = sum(each.posterior is not None and each.posterior.status == "not needed" for each in refined)
     if regular:

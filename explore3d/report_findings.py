@@ -74,6 +74,8 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
         content.append(table(head, [_row(feature, analysis, shared) for feature in features]))
         content.extend(paragraph(f"{_capital(note)} (all of them).") for note in shared)
         content.append(paragraph("Ranges are central 90 % intervals. ", limit_sentence(analysis)))
+    if analysis.inspected is not None and not is_profile(analysis):
+        content.append(paragraph(analysis.inspected.sentence()))
     if analysis.ended:
         content.append(paragraph(f"Why the exploration ended: {analysis.ended.rstrip('.')}."))
     picture = "profile" if is_profile(analysis) else "object"

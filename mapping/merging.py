@@ -174,6 +174,7 @@ def merge_model(model: ObjectModel, new: Sequence[Feature], source: str, pose_sd
             features[pair.known] = merge_features(features[pair.known], fresh, source)
     history = [*model.provenance.get("merged", []), source]
     about = {"left_out": model.left_out, "timings": model.timings, "reach": model.reach, "sigma": model.sigma}
+    about["inspected"] = model.inspected
     return ObjectModel.attach(
         model.base, [*features, *added], provenance={**model.provenance, "merged": history}, **about
     )

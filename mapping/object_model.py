@@ -27,6 +27,9 @@ __all__ = ["LeftOut", "ObjectModel"]
 
 FloatArray = NDArray[np.float64]
 
+# Fields over the base's vertices or faces that are kept beside it
+FIELDS = ("reach", "sigma", "inspected")
+
 
 @dataclass(frozen=True, eq=False)
 class ObjectModel:
@@ -40,6 +43,7 @@ class ObjectModel:
         provenance: where it came from (scene, tip radius, log hash, software version); JSON values.
         reach: (V,) label of each base vertex (0 touched, 1 bridged, 2 extrapolated), or None.
         sigma: (V,) standard deviation of the base at each vertex, m, or None.
+        inspected: (F,) height above which each base face is free of features that were not found, m, or None.
     """
 
     base: Base
@@ -49,6 +53,7 @@ class ObjectModel:
     provenance: dict[str, Any] = field(default_factory=dict)
     reach: FloatArray | None = None
     sigma: FloatArray | None = None
+    inspected: FloatArray | None = None
 
     @classmethod
     def attach(cls, base: Base, features: Sequence[Feature], **about: Any) -> Self:
@@ -108,6 +113,7 @@ class ObjectModel:
                 record["provenance"],
                 arrays.get("reach"),
                 arrays.get("sigma"),
+                arrays.get("inspected"),
             )
         except KeyError as error:
             raise ModelError(f"{file}: field {error.args[0]!r} is missing") from error
@@ -148,7 +154,7 @@ class ObjectModel:
             "base_faces": self.base.surface.faces,
         }
         arrays |= {f"draws/{each.id}": each.posterior.samples for each in self.features if each.posterior is not None}
-        arrays |= {name: getattr(self, name) for name in ("reach", "sigma") if getattr(self, name) is not None}
+        arrays |= {name: getattr(self, name) for name in FIELDS if getattr(self, name) is not None}
         stream = io.BytesIO()
         np.savez_compressed(stream, **arrays)
         return stream.getvalue()

@@ -1,4 +1,4 @@
-"""Coverage: which share of each face lies within the strips that sweeps inspect."""
+"""Coverage: which share of each face sweeps inspected, and how small a feature on it they would have found."""
 
 from __future__ import annotations
 
@@ -48,6 +48,58 @@ def coverage(surface: Surface, touched: FloatArray, reach: float, region: NDArra
     areas = surface.face_areas if region is None else surface.face_areas * region
     total = float(areas.sum())
     return Coverage(share, float((share * areas).sum() / total) if total > 0 else 0.0, reach)
+
+
+def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limit: float) -> FloatArray:
+    """(F,) m: a crest at least this high anywhere on the face would have been found; infinity where it might not.
+
+    A ball that passes a sharp crest of height D at the distance y still rises to D - (r - sqrt(r^2 - y^2)); it is
+    found, with the probability that `limit` is stated for, if that is at least the detection limit. Taken is the
+    nearest sweep alone, so the true probability is higher where two sweeps pass near.
+
+    Args:
+        touched: (N, 3) places of the base that sweeps touched, closer together than the answer is wanted, m.
+        tip_radius: r, m.
+        limit: height of the smallest crest found where a sweep crosses it, m.
+
+    Reference: theory sections 4 and 6.
+    """
+    from scipy.spatial import cKDTree
+
+    if not len(touched):
+        return np.full(len(surface.faces), np.inf)
+    step = 0.06 * tip_radius
+    points, owner = face_samples(surface, step)
+    distance, _ = cKDTree(touched).query(points, distance_upper_bound=0.9 * tip_radius)
+    passed = np.isfinite(distance)
+    distance = np.asarray(distance) + 0.55 * step  # as far as a place of the face may lie from the nearest sample
+    lost = np.full(len(points), np.inf)
+    lost[passed] = distance[passed] ** 2 / (tip_radius + np.sqrt(tip_radius**2 - distance[passed] ** 2))
+    worst = np.zeros(len(surface.faces))
+    np.maximum.at(worst, owner, lost)
+    return limit + worst
+
+
+def found_probability(
+    distance: FloatArray, height: float, tip_radius: float, limit: float, threshold: float, at_limit: float = 0.95
+) -> FloatArray:
+    """(N,) probability that a sweep which passes a sharp crest at the distances (N,) m finds it.
+
+    The signal-to-noise ratio grows as the 5/4th power of the height that the sweep sees (white noise: height times
+    the square root of the width), and is such that a crest of the detection limit is found with `at_limit`.
+
+    Args:
+        height: of the crest, m.
+        limit, threshold: of the detection: m, and in standard deviations.
+
+    Reference: theory section 6: P = Phi(d' - u).
+    """
+    from scipy.special import ndtr, ndtri
+
+    y = np.minimum(np.abs(distance), tip_radius)
+    seen = np.clip(height - y**2 / (tip_radius + np.sqrt(tip_radius**2 - y**2)), 0.0, None)
+    signal = (threshold + ndtri(at_limit)) * (seen / limit) ** 1.25
+    return np.where(seen > 0, ndtr(signal - threshold), 0.0)
 
 
 def face_samples(surface: Surface, spacing: float) -> tuple[FloatArray, NDArray[np.int64]]:
