@@ -12,9 +12,14 @@ from explore3d.bench_calibration import NOISES, Case, noise_of, run_case
 from explore3d.calibration_verdicts import verdicts
 from mapping.base import Base
 from mapping.feature import Evidence, Feature, Interval
+from mapping.importance import importance_sample
+from mapping.laplace import find_optima, laplace
 from mapping.noise import Noise
+from mapping.onto_base import onto_base
 from mapping.problem import Surroundings
+from mapping.psis import resample
 from mapping.refine import pose_problem, refine, sample_posterior, solve
+from mapping.sampling import sample_ensemble
 from mapping.shapes import cap_height, chain_height, groove_height, rim_height, step_height
 from mapping.surface import Surface
 from mapping.trace import Trace
@@ -221,6 +226,24 @@ def test_kinds_without_a_closed_form_come_back_with_a_note():
     assert same.posterior is None and "no closed-form" in same.notes[0]
 
 
+def test_a_tip_of_unknown_radius_widens_the_wire_and_nothing_else():
+    # only a + r counts under a ball: 0.2 mm that are not known of the tip are not known of the wire
+    def answer(tip_sd, seed=0):
+        trace = record([line((x, -10e-3), (x, 10e-3), 24e-6) for x in (-3e-3, 0.0, 3e-3)], big, FINE)
+        guess = feature("bump", (0, 0, 0), 1.4e-3, 3e-3)
+        rng = np.random.default_rng(seed)
+        return sample_posterior(guess, trace, rng, base=plate(), noise=FINE, tip_sd=tip_sd, confirm=False)
+
+    big = lambda feet: cap_height(np.linalg.norm(feet, axis=1), 1.5e-3, 3e-3, TIP)  # noqa: E731
+    known, free = answer(0.0), answer(0.2e-3)
+    assert free.names[-1] == "tip radius" and free.names[:-1] == known.names
+    assert free.draws("height").std() < 1.5 * known.draws("height").std()
+    radius = np.exp(free.draws("log radius"))
+    assert radius.std() == pytest.approx(0.2e-3, rel=0.25)
+    assert radius.std() > 3.0 * np.exp(known.draws("log radius")).std()
+    np.testing.assert_allclose((radius + free.draws("tip radius")).mean(), 13e-3, atol=0.05e-3)
+
+
 def test_a_second_wire_near_by_is_taken_into_account():
     # closer than 2 x_c = 7.2 mm
     other_ends = [(-15e-3, 5e-3, 0), (16e-3, 5e-3, 0)]
@@ -233,6 +256,45 @@ def test_a_second_wire_near_by_is_taken_into_account():
     )
     assert inside(found.height, D, 5e-6)
     assert abs(found.axis[:, 1].mean() - 0.05e-3) < 60e-6
+
+
+@pytest.mark.slow
+def test_a_ring_keeps_its_course_where_sweeps_graze_it():
+    # The crossings of sweeps that graze a ring lie up to 1 mm beside it: its axis is the trace's to say
+    radius, turn = 18e-3, np.linspace(0.0, 2.0 * np.pi, 181)
+    ring = radius * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    ring[-1] = ring[0]
+    trace = record([line((-28e-3, y), (28e-3, y), 24e-6) for y in np.arange(-19e-3, 20e-3, 3.8e-3)], wire(ring))
+    angles = np.concatenate(
+        [np.arcsin(np.arange(-15.2, 16, 3.8) / 18), np.pi - np.arcsin(np.arange(-15.2, 16, 3.8) / 18)]
+    )
+    wrong = radius + np.where(np.abs(np.sin(angles)) > 0.8, 0.8e-3, 0.05e-3) * np.sign(np.sin(7 * angles))
+    order = np.argsort(angles)
+    found = np.column_stack([wrong * np.cos(angles), wrong * np.sin(angles), 0.0 * angles])[order]
+    guess = feature("ridge", np.concatenate([found, found[:1]]), 0.6e-3, D, crossings=len(found), sd=50e-6)
+    refined = refine(guess, trace, np.random.default_rng(0), base=plate(), noise=WHITE, confirm=False)
+    off = np.linalg.norm(refined.axis[:, :2], axis=1) - radius
+    assert np.sqrt(np.mean(off**2)) < 40e-6 and inside(refined.height, D, 4e-6)
+
+
+def test_a_faceted_base_does_not_shake_the_axis():
+    # A pipe of 120 facets: feet of centres 10 mm above it lie up to 0.26 mm beside the axis
+    sides, radius = 120, 40e-3
+    turn = 2.0 * np.pi * np.arange(sides) / sides
+    rings = [np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full(sides, z)]) for z in (-0.05, 0.05)]
+    k = np.arange(sides)
+    low, up = (
+        np.stack([k, (k + 1) % sides, k + sides], 1),
+        np.stack([(k + 1) % sides, (k + 1) % sides + sides, k + sides], 1),
+    )
+    base = Base(Surface(np.concatenate(rings), np.concatenate([low, up])))
+    course = np.linspace(0.1, 1.0, 40)
+    axis = np.column_stack([radius * np.cos(course), radius * np.sin(course), 0.02 * course])
+    normals = axis * [1.0, 1.0, 0.0] / radius
+    points, _ = onto_base(axis, normals, base, TIP, smooth=4)
+    around = np.arctan2(points[:, 1], points[:, 0]) - course
+    assert np.abs(radius * around).max() < 2e-6 and np.abs(points[:, 2] - axis[:, 2]).max() < 1e-9
+    assert np.abs(np.hypot(points[:, 0], points[:, 1]) - radius).max() < 14e-6
 
 
 @pytest.mark.slow
@@ -334,17 +396,70 @@ def test_no_sample_near_by_is_refused():
         refine(far, trace, np.random.default_rng(0), base=plate(), noise=WHITE)
 
 
-def test_location_reaches_the_cramer_rao_bound():
+@pytest.mark.parametrize(
+    "diameter", [D, pytest.param(0.2e-3, marks=pytest.mark.slow), pytest.param(1e-3, marks=pytest.mark.slow)]
+)
+def test_location_reaches_the_cramer_rao_bound(diameter):
     """The sd of a wire's place from one crossing against sigma/D sqrt(3 spacing x_c / 8) (theory section 6)."""
-    spacing, noise = 12e-6, Noise(0.2e-3)
-    trace = record(CROSSINGS[1:2], wire(ENDS), noise)
-    guess = feature("bump", (-3e-3, 0.1e-3, 0), 0.6e-3, 0.6e-3, crossings=1)
+    spacing, noise = 12e-6, Noise(0.2e-3 * diameter / D)
+    trace = record(CROSSINGS[1:2], wire(ENDS, diameter), noise)
+    guess = feature("bump", (-3e-3, 0.1e-3, 0), 0.9 * diameter, 0.9 * diameter, crossings=1)
     problem = pose_problem(guess, Surroundings(trace, plate(), noise))
     posterior = sample_posterior(guess, trace, np.random.default_rng(0), base=plate(), noise=noise)
-    x_c = np.sqrt(2 * TIP * D)
-    bound = noise.white / D * np.sqrt(3 * spacing * x_c / 8)
+    x_c = np.sqrt(2 * TIP * diameter)
+    bound = noise.white / diameter * np.sqrt(3 * spacing * x_c / 8)
     assert len(problem.window) > 100
     assert posterior.draws("along").std() == pytest.approx(bound, rel=0.10)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["ridge", "bump", "step"])
+def test_emcee_and_importance_sampling_agree_closely_in_regular_cases(kind):
+    """Means within 0.1 and standard deviations within 5 %, from 20 000 effective draws each."""
+    problem = regular_problem(kind)
+    rng = np.random.default_rng(0)
+    optima = find_optima(problem.target, problem.beginnings)
+    fast = [importance_sample(problem.target, [laplace(problem.target, o) for o in optima], rng) for _ in range(8)]
+    draws, weights = np.concatenate([each.draws for each in fast]), np.concatenate([each.weights for each in fast]) / 8
+    mean = weights @ draws
+    sd = np.sqrt(weights @ (draws - mean) ** 2)
+    starts = fast[0].draws[resample(rng, fast[0].weights, 40)]
+    chain = sample_ensemble(problem.target, starts, rng, max_steps=4000)
+    longer = [sample_ensemble(problem.target, starts, rng, max_steps=4000) for _ in range(4)]
+    samples = np.concatenate([each.samples for each in (chain, *longer)])
+    assert max(each.k_hat for each in fast) < 0.5
+    np.testing.assert_array_less(np.abs(samples.mean(axis=0) - mean) / sd, 0.1)
+    np.testing.assert_allclose(samples.std(axis=0) / sd, 1.0, atol=0.05)
+
+
+def regular_problem(kind):
+    if kind == "bump":
+        paths = [line((x, -9e-3), (x, 9e-3)) for x in (-1.5e-3, 0.5e-3)] + [line((-9e-3, 0.0), (9e-3, 0.0))]
+        guess, truth = (
+            feature("bump", (0, 0, 0), 0.4e-3, 1e-3),
+            lambda feet: cap_height(np.linalg.norm(feet, axis=1), 0.5e-3, 2e-3, TIP),
+        )
+    elif kind == "step":
+        paths, guess = CROSSINGS, feature("step", [(-9e-3, 0, 0), (9e-3, 0, 0)], 0.35e-3, 0.0)
+        truth = lambda feet: step_height(feet[:, 1] - 0.2e-3, 0.4e-3, TIP)  # noqa: E731
+    else:
+        paths, guess, truth = CROSSINGS + SLIDES, GUESS, wire(ENDS)
+    return pose_problem(guess, Surroundings(record(paths, truth), plate(), WHITE))
+
+
+@pytest.mark.slow
+def test_ten_million_samples_are_read_in_seconds():
+    # 9.6e6 samples of a long crossing and 4e5 that matter: one look at the boxes of blocks decides
+    near = record([line((x, -12e-3), (x, 12e-3), 0.25e-6) for x in (-9e-3, -3e-3, 3e-3, 9e-3)], wire(ENDS))
+    count = 10_000_000 - len(near)
+    far = np.column_stack([np.linspace(0.05, 0.09, count), np.full(count, 0.05), np.full(count, TIP)])
+    whole = Trace.concatenate([near, Trace(np.arange(count) * 1e-3, far, np.full(count, 99), TIP)])
+    guess = replace(GUESS, evidence=Evidence(50.0, 4))
+    begin = time.perf_counter()
+    found = refine(guess, whole, np.random.default_rng(0), base=plate(), noise=WHITE, confirm=False)
+    assert len(whole) == 10_000_000 and time.perf_counter() - begin < 20.0
+    assert found.posterior.status in ("not needed", "converged")
+    assert inside(found.height, D, 1e-6)
 
 
 @pytest.mark.slow
