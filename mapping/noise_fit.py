@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -57,13 +57,27 @@ def fit_noise(blocks: Sequence[Blocks], start: Noise) -> NoiseFit:
     white = _white_alone(blocks)
     if count < 32 or white == 0:
         return NoiseFit(start)
-    alone = np.zeros((3, 3))
-    alone[0, 0] = 2.0 / count
+    # units near the data's own, by powers of two: logarithms then see the same digits at every scale
+    height = float(np.exp2(np.round(np.log2(white))))
     longest = max(float(np.abs(b.steps).max(initial=0.0)) for b in blocks)
-    guess = start if start.correlated > 0 else Noise(start.white or white, 0.1 * white, 10 * longest)
+    path = float(np.exp2(np.round(np.log2(longest))))
+    fit = _unit_fit(
+        [Blocks(b.values / height, b.steps / path, b.samples) for b in blocks],
+        Noise(start.white / height, start.correlated / height, start.length / path),
+    )
+    noise = Noise(fit.noise.white * height, fit.noise.correlated * height, fit.noise.length * path)
+    return replace(fit, noise=noise)
+
+
+def _unit_fit(blocks: Sequence[Blocks], start: Noise) -> NoiseFit:
+    """The fit in units in which levels and steps are about 1."""
+    white = _white_alone(blocks)
+    guess = start if start.correlated > 0 else Noise(start.white or white, 0.1 * white, 10.0)
     theta, covariance, misfit = _newton(blocks, _logarithms(guess, white))
     if misfit + CORRELATED_GAIN > _misfit(blocks, Noise(white)):
-        return NoiseFit(Noise(white), alone)
+        alone = np.zeros((3, 3))
+        alone[0, 0] = 2.0 / sum(int(np.isfinite(b.values).sum()) for b in blocks)
+        return NoiseFit(Noise(white, 0.0, guess.length), alone)
     return NoiseFit(_noise(theta), covariance)
 
 

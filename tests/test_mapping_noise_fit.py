@@ -90,3 +90,18 @@ def test_every_leading_block_of_a_toeplitz_system_is_solved():
         expected = np.linalg.solve(dense[:k, :k], columns[:k])
         np.testing.assert_allclose(solved[k - smallest, :k], expected, rtol=1e-10, atol=1e-12)
         assert (solved[k - smallest, k:] == 0).all()
+
+
+def test_the_fit_has_the_same_digits_at_every_power_of_two():
+    rng = np.random.default_rng(5)
+    height, step = drawn(Noise(1.0, 2.0, 0.1), 2000, 0.01, rng), 0.01
+    start = Noise(1.1, 1.5, 0.2)
+    plain = fit_noise([blocks_of(height, step)], start).noise
+    for scale in (2.0**-40, 2.0**30):
+        scaled = Noise(start.white * scale, start.correlated * scale, start.length * scale)
+        found = fit_noise([blocks_of(height * scale, step * scale)], scaled).noise
+        assert (found.white, found.correlated, found.length) == (
+            plain.white * scale,
+            plain.correlated * scale,
+            plain.length * scale,
+        )
