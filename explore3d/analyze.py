@@ -10,6 +10,7 @@ from typing import Any
 from explore3d.analysis import Analysis
 from explore3d.base_record import read_base
 from explore3d.build_model import build_model
+from explore3d.forecast import Forecast, forecast, worst_errors
 from explore3d.load_logs import load_logs
 from explore3d.log_stream import large_log
 from explore3d.meshes import load_mesh
@@ -73,6 +74,9 @@ def conclude(session: Session, log: Log, scene: Scene | None, base: Base | None,
     with session.staging() as folder:
         with stages.stage("report"):
             write_report(analysis, folder, stages.is_forced("rendered pictures"))
-        model = replace(analysis.model, timings=dict(stages.timings))
+        about = {"forecast": forecast(analysis), "errors": worst_errors(analysis.errors)}
+        known = {name: each.record() if isinstance(each, Forecast) else each for name, each in about.items() if each}
+        provenance = analysis.model.provenance | known
+        model = replace(analysis.model, provenance=provenance, timings=dict(stages.timings))
         model.save(folder)
     return replace(analysis, model=model, timings=dict(stages.timings))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 
 from explore3d.analysis import Analysis
+from explore3d.forecast import forecast
 from explore3d.markup import Html, Row, element, paragraph, section, table
 from explore3d.pictures import Pictures
-from explore3d.quantity import seconds_text
+from explore3d.quantity import length_text, seconds_text
 from mapping.left_out import LeftOut
 
 
@@ -31,7 +32,26 @@ def account_of_time(analysis: Analysis) -> Html:
         for name, seconds in analysis.timings.items()
     ]
     rows.append((element("b", "together"), seconds_text(sum(analysis.timings.values())), ""))
-    return section("Where the time went", "time", table(("stage", "time", ""), rows, numeric=(1,)))
+    content = [table(("stage", "time", ""), rows, numeric=(1,)), *_what_time_buys(analysis)]
+    return section("Where the time went", "time", *content)
+
+
+def _what_time_buys(analysis: Analysis) -> list[Html]:
+    """Error now, and predicted for half and double the finger's time."""
+    known = forecast(analysis)
+    if known is None:
+        return []
+    kind = "error of the worst axis" if analysis.time_curve else "largest standard deviation of a place or height"
+    rows: list[Row] = [
+        (name, seconds_text(share * known.seconds), length_text(error, 2))
+        for name, share, error in (
+            ("half the time (predicted)", 0.5, known.half),
+            ("as it was", 1.0, known.error),
+            ("twice the time (predicted)", 2.0, known.double),
+        )
+    ]
+    how = f"Predicted {known.how} (error ~ time^{-known.exponent:.2f}). Computing grows in proportion to the samples."
+    return [table(("what the finger's time buys", "finger", kind), rows, numeric=(1, 2)), paragraph(how)]
 
 
 def provenance(analysis: Analysis) -> Html:
