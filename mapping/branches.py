@@ -72,7 +72,7 @@ def branches(points: FloatArray, half_width: float, length: FloatArray | None = 
     if not forks:
         return [Branch(points[_path(tree)], (True, True), junction=False)]
     hubs = _clusters(forks, points, SAME_HUB * half_width)
-    arms = _arms(tree, points, hubs, WITHIN_HUB * half_width)
+    arms = _loosened(_arms(tree, points, hubs, WITHIN_HUB * half_width))
     meeting, partner, crowded = _meetings(arms, points, hubs, half_width)
     return _joined(arms, meeting, partner, crowded)
 
@@ -172,6 +172,16 @@ def _arms(tree: Tree, points: FloatArray, hubs: list[list[int]], radius: float) 
         if first < 0 or last < 0 or length > radius:
             arms.append(_Arm(points[path], (first, last)))
     return arms
+
+
+def _loosened(arms: list[_Arm]) -> list[_Arm]:
+    """The arms with free ends where a hub has no other arm: nothing meets there."""
+    at = [hub for arm in arms for hub in arm.hubs]
+
+    def held(hub: int) -> int:
+        return hub if at.count(hub) > 1 else -1
+
+    return [_Arm(arm.points, (held(arm.hubs[0]), held(arm.hubs[1]))) for arm in arms]
 
 
 def _is_corner(i: int, tree: Tree, points: FloatArray, half_width: float) -> bool:
