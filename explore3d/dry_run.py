@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d.expedition import discoverer, explorer, known_base
+from explore3d.expedition import discoverer, explorer, known_base, locator
 from explore3d.run import scene_finger
 from explore3d.scene import Scene, load_scene
 from hw.moves import Move
@@ -31,6 +31,7 @@ class DryRun:
         covered: share of the surface that the sweeps inspect.
         reach: distance from a sweep up to which the smallest feature is seen, m.
         violations: (number of the move, what limit it breaks).
+        assumed: what had to be assumed of the object, a sentence or "".
     """
 
     base: Base
@@ -41,6 +42,7 @@ class DryRun:
     covered: float
     reach: float
     violations: tuple[tuple[int, str], ...]
+    assumed: str = ""
 
     def record(self) -> dict[str, Any]:
         """The plan in JSON values: SI units."""
@@ -62,7 +64,8 @@ class DryRun:
         first = f"{sweeps}, {length_text(self.metres)} of finger path, {seconds_text(self.seconds)}"
         second = f"{100 * self.covered:.1f} % of the surface lies within {length_text(self.reach)} of a sweep"
         broken = [f"move {number}: {what}" for number, what in self.violations]
-        return [first, second, *(broken or ["no move breaks a limit"])]
+        assumed = [self.assumed] if self.assumed else []
+        return [*assumed, first, second, *(broken or ["no move breaks a limit"])]
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""
@@ -86,12 +89,15 @@ def plan_scene(path: Path | str) -> DryRun:
         workspace = finger.workspace
     if base is None:
         first, base = imagined(scene)
+        assumed = "the body is not known: planned as if it were flat and lay in the middle of the region"
     else:
-        first = []
+        first, assumed = [], ""
+    nothing = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip)
+    if scene.model.pose == "estimate" and scene.model.mesh is not None:
+        first, _ = dry_run(locator(scene, base).plan(), nothing)
     ways = Ways(base, tip, workspace.low, workspace.high, workspace.max_speed)
     explore = explorer(scene, base)
     plan = routed(explore.plan(), ways)
-    nothing = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip)
     planned, outcome = dry_run(plan, nothing)
     moves, limits = [*first, *planned], Limits.of(workspace, base, tip)
     before: list[Move | None] = [None, *moves]
@@ -102,7 +108,7 @@ def plan_scene(path: Path | str) -> DryRun:
         spent.count(move)
     survey = outcome.value.survey
     return DryRun(
-        base, tip, tuple(moves), spent.metres, spent.seconds, survey.fraction, survey.reach, tuple(violations)
+        base, tip, tuple(moves), spent.metres, spent.seconds, survey.fraction, survey.reach, tuple(violations), assumed
     )
 
 

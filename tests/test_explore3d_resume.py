@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,20 @@ def test_the_resumed_session_feels_what_the_whole_one_would_have_felt(tmp_path: 
     trace = Trace.concatenate([trace for _, trace in record])
     assert (np.diff(trace.t) > 0).all()
     assert np.unique(trace.sweep).tolist() == list(range(1, 9))
+
+
+@pytest.mark.parametrize("after", [2, 5, 7])
+def test_a_resumed_simulation_has_the_noise_and_the_time_of_the_whole_one(tmp_path: Path, after: int) -> None:
+    noisy = replace(finger(), white=1e-4, correlated=1e-5)
+    whole, _ = drive(plan(), noisy.execute)
+    with LogWriter(tmp_path / "log.mcap", tip_radius=R) as log:
+        drive(plan(after), logged(replace(finger(), white=1e-4, correlated=1e-5).execute, log))
+    again = replace(finger(), white=1e-4, correlated=1e-5)
+    record, _ = drive(plan(), Replay(read_log(tmp_path / "log.mcap")).before(again.execute, again.skip))
+    assert len(record) == len(whole) == 8
+    for (_, one), (_, other) in zip(record, whole, strict=True):
+        assert np.allclose(one.centers, other.centers, atol=1e-9) and np.allclose(one.t, other.t, atol=1e-9)
+        assert (one.sweep == other.sweep).all()
 
 
 def test_a_finished_session_is_replayed_whole_and_moves_nothing(tmp_path: Path) -> None:
