@@ -14,11 +14,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from explore3d.bench_calibration import plate, record, straight_path
+from mapping.broken_ridge_shape import BrokenRidgeShape
+from mapping.bump_shape import BumpShape
 from mapping.evidence import log_evidence, log_evidence_of_nothing
 from mapping.feature import Evidence, Feature, Interval
 from mapping.kind_odds import as_broken, as_bump
@@ -74,30 +77,70 @@ def run_odds(pair: str, seed: int) -> OddsCase:
     rng = np.random.default_rng([PAIRS.index(pair), seed])
     first, second = hypotheses(pair)
     truth = bool(rng.random() < 0.5)
-    heights = simulated(first if truth else second, first, rng)
-    asked = _given(first, heights)
+    heights, theta = simulated(first if truth else second, first, rng)
+    place = None if theta is None else _place(first if truth else second, theta)
+    asked = _begun(_given(first, heights), place, theta)
     if second is None:
         return OddsCase(pair, seed, truth, log_evidence(asked, rng) - log_evidence_of_nothing(asked.target))
-    other = _given(second, heights)
+    other = _begun(_given(second, heights), place, theta)
     if pair == "two ridges or one":
         asked = as_broken(other)  # where the search begins depends on the data
     return OddsCase(pair, seed, truth, log_evidence(asked, rng) - log_evidence(other, rng))
 
 
-def simulated(true: Problem | None, window_of: Problem, rng: np.random.Generator) -> FloatArray:
-    """(n,) bin heights drawn from the prior of a problem (None: nothing is there) and from the likelihood."""
+def _place(true: Problem | None, theta: FloatArray) -> FloatArray:
+    """(3,) middle of what is there, m."""
+    assert true is not None
+    shape: Any = true.target.shape
+    if isinstance(shape, BumpShape):
+        return np.asarray(shape.spot.lifted(theta[None, :2], np.zeros(1))[0])
+    ridge = shape.whole if isinstance(shape, BrokenRidgeShape) else shape
+    own = theta[-len(ridge.names) :]
+    s = np.array([0.5 * (own[-4] + own[-3])])
+    points, laterals, _, _ = ridge.chart.at(s)
+    return np.asarray(points[0] + ridge.modes.lateral(own[None, : ridge.modes.count], s)[0, 0] * laterals[0])
+
+
+def _begun(problem: Problem, place: FloatArray | None, theta: FloatArray | None) -> Problem:
+    """The problem with its search begun near what is there, as it is after a detection, under either hypothesis."""
+    shape: Any = problem.target.shape
+    start = shape.start.copy()
+    if place is None or theta is None:
+        more = start[None]
+    elif isinstance(shape, BumpShape):
+        start[:2] = (place - shape.spot.point) @ shape.spot.axes.T
+        more = start[None]
+    else:
+        ridge = shape.whole if isinstance(shape, BrokenRidgeShape) else shape
+        s, lateral, _ = ridge.chart.coordinates(place[None])
+        half = 0.25 * problem.sizes.half_width
+        start[-len(ridge.names)] = lateral[0]
+        start[-4:-2] = s[0] - half, s[0] + half
+        more = np.array([start, theta[-len(start) :]]) if len(theta) >= len(start) else start[None]
+    inside = np.clip(more, problem.target.low, problem.target.high)
+    return replace(problem, beginnings=np.concatenate([problem.beginnings, inside]))
+
+
+def simulated(
+    true: Problem | None, window_of: Problem, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray | None]:
+    """(n,) bin heights drawn from the prior of a problem (None: nothing is there) and from the likelihood.
+
+    The parameters that were drawn come with them.
+    """
     window, nuisance = window_of.window, window_of.nuisance
-    heights = np.zeros(len(window))
+    heights, theta = np.zeros(len(window)), None
     if true is not None:
         shape = true.target.shape
         theta = np.array([float(prior.draw(rng, 1)[0]) for prior in shape.priors])
-        heights = shape.templates(np.clip(theta, true.target.low, true.target.high)[None])[0].copy()
+        theta = np.clip(theta, true.target.low, true.target.high)
+        heights = shape.templates(theta[None])[0].copy()
     unit = np.linalg.inv(window_of.target.likelihood.filter.whiten(np.eye(len(window))).T)
     heights += unit @ rng.standard_normal(len(window))
     for start, stop in zip(window.starts[:-1], window.starts[1:], strict=True):
         place = np.linspace(-1.0, 1.0, stop - start)
         heights[start:stop] += nuisance.offset * rng.standard_normal() + nuisance.slope * rng.standard_normal() * place
-    return heights
+    return heights, theta
 
 
 def _given(problem: Problem, heights: FloatArray) -> Problem:
