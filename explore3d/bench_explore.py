@@ -8,7 +8,7 @@ Every run is one line of a JSONL file; what is already in the file is not run ag
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from explore3d.bench_scenes import SCENES, BenchScene
-from explore3d.truth import compare
+from explore3d.truth import Comparison, TrueFeature, compare
 from hw.moves import Move
 from hw.simulated import SimulatedFinger
 from mapping.base import Base
@@ -30,7 +30,7 @@ from planners.plan import Plan
 
 TIP_RADIUS = 0.01
 # Wanted half-width of the 90 % interval of an end, m
-PRECISION = 0.03e-3
+PRECISION = 0.02e-3
 # The apparatus of the paper (theory section 6), and one whose noise is correlated over as much as a wire disturbs
 APPARATUS: dict[str, Any] = {"rate": 5000.0, "white": 0.2e-3, "correlated": 0.02e-3, "correlation_length": 1e-3}
 NOISES = {"apparatus": APPARATUS, "correlated": APPARATUS | {"correlated": 0.06e-3, "correlation_length": 2e-3}}
@@ -142,7 +142,7 @@ def errors(model: ObjectModel, body: BenchScene) -> dict[str, Any]:
     """Counts of found, mistaken, missed and invented features, and the largest errors of the found ones, m."""
     pairs = compare(model, body.truth, TIP_RADIUS)
     found = [pair for pair in pairs if pair.status == "found" and pair.true and pair.found]
-    ends = [pair.end_error for pair in found if np.isfinite(pair.end_error)]
+    ends = [error for pair in found for error in free_end_errors(pair, body.truth)]
     return {
         "true": len(body.truth),
         "found": len(found),
@@ -153,6 +153,17 @@ def errors(model: ObjectModel, body: BenchScene) -> dict[str, Any]:
         "axis_rms": max((pair.axis_rms for pair in found), default=None),
         "height_error": max((abs(pair.height_error) for pair in found), default=None),
     }
+
+
+def free_end_errors(pair: Comparison, truth: Sequence[TrueFeature]) -> list[float]:
+    """Distances of a ridge's true ends from the found ones, m; an end at which it meets another ridge is none."""
+    if pair.true is None or pair.found is None or np.isnan(pair.end_error):
+        return []
+    mine = pair.found.axis[[0, -1]]
+    others = [each.axis for each in truth if each is not pair.true]
+    ends = pair.true.axis[[0, -1]]
+    free = [end for end in ends if all(np.linalg.norm(axis - end, axis=1).min() > pair.true.height for axis in others)]
+    return [float(np.linalg.norm(mine - end, axis=1).min()) for end in free]
 
 
 class _Clock:

@@ -53,7 +53,9 @@ def seen_again(
     window = np.abs(place) <= reach + (2.5 if is_step(like) else 0.9) * like.half_width
     if window.sum() < 32:
         return None
-    fit, kind, half_width = _fitted(place[window], height[window], trace.tip_radius, noise, like, reach)
+    wide = flattening(place[window], normals[window], way, trace.tip_radius)
+    fit, kind, half_width = _fitted(wide * place[window], height[window], trace.tip_radius, noise, like, wide * reach)
+    fit, half_width = replace(fit, place=fit.place / wide, sd=fit.sd / wide), half_width / wide
     # a fit at the rim of its range follows the flank of something else
     if fit.gain < SEEN or abs(fit.place) > 0.97 * reach:
         return None
@@ -73,6 +75,26 @@ def seen_again(
         half_width=half_width,
         snr=float(np.sqrt(fit.gain)),
     )
+
+
+def flattening(place: FloatArray, normals: FloatArray, way: FloatArray, tip_radius: float) -> float:
+    """By how much shapes on a bent base are narrower than the same shapes on a flat one.
+
+    Over a base of curvature k the ball's centre runs 1 + k r times as far as its foot, and the crest's own trace of
+    radius R rises over one of radius r + 1/k: to second order the height falls off as over a flat base whose
+    lengths are stretched by sqrt((1 + k r) (1 - k (R - r))), about sqrt(1 + k r).
+
+    Args:
+        place: (N,) places along the sweep, m, in order.
+        normals: (N, 3) of the base there.
+        way: (3,) direction of the sweep, of any length.
+    """
+    ends = np.linspace(0, len(place) - 1, 9).astype(int)
+    step = np.diff(place[ends])
+    turn = np.diff(normals[ends], axis=0) @ (way / np.linalg.norm(way))
+    # the median leaves out an edge of the mesh, where the base turns at once
+    bend = float(np.median(turn[step > 0] / step[step > 0])) if (step > 0).any() else 0.0
+    return float(np.sqrt(np.clip(1.0 + bend * tip_radius, 0.25, 4.0)))
 
 
 def _fitted(

@@ -34,8 +34,8 @@ FloatArray = NDArray[np.float64]
 LEARNING = 50.0
 # Height that must stay visible between two sweeps, in detection limits
 MARGIN = 1.25
-# Slides off one end, at most
-MOST_SLIDES = 60
+# Slides off one end, at most, and in one go
+MOST_SLIDES, AT_ONCE = 150, 8
 
 
 @dataclass(frozen=True)
@@ -256,7 +256,7 @@ class Explore:
                 done = found.slides.get((index, which), 0)
                 if end.reason == "end" and end.sd > self.wanted_sd and done < MOST_SLIDES and track.kind != "step":
                     seconds = 1.65 * track.half_width / self.speed
-                    # the n-th slide leaves sqrt((n - 1) / n) of the uncertainty
+                    # n slides leave 1 / sqrt(n) of the uncertainty of one
                     left = float(np.sqrt((done + 1.0) / (done + 2.0)))
                     gain = end.sd * (1.0 - left) if np.isfinite(end.sd) else self.survey.pitch
                     start = partial(self._slide, index, which, found, strokes)
@@ -306,12 +306,16 @@ class Explore:
         return RidgeFollower(strokes, sense, found.noise or Noise(0.0), self.wanted_sd, known=known)
 
     def _slide(self, index: int, which: int, found: Found, strokes: Strokes) -> Plan:
-        """One more sweep off an end that is not known well enough."""
+        """More sweeps to and fro off an end that is not known well enough; the way to it is paid once for all."""
         track = found.tracks[index]
-        found.slides[index, which] = found.slides.get((index, which), 0) + 1
         finder = EndFinder(strokes, self.base, found.noise or Noise(0.0))
         crest = Crest(track.height, track.height_sd, track.half_width, track.sign)
-        end = yield from finder.slide(track.ends[which], crest)
+        end = track.ends[which]
+        for _ in range(AT_ONCE):
+            end = yield from finder.slide(end, crest)
+            found.slides[index, which] = found.slides.get((index, which), 0) + 1
+            if end.reason != "end" or end.sd <= self.wanted_sd:
+                break
         found.tracks[index] = track.with_end(which, end)
         return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")
 

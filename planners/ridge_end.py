@@ -13,6 +13,7 @@ from mapping.base import Base
 from mapping.noise import Noise
 from mapping.trace import Trace
 from planners.axis_track import AxisEnd, Slides
+from planners.crest import flattening
 from planners.shape_fit import ShapeFit, end_shape, fit_shape
 from planners.strokes import Strokes, tangential
 
@@ -66,7 +67,7 @@ class EndFinder:
             return end
         feet = self.base.foot(trace.centers, tip)
         felt = Slides.joined(end.felt, feet.points, feet.height)
-        fit = self._fitted(felt, points, along, crest, (0.0, float(along[-1]) - 0.5 * half))
+        fit = self._fitted(felt, points, normals, along, crest, float(along[-1]) - 0.5 * half)
         inside = 0.02 * tip < fit.place < float(along[-1]) - 0.5 * half - 0.02 * tip
         if not inside or fit.sd > 0.2 * tip or abs(fit.height) < 0.4 * crest.height:
             return end if np.isfinite(end.sd) else replace(end, sd=max(end.reach, 0.1 * tip), reason="lost")
@@ -82,7 +83,7 @@ class EndFinder:
         return slice(inside[0], inside[-1] + 1) if len(inside) > 1 else slice(None)
 
     def _fitted(
-        self, felt: Slides, points: FloatArray, along: FloatArray, crest: Crest, within: tuple[float, float]
+        self, felt: Slides, points: FloatArray, normals: FloatArray, along: FloatArray, crest: Crest, last: float
     ) -> ShapeFit:
         """The end's place on the line of points, from all slides laid over each other."""
         place = places_along(felt.points, points, along)
@@ -90,16 +91,18 @@ class EndFinder:
         # the correlated part of the noise averages out over the slides, not along them
         noise = replace(self.noise, correlated=self.noise.correlated / np.sqrt(felt.count))
         shape = end_shape(crest.sign, self.strokes.tip_radius)
-        return fit_shape(
-            place[order],
+        wide = flattening(along, normals, points[-1] - points[0], self.strokes.tip_radius)
+        fit = fit_shape(
+            wide * place[order],
             felt.heights[order],
             shape,
             crest.sign,
             crest.height,
-            within,
+            (0.0, wide * last),
             noise,
             crest_sd=crest.height_sd,
         )
+        return replace(fit, place=fit.place / wide, sd=fit.sd / wide)
 
 
 def _at(place: float, along: FloatArray, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
