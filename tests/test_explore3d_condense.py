@@ -100,3 +100,18 @@ def same(one: Condensed, other: Condensed) -> None:
     for a, b in zip(one.detections.crossings, other.detections.crossings, strict=True):
         np.testing.assert_array_equal(a.point, b.point)
         assert (a.start, a.stop, a.height, a.kind) == (b.start, b.stop, b.height, b.kind)
+
+
+@pytest.mark.slow
+def test_a_streamed_analysis_finds_the_wire_and_leaves_no_chunks_behind(log: Path, tmp_path: Path):
+    from explore3d.analyze import analyze
+    from explore3d.streaming import analyze_stream
+
+    out = tmp_path / "out"
+    streamed = analyze_stream(log, out, chunk=CHUNK)
+    assert not (tmp_path / "out.chunks").exists()
+    assert (out / "report.html").is_file()
+    assert any("samples were searched" in each.reason for each in streamed.left_out)
+    (found,), (whole,) = streamed.model.features, analyze(log).model.features
+    assert found.height.median == pytest.approx(whole.height.median, abs=0.05e-3)
+    assert found.length.median == pytest.approx(whole.length.median, abs=1e-3)
