@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from explore3d import __version__
 from explore3d.log_stream import LogStream, count_samples
+from explore3d.recording import Event
 from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.detectors import Detections, detect
@@ -39,11 +40,15 @@ class Condensed:
         trace: samples near crossings, and every k-th of the others.
         detections: of all samples; `start` and `stop` of its crossings count in `trace`.
         samples: how many there were.
+        events, complete, recovered: of a whole log, as in explore3d.recording.Log.
     """
 
     trace: Trace
     detections: Detections
     samples: int
+    events: tuple[Event, ...] = ()
+    complete: bool = True
+    recovered: str = ""
 
 
 def condense(
@@ -67,6 +72,9 @@ def condense(
     total = count_samples(stream.path)
     every = max(1, round(total / KEPT))
     key = _key(stream.path, every, chunk, settings)
+    result = None if folder is None else folder / "whole.npz"
+    if result is not None and (earlier := _load(result, key)) is not None:
+        return earlier
     parts: list[Condensed] = []
     done = 0
     for number, trace in enumerate(stream.sweeps(chunk)):
@@ -79,7 +87,10 @@ def condense(
         parts.append(part)
         done += part.samples
         share(min(1.0, done / max(total, 1)))
-    return joined(parts)
+    whole = replace(joined(parts), events=stream.events, complete=stream.complete, recovered=stream.recovered)
+    if result is not None:
+        _save(whole, result, key)
+    return whole
 
 
 def joined(parts: list[Condensed]) -> Condensed:
@@ -139,6 +150,8 @@ def _save(part: Condensed, file: Path, key: str) -> None:
     arrays: dict[str, Any] = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
     numbers = {name: value for name, value in values.items() if isinstance(value, float)}
     record = asdict(part.detections) | {"samples": part.samples, "key": key, "trace": numbers}
+    record["log"] = {"complete": part.complete, "recovered": part.recovered}
+    record["events"] = [asdict(event) for event in part.events]
     text = json.dumps(record, default=lambda array: array.tolist())
     stream = io.BytesIO()
     np.savez(stream, record=np.frombuffer(text.encode(), dtype=np.uint8), **arrays)
@@ -155,10 +168,12 @@ def _load(file: Path, key: str) -> Condensed | None:
         if record.pop("key") != key:
             return None
         trace = Trace(**record.pop("trace"), **{name: arrays[name] for name in arrays.files if name != "record"})
-    samples = record.pop("samples")
+    samples, log = record.pop("samples"), record.pop("log", {})
+    events = tuple(Event(**event) for event in record.pop("events", []))
     vectors = ("point", "normal", "tangent")
     crossings = tuple(
         Crossing(**(each | {name: np.array(each[name]) for name in vectors})) for each in record.pop("crossings")
     )
     noise, left_out = Noise(**record.pop("noise")), tuple(record.pop("left_out"))
-    return Condensed(trace, Detections(crossings=crossings, noise=noise, left_out=left_out, **record), samples)
+    detections = Detections(crossings=crossings, noise=noise, left_out=left_out, **record)
+    return Condensed(trace, detections, samples, events, **log)

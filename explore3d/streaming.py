@@ -47,7 +47,7 @@ def analyze_stream(
             stream, base, folder, share, chunk,
             algorithm=settings.algorithm, false_alarms_per_metre=settings.false_alarms_per_metre,
         )  # fmt: skip
-    log = _log(stream, condensed)
+    log = _log(path, scene_text, condensed)
     far = condensed.samples - len(condensed.trace)
     searched = f"all {condensed.samples:,} samples were searched; {far:,} of them, away from crossings, were not kept"
     stages.left_out.append(LeftOut("part of the trace", searched))
@@ -60,15 +60,15 @@ def analyze_stream(
     return analysis
 
 
-def _log(stream: LogStream, condensed: Condensed) -> Log:
+def _log(path: Path, scene_text: str, condensed: Condensed) -> Log:
     return Log(
         trace=condensed.trace,
-        scene_text=stream.scene_text,
-        events=stream.events,
-        complete=stream.complete,
-        recovered=stream.recovered,
-        sha256=digest(stream.path),
-        sources=(str(stream.path),),
+        scene_text=scene_text,
+        events=condensed.events,
+        complete=condensed.complete,
+        recovered=condensed.recovered,
+        sha256=digest(path),
+        sources=(str(path),),
         detections=condensed.detections,
     )
 

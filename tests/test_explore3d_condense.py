@@ -88,7 +88,10 @@ def test_a_broken_off_search_goes_on_where_it_stopped(log: Path, tmp_path: Path,
     resumed = condense(LogStream(log), base, tmp_path, chunk=CHUNK)
     count = len(list(LogStream(log).sweeps(CHUNK)))
     assert len(searched) == count + 1  # the one that was broken off is done again, none else
+    monkeypatch.setattr(LogStream, "sweeps", None)  # the whole is there: the log is not read again
     same(resumed, condense(LogStream(log), base, tmp_path, chunk=CHUNK))
+    monkeypatch.undo()
+    monkeypatch.setattr(module, "detect", counted)
     assert len(searched) == count + 1
     condense(LogStream(log), base, tmp_path, chunk=CHUNK, false_alarms_per_metre=0.1)
     assert len(searched) == 2 * count + 1  # other settings: searched anew
@@ -97,6 +100,8 @@ def test_a_broken_off_search_goes_on_where_it_stopped(log: Path, tmp_path: Path,
 def same(one: Condensed, other: Condensed) -> None:
     np.testing.assert_array_equal(one.trace.centers, other.trace.centers)
     assert one.detections.noise == other.detections.noise
+    assert (one.complete, one.recovered) == (other.complete, other.recovered)
+    assert [(e.kind, e.t) for e in one.events] == [(e.kind, e.t) for e in other.events]
     for a, b in zip(one.detections.crossings, other.detections.crossings, strict=True):
         np.testing.assert_array_equal(a.point, b.point)
         assert (a.start, a.stop, a.height, a.kind) == (b.start, b.stop, b.height, b.kind)
