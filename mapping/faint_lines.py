@@ -26,7 +26,7 @@ TILE = 30.0
 FACING = 0.87
 # Bins across and along the line, in half-widths; lengths of lines, in bins along.
 ACROSS, ALONG = 1.0 / 3.0, 2.0
-LENGTHS = (4, 6, 9, 13, 19, 27)
+LENGTHS = (4, 7, 12, 20)
 # Sweeps that must agree, and the share of the evidence that must remain without the one that says most.
 SWEEPS, WITHOUT_BEST = 4, 0.75
 # The number of straight lines that noise can choose from is larger than that of lines without common places: the
@@ -132,7 +132,7 @@ def _clearest_in(
     height = inspection.height[tile]
     size = 2 * float(np.linalg.norm(flat, axis=1).max())
     best = (0.0, 0.0, 0.0, 0.0, 0.0)
-    for angle in np.arange(0.0, np.pi, 2.4 / (LENGTHS[3] * ALONG)):
+    for angle in np.arange(0.0, np.pi, 2.4 / (LENGTHS[2] * ALONG)):
         way = np.array([np.cos(angle), np.sin(angle)])
         u, v = flat @ way, flat @ [-way[1], way[0]]
         snr, row, begin, end = _best_segment(u, v, height / inspection.sd, size, half_width)

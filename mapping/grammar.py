@@ -17,7 +17,7 @@ from mapping.feature import Feature
 from mapping.inspection import inspect
 from mapping.line_feature import Around, line_features
 from mapping.linking import groups
-from mapping.open_crest import is_open, on_a_step
+from mapping.open_crest import comes_down, is_open, on_a_step
 from mapping.outline import outline
 from mapping.point_feature import point_feature
 from mapping.runs import Run, split_runs
@@ -65,7 +65,9 @@ def _linked(detections: Detections, trace: Trace, base: Base) -> list[Feature]:
     scale = _scale(crossings, trace.tip_radius)
     around = Around(inspect(trace, base, detections.noise, 0.2 * scale), base, detections, trace.tip_radius)
     edges, crossings = edge_features(crossings, around)
-    runs, steps = split_runs(crossings)
+    runs, steps = split_runs(
+        [c for c in crossings if not c.kind.startswith("step") or comes_down(c, around.inspection)]
+    )
     lines, bands = _sorted_runs(runs, steps, around)
     steps += [edge for band in bands for edge in (band.first, band.last)]
     pitch = around.inspection.pitch

@@ -34,6 +34,14 @@ def is_open(crossing: Crossing, inspection: Inspection) -> bool:
     )
 
 
+def comes_down(edge: Crossing, inspection: Inspection) -> bool:
+    """True if the sweep was felt at the lower level beyond a step, and not only up to its own end."""
+    own = inspection.sweep == edge.sweep
+    beyond = (inspection.points[own] - edge.point) @ uphill(edge) * -np.sign(edge.height) > 0
+    low = np.abs(inspection.height[own][beyond]) < 0.5 * abs(edge.height)
+    return bool(low.sum() >= 2)
+
+
 def on_a_step(crest: Crossing, edges: Sequence[Crossing], steps: Sequence[Feature]) -> bool:
     """True if a crest is no higher than a step, and lies on its displaced side or over its edge."""
     for step in steps:

@@ -8,7 +8,7 @@ import pytest
 from mapping.base import Base
 from mapping.detectors import detect
 from mapping.grammar import assemble
-from mapping.shapes import chain_height, step_height
+from mapping.shapes import chain_height, rim_height, step_height
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -111,3 +111,58 @@ def test_a_tee_is_a_junction():
     assert {f.kind for f in found} == {"ridge"}
     assert len(found) >= 2
     assert all("junction" in f.notes for f in found)
+
+
+def test_a_ridge_beyond_the_inspected_part_is_at_least_as_long_as_what_was_seen():
+    (ridge,) = features(ridges([[0.01, -0.06, RADIUS], [0.012, 0.06, RADIUS]]))
+    assert ridge.length.censored
+    assert 0.06 < ridge.length.low < 0.085
+    assert any("at least" in note for note in ridge.notes)
+
+
+def test_an_end_that_was_seen_is_no_limit():
+    (ridge,) = features(ridges(RIDGE))
+    assert not ridge.length.censored
+    assert ridge.length.low - 1e-3 < 0.0652 < ridge.length.high + 1e-3
+
+
+def hollow(rim):
+    """Height over a hollow of which `rim` (N, 2) -> (N,) is the distance inside its rim."""
+    return lambda foot: rim_height(rim(foot[:, :2]), TIP)
+
+
+def test_a_pit_is_a_pit_and_a_groove_a_groove():
+    (pit,) = features(hollow(lambda p: 4e-3 - np.linalg.norm(p - [0.003, 0.004], axis=1)), pitch=4e-3)
+    assert pit.kind == "pit"
+    np.testing.assert_allclose(pit.axis[0], [0.003, 0.004, 0.0], atol=3e-4)
+    half = np.array([0.022, 2.5e-3])
+    turn = np.array([[0.6, 0.8], [-0.8, 0.6]])
+    (groove,) = features(hollow(lambda p: (half - np.abs(p @ turn.T)).min(axis=1)))
+    assert groove.kind == "groove"
+    assert groove.length.low - 2e-3 < 0.044 < groove.length.high + 2e-3
+    assert abs(groove.height.median + 2.5e-3**2 / (2 * TIP)) < 0.08e-3
+
+
+def test_a_circuit_on_the_plateau_adds_nothing_to_a_step():
+    def height(foot):
+        return step_height(foot[:, 0] - 0.01 - 0.2 * foot[:, 1], 0.5e-3, TIP)
+
+    plain = survey(height)
+    angle = np.arange(0.0, 2 * np.pi, SPACING / 0.01)
+    foot = np.column_stack([0.05 + 0.01 * np.cos(angle), 0.01 * np.sin(angle), 0.0 * angle])
+    noise = 0.09e-3 * np.random.default_rng(9).standard_normal(foot.shape)
+    t = 1000.0 + SPACING / 0.03 * np.arange(len(foot))
+    circle = Trace(t, foot + np.outer(TIP + height(foot), NORMAL) + noise, np.full(len(foot), 99), TIP)
+    trace = Trace.concatenate([plain, circle])
+    (step,) = assemble(detect(trace, plate()), trace, plate())
+    assert step.kind == "step"
+
+
+def test_two_ridges_that_cross_are_two_ridges():
+    found = features(
+        ridges([[-0.03, -0.02, RADIUS], [0.03, 0.02, RADIUS]], [[-0.01, 0.03, RADIUS], [0.012, -0.03, RADIUS]])
+    )
+    assert [f.kind for f in found] == ["ridge", "ridge"]
+    assert all("junction" in f.notes for f in found)
+    lengths = sorted(f.length.median for f in found)
+    np.testing.assert_allclose(lengths, [np.hypot(0.022, 0.06), np.hypot(0.06, 0.04)], atol=3e-3)
