@@ -163,3 +163,32 @@ def test_positions_alone_load_nothing_that_only_contact_data_chains_or_viewers_n
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert "mapping.detectors" in loaded
     assert not set(FORBIDDEN[case]) & set(loaded)
+
+
+def test_a_flat_base_needs_no_geodesics_and_they_would_space_the_sweeps_alike():
+    from explore3d.bench_trace import bump_mesh
+    from mapping.surface import Surface
+    from planners.level_field import _geodesic, _slope, level_field
+
+    mesh = bump_mesh(800)
+    flat_mesh = Surface(mesh.vertices * np.array([1.0, 1.0, 0.0]), mesh.faces)
+    chart = np.arange(len(flat_mesh.faces))
+    field = level_field(flat_mesh, flat_mesh.vertices, chart)
+    assert field.kind == "linear"
+    distance = _geodesic(flat_mesh.vertices, flat_mesh.faces)
+    assert distance is not None
+    corner = flat_mesh.vertices[distance.argmin()]
+    straight = np.linalg.norm(flat_mesh.vertices - corner, axis=1)
+    # its level sets lie as far apart as those of a coordinate
+    assert np.abs(distance - straight).max() < 0.05 * straight.max()
+    assert _slope(flat_mesh.vertices, flat_mesh.faces, flat_mesh.vertices[:, 0]) == pytest.approx(1.0)
+
+
+def test_planning_over_a_flat_base_loads_no_geodesics():
+    code = (
+        "import sys; from explore3d.stability_traces import plate; from planners.explore import Explore;"
+        "next(Explore(base=plate(0.03), tip_radius=0.01, smallest=3e-4).plan()); print(*sys.modules)"
+    )
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "planners.level_field" in loaded
+    assert "igl" not in loaded
