@@ -199,10 +199,11 @@ class Explore:
     def _survey(self, found: Found) -> Plan:
         """Every sweep of the survey; the first ones are detected together, for they tell the noise."""
         survey, waiting, paths, felt = self.survey, list[Trace](), list[FloatArray](), 0.0
+        pitch = survey.pitch
         if survey.slices is None and (first := next(survey.sweeps(), None)) is not None:
             trace = yield first
-            survey = self._widened(survey, trace, found)
-        for move in survey.sweeps():
+            pitch = self._widened(survey, trace, found)
+        for move in survey.sweeps(pitch):
             trace = yield move
             paths.append(move.path + self.tip_radius * move.approach)
             if len(trace) == 0:
@@ -214,7 +215,7 @@ class Explore:
                 self._detect(waiting, found)
         if waiting:
             self._detect(waiting, found)
-        found.survey = survey.covered(paths)
+        found.survey = survey.covered(paths, pitch)
         if survey.slices is not None:
             found.left_out.append(
                 f"features smaller than a ridge that spans {1e3 * (self.shortest_ridge or 0.0):g} mm: "
@@ -222,17 +223,17 @@ class Explore:
             )
         return Outcome("done")
 
-    def _widened(self, survey: Survey, trace: Trace, found: Found) -> Survey:
-        """The survey with strips as wide as the noise of a first sweep allows its smallest feature to be seen."""
+    def _widened(self, survey: Survey, trace: Trace, found: Found) -> float:
+        """Strips (m) as wide as the noise of a first sweep allows the smallest feature to be seen."""
         if len(trace) < 16:
-            return survey
+            return survey.pitch
         limit = detect(trace, self.base, noise=found.noise).detection_limit
         if limit > self.smallest:
             found.left_out.append(
                 f"features lower than {1e3 * limit:.2g} mm: a single sweep does not show them through the noise, "
                 f"though {1e3 * self.smallest:.2g} mm were asked for"
             )
-        return replace(survey, visible=float(np.clip(MARGIN * limit / self.smallest, 0.1, survey.visible)))
+        return survey.strip(float(np.clip(MARGIN * limit / self.smallest, 0.1, survey.visible)))
 
     def _detect(self, waiting: list[Trace], found: Found) -> None:
         felt = detect(

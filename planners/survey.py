@@ -15,7 +15,7 @@ from planners.charts import crease_charts
 from planners.coverage import Coverage, coverage
 from planners.errors import PlannerError
 from planners.isolines import Isoline, isolines
-from planners.level_field import level_field
+from planners.level_field import LevelField, level_field
 from planners.plan import Outcome, Plan
 from planners.pressed_path import pressed_sweep, thinned, touched_points
 from planners.slices import Slices, slices_for
@@ -64,8 +64,11 @@ class Survey:
     @property
     def pitch(self) -> float:
         """Width of the strip in which a sweep sees the smallest feature, m; never more than a tip radius."""
-        seen = 2.0 * self.smallest * (1.0 - self.visible) * self.tip_radius
-        return float(min(2.0 * np.sqrt(seen), self.tip_radius))
+        return self.strip(self.visible)
+
+    def strip(self, visible: float) -> float:
+        """Width of the strip in which a sweep sees a share of the smallest feature, m."""
+        return float(min(2.0 * np.sqrt(2.0 * self.smallest * (1.0 - visible) * self.tip_radius), self.tip_radius))
 
     def plan(self) -> Plan:
         """Yield every sweep; the outcome's value is the planned Coverage."""
@@ -77,11 +80,12 @@ class Survey:
         detail = f"{100 * done.fraction:.1f} % of the surface lies within {1e3 * done.reach:.2f} mm of a sweep"
         return Outcome("done" if done.fraction > 0.99 else "not all reached", detail, done)
 
-    def covered(self, paths: list[FloatArray]) -> Coverage:
-        """Coverage of the region by touched paths (each (K, 3), m)."""
-        dense = [_dense(path, 0.2 * self.pitch) for path in paths]
+    def covered(self, paths: list[FloatArray], pitch: float | None = None) -> Coverage:
+        """Coverage of the region by touched paths (each (K, 3), m) that see strips as wide as the pitch."""
+        pitch = pitch or self.pitch
+        dense = [_dense(path, 0.2 * pitch) for path in paths]
         points = np.concatenate(dense) if dense else np.zeros((0, 3))
-        return coverage(self.base.surface, points, 0.55 * self.pitch, self._inside())
+        return coverage(self.base.surface, points, 0.55 * pitch, self._inside())
 
     @cached_property
     def slices(self) -> Slices | None:
@@ -96,9 +100,9 @@ class Survey:
     def _charts(self) -> list[IntArray]:
         return crease_charts(self.base.surface, self._inside())
 
-    def sweeps(self) -> Iterator[Move]:
-        """All sweeps, each begun near the end of the one before it."""
-        return self._strips() if self.slices is None else self._crossed(self.slices)
+    def sweeps(self, pitch: float | None = None) -> Iterator[Move]:
+        """All sweeps, each begun near the end of the one before it; strips may be given another pitch (m)."""
+        return self._strips(pitch or self.pitch) if self.slices is None else self._crossed(self.slices)
 
     def _crossed(self, slices: Slices) -> Iterator[Move]:
         """Sweeps along one family of plane sections after the other."""
@@ -117,24 +121,31 @@ class Survey:
                     here = line.points[-1]
                     yield from self._pressed(line)
 
-    def _strips(self) -> Iterator[Move]:
+    @cached_property
+    def _fields(self) -> dict[int, LevelField]:
+        """The fields solved so far, by the number of the chart."""
+        return {}
+
+    def _strips(self, pitch: float) -> Iterator[Move]:
         """Sweeps along the level sets of one chart after the other, a pitch apart."""
         surface = self.base.surface
         here: FloatArray | None = None
         done = np.zeros(len(surface.faces), dtype=bool)
-        for chart in self._charts:
+        for number, chart in enumerate(self._charts):
             if done[chart].all():
                 continue
             touched = []
-            levels = level_field(surface, surface.vertices, chart)
-            for level in levels.levels(self.pitch):
+            if number not in self._fields:
+                self._fields[number] = level_field(surface, surface.vertices, chart)
+            levels = self._fields[number]
+            for level in levels.levels(pitch):
                 lines = isolines(surface.vertices, surface.faces, chart, levels.values, float(level))
-                for line in _in_turn(lines, here, self.pitch):
+                for line in _in_turn(lines, here, pitch):
                     here = line.points[-1]
                     touched.append(line.points)
                     yield from self._pressed(line)
             if len(chart) < len(surface.faces):
-                done |= self.covered(touched).share > 0.999
+                done |= self.covered(touched, pitch).share > 0.999
 
     def _pressed(self, line: Isoline) -> Iterator[Move]:
         points, normals = touched_points(line, self.base.surface)
