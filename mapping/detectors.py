@@ -193,7 +193,7 @@ def _crossings(found: Disturbance, profile: HeightProfile, base: Base, tip: floa
         for kind, edge, bound, outside in zip(
             kinds, edges, bounds, (found.start <= low, found.stop >= high), strict=True
         )
-        if not outside
+        if not outside and low <= edge <= high
     ]
 
 

@@ -13,6 +13,8 @@ from mapping.noise import FloatArray, Noise
 CORRELATED_GAIN = 8.0
 # Standard deviation, in natural logarithms, of what is known of a parameter before anything is measured.
 IGNORANCE = 2.0
+# Longest correlation, in lengths of the whole path, that the path can tell from an offset of the base.
+LONGEST = 0.25
 NEWTON_STEPS = 12
 # Steps of the numerical derivatives, in natural logarithms: the likelihood bends over 0.1 and more.
 DIFFERENCE = 0.02
@@ -47,7 +49,7 @@ class NoiseFit:
 
 
 def fit_noise(blocks: Sequence[Blocks], start: Noise) -> NoiseFit:
-    """Maximum likelihood of white + OU noise, from any start within about a decade.
+    """Maximum likelihood of white + OU noise, from any start within about a decade; the start where none is found.
 
     Args:
         blocks: what was measured, on one or more scales.
@@ -66,6 +68,8 @@ def fit_noise(blocks: Sequence[Blocks], start: Noise) -> NoiseFit:
         Noise(start.white / height, start.correlated / height, start.length / path),
     )
     noise = Noise(fit.noise.white * height, fit.noise.correlated * height, fit.noise.length * path)
+    if noise.correlated > 0 and noise.length > LONGEST * sum(float(np.abs(b.steps).sum()) for b in blocks):
+        return NoiseFit(start)
     return replace(fit, noise=noise)
 
 

@@ -63,8 +63,9 @@ def find_disturbances(
 
 
 def quiet_bins(profile: HeightProfile, bank: Bank, noise: Noise, threshold: float, tip_radius: float) -> BoolArray:
-    """(n,) True where a profile shows nothing above the threshold."""
-    quiet = np.ones(len(profile.height), dtype=bool)
+    """(n,) True where a profile shows nothing above the threshold; nowhere if it is too short for any filter."""
+    short = bank.filters[0].half_width > LARGEST_SHARE * profile.length
+    quiet = np.full(len(profile.height), not short)
     for _, begin, end, _, _ in _stretches(profile, bank, noise, threshold, tip_radius):
         quiet[begin:end] = False
     return quiet

@@ -92,6 +92,16 @@ def test_a_groove_is_concave_and_sharp_and_a_step_goes_up_and_comes_down():
     assert abs(up.point[0]) < 0.5e-3
 
 
+def test_sweeps_too_short_to_inspect_say_nothing_about_the_noise():
+    long = sweep(wire, white=1e-4, seed=1)
+    stubs = [sweep(lambda x: np.full(len(x), 0.5e-3), length=1.5e-3, white=1e-4, seed=k) for k in range(4)]
+    parts = [replace(part, t=part.t + 10 * k, sweep=np.full(len(part), k)) for k, part in enumerate([long, *stubs])]
+    found = detect(Trace.concatenate(parts), plate())
+    assert found.noise.correlated == 0
+    np.testing.assert_allclose(found.noise.white, 1e-4, rtol=0.03)
+    assert [c.sweep for c in found.crossings] == [0]
+
+
 def test_two_wires_nearer_than_their_disturbances_are_two():
     both = sweep(lambda x: np.maximum(wire(x, place=-2e-3), wire(x, place=2.5e-3)), white=2e-5)
     places = [c.point[0] for c in detect(both, plate()).crossings]
@@ -222,3 +232,16 @@ def test_rounding_of_the_positions_is_no_feature_but_a_wire_beneath_it_is() -> N
     assert silent.detection_limit >= step
     (crossing,) = detect(rounded(wire), plate()).crossings
     np.testing.assert_allclose(crossing.height, 0.65e-3, rtol=0.03)
+
+
+def test_a_tip_thrown_off_for_moments_changes_neither_the_noise_nor_the_wire() -> None:
+    """Most of the path lies on the wire, and its flank comes in pieces: as from a force sensor that slides down it."""
+    whole = sweep(wire, length=0.012, white=5e-7)
+    x = whole.centers[:, 0]
+    flying = (x > 1e-3) & (x < 3.5e-3) & (np.sin(x / 4e-5) > 0.8)
+    far = (x > 2e-3) & (x < 2.5e-3)
+    torn = whole.select(~flying & ~far)
+    found = detect(torn, plate())
+    assert 3e-7 < found.noise.sd < 2e-6
+    strongest = max(found.crossings, key=lambda crossing: crossing.snr)
+    np.testing.assert_allclose(strongest.height, 0.65e-3, rtol=0.02)
