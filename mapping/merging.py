@@ -41,6 +41,9 @@ class Association:
 def associate(known: Sequence[Feature], new: Sequence[Feature], pose_sd: float = 0.0) -> tuple[Association, ...]:
     """Pair new features with known ones of the same kind, the closest pairs first, each at most once.
 
+    Two are the same if their axes are as close as their posteriors allow, or so close that the bodies would share
+    half of the narrower one: two bodies cannot, so one of the posteriors is then too sure of its place.
+
     Args:
         known: features of the model.
         new: features of the later log, in the same frame.
@@ -52,7 +55,8 @@ def associate(known: Sequence[Feature], new: Sequence[Feature], pose_sd: float =
     taken: dict[int, Association] = {}
     used: set[int] = set()
     for distance, i, j in pairs:
-        if distance <= SAME and i not in taken and j not in used:
+        near = distance <= SAME or _share_a_body(new[i], known[j])
+        if near and np.isfinite(distance) and i not in taken and j not in used:
             taken[i] = Association(i, j, distance)
             used.add(j)
     nearest = {i: min((d for d, k, _ in pairs if k == i), default=float("inf")) for i in range(len(new))}
@@ -62,14 +66,22 @@ def associate(known: Sequence[Feature], new: Sequence[Feature], pose_sd: float =
 def axis_distance(a: Feature, b: Feature, pose_sd: float = 0.0) -> float:
     """Distance of two axes in standard deviations: rms over the stretch that they share; inf if they share none."""
     sd = float(np.sqrt(a.position_sd**2 + b.position_sd**2 + pose_sd**2))
-    sd = max(sd, np.finfo(float).tiny)
+    return axis_gap(a, b) / max(sd, np.finfo(float).tiny)
+
+
+def axis_gap(a: Feature, b: Feature) -> float:
+    """Distance of two axes, m: rms over the stretch that they share; inf if they share none."""
     short, long = sorted((a.axis, b.axis), key=lambda axis: float(arclengths(axis)[-1]))
     points = resample(short, SAMPLES) if len(short) > 1 else short
     gaps, inside = _gaps(points, long)
     if len(long) > 1 and len(short) > 1 and inside.mean() < OVERLAP:
         return float("inf")
     counted = gaps[inside] if inside.any() else gaps
-    return float(np.sqrt(np.mean(counted**2)) / sd)
+    return float(np.sqrt(np.mean(counted**2)))
+
+
+def _share_a_body(a: Feature, b: Feature) -> bool:
+    return axis_gap(a, b) < 0.5 * min(a.width.median, b.width.median)
 
 
 def _gaps(points: FloatArray, axis: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -104,6 +116,10 @@ def merge_features(known: Feature, new: Feature, source: str) -> Feature:
         tuple(sorted({*known.evidence.algorithms, *new.evidence.algorithms})),
         better.evidence.log_odds,
     )
+    # Measurements further apart than their sds allow: the sd of their mean is scaled to match (Particle Data Group).
+    apart = axis_distance(known, new)
+    scale = apart if SAME < apart < np.inf else 1.0
+    doubt = (f"two logs place it {apart:.0f} standard deviations apart: its place is less sure",) if scale > 1.0 else ()
     record = {
         "source": source,
         "height": new.height.median,
@@ -119,8 +135,8 @@ def merge_features(known: Feature, new: Feature, source: str) -> Feature:
         length=merge_intervals(known.length, new.length),
         evidence=evidence,
         curvature_feature=known.curvature_feature or new.curvature_feature,
-        position_sd=float(1.0 / np.sqrt(precision.sum())),
-        notes=tuple(dict.fromkeys((*better.notes, *other.notes))) if better.length.censored else better.notes,
+        position_sd=scale * float(1.0 / np.sqrt(precision.sum())),
+        notes=tuple(dict.fromkeys((*better.notes, *(other.notes if better.length.censored else ()), *doubt))),
         extra={**other.extra, **better.extra, "history": [*known.extra.get("history", []), record]},
     )
 

@@ -50,6 +50,15 @@ def test_the_merged_axis_lies_between_the_two_by_their_precisions():
     assert merged.position_sd == pytest.approx(20e-6 / np.sqrt(5))
 
 
+def test_bodies_that_would_share_half_of_themselves_are_one_with_a_doubt():
+    # 0.2 mm apart, 0.65 mm wide: 7 standard deviations, but two wires cannot be there
+    model = ObjectModel.attach(plate(), [ridge(0.0)])
+    (merged,) = merge_model(model, [ridge(0.2e-3)], "second log").features
+    assert any("standard deviations apart" in note for note in merged.notes)
+    assert merged.position_sd == pytest.approx(0.1e-3, rel=0.01)
+    assert len(merge_model(model, [ridge(0.4e-3)], "second log").features) == 2
+
+
 def test_nothing_is_removed_by_an_empty_log():
     model = ObjectModel.attach(plate(), [ridge(0.0)])
     assert len(merge_model(model, [], "empty").features) == 1
