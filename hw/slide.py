@@ -29,7 +29,7 @@ QUEUED = 2
 # Samples are handed on this often, s
 BATCH = 0.5
 # Share of the wanted force that may be missing, or too much, at full tangential speed; and the slowest pace
-EASE, SLOWEST = 0.5, 0.1
+EASE, SLOWEST = 0.25, 0.1
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Slide:
     reach: float = 2e-3
     gain: float = 0.2
     delay: float = 0.0
-    contact: float = 0.1
+    contact: float = 0.05
 
     def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
         """Samples in contact with their forces, about every BATCH seconds; what was felt before a stop as well."""
@@ -157,4 +157,5 @@ def _pace(error: float) -> float:
     At full speed the tip would fly off behind a ridge, and be pressed hard in front of it, since the force
     follows the body only as fast as the guarded speed lets it.
     """
-    return float(np.clip((1.0 - abs(error)) / (1.0 - EASE), SLOWEST, 1.0))
+    spare = max(0.0, 1.0 - abs(error)) / (1.0 - EASE)
+    return float(np.clip(spare**2, SLOWEST, 1.0))

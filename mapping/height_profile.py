@@ -17,8 +17,9 @@ IntArray = NDArray[np.int64]
 # the path does not.
 LENGTH_TOLERANCE = 0.01
 LARGEST_FIRST_BLOCK_COUNT = 2000
-# A gap of more than this many bins cuts a profile: nothing was touched there.
-LONGEST_GAP = 2
+# A gap of more than this many bins, and of more than this share of the tip radius, cuts a profile: nothing was
+# touched there. A shorter one is a tip that was thrown off for a moment; the ball saw no detail that narrow.
+LONGEST_GAP, NARROW = 2, 0.03
 # Bins of fewer samples average heights: the mean of two centres on a curved path lies beside it, which shows without
 # noise. Bins of more average centres first: the distance of a noisy centre from a kink is biased.
 FEW = 4
@@ -106,7 +107,8 @@ def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing
         height = np.add.reduceat(base.foot(trace.centers, trace.tip_radius).height, first) / counts
     else:
         height = base.foot(centers, trace.tip_radius).height
-    cuts = np.flatnonzero(np.diff(occupied) > LONGEST_GAP + 1) + 1
+    longest = max(LONGEST_GAP, int(NARROW * trace.tip_radius / spacing))
+    cuts = np.flatnonzero(np.diff(occupied) > longest + 1) + 1
     profiles = []
     for begin, end in zip([0, *cuts], [*cuts, len(occupied)], strict=True):
         # a bin that the sweep only begins or ends in is as noisy as its few samples

@@ -24,6 +24,8 @@ ROUNDING = 1e-8
 # Signal-to-noise ratio of the smallest crest looked for, and of what is kept out of the noise's estimate.
 CERTAIN = 5.0
 SUSPECT = 3.5
+# Standard deviations off a known base that no bin of noise reaches, even where its level is a guess.
+UNLIKELY = 10.0
 # Samples that the noise is first estimated from, and blocks that it is fitted to.
 RAW_SAMPLES = 40_000
 BLOCKS = 8000
@@ -116,13 +118,21 @@ def background(
     level, fit, bank = first, NoiseFit(first), _bank(profiles, first, tip_radius, largest, drift)
     before: list[BoolArray] = []
     for _ in range(ROUNDS):
-        quiet = [quiet_bins(p, bank, level, SUSPECT, tip_radius) for p in profiles]
+        quiet = [quiet_bins(p, bank, level, SUSPECT, tip_radius) & _likely(p, level, drift) for p in profiles]
         if before and all(np.array_equal(a, b) for a, b in zip(quiet, before, strict=True)):
             break
         fit = _fit(profiles, quiet, stretches, level, first, base)
         level = floored(fit.noise, tip_radius)
         bank, before = _bank(profiles, level, tip_radius, largest, drift), quiet
     return Background(level, bank, _uncertainty(fit, bank))
+
+
+def _likely(profile: HeightProfile, noise: Noise, drift: int) -> BoolArray:
+    """(n,) False where a bin is too far off a known base for noise: pieces too short for any filter hide much."""
+    if drift:
+        return np.ones(len(profile.height), dtype=bool)
+    sd = np.sqrt(noise.block_covariances(1, profile.spacing, profile.samples)[0])
+    return np.asarray(np.abs(profile.height) <= UNLIKELY * sd)
 
 
 def _bank(profiles: Sequence[HeightProfile], noise: Noise, tip_radius: float, largest: float, drift: int) -> Bank:
