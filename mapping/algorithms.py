@@ -15,6 +15,7 @@ threshold 1/r finds nothing convex there (theory section 3).
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,35 @@ FloatArray = NDArray[np.float64]
 
 # A curve is put on this many steps per fit: more only cost time.
 STEPS = 40
+# Narrowest fit to estimated surfaces and normals, in tip radii: narrower ones see grids and facets.
+FINEST = 0.02
+# Share by which a concave feature of an estimated surface must exceed the fillets' own curvature.
+FILLET = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class CurvatureProfile:
+    """What an algorithm sees along a sweep.
+
+    Args:
+        s: (N,) places along the sweep's chord, m.
+        curvature: (N,) 1/m, of the surface that the algorithm stands on.
+        convex, concave: thresholds of that surface, 1/m; concave < 0.
+        half_width: of the local fits, m.
+    """
+
+    s: FloatArray
+    curvature: FloatArray
+    convex: float
+    concave: float
+    half_width: float
+
+    @property
+    def features(self) -> tuple[CurvatureFeature, ...]:
+        """Stretches beyond a threshold, less what the noise made of them, and less those of the end windows alone."""
+        found = joined(features_beyond(self.s, self.curvature, self.convex, self.concave), self.half_width)
+        low, high = self.s.min() + self.half_width, self.s.max() - self.half_width
+        return tuple(f for f in found if max(f.start, f.stop) > low and min(f.start, f.stop) < high)
 
 
 def curvature_features(trace: Trace, algorithm: int = 3, noise: float | None = None) -> tuple[CurvatureFeature, ...]:
@@ -44,6 +74,11 @@ def curvature_features(trace: Trace, algorithm: int = 3, noise: float | None = N
 
     Reference: paper section 3.1 and figure 4.
     """
+    return curvature_profile(trace, algorithm, noise).features
+
+
+def curvature_profile(trace: Trace, algorithm: int = 3, noise: float | None = None) -> CurvatureProfile:
+    """The curvature that an algorithm tests, and its thresholds; arguments and errors as `curvature_features`."""
     if algorithm not in ALGORITHMS:
         raise DetectionError(f"unknown algorithm {algorithm!r}; the paper has 1, 2, 3 and 4")
     if len(trace) < 16:
@@ -58,14 +93,17 @@ def along_chord(trace: Trace, points: FloatArray) -> FloatArray:
     return _planar(trace, points)[0]
 
 
-def _estimated_from_contacts(trace: Trace, noise: float | None) -> tuple[CurvatureFeature, ...]:
+def _estimated_from_contacts(trace: Trace, noise: float | None) -> CurvatureProfile:
     normals = _given(trace.normals)
     contacts = trace.centers - trace.tip_radius * normals if trace.contacts is None else trace.contacts
     x, z = _planar(trace, contacts)
-    return _curve(x, z, noise, trace.tip_radius, 1 / trace.tip_radius)
+    grid, smooth, half_width = _smoothed(x, z, noise, trace.tip_radius, 1 / trace.tip_radius)
+    # contacts leap over what the tip cannot reach: there the estimate is the tip's own arc
+    closed = _eroded(-_eroded(-smooth, grid, trace.tip_radius), grid, trace.tip_radius)
+    return _on_estimate(grid, closed, half_width, trace.tip_radius)
 
 
-def _normal_derivative(trace: Trace, noise: float | None) -> tuple[CurvatureFeature, ...]:
+def _normal_derivative(trace: Trace, noise: float | None) -> CurvatureProfile:
     along, outward = _frame(trace)
     x, _ = _planar(trace, trace.centers)
     normals = _given(trace.normals)
@@ -74,43 +112,35 @@ def _normal_derivative(trace: Trace, noise: float | None) -> tuple[CurvatureFeat
     spacing = float(np.ptp(x)) / (len(x) - 1)
     # slope of a line over 2 w: sd^2 = 3 sigma^2 Delta / (2 w^3)
     threshold = 1 / (2 * trace.tip_radius)
-    half_width = max(float((13.5 * level**2 * spacing / threshold**2) ** (1 / 3)), 4 * spacing)
+    half_width = max(
+        float((13.5 * level**2 * spacing / threshold**2) ** (1 / 3)), 4 * spacing, FINEST * trace.tip_radius
+    )
     grid, angle = _even(x, angle, half_width)
     from scipy.signal import savgol_filter
 
     size = min(2 * max(2, round(half_width / (grid[1] - grid[0]))) + 1, len(grid) - (len(grid) + 1) % 2)
     slope = savgol_filter(angle, size, 1, deriv=1, delta=grid[1] - grid[0], mode="interp")
     # the centre rises by tan(angle): its path is longer than its chord
-    return joined(features_beyond(grid, slope * np.cos(angle), threshold, -1 / trace.tip_radius), half_width)
+    return CurvatureProfile(grid, slope * np.cos(angle), threshold, -1 / trace.tip_radius, half_width)
 
 
-def _traced(trace: Trace, noise: float | None) -> tuple[CurvatureFeature, ...]:
+def _traced(trace: Trace, noise: float | None) -> CurvatureProfile:
     x, z = _planar(trace, trace.centers)
-    return _curve(x, z, noise, trace.tip_radius, 1 / (2 * trace.tip_radius))
+    wide = _curve(x, z, noise, trace.tip_radius, 1 / (2 * trace.tip_radius))
+    # the concave threshold is twice the convex one and bears narrower fits, which see kinks more sharply
+    narrow = _curve(x, z, noise, trace.tip_radius, 1 / trace.tip_radius)
+    kinks = np.interp(wide.s, narrow.s, narrow.curvature)
+    return replace(wide, curvature=np.where(kinks < wide.concave, np.minimum(kinks, wide.curvature), wide.curvature))
 
 
-def _estimated_from_trace(trace: Trace, noise: float | None) -> tuple[CurvatureFeature, ...]:
-    tip = trace.tip_radius
+def _estimated_from_trace(trace: Trace, noise: float | None) -> CurvatureProfile:
     x, z = _planar(trace, trace.centers)
-    level, spacing = _level(z, noise), float(np.ptp(x)) / (len(x) - 1)
-    half_width = half_width_for(level, spacing, 1 / (2 * tip))
-    grid, z = _even(x, z, half_width)
-    step = grid[1] - grid[0]
     # balls on raw noise are biased by its extremes (theory section 6): smooth first
-    from scipy.signal import savgol_filter
-
-    size = min(2 * max(2, round(half_width / step)) + 1, len(grid) - (len(grid) + 1) % 2)
-    smooth = savgol_filter(z, size, 2, mode="interp")
-    offsets = np.arange(-int(tip / step), int(tip / step) + 1)
-    ball = np.sqrt(np.maximum(tip**2 - (offsets * step) ** 2, 0.0))
-    padded = np.pad(smooth, len(offsets) // 2, constant_values=np.inf)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, len(offsets))
-    envelope = np.array([(window - ball).min() for window in windows])
-    curvature = curvature_along(grid, envelope, half_width)
-    return joined(features_beyond(grid, curvature, 1 / tip, -1 / tip), half_width)
+    grid, smooth, half_width = _smoothed(x, z, noise, trace.tip_radius, 1 / (2 * trace.tip_radius))
+    return _on_estimate(grid, _eroded(smooth, grid, trace.tip_radius), half_width, trace.tip_radius)
 
 
-ALGORITHMS: dict[int, Callable[[Trace, float | None], tuple[CurvatureFeature, ...]]] = {
+ALGORITHMS: dict[int, Callable[[Trace, float | None], CurvatureProfile]] = {
     1: _estimated_from_contacts,
     2: _normal_derivative,
     3: _traced,
@@ -118,13 +148,41 @@ ALGORITHMS: dict[int, Callable[[Trace, float | None], tuple[CurvatureFeature, ..
 }
 
 
-def _curve(
-    x: FloatArray, z: FloatArray, noise: float | None, tip: float, convex: float
-) -> tuple[CurvatureFeature, ...]:
-    """Features of a curve z(x) by quadratics as wide as its noise demands."""
+def _curve(x: FloatArray, z: FloatArray, noise: float | None, tip: float, convex: float) -> CurvatureProfile:
+    """Curvature of a curve z(x) by quadratics as wide as its noise demands."""
     half_width = half_width_for(_level(z, noise), float(np.ptp(x)) / (len(x) - 1), convex)
     grid, even = _even(x, z, half_width)
-    return joined(features_beyond(grid, curvature_along(grid, even, half_width), convex, -1 / tip), half_width)
+    return CurvatureProfile(grid, curvature_along(grid, even, half_width), convex, -1 / tip, half_width)
+
+
+def _smoothed(
+    x: FloatArray, z: FloatArray, noise: float | None, tip: float, threshold: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """An even grid, z smoothed on it by quadratics, and their half-width."""
+    from scipy.signal import savgol_filter
+
+    spacing = float(np.ptp(x)) / (len(x) - 1)
+    half_width = max(half_width_for(_level(z, noise), spacing, threshold), FINEST * tip)
+    grid, even = _even(x, z, half_width)
+    size = min(2 * max(2, round(half_width / (grid[1] - grid[0]))) + 1, len(grid) - (len(grid) + 1) % 2)
+    return grid, np.asarray(savgol_filter(even, size, 2, mode="interp")), half_width
+
+
+def _eroded(z: FloatArray, grid: FloatArray, tip: float) -> FloatArray:
+    """Lower envelope of balls centred on the curve z(x)."""
+    step = grid[1] - grid[0]
+    reach = min(int(tip / step), len(z) - 1)
+    lowest = z - tip
+    for k in range(1, reach + 1):
+        ball = np.sqrt(max(tip**2 - (k * step) ** 2, 0.0))
+        lowest[:-k] = np.minimum(lowest[:-k], z[k:] - ball)
+        lowest[k:] = np.minimum(lowest[k:], z[:-k] - ball)
+    return np.asarray(lowest)
+
+
+def _on_estimate(grid: FloatArray, z: FloatArray, half_width: float, tip: float) -> CurvatureProfile:
+    """Curvature of an estimated surface, whose fillets of exactly -1/r are no features."""
+    return CurvatureProfile(grid, curvature_along(grid, z, half_width), 1 / tip, -(1 + FILLET) / tip, half_width)
 
 
 def _level(z: FloatArray, noise: float | None) -> float:
