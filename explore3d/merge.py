@@ -35,7 +35,7 @@ def merge(model: Path | str, logs: Sequence[Path | str], out: Path | str, pose_s
         if log.sha256 in seen:
             raise UserError(f"{path}: this log is in the model {model} already; merged twice it would count twice")
         analysis = build_model(log, None, known.base, Stages())
-        known = merge_model(known, analysis.model.features, Path(path).name, pose_sd)
+        known = merge_model(known, analysis.model.features, "/".join(Path(path).resolve().parts[-2:]), pose_sd)
         hashes = [*known.provenance.get("merged_sha256", []), log.sha256]
         known = replace(known, provenance={**known.provenance, "merged_sha256": hashes})
     try:
