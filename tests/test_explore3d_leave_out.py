@@ -70,6 +70,7 @@ def test_a_regular_posterior_needs_no_long_chain_and_one_changes_it_by_less_than
         assert abs(a.median - b.median) < (b.high - b.low) / 3
 
 
+@pytest.mark.slow
 def test_a_given_base_needs_no_fit_and_one_finds_the_same_feature(record):
     path = record(wire(), 0.02e-3, half=60e-3)  # a fit tells base from detail over eight tip radii
     given, fitted = analyze(path), analyze(path, force=["base fit"])
