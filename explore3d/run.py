@@ -99,9 +99,14 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
 
     with stages.stage("exploration") as share, finger:
         about = {"software": f"explore3d {__version__}", "seed": scene.seed, "finger": finger.info}
-        log = session.open_log(tip_radius=scene.tip.radius, scene_text=scene.resolved, metadata=about)
+        log = session.open_log(
+            tip_radius=scene.tip.radius,
+            scene_text=scene.resolved,
+            metadata=about,
+            resolution=finger.info.get("resolution", 0.0),
+        )
         if hasattr(finger, "notice"):
-            finger.notice = log.event  # a slow sweep's samples are on disk before it ends
+            finger.notice = log.felt  # a slow sweep's samples are on disk before it ends
         touch = finger.execute if replay is None else replay.before(finger.execute, getattr(finger, "skip", None))
         execute = _logged(touch, log, scene.explore.time_budget, share)
         outcome = Expedition(scene, finger, execute, log).go()
