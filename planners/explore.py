@@ -52,7 +52,8 @@ class Action:
 class Found:
     """What the exploration knows so far; the outcome's value.
 
-    `actions` names everything that was done after the survey, with its outcome; `left_out` what was not.
+    `actions` names everything that was done after the survey, with its outcome; `left_out` what was not, `unseen` what
+    the survey may have missed.
     """
 
     tip_radius: float
@@ -65,6 +66,7 @@ class Found:
     slides: dict[tuple[int, int], int] = field(default_factory=dict)
     actions: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    unseen: list[str] = field(default_factory=list)
 
     def unexplained(self) -> list[Crossing]:
         """Crossings that no track or bump accounts for and that were not looked into yet.
@@ -172,7 +174,7 @@ class Explore:
         if outcome.reason == "budget":
             found.left_out.append(f"{_counted(len(found.unexplained()), 'detection')} not looked into: budget spent")
         why = f"{self._why(outcome.reason, found)}, after {spent.seconds:.0f} s and {spent.metres:.3g} m of finger path"
-        return Outcome(outcome.reason, why, found)
+        return Outcome(outcome.reason, "; not inspected for ".join([why, *found.unseen]), found)
 
     @staticmethod
     def _why(reason: str, found: Found) -> str:
@@ -217,7 +219,7 @@ class Explore:
             self._detect(waiting, found)
         found.survey = survey.covered(paths, pitch)
         if survey.slices is not None:
-            found.left_out.append(
+            found.unseen.append(
                 f"features smaller than a ridge that spans {1e3 * (self.shortest_ridge or 0.0):g} mm: "
                 f"{100 * found.survey.fraction:.0f} % of the surface lies near enough to a sweep to see them"
             )
@@ -229,7 +231,7 @@ class Explore:
             return survey.pitch
         limit = detect(trace, self.base, noise=found.noise).detection_limit
         if limit > self.smallest:
-            found.left_out.append(
+            found.unseen.append(
                 f"features lower than {1e3 * limit:.2g} mm: a single sweep does not show them through the noise, "
                 f"though {1e3 * self.smallest:.2g} mm were asked for"
             )

@@ -294,3 +294,11 @@ def test_an_end_moved_back_takes_the_points_beyond_it_along() -> None:
         shorter = track.with_end(index, moved)
         assert shorter.length == pytest.approx(0.037)
         assert shorter.ends[index] is moved
+
+
+def test_what_the_survey_may_have_missed_is_said_where_the_exploration_ends() -> None:
+    found, _, outcome = explore(PLATE, shortest_ridge=0.03)
+    assert "not inspected for features smaller than a ridge that spans 30 mm" in outcome.detail
+    assert len(found.unseen) == 1 and not found.crossings
+    _, _, outcome = explore(PLATE)
+    assert "not inspected" not in outcome.detail
