@@ -14,13 +14,13 @@ from mapping.detectors import Detections
 from mapping.edge_feature import edge_features
 from mapping.faint_feature import with_faint_lines
 from mapping.feature import Feature
-from mapping.inspection import inspect
+from mapping.inspection import Inspection, inspect
 from mapping.line_feature import Around, line_features
 from mapping.linking import groups
 from mapping.open_crest import comes_down, is_open, on_a_step
 from mapping.outline import outline
 from mapping.point_feature import point_feature
-from mapping.runs import Run, split_runs
+from mapping.runs import split_runs
 from mapping.step_feature import step_features
 from mapping.trace import Trace
 
@@ -61,34 +61,48 @@ def assemble(
 
 def _linked(detections: Detections, trace: Trace, base: Base) -> list[Feature]:
     """Features of the crossings that single sweeps detected."""
-    crossings: Sequence[Crossing] = detections.crossings
-    scale = _scale(crossings, trace.tip_radius)
-    around = Around(inspect(trace, base, detections.noise, 0.2 * scale), base, detections, trace.tip_radius)
-    edges, crossings = edge_features(crossings, around)
-    runs, steps = split_runs(
-        [c for c in crossings if not c.kind.startswith("step") or comes_down(c, around.inspection)]
-    )
-    lines, bands = _sorted_runs(runs, steps, around)
-    steps += [edge for band in bands for edge in (band.first, band.last)]
+    tip, scale = trace.tip_radius, _scale(detections.crossings, trace.tip_radius)
+    around = Around(inspect(trace, base, detections.noise, 0.2 * scale), base, detections, tip)
+    edges, crossings = edge_features(detections.crossings, around)
+    crests, steps = _crests_and_steps(crossings, around, scale)
+    certain, doubtful = _grouped(crests, around.inspection, scale)
+    details = [feature for group in certain for feature in _details(group, around)]
+    stepped = step_features(steps, _without_shadows(details, tip), around, scale)
+    for group in doubtful:
+        details += _details([c for c in group if not on_a_step(c, steps, stepped)], around)
+    return [*_without_shadows(details, tip), *stepped, *edges]
+
+
+def _crests_and_steps(
+    crossings: Sequence[Crossing], around: Around, scale: float
+) -> tuple[list[Crossing], list[Crossing]]:
+    """Crests and hollows, with places along those that a sweep ran along, and the steps that are not such runs."""
+    crests = [c for c in crossings if not c.kind.startswith("step")]
+    runs, steps = split_runs([c for c in crossings if c not in crests and comes_down(c, around.inspection)])
+    edges = [c for run in runs for c in (run.first, run.last)] + steps
     pitch = around.inspection.pitch
-    along = [point for run in lines for point in run.points(max(min(pitch, run.length), scale), base, trace.tip_radius)]
-    details: list[Feature] = []
-    doubtful: list[tuple[int, list[Crossing]]] = []
-    for sign, kind in ((1, "convex"), (-1, "concave")):
-        crests = [c for c in [*crossings, *along] if c.kind == kind]
-        for members in groups(crests, around.inspection, scale) if crests else []:
-            group = [crests[i] for i in members]
+    for run in runs:
+        if run.is_band(edges, pitch, around.tip_radius):
+            steps += [run.first, run.last]
+        else:
+            crests += run.points(max(min(pitch, run.length), scale), around.base, around.tip_radius)
+    return crests, steps
+
+
+def _grouped(
+    crests: list[Crossing], inspection: Inspection, scale: float
+) -> tuple[list[list[Crossing]], list[list[Crossing]]]:
+    """Groups of linked crests of one sign: those that a sweep came down from on both sides, and the others."""
+    certain: list[list[Crossing]] = []
+    doubtful: list[list[Crossing]] = []
+    for kind in ("convex", "concave"):
+        alike = [c for c in crests if c.kind == kind]
+        for members in groups(alike, inspection, scale) if alike else []:
+            group = [alike[i] for i in members]
             top = max(abs(c.height) for c in group)
-            if all(is_open(c, around.inspection) for c in group if abs(c.height) > 0.5 * top):
-                doubtful.append((sign, group))
-            else:
-                details += _details(group, sign, around)
-    features = _without_shadows(details, trace.tip_radius)
-    stepped = step_features(steps, features, around, scale)
-    for sign, group in doubtful:
-        rest = [c for c in group if not on_a_step(c, steps, stepped)]
-        details += _details(rest, sign, around) if rest else []
-    return [*_without_shadows(details, trace.tip_radius), *stepped, *edges]
+            high = [c for c in group if abs(c.height) > 0.5 * top]
+            (doubtful if all(is_open(c, inspection) for c in high) else certain).append(group)
+    return certain, doubtful
 
 
 def _name(crossing: Crossing) -> str:
@@ -106,25 +120,21 @@ def _scale(crossings: Sequence[Crossing], tip_radius: float) -> float:
     return float(np.sqrt(2 * tip_radius * np.median(heights)))
 
 
-def _sorted_runs(runs: list[Run], steps: list[Crossing], around: Around) -> tuple[list[Run], list[Run]]:
-    """Runs along a line, and runs over a band that other sweeps found as well."""
-    edges = [c for run in runs for c in (run.first, run.last)] + steps
-    bands = [run for run in runs if run.is_band(edges, around.inspection.pitch, around.tip_radius)]
-    return [run for run in runs if run not in bands], bands
-
-
-def _details(members: list[Crossing], sign: int, around: Around) -> list[Feature]:
-    """One bump, one ridge, or the ridges that meet."""
+def _details(members: list[Crossing], around: Around) -> list[Feature]:
+    """One bump, one ridge, or the ridges that meet; nothing of no crossings."""
+    if not members:
+        return []
     highest = max(members, key=lambda c: abs(c.height))
+    spot_name, line_name = NAMES[1 if highest.height > 0 else -1]
     half_width = float(np.sqrt(2 * around.tip_radius * abs(highest.height)))
     half_width = max(half_width, min(c.half_width for c in members if abs(c.height) > 0.7 * abs(highest.height)))
     points = np.array([c.point for c in members])
     if np.linalg.norm(points - highest.point, axis=1).max() <= WIDEST_SPOT * half_width:
         spot = outline(members, around.inspection, half_width)
         if spot.length == 0.0:
-            return [point_feature(members, NAMES[sign][0], around.detections, around.tip_radius, spot)]
-    lines = line_features(members, NAMES[sign][1], around)
-    return lines or [point_feature(members, NAMES[sign][0], around.detections, around.tip_radius)]
+            return [point_feature(members, spot_name, around.detections, around.tip_radius, spot)]
+    lines = line_features(members, line_name, around)
+    return lines or [point_feature(members, spot_name, around.detections, around.tip_radius)]
 
 
 def _without_shadows(features: list[Feature], tip_radius: float) -> list[Feature]:
