@@ -400,16 +400,21 @@ def test_no_sample_near_by_is_refused():
     "diameter", [D, pytest.param(0.2e-3, marks=pytest.mark.slow), pytest.param(1e-3, marks=pytest.mark.slow)]
 )
 def test_location_reaches_the_cramer_rao_bound(diameter):
-    """The sd of a wire's place from one crossing against sigma/D sqrt(3 spacing x_c / 8) (theory section 6)."""
+    """The sd of a wire's place from one crossing against sigma/D sqrt(3 spacing x_c / 8) (theory section 6).
+
+    The bound is of the mean over the noise: single traces are up to 16 % luckier or less lucky.
+    """
     spacing, noise = 12e-6, Noise(0.2e-3 * diameter / D)
-    trace = record(CROSSINGS[1:2], wire(ENDS, diameter), noise)
     guess = feature("bump", (-3e-3, 0.1e-3, 0), 0.9 * diameter, 0.9 * diameter, crossings=1)
-    problem = pose_problem(guess, Surroundings(trace, plate(), noise))
-    posterior = sample_posterior(guess, trace, np.random.default_rng(0), base=plate(), noise=noise)
-    x_c = np.sqrt(2 * TIP * diameter)
-    bound = noise.white / diameter * np.sqrt(3 * spacing * x_c / 8)
-    assert len(problem.window) > 100
-    assert posterior.draws("along").std() == pytest.approx(bound, rel=0.10)
+    variances = []
+    for seed in range(5):
+        trace = record(CROSSINGS[1:2], wire(ENDS, diameter), noise, seed)
+        assert len(pose_problem(guess, Surroundings(trace, plate(), noise)).window) > 80
+        rng = np.random.default_rng(0)
+        posterior = sample_posterior(guess, trace, rng, base=plate(), noise=noise, confirm=False)
+        variances.append(posterior.draws("along").var())
+    bound = noise.white / diameter * np.sqrt(3 * spacing * np.sqrt(2 * TIP * diameter) / 8)
+    assert np.sqrt(np.mean(variances)) == pytest.approx(bound, rel=0.10)
 
 
 @pytest.mark.slow
