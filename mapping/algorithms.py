@@ -225,8 +225,10 @@ def _even(x: FloatArray, z: FloatArray, half_width: float) -> tuple[FloatArray, 
     counts = np.bincount(bins)
     filled = counts > 0
     centre = x.min() + (np.arange(len(counts)) + 0.5) * step
-    mean = np.bincount(bins, weights=z)[filled] / counts[filled]
-    return centre, np.interp(centre, centre[filled], mean)
+    mean = np.interp(centre, centre[filled], np.bincount(bins, weights=z)[filled] / counts[filled])
+    # beyond the path's ends lie only the few samples that noise threw there
+    well = np.flatnonzero(counts >= 0.5 * np.median(counts[filled]))
+    return centre[well[0] : well[-1] + 1], mean[well[0] : well[-1] + 1]
 
 
 def _given(array: FloatArray | None) -> FloatArray:
