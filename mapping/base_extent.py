@@ -16,7 +16,9 @@ from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
 
-CELLS = 20_000
+CELLS = 4000
+# So far from a place where the finger felt nothing, or rolled off, the body is taken to go on, in tip radii
+EDGE = 0.5
 # A sweep that ends this deep (tip radii) below the base rolled off the body's edge
 ROLLED_OFF = 0.05
 # A centre this far off the base's normal (rad) stands beside the base, not over it
@@ -24,7 +26,7 @@ BESIDE = float(np.radians(5.0))
 
 
 def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray) -> Base:
-    """The faces of a base inside a box whose nearest known place was touched, not empty.
+    """The faces of a base inside a box whose nearest known place was touched, and that stay clear of empty ones.
 
     Args:
         base: as fitted, larger than the body.
@@ -45,7 +47,10 @@ def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray) -
     touched = np.concatenate([~off, np.zeros(len(bare), dtype=bool)])
     middle = base.surface.vertices[base.surface.faces].mean(axis=1)
     _, nearest = cKDTree(places).query(middle)
-    keep = touched[nearest] & (middle >= box[0]).all(axis=1) & (middle <= box[1]).all(axis=1)
+    keep = touched[nearest]
+    if not touched.all():
+        keep &= cKDTree(places[~touched]).query(middle)[0] > EDGE * trace.tip_radius
+    keep = keep & (middle >= box[0]).all(axis=1) & (middle <= box[1]).all(axis=1)
     if not keep.any():
         raise SurfaceError("no part of the fitted base lies inside the region; is the region where the body is?")
     used, faces = np.unique(base.surface.faces[keep], return_inverse=True)

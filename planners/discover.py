@@ -13,6 +13,7 @@ from mapping.base import Base
 from mapping.base_extent import rolled_off, touched_part
 from mapping.base_fit import fit_base
 from mapping.cells import Cells
+from mapping.errors import SurfaceError, TraceError
 from mapping.robust import MAD_TO_SD, robust_scale
 from mapping.trace import Trace
 from planners.errors import PlannerError
@@ -64,7 +65,13 @@ class Discover:
             raise PlannerError(f"discover: low must lie below high; found {self.low} and {self.high}")
 
     def plan(self) -> Plan:
-        """The outcome's value is the Base, or None if nothing was touched."""
+        """The outcome's value is the Base, or None if nothing was touched inside the box."""
+        try:
+            return (yield from self._everything())
+        except (SurfaceError, TraceError) as error:
+            return Outcome("nothing found", str(error))
+
+    def _everything(self) -> Plan:
         felt = Felt()
         for side in self.sides:
             for line in self._lines(side):

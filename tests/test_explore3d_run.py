@@ -16,7 +16,6 @@ import pytest
 
 from explore3d.analysis import Analysis
 from explore3d.analyze import analyze
-from explore3d.errors import UserError
 from explore3d.run import run
 
 ASSETS = Path(__file__).resolve().parents[1] / "assets"
@@ -128,16 +127,6 @@ def test_a_bare_tile_has_no_feature_and_costs_no_chain(tmp_path: Path) -> None:
     stages = {left.stage for left in analysis.left_out}
     assert {"grammar", "posterior", "estimated surface", "curvature", "error against time"} <= stages
     assert "posterior" not in analysis.timings
-
-
-def test_a_scene_without_a_global_mesh_is_refused_before_anything_is_written(tmp_path: Path) -> None:
-    scene = write_scene(tmp_path)
-    region = 'region = {low = ["-30 mm", "-20 mm", "-1 mm"], high = ["30 mm", "20 mm", "1 mm"]}'
-    mesh = f'mesh = "{ASSETS}/meshes/tile.ply"'
-    scene.write_text(scene.read_text().replace(mesh, region))
-    with pytest.raises(UserError, match=r"model\.mesh"):
-        run(scene, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow
