@@ -46,6 +46,7 @@ def test_a_plate_with_a_wire_on_it_is_a_plane_in_the_box() -> None:
     assert np.allclose(base.surface.bounds[:, :2], [[-0.025, -0.015], [0.025, 0.015]], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_plate_smaller_than_the_box_ends_where_it_ends() -> None:
     base = found(load_mesh(MESHES / "tile.ply", "m"), [-0.04, -0.028, -0.008], [0.04, 0.028, 0.008])
     assert base is not None and base.kind == "plane"
@@ -61,6 +62,7 @@ def test_the_top_of_a_cylinder_is_a_cylinder() -> None:
     assert abs(base.parameters["axis"][0]) == pytest.approx(1.0, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_the_top_of_a_sphere_is_a_sphere() -> None:
     import trimesh
 
