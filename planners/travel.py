@@ -152,8 +152,9 @@ class Ways:
         source, target = self._node(start), self._node(stop)
         if source is None or target is None:
             return None
-        length, previous = dijkstra(graph, directed=False, indices=np.int64(source), return_predecessors=True)
-        if not np.isfinite(length[target]):
+        lengths, befores = dijkstra(graph, directed=False, indices=np.array([source]), return_predecessors=True)
+        previous = befores[0]
+        if not np.isfinite(lengths[0, target]):
             return None
         route = [target]
         while route[-1] != source:

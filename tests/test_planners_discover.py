@@ -23,8 +23,8 @@ MESHES = Path(__file__).resolve().parents[1] / "assets" / "meshes"
 
 def found(body: Surface, low: list[float], high: list[float], sides: tuple[str, ...] = ("+z",)) -> Base | None:
     finger = SimulatedFinger(object=body, tip_radius=R, rate=600.0, white=5e-5, correlated=1e-5, seed=1, margin=0.2)
-    box = {"low": np.array(low), "high": np.array(high)}
-    _, outcome = drive(Discover(tip_radius=R, smallest=3e-4, sides=sides, **box).plan(), finger.execute)
+    discover = Discover(low=np.array(low), high=np.array(high), tip_radius=R, smallest=3e-4, sides=sides)
+    _, outcome = drive(discover.plan(), finger.execute)
     base: Base | None = outcome.value
     return base
 

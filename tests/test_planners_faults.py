@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from faulty_finger import faulty
+from numpy.typing import NDArray
 
 from explore3d.meshes import load_mesh
 from hw.moves import Move
@@ -29,6 +30,10 @@ UP = np.array([0.0, 0.0, 1.0])
 AXIS = np.array([[-0.007468129, -0.01003007, 0.0], [0.015468129, 0.00603007, 0.0]])
 EMPTY = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), R)
 REASONS = {"done", "budget", "nothing found", "finger refuses", "lost", "misplaced"}
+
+
+def at(path: list[list[float]], approach: NDArray[np.float64]) -> Move:
+    return Move(np.array(path), approach)
 
 
 def finger(object: Surface = WIRE) -> SimulatedFinger:
@@ -107,7 +112,7 @@ def test_a_plan_whose_moves_are_all_forbidden_ends() -> None:
 
     def mad() -> Plan:
         while True:
-            yield Move([[9.0, 9.0, 9.0]], -UP)
+            yield at([[9.0, 9.0, 9.0]], -UP)
 
     record, outcome = drive(mad(), finger().execute, check=limits.violation, empty=EMPTY)
     assert not record and outcome.reason == "finger refuses" and "workspace" in outcome.detail
@@ -122,8 +127,8 @@ def ball() -> Base:
 
 def test_travel_leads_round_the_body_and_is_free() -> None:
     base = ball()
-    before = Move([[0.0, 0.0, 0.045]], [0.0, 0.0, -1.0])
-    after = Move([[0.001, 0.0, -0.045]], [0.0, 0.0, 1.0])
+    before = at([[0.0, 0.0, 0.045]], -UP)
+    after = at([[0.001, 0.0, -0.045]], UP)
     touch = SimulatedFinger(object=base.surface, tip_radius=R)
     limits = Limits.of(touch.workspace, base, R)
     assert "the way from the move before" in str(limits.violation(after, before))
@@ -131,16 +136,16 @@ def test_travel_leads_round_the_body_and_is_free() -> None:
     travel = ways.round(before, after)
     assert travel is not None and travel.purpose == "travel" and travel.length < 0.3
     assert limits.violation(travel, before) is None and limits.violation(after, travel) is None
-    assert ways.round(before, Move([[0.01, 0.0, 0.046]], [0.0, 0.0, -1.0])) is None  # the straight way is free
+    assert ways.round(before, at([[0.01, 0.0, 0.046]], -UP)) is None  # the straight way is free
 
 
 def test_a_routed_plan_sends_what_was_felt_to_the_plan_alone() -> None:
     base = ball()
-    sent = []
+    sent: list[object] = []
 
     def two() -> Plan:
-        sent.append((yield Move([[0.0, 0.0, 0.045]], -UP)))
-        sent.append((yield Move([[0.0, 0.001, -0.045]], UP)))
+        sent.append((yield at([[0.0, 0.0, 0.045]], -UP)))
+        sent.append((yield at([[0.0, 0.001, -0.045]], UP)))
         return Outcome("done")
 
     answers = iter("abcdef")
