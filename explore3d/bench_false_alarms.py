@@ -36,6 +36,8 @@ TIP = 0.01
 RATE = 1.0
 NOISES = {"none": Noise(0.0), "white": Noise(0.2e-3), "correlated": Noise(0.0, 0.2e-3, 1e-3)}
 SWEEPS = 3
+# Steps of the path over steps across the body, up to which a body is swept: slopes of 66 degrees.
+STEEP = 2.5
 
 
 def sphere() -> Surface:
@@ -84,8 +86,9 @@ def swept(body: str, mesh: Path | None = None) -> tuple[Base, Trace]:
         centers = BallContact(surface, TIP).first_contact(above, np.array([0.0, 0.0, -1.0])).centers
         centers = centers[np.isfinite(centers).all(axis=1)]
         steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)
-        # a ball let down from above jumps over overhangs: only the longest stretch of sliding is a sweep
-        cuts = np.concatenate([[0], np.flatnonzero(steps > 10 * SPACING) + 1, [len(centers)]])
+        # a ball let down from above jumps over overhangs and skips on steep flanks, where a sliding finger does
+        # not: only the longest stretch that is sampled nearly evenly is a sweep
+        cuts = np.concatenate([[0], np.flatnonzero(steps > STEEP * SPACING) + 1, [len(centers)]])
         longest = int(np.diff(cuts).argmax())
         parts.append(_sweep(centers[cuts[longest] : cuts[longest + 1]], number))
     base, trace = Base(surface), Trace.concatenate(parts)

@@ -34,6 +34,8 @@ LARGEST_SHARE = 0.6
 # A disturbance weaker than this many thresholds hides no other: what it leaves behind are its own side lobes.
 HIDING = 1.5
 ROUNDS = 50
+# Samples are scarce where the noise's variance is raised by more than this share: less is the binning's own.
+SCARCE = 0.1
 
 
 def find_disturbances(
@@ -80,9 +82,11 @@ def _stretches(
     are strong enough to hide others, and looks again, until nothing new exceeds the threshold.
     """
     height = profile.height.copy()
+    scarcity = _scarcity(profile, bank)
+    even = scarcity.max(initial=0.0) <= SCARCE
     weak: list[tuple[int, float]] = []
     for _ in range(ROUNDS):
-        accepted = _dominant(_candidates(height, bank, threshold, tip_radius), weak)
+        accepted = _dominant(_candidates(height, bank, threshold, tip_radius, None if even else scarcity), weak)
         if not accepted:
             return
         for place, half_width, crest, snr in accepted:
@@ -95,8 +99,22 @@ def _stretches(
             height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
 
 
+def _scarcity(profile: HeightProfile, bank: Bank) -> FloatArray:
+    """(n,) share by which the noise's variance in a bin exceeds the average for want of samples; 0 if none does."""
+    counts = np.maximum(np.diff(profile.first), 1)
+    white = bank.noise.white**2 / bank.samples
+    share = white / max(white + bank.noise.correlated**2, np.finfo(float).tiny)
+    return np.asarray(share * (bank.samples / counts - 1.0))
+
+
+def _certainty(scarcity: FloatArray, bins: int) -> FloatArray:
+    """(n,) at most 1: expected over actual standard deviation of what a filter of this half-width sees."""
+    raised = _running_mean(scarcity, max(1, bins))
+    return np.asarray(1 / np.sqrt(1 + np.where(raised > SCARCE, raised, 0.0)))
+
+
 def _candidates(
-    height: FloatArray, bank: Bank, threshold: float, tip_radius: float
+    height: FloatArray, bank: Bank, threshold: float, tip_radius: float, scarcity: FloatArray | None
 ) -> list[tuple[float, int, float, float]]:
     """(signal-to-noise, bin, half-width in bins, height) of local maxima over place for every width."""
     result = []
@@ -106,6 +124,9 @@ def _candidates(
         crest, sd = f.heights(height)
         possible = np.abs(crest) <= PHYSICAL * f.half_width**2 / (2 * tip_radius)
         snr = np.where(possible, np.abs(crest) / sd, 0.0)
+        if scarcity is not None:
+            certainty = _certainty(scarcity, int(f.half_width / bank.spacing))
+            snr *= certainty[: len(crest) * f.coarse : f.coarse]
         around = np.concatenate([[-1.0], snr, [-1.0]])
         peaks = np.flatnonzero((snr > threshold) & (snr >= around[:-2]) & (snr > around[2:]))
         width = f.half_width / bank.spacing

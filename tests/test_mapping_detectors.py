@@ -116,6 +116,26 @@ def test_a_reversed_sweep_tells_the_same():
     np.testing.assert_allclose(a.tangent, -b.tangent, atol=1e-2)
 
 
+def bare_profile(samples: np.ndarray, rng: np.random.Generator) -> HeightProfile:
+    """White noise of 0.2 mm in bins of 0.1 mm with so many samples each."""
+    count = len(samples)
+    first = np.concatenate([[0], np.cumsum(samples)]).round().astype(np.int64)
+    height = rng.standard_normal(count) * 2e-4 / np.sqrt(samples)
+    return HeightProfile(
+        0, 0.0, 1e-4, height, float(samples.mean()), first, np.arange(float(count)), np.zeros((count, 3))
+    )
+
+
+def test_where_samples_are_scarce_the_noise_they_leave_is_no_feature():
+    samples = np.full(10_000, 20.0)
+    samples[3000:5000] = 3.0
+    bank = build_bank(Noise(2e-4), 1e-4, float(samples.mean()), 1.4e-3, 0.02)
+    threshold, rng = threshold_for(bank, 1.0), np.random.default_rng(8)
+    found = sum(len(find_disturbances(bare_profile(samples, rng), bank, bank.noise, threshold, TIP)) for _ in range(12))
+    # 99.9 % of a Poisson number with mean 12
+    assert found <= 24
+
+
 @pytest.mark.parametrize("drift", [0, 2])
 def test_false_alarms_come_as_often_as_asked(drift):
     noise, spacing, samples, rate = Noise(2e-4), 1e-4, 16.7, 1.0
@@ -125,11 +145,7 @@ def test_false_alarms_come_as_often_as_asked(drift):
     rng = np.random.default_rng(7)
     metres, found = 80, 0
     for _ in range(metres):
-        height = rng.standard_normal(10_000) * 2e-4 / np.sqrt(samples)
-        profile = HeightProfile(
-            0, 0.0, spacing, height, samples, np.arange(10_001), np.arange(10_000.0), np.zeros((10_000, 3))
-        )
-        found += len(find_disturbances(profile, bank, noise, threshold, TIP))
+        found += len(find_disturbances(bare_profile(np.full(10_000, samples), rng), bank, noise, threshold, TIP))
     # 99 % of a Poisson number with mean 80
     assert 57 <= found <= 104
 
