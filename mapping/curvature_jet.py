@@ -1,99 +1,254 @@
-"""Curvature by local jets that choose their own degree and neighbourhood from the noise."""
+"""Curvature by local jets that weigh every degree and neighbourhood by the error that the noise lets it expect."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.curvature import Curvature, from_operators
+from mapping.curvature import Curvature, CurvatureError, from_operators
 from mapping.surface import Surface
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
-# Neighbourhoods from which a point chooses; 25 is the square of a regular grid, whose symmetry cancels odd errors.
-SIZES = (25, 36, 54, 81, 122, 183, 274, 411, 616)
-CONFIDENCE = 3.0
+# Neighbourhoods from which points choose. Regular grids are symmetric in 25, 37, 49, 69 and 97 neighbours, which
+# cancels odd errors; 33 are the fewest that a jet of degree 6 needs with some to spare.
+SIZES = (25, 33, 37, 49, 69, 97, 137, 193, 274, 387, 547)
+DEGREE = 6
+# Sizes whose residuals tell the noise.
+SMALL = (37, 49)
+# Every so many of the nearest points speak for a point's surroundings, up to so many.
+POOL_STEP, POOL = 4, 60
+CERTAINTY = 3.5
+# Weights fall with this power of the squared error: 1 averages most, large powers choose.
+SHARPNESS = 0.75
 SAMPLE = 3000
+# Share of the weight that may be lost at either end.
+SHARE = 0.1
+# Meshes above this size try only the neighbourhoods that a sample of their points chooses.
+LARGE = 20_000
 # Neighbour indices held at once by one thread: keeps a million points under a gigabyte.
 CHUNK_VALUES = 4_000_000
 SMOOTHING = 24
 # Share of the residual that counts as noise even where all of it seems to be the polynomial's misfit.
 NOISE_FLOOR = 1e-3
+# Least share of the next size's residual that a jet with hardly more points than terms is credited with.
+LUCK = 1.0
 
 
-def jet_curvature(body: Surface | FloatArray, normals: FloatArray | None, noise: float | None = None) -> Curvature:
-    """Curvature from polynomials of degree 4 or 2 over the nearest points, by Lepski's rule for each point.
+def jet_curvature(
+    body: Surface | FloatArray,
+    normals: FloatArray | None,
+    noise: float | None = None,
+    neighbours: int | None = None,
+    degree: int = DEGREE,
+) -> Curvature:
+    """Curvature from polynomials of degree 2, 4 and 6 over neighbourhoods of 25 to 547 points.
 
-    The noise is the residual of quartic fits over the smallest neighbourhoods; a sample of points tells which
-    sizes are ever chosen, and only these are tried on all.
+    Each candidate's variance follows from the noise, its bias from how much it disagrees around the point with
+    narrower and higher ones; the weights of the mean fall with a power of their sum.
 
     Args:
         body: mesh or points (N, 3), m.
         normals: (N, 3) outward normals, or None.
         noise: standard deviation of the points along the normal, m, or None: estimated.
+        neighbours: use this neighbourhood and `degree` alone instead of choosing.
+        degree: 2, 4 or 6; the highest to choose from.
+
+    Raises:
+        CurvatureError: an odd degree, one beyond 6, or fewer neighbours than the degree needs.
     """
-    from scipy.spatial import cKDTree
-
-    from mapping.jet_kernels import fit_jets
-
+    _check(neighbours, degree)
     points, rough, used = _oriented(body, normals)
-    count = len(points)
-    if used.sum() < 8:
-        nothing = np.full(count, np.nan)
-        return from_operators(
-            np.full((count, 3), np.nan), np.full((count, 2, 3), np.nan), nothing, np.zeros(count, dtype=bool)
-        )
     index = np.flatnonzero(used)
+    if len(index) < 8:
+        return _nothing(len(points))
     place = points[index] - points[index].mean(axis=0)
     size = float(np.abs(place).max()) or 1.0
-    place = place / size
-    tree = cKDTree(place)
-    smooth = _smoothed_normals(place, rough[index], tree)
-    sizes = np.array([s for s in SIZES if s <= max(len(index), SIZES[0])])
-    sample = np.linspace(0, len(index) - 1, min(SAMPLE, len(index))).astype(np.int64)
+    jets = _Jets(place / size, rough[index], degree)
+    sizes = np.array([s for s in SIZES if s <= max(len(index), SIZES[0])] if neighbours is None else [neighbours])
+    level = jets.noise() if noise is None else noise / size
+    if len(index) > LARGE:
+        sizes = jets.worthwhile(sizes, level)
+    operators, slopes, sd = jets.weighed(sizes, level, fixed=neighbours is not None)
+    return _spread(len(points), index, operators / size, jets.bases(slopes), sd / size)
 
-    def fit(chosen: IntArray, which: IntArray, level: float) -> tuple[FloatArray, ...]:
-        near = np.asarray(tree.query(place[chosen], k=int(which[-1]))[1], dtype=np.int64)
-        return tuple(fit_jets(place, smooth, smooth, near, chosen, which, level, CONFIDENCE))
 
-    level = noise / size if noise is not None else _noise(*(fit(sample, np.array([s]), -1.0)[3] for s in SIZES[:2]))
-    taken, degrees = fit(sample, sizes, level)[4:6]
-    low, high = np.quantile(taken[degrees > 0], [0.02, 0.98]) if (degrees > 0).any() else (sizes[0], sizes[-1])
-    wanted = sizes[(sizes >= 0.9 * low) & (sizes <= 1.1 * high)]
-    wanted = wanted if len(wanted) else sizes
-    operators, bases = np.full((count, 3), np.nan), np.full((count, 2, 3), np.nan)
-    sd, valid = np.full(count, np.nan), np.zeros(count, dtype=bool)
-    parts = np.array_split(np.arange(len(index)), max(4, len(index) * int(wanted[-1]) // CHUNK_VALUES))
+def _check(neighbours: int | None, degree: int) -> None:
+    if degree not in (2, 4, 6):
+        raise CurvatureError(f"jets have degree 2, 4 or 6; found {degree}")
+    least = (degree + 1) * (degree + 2) // 2 + (2 if degree == 2 else 4)
+    if neighbours is not None and neighbours < least:
+        raise CurvatureError(f"a jet of degree {degree} needs at least {least} neighbours; found {neighbours}")
+
+
+def _nothing(count: int) -> Curvature:
+    return _spread(count, np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 2, 3)), np.zeros(0))
+
+
+def _spread(count: int, index: IntArray, operators: FloatArray, bases: FloatArray, sd: FloatArray) -> Curvature:
+    """Curvature at all points from that of the indexed ones."""
+    every, frames, spread = np.full((count, 3), np.nan), np.full((count, 2, 3), np.nan), np.full(count, np.nan)
+    every[index], frames[index], spread[index] = operators, bases, sd
+    return from_operators(every, frames, spread, np.isfinite(every).all(axis=1))
+
+
+@dataclass(eq=False)
+class _Candidates:
+    """Fits of `fit_jets` for M points, S sizes and D degrees."""
+
+    operators: FloatArray
+    factors: FloatArray
+    rests: FloatArray
+    slopes: FloatArray
+
+    def deviations(self, noise: float) -> FloatArray:
+        """(M, S, D) standard deviations; the highest degree is trusted no better than what it leaves over."""
+        level = np.full(self.factors.shape, noise)
+        highest = self.rests[..., -1]
+        # with few points to spare a small residual may be luck: that of the next size tells
+        bound = LUCK * np.concatenate([highest[:, 1:], highest[:, -1:]], axis=1)
+        level[..., -1] = np.fmax(noise, np.fmax(highest, bound))
+        return self._times(level)
+
+    def part(self, chosen: IntArray) -> _Candidates:
+        """The candidates of some points."""
+        return _Candidates(self.operators[chosen], self.factors[chosen], self.rests[chosen], self.slopes[chosen])
+
+    def misfits(self, noise: float) -> FloatArray:
+        """(M, S, D) standard deviations if all that a fit leaves over were noise."""
+        return self._times(np.fmax(noise, self.rests))
+
+    def _times(self, level: FloatArray) -> FloatArray:
+        known = np.isfinite(self.factors) & np.isfinite(level)
+        return np.asarray(np.multiply(level, self.factors, where=known, out=np.full(level.shape, np.inf)))
+
+
+class _Jets:
+    """Points (N, 3) of about unit size with their neighbourhoods and mean normals."""
+
+    def __init__(self, place: FloatArray, rough: FloatArray, degree: int):
+        from scipy.spatial import cKDTree
+
+        self.place, self.degree = place, degree
+        self.tree = cKDTree(place)
+        self.normals = _smoothed_normals(place, rough, self.tree)
+
+    def fit(self, chosen: IntArray, sizes: IntArray) -> _Candidates:
+        """Every candidate at the chosen points."""
+        from mapping.jet_kernels import fit_jets
+
+        near = self.near(chosen, int(sizes[-1]))
+        return _Candidates(*fit_jets(self.place, self.normals, near, chosen, sizes, self.degree))
+
+    def near(self, chosen: IntArray, count: int) -> IntArray:
+        """(M, count) nearest points, nearest first; N where there are no more."""
+        return np.asarray(self.tree.query(self.place[chosen], k=count)[1], dtype=np.int64).reshape(len(chosen), count)
+
+    def sample(self) -> IntArray:
+        """Indices of points that speak for all."""
+        return np.linspace(0, len(self.place) - 1, min(SAMPLE, len(self.place))).astype(np.int64)
+
+    def noise(self) -> float:
+        """Noise level from residuals of the highest fits over two small neighbourhoods.
+
+        Noise leaves the same residual in both; what the polynomial cannot follow grows with the power of the radius
+        that is one above its degree. The median ignores the few points where the surface is not smooth.
+        """
+        rests = self.fit(self.sample(), np.array(SMALL)).rests[..., -1]
+        rests = rests[np.isfinite(rests).all(axis=1)]
+        if len(rests) == 0:
+            return 0.0
+        free = np.array(SMALL) - (self.degree + 1) * (self.degree + 2) // 2
+        # median of chi-square over its degrees of freedom (Wilson and Hilferty)
+        first, second = np.median(rests, axis=0) ** 2 / (1 - 2 / (9 * free)) ** 3
+        growth = (SMALL[1] / SMALL[0]) ** (self.degree + 1)
+        return float(np.sqrt(max((growth * first - second) / (growth - 1), NOISE_FLOOR**2 * first)))
+
+    def worthwhile(self, sizes: IntArray, noise: float) -> IntArray:
+        """The sizes that points of a sample give most weight to, with those that judge them."""
+        sample = self.sample()
+        found = self.fit(sample, sizes)
+        own, all_of_it = found.deviations(noise), np.arange(len(sample))
+        weights = self._weights(found, own, all_of_it, all_of_it[:, None], sizes, noise)[0].sum(axis=2)
+        reach = np.cumsum(weights[np.isfinite(weights).all(axis=1)].mean(axis=0))
+        last = min(int(np.searchsorted(reach, 1 - SHARE)), len(sizes) - 1)
+        first = min(max(int(np.searchsorted(reach, SHARE)) - 2, 0), last)
+        return sizes[first : last + 1]
+
+    def weighed(self, sizes: IntArray, noise: float, fixed: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(N, 3) operators, (N, 2) slopes and (N,) standard deviations of the weighed mean at every point."""
+        count = len(self.place)
+        shape = (count, len(sizes), self.degree // 2)
+        every = _Candidates(np.empty((*shape, 3)), np.empty(shape), np.empty(shape), np.empty((*shape, 2)))
+        pools = np.empty((count, POOL // POOL_STEP), dtype=np.int64)
+        parts = np.array_split(np.arange(count), max(4, count * int(sizes[-1]) // CHUNK_VALUES))
+
+        def fill(part: IntArray) -> None:
+            found = self.fit(part, sizes)
+            every.operators[part], every.factors[part] = found.operators, found.factors
+            every.rests[part], every.slopes[part] = found.rests, found.slopes
+            pools[part] = np.minimum(self.near(part, POOL)[:, ::POOL_STEP], count - 1)
+
+        def mean(part: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            weights, error = self._weights(every, own, part, pools[part], sizes, noise)
+            return (
+                np.einsum("msd,msdk->mk", weights, np.nan_to_num(every.operators[part])),
+                np.einsum("msd,msdk->mk", weights, every.slopes[part]),
+                np.sqrt(error / 2),
+            )
+
+        _in_threads(fill, parts)
+        if fixed:
+            return every.operators[:, 0, -1], every.slopes[:, 0, -1], every.misfits(noise)[:, 0, -1] / np.sqrt(2)
+        own = every.deviations(noise)
+        results = _in_threads(mean, parts)
+        operators, slopes, sd = (np.concatenate(values) for values in zip(*results, strict=True))
+        return operators, slopes, sd
+
+    def _weights(
+        self, every: _Candidates, own: FloatArray, part: IntArray, pools: IntArray, sizes: IntArray, noise: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """(M, S, D) weights, NaN where no candidate has a value, and (M,) squared errors of the weighed means."""
+        from mapping.jet_kernels import pooled_bias
+
+        bias = np.empty((len(part), *own.shape[1:]))
+        pooled_bias(every.operators, own, pools, sizes, CERTAINTY, bias)
+        # where all agree to rounding, none is better than another
+        trust = np.maximum(own[part] ** 2 + bias, np.finfo(float).tiny ** 0.25) ** -SHARPNESS
+        total = trust.sum(axis=(1, 2))
+        weights = trust / np.where(total > 0, total, np.nan)[:, None, None]
+        # errors of the candidates partly cancel: the mean is about as good as its best member
+        error = every.part(part).misfits(noise) ** 2 + bias
+        least = error.reshape(len(part), -1).min(axis=1)
+        return weights, np.where(np.isfinite(least), least, np.nan)
+
+    def bases(self, slopes: FloatArray) -> FloatArray:
+        """(N, 2, 3) orthonormal bases of the tangent planes with the given slopes in the normals' frames."""
+        n = self.normals
+        axis = np.eye(3)[np.abs(n).argmin(axis=1)]
+        e1 = axis - (axis * n).sum(axis=1, keepdims=True) * n
+        e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
+        e2 = np.cross(n, e1)
+        t1, t2 = e1 + slopes[:, :1] * n, e2 + slopes[:, 1:] * n
+        t1 /= np.linalg.norm(t1, axis=1, keepdims=True)
+        t2 -= (t2 * t1).sum(axis=1, keepdims=True) * t1
+        return np.stack([t1, t2 / np.linalg.norm(t2, axis=1, keepdims=True)], axis=1)
+
+
+def _in_threads(work: Callable[[IntArray], Any], parts: list[IntArray]) -> list[Any]:
     with ThreadPoolExecutor(os.cpu_count()) as threads:
-        for part, jets in zip(parts, threads.map(lambda p: fit(p, wanted, level), parts), strict=True):
-            found, basis, spread, _, _, degree = jets
-            operators[index[part]], bases[index[part]] = found / size, basis
-            sd[index[part]], valid[index[part]] = spread / size, degree > 0
-    return from_operators(operators, bases, sd, valid)
+        return list(threads.map(work, parts))
 
 
-def _noise(small: FloatArray, large: FloatArray) -> float:
-    """Noise level from residuals of quartic fits over the two smallest neighbourhoods.
-
-    Noise leaves the same residual in both; what the polynomial cannot follow grows with the fifth power of the
-    radius. The median ignores the few points where the surface is not smooth.
-    """
-    known = np.isfinite(small) & np.isfinite(large)
-    if not known.any():
-        return 0.0
-    first, second = float(np.median(small[known])), float(np.median(large[known]))
-    growth = (SIZES[1] / SIZES[0]) ** 5
-    square = (growth * first**2 - second**2) / (growth - 1)
-    return float(np.sqrt(max(square, (NOISE_FLOOR * first) ** 2)))
-
-
-def _oriented(
-    body: Surface | FloatArray, normals: FloatArray | None
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+def _oriented(body: Surface | FloatArray, normals: FloatArray | None) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Points, outward normals, and which points belong to a body at all."""
     if isinstance(body, Surface):
         points = body.vertices
@@ -110,11 +265,11 @@ def _oriented(
     return points, np.divide(rough, length[:, None], out=np.zeros_like(rough), where=used[:, None]), used
 
 
-def _smoothed_normals(place: FloatArray, rough: FloatArray, tree: object) -> FloatArray:
+def _smoothed_normals(place: FloatArray, rough: FloatArray, tree: Any) -> FloatArray:
     """Mean normals over the nearest points: noise tilts single triangles."""
     smooth = np.empty_like(rough)
     for part in np.array_split(np.arange(len(place)), max(1, len(place) * SMOOTHING // CHUNK_VALUES)):
-        near = tree.query(place[part], k=min(SMOOTHING, len(place)), workers=-1)[1]  # type: ignore[attr-defined]
+        near = tree.query(place[part], k=min(SMOOTHING, len(place)), workers=-1)[1]
         same = np.einsum("ijk,ik->ij", rough[near], rough[part]) > 0
         smooth[part] = np.einsum("ijk,ij->ik", rough[near], same.astype(np.float64))
     length = np.linalg.norm(smooth, axis=1, keepdims=True)

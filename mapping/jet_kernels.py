@@ -1,94 +1,104 @@
-"""Local jets, compiled: nested least-squares fits of degree 2 and 4 over growing neighbourhoods."""
+"""Local jets, compiled: nested least-squares fits of degree 2, 4 and 6 over growing neighbourhoods."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-COLUMNS = 15  # monomials of two variables up to degree 4
-QUADRATIC = 6
-CONDITION = 300.0  # ratio of the diagonal of R beyond which the stencil does not determine the jet
+COLUMNS = 28  # monomials of two variables up to degree 6
+TERMS = np.array([6, 15, 28])  # those of degree 2, 4 and 6
+SPARE = np.array([2, 4, 4])  # points that a fit needs beyond its terms
+CONDITION = 1e5  # ratio of the diagonal of R beyond which the stencil does not determine the jet
+
+ROUNDING = 1e-28  # squared error of a curvature that is never undercut, for bodies of about unit size
 
 
 @njit(cache=True)
-def _design(u, v, z, count, scale, out):  # type: ignore[no-untyped-def]
+def _design(u, v, z, first, last, scale, degree, out):  # type: ignore[no-untyped-def]
     """Columns ordered by degree (so that one QR serves every degree) and the heights, in units of the scale."""
-    for i in range(count):
-        x, y = u[i] / scale, v[i] / scale
-        out[0, i] = 1.0
-        out[1, i] = x
-        out[2, i] = y
-        out[3, i] = x * x
-        out[4, i] = x * y
-        out[5, i] = y * y
-        out[6, i] = x * x * x
-        out[7, i] = x * x * y
-        out[8, i] = x * y * y
-        out[9, i] = y * y * y
-        out[10, i] = x * x * x * x
-        out[11, i] = x * x * x * y
-        out[12, i] = x * x * y * y
-        out[13, i] = x * y * y * y
-        out[14, i] = y * y * y * y
-        out[15, i] = z[i] / scale
+    for i in range(first, last):
+        x, y, row = u[i] / scale, v[i] / scale, i - first
+        out[0, row] = 1.0
+        column = 1
+        for d in range(1, degree + 1):
+            for p in range(d):
+                out[column + p, row] = x * out[column - d + p, row]
+            out[column + d, row] = y * out[column - 1, row]
+            column += d + 1
+        out[COLUMNS, row] = z[i] / scale
 
 
-@njit(cache=True)
-def _householder(a, count, columns):  # type: ignore[no-untyped-def]
-    """R in place (row j of the transposed array holds column j) with the heights rotated along."""
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _absorb(triangle, rows, count, columns):  # type: ignore[no-untyped-def]
+    """Fold new rows into R and the rotated heights by reflections that leave R's zeros alone.
+
+    Row j of either array holds column j of the least-squares problem, so that the inner loops run along memory.
+
+    Returns:
+        sum of squares of the part of the new heights that no column explains.
+    """
     for j in range(columns):
         norm = 0.0
-        for i in range(j, count):
-            norm += a[j, i] * a[j, i]
-        norm = np.sqrt(norm)
+        for i in range(count):
+            norm += rows[j, i] * rows[j, i]
         if norm == 0.0:
             continue
-        alpha = -norm if a[j, j] > 0 else norm
-        head = a[j, j] - alpha
-        for i in range(j + 1, count):
-            a[j, i] /= head
+        norm = np.sqrt(norm + triangle[j, j] * triangle[j, j])
+        alpha = -norm if triangle[j, j] > 0 else norm
+        head = triangle[j, j] - alpha
+        for i in range(count):
+            rows[j, i] /= head
         tau = -head / alpha
-        a[j, j] = alpha
+        triangle[j, j] = alpha
         for c in range(j + 1, COLUMNS + 1):
-            if c >= columns and c < COLUMNS:
+            if columns <= c < COLUMNS:
                 continue
-            dot = a[c, j]
-            for i in range(j + 1, count):
-                dot += a[j, i] * a[c, i]
+            dot = triangle[c, j]
+            for i in range(count):
+                dot += rows[j, i] * rows[c, i]
             dot *= tau
-            a[c, j] -= dot
-            for i in range(j + 1, count):
-                a[c, i] -= dot * a[j, i]
+            triangle[c, j] -= dot
+            for i in range(count):
+                rows[c, i] -= dot * rows[j, i]
+    rest = 0.0
+    for i in range(count):
+        rest += rows[COLUMNS, i] * rows[COLUMNS, i]
+    return rest
 
 
 @njit(cache=True)
-def _solve(a, columns, coefficients, spread):  # type: ignore[no-untyped-def]
-    """Coefficients of the nested fit and the variance factors of those of degree 2; False if undetermined."""
-    largest = 0.0
-    smallest = np.inf
-    for j in range(columns):
-        size = abs(a[j, j])
-        largest = max(largest, size)
-        smallest = min(smallest, size)
-    if not smallest * CONDITION > largest:
-        return False
+def _determined(triangle, columns, ratio):  # type: ignore[no-untyped-def]
+    """False if the stencil does not determine the jet; `ratio` scales columns by the neighbourhood's own size."""
+    largest, smallest, power, j, degree = 0.0, np.inf, 1.0, 0, 0
+    while j < columns:
+        for _ in range(degree + 1):
+            size = abs(triangle[j, j]) * power
+            largest, smallest = max(largest, size), min(smallest, size)
+            j += 1
+        degree += 1
+        power *= ratio
+    return smallest * CONDITION > largest
+
+
+@njit(cache=True)
+def _solve(triangle, columns, coefficients, row):  # type: ignore[no-untyped-def]
+    """Coefficients of the nested fit; returns the variance factor of its curvatures (squared Frobenius norm)."""
     for j in range(columns - 1, -1, -1):
-        total = a[COLUMNS, j]
+        total = triangle[COLUMNS, j]
         for c in range(j + 1, columns):
-            total -= a[c, j] * coefficients[c]
-        coefficients[j] = total / a[j, j]
-    row = np.zeros(columns)
-    for k in range(3):
-        target = 3 + k
+            total -= triangle[c, j] * coefficients[c]
+        coefficients[j] = total / triangle[j, j]
+    factor = 0.0
+    for target in range(3, 6):
         square = 0.0
         for j in range(target, columns):
             total = 1.0 if j == target else 0.0
             for c in range(target, j):
-                total -= a[j, c] * row[c]
-            row[j] = total / a[j, j]
+                total -= triangle[j, c] * row[c]
+            row[j] = total / triangle[j, j]
             square += row[j] * row[j]
-        spread[k] = square
-    return True
+        factor += (2.0 if target == 4 else 4.0) * square
+    return factor
 
 
 @njit(cache=True)
@@ -105,146 +115,159 @@ def _weingarten(coefficients, scale, out):  # type: ignore[no-untyped-def]
     out[2] = (vv - 2 * cross * uv / first + cross * cross * uu / (first * first)) / (second * second)
 
 
-@njit(cache=True, nogil=True)
-def fit_jets(points, normals, smooth, neighbours, chosen, sizes, noise, confidence):  # type: ignore[no-untyped-def]
-    """Shape operators of chosen points by Lepski's rule over neighbourhood sizes and degrees.
+@njit(cache=True)
+def _frame(n):  # type: ignore[no-untyped-def]
+    """Two unit vectors that span the plane perpendicular to n."""
+    axis = 0
+    if abs(n[1]) < abs(n[axis]):
+        axis = 1
+    if abs(n[2]) < abs(n[axis]):
+        axis = 2
+    e1 = -n[axis] * n
+    e1[axis] += 1.0
+    e1 /= np.sqrt(e1[0] * e1[0] + e1[1] * e1[1] + e1[2] * e1[2])
+    e2 = np.array([n[1] * e1[2] - n[2] * e1[1], n[2] * e1[0] - n[0] * e1[2], n[0] * e1[1] - n[1] * e1[0]])
+    return e1, e2
 
-    Every candidate (size, degree) has an estimate and a standard deviation. From the most variable on, a candidate
-    is taken as long as it agrees with all before it; the last one taken has the least variance that bias allows.
+
+@njit(cache=True)
+def _gather(points, normals, near, centre, e1, e2, sizes, place, ends):  # type: ignore[no-untyped-def]
+    """Coordinates of the neighbours on this side of the body; `ends` counts them for each size."""
+    n, used, s = normals[centre], 0, 0
+    for i in range(len(near)):
+        while s < len(sizes) and i == sizes[s]:
+            ends[s] = used
+            s += 1
+        j = near[i]
+        if j < 0 or j >= len(points):
+            continue
+        if normals[j, 0] * n[0] + normals[j, 1] * n[1] + normals[j, 2] * n[2] < 0.0:
+            continue
+        dx, dy, dz = (
+            points[j, 0] - points[centre, 0],
+            points[j, 1] - points[centre, 1],
+            points[j, 2] - points[centre, 2],
+        )
+        place[0, used] = dx * e1[0] + dy * e1[1] + dz * e1[2]
+        place[1, used] = dx * e2[0] + dy * e2[1] + dz * e2[2]
+        place[2, used] = dx * n[0] + dy * n[1] + dz * n[2]
+        used += 1
+    ends[s:] = used
+    return used
+
+
+@njit(cache=True)
+def _reach(place, first, last, reach):  # type: ignore[no-untyped-def]
+    """Largest squared distance from the axis, of those before and points first to last."""
+    for i in range(first, last):
+        reach = max(reach, place[0, i] * place[0, i] + place[1, i] * place[1, i])
+    return reach
+
+
+@njit(cache=True, nogil=True)
+def fit_jets(points, normals, neighbours, chosen, sizes, degree):  # type: ignore[no-untyped-def]
+    """Shape operators of chosen points by every neighbourhood size and every even degree up to the given one.
+
+    The sizes are nested: each adds its new points to the triangle of the one before, and one triangle serves all
+    degrees, so that all candidates together cost one fit over the largest neighbourhood.
 
     Args:
-        points, normals, smooth: (N, 3) positions, normals of the frames, normals that tell sheets apart.
-        neighbours: (M, K) indices of the nearest points of each chosen point, nearest first.
+        points, normals: (N, 3) positions and the normals of the frames; neighbours on another side are left out.
+        neighbours: (M, K) indices of the nearest points of each chosen point, nearest first; others are skipped.
         chosen: (M,) indices.
         sizes: (S,) neighbourhood sizes, ascending, at most K.
-        noise: standard deviation of the heights, in the points' unit; negative: return residuals alone.
-        confidence: half-width of the intervals that must agree, in standard deviations.
+        degree: 2, 4 or 6.
 
     Returns:
-        (M, 3) operators, (M, 2, 3) tangent bases, (M,) sds, (M,) residual sds of the smallest quartic fit,
-        (M,) sizes and (M,) degrees taken (0: no fit).
+        (M, S, D, 3) operators, NaN where undetermined; (M, S, D) standard deviations per unit of noise (Frobenius);
+        (M, S, D) standard deviations of the residuals; (M, S, D, 2) slopes of the fits in the normals' frames.
     """
-    count = len(chosen)
-    operators = np.full((count, 3), np.nan)
-    bases = np.full((count, 2, 3), np.nan)
-    sds = np.full(count, np.nan)
-    residuals = np.full(count, np.nan)
-    taken = np.zeros(count, dtype=np.int64)
-    degrees = np.zeros(count, dtype=np.int64)
-    widest = neighbours.shape[1]
+    count, options = len(chosen), degree // 2
+    operators = np.full((count, len(sizes), options, 3), np.nan)
+    factors = np.full((count, len(sizes), options), np.inf)
+    rests = np.full((count, len(sizes), options), np.nan)
+    slopes = np.zeros((count, len(sizes), options, 2))
+    widest, columns = neighbours.shape[1], TERMS[options - 1]
+    place = np.empty((3, widest))
+    rows = np.empty((COLUMNS + 1, widest))
+    triangle = np.empty((COLUMNS + 1, COLUMNS))
+    coefficients, row = np.zeros(COLUMNS), np.zeros(COLUMNS)
+    ends = np.zeros(len(sizes), dtype=np.int64)
     for m in range(count):
-        centre = chosen[m]
-        n = normals[centre]
-        e1 = np.zeros(3)
-        axis = 0
-        if abs(n[1]) < abs(n[axis]):
-            axis = 1
-        if abs(n[2]) < abs(n[axis]):
-            axis = 2
-        e1[axis] = 1.0
-        along = n[axis]
-        e1 -= along * n
-        e1 /= np.sqrt(e1[0] * e1[0] + e1[1] * e1[1] + e1[2] * e1[2])
-        e2 = np.array([n[1] * e1[2] - n[2] * e1[1], n[2] * e1[0] - n[0] * e1[2], n[0] * e1[1] - n[1] * e1[0]])
-        u, v, z = np.empty(widest), np.empty(widest), np.empty(widest)
-        used = 0
-        ends = np.zeros(len(sizes), dtype=np.int64)
-        for i in range(widest):
-            for s in range(len(sizes)):
-                if i == sizes[s]:
-                    ends[s] = used
-            j = neighbours[m, i]
-            if j < 0 or j >= len(points):
-                continue
-            if smooth[j, 0] * n[0] + smooth[j, 1] * n[1] + smooth[j, 2] * n[2] < 0.0:
-                continue
-            dx = points[j, 0] - points[centre, 0]
-            dy = points[j, 1] - points[centre, 1]
-            dz = points[j, 2] - points[centre, 2]
-            u[used] = dx * e1[0] + dy * e1[1] + dz * e1[2]
-            v[used] = dx * e2[0] + dy * e2[1] + dz * e2[2]
-            z[used] = dx * n[0] + dy * n[1] + dz * n[2]
-            used += 1
-        for s in range(len(sizes)):
-            if ends[s] == 0 or sizes[s] >= widest:
-                ends[s] = used
-        candidates = 2 * len(sizes)
-        values = np.zeros((candidates, 3))
-        spreads = np.full(candidates, np.inf)
-        honest = np.full(candidates, np.inf)
-        slopes = np.zeros((candidates, 2))
-        work = np.empty((COLUMNS + 1, widest))
-        coefficients = np.zeros(COLUMNS)
-        factor = np.zeros(3)
-        operator = np.zeros(3)
-        for s in range(len(sizes)):
-            size = ends[s]
-            if size < QUADRATIC + 2:
-                continue
-            scale = 0.0
-            for i in range(size):
-                scale = max(scale, u[i] * u[i] + v[i] * v[i])
-            scale = np.sqrt(scale)
-            if scale == 0.0:
-                continue
-            columns = COLUMNS if size >= COLUMNS + 4 else QUADRATIC
-            _design(u, v, z, size, scale, work)
-            _householder(work, size, columns)
-            for degree in range(2):
-                terms = COLUMNS if degree == 0 else QUADRATIC
-                if terms > columns or not _solve(work, terms, coefficients, factor):
-                    continue
-                rest = 0.0
-                for i in range(terms, size):
-                    rest += work[COLUMNS, i] * work[COLUMNS, i]
-                rest = np.sqrt(rest / (size - terms)) * scale
-                if degree == 0 and np.isnan(residuals[m]):
-                    residuals[m] = rest
-                _weingarten(coefficients, scale, operator)
-                k = 2 * s + degree
-                values[k] = operator
-                slopes[k, 0], slopes[k, 1] = coefficients[1], coefficients[2]
-                unit = np.sqrt(4 * factor[0] + 2 * factor[1] + 4 * factor[2]) / (scale * scale)
-                spreads[k] = max(noise, 0.0) * unit
-                # a fit that leaves more than the noise is trusted no better than what it leaves
-                honest[k] = max(noise, rest) * unit
-        if noise < 0:
+        e1, e2 = _frame(normals[chosen[m]])
+        used = _gather(points, normals, neighbours[m], chosen[m], e1, e2, sizes, place, ends)
+        scale = np.sqrt(_reach(place, 0, used, 0.0))
+        if scale == 0.0:
             continue
-        order = np.argsort(-spreads)
-        best = -1
-        for index in range(candidates):
-            k = order[index]
-            if not np.isfinite(spreads[k]):
+        triangle[:] = 0.0
+        rest, first, reach = 0.0, 0, 0.0
+        for s in range(len(sizes)):
+            last = ends[s]
+            if last == first:
                 continue
-            agrees = True
-            for earlier in range(index):
-                o = order[earlier]
-                if not np.isfinite(spreads[o]):
+            reach = _reach(place, first, last, reach)
+            _design(place[0], place[1], place[2], first, last, scale, degree, rows)
+            rest += _absorb(triangle, rows, last - first, columns)
+            first, over, before = last, rest, columns
+            for d in range(options - 1, -1, -1):
+                terms = TERMS[d]
+                for j in range(terms, before):
+                    over += triangle[COLUMNS, j] ** 2
+                before = terms
+                if last < terms + SPARE[d] or reach == 0.0:
                     continue
-                gap = 0.0
-                for c in range(3):
-                    weight = 2.0 if c == 1 else 1.0
-                    gap += weight * (values[k, c] - values[o, c]) ** 2
-                if gap > (confidence * spreads[o]) ** 2:
-                    agrees = False
-                    break
-            if not agrees:
-                break
-            best = k
-        if best < 0:
-            continue
-        p, q = slopes[best, 0], slopes[best, 1]
-        t1 = e1 + p * n
-        t1 /= np.sqrt(1 + p * p)
-        t2 = e2 + q * n
-        t2 -= (t2[0] * t1[0] + t2[1] * t1[1] + t2[2] * t1[2]) * t1
-        t2 /= np.sqrt(t2[0] * t2[0] + t2[1] * t2[1] + t2[2] * t2[2])
-        operators[m] = values[best]
-        bases[m, 0] = t1
-        bases[m, 1] = t2
-        # what the rule cannot tell from noise may be bias of half the confidence that it grants
-        allowance = 1.0 if best == order[0] else np.sqrt(1 + 0.25 * confidence * confidence)
-        sds[m] = allowance * honest[best] / np.sqrt(2.0)
-        taken[m] = ends[best // 2]
-        degrees[m] = 4 if best % 2 == 0 else 2
-    return operators, bases, sds, residuals, taken, degrees
+                if not _determined(triangle, terms, scale / np.sqrt(reach)):
+                    continue
+                factors[m, s, d] = np.sqrt(_solve(triangle, terms, coefficients, row)) / (scale * scale)
+                _weingarten(coefficients, scale, operators[m, s, d])
+                slopes[m, s, d] = coefficients[1:3]
+                rests[m, s, d] = np.sqrt(over / (last - terms)) * scale
+    return operators, factors, rests, slopes
+
+
+@njit(cache=True, nogil=True)
+def pooled_bias(operators, deviations, pools, sizes, certainty, out):  # type: ignore[no-untyped-def]
+    """Squared bias of every candidate, from its disagreement with less biased ones around each point.
+
+    The variance of the difference of two nested fits is the difference of their variances if the wider one is
+    unbiased (Hausman): what exceeds it on average over the pool, and `certainty` standard deviations of that
+    average, is bias.
+
+    Args:
+        operators: (N, S, D, 3) of `fit_jets`.
+        deviations: (N, S, D) their standard deviations, infinite where undetermined.
+        pools: (M, P) indices of points around each of M points.
+        sizes: (S,) neighbourhood sizes.
+        certainty: standard deviations.
+        out: (M, S, D) squared Frobenius norms, written.
+    """
+    options = operators.shape[2]
+    for m in range(len(pools)):
+        for s in range(len(sizes)):
+            for d in range(options):
+                worst = 0.0
+                for other in range(min(s + 2, len(sizes))):
+                    for higher in range(d, options):
+                        # one size wider serves as a judge only if its degree is higher
+                        if higher == d and other >= s:
+                            continue
+                        excess, weight, members = 0.0, 0.0, 0
+                        for y in pools[m]:
+                            own, its = deviations[y, s, d], deviations[y, other, higher]
+                            if not (np.isfinite(own) and np.isfinite(its)) or (other <= s and its <= own):
+                                continue
+                            expected = max(its * its + (own * own if other > s else -own * own), ROUNDING)
+                            gap = 0.0
+                            for k in range(3):
+                                part = operators[y, s, d, k] - operators[y, other, higher, k]
+                                gap += part * part * (2.0 if k == 1 else 1.0)
+                            # the variance of the gap: one uncertain judge must not drown the others
+                            excess += (gap - expected) / (expected * expected)
+                            weight += 1.0 / (expected * expected)
+                            members += 1
+                        if members:
+                            # neighbourhoods overlap: the pool holds fewer independent values than points
+                            independent = 1.0 + 3.0 * members / sizes[other]
+                            allowance = certainty * np.sqrt(2.0 * members / (3.0 * independent * weight))
+                            worst = max(worst, excess / weight - allowance)
+                out[m, s, d] = worst
