@@ -74,8 +74,8 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
     base = _placed(log.trace, base, scene, stages)
     trace = _over(log.trace, base, stages)
     detections = log.detections or _detect(trace, base, settings, stages)
-    features = _assemble(detections, trace, base, stages)
-    features = _refine(features, trace, base, detections, settings, stages)
+    features = _assemble(detections, trace, base, settings, stages)
+    features = _believed(_refine(features, trace, base, detections, settings, stages), stages)
     estimate = _estimate(features, trace, base, detections, stages)
     curvature = _curvature(estimate, stages)
     truth = (
@@ -181,13 +181,15 @@ def _detect(trace: Trace, base: Base, settings: Settings, stages: Stages) -> Det
         return detect(trace, base, algorithm=settings.algorithm, false_alarms_per_metre=settings.false_alarms_per_metre)
 
 
-def _assemble(detections: Detections, trace: Trace, base: Base, stages: Stages) -> tuple[Feature, ...]:
+def _assemble(
+    detections: Detections, trace: Trace, base: Base, settings: Settings, stages: Stages
+) -> tuple[Feature, ...]:
     from mapping.grammar import assemble
 
     if not stages.needed("grammar", "" if detections.crossings else "nothing was detected"):
         return ()
     with stages.stage("grammar"):
-        return assemble(detections, trace, base)
+        return assemble(detections, trace, base, false_alarms_per_metre=settings.false_alarms_per_metre)
 
 
 def _refine(
@@ -216,6 +218,16 @@ def _refine(
     if regular:
         stages.needed("long chain", f"the posterior of {regular} of {len(refined)} is regular (k-hat below 0.5)")
     return tuple(refined)
+
+
+def _believed(features: tuple[Feature, ...], stages: Stages) -> tuple[Feature, ...]:
+    """Without what all sweeps together say is more likely nothing: a false alarm that later sweeps passed by."""
+    kept = tuple(f for f in features if f.evidence.log_odds is None or f.evidence.log_odds >= 0.0)
+    for feature in (f for f in features if f not in kept):
+        x, y, z = np.round(1e3 * feature.axis[0], 2)
+        reason = f"with all sweeps together it is more likely nothing (log odds {feature.evidence.log_odds:.1f})"
+        stages.left_out.append(LeftOut(f"a {feature.kind} at ({x:g}, {y:g}, {z:g}) mm", reason))
+    return kept
 
 
 def _estimate(

@@ -30,6 +30,10 @@ QUEUED = 2
 BATCH = 0.5
 # Share of the wanted force that may be missing, or too much, at full tangential speed; and the slowest pace
 EASE, SLOWEST = 0.25, 0.1
+# A sweep begins when the force is this near to the wanted one, in its share, or after so many control periods
+SETTLED, SETTLING = 0.2, 50
+# A path of one point is touched for so many control periods
+DWELL = 10
 
 
 @dataclass(frozen=True)
@@ -66,8 +70,10 @@ class Slide:
             return
         last = told = time.monotonic()
         try:
-            for _ in self._steer(stage, move, path, approach, float((where - path[0]) @ approach[0])):
-                if time.monotonic() > told + BATCH:
+            for sliding in self._steer(stage, move, path, approach, float((where - path[0]) @ approach[0])):
+                if not sliding:
+                    last = time.monotonic()  # what the tip feels while it settles is no sweep
+                elif time.monotonic() > told + BATCH:
                     told = time.monotonic()
                     batch = self._fused(stage, last)
                     if len(batch.times):
@@ -83,16 +89,22 @@ class Slide:
 
     def _steer(
         self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, depth: float
-    ) -> Iterator[None]:
-        """Along the path, one jog a period; `depth` (m) behind it along the approach follows the force."""
+    ) -> Iterator[bool]:
+        """Along the path, one jog a period; `depth` (m) behind it along the approach follows the force.
+
+        Each period says whether the sweep has begun.
+        """
         controller, trend = stage.controller, 0.0
         here, at, end = path[0] + depth * approach[0], 0.0, len(path) - 1.0
         queued = [0.0] * QUEUED  # lengths of the last jogs
+        settling = SETTLING  # periods to press on before the sweep begins
+        left = 0 if end > 0 else DWELL
         while True:
             inwards = _between(approach, at)
             inwards /= np.linalg.norm(inwards)
             missing = move.force - self._pressing(stage, inwards, here, sum(queued))
-            pace = _pace(missing / move.force)
+            settling = 0 if abs(missing) <= SETTLED * move.force else max(0, settling - 1)
+            pace = 0.0 if settling else _pace(missing / move.force)
             at = min(end, at + pace)
             wanted = self.gain * missing / self.stiffness
             # the slope of the body, learnt as it comes: else a ramp leaves a lasting error
@@ -106,9 +118,11 @@ class Slide:
                 stage.check(target, "sliding")
                 controller.jog(stage.frame.to_machine(target), max(way / self.period, 1e-4))
                 here, queued = target, [*queued[1:], way]
-            yield
-            if at >= end:
-                return
+            yield not settling
+            if at >= end and not settling:
+                if left == 0:
+                    return
+                left -= 1
 
     def _pressing(self, stage: GuardedStage, inwards: FloatArray, here: FloatArray, queued: float) -> float:
         """Force along the approach, N, as soon as at most `queued` metres of motion are left up to `here`.

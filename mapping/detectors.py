@@ -27,8 +27,8 @@ LARGEST = 4.0
 ROUGHNESS = 5.0
 PROBABILITY = 0.95
 # Height, in steps of positions that are rounded, up to which a detail may be the rounding's: half a step to either
-# side, and half a step of motion between two reports.
-UNRESOLVED = 1.5
+# side, and a step and a half of motion between two reports.
+UNRESOLVED = 2.5
 
 
 class DetectionError(MappingError):
