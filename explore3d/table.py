@@ -127,7 +127,8 @@ def _trace(values: Columns, settings: TableSettings, text: TableText) -> Trace:
     t = values["t"] if "t" in values else np.arange(len(x), dtype=np.float64)
     centers = table @ rotation.T + origin if moved else table
     try:
-        return Trace(t, centers, _sweeps(values, table, settings.jump, text), radius, **vectors)
+        sweep = _sweeps(values, table, settings.jump, text)
+        return Trace(t, centers, sweep, radius, vectors.get("normals"), vectors.get("contacts"), vectors.get("force"))
     except TraceError as error:
         raise UserError(f"{text.path}: {error}") from error
 

@@ -41,4 +41,4 @@ class Cells:
     def trace(self, tip_radius: float, keep: NDArray[np.bool_]) -> Trace:
         """Some of the cells as a trace of their own; their times count cells."""
         normals = None if self.normals is None else self.normals[keep]
-        return Trace(np.flatnonzero(keep) * 1.0, self.centers[keep], self.sweep[keep], tip_radius, normals)
+        return Trace(np.flatnonzero(keep).astype(np.float64), self.centers[keep], self.sweep[keep], tip_radius, normals)
