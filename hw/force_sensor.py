@@ -122,14 +122,14 @@ class ForceSensor:
             return self._news.wait_for(done, timeout=within)
 
     def tare(self, duration: float = 0.2) -> None:
-        """Take the mean force of the next moments, free of contact, as zero. Raises LinkError."""
+        """Take the median force of the next moments, free of contact, as zero. Raises LinkError."""
         since = time.monotonic()
         self.wait(lambda: time.monotonic() > since + duration, duration + 0.5)
         _, arrivals, forces = self.recorded()
         recent = forces[arrivals > since]
         if len(recent) == 0:
             raise LinkError(f"{self.link.port}: no samples from the {self.name} for {duration:g} s")
-        self.zero = recent.mean(axis=0)
+        self.zero = np.median(recent, axis=0)  # a first sample after a reconnection may be anything
 
     def recorded(self, since: float = -np.inf) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """Ticks (N,), arrivals (N,) s and raw forces (N, 3) N of the samples that arrived after `since`."""
