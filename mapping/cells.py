@@ -30,13 +30,13 @@ class Cells:
     def of(cls, trace: Trace, most: int) -> Cells:
         """At most about `most` cells of equally many samples each; no cell spans two sweeps."""
         group = np.arange(len(trace)) * most // max(len(trace), most)
-        group = np.unique(np.column_stack([trace.sweep, group]), axis=0, return_inverse=True)[1].ravel()
-        order = np.argsort(group, kind="stable")
-        starts = np.flatnonzero(np.diff(group[order], prepend=-1))
+        order = np.argsort(trace.sweep, kind="stable")  # by sweep and, within each, by group
+        sweep, group = trace.sweep[order], group[order]
+        starts = np.flatnonzero((np.diff(sweep, prepend=sweep[:1] - 1) != 0) | (np.diff(group, prepend=-1) != 0))
         counts = np.diff(np.append(starts, len(trace)))[:, None]
         centers = np.add.reduceat(trace.centers[order], starts) / counts
         normals = None if trace.normals is None else np.add.reduceat(trace.normals[order], starts) / counts
-        return cls(centers, trace.sweep[order][starts], normals)
+        return cls(centers, sweep[starts], normals)
 
     def trace(self, tip_radius: float, keep: NDArray[np.bool_]) -> Trace:
         """Some of the cells as a trace of their own; their times count cells."""
