@@ -70,11 +70,12 @@ def arclength(trace: Trace, base: Base) -> FloatArray:
     if count < 2:
         return np.zeros(count)
     size = max(1, count // LARGEST_FIRST_BLOCK_COUNT)
-    while count // (2 * size) >= 4 and _length(_block_means(trace.centers, size)) > (1 + LENGTH_TOLERANCE) * _length(
-        _block_means(trace.centers, 2 * size)
-    ):
-        size *= 2
     means = _block_means(trace.centers, size)
+    while count // (2 * size) >= 4:
+        longer = _block_means(means, 2)
+        if _length(means) <= (1 + LENGTH_TOLERANCE) * _length(longer):
+            break
+        means, size = longer, 2 * size
     if len(means) < 2:
         means, size = trace.centers[[0, -1]], count - 1
     feet = base.foot(means, trace.tip_radius)
@@ -135,7 +136,7 @@ def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing
 
 def _block_means(points: FloatArray, size: int) -> FloatArray:
     whole = len(points) // size * size
-    return np.asarray(points[:whole].reshape(-1, size, 3).mean(axis=1))
+    return np.asarray(np.add.reduceat(points[:whole], np.arange(0, whole, size), axis=0) / size)
 
 
 def _length(points: FloatArray) -> float:

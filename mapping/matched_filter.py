@@ -43,18 +43,25 @@ class MatchedFilter:
     def heights(self, profile: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Estimated height of a cap centred at each coarse bin of a profile (n,), and its standard deviation."""
         whole = len(profile) // self.coarse * self.coarse
-        bins = profile[:whole].reshape(-1, self.coarse).mean(axis=1)
+        bins = np.add.reduceat(profile[:whole], np.arange(0, whole, self.coarse)) / self.coarse
         reach = len(self.weights) // 2
-        padded = np.concatenate([np.zeros(reach), bins, np.zeros(reach)])
+        padded = np.zeros(len(bins) + 2 * reach)
+        padded[reach : reach + len(bins)] = bins
         heights = _filtered(padded, self.weights)
         sd = np.full(len(bins), self.sd)
         count = min(len(self.edge), len(bins))
-        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
-        heights[:count] = np.einsum("ij,ij->i", windows[:count], self.edge[:count])
-        heights[len(bins) - count :] = np.einsum("ij,ij->i", windows[::-1][:count, ::-1], self.edge[:count])[::-1]
+        heights[:count] = _at_edge(padded, self.edge[:count])
+        heights[len(bins) - count :] = _at_edge(padded[::-1], self.edge[:count])[::-1]
         sd[:count] = self.edge_sd[:count]
         sd[len(bins) - count :] = np.maximum(sd[len(bins) - count :], self.edge_sd[:count][::-1])
         return heights, sd
+
+
+def _at_edge(padded: FloatArray, weights: FloatArray) -> FloatArray:
+    """Sums weighted by a row of (m, k) weights for each of the first m places of a padded profile."""
+    stride = padded.strides[0]
+    windows = np.lib.stride_tricks.as_strided(padded, weights.shape, (stride, stride), writeable=False)
+    return np.asarray(np.einsum("ij,ij->i", windows, weights))
 
 
 def _filtered(values: FloatArray, weights: FloatArray) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -82,11 +82,13 @@ def _stretches(
     are strong enough to hide others, and looks again, until nothing new exceeds the threshold.
     """
     height = profile.height.copy()
-    scarcity = _scarcity(profile, bank)
-    even = scarcity.max(initial=0.0) <= SCARCE
+    certainties = _certainties(profile, bank)
     weak: list[tuple[int, float]] = []
+    changed = True
     for _ in range(ROUNDS):
-        accepted = _dominant(_candidates(height, bank, threshold, tip_radius, None if even else scarcity), weak)
+        if changed:
+            candidates = _candidates(height, bank, threshold, tip_radius, certainties)
+        accepted, changed = _dominant(candidates, weak), False
         if not accepted:
             return
         for place, half_width, crest, snr in accepted:
@@ -96,6 +98,7 @@ def _stretches(
                 weak.append((place, half_width))
                 continue
             shoulders = _shoulders(height, begin, end, bank.drift > 0)
+            changed = True
             height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
 
 
@@ -107,26 +110,36 @@ def _scarcity(profile: HeightProfile, bank: Bank) -> FloatArray:
     return np.asarray(share * (bank.samples / counts - 1.0))
 
 
-def _certainty(scarcity: FloatArray, bins: int) -> FloatArray:
-    """(n,) at most 1: expected over actual standard deviation of what a filter of this half-width sees."""
+def _certainties(profile: HeightProfile, bank: Bank) -> list[FloatArray | None]:
+    """At most 1, in each bin (n,): expected over actual sd of what each filter sees; None where it is 1 throughout."""
+    scarcity = _scarcity(profile, bank)
+    if scarcity.max(initial=0.0) <= SCARCE:
+        return [None] * len(bank.filters)
+    return [_certainty(scarcity, int(f.half_width / bank.spacing)) for f in bank.filters]
+
+
+def _certainty(scarcity: FloatArray, bins: int) -> FloatArray | None:
     raised = _running_mean(scarcity, max(1, bins))
+    if raised.max() <= SCARCE:
+        return None
     return np.asarray(1 / np.sqrt(1 + np.where(raised > SCARCE, raised, 0.0)))
 
 
 def _candidates(
-    height: FloatArray, bank: Bank, threshold: float, tip_radius: float, scarcity: FloatArray | None
+    height: FloatArray, bank: Bank, threshold: float, tip_radius: float, certainties: Sequence[FloatArray | None]
 ) -> list[tuple[float, int, float, float]]:
     """(signal-to-noise, bin, half-width in bins, height) of local maxima over place for every width."""
     result = []
-    for f in bank.filters:
+    for f, certainty in zip(bank.filters, certainties, strict=True):
         if f.half_width > LARGEST_SHARE * len(height) * bank.spacing or len(height) < 2 * f.coarse:
             continue
         crest, sd = f.heights(height)
-        possible = np.abs(crest) <= PHYSICAL * f.half_width**2 / (2 * tip_radius)
-        snr = np.where(possible, np.abs(crest) / sd, 0.0)
-        if scarcity is not None:
-            certainty = _certainty(scarcity, int(f.half_width / bank.spacing))
+        snr = np.abs(crest) / sd
+        if certainty is not None:
             snr *= certainty[: len(crest) * f.coarse : f.coarse]
+        if snr.max() <= threshold:
+            continue
+        snr[np.abs(crest) > PHYSICAL * f.half_width**2 / (2 * tip_radius)] = 0.0
         around = np.concatenate([[-1.0], snr, [-1.0]])
         peaks = np.flatnonzero((snr > threshold) & (snr >= around[:-2]) & (snr > around[2:]))
         width = f.half_width / bank.spacing
