@@ -202,7 +202,12 @@ def _need_start(reading: _Reading) -> None:
 
 def _trace(batches: list[NDArray[np.void]], reading: _Reading) -> Trace:
     def column(names: Sequence[str]) -> NDArray[np.float64]:
-        return np.concatenate([np.column_stack([batch[name] for name in names]) for batch in batches])
+        values, begin = np.empty((sum(map(len, batches)), len(names))), 0
+        for batch in batches:
+            for axis, name in enumerate(names):
+                values[begin : begin + len(batch), axis] = batch[name]
+            begin += len(batch)
+        return values
 
     optional = {
         group: column(names)
@@ -211,7 +216,7 @@ def _trace(batches: list[NDArray[np.void]], reading: _Reading) -> Trace:
     }
     assert reading.tip_radius is not None
     try:
-        t, sweep = column("t")[:, 0], np.concatenate([batch["sweep"] for batch in batches])
+        t, sweep = column(["t"])[:, 0], np.concatenate([batch["sweep"] for batch in batches])
         resolution = float(reading.start.get("resolution", 0.0))
         return Trace(t, column("xyz"), sweep, reading.tip_radius, **optional, resolution=resolution)
     except TraceError as error:

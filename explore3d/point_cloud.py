@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -59,19 +60,25 @@ def decode(message: bytes) -> NDArray[np.void]:
     """
     try:
         entries = list(_entries(message))
-        fields = [dict(_entries(value)) for number, value in entries if number == 5]
         last = dict(entries)
-        dtype: np.dtype[np.void] = np.dtype(
-            {
-                "names": [field[1].decode() for field in fields],
-                "formats": [_DTYPE[field[3]] for field in fields],
-                "offsets": [struct.unpack("<I", field.get(2, bytes(4)))[0] for field in fields],
-                "itemsize": struct.unpack("<I", last[4])[0],
-            }
-        )
+        dtype = _layout(tuple(value for number, value in entries if number == 5), last[4])
         return np.frombuffer(last.get(6, b""), dtype=dtype)
     except (KeyError, ValueError, IndexError, TypeError, AttributeError, struct.error) as error:
         raise PointCloudError(f"these {len(message)} bytes are not a {SCHEMA_NAME} message: {error}") from error
+
+
+@lru_cache(maxsize=16)
+def _layout(fields: tuple[bytes, ...], stride: bytes) -> np.dtype[np.void]:
+    """The dtype that a message's fields describe; the messages of a log share one."""
+    read = [dict(_entries(value)) for value in fields]
+    return np.dtype(
+        {
+            "names": [field[1].decode() for field in read],
+            "formats": [_DTYPE[field[3]] for field in read],
+            "offsets": [struct.unpack("<I", field.get(2, bytes(4)))[0] for field in read],
+            "itemsize": struct.unpack("<I", stride)[0],
+        }
+    )
 
 
 def descriptor_set() -> bytes:
