@@ -56,7 +56,7 @@ def edge_features(crossings: Sequence[Crossing], around: Around) -> tuple[list[F
 
 def _hinge(crossing: Crossing, inspection: Inspection) -> Hinge | None:
     """The hinge of a sweep whose height runs off in a straight line to one of its ends."""
-    own = inspection.sweep == crossing.sweep
+    own = inspection.of_sweep(crossing.sweep)
     points, heights = inspection.points[own], np.sign(crossing.height) * inspection.height[own]
     for order in (slice(None), slice(None, None, -1)):
         place, height = points[order], heights[order]

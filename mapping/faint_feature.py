@@ -53,7 +53,8 @@ def with_faint_lines(
     for feature in features:
         if feature not in weak:
             reach = 1.3 * np.sqrt(2 * trace.tip_radius * abs(feature.height.median)) + 0.5 * feature.width.high
-            masked |= distances(inspection.points, feature.axis) < reach
+            near = inspection.near(feature.axis, float(reach))
+            masked[near] |= distances(inspection.points[near], feature.axis) < reach
     alarms = false_alarms_per_metre * detections.inspected_length
     inflation = _inflation(inspection, detections, len(trace), half_width)
     lines = faint_lines(inspection, normals, masked, half_width, inflation, alarms)

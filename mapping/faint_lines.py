@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.crest_trace import crest_trace
+from mapping.crest_trace import crest_trace, distances
 from mapping.inspection import Inspection
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
 
 # Half-widths of the sections looked for, against that of the smallest crest which a single sweep detects.
 SECTIONS = (1.0, 0.65)
@@ -74,15 +75,19 @@ def faint_lines(
     found: list[FaintLine] = []
     free = ~masked
     needed = threshold(len(inspection.points) * inspection.spacing, inspection.pitch, half_width, alarms)
+    tiles = _tiles(inspection, normals, free, half_width)
+    lines = [_clearest(inspection, tile, normals, half_width, inflation) for tile in tiles]
     for _ in range(MOST_LINES):
-        best = _clearest(inspection, normals, free, half_width, inflation)
+        best = max((line for line in lines if line is not None), key=lambda line: line.snr, default=None)
         if best is None or best.snr < needed:
             break
         found.append(best)
-        start, way = best.axis[0], best.axis[1] - best.axis[0]
-        offset = inspection.points - start
-        share = np.clip(offset @ way / (way @ way), 0.0, 1.0)
-        free = free & (np.linalg.norm(offset - share[:, None] * way, axis=1) > 1.5 * best.half_width)
+        near = inspection.near(best.axis, 1.5 * best.half_width)
+        free[near[distances(inspection.points[near], best.axis) <= 1.5 * best.half_width]] = False
+        for k, tile in enumerate(tiles):
+            if not free[tile].all():
+                tiles[k] = tile[free[tile]]
+                lines[k] = _clearest(inspection, tiles[k], normals, half_width, inflation)
     return tuple(found)
 
 
@@ -98,29 +103,38 @@ def threshold(path: float, pitch: float, half_width: float, alarms: float) -> fl
     return float(-ndtri(min(alarms / (2 * CONTINUUM * max(lines, 1.0)), 0.1)))
 
 
-def _clearest(
-    inspection: Inspection, normals: FloatArray, free: BoolArray, half_width: float, inflation: float
-) -> FaintLine | None:
-    best: FaintLine | None = None
-    left = free.copy()
-    while left.any():
-        centre = int(left.argmax())
-        gap = np.linalg.norm(inspection.points - inspection.points[centre], axis=1)
-        facing = normals @ normals[centre] > FACING
-        tile = np.flatnonzero(facing & free & (gap < TILE * half_width))
-        left &= ~(facing & (gap < 0.8 * TILE * half_width))
+def _tiles(inspection: Inspection, normals: FloatArray, free: BoolArray, half_width: float) -> list[IntArray]:
+    """Overlapping circles of places that face the same way as their first one; together they hold all free places."""
+    tiles, left = [], free.copy()
+    for centre in range(len(left)):
+        if not left[centre]:
+            continue
+        near = inspection.near(inspection.points[centre][None], TILE * half_width)
+        near = near[normals[near] @ normals[centre] > FACING]
+        gap = np.linalg.norm(inspection.points[near] - inspection.points[centre], axis=1)
+        left[near[gap < 0.8 * TILE * half_width]] = False
         left[centre] = False
-        for section in SECTIONS:
-            line = _clearest_in(inspection, tile, normals[centre], section * half_width, inflation)
-            if line is not None and (best is None or line.snr > best.snr):
-                best = line
-    return best
+        near, gap = near[free[near]], gap[free[near]]
+        tiles.append(np.append(centre, near[(gap < TILE * half_width) & (near != centre)]))
+    return tiles
+
+
+def _clearest(
+    inspection: Inspection, tile: IntArray, normals: FloatArray, half_width: float, inflation: float
+) -> FaintLine | None:
+    """The clearest line of any section among the places of one tile."""
+    if len(tile) == 0:
+        return None
+    lines = [_clearest_in(inspection, tile, normals[tile[0]], w * half_width, inflation) for w in SECTIONS]
+    return max((line for line in lines if line is not None), key=lambda line: line.snr, default=None)
 
 
 def _clearest_in(
-    inspection: Inspection, tile: NDArray[np.int64], normal: FloatArray, half_width: float, inflation: float
+    inspection: Inspection, tile: IntArray, normal: FloatArray, half_width: float, inflation: float
 ) -> FaintLine | None:
     """The clearest line among the places of one tile."""
+    from mapping.faint_kernels import best_segment
+
     if len(tile) < 16:
         return None
     origin = inspection.points[tile].mean(axis=0)
@@ -131,12 +145,10 @@ def _clearest_in(
     flat = (inspection.points[tile] - origin) @ frame.T
     height = inspection.height[tile]
     size = 2 * float(np.linalg.norm(flat, axis=1).max())
-    best = (0.0, 0.0, 0.0, 0.0, 0.0)
-    for angle in np.arange(0.0, np.pi, 2.4 / (LENGTHS[2] * ALONG)):
-        way = np.array([np.cos(angle), np.sin(angle)])
-        u, v = flat @ way, flat @ [-way[1], way[0]]
-        snr, row, begin, end = _best_segment(u, v, height / inspection.sd, size, half_width)
-        best = max(best, (snr, float(angle), row, begin, end), key=lambda line: abs(line[0]))
+    angles = np.arange(0.0, np.pi, 2.4 / (LENGTHS[2] * ALONG))
+    cell_u, cell_v = ALONG * half_width, ACROSS * half_width
+    section = crest_trace(np.arange(-2.0, 3.0) * cell_v, 1.0, half_width)
+    best = best_segment(flat, height / inspection.sd, angles, size, cell_u, cell_v, section, np.array(LENGTHS))
     if best[0] == 0.0:
         return None
     _, angle, row, begin, end = best
@@ -159,7 +171,7 @@ class _Support:
     square: FloatArray
 
     @classmethod
-    def of(cls, height: FloatArray, across: FloatArray, sweep: NDArray[np.int64], half_width: float) -> _Support:
+    def of(cls, height: FloatArray, across: FloatArray, sweep: IntArray, half_width: float) -> _Support:
         shape = crest_trace(across, 1.0, half_width)
         number = np.unique(sweep, return_inverse=True)[1]
         return cls(np.asarray(np.bincount(number, shape * height)), np.asarray(np.bincount(number, shape**2)))
@@ -172,33 +184,3 @@ class _Support:
         rest = np.arange(len(self.signal)) != int((sign * self.signal).argmax())
         whole = sign * float(self.signal.sum() / np.sqrt(self.square.sum()))
         return sign * float(self.signal[rest].sum() / np.sqrt(self.square[rest].sum())) > WITHOUT_BEST * whole
-
-
-def _best_segment(
-    u: FloatArray, v: FloatArray, height: FloatArray, size: float, half_width: float
-) -> tuple[float, float, float, float]:
-    """(signal-to-noise, place across, beginning, end) of the clearest segment along u."""
-    cell_v, cell_u = ACROSS * half_width, ALONG * half_width
-    rows, columns = int(size / cell_v) + 3, int(size / cell_u) + 3
-    low_v, low_u = -0.5 * rows * cell_v, -0.5 * columns * cell_u
-    index = ((v - low_v) / cell_v).astype(np.int64) * columns + ((u - low_u) / cell_u).astype(np.int64)
-    total = np.bincount(index, height, rows * columns).reshape(rows, columns)
-    count = np.bincount(index, minlength=rows * columns).reshape(rows, columns).astype(np.float64)
-    offsets = np.arange(-2.0, 3.0) * cell_v
-    section = crest_trace(offsets, 1.0, half_width)
-    signal = sum(w * total[2 + k : rows - 2 + k] for w, k in zip(section, range(-2, 3), strict=True))
-    square = sum(w**2 * count[2 + k : rows - 2 + k] for w, k in zip(section, range(-2, 3), strict=True))
-    signal = np.concatenate([np.zeros((rows - 4, 1)), np.cumsum(signal, axis=1)], axis=1)
-    square = np.concatenate([np.zeros((rows - 4, 1)), np.cumsum(square, axis=1)], axis=1)
-    best = (0.0, 0.0, 0.0, 0.0)
-    for length in LENGTHS:
-        if length > columns:
-            break
-        power = square[:, length:] - square[:, :-length]
-        snr = np.where(power > 2.0, (signal[:, length:] - signal[:, :-length]) / np.sqrt(np.maximum(power, 1e-9)), 0.0)
-        k = int(np.abs(snr).argmax())
-        row, column = divmod(k, snr.shape[1])
-        if abs(snr[row, column]) > abs(best[0]):
-            begin = low_u + column * cell_u
-            best = (float(snr[row, column]), low_v + (row + 2.5) * cell_v, begin, begin + length * cell_u)
-    return best

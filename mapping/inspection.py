@@ -17,6 +17,9 @@ from mapping.trace import Trace
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+# Sweeps that tell the typical distance between neighbours.
+PROBED = 200
+
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
@@ -45,20 +48,50 @@ class Inspection:
     @cached_property
     def pitch(self) -> float:
         """Typical distance from a place to the nearest other sweep, m; infinity for a single sweep."""
-        gaps = []
-        for number in np.unique(self.sweep):
-            own = np.flatnonzero(self.sweep == number)
-            probes = own[np.linspace(0, len(own) - 1, 7).astype(int)[1:-1]]
-            others = self.points[self.sweep != number]
-            if len(others):
-                distance = np.linalg.norm(self.points[probes][:, None] - others[None], axis=2).min(axis=1)
-                gaps.append(float(np.median(distance)))
-        return float(np.quantile(gaps, 0.75)) if gaps else float("inf")
+        numbers = sorted(self._places)
+        if len(numbers) < 2:
+            return float("inf")
+        chosen = [numbers[k] for k in np.linspace(0, len(numbers) - 1, min(len(numbers), PROBED)).astype(int)]
+        own = [self._places[number] for number in chosen]
+        probes = np.concatenate([places[np.linspace(0, len(places) - 1, 7).astype(int)[1:-1]] for places in own])
+        gaps = self._to_other_sweeps(probes).reshape(len(own), -1)
+        return float(np.quantile(np.median(gaps, axis=1), 0.75))
+
+    def _to_other_sweeps(self, places: IntArray) -> FloatArray:
+        """Distance from each of the places (indices) to the nearest place of another sweep, m."""
+        gap, left, count = np.full(len(places), np.inf), np.arange(len(places)), 32
+        while len(left):
+            count = min(2 * count, len(self.points))
+            distance, index = self._tree.query(self.points[places[left]], count)
+            other = np.where(self.sweep[index] != self.sweep[places[left], None], distance, np.inf).min(axis=1)
+            gap[left] = other
+            left = left[np.isinf(other)] if count < len(self.points) else left[:0]
+        return gap
+
+    @cached_property
+    def _places(self) -> dict[int, IntArray]:
+        order = np.argsort(self.sweep, kind="stable")
+        cuts = np.flatnonzero(np.diff(self.sweep[order])) + 1
+        return {int(self.sweep[own[0]]): own for own in np.split(order, cuts) if len(own)}
+
+    def of_sweep(self, number: int) -> IntArray:
+        """Indices of one sweep's places in the order in which it passed them."""
+        return self._places.get(number, np.zeros(0, dtype=np.int64))
+
+    def near(self, axis: FloatArray, reach: float) -> IntArray:
+        """Indices, ascending, of all places within `reach` of a polyline (K, 3), and of a few more."""
+        legs = np.linalg.norm(np.diff(axis, axis=0), axis=1)
+        parts = np.maximum(np.ceil(legs / max(reach, np.finfo(float).tiny)).astype(int), 1)
+        share = [k / n for n in parts for k in range(n)]
+        path = np.vstack([np.repeat(axis[:-1], parts, axis=0), axis[-1:]])
+        path[:-1] += np.array(share)[:, None] * np.repeat(np.diff(axis, axis=0), parts, axis=0) if share else 0.0
+        found = self._tree.query_ball_point(path, 1.2 * reach)
+        return np.unique(np.concatenate([np.asarray(some, dtype=np.int64) for some in found]))
 
     def denies(self, path: FloatArray, height: float, reach: float) -> bool:
         """True if a place within `reach` of the path (K, 3) was found clearly lower than half the height."""
         near = self._tree.query_ball_point(path, reach)
-        places = sorted({place for some in near for place in some})
+        places = list({place for some in near for place in some})
         if not places:
             return False
         return bool((np.sign(height) * self.height[places] + 3 * self.sd < 0.5 * abs(height)).any())

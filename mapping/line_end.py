@@ -50,7 +50,9 @@ def line_end(axis: FloatArray, height: float, half_width: float, inspection: Ins
         longest: distance beyond the last point up to which the line may go unseen, m.
     """
     anchor, way, length = _last_leg(axis, BACK * half_width)
-    offset = inspection.points - anchor
+    farthest = anchor + (length + longest + half_width) * way
+    places = inspection.near(np.stack([anchor, farthest]), ASIDE * half_width)
+    offset = inspection.points[places] - anchor
     along = offset @ way
     across = np.linalg.norm(offset - np.outer(along, way), axis=1)
     step = (length + longest) / STEPS
@@ -58,7 +60,7 @@ def line_end(axis: FloatArray, height: float, half_width: float, inspection: Ins
     reach = step * np.arange(1, STEPS + 1)
     beyond = np.maximum(along[near][:, None] - reach, 0.0)
     model = crest_trace(np.hypot(beyond, across[near][:, None]), height, half_width)
-    rise = misfit(inspection.height[near][:, None] - model, inspection.sd, height).sum(axis=0)
+    rise = misfit(inspection.height[places[near]][:, None] - model, inspection.sd, height).sum(axis=0)
     rise -= rise.min()
     likely = reach[rise <= INTERVAL]
     seen = bool(rise[-1] > SEEN)

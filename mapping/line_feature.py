@@ -138,12 +138,12 @@ def _line_feature(branch: Branch, members: list[Crossing], kind: str, around: Ar
         axis, length = _ended(branch, height, half_width, members, around)
         if length.censored:
             notes += ("runs on where nothing was inspected: its length is at least this",)
-    lifted = axis + around.tip_radius * members[0].normal
-    feet = around.base.foot(lifted, around.tip_radius)
+    # lowered onto the base, not along one crossing's normal: a line that bends over the base has many
+    on_base = around.base.foot(axis, around.tip_radius).points
     return Feature(
         kind=kind,
-        axis=feet.points if not np.array_equal(axis[0], axis[-1]) else np.vstack([feet.points[:-1], feet.points[:1]]),
-        normals=feet.normals,
+        axis=on_base if not np.array_equal(axis[0], axis[-1]) else np.vstack([on_base[:-1], on_base[:1]]),
+        normals=around.base.foot(on_base, around.tip_radius).normals,
         height=Interval.normal(height, sd),
         width=body_width(height, half_width, around.tip_radius),
         length=length,
@@ -163,12 +163,14 @@ def _section(axis: FloatArray, members: list[Crossing], around: Around) -> tuple
     highest = [c for c in members if not isinstance(c, RunPoint)] or members
     guess = float(np.median([c.height for c in highest]))
     width = float(np.sqrt(2 * around.tip_radius * abs(guess)))
-    distance = distances(inspection.points, axis)
-    inner = np.linalg.norm(inspection.points[:, None] - axis[None, [0, -1]], axis=2).min(axis=1) > distance + 1e-12
+    places = inspection.near(axis, 1.5 * width)
+    points = inspection.points[places]
+    distance = distances(points, axis)
+    inner = np.linalg.norm(points[:, None] - axis[None, [0, -1]], axis=2).min(axis=1) > distance + 1e-12
     near = inner & (distance < 1.5 * width)
     if near.sum() < 8:
         return guess, width, float(np.median([c.height_sd for c in members]))
-    found = inspection.height[near]
+    found = inspection.height[places[near]]
     best = (np.inf, guess, width, 0.0)
     for half_width in width * np.geomspace(0.6, 2.0, 25):
         shape = crest_trace(distance[near], np.sign(guess), half_width) * np.sign(guess)

@@ -31,17 +31,23 @@ def groups(crossings: Sequence[Crossing], inspection: Inspection, scale: float) 
         return i
 
     points = np.array([c.point for c in crossings])
-    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-    reach = LONGEST_LINK * max(min(inspection.pitch, 1e300), scale)
-    first, second = np.nonzero(np.triu(distance <= reach, 1))
-    for k in np.argsort(distance[first, second], kind="stable"):
-        i, j = int(first[k]), int(second[k])
+    pairs = _pairs(points, LONGEST_LINK * max(min(inspection.pitch, 1e300), scale))
+    for i, j in pairs:
         if root(i) != root(j) and linked(crossings[i], crossings[j], inspection, scale):
             parent[root(i)] = root(j)
     members: dict[int, list[int]] = {}
     for i in range(len(crossings)):
         members.setdefault(root(i), []).append(i)
     return sorted(members.values())
+
+
+def _pairs(points: FloatArray, reach: float) -> list[tuple[int, int]]:
+    """Pairs of points no further apart than `reach`, m, the nearest first."""
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    return [(int(i), int(j)) for i, j in pairs[np.lexsort((pairs[:, 1], pairs[:, 0], distance))]]
 
 
 def linked(a: Crossing, b: Crossing, inspection: Inspection, scale: float) -> bool:

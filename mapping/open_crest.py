@@ -20,14 +20,14 @@ HIGHER = 1.3
 
 def is_open(crossing: Crossing, inspection: Inspection) -> bool:
     """True if the sweep's height had not come back to the base at its first or last place."""
-    heights = np.sign(crossing.height) * inspection.height[inspection.sweep == crossing.sweep]
+    own = inspection.of_sweep(crossing.sweep)
+    heights = np.sign(crossing.height) * inspection.height[own]
     if len(heights) < 4:
         return True
     sides = (heights[:2].mean(), heights[-2:].mean())
     up = max(STILL_UP * abs(crossing.height), 4 * inspection.sd)
     # the two ends of the disturbance itself, in places of this sweep
-    place = inspection.points[inspection.sweep == crossing.sweep]
-    nearest = int(np.linalg.norm(place - crossing.point, axis=1).argmin())
+    nearest = int(np.linalg.norm(inspection.points[own] - crossing.point, axis=1).argmin())
     return any(
         side > up and bool((part > 0.5 * up).all())
         for side, part in zip(sides, (heights[: nearest + 1], heights[nearest:]), strict=True)
@@ -36,7 +36,7 @@ def is_open(crossing: Crossing, inspection: Inspection) -> bool:
 
 def comes_down(edge: Crossing, inspection: Inspection) -> bool:
     """True if the sweep was felt at the lower level beyond a step, and not only up to its own end."""
-    own = inspection.sweep == edge.sweep
+    own = inspection.of_sweep(edge.sweep)
     beyond = (inspection.points[own] - edge.point) @ uphill(edge) * -np.sign(edge.height) > 0
     low = np.abs(inspection.height[own][beyond]) < 0.5 * abs(edge.height)
     return bool(low.sum() >= 2)

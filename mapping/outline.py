@@ -53,7 +53,8 @@ def outline(members: list[Crossing], inspection: Inspection, half_width: float) 
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     frame = _tangent_frame(points - middle, highest.normal)
     reach = float(np.linalg.norm(points - middle, axis=1).max()) + AROUND * half_width
-    near = np.linalg.norm(inspection.points - middle, axis=1) < reach
+    near = inspection.near(middle[None], reach)
+    near = near[np.linalg.norm(inspection.points[near] - middle, axis=1) < reach]
     places, height = (inspection.points[near] - middle) @ frame.T, inspection.height[near]
     flat = (points - middle) @ frame.T
     spot = _fit(places, height, inspection.sd, flat, highest.height, half_width, elongated=False)

@@ -1,0 +1,53 @@
+"""Kernel of the search for faint lines: sums over cells along and across every direction."""
+
+# mypy: disable-error-code="untyped-decorator"
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def best_segment(flat, height, angles, size, cell_u, cell_v, section, lengths):  # type: ignore[no-untyped-def]
+    """(signal-to-noise, angle, place across, beginning, end) of the clearest segment in any direction; zeros if none.
+
+    Args:
+        flat: (N, 2) places.
+        height: (N,) in standard deviations.
+        angles: (A,) directions, rad.
+        size: diameter of a circle about the origin that holds all places.
+        cell_u, cell_v: cells along and across the line.
+        section: (2 k + 1,) heights of the line's section at cells across.
+        lengths: (L,) of lines in cells along, ascending.
+    """
+    rows, columns, wings = int(size / cell_v) + 3, int(size / cell_u) + 3, len(section) // 2
+    low_v, low_u = -0.5 * rows * cell_v, -0.5 * columns * cell_u
+    total, count = np.zeros((rows, columns)), np.zeros((rows, columns))
+    signal, square = np.zeros(columns + 1), np.zeros(columns + 1)
+    best_square, best = 0.0, np.zeros(5)
+    for angle in angles:
+        c, s = np.cos(angle), np.sin(angle)
+        total[:], count[:] = 0.0, 0.0
+        for i in range(len(height)):
+            u, v = flat[i, 0] * c + flat[i, 1] * s, flat[i, 1] * c - flat[i, 0] * s
+            row, column = int((v - low_v) / cell_v), int((u - low_u) / cell_u)
+            total[row, column] += height[i]
+            count[row, column] += 1.0
+        for row in range(wings, rows - wings):
+            for column in range(columns):
+                match, power = 0.0, 0.0
+                for k in range(2 * wings + 1):
+                    match += section[k] * total[row - wings + k, column]
+                    power += section[k] ** 2 * count[row - wings + k, column]
+                signal[column + 1], square[column + 1] = signal[column] + match, square[column] + power
+            for length in lengths:
+                for column in range(columns - length + 1):
+                    power = square[column + length] - square[column]
+                    match = signal[column + length] - signal[column]
+                    if power > 2.0 and match * match > best_square * power:
+                        best_square = match * match / power
+                        begin = low_u + column * cell_u
+                        best[0], best[1], best[2] = match / np.sqrt(power), angle, low_v + (row + 0.5) * cell_v
+                        best[3], best[4] = begin, begin + length * cell_u
+    return best
