@@ -10,6 +10,7 @@ from explore3d.work_precision import Point, Stage
 
 COLOURS = (ESTIMATED, "#1d4e89", TRUTH, "#b7791f", "#6b46c1", MUTED, "#0e7490", "#9d174d")
 MARKERS = "osD^vP*X"
+DECADE = 10.0  # an axis shows at least so large a ratio: less would make much of little, and crowd its labels
 SMALLEST = 1e-18  # an error of exactly nothing still needs a place on the axis
 
 
@@ -31,9 +32,17 @@ def diagram(stage: Stage, points: Sequence[Point]) -> dict[str, bytes]:
             axes.set_xscale("log")
             axes.set_yscale("log")
             axes.set_xlabel(label)
+            axes.set_xlim(*_widened(*axes.get_xlim()))
+            axes.set_ylim(*_widened(*axes.get_ylim()))
         every[0].set_ylabel(stage.error.split(",")[0])
         figure.legend(*every[0].get_legend_handles_labels(), loc="outside right center")
         return {kind: _saved(figure, kind) for kind in ("png", "svg")}
+
+
+def _widened(low: float, high: float) -> tuple[float, float]:
+    """Limits about the same middle, a decade apart at least."""
+    grow = max(1.0, (DECADE / (high / low)) ** 0.5)
+    return low / grow, high * grow
 
 
 def _saved(figure: object, kind: str) -> bytes:
