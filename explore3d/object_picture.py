@@ -117,7 +117,9 @@ def _draw(axes: Any, picture: Picture, features: Sequence[Feature]) -> None:
     axes.imshow(np.clip(pixels, 0.0, 1.0), interpolation="none")
     for feature in features:
         reference = feature.axis[len(feature.axis) // 2] if feature.anchor is None else feature.anchor.position
-        place, depth = picture.camera.project(reference[None, :])
+        # A wide bump hides its own foot: the label points at what stands out.
+        crest = reference + max(feature.height.median, 0.0) * feature.normals[len(feature.axis) // 2]
+        place, depth = picture.camera.project(crest[None, :])
         column, row = np.rint(place[0]).astype(int)
         hidden = not (0 <= row < picture.depth.shape[0] and 0 <= column < picture.depth.shape[1])
         if hidden or depth[0] > 1.02 * picture.depth[row, column]:
