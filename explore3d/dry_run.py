@@ -28,10 +28,10 @@ class DryRun:
         tip_radius: m.
         moves: in their order.
         metres, seconds: finger path and time, the ways between the sweeps included.
-        covered: share of the surface that the sweeps inspect.
-        reach: distance from a sweep up to which the smallest feature is seen, m.
+        covered: share of the surface that the sweeps inspect; None if the time budget ends before the survey.
+        reach: distance from a sweep up to which the smallest feature is seen, m; None likewise.
         violations: (number of the move, what limit it breaks).
-        assumed: what had to be assumed of the object, a sentence or "".
+        assumed: what had to be assumed of the object, and what the plan falls short of; a sentence or "".
     """
 
     base: Base
@@ -39,8 +39,8 @@ class DryRun:
     moves: tuple[Move, ...]
     metres: float
     seconds: float
-    covered: float
-    reach: float
+    covered: float | None
+    reach: float | None
     violations: tuple[tuple[int, str], ...]
     assumed: str = ""
 
@@ -62,10 +62,12 @@ class DryRun:
 
         sweeps = count_text(sum(move.purpose == "sweep" for move in self.moves), "sweep")
         first = f"{sweeps}, {length_text(self.metres)} of finger path, {seconds_text(self.seconds)}"
-        second = f"{100 * self.covered:.1f} % of the surface lies within {length_text(self.reach)} of a sweep"
+        within = []
+        if self.covered is not None and self.reach is not None:
+            within = [f"{100 * self.covered:.1f} % of the surface lies within {length_text(self.reach)} of a sweep"]
         broken = [f"move {number}: {what}" for number, what in self.violations]
         assumed = [self.assumed] if self.assumed else []
-        return [*assumed, first, second, *(broken or ["no move breaks a limit"])]
+        return [*assumed, first, *within, *(broken or ["no move breaks a limit"])]
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""
@@ -107,9 +109,11 @@ def plan_scene(path: Path | str) -> DryRun:
     for move in moves:
         spent.count(move)
     survey = outcome.value.survey
-    return DryRun(
-        base, tip, tuple(moves), spent.metres, spent.seconds, survey.fraction, survey.reach, tuple(violations), assumed
-    )
+    if survey is None:
+        short = "the time budget ends before the survey does: raise explore.time_budget or survey.smallest_feature"
+        assumed = f"{assumed}; {short}" if assumed else short
+    covered, reach = (None, None) if survey is None else (survey.fraction, survey.reach)
+    return DryRun(base, tip, tuple(moves), spent.metres, spent.seconds, covered, reach, tuple(violations), assumed)
 
 
 def imagined(scene: Scene) -> tuple[list[Move], Base]:
