@@ -50,7 +50,8 @@ def corner_picture(feature: Feature) -> bytes | None:
                     axes.set_yticklabels([])
                 if i == count - 1:
                     axes.set_xlabel(columns[j][1], fontsize=7)
-        figure.suptitle(f"{feature.id}: {len(posterior.samples)} draws, {posterior.status}", fontweight="bold", x=0.6)
+        how = "no chain needed" if posterior.status == "not needed" else f"chain {posterior.status}"
+        figure.suptitle(f"{feature.id}: {len(posterior.samples)} draws, {how}", fontweight="bold", x=0.6)
         return png(figure)
 
 

@@ -43,6 +43,7 @@ def _errors(axes: Any, name: str, rows: Sequence[Comparison]) -> None:
         axes.hlines(place[mask], low, np.where(np.isfinite(high), high, middle), color=ESTIMATED, linewidth=2.2)
         axes.plot(middle, place[mask], "o", color=ESTIMATED, markerfacecolor=face, markersize=6)
     axes.axvline(0.0, color=TRUTH, linewidth=1.2)
+    axes.locator_params(axis="x", nbins=5)
     axes.set_yticks(place, [row.found.id if row.found else "" for row in rows])
     axes.set_ylim(-len(rows) + 0.4, 0.6)
     axes.set_xlabel(f"found minus true ({unit})")

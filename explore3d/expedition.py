@@ -52,7 +52,7 @@ class Expedition:
         if left <= 0:
             return Outcome("budget", f"the budget was spent before exploring began: {outcome.detail}")
         found = self._carry_out(explorer(self.scene, base, left).plan(), base)
-        detail = f"{outcome.detail}; {found.detail}" if outcome.detail else found.detail
+        detail = f"{found.detail}; before that, to know the base: {outcome.detail}" if outcome.detail else found.detail
         return replace(found, detail=detail)
 
     def _base(self) -> Outcome:

@@ -64,12 +64,17 @@ class Reprobed:
 
     def lines(self) -> list[str]:
         """The same in words."""
-        offsets = 1e6 * self.offsets
-        spread = f", {offsets.std(ddof=1):.1f} um of scatter" if len(offsets) > 1 else ""
+        from explore3d.quantity import count_text, length_text
+
+        offsets = self.offsets
+        spread = f"; the touches scatter by {length_text(float(offsets.std(ddof=1)), 2)}" if len(offsets) > 1 else ""
+        middle = float(offsets.mean())
+        off = f"{length_text(abs(middle), 3)} further {'out' if middle >= 0 else 'in'}"
+        near = count_text(self.neighbours, "sample")
         where = ", ".join(f"{1e3 * value:.3f}" for value in self.recorded)
         return [
-            f"recorded then: the ball's centre at ({where}) mm, by {self.neighbours} samples about {self.sample}",
-            f"felt again {len(offsets)} times: {offsets.mean():+.1f} um further out{spread}",
+            f"recorded then: the ball's centre at ({where}) mm, by {near} about number {self.sample}",
+            f"felt again {count_text(len(offsets), 'time')}: {off} on average{spread}",
             f"log: {self.log}",
         ]
 

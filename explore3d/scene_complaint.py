@@ -13,14 +13,17 @@ def complaint(error: ValidationError, root: type[BaseModel]) -> str:
     mistakes = sorted(error.errors(), key=lambda mistake: mistake["type"] != "extra_forbidden")
     first = mistakes[0]
     field = _field_name(first["loc"])
-    more = f" (and {len(mistakes) - 1} more)" if len(mistakes) > 1 else ""
+    others = len({_field_name(mistake["loc"]) for mistake in mistakes}) - 1
+    more = f" (and {others} more)" if others else ""
     return f"{field}: {_reason(first, root)}{more}" if field else f"{_reason(first, root)}{more}"
 
 
 def _field_name(place: tuple[int | str, ...]) -> str:
-    """tip.radius, truth[2].axis[0][1]"""
+    """tip.radius, truth[2].axis[0][1]; what pydantic calls the alternatives of a union ("dict[...]") is left out."""
     name = ""
     for part in place:
+        if isinstance(part, str) and "[" in part:
+            continue
         name += f"[{part}]" if isinstance(part, int) else f".{part}"
     return name.removeprefix(".")
 
