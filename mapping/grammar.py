@@ -24,6 +24,7 @@ from mapping.point_feature import point_feature
 from mapping.runs import split_runs
 from mapping.step_feature import step_features
 from mapping.trace import Trace
+from mapping.unseen import is_unseen
 
 FloatArray = NDArray[np.float64]
 
@@ -79,9 +80,9 @@ def _crests_and_steps(
 ) -> tuple[list[Crossing], list[Crossing]]:
     """Crests and hollows, with places along those that a sweep ran along, and the steps that are not such runs."""
     crests = [c for c in crossings if not c.kind.startswith("step")]
-    ends = [c for c in crests if is_plateau_end(c, around.inspection)]
-    crossings = [c for c in crossings if c not in ends]
-    crests = [c for c in crests if c not in ends]
+    wrong = [c for c in crests if is_plateau_end(c, around.inspection) or is_unseen(c, around.inspection)]
+    crossings = [c for c in crossings if c not in wrong]
+    crests = [c for c in crests if c not in wrong]
     runs, steps = split_runs([c for c in crossings if c not in crests and comes_down(c, around.inspection)])
     edges = [c for run in runs for c in (run.first, run.last)] + steps
     pitch = around.inspection.pitch
