@@ -11,11 +11,10 @@ from mapping.object_model import ObjectModel
 from mapping.trace import Trace
 
 if TYPE_CHECKING:
-    from mapping.curvature import Curvature
-
     from explore3d.inspected import Inspected
     from explore3d.scene import Scene
     from explore3d.truth import Comparison, TrueFeature
+    from mapping.curvature import Curvature
     from mapping.detectors import Detections
     from mapping.envelope import Estimate
 

@@ -200,8 +200,8 @@ def _curvature_error(mesh: Surface, found: Any) -> float:
 STAGES = (
     Stage("traced surface", "root mean square error of the ball's height, in heights of the bump",
           "The smooth bump's own trace, by dilation and, independently, from equation 11.",
-          "Every curve falls with the mesh's own error. The tree pays little for more triangles, brute force for each of "
-          "them, and rays on the displaced mesh are ten times less exact: it folds beside the kink.", traced),
+          "Every curve falls with the mesh's own error. The tree pays little for more triangles, brute force for "
+          "each, and rays on the displaced mesh are ten times less exact: it folds beside the kink.", traced),
     Stage("estimated surface", "root mean square distance from the true body (m), touched and bridged",
           "The wire and the plate themselves; the trace has 20 um of white noise.",
           "Balls on raw noise are biased by its extremes, the more so the denser the samples: those curves do not "

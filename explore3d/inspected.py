@@ -44,6 +44,9 @@ class Inspected:
     def of(cls, trace: Trace, base: Base, detections: Detections, asked: float | None) -> Inspected:
         """What a trace inspected of a base, by the noise and the threshold of its detection."""
         limit = detections.detection_limit
+        if base.kind == "profile":  # a strip as wide as one likes: all of it lies under the one sweep
+            height = np.full(len(base.surface.faces), limit)
+            return cls(height, base.surface.face_areas, limit, detections.probability, asked)
         places = base.foot(Cells.of(trace, CELLS).centers, trace.tip_radius).points
         if not np.isfinite(limit):
             places = places[:0]

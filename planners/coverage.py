@@ -12,6 +12,10 @@ from mapping.surface import Surface
 FloatArray = NDArray[np.float64]
 
 
+# Samples of faces looked at, at most
+MOST_SAMPLES = 2_000_000
+
+
 @dataclass(frozen=True, eq=False)
 class Coverage:
     """How much of a mesh was inspected.
@@ -69,10 +73,12 @@ def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limi
     if not len(touched):
         return np.full(len(surface.faces), np.inf)
     step = 0.06 * tip_radius
+    while _sample_count(surface, step) > MOST_SAMPLES:
+        step *= 1.5  # a coarser answer is a more cautious one
     points, owner = face_samples(surface, step)
     distance, _ = cKDTree(touched).query(points, distance_upper_bound=0.9 * tip_radius)
-    passed = np.isfinite(distance)
     distance = np.asarray(distance) + 0.55 * step  # as far as a place of the face may lie from the nearest sample
+    passed = distance < tip_radius
     lost = np.full(len(points), np.inf)
     lost[passed] = distance[passed] ** 2 / (tip_radius + np.sqrt(tip_radius**2 - distance[passed] ** 2))
     worst = np.zeros(len(surface.faces))
@@ -102,12 +108,23 @@ def found_probability(
     return np.where(seen > 0, ndtr(signal - threshold), 0.0)
 
 
-def face_samples(surface: Surface, spacing: float) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Points (N, 3) spread evenly over every face, at most about `spacing` apart, and the face of each."""
+def _parts(surface: Surface, spacing: float) -> NDArray[np.int64]:
+    """(F,) subdivisions of each face's sides."""
     corners = surface.vertices[surface.faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     # a face of 200 subdivisions already has 40 000 samples
-    parts = np.clip(np.ceil(longest / spacing), 1, 200).astype(np.int64)
+    return np.asarray(np.clip(np.ceil(longest / spacing), 1, 200).astype(np.int64))
+
+
+def _sample_count(surface: Surface, spacing: float) -> int:
+    parts = _parts(surface, spacing)
+    # a spacing that leaves each face one sample cannot be made coarser
+    return int((parts**2).sum()) if parts.max(initial=1) > 1 else 0
+
+
+def face_samples(surface: Surface, spacing: float) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Points (N, 3) spread evenly over every face, at most about `spacing` apart, and the face of each."""
+    corners, parts = surface.vertices[surface.faces], _parts(surface, spacing)
     points, owner = [], []
     for n in np.unique(parts):
         faces = np.flatnonzero(parts == n)

@@ -12,7 +12,6 @@ from explore3d import bench
 from explore3d.bench_surfaces import PLACES, dilated, paralleled
 from explore3d.work_precision import Omission, Point, Stage, timed
 
-
 PICTURES = {"a_stage.png", "a_stage.svg"}
 
 
