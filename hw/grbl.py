@@ -204,10 +204,10 @@ class GrblFinger:
         except (LinkError, StoppedError) as error:
             stage.controller.halt(str(error))
             self._lost = str(error)
-            if not touched:
+            if not any(map(len, touched)):
                 raise
         except FingerError:
-            if not touched:  # one line was refused, a garbled one perhaps: what was felt before it stays
+            if not any(map(len, touched)):  # one line was refused, a garbled one perhaps: what was felt before it stays
                 raise
         return Trace.concatenate(touched or [self._trace(Touched(np.zeros(0), np.zeros((0, 3))))])
 
