@@ -26,6 +26,7 @@ from planners.baselines import RandomSweeps, Raster
 from planners.drive import drive
 from planners.ergodic import Ergodic
 from planners.explore import Explore
+from planners.locate import Locate
 from planners.plan import Plan
 
 TIP_RADIUS = 0.01
@@ -39,13 +40,20 @@ Strategy = Callable[[BenchScene, np.random.Generator], Plan]
 
 
 def _explore(scene: BenchScene, rng: np.random.Generator) -> Plan:
-    return Explore(
-        base=Base(scene.base),
+    base = Base(scene.base)
+    if scene.misplaced:
+        located = yield from Locate(base=base, tip_radius=TIP_RADIUS, smallest=scene.smallest).plan()
+        if located.value is None:
+            return located
+        base = located.value.moved(base)
+    explore = Explore(
+        base=base,
         tip_radius=TIP_RADIUS,
         smallest=scene.smallest,
         shortest_ridge=scene.shortest_ridge,
         precision=PRECISION,
-    ).plan(rng)
+    )
+    return (yield from explore.plan(rng))
 
 
 def _raster(pitch: float) -> Strategy:
@@ -96,13 +104,12 @@ def records(store: Path) -> list[dict[str, Any]]:
 
 def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus") -> dict[str, Any]:
     """Sweep the body by one strategy, build its model, and compare it with the truth."""
-    base = Base(body.base)
     finger = SimulatedFinger(object=body.object, tip_radius=TIP_RADIUS, seed=seed, **NOISES[noise])
     clock = _Clock(finger)
     record, outcome = drive(STRATEGIES[strategy](body, np.random.default_rng(seed)), clock.execute)
     trace = Trace.concatenate([felt for _, felt in record if len(felt)])
     start = perf_counter()
-    model = modelled(trace, base, seed)
+    model = modelled(trace, body, seed)
     modelling = perf_counter() - start
     return {
         "finger_seconds": finger.clock,
@@ -115,12 +122,16 @@ def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus"
     } | errors(model, body)
 
 
-def modelled(trace: Trace, base: Base, seed: int) -> ObjectModel:
+def modelled(trace: Trace, body: BenchScene, seed: int) -> ObjectModel:
     """The annotated model of all samples, by the stages of `explore3d analyze`."""
     from mapping.detectors import detect
     from mapping.grammar import assemble
+    from mapping.pose import estimate_pose
     from mapping.refine import refine
 
+    base = Base(body.base)
+    if body.misplaced:
+        base = estimate_pose(trace, base).moved(base)
     detections = detect(trace, base)
     features = assemble(detections, trace, base)
     refined = [
@@ -135,7 +146,7 @@ def modelled(trace: Trace, base: Base, seed: int) -> ObjectModel:
         )
         for k, feature in enumerate(features)
     ]
-    return ObjectModel.attach(base, tuple(refined), provenance={})
+    return ObjectModel.attach(base, tuple(f for f in refined if f.evidence.likely), provenance={})
 
 
 def errors(model: ObjectModel, body: BenchScene) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,7 @@ class BenchScene:
         truth: the features by which they differ.
         shortest_ridge: the survey's setting, m; None where there may be bumps.
         smallest: height of the smallest feature that the survey must find, m.
+        misplaced: the object stands off the global model, and the finger must find out how.
     """
 
     base: Surface
@@ -49,6 +50,7 @@ class BenchScene:
     truth: tuple[TrueFeature, ...]
     shortest_ridge: float | None = SPAN
     smallest: float = 0.3e-3
+    misplaced: bool = False
 
 
 def wires(
@@ -137,8 +139,8 @@ def groove(rng: np.random.Generator) -> BenchScene:
     return BenchScene(*scene, (truth,), smallest=-0.8 * dip)
 
 
-def free_form(rng: np.random.Generator, subdivisions: int = 6) -> BenchScene:
-    """A bunny-sized free-form body with two ridges and three bumps."""
+def free_form(rng: np.random.Generator, bumps: bool = True, subdivisions: int = 6) -> BenchScene:
+    """A bunny-sized free-form body with two ridges and, if wanted, three bumps."""
     unit, faces = sphere_mesh(subdivisions)
     rotation = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     ways = np.array([[1.0, 0.3, 0.2], [-0.6, 0.7, -0.2], [-0.2, -0.9, 0.4], [0.1, 0.2, 1.0], [0.2, -0.1, -1.0]])
@@ -152,11 +154,31 @@ def free_form(rng: np.random.Generator, subdivisions: int = 6) -> BenchScene:
         parts.append(tube(axis + 0.5 * WIRE * up, up, 0.5 * WIRE))
         truth.append(TrueFeature("ridge", axis, WIRE, WIRE))
     ball, some = sphere_mesh(4)
-    for way in ways[2:]:
+    for way in ways[2:] if bumps else ():
         point = blob(way[None])
         parts.append((point + 1e-3 * ball, some))
         truth.append(TrueFeature("bump", point, 1e-3, 2e-3))
-    return BenchScene(Surface(*parts[0]), joined(*parts), tuple(truth), shortest_ridge=None, smallest=0.6e-3)
+    shortest = None if bumps else SPAN
+    return BenchScene(Surface(*parts[0]), joined(*parts), tuple(truth), shortest_ridge=shortest, smallest=0.6e-3)
+
+
+def misplaced(scene: BenchScene, rng: np.random.Generator) -> BenchScene:
+    """The same with the object 3 mm and 2 degrees off its model, in directions of chance."""
+    from scipy.spatial.transform import Rotation
+
+    (shift, turn), middle = rng.standard_normal((2, 3)), scene.object.vertices.mean(axis=0)
+    rotation = Rotation.from_rotvec(np.radians(2.0) * turn / np.linalg.norm(turn)).as_matrix()
+    shift *= 3e-3 / np.linalg.norm(shift)
+
+    def moved(points: FloatArray) -> FloatArray:
+        return np.asarray((points - middle) @ rotation.T + middle + shift)
+
+    return replace(
+        scene,
+        object=Surface(moved(scene.object.vertices), scene.object.faces),
+        truth=tuple(TrueFeature(each.kind, moved(each.axis), each.height, each.width) for each in scene.truth),
+        misplaced=True,
+    )
 
 
 SCENES: dict[str, Callable[[np.random.Generator], BenchScene]] = {
@@ -169,5 +191,6 @@ SCENES: dict[str, Callable[[np.random.Generator], BenchScene]] = {
     "groove": groove,
     "edge": edge,
     "free form": free_form,
+    "wrong pose": lambda rng: misplaced(free_form(rng, bumps=False), rng),
     "empty": lambda rng: wires(),
 }

@@ -72,6 +72,11 @@ class Evidence:
     algorithms: tuple[int, ...] = ()
     log_odds: float | None = None
 
+    @property
+    def likely(self) -> bool:
+        """False if all sweeps together say that it is more likely nothing: a false alarm that later ones passed by."""
+        return self.log_odds is None or self.log_odds >= 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class Feature:
