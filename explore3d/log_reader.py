@@ -24,7 +24,7 @@ _TOPICS |= dict(enumerate((log_format.TRACE_TOPIC, log_format.PATH_TOPIC, log_fo
 
 
 @dataclass
-class _Reading:
+class Reading:
     """What has been learnt of a log while its samples pass by."""
 
     path: Path
@@ -67,13 +67,15 @@ def read_log(path: Path | str | Sequence[Path | str], tip_radius: float | None =
     """
     if not isinstance(path, str | Path):
         return merge([read_log(one, tip_radius) for one in path])
-    reading = _Reading(Path(path), tip_radius, events=[])
+    reading = Reading(Path(path), tip_radius, events=[])
     batches = list(_batches(reading))
     if not batches:
         raise UserError(f"{path}: field samples: the log holds none{_loss(reading, ', ')}")
-    trace = _trace(batches, reading)
-    with reading.path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    return as_log(_trace(batches, reading), reading)
+
+
+def as_log(trace: Trace, reading: Reading) -> Log:
+    """All samples of a file, and what was noted while they passed by, as a Log."""
     metadata = dict(reading.start.get("metadata", {}))
     return Log(
         trace=trace,
@@ -82,9 +84,15 @@ def read_log(path: Path | str | Sequence[Path | str], tip_radius: float | None =
         metadata=metadata | {"started": reading.start.get("started")},
         complete=reading.complete,
         recovered=_loss(reading),
-        sha256=digest,
-        sources=(str(path),),
+        sha256=digest(reading.path),
+        sources=(str(reading.path),),
     )
+
+
+def digest(path: Path | str) -> str:
+    """The file's SHA-256."""
+    with Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def iter_log(path: Path | str, samples: int = 100_000, tip_radius: float | None = None) -> Iterator[Trace]:
@@ -93,7 +101,7 @@ def iter_log(path: Path | str, samples: int = 100_000, tip_radius: float | None 
     Raises:
         UserError: as `read_log`, when the first trace is asked for.
     """
-    reading = _Reading(Path(path), tip_radius)
+    reading = Reading(Path(path), tip_radius)
     batches: list[NDArray[np.void]] = []
     given = 0
     for batch in _batches(reading):
@@ -107,7 +115,7 @@ def iter_log(path: Path | str, samples: int = 100_000, tip_radius: float | None 
         raise UserError(f"{path}: field samples: the log holds none{_loss(reading, ', ')}")
 
 
-def _batches(reading: _Reading) -> Iterator[NDArray[np.void]]:
+def _batches(reading: Reading) -> Iterator[NDArray[np.void]]:
     """The messages' samples in order; everything else that is met is noted in `reading`."""
     from mcap.records import Channel, Message
 
@@ -134,7 +142,7 @@ def _batches(reading: _Reading) -> Iterator[NDArray[np.void]]:
         raise UserError(f"{reading.path}: {why}holds no intact message of an explore3d log; nothing can be recovered")
 
 
-def _take_checked(topic: str, message: Any, reading: _Reading) -> NDArray[np.void] | None:
+def _take_checked(topic: str, message: Any, reading: Reading) -> NDArray[np.void] | None:
     try:
         return _take(topic, message, reading)
     except UserError:
@@ -143,7 +151,7 @@ def _take_checked(topic: str, message: Any, reading: _Reading) -> NDArray[np.voi
         raise UserError(f"{reading.path}: message on {topic!r} is not of an explore3d log: {error!r}") from error
 
 
-def _take(topic: str, message: Any, reading: _Reading) -> NDArray[np.void] | None:
+def _take(topic: str, message: Any, reading: Reading) -> NDArray[np.void] | None:
     """Note an event, or return the samples of a batch."""
     if not reading.start and topic != "/start":
         _need_start(reading)
@@ -156,9 +164,14 @@ def _take(topic: str, message: Any, reading: _Reading) -> NDArray[np.void] | Non
     if topic == log_format.FELT_TOPIC:
         reading.felt.append(point_cloud.decode(message.data))
         return None
-    if topic not in _TOPICS.values() or topic == log_format.PATH_TOPIC:
-        return None
-    data = json.loads(message.data)
+    if topic in _TOPICS.values() and topic != log_format.PATH_TOPIC:
+        note(topic, message.data, reading)
+    return None
+
+
+def note(topic: str, message: bytes, reading: Reading) -> None:
+    """Take down what a message besides the samples says."""
+    data = json.loads(message)
     if topic == "/start":
         _begin(data, reading)
     elif topic == "/move":
@@ -171,15 +184,14 @@ def _take(topic: str, message: Any, reading: _Reading) -> NDArray[np.void] | Non
     elif topic == "/end":
         reading.closed = True
         reading.promised = max(reading.promised, data["samples"])
-    return None
 
 
-def _keep(reading: _Reading, event: Event) -> None:
+def _keep(reading: Reading, event: Event) -> None:
     if reading.events is not None:
         reading.events.append(event)
 
 
-def _begin(data: dict[str, Any], reading: _Reading) -> None:
+def _begin(data: dict[str, Any], reading: Reading) -> None:
     if data.get("schema") != log_format.VERSION:
         raise UserError(
             f"{reading.path}: field schema is {data.get('schema')!r}; this version reads {log_format.VERSION!r}"
@@ -192,7 +204,7 @@ def _begin(data: dict[str, Any], reading: _Reading) -> None:
     reading.start, reading.tip_radius = data, stated
 
 
-def _need_start(reading: _Reading) -> None:
+def _need_start(reading: Reading) -> None:
     if reading.tip_radius is None:
         raise UserError(
             f"{reading.path}: field tip_radius: the log's first message, which states it, is destroyed (or this is "
@@ -200,7 +212,7 @@ def _need_start(reading: _Reading) -> None:
         )
 
 
-def _trace(batches: list[NDArray[np.void]], reading: _Reading) -> Trace:
+def _trace(batches: list[NDArray[np.void]], reading: Reading) -> Trace:
     def column(names: Sequence[str]) -> NDArray[np.float64]:
         values, begin = np.empty((sum(map(len, batches)), len(names))), 0
         for batch in batches:
@@ -223,7 +235,7 @@ def _trace(batches: list[NDArray[np.void]], reading: _Reading) -> Trace:
         raise UserError(f"{reading.path}: {error}") from error
 
 
-def _loss(reading: _Reading, prefix: str = "") -> str:
+def _loss(reading: Reading, prefix: str = "") -> str:
     """One sentence on what is missing, "" if nothing is."""
     if reading.complete:
         return ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from explore3d.errors import UserError
 from explore3d.log_format import SAMPLES_PER_MESSAGE, TRACE_TOPIC
-from explore3d.log_reader import _batches, _loss, _Reading, _trace, is_log
+from explore3d.log_reader import Reading, _batches, _loss, _trace, is_log
 from explore3d.recording import Event
 from explore3d.session import LOG
 from mapping.trace import Trace
@@ -35,7 +34,7 @@ class LogStream:
 
     def __init__(self, path: Path | str, tip_radius: float | None = None) -> None:
         self.path = Path(path)
-        self._reading = _Reading(self.path, tip_radius, events=[])
+        self._reading = Reading(self.path, tip_radius, events=[])
 
     def sweeps(self, samples: int) -> Iterator[Trace]:
         """Traces of at least that many samples (the last one fewer), each of whole sweeps.
@@ -112,9 +111,3 @@ def large_log(path: Path | str) -> Path | None:
     if not file.is_file() or file.stat().st_size < MOST * BYTES // 4:  # the cheap test first
         return None
     return file if is_log(file) and count_samples(file) > MOST else None
-
-
-def digest(path: Path | str) -> str:
-    """The file's SHA-256."""
-    with Path(path).open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

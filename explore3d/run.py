@@ -12,16 +12,15 @@ from explore3d.base_record import read_base
 from explore3d.errors import UserError
 from explore3d.expedition import known_base
 from explore3d.leave_out import without_needless_dynamics
-from explore3d.log import LogWriter
-from explore3d.log_reader import read_log
+from explore3d.recorder import Recorder
+from explore3d.recording import Log
 from explore3d.resume import EARLIER, Replay, earlier_log
 from explore3d.scene import Scene, load_scene
-from explore3d.session import LOG, Session
+from explore3d.session import Session
 from explore3d.stages import Progress, Stages, silent
 from hw.finger import Finger, open_finger
 from hw.moves import Move
 from mapping.trace import Trace
-from planners.plan import Outcome
 
 
 def run(
@@ -60,8 +59,7 @@ def run(
         session.write("scene.toml", scene.resolved)
         if resume:
             session.write(EARLIER, content)
-        _explore(scene, finger, session, stages, replay)
-        log = read_log(session.folder / LOG)
+        log = _explore(scene, finger, session, stages, replay)
         return conclude(session, log, scene, read_base(log.events), stages)
 
 
@@ -93,7 +91,7 @@ def scene_finger(scene: Scene, arm: bool = False) -> Finger:
     )
 
 
-def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, replay: Replay | None = None) -> Outcome:
+def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, replay: Replay | None = None) -> Log:
     """Carry out the exploration; every sample is in the session's log before the next move begins."""
     from explore3d.expedition import Expedition
 
@@ -114,11 +112,11 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
         if not log.samples:
             raise UserError(f"{session.folder}: nothing was felt: {outcome.detail or outcome.reason}")
         log.close()  # its digest goes into the model
-    return outcome
+        return log.recorded()
 
 
 def _logged(
-    touch: Callable[[Move], Trace], log: LogWriter, budget: float, share: Callable[[float], None]
+    touch: Callable[[Move], Trace], log: Recorder, budget: float, share: Callable[[float], None]
 ) -> Callable[[Move], Trace]:
     def execute(move: Move) -> Trace:
         trace = touch(move)

@@ -15,7 +15,7 @@ from typing import Any
 
 from explore3d import __version__
 from explore3d.errors import FolderError, UserError
-from explore3d.log import LogWriter
+from explore3d.recorder import Recorder
 
 MARKER = "session.json"
 SCHEMA = "explore3d/session/1"
@@ -45,7 +45,7 @@ class Session:
         self._keep = {Path(path).resolve() for path in keep}
         self._files: list[str] = []
         self._made: list[Path] = []
-        self._log: LogWriter | None = None
+        self._log: Recorder | None = None
         self._started = datetime.now(UTC)
         self._lock: int | None = None
         self._aside: Path | None = None
@@ -89,10 +89,10 @@ class Session:
         """Names of what has been written so far, relative to the folder."""
         return tuple(self._files)
 
-    def open_log(self, **settings: Any) -> LogWriter:
-        """The session's log, closed with the session; `settings` as for LogWriter."""
+    def open_log(self, **settings: Any) -> Recorder:
+        """The session's log, closed with the session; `settings` as for Recorder."""
         self._note(LOG)
-        self._log = LogWriter(self.folder / LOG, **settings)
+        self._log = Recorder(self.folder / LOG, **settings)
         return self._log
 
     def write(self, name: str, content: str | bytes) -> Path:

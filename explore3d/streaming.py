@@ -11,7 +11,8 @@ from explore3d.analyze import conclude
 from explore3d.base_record import read_base
 from explore3d.build_model import Settings, build_model
 from explore3d.condense import CHUNK, KEPT, Condensed, condense
-from explore3d.log_stream import LogStream, count_samples, digest, head
+from explore3d.log_reader import digest
+from explore3d.log_stream import LogStream, count_samples, head
 from explore3d.recording import Log
 from explore3d.scene import parse_scene
 from explore3d.session import Session

@@ -20,6 +20,7 @@ from explore3d import log_format, point_cloud
 from explore3d.load_logs import load_logs
 from explore3d.log import LogWriter
 from explore3d.log_reader import iter_log, read_log
+from explore3d.recorder import Recorder
 from hw.moves import Move
 from mapping.trace import Trace
 
@@ -58,6 +59,22 @@ def test_a_closed_log_comes_back_whole_with_scene_events_and_moves(tmp_path: Pat
     assert np.array_equal(move.data["path"], MOVE.path) and np.array_equal(move.data["approach"], MOVE.approach)
     assert log.events[2].data == {"number": 0, "at": [1.0, 2.0]}
     assert log.sha256 == hashlib.sha256((tmp_path / "log.mcap").read_bytes()).hexdigest()
+
+
+def test_a_recorder_remembers_what_its_log_says(tmp_path: Path) -> None:
+    empty = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=int), RADIUS)
+    with Recorder(tmp_path / "log.mcap", tip_radius=RADIUS, scene_text="a = 1\n", metadata={"n": np.arange(2)}) as log:
+        log.event("base", {"vertices": np.eye(3)})
+        log.write(MOVE, empty)
+        for first in (0, 700):
+            log.write(MOVE, trace_of(first, 700))
+    remembered, read = log.recorded(), read_log(tmp_path / "log.mcap")
+    for name in ("t", "centers", "sweep", "normals", "contacts", "force"):
+        one, other = getattr(remembered.trace, name), getattr(read.trace, name)
+        assert (one is None and other is None) or one.tobytes() == other.tobytes(), name
+    for name in ("scene_text", "events", "metadata", "complete", "recovered", "sha256", "sources"):
+        assert getattr(remembered, name) == getattr(read, name), name
+    assert remembered.trace.resolution == read.trace.resolution
 
 
 def test_what_was_felt_of_a_move_that_never_ended_is_recovered(tmp_path: Path) -> None:
