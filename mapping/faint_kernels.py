@@ -9,7 +9,7 @@ from numba import njit
 
 
 @njit(cache=True)
-def best_segment(flat, height, angles, size, cell_u, cell_v, section, lengths):  # type: ignore[no-untyped-def]
+def best_segment(flat, height, angles, size, cell_u, cell_v, section, lengths, least):  # type: ignore[no-untyped-def]
     """(signal-to-noise, angle, place across, beginning, end) of the clearest segment in any direction; zeros if none.
 
     Args:
@@ -20,6 +20,7 @@ def best_segment(flat, height, angles, size, cell_u, cell_v, section, lengths): 
         cell_u, cell_v: cells along and across the line.
         section: (2 k + 1,) heights of the line's section at cells across.
         lengths: (L,) of lines in cells along, ascending.
+        least: sum of the section's squares over its places that a segment must have.
     """
     rows, columns, wings = int(size / cell_v) + 3, int(size / cell_u) + 3, len(section) // 2
     low_v, low_u = -0.5 * rows * cell_v, -0.5 * columns * cell_u
@@ -45,7 +46,7 @@ def best_segment(flat, height, angles, size, cell_u, cell_v, section, lengths): 
                 for column in range(columns - length + 1):
                     power = square[column + length] - square[column]
                     match = signal[column + length] - signal[column]
-                    if power > 2.0 and match * match > best_square * power:
+                    if power > least and match * match > best_square * power:
                         best_square = match * match / power
                         begin = low_u + column * cell_u
                         best[0], best[1], best[2] = match / np.sqrt(power), angle, low_v + (row + 0.5) * cell_v

@@ -8,7 +8,7 @@ noise alone would hardly ever look so like a line anywhere.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,19 @@ FACING = 0.87
 # Bins across and along the line, in half-widths; lengths of lines, in bins along.
 ACROSS, ALONG = 1.0 / 3.0, 2.0
 LENGTHS = (4, 7, 12, 20)
-# Sweeps that must agree, and the share of the evidence that must remain without the one that says most.
-SWEEPS, WITHOUT_BEST = 4, 0.75
+# Places at the crest of a line, at least: fewer say nothing of its height.
+LEAST_POWER = 2.0
+# Half-widths by which the ends of the longest line may lie beside the nearest direction that is tried.
+ASIDE = 0.5
+# Sweeps that must agree; without the one that says most this share of what the others should say must remain, and
+# so many standard deviations.
+SWEEPS, WITHOUT_BEST, OTHERS = 4, 0.75, 3.0
 # The number of straight lines that noise can choose from is larger than that of lines without common places: the
 # field of lines is continuous in place, direction, beginning and end. Set by simulation.
 CONTINUUM = 30.0
 MOST_LINES = 8
+# Times that a line is turned, moved and lengthened.
+POLISHINGS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +88,8 @@ def faint_lines(
         best = max((line for line in lines if line is not None), key=lambda line: line.snr, default=None)
         if best is None or best.snr < needed:
             break
+        for _ in range(POLISHINGS):
+            best = _polished(best, inspection, inflation)
         found.append(best)
         near = inspection.near(best.axis, 1.5 * best.half_width)
         free[near[distances(inspection.points[near], best.axis) <= 1.5 * best.half_width]] = False
@@ -138,29 +147,67 @@ def _clearest_in(
     if len(tile) < 16:
         return None
     origin = inspection.points[tile].mean(axis=0)
-    helper = np.eye(3)[np.abs(normal).argmin()]
-    first = np.cross(normal, helper)
-    first /= np.linalg.norm(first)
-    frame = np.stack([first, np.cross(normal, first)])
+    frame = _frame(normal, np.eye(3)[np.abs(normal).argmin()])
     flat = (inspection.points[tile] - origin) @ frame.T
     height = inspection.height[tile]
     size = 2 * float(np.linalg.norm(flat, axis=1).max())
-    angles = np.arange(0.0, np.pi, 2.4 / (LENGTHS[2] * ALONG))
+    angles = np.arange(0.0, np.pi, 4 * ASIDE / (LENGTHS[-1] * ALONG))
     cell_u, cell_v = ALONG * half_width, ACROSS * half_width
     section = crest_trace(np.arange(-2.0, 3.0) * cell_v, 1.0, half_width)
-    best = best_segment(flat, height / inspection.sd, angles, size, cell_u, cell_v, section, np.array(LENGTHS))
+    heights, lengths = height / inspection.sd, np.array(LENGTHS)
+    best = best_segment(flat, heights, angles, size, cell_u, cell_v, section, lengths, LEAST_POWER)
     if best[0] == 0.0:
         return None
     _, angle, row, begin, end = best
     way, aside = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     inside = (flat @ way >= begin) & (flat @ way <= end) & (np.abs(flat @ aside - row) < half_width)
     line = _Support.of(height[inside], flat[inside] @ aside - row, inspection.sweep[tile][inside], half_width)
-    if not line.agreed():
+    if not line.agreed(inspection.sd * inflation):
         return None
     sd = inspection.sd * inflation / float(np.sqrt(line.square.sum()))
     crest = float(line.signal.sum() / line.square.sum())
     ends = np.array([at * way + row * aside for at in (begin, end)]) @ frame
     return FaintLine(origin + ends, normal, crest, sd, half_width, abs(crest) / sd, len(line.signal))
+
+
+def _frame(normal: FloatArray, way: FloatArray) -> FloatArray:
+    """(2, 3) orthonormal tangents: the first square to the normal and to `way`."""
+    first = np.cross(normal, way)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)])
+
+
+def _polished(line: FaintLine, inspection: Inspection, inflation: float) -> FaintLine:
+    """The line turned and moved aside by less than what was tried, and as long as all places along it say."""
+    middle, length = line.axis.mean(axis=0), float(np.linalg.norm(line.axis[1] - line.axis[0]))
+    frame = _frame(line.normal, np.cross(line.normal, line.axis[1] - line.axis[0]))
+    reach = max(length, LENGTHS[-1] * ALONG * line.half_width)
+    near = inspection.near(middle + reach / length * (line.axis - line.axis[::-1]), 3.0 * line.half_width)
+    flat = (inspection.points[near] - middle) @ frame.T
+    edges = np.arange(-reach, reach + line.half_width, line.half_width)
+    widest, step = 2.0 * ASIDE * line.half_width / length, 2.0 * ASIDE * line.half_width / reach
+    best = (0.0, 0.0, 0.0, *(frame @ (line.axis - middle).T)[0], 0.0)
+    for angle in np.arange(-widest, widest + step, step):
+        along = flat @ [np.cos(angle), np.sin(angle)]
+        across = flat @ [-np.sin(angle), np.cos(angle)]
+        for row in np.linspace(-1.0, 1.0, 7) * ACROSS * line.half_width:
+            shape = crest_trace(across - row, np.sign(line.height), line.half_width)
+            sums = [np.histogram(along, edges, weights=w)[0] for w in (shape * inspection.height[near], shape**2)]
+            signal, square = (np.append(0.0, np.cumsum(values)) for values in sums)
+            power = np.maximum(square[None] - square[:, None], LEAST_POWER)
+            match = np.triu(signal[None] - signal[:, None], LENGTHS[0]) / np.sqrt(power)
+            first, last = np.unravel_index(match.argmax(), match.shape)
+            touched = np.flatnonzero(sums[1][first:last] > 0)
+            first, last = first + touched[0], first + touched[-1] + 1
+            height = float(match[first, last] / np.sqrt(power[first, last]))
+            best = max(best, (float(match[first, last]), float(angle), float(row), edges[first], edges[last], height))
+    match, angle, row, begin, end, height = best
+    if match == 0.0:
+        return line
+    way, aside = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    axis = middle + np.array([at * way + row * aside for at in (begin, end)]) @ frame
+    sd = inspection.sd * inflation * height / match
+    return replace(line, axis=axis, height=np.sign(line.height) * height, height_sd=sd, snr=height / sd)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,11 +223,16 @@ class _Support:
         number = np.unique(sweep, return_inverse=True)[1]
         return cls(np.asarray(np.bincount(number, shape * height)), np.asarray(np.bincount(number, shape**2)))
 
-    def agreed(self) -> bool:
-        """True if enough sweeps show the line, and it stands without the one that shows it best."""
+    def agreed(self, sd: float) -> bool:
+        """True if enough sweeps show the line, and it stands without the one that shows it best.
+
+        A sweep that runs at a slant over the line says more of it than the others, and may.
+        """
         if len(self.signal) < SWEEPS:
             return False
         sign = float(np.sign(self.signal.sum()))
         rest = np.arange(len(self.signal)) != int((sign * self.signal).argmax())
-        whole = sign * float(self.signal.sum() / np.sqrt(self.square.sum()))
-        return sign * float(self.signal[rest].sum() / np.sqrt(self.square[rest].sum())) > WITHOUT_BEST * whole
+        height = sign * float(self.signal.sum() / self.square.sum())
+        others = sign * float(self.signal[rest].sum()) / max(float(self.square[rest].sum()), np.finfo(float).tiny)
+        certain = others * float(np.sqrt(self.square[rest].sum())) > OTHERS * sd
+        return certain and others > WITHOUT_BEST * height

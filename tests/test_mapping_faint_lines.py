@@ -52,3 +52,27 @@ def test_one_bump_is_no_line():
 def test_fewer_false_lines_need_a_higher_threshold():
     bars = [threshold(1.0, 4e-3, WIDTH, alarms) for alarms in (1.0, 0.1, 0.01)]
     assert bars[0] < bars[1] < bars[2]
+
+
+def test_a_sweep_that_happens_to_run_along_the_line_speaks_for_it_too():
+    crossed = places(-1.7 * SD, 0)
+    along = AXIS[0] + np.linspace(0.0, 1.0, 75)[:, None] * (AXIS[1] - AXIS[0]) + [0.0, 0.3 * WIDTH, 0.0]
+    felt = crest_trace(distances(along, AXIS), -1.7 * SD, WIDTH) + SD * np.random.default_rng(1).standard_normal(75)
+    both = Inspection(
+        np.concatenate([crossed.points, along]),
+        np.concatenate([crossed.height, felt]),
+        SD,
+        np.concatenate([crossed.sweep, np.full(75, 999)]),
+        crossed.spacing,
+    )
+    (line,) = found(both)
+    assert line.height < 0 and distances(line.axis, 3 * AXIS - 2 * AXIS.mean(axis=0)).max() < WIDTH
+
+
+@pytest.mark.parametrize("angle", np.radians([2.9, 17.2, 48.7, 101.2, 160.3]))
+def test_a_long_line_is_found_in_any_direction(angle):
+    way = 0.021 * np.array([np.cos(angle), np.sin(angle), 0.0])
+    for seed in range(4):
+        (line,) = found(places(-2.4 * SD, seed, axis=np.stack([-way, way])))
+        heading = (line.axis[1] - line.axis[0]) / np.linalg.norm(line.axis[1] - line.axis[0])
+        assert abs(heading @ way) / 0.021 > np.cos(0.1)
