@@ -185,7 +185,7 @@ def _spline(
     spacing: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Smoothing spline through the kept blocks: its values and its curvature towards `outward` at all blocks."""
-    from scipy.interpolate import make_smoothing_spline
+    from mapping.smoothing_spline import smoothing_spline
 
     if kept.sum() < FEWEST or s[-1] == s[0]:
         return centers, np.zeros(len(s))
@@ -194,7 +194,7 @@ def _spline(
     origin = centers.mean(axis=0)
     lam = scale**4 / (spacing * unit_length**3) if spacing > 0 else 0.0
     x = (s - s[0]) / unit_length
-    spline = make_smoothing_spline(x[kept], (centers[kept] - origin) / unit_length, w=weight[kept], lam=lam)
+    spline = smoothing_spline(x[kept], (centers[kept] - origin) / unit_length, weight[kept], lam)
     first, second = spline(x, 1), spline(x, 2) / unit_length
     speed = np.maximum((first**2).sum(axis=1), 1e-300)
     along = unit(first)
