@@ -51,8 +51,12 @@ class Likelihood:
         """(W,) log likelihoods of W templates (W, n), m, up to one constant of the window."""
         from mapping.whitening_kernels import chi_square
 
-        white = self.filter.whiten(self.window.height - templates)
-        return np.asarray(-0.5 * chi_square(white, self.filter.starts, self.basis, self.shrink))
+        f = self.filter
+        templates = np.ascontiguousarray(templates)
+        square = chi_square(
+            self.window.height, templates, f.starts, f.carry, f.observe, f.gain, f.scale, self.basis, self.shrink
+        )
+        return np.asarray(-0.5 * square)
 
     def residuals(self, templates: FloatArray) -> FloatArray:
         """(W, n) residuals whose squares sum to -2 log_density."""

@@ -80,17 +80,28 @@ class RidgeShape:
 
     def chains(self, theta: FloatArray, lift: FloatArray) -> FloatArray:
         """(W, K, 3) axes at `lift` (W,) over the base, m; vertices beyond an end stand at the end."""
-        chart = self.chart
-        lateral = self.modes.lateral(theta[:, : self.modes.count], chart.s)
-        axes = _lifted(chart.points, chart.laterals, chart.normals, chart.bend, lateral, lift[:, None])
-        if not chart.closed:
-            for side, s in enumerate((theta[:, -4], theta[:, -3])):
-                points, laterals, normals, bend = chart.at(s)
-                aside = self.modes.lateral_at(theta[:, : self.modes.count], s)
-                end = _lifted(points, laterals, normals, bend, aside, lift)
-                beyond = chart.s[None, :] < s[:, None] if side == 0 else chart.s[None, :] > s[:, None]
-                axes = np.where(beyond[..., None], end[:, None, :], axes)
-        return np.ascontiguousarray(axes)
+        from mapping.axis_kernels import axes_about
+
+        chart, modes = self.chart, self.modes
+        return np.asarray(
+            axes_about(
+                chart.s,
+                chart.points,
+                chart.laterals,
+                chart.normals,
+                chart.bend,
+                self._basis,
+                modes.middle,
+                modes.reach,
+                np.ascontiguousarray(theta[:, : modes.count]),
+                np.ascontiguousarray(lift),
+                np.zeros((0, 2)) if chart.closed else np.ascontiguousarray(theta[:, -4:-2]),
+            )
+        )
+
+    @cached_property
+    def _basis(self) -> FloatArray:
+        return np.ascontiguousarray(self.modes.basis(self.chart.s))
 
     @cached_property
     def _candidates(self) -> tuple[IntArray, IntArray]:
@@ -102,16 +113,3 @@ class RidgeShape:
 def rounding_of(turn: FloatArray) -> FloatArray:
     """Rounding 0 to 1 of an end from a parameter that is uniform on 0 to 1: mostly either square or round."""
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * turn))
-
-
-def _lifted(
-    points: FloatArray,
-    laterals: FloatArray,
-    normals: FloatArray,
-    bend: FloatArray,
-    aside: FloatArray,
-    lift: FloatArray,
-) -> FloatArray:
-    """Points `aside` of the chart along the base (to second order in its bend) and `lift` above it, m."""
-    out = points + (aside * (1.0 + lift * bend))[..., None] * laterals
-    return np.asarray(out + (lift - 0.5 * bend * aside**2)[..., None] * normals)

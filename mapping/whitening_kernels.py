@@ -33,24 +33,41 @@ def whiten(
 
 
 @njit(cache=True)
-def chi_square(white: FloatArray, starts: IntArray, basis: FloatArray, shrink: FloatArray) -> FloatArray:
-    """(W,) squared lengths of whitened series after the nuisance of each run is marginalised.
+def chi_square(
+    height: FloatArray,
+    templates: FloatArray,
+    starts: IntArray,
+    carry: FloatArray,
+    observe: FloatArray,
+    gain: FloatArray,
+    scale: FloatArray,
+    basis: FloatArray,
+    shrink: FloatArray,
+) -> FloatArray:
+    """(W,) squared lengths of heights (n,) less templates (W, n), whitened, each run's nuisance marginalised.
 
     |e|^2 - sum_j g_j^2 (u_j . e)^2 with the orthonormal columns u_j of `basis` (n, Q) within each run and
-    `shrink` (runs, Q) holding g_j^2.
+    `shrink` (runs, Q) holding g_j^2. `whiten` and this in one pass, which keeps no whitened series.
     """
-    walkers = white.shape[0]
+    walkers = templates.shape[0]
     count = basis.shape[1]
     total = np.zeros(walkers)
+    dots = np.empty(count)
     for w in range(walkers):
+        square = 0.0
         for run in range(len(starts) - 1):
+            dots[:] = 0.0
+            state = 0.0
             for i in range(starts[run], starts[run + 1]):
-                total[w] += white[w, i] * white[w, i]
+                innovation = height[i] - templates[w, i] - observe[i] * state
+                state = carry[i] * state + gain[i] * innovation
+                white = innovation * scale[i]
+                square += white * white
+                for j in range(count):
+                    dots[j] += white * basis[i, j]
             for j in range(count):
-                dot = 0.0
-                for i in range(starts[run], starts[run + 1]):
-                    dot += white[w, i] * basis[i, j]
-                total[w] -= shrink[run, j] * dot * dot
+                square -= shrink[run, j] * dots[j] * dots[j]
+        total[w] = square
     return total
 
 
