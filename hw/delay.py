@@ -47,11 +47,12 @@ def measured_delay(
         _follow(stage, low, speed)
         _follow(stage, free, speed)
         time.sleep(LULL)
-        reports = [(t, status) for t, status in list(stage.controller.reports) if t >= begun]
-        heights = [float(stage.frame.to_object(stage.controller.machine_position(s)) @ -inwards) for _, s in reports]
+        reports = stage.controller.reported(begun)
+        places = [stage.frame.to_object(stage.controller.machine_position(report.status)) for report in reports]
+        heights = [float(place @ -inwards) for place in places]
         times, forces = sensor.timed(begun)
         pressing = -(stage.frame.turn_to_object(forces) @ inwards)
-        stamps = np.array([t for t, _ in reports])
+        stamps = np.array([report.at for report in reports])
         with suppress(ValueError):  # a touch during which a busy host missed the reports says nothing
             found.append(estimate_delay(stamps, np.array(heights), times, pressing, 0.3 * press))
         if len(found) == ENOUGH:

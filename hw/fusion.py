@@ -7,14 +7,31 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from hw.grbl_controller import Report
+
 FloatArray = NDArray[np.float64]
 
+# A report that took longer than usual by this, s, came late to a busy host: nobody knows when it was true
+LATE = 5e-4
 
-def positions_at(times: FloatArray, reported: FloatArray, positions: FloatArray) -> FloatArray:
-    """(N, 3) stage positions at times (N,) s, between the reports (M,) s, (M, 3) m; NaN outside of them."""
+
+def prompt(reports: Sequence[Report]) -> list[Report]:
+    """The reports whose round trip took hardly longer than is usual: those that their stamps can be trusted of."""
+    usual = float(np.median([report.round_trip for report in reports])) if reports else 0.0
+    return [report for report in reports if report.round_trip <= usual + LATE]
+
+
+def positions_at(times: FloatArray, reported: FloatArray, positions: FloatArray, longest: float = np.inf) -> FloatArray:
+    """(N, 3) stage positions at times (N,) s, between the reports (M,) s, (M, 3) m; NaN where none are near.
+
+    Args:
+        longest: time between two reports, s, beyond which what the stage did in between is not known.
+    """
+    after = np.searchsorted(reported, times, side="left")
     inside = (times >= reported[0]) & (times <= reported[-1])
+    gap = np.diff(reported, prepend=reported[0])[np.minimum(after, len(reported) - 1)]
     found = np.column_stack([np.interp(times, reported, positions[:, k]) for k in range(3)])
-    found[~inside] = np.nan
+    found[~inside | (gap > longest)] = np.nan
     return found
 
 

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import takewhile
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,23 @@ FloatArray = NDArray[np.float64]
 POLL = 0.05
 # With no sign of life for so long the controller is taken for lost, s
 STALE = 1.5
+
+# Reports that are kept: ten seconds of asking as fast as a port can answer
+KEPT = 50_000
+
+
+class Report(NamedTuple):
+    """A status report: true at some moment of the round trip that ended at `at`, s, time.monotonic.
+
+    Args:
+        at: when it arrived.
+        status: what it says.
+        round_trip: s since it was asked for; 0 if it came unasked.
+    """
+
+    at: float
+    status: Status
+    round_trip: float
 
 
 class GrblController:
@@ -50,7 +68,8 @@ class GrblController:
         self.offset = np.zeros(3)
         self.alarm: str | None = None
         self.stop_reason: str | None = None
-        self.reports: deque[tuple[float, Status]] = deque(maxlen=4096)
+        self.reports: deque[Report] = deque(maxlen=KEPT)
+        self._asked: float | None = None
         self._news = threading.Condition()
         self._answers: deque[str] = deque()
         self._feedback: list[str] = []
@@ -132,26 +151,32 @@ class GrblController:
         """A report asked for now. Raises LinkError."""
         since = time.monotonic()
         while time.monotonic() < since + within:
-            self.link.write(protocol.STATUS)
+            self._request()
             with self._news:
                 if self._news.wait_for(lambda: self._fresh(since) or not self.link.is_open, timeout=0.2):
                     break
         if not self._fresh(since):
             raise LinkError(self.link.error or f"{self.link.port}: no status report within {within:g} s")
-        return self.reports[-1][1]
+        return self.reports[-1].status
+
+    def _request(self) -> None:
+        """Ask for a report; its round trip counts from the first asking that is not answered yet."""
+        if self._asked is None:
+            self._asked = time.monotonic()
+        self.link.write(protocol.STATUS)
 
     def _fresh(self, since: float) -> bool:
-        return bool(self.reports) and self.reports[-1][0] > since
+        return bool(self.reports) and self.reports[-1].at > since
 
-    def reported(self, since: float) -> list[tuple[float, Status]]:
-        """(time.monotonic, report) of what arrived since then."""
-        recent = takewhile(lambda report: report[0] >= since, reversed(list(self.reports)))
+    def reported(self, since: float) -> list[Report]:
+        """What arrived since then."""
+        recent = takewhile(lambda report: report.at >= since, reversed(list(self.reports)))
         return list(recent)[::-1]
 
     @property
     def paused(self) -> bool:
         """True while the operator holds the machine or its door is open."""
-        return bool(self.reports) and self.reports[-1][1].state in ("Hold", "Door")
+        return bool(self.reports) and self.reports[-1].status.state in ("Hold", "Door")
 
     def position(self) -> FloatArray:
         """(3,) machine position now, m."""
@@ -309,7 +334,8 @@ class GrblController:
         if line.startswith("<"):
             status = protocol.parse_status(line)
             if status is not None:
-                self.reports.append((now, status))
+                asked, self._asked = self._asked, None
+                self.reports.append(Report(now, status, 0.0 if asked is None else now - asked))
                 if status.offset is not None:
                     self.offset = status.offset * self.settings.report_scale
         elif line == "ok" or line.startswith("error:"):
@@ -352,7 +378,7 @@ class GrblController:
             if now > until or now - self.link.heard > stale:
                 silent = f"{now - self.link.heard:.1f} s of silence while waiting for {what}"
                 raise LinkError(f"{self.link.port}: {silent}; check cable and power, reset the controller")
-            self.link.write(protocol.STATUS)
+            self._request()
 
     def _trouble(self, restarts: int, alarm: str | None) -> bool:
         changed = self._restarts != restarts or self.alarm != alarm

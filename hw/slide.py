@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hw.errors import LinkError, StoppedError
 from hw.force_sensor import ForceSensor
-from hw.fusion import positions_at, rigid_centers
+from hw.fusion import positions_at, prompt, rigid_centers
 from hw.guarded_stage import PATIENCE, GuardedStage
 from hw.moves import Move
 from hw.peck import Touched, spaced
@@ -32,6 +32,10 @@ BATCH = 0.5
 EASE, SLOWEST = 0.25, 0.1
 # A sweep begins when the force is this near to the wanted one, in its share, or after so many control periods
 SETTLED, SETTLING = 0.2, 50
+# Reports further apart than this, in control periods, hide a turn or a stand; than this many usual gaps, if it is more
+BLIND, UNUSUAL = 0.5, 2.0
+# Reports from so long before the samples are looked at: the last one may be that old, s
+BEFORE = 0.1
 # A path of one point is touched for so many control periods
 DWELL = 10
 
@@ -144,18 +148,24 @@ class Slide:
 
     def _fused(self, stage: GuardedStage, after: float) -> Touched:
         """Samples in contact taken after that time, as far as the stage has reported where it was."""
-        reports = [(t, stage.controller.machine_position(status)) for t, status in stage.controller.reported(after - 1)]
+        reports = prompt(stage.controller.reported(after - BEFORE))
         if len(reports) < 2:
             return Touched(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
         times, forces = self.sensor.timed(after)
-        stamps = np.array([t for t, _ in reports])
-        places = stage.frame.to_object(np.array([place for _, place in reports]))
+        stamps = np.array([report.at for report in reports])
+        places = stage.frame.to_object(
+            np.array([stage.controller.machine_position(report.status) for report in reports])
+        )
         forces = stage.frame.turn_to_object(forces)
-        centers = positions_at(times - self.delay, stamps, places)
+        centers = positions_at(times - self.delay, stamps, places, self._longest_gap(stamps))
         touching = (np.linalg.norm(forces, axis=1) > self.contact) & np.isfinite(centers).all(axis=1)
         touching &= times > after
         rigid = rigid_centers(centers[touching], forces[touching], self.stiffness)
         return Touched(times[touching], rigid, forces[touching])
+
+    def _longest_gap(self, stamps: FloatArray) -> float:
+        """Time between reports, s, beyond which the way between them is not known: a host that was late, mostly."""
+        return max(BLIND * self.period, UNUSUAL * float(np.median(np.diff(stamps))))
 
 
 def _between(rows: FloatArray, at: float) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,6 +62,14 @@ class Noise:
     def sd(self) -> float:
         """Standard deviation of a single sample, m."""
         return float(np.hypot(self.white, self.correlated))
+
+    def rounded(self, step: float) -> Noise:
+        """This noise of positions that are rounded to a step, m, where the finger crosses many of them.
+
+        What a finger that moves along one step shows there is no measure of it: on a flank each sample falls
+        elsewhere within its step, and is wrong by up to half of it.
+        """
+        return replace(self, white=max(self.white, step / np.sqrt(12.0)))
 
     def covariance(self, s: ArrayLike) -> FloatArray:
         """(N, N) covariance of samples at arclengths s (N,), m^2."""

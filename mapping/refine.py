@@ -19,7 +19,7 @@ from mapping.noise import Noise
 from mapping.posterior import Posterior
 from mapping.problem import Problem, Surroundings
 from mapping.psis import resample
-from mapping.sampling import WALKERS, Chain, sample_ensemble
+from mapping.sampling import Chain, sample_ensemble, walkers_for
 from mapping.summary import describe
 from mapping.trace import Trace
 from mapping.trace_noise import noise_of_trace
@@ -99,7 +99,7 @@ def refine(
         note = f"no posterior: a {feature.kind} has no closed-form trace"
         return replace(feature, notes=(*feature.notes, note))
     base = base or _fitted(trace)
-    noise = noise or noise_of_trace(trace, base)
+    noise = (noise or noise_of_trace(trace, base)).rounded(trace.resolution)
     solution = solve(feature, trace, rng, base=base, noise=noise, others=others, tip_sd=tip_sd, confirm=confirm)
     found = describe(solution.problem, solution.posterior, base)
     if solution.problem.noise != noise:  # see mapping.misfit: intervals hold within the family only
@@ -122,7 +122,7 @@ def solve(
 ) -> Solution:
     """Pose and solve a feature's posterior; arguments as for `sample_posterior`."""
     base = base or _fitted(trace)
-    noise = noise or noise_of_trace(trace, base)
+    noise = (noise or noise_of_trace(trace, base)).rounded(trace.resolution)
     around = Surroundings(trace, base, noise, others, tip_sd)
     solution = solve_problem(pose_problem(feature, around), rng, confirm=confirm)
     if feature.kind != "bump" or solution.problem.noise == noise:
@@ -160,11 +160,12 @@ def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool =
     if adapt:
         problem, optima = account_for_misfit(problem, optima)
     fast = importance_sample(problem.target, [laplace(problem.target, optimum) for optimum in optima], rng)
-    if not confirm and fast.k_hat < TRUSTED_K_HAT:
+    trusted = fast.k_hat < TRUSTED_K_HAT
+    if not confirm and trusted:
         return Solution(problem, _from_importance(problem, fast, rng), fast, None)
-    walkers = max(WALKERS, 2 * fast.draws.shape[1] + 4)
+    walkers = walkers_for(len(problem.window), fast.draws.shape[1])
     starts = _starts(problem, fast, rng, walkers)
-    chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal)
+    chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal, trusted=trusted)
     return Solution(problem, _from_chain(problem, fast, chain, rng), fast, chain)
 
 

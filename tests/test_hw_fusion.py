@@ -8,9 +8,10 @@ import pytest
 from hw.delay import measured_delay
 from hw.force_emulators import OptoForceEmulator
 from hw.frame import Frame
-from hw.fusion import estimate_delay, positions_at, rigid_centers
-from hw.grbl_controller import GrblController
+from hw.fusion import estimate_delay, positions_at, prompt, rigid_centers
+from hw.grbl_controller import GrblController, Report
 from hw.grbl_emulator import GrblEmulator
+from hw.grbl_protocol import parse_status
 from hw.guarded_stage import GuardedStage
 from hw.optoforce import OptoForce
 from hw.pty_server import PtyServer
@@ -51,6 +52,40 @@ def test_positions_between_reports_are_interpolated_and_outside_unknown() -> Non
     assert found[1].tolist() == [0.25, 0.5, 0.75]
     assert np.isnan(found[[0, 2]]).all()
     assert rigid_centers(found[1:2], np.array([[0.0, 0.0, 2.0]]), 1e4)[0, 2] == pytest.approx(0.75 + 2e-4)
+
+
+def test_positions_in_a_long_silence_between_reports_are_unknown() -> None:
+    stamps, places = np.array([0.0, 0.01, 0.5, 0.51]), np.zeros((4, 3))
+    found = positions_at(np.array([0.005, 0.2, 0.5, 0.505]), stamps, places, longest=0.02)
+    assert np.isfinite(found).all(axis=1).tolist() == [True, False, False, True]
+
+
+def test_reports_that_came_late_to_a_busy_host_are_not_trusted() -> None:
+    status = parse_status("<Idle|MPos:0.000,0.000,0.000|FS:0,0>")
+    assert status is not None
+    reports = [Report(0.1 * k, status, 2e-4 if k != 3 else 5e-3) for k in range(6)]
+    assert [report.at for report in prompt(reports)] == [0.1 * k for k in (0, 1, 2, 4, 5)]
+
+
+def test_in_a_corner_the_spring_pulls_from_where_the_rigid_ball_rests() -> None:
+    # a wedge opening upwards, 90 degrees: the ball rests on both sides, its centre sqrt(2) r above the edge
+    r, stiffness = 5e-3, 1e4
+    corners = [[0, -1, 0], [0, 1, 0], [1, -1, 1], [1, 1, 1], [-1, -1, 1], [-1, 1, 1]]
+    body = TouchedBody(
+        Surface(0.05 * np.array(corners, dtype=float), [[0, 2, 1], [1, 2, 3], [0, 1, 4], [1, 5, 4]]), r, None, stiffness
+    )
+    rest = np.array([0.0, 0.0, np.sqrt(2.0) * r])
+    for off in ([0.0, 0.0, -1e-4], [2e-5, 0.0, -1e-4], [-3e-5, 1e-3, -5e-5]):
+        place = rest + off
+        resting = rigid_centers(place[None], body.force(place)[None], stiffness)[0]
+        assert resting == pytest.approx(np.array([0.0, off[1], rest[2]]), abs=1e-9)
+
+
+def test_on_one_side_the_spring_pulls_along_its_normal() -> None:
+    corners = 0.02 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    body = TouchedBody(Surface(corners, [[0, 1, 2], [0, 2, 3]]), 0.005, None, 1e4)
+    assert body.force(np.array([1e-3, 2e-3, 0.0049])) == pytest.approx([0.0, 0.0, 1.0])
+    assert not body.force(np.array([1e-3, 2e-3, 0.0051])).any()
 
 
 @pytest.mark.slow

@@ -88,3 +88,11 @@ def test_block_variances_of_correlated_noise_keep_their_digits_at_every_length()
         assert math.isclose(Noise(0.0, 1.0, 1.0).block_covariances(1, x, 1.0)[0], series, rel_tol=1e-14)
     below, above = (Noise(0.0, 1.0, 1.0).block_covariances(1, 0.5 * (1 + step), 1.0)[0] for step in (-1e-9, 1e-9))
     assert math.isclose(below, above, rel_tol=2e-9)
+
+
+def test_rounded_positions_are_never_better_than_their_step_allows():
+    rng = np.random.default_rng(0)
+    flank = np.cumsum(rng.uniform(3e-6, 8e-6, 20_000))
+    rounding = np.round(flank / 4e-6) * 4e-6 - flank
+    assert Noise(1e-7).rounded(4e-6).white == pytest.approx(rounding.std(), rel=0.02)
+    assert Noise(2e-6, 1e-6, 1e-3).rounded(4e-6) == Noise(2e-6, 1e-6, 1e-3)
