@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 
 from explore3d.analysis import Analysis
@@ -22,7 +23,7 @@ def show(analysis: Analysis, out: Path, as_json: bool) -> None:
 
 
 def summary(analysis: Analysis) -> list[str]:
-    """One line on the whole, one a feature."""
+    """One line on the whole, one a feature, and one on what would have been seen."""
     features = analysis.model.features
     finer = sum(feature.curvature_feature for feature in features)
     lines = [f"{count_text(len(features), 'feature')} found"]
@@ -31,7 +32,18 @@ def summary(analysis: Analysis) -> list[str]:
     if analysis.recovered:
         lines.append(analysis.recovered)
     more = [f"  and {len(features) - MOST} more, see the report"] if len(features) > MOST else []
-    return lines + [feature_line(feature) for feature in features[:MOST]] + more
+    return [*lines, *(feature_line(feature) for feature in features[:MOST]), *more, limit_sentence(analysis)]
+
+
+def limit_sentence(analysis: Analysis) -> str:
+    """What would have been seen."""
+    detections = analysis.detections
+    if not isfinite(detections.detection_limit):
+        return "The trace is too short to say what would have been seen."
+    return (
+        f"A sharp crest {length_text(detections.detection_limit, 2)} high or higher is seen with "
+        f"{100 * detections.probability:.0f} % probability where a sweep crosses it."
+    )
 
 
 def feature_line(feature: Feature) -> str:

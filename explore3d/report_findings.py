@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from math import isfinite
 
 from explore3d.analysis import Analysis
+from explore3d.findings import limit_sentence
 from explore3d.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.pictures import Pictures, is_profile
 from explore3d.quantity import UNKNOWN, count_text, interval_text, length_text
@@ -38,17 +38,6 @@ def found_sentence(analysis: Analysis) -> str:
         sizes = [f"{_described(getattr(features[0], name))} {word}" for name, word in _sizes(features[0])]
         sentence += f" It is {_listed(sizes)}."
     return sentence[0].upper() + sentence[1:]
-
-
-def limit_sentence(analysis: Analysis) -> str:
-    """What would have been seen."""
-    detections = analysis.detections
-    if not isfinite(detections.detection_limit):
-        return "The trace is too short to say what would have been seen."
-    return (
-        f"A sharp crest {length_text(detections.detection_limit, 2)} high or higher is seen with "
-        f"{100 * detections.probability:.0f} % probability where a sweep crosses it."
-    )
 
 
 def facts(analysis: Analysis) -> Html:
