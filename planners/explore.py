@@ -32,6 +32,9 @@ FloatArray = NDArray[np.float64]
 
 # Path of the first survey sweeps, in tip radii, that tell the noise if it is not given; later ones are detected singly
 LEARNING = 50.0
+# False alarms of the survey against those accepted in the end: a look at each of them costs seconds, and what the
+# analysis of all sweeps may report at its own estimate of the noise must have been looked at
+CANDIDATES = 4.0
 # Height that must stay visible between two sweeps, in detection limits
 MARGIN = 1.25
 # Slides off one end, at most, and in one go
@@ -242,7 +245,7 @@ class Explore:
             Trace.concatenate(waiting),
             self.base,
             noise=found.noise,
-            false_alarms_per_metre=self.false_alarms_per_metre,
+            false_alarms_per_metre=CANDIDATES * self.false_alarms_per_metre,
         )
         found.noise = felt.noise
         found.crossings.extend(felt.crossings)
