@@ -131,7 +131,7 @@ def run_case(case: Case) -> dict[str, dict[str, Any]]:
         spans = [(c.point[0], c.point[0], np.sign(c.height), c.point[0]) for c in crossings]
         result[name] = _judged(spans, place, extent, sign)
     for number in (1, 2, 3, 4):
-        features = curvature_features(trace, number)
+        features = curvature_features(trace, number, noise)
         shift = trace.centers[0, 0]
         spans = [(f.start + shift, f.stop + shift, f.sign, f.place + shift) for f in features]
         result[f"algorithm {number}"] = _judged(spans, place, extent, sign)

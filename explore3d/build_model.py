@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from explore3d.base_reach import base_reach
 from explore3d.inspected import Inspected
 from explore3d.leave_out import with_savings
 from explore3d.recording import Log
+from explore3d.settings import Settings
 from explore3d.stages import Stages
 from explore3d.truth import TrueFeature, compare
 from mapping.base import Base
@@ -34,30 +35,6 @@ OTHER_TIP = 2.5
 BELIEVED = 1.25
 # Less noise than this many tip radii is rounding: nothing to smooth away
 NOISE_FREE = 2e-8
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What a recording is asked for.
-
-    Args:
-        algorithm: number in figure 4 of the paper that decides.
-        false_alarms_per_metre: expected number of invented crossings per metre of path.
-        seed: of the posterior's chains.
-        tip_sd: standard deviation of the tip's radius, m.
-    """
-
-    algorithm: int = 3
-    false_alarms_per_metre: float = 0.01
-    seed: int = 1
-    tip_sd: float = 0.0
-
-    @classmethod
-    def of(cls, scene: Scene | None) -> Settings:
-        """The settings of a scene; the defaults without one."""
-        if scene is None:
-            return cls()
-        return cls(scene.detection.algorithm, scene.detection.false_alarms_per_metre, scene.seed, scene.tip.radius_sd)
 
 
 def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages) -> Analysis:
@@ -178,7 +155,7 @@ def _detect(trace: Trace, base: Base, settings: Settings, stages: Stages) -> Det
     if not trace.has_contact_data:
         stages.needed("algorithms 1 and 2", "the log holds positions alone, no contact normals", possible=False)
     with stages.stage("detection"):
-        return detect(trace, base, algorithm=settings.algorithm, false_alarms_per_metre=settings.false_alarms_per_metre)
+        return detect(trace, base, **settings.detection)
 
 
 def _assemble(

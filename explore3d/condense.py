@@ -142,7 +142,8 @@ def _kept(trace: Trace, crossings: tuple[Crossing, ...], every: int) -> NDArray[
 
 def _key(path: Path, every: int, chunk: int, settings: dict[str, Any]) -> str:
     state = path.stat()
-    return json.dumps([__version__, str(path.resolve()), state.st_size, state.st_mtime_ns, every, chunk, settings])
+    log = [str(path.resolve()), state.st_size, state.st_mtime_ns]
+    return json.dumps([__version__, *log, every, chunk, repr(settings)])
 
 
 def _save(part: Condensed, file: Path, key: str) -> None:

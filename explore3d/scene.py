@@ -79,13 +79,18 @@ class GlobalModel(Table):
 
 
 class FingerNoise(Table):
-    """Noise of the simulated finger: of the centre (white, and correlated along the path), of what it feels."""
+    """Noise of the finger: of the centre (white, and correlated along the path), of what it feels.
+
+    The simulated finger has it; of any other it is what its data sheet states. The analysis takes the centre's for
+    known to a share `doubt`.
+    """
 
     white: Extent = 0.0
     correlated: Extent = 0.0
     correlation_length: Length = 1e-3
     angle: Angle = 0.0
     contact: Extent = 0.0
+    doubt: Annotated[float, Field(gt=0)] = 0.1
 
 
 class DynamicsTable(Table):

@@ -9,13 +9,14 @@ from pathlib import Path
 from explore3d.analysis import Analysis
 from explore3d.analyze import conclude
 from explore3d.base_record import read_base
-from explore3d.build_model import Settings, build_model
+from explore3d.build_model import build_model
 from explore3d.condense import CHUNK, KEPT, Condensed, condense
 from explore3d.log_reader import digest
 from explore3d.log_stream import LogStream, count_samples, head
 from explore3d.recording import Log
 from explore3d.scene import parse_scene
 from explore3d.session import Session
+from explore3d.settings import Settings
 from explore3d.stages import Progress, Stages, silent
 from mapping.base import Base
 from mapping.left_out import LeftOut
@@ -44,10 +45,7 @@ def analyze_stream(
     folder = None if out is None else Path(out).with_name(Path(out).name + ".chunks")
     stream = LogStream(path, tip_radius)
     with stages.stage("detection") as share:
-        condensed = condense(
-            stream, base, folder, share, chunk,
-            algorithm=settings.algorithm, false_alarms_per_metre=settings.false_alarms_per_metre,
-        )  # fmt: skip
+        condensed = condense(stream, base, folder, share, chunk, **settings.detection)
     log = _log(path, scene_text, condensed)
     far = condensed.samples - len(condensed.trace)
     searched = f"all {condensed.samples:,} samples were searched; {far:,} of them, away from crossings, were not kept"

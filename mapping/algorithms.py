@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.detectors import DetectionError
-from mapping.noise import robust_sd
+from mapping.noise import Noise, robust_sd
 from mapping.sweep_curvature import CurvatureFeature, curvature_along, features_beyond, half_width_for, joined
 from mapping.trace import Trace
 
@@ -60,14 +60,14 @@ class CurvatureProfile:
         return tuple(f for f in found if max(f.start, f.stop) > low and min(f.start, f.stop) < high)
 
 
-def curvature_features(trace: Trace, algorithm: int = 3, noise: float | None = None) -> tuple[CurvatureFeature, ...]:
+def curvature_features(trace: Trace, algorithm: int = 3, noise: Noise | None = None) -> tuple[CurvatureFeature, ...]:
     """Curvature features along one sweep, by arclength of the centre's path projected on the sweep's chord.
 
     Args:
         trace: a single sweep; algorithms 1 and 2 need its contact normals.
         algorithm: number in figure 4 of the paper.
-        noise: standard deviation of what the algorithm differentiates (m; rad for algorithm 2), or None: estimated
-            from differences of neighbouring samples.
+        noise: of the centres, or None: white, its level estimated from differences of neighbouring samples. Contact
+            points (algorithm 1) share its correlated part alone, normals (algorithm 2) none of it.
 
     Raises:
         DetectionError: an unknown algorithm, fewer than 16 samples, or no contact data where it is needed.
@@ -77,7 +77,7 @@ def curvature_features(trace: Trace, algorithm: int = 3, noise: float | None = N
     return curvature_profile(trace, algorithm, noise).features
 
 
-def curvature_profile(trace: Trace, algorithm: int = 3, noise: float | None = None) -> CurvatureProfile:
+def curvature_profile(trace: Trace, algorithm: int = 3, noise: Noise | None = None) -> CurvatureProfile:
     """The curvature that an algorithm tests, and its thresholds; arguments and errors as `curvature_features`."""
     if algorithm not in ALGORITHMS:
         raise DetectionError(f"unknown algorithm {algorithm!r}; the paper has 1, 2, 3 and 4")
@@ -93,22 +93,23 @@ def along_chord(trace: Trace, points: FloatArray) -> FloatArray:
     return _planar(trace, points)[0]
 
 
-def _estimated_from_contacts(trace: Trace, noise: float | None) -> CurvatureProfile:
+def _estimated_from_contacts(trace: Trace, noise: Noise | None) -> CurvatureProfile:
     normals = _given(trace.normals)
     contacts = trace.centers - trace.tip_radius * normals if trace.contacts is None else trace.contacts
     x, z = _planar(trace, contacts)
-    grid, smooth, half_width = _smoothed(x, z, noise, trace.tip_radius, 1 / trace.tip_radius)
+    level = _level(z) if noise is None else replace(noise, white=_level(z).white)
+    grid, smooth, half_width = _smoothed(x, z, level, trace.tip_radius, 1 / trace.tip_radius)
     # contacts leap over what the tip cannot reach: there the estimate is the tip's own arc
     closed = _eroded(-_eroded(-smooth, grid, trace.tip_radius), grid, trace.tip_radius)
     return _on_estimate(grid, closed, half_width, trace.tip_radius)
 
 
-def _normal_derivative(trace: Trace, noise: float | None) -> CurvatureProfile:
+def _normal_derivative(trace: Trace, _: Noise | None) -> CurvatureProfile:
     along, outward = _frame(trace)
-    x, _ = _planar(trace, trace.centers)
+    x = _planar(trace, trace.centers)[0]
     normals = _given(trace.normals)
     angle = np.unwrap(np.arctan2(normals @ along, normals @ outward))
-    level = robust_sd(np.diff(angle)) / np.sqrt(2) if noise is None else noise
+    level = robust_sd(np.diff(angle)) / np.sqrt(2)
     spacing = float(np.ptp(x)) / (len(x) - 1)
     # slope of a line over 2 w: sd^2 = 3 sigma^2 Delta / (2 w^3)
     threshold = 1 / (2 * trace.tip_radius)
@@ -124,23 +125,24 @@ def _normal_derivative(trace: Trace, noise: float | None) -> CurvatureProfile:
     return CurvatureProfile(grid, slope * np.cos(angle), threshold, -1 / trace.tip_radius, half_width)
 
 
-def _traced(trace: Trace, noise: float | None) -> CurvatureProfile:
+def _traced(trace: Trace, noise: Noise | None) -> CurvatureProfile:
     x, z = _planar(trace, trace.centers)
-    wide = _curve(x, z, noise, trace.tip_radius, 1 / (2 * trace.tip_radius))
+    level = noise or _level(z)
+    wide = _curve(x, z, level, trace.tip_radius, 1 / (2 * trace.tip_radius))
     # the concave threshold is twice the convex one and bears narrower fits, which see kinks more sharply
-    narrow = _curve(x, z, noise, trace.tip_radius, 1 / trace.tip_radius)
+    narrow = _curve(x, z, level, trace.tip_radius, 1 / trace.tip_radius)
     kinks = np.interp(wide.s, narrow.s, narrow.curvature)
     return replace(wide, curvature=np.where(kinks < wide.concave, np.minimum(kinks, wide.curvature), wide.curvature))
 
 
-def _estimated_from_trace(trace: Trace, noise: float | None) -> CurvatureProfile:
+def _estimated_from_trace(trace: Trace, noise: Noise | None) -> CurvatureProfile:
     x, z = _planar(trace, trace.centers)
     # balls on raw noise are biased by its extremes (theory section 6): smooth first
-    grid, smooth, half_width = _smoothed(x, z, noise, trace.tip_radius, 1 / (2 * trace.tip_radius))
+    grid, smooth, half_width = _smoothed(x, z, noise or _level(z), trace.tip_radius, 1 / (2 * trace.tip_radius))
     return _on_estimate(grid, _eroded(smooth, grid, trace.tip_radius), half_width, trace.tip_radius)
 
 
-ALGORITHMS: dict[int, Callable[[Trace, float | None], CurvatureProfile]] = {
+ALGORITHMS: dict[int, Callable[[Trace, Noise | None], CurvatureProfile]] = {
     1: _estimated_from_contacts,
     2: _normal_derivative,
     3: _traced,
@@ -148,21 +150,21 @@ ALGORITHMS: dict[int, Callable[[Trace, float | None], CurvatureProfile]] = {
 }
 
 
-def _curve(x: FloatArray, z: FloatArray, noise: float | None, tip: float, convex: float) -> CurvatureProfile:
+def _curve(x: FloatArray, z: FloatArray, noise: Noise, tip: float, convex: float) -> CurvatureProfile:
     """Curvature of a curve z(x) by quadratics as wide as its noise demands."""
-    half_width = half_width_for(_level(z, noise), float(np.ptp(x)) / (len(x) - 1), convex)
+    half_width = half_width_for(noise, float(np.ptp(x)) / (len(x) - 1), convex)
     grid, even = _even(x, z, half_width)
     return CurvatureProfile(grid, curvature_along(grid, even, half_width), convex, -1 / tip, half_width)
 
 
 def _smoothed(
-    x: FloatArray, z: FloatArray, noise: float | None, tip: float, threshold: float
+    x: FloatArray, z: FloatArray, noise: Noise, tip: float, threshold: float
 ) -> tuple[FloatArray, FloatArray, float]:
     """An even grid, z smoothed on it by quadratics, and their half-width."""
     from scipy.signal import savgol_filter
 
     spacing = float(np.ptp(x)) / (len(x) - 1)
-    half_width = max(half_width_for(_level(z, noise), spacing, threshold), FINEST * tip)
+    half_width = max(half_width_for(noise, spacing, threshold), FINEST * tip)
     grid, even = _even(x, z, half_width)
     size = min(2 * max(2, round(half_width / (grid[1] - grid[0]))) + 1, len(grid) - (len(grid) + 1) % 2)
     return grid, np.asarray(savgol_filter(even, size, 2, mode="interp")), half_width
@@ -185,9 +187,9 @@ def _on_estimate(grid: FloatArray, z: FloatArray, half_width: float, tip: float)
     return CurvatureProfile(grid, curvature_along(grid, z, half_width), 1 / tip, -(1 + FILLET) / tip, half_width)
 
 
-def _level(z: FloatArray, noise: float | None) -> float:
+def _level(z: FloatArray) -> Noise:
     """Noise of single samples: second differences know no slope, and features are rare."""
-    return robust_sd(np.diff(z, 2)) / float(np.sqrt(6)) if noise is None else noise
+    return Noise(robust_sd(np.diff(z, 2)) / float(np.sqrt(6)))
 
 
 def _frame(trace: Trace) -> tuple[FloatArray, FloatArray]:

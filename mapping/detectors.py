@@ -16,6 +16,7 @@ from mapping.height_profile import HeightProfile, arclength, height_profiles
 from mapping.matched_filter import BINS_PER_HALF_WIDTH, smallest_half_width
 from mapping.noise import Noise
 from mapping.quiet_noise import CERTAIN, background, first_noise, floored, raw_stretches
+from mapping.stated_noise import StatedNoise
 from mapping.stretches import find_disturbances
 from mapping.trace import Trace
 
@@ -67,6 +68,7 @@ def detect(
     algorithm: int = 3,
     false_alarms_per_metre: float = 0.01,
     noise: Noise | None = None,
+    stated: StatedNoise | None = None,
     largest: float | None = None,
 ) -> Detections:
     """Find every crossing of something that the base does not explain.
@@ -81,6 +83,7 @@ def detect(
         algorithm: number in figure 4 of the paper.
         false_alarms_per_metre: expected number of false crossings per metre of path, 1/m.
         noise: of the samples; None: estimated from the trace.
+        stated: what is known of the noise before, say from a data sheet; it guides the estimate over a given mesh.
         largest: half-width of the widest disturbance that counts as a fine feature, m; None: four tip radii.
 
     Raises:
@@ -113,7 +116,7 @@ def detect(
     first = floored(noise, tip) if noise else first_noise(stretches, raw, tip)
     widest = LARGEST * tip if largest is None else largest
     profiles = _profiles(usable, base, first, raw, tip)
-    behind = background(profiles, base, noise, stretches, first, tip, widest)
+    behind = background(profiles, base, noise, stretches, first, tip, widest, stated)
     level, bank = behind.noise, behind.bank
     threshold = threshold_for(bank, false_alarms_per_metre, behind.uncertainty)
     crossings = []
@@ -126,7 +129,7 @@ def detect(
     crossings, unresolved = _resolved(crossings, trace.resolution)
     left_out += unresolved
     if algorithm != 3:
-        crossings = _judged(crossings, usable, algorithm)
+        crossings = _judged(crossings, usable, algorithm, level)
     length = sum(p.length for p in profiles)
     limit = max(bank.detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
     return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out)
@@ -164,13 +167,15 @@ def _stands_out(found: Disturbance, profile: HeightProfile, noise: Noise, tip: f
     return bool(abs(found.height) > ROUGHNESS * np.sqrt(variance))
 
 
-def _judged(crossings: list[Crossing], usable: list[tuple[int, Trace, FloatArray]], algorithm: int) -> list[Crossing]:
+def _judged(
+    crossings: list[Crossing], usable: list[tuple[int, Trace, FloatArray]], algorithm: int, noise: Noise
+) -> list[Crossing]:
     """Crossings whose `curvature_feature` says whether the paper's algorithm reports a feature of their sign there."""
     from mapping.algorithms import along_chord, curvature_features
 
     judged = []
     for number, part, _ in usable:
-        features = curvature_features(part, algorithm)
+        features = curvature_features(part, algorithm, noise)
         for c in (c for c in crossings if c.sweep == number and part.t[0] <= c.t <= part.t[-1]):
             low, high = sorted(along_chord(part, part.centers[[c.start, min(c.stop, len(part)) - 1]]))
             sign = 1 if c.height > 0 else -1

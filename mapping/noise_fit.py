@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mapping.noise import FloatArray, Noise
+from mapping.stated_noise import StatedNoise
 
 # A correlated part must raise twice the log-likelihood by this much over white noise alone.
 CORRELATED_GAIN = 8.0
@@ -48,12 +49,13 @@ class NoiseFit:
     covariance: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
 
 
-def fit_noise(blocks: Sequence[Blocks], start: Noise) -> NoiseFit:
-    """Maximum likelihood of white + OU noise, from any start within about a decade; the start where none is found.
+def fit_noise(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None = None) -> NoiseFit:
+    """The most likely white + OU noise, from any start within about a decade; the start where none is found.
 
     Args:
         blocks: what was measured, on one or more scales.
         start: a first estimate (see `estimate_noise`).
+        stated: what was known before, or None.
     """
     count = sum(int(np.isfinite(b.values).sum()) for b in blocks)
     white = _white_alone(blocks)
@@ -66,6 +68,7 @@ def fit_noise(blocks: Sequence[Blocks], start: Noise) -> NoiseFit:
     fit = _unit_fit(
         [Blocks(b.values / height, b.steps / path, b.samples) for b in blocks],
         Noise(start.white / height, start.correlated / height, start.length / path),
+        None if stated is None else stated.scaled(height, path),
     )
     noise = Noise(fit.noise.white * height, fit.noise.correlated * height, fit.noise.length * path)
     if noise.correlated > 0 and noise.length > LONGEST * sum(float(np.abs(b.steps).sum()) for b in blocks):
@@ -73,12 +76,13 @@ def fit_noise(blocks: Sequence[Blocks], start: Noise) -> NoiseFit:
     return replace(fit, noise=noise)
 
 
-def _unit_fit(blocks: Sequence[Blocks], start: Noise) -> NoiseFit:
+def _unit_fit(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None) -> NoiseFit:
     """The fit in units in which levels and steps are about 1."""
     white = _white_alone(blocks)
-    guess = start if start.correlated > 0 else Noise(start.white or white, 0.1 * white, 10.0)
-    theta, covariance, misfit = _newton(blocks, _logarithms(guess, white))
-    if misfit + CORRELATED_GAIN > _misfit(blocks, Noise(white)):
+    expected = stated.noise if stated is not None and stated.noise.correlated > 0 else None
+    guess = start if start.correlated > 0 else expected or Noise(start.white or white, 0.1 * white, 10.0)
+    theta, covariance, misfit = _newton(blocks, _logarithms(guess, white), stated)
+    if misfit + (0.0 if expected else CORRELATED_GAIN) > _misfit(blocks, Noise(white)):
         alone = np.zeros((3, 3))
         alone[0, 0] = 2.0 / sum(int(np.isfinite(b.values).sum()) for b in blocks)
         return NoiseFit(Noise(white, 0.0, guess.length), alone)
@@ -101,11 +105,14 @@ def perturbed(noise: Noise, index: int, step: float = DIFFERENCE) -> Noise:
     return Noise(noise.white * factors[0] ** 0.5, noise.correlated * factors[1] ** 0.5, noise.length * factors[2])
 
 
-def _newton(blocks: Sequence[Blocks], start: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+def _newton(
+    blocks: Sequence[Blocks], start: FloatArray, stated: StatedNoise | None
+) -> tuple[FloatArray, FloatArray, float]:
     """Parameters, their covariance and the misfit at the most likely noise, by damped Newton steps."""
 
     def cost(theta: FloatArray) -> float:
-        return _misfit(blocks, _noise(theta)) + float(np.sum(((theta - start) / IGNORANCE) ** 2))
+        known = 0.0 if stated is None else stated.surprise(theta)
+        return _misfit(blocks, _noise(theta)) + float(np.sum(((theta - start) / IGNORANCE) ** 2)) + known
 
     theta, value = start, cost(start)
     for _ in range(NEWTON_STEPS):

@@ -13,6 +13,7 @@ from mapping.height_profile import HeightProfile
 from mapping.matched_filter import Bank, build_bank, filter_sd, smallest_half_width
 from mapping.noise import Noise, estimate_noise
 from mapping.noise_fit import Blocks, NoiseFit, fit_noise, perturbed, relative_sd
+from mapping.stated_noise import StatedNoise
 from mapping.stretches import quiet_bins
 from mapping.trace import Trace
 
@@ -98,6 +99,7 @@ def background(
     first: Noise,
     tip_radius: float,
     largest: float,
+    stated: StatedNoise | None = None,
 ) -> Background:
     """The noise of what is no feature, and filters for it; each improves the other unless the noise is given.
 
@@ -109,6 +111,7 @@ def background(
         first: a first estimate.
         tip_radius: m.
         largest: half-width of the widest feature, m.
+        stated: what was known of the noise before, if it is not given.
     """
     drift = 0 if base.kind == "mesh" else 2
     if given is not None:
@@ -121,7 +124,7 @@ def background(
         quiet = [quiet_bins(p, bank, level, SUSPECT, tip_radius) & _likely(p, level, drift) for p in profiles]
         if before and all(np.array_equal(a, b) for a, b in zip(quiet, before, strict=True)):
             break
-        fit = _fit(profiles, quiet, stretches, level, first, base)
+        fit = _fit(profiles, quiet, stretches, level, first, base, stated)
         level = floored(fit.noise, tip_radius)
         bank, before = _bank(profiles, level, tip_radius, largest, drift), quiet
     return Background(level, bank, _uncertainty(fit, bank))
@@ -148,6 +151,7 @@ def _fit(
     start: Noise,
     first: Noise,
     base: Base,
+    stated: StatedNoise | None,
 ) -> NoiseFit:
     """Noise of what is quiet: by likelihood over a known base, else by what an unknown base disturbs less."""
     if base.kind != "mesh":
@@ -156,7 +160,7 @@ def _fit(
     blocks = [_raw_blocks(stretches, profiles, quiet, size)]
     if sum(p.samples * len(p.height) for p in profiles) > 1.1 * sum(len(stretch.s) for stretch in stretches):
         blocks += [_profile_blocks(p, keep) for p, keep in zip(profiles, quiet, strict=True)]
-    return fit_noise(blocks, start)
+    return fit_noise(blocks, start, stated)
 
 
 def _raw_blocks(

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.noise import Noise
+
 FloatArray = NDArray[np.float64]
 
 # Standard deviations of the curvature's noise that a threshold must be apart from zero.
 CERTAINTY = 3.0
+# Bins of a fit for which the effect of correlated noise is summed.
+BINS = 120
 
 
 @dataclass(frozen=True)
@@ -31,12 +35,43 @@ class CurvatureFeature:
     curvature: float
 
 
-def half_width_for(sd: float, spacing: float, threshold: float) -> float:
+def half_width_for(noise: Noise, spacing: float, threshold: float) -> float:
     """Half-width of a quadratic fit whose curvature has a third of the threshold as standard deviation, m.
 
-    w = (45 sigma^2 Delta z^2 / (2 T^2))^(1/5), theory section 6; never under four spacings.
+    w = (45 sigma^2 Delta z^2 / (2 T^2))^(1/5) in white noise, theory section 6; never under four spacings.
+
+    Args:
+        noise: of the samples.
+        spacing: between samples, m.
+        threshold: of the curvature, 1/m.
     """
-    return max(float((22.5 * sd**2 * spacing * CERTAINTY**2 / threshold**2) ** 0.2), 4 * spacing)
+    from scipy.optimize import brentq
+
+    white = float((22.5 * noise.white**2 * spacing * CERTAINTY**2 / threshold**2) ** 0.2)
+    if noise.correlated == 0:
+        return max(white, 4 * spacing)
+    # over many correlation lengths the process is white noise of this density; over few it is less than that
+    density = noise.white**2 * spacing + 2 * noise.correlated**2 * noise.length
+    widest = float((22.5 * density * CERTAINTY**2 / threshold**2) ** 0.2)
+
+    def excess(log_width: float) -> float:
+        return float(np.log(CERTAINTY * curvature_sd(noise, spacing, np.exp(log_width)) / threshold))
+
+    low, high = np.log(4 * spacing), np.log(max(1.1 * widest, 8 * spacing))
+    if excess(low) <= 0:
+        return 4 * spacing
+    return float(np.exp(brentq(excess, low, high, xtol=1e-4)))
+
+
+def curvature_sd(noise: Noise, spacing: float, half_width: float) -> float:
+    """Standard deviation of the second derivative of a least-squares quadratic over +-half_width, 1/m."""
+    bin_width = 2 * half_width / BINS
+    x = (np.arange(BINS) + 0.5) * bin_width - half_width
+    weights = 3.75 / half_width**5 * (3 * x**2 - half_width**2) * bin_width
+    covariance = noise.block_covariances(BINS, bin_width, bin_width / spacing)
+    # a symmetric Toeplitz form is the weights' autocorrelation against the covariance
+    products = np.correlate(weights, weights, "full")[BINS - 1 :]
+    return float(np.sqrt(covariance[0] * products[0] + 2 * covariance[1:] @ products[1:]))
 
 
 def curvature_along(x: FloatArray, z: FloatArray, half_width: float) -> FloatArray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from mapping.noise import Noise
 from mapping.online import OnlineDetector
 from mapping.shapes import cap_height, groove_height
 from mapping.surface import Surface
-from mapping.sweep_curvature import curvature_along, features_beyond, half_width_for
+from mapping.sweep_curvature import curvature_along, curvature_sd, features_beyond, half_width_for
 from mapping.trace import Trace
 
 TIP = 0.01
@@ -77,8 +79,38 @@ def test_a_plane_under_noise_has_no_curvature_features():
 
 
 def test_the_window_follows_from_the_noise_as_in_the_theory():
-    np.testing.assert_allclose(half_width_for(2e-4, 6e-6, 1 / TIP), 1.37e-3, rtol=0.01)
-    np.testing.assert_allclose(half_width_for(2e-4, 6e-6, 1 / (2 * TIP)), 1.81e-3, rtol=0.01)
+    np.testing.assert_allclose(half_width_for(Noise(2e-4), 6e-6, 1 / TIP), 1.37e-3, rtol=0.01)
+    np.testing.assert_allclose(half_width_for(Noise(2e-4), 6e-6, 1 / (2 * TIP)), 1.81e-3, rtol=0.01)
+
+
+def ornstein_uhlenbeck(noise: Noise, count: int, seed: int) -> np.ndarray:
+    from scipy.signal import lfilter
+
+    rng, decay = np.random.default_rng(seed), np.exp(-6e-6 / noise.length)
+    kicks = noise.correlated * np.sqrt(1 - decay**2) * rng.standard_normal(count)
+    kicks[0] /= np.sqrt(1 - decay**2)
+    return lfilter([1.0], [1.0, -decay], kicks) + noise.white * rng.standard_normal(count)
+
+
+def test_curvature_scatters_in_correlated_noise_as_the_window_assumes():
+    noise, half_width = Noise(1e-4, 2e-4, 1e-3), 2e-3
+    x = 6e-6 * np.arange(400_000)
+    found = curvature_along(x, ornstein_uhlenbeck(noise, len(x), 0), half_width)
+    # 2.4 m hold about a thousand independent windows
+    assert np.std(found) == pytest.approx(curvature_sd(noise, 6e-6, half_width), rel=0.08)
+    width = half_width_for(noise, 6e-6, 1 / TIP)
+    assert 3 * curvature_sd(noise, 6e-6, width) == pytest.approx(1 / TIP, rel=1e-3)
+
+
+@pytest.mark.parametrize("algorithm", [1, 3, 4])
+def test_a_plane_under_correlated_noise_has_no_curvature_features_where_the_noise_is_known(algorithm):
+    noise, found = Noise(0.0, 2e-4, 1e-3), 0
+    for seed in range(5):
+        plain = sweep(lambda x, seed=seed: ornstein_uhlenbeck(noise, len(x), seed))
+        level = replace(plain, normals=np.tile([0.0, 0.0, 1.0], (len(plain), 1)))
+        assert len(curvature_features(level, algorithm)) > 10
+        found += len(curvature_features(level, algorithm, noise))
+    assert found <= 3
 
 
 def test_contact_data_is_asked_for_where_it_is_needed():

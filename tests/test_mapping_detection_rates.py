@@ -12,6 +12,7 @@ from mapping.detectors import detect
 from mapping.height_profile import arclength
 from mapping.noise import Noise
 from mapping.shapes import cap_height
+from mapping.stated_noise import StatedNoise
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -69,9 +70,10 @@ def test_wires_of_a_tenth_of_a_millimetre_are_found_in_white_noise():
 
 
 @pytest.mark.slow
-def test_a_wire_is_found_by_height_alone_in_noise_correlated_over_a_millimetre():
+@pytest.mark.parametrize("known", ["noise", "stated"])
+def test_a_wire_is_found_by_height_alone_in_noise_correlated_over_a_millimetre(known):
     noise = Noise(0.0, 2e-4, 1e-3)
-    errors, others = passes(0.65e-3, noise, 150, noise=noise)
+    errors, others = passes(0.65e-3, noise, 150, **{known: noise if known == "noise" else StatedNoise(noise)})
     assert len(errors) >= 0.6 * 150
     assert others <= poisson.ppf(0.999, 0.01 * LENGTH * 150)
 
