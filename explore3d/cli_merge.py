@@ -18,6 +18,8 @@ def merge(
 ) -> None:
     """Update a model's features by later logs instead of finding them anew; none is removed.
 
+    A log whose mesh or samples lie off the model's base is refused: it shows another object, or another frame.
+
     Example: explore3d merge out/wire out/second/log.mcap --out out/both
     """
     from explore3d.findings import feature_line

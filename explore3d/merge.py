@@ -9,6 +9,7 @@ from pathlib import Path
 from explore3d.build_model import build_model
 from explore3d.errors import FolderError, UserError
 from explore3d.log_reader import read_log
+from explore3d.same_object import unlike
 from explore3d.stages import Stages
 from mapping.merging import merge_model
 from mapping.object_model import ObjectModel
@@ -25,8 +26,8 @@ def merge(model: Path | str, logs: Sequence[Path | str], out: Path | str, pose_s
 
     Raises:
         ModelError: a model that cannot be read.
-        UserError: a log that cannot be read or is in the model already (it would count twice), or a folder that
-            cannot be written.
+        UserError: a log that cannot be read, is in the model already (it would count twice) or shows another
+            object, or a folder that cannot be written.
     """
     known = ObjectModel.load(model)
     for path in logs:
@@ -34,6 +35,8 @@ def merge(model: Path | str, logs: Sequence[Path | str], out: Path | str, pose_s
         seen = [known.provenance.get("log_sha256"), *known.provenance.get("merged_sha256", [])]
         if log.sha256 in seen:
             raise UserError(f"{path}: this log is in the model {model} already; merged twice it would count twice")
+        if complaint := unlike(log, known.base, pose_sd):
+            raise UserError(f"{path}: not a log of the object of {model}, or not in its frame: {complaint}")
         analysis = build_model(log, None, known.base, Stages())
         known = merge_model(known, analysis.model.features, "/".join(Path(path).resolve().parts[-2:]), pose_sd)
         hashes = [*known.provenance.get("merged_sha256", []), log.sha256]
