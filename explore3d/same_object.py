@@ -10,9 +10,9 @@ from mapping.base import Base
 
 # Two surfaces, or a trace and the base under it, may lie so far apart in tip radii, and in sds of the pose
 APART, POSE_SDS = 0.1, 3.0
-# Samples, or vertices, that are looked at
+# Samples, or faces, that are looked at
 MOST = 5000
-# Share of the vertices that must lie on the other mesh: a border may be cut elsewhere
+# Share of the faces whose middles must lie on the other mesh: a border may be cut elsewhere
 SHARE = 0.9
 
 
@@ -42,10 +42,10 @@ def unlike(log: Log, base: Base, pose_sd: float = 0.0) -> str:
     return ""
 
 
-def _gap(surface: Base, other: Base) -> float:
-    """Distance of a mesh from another that SHARE of its vertices keep within, m."""
-    vertices = surface.surface.vertices
-    some = vertices[np.linspace(0, len(vertices) - 1, min(MOST, len(vertices))).astype(np.int64)]
+def _gap(one: Base, other: Base) -> float:
+    """Distance of a mesh from another that SHARE of its faces keep within, m."""
+    middles = one.surface.vertices[one.surface.faces].mean(axis=1)
+    some = middles[np.linspace(0, len(middles) - 1, min(MOST, len(middles))).astype(np.int64)]
     return float(np.quantile(other.nearest.query(some).distance, SHARE))
 
 
