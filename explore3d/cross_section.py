@@ -188,22 +188,10 @@ def _trace_of(
     if feature.kind == "step":
         return step_height(x, abs(height), tip_radius)
     # The radius that the record may hold belongs to its median height.
-    extra = feature.extra if height == feature.height.median else {}
-    if "exponent" in feature.extra:
-        return _bell(feature, height, points, tip_radius)
+    own = height == feature.height.median
+    extra = {name: value for name, value in feature.extra.items() if own or name != "radius"}
     so_high = replace(feature, height=Interval(height, height, height), extra=extra)
     return feature_trace(so_high, points, normals, tip_radius)
-
-
-def _bell(feature: Feature, height: float, points: FloatArray, tip_radius: float) -> FloatArray:
-    """(N,) the same for a bump with a skirt, which the record describes by a scale and an exponent."""
-    from mapping.bell_kernels import bell_heights
-
-    away = np.linalg.norm(points - feature.axis[0], axis=1)[:, None]
-    scale, exponent = (np.array([float(feature.extra[name])]) for name in ("scale", "exponent"))
-    out = np.empty((1, len(points)))
-    bell_heights(away, np.zeros_like(away), np.zeros((1, 2)), np.array([height]), scale, exponent, tip_radius, out)
-    return np.asarray(out[0])
 
 
 def _aligned(curves: list[FloatArray], height: FloatArray) -> list[FloatArray]:

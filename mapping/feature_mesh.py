@@ -1,4 +1,4 @@
-"""Meshes of features, for viewers: a tube along a ridge, a cap on a bump, a ribbon in a groove or on a step."""
+"""Meshes of features, for viewers: a tube along a ridge, a cap or bell on a bump, a ribbon in a groove or on a step."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.anchor import tangent_frame
+from mapping.bell_shape import width_at_half_height
 from mapping.feature import Feature, Interval
 from mapping.polyline import directions
 from mapping.surface import Surface
@@ -19,17 +20,20 @@ IntArray = NDArray[np.int64]
 CORNERS = 17
 # A ribbon stands this part of its width above the base, lest viewers show it in stripes.
 LIFT = 0.02
+# A bell is drawn down to this share of its height.
+SKIRT = 0.03
 
 
 def feature_mesh(feature: Feature) -> Surface:
     """The feature's estimated body as a mesh on the base, m, object frame.
 
-    Ridges and bumps are half ellipses of the median height and width, grooves and pits flat ribbons and
-    discs of the median width, steps walls of the median height: a picture of the record, not of the data.
+    Ridges and bumps are half ellipses of the median height and width, bumps with a skirt the bells that were fitted,
+    grooves and pits flat ribbons and discs of the median width, steps walls of the median height: a picture of the
+    record, not of the data.
     """
     height, width = _size(feature)
     if len(feature.axis) == 1:
-        return _dome(feature, max(height, LIFT * width), width)
+        return _turned(feature, _meridian(feature, max(height, LIFT * width), width))
     if feature.kind == "step":
         return _sweep(feature, np.array([[0.0, 0.0], [0.0, height]]), closed=False)
     if height < 0.0:
@@ -57,18 +61,30 @@ def _size(feature: Feature) -> tuple[float, float]:
     return height, width
 
 
-def _dome(feature: Feature, height: float, width: float) -> Surface:
-    """Half an ellipsoid over the feature's point."""
+def _meridian(feature: Feature, height: float, width: float) -> FloatArray:
+    """(M, 2) distances from the axis of a point feature and heights, m, from the crest down to the base."""
+    if "exponent" in feature.extra and feature.height.median > 0.0:
+        p = float(feature.extra["exponent"])
+        share = np.linspace(0.0, 1.0, 2 * CORNERS)
+        # evenly spaced in the distance up to where the skirt is hardly higher than the base
+        place = share * np.sqrt(p * np.expm1(-np.log(SKIRT) / p))
+        fall = (1.0 + place**2 / p) ** -p
+        bell = np.column_stack([width / float(width_at_half_height(1.0, p)) * place, height * fall])
+        return np.vstack([bell, [bell[-1, 0], 0.0]])
+    polar = np.linspace(0.0, 0.5 * np.pi, CORNERS // 2 + 1)
+    return np.column_stack([0.5 * width * np.sin(polar), height * np.cos(polar)])
+
+
+def _turned(feature: Feature, meridian: FloatArray) -> Surface:
+    """The body of revolution of a meridian (M, 2) that begins on the axis, over the feature's point."""
     frame = tangent_frame(feature.normals[0], np.zeros(3))
-    polar, around = np.linspace(0.0, 0.5 * np.pi, CORNERS // 2 + 1), np.linspace(0.0, 2.0 * np.pi, 2 * CORNERS)[:-1]
-    radius = 0.5 * width * np.sin(polar)[:, None]
-    local = np.stack(
-        np.broadcast_arrays(radius * np.cos(around), radius * np.sin(around), height * np.cos(polar)[:, None]), axis=-1
-    )
-    points = np.concatenate([[[0.0, 0.0, height]], local[1:].reshape(-1, 3)])
+    around = np.linspace(0.0, 2.0 * np.pi, 2 * CORNERS)[:-1]
+    radius, up = meridian[1:, :1], meridian[1:, 1:]
+    local = np.stack(np.broadcast_arrays(radius * np.cos(around), radius * np.sin(around), up), axis=-1)
+    points = np.concatenate([[[0.0, 0.0, meridian[0, 1]]], local.reshape(-1, 3)])
     ring, count = np.arange(len(around)), len(around)
     fan = np.column_stack([np.zeros_like(ring), 1 + ring, 1 + (ring + 1) % count])
-    faces = [fan, *(_band(1 + i * count, 1 + (i + 1) * count, count) for i in range(len(polar) - 2))]
+    faces = [fan, *(_band(1 + i * count, 1 + (i + 1) * count, count) for i in range(len(meridian) - 2))]
     return Surface(feature.axis[0] + points @ frame, np.concatenate(faces))
 
 

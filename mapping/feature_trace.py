@@ -18,18 +18,32 @@ def feature_trace(feature: Feature, feet: FloatArray, normals: FloatArray, tip_r
     """(N,) heights that the feature's median shape leaves on the trace, m; 0 for kinds without a closed form here.
 
     Args:
-        feature: any feature; ridges and bumps are chains of capsules, grooves and pits rest the ball on their rim.
+        feature: any feature; ridges and bumps are chains of capsules, bumps with a skirt the bells of their record,
+            grooves and pits rest the ball on their rim.
         feet: (N, 3) points of the base, m.
         normals: (N, 3) outward unit normals there.
         tip_radius: radius of the fingertip, m.
     """
     height, width = feature.height.median, max(feature.width.median, 1e-12)
+    if "exponent" in feature.extra:
+        return _bell(feature, feet, tip_radius)
     if feature.kind in ("ridge", "bump") and height > 0.0:
         radius = float(feature.extra.get("radius", radius_of_cap(height, width)))
         return chain_height(feet, normals, feature.axis + (height - radius) * feature.normals, radius, tip_radius)
     if feature.kind in ("groove", "pit") and height < 0.0:
         return rim_height(0.5 * width - _distance(feet, feature.axis), tip_radius, -height)
     return np.zeros(len(feet))
+
+
+def _bell(feature: Feature, feet: FloatArray, tip_radius: float) -> FloatArray:
+    """(N,) heights that a bump of revolution with the feature's scale and exponent leaves, m."""
+    from mapping.bell_kernels import bell_heights
+
+    away = np.linalg.norm(feet - feature.axis[0], axis=1)[:, None]
+    height, scale = np.array([feature.height.median]), np.array([float(feature.extra["scale"])])
+    exponent, out = np.array([float(feature.extra["exponent"])]), np.empty((1, len(feet)))
+    bell_heights(away, np.zeros_like(away), np.zeros((1, 2)), height, scale, exponent, tip_radius, out)
+    return np.asarray(out[0])
 
 
 def _distance(points: FloatArray, axis: FloatArray) -> FloatArray:
