@@ -51,14 +51,15 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
     base = _placed(log.trace, base, scene, stages)
     trace = _over(log.trace, base, stages)
     detections = log.detections or _detect(trace, base, settings, stages)
-    features = _assemble(detections, trace, base, settings, stages)
+    asked = None if scene is None else scene.survey.smallest_feature
+    features = _assemble(detections, trace, base, settings, asked, stages)
     features = _believed(_refine(features, trace, base, detections, settings, stages), stages)
     estimate = _estimate(features, trace, base, detections, stages)
     curvature = _curvature(estimate, stages)
     truth = (
         tuple(TrueFeature(t.kind, t.axis, t.height, t.width, t.length or None) for t in scene.truth) if scene else ()
     )
-    inspected = Inspected.of(trace, base, detections, None if scene is None else scene.survey.smallest_feature)
+    inspected = Inspected.of(trace, base, detections, asked)
     model = ObjectModel.attach(
         base,
         in_model_frame(features, base),
@@ -159,14 +160,24 @@ def _detect(trace: Trace, base: Base, settings: Settings, stages: Stages) -> Det
 
 
 def _assemble(
-    detections: Detections, trace: Trace, base: Base, settings: Settings, stages: Stages
+    detections: Detections, trace: Trace, base: Base, settings: Settings, asked: float | None, stages: Stages
 ) -> tuple[Feature, ...]:
+    if not stages.needed("grammar", "" if detections.crossings else _why_no_lines(detections, trace, base, asked)):
+        return ()
     from mapping.grammar import assemble
 
-    if not stages.needed("grammar", "" if detections.crossings else "nothing was detected"):
-        return ()
     with stages.stage("grammar"):
         return assemble(detections, trace, base, false_alarms_per_metre=settings.false_alarms_per_metre)
+
+
+def _why_no_lines(detections: Detections, trace: Trace, base: Base, asked: float | None) -> str:
+    """Why a trace without a single crossing cannot, or need not, hold what only many sweeps together show."""
+    from mapping.faint_feature import why_none_sought
+
+    if asked is not None and detections.detection_limit <= asked:
+        return "nothing was detected, though a single sweep shows all that the scene asks for"
+    why_not = why_none_sought(detections, trace, base)
+    return f"nothing was detected, and lines too faint for one sweep are not sought: {why_not}" if why_not else ""
 
 
 def _refine(

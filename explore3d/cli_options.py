@@ -11,5 +11,9 @@ Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results; 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, and no progress.")]
 Force = Annotated[
     list[str] | None,
-    typer.Option("--force", metavar="STAGE", help="Run this stage though it is not needed; may be repeated."),
+    typer.Option(
+        "--force",
+        metavar="STAGE",
+        help="Run a stage that the report says was left out; may be repeated.",
+    ),
 ]

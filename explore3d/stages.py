@@ -7,8 +7,24 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from explore3d.errors import UserError
 from mapping.left_out import LeftOut
 
+# Stages that a job may leave out, and that can be forced back in
+OPTIONAL = (
+    "dynamics",
+    "base fit",
+    "pose",
+    "algorithms 1 and 2",
+    "grammar",
+    "posterior",
+    "long chain",
+    "estimated surface",
+    "smoothing",
+    "curvature",
+    "error against time",
+    "rendered pictures",
+)
 # Told the stage's name and the share of it that is done, 0 to 1.
 Progress = Callable[[str, float], None]
 
@@ -23,13 +39,21 @@ class Stages:
 
     Args:
         progress: told what is under way.
-        forced: names of stages to run even where the scene does not need them.
+        forced: names of stages, of OPTIONAL, to run even where the scene does not need them.
+
+    Raises:
+        UserError: a stage to be forced that there is not.
     """
 
     progress: Progress = silent
     forced: Collection[str] = ()
     timings: dict[str, float] = field(default_factory=dict)
     left_out: list[LeftOut] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        for name in self.forced:
+            if name not in OPTIONAL:
+                raise UserError(f"no stage {name!r} to force; possible: {', '.join(OPTIONAL)}")
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Callable[[float], None]]:
@@ -51,7 +75,7 @@ class Stages:
 
         A stage that is not `possible` for want of what it works on stays left out even if forced.
         """
-        if not why_not or (possible and name in self.forced):
+        if not why_not or (possible and self.is_forced(name)):
             return True
         self.left_out.append(LeftOut(name, why_not, saved))
         return False

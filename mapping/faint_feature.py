@@ -35,16 +35,12 @@ def with_faint_lines(
 ) -> list[Feature]:
     """The features, and the lines that no single sweep showed; spots that are a part of such a line become the line.
 
-    Nothing is sought over a base that was fitted, whose own errors run along lines too, nor where there is hardly
-    any noise, or more path than can be looked through in seconds.
+    Nothing is sought where `why_none_sought` says so.
     """
     features = list(features)
-    if base.kind != "mesh" or len(np.unique(trace.sweep)) < SWEEPS or not np.isfinite(detections.detection_limit):
+    if why_none_sought(detections, trace, base):
         return features
-    half_width = float(np.sqrt(2 * trace.tip_radius * detections.detection_limit))
-    spacing = min(SECTIONS) * half_width / PLACES
-    if detections.inspected_length > min(MOST_PLACES, len(trace) / LEAST_SAMPLES) * spacing:
-        return features
+    half_width, spacing = _scales(detections, trace.tip_radius)
     inspection = inspect(trace, base, detections.noise, spacing)
     normals = base.foot(inspection.points, trace.tip_radius).normals
     weak = [f for f in features if _is_weak(f, detections)]
@@ -63,6 +59,26 @@ def with_faint_lines(
         features = [f for f in features if f not in weak or distances(f.axis, ridge.axis).max() > 2 * line.half_width]
         features.append(ridge)
     return features
+
+
+def why_none_sought(detections: Detections, trace: Trace, base: Base) -> str:
+    """Why no lines fainter than single sweeps show can be sought, "" if they can."""
+    if base.kind != "mesh":
+        return "over a base that was fitted its own errors run along lines too"
+    if len(np.unique(trace.sweep)) < SWEEPS:
+        return f"there are fewer than {SWEEPS} sweeps"
+    if not np.isfinite(detections.detection_limit):
+        return "the sweeps are too short"
+    places = detections.inspected_length / _scales(detections, trace.tip_radius)[1]
+    if places > len(trace) / LEAST_SAMPLES:
+        return "there is hardly any noise to average away"
+    return "there is more path than can be looked through in seconds" if places > MOST_PLACES else ""
+
+
+def _scales(detections: Detections, tip_radius: float) -> tuple[float, float]:
+    """Half-width of the smallest crest that a single sweep detects, and distance between places to look at, m."""
+    half_width = float(np.sqrt(2 * tip_radius * detections.detection_limit))
+    return half_width, min(SECTIONS) * half_width / PLACES
 
 
 def _is_weak(feature: Feature, detections: Detections) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -10,20 +11,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from explore3d import stages as stages_module
 from explore3d.analysis import Analysis
 from explore3d.analyze import analyze
 from explore3d.base_record import KIND, base_event
+from explore3d.errors import UserError
 from explore3d.leave_out import with_savings, without_needless_dynamics
 from explore3d.log import LogWriter
 from explore3d.scene import parse_scene
 from explore3d.stability_traces import DIAMETER, TIP, Heights, plate, sweeps, wire
-from explore3d.stages import Stages
+from explore3d.stages import OPTIONAL, Stages
 from hw.moves import Move
 from hw.simulated import SimulatedFinger
 from mapping.estimate import TOUCHED
 from mapping.left_out import LeftOut
 
 SCENE = Path(__file__).parents[1] / "assets" / "scenes" / "wire_on_plate.toml"
+EMPTY = SCENE.with_name("empty_plate.toml")
 Record = Callable[..., Path]
 
 
@@ -35,10 +39,11 @@ def flat(feet: np.ndarray) -> np.ndarray:
 def record(tmp_path_factory: pytest.TempPathFactory) -> Record:
     """Logs of positions alone, of sweeps over a plate that the log knows."""
 
-    def write(heights: Heights, white: float, half: float = 12e-3) -> Path:
-        trace = sweeps(heights, white=white, places=(-half / 2, 0.0, half / 2), spacing=half / 500, half=half)
+    def write(heights: Heights, white: float, half: float = 12e-3, count: int = 3, scene: str = "") -> Path:
+        places = np.linspace(-half / 2, half / 2, count)
+        trace = sweeps(heights, white=white, places=places, spacing=half / 500, half=half)
         path = tmp_path_factory.mktemp("log") / "log.mcap"
-        with LogWriter(path, tip_radius=TIP) as log:
+        with LogWriter(path, tip_radius=TIP, scene_text=scene) as log:
             log.event(KIND, base_event(plate()))
             for _, part in trace.sweeps():
                 log.write(Move(path=part.centers[[0, -1]], approach=np.array([0.0, 0.0, -1.0])), part)
@@ -103,6 +108,35 @@ def test_where_nothing_is_detected_nothing_follows_and_forcing_it_finds_nothing(
     assert bare.model.features == forced.model.features == ()
     assert not set(left(forced)) & {"grammar", "posterior", "estimated surface"}
     assert forced.detections.threshold == bare.detections.threshold
+
+
+def test_without_a_crossing_a_wire_that_only_many_sweeps_show_is_found_all_the_same(record):
+    faint = analyze(record(wire(), 2.9e-3, count=12))
+    assert faint.detections.crossings == ()
+    assert faint.detections.detection_limit > DIAMETER
+    (ridge,) = faint.model.features
+    assert np.abs(ridge.axis[:, 1]).max() < 1e-3
+    assert "grammar" not in left(faint)
+
+
+def test_where_each_sweep_shows_all_that_is_asked_for_no_fainter_lines_are_sought_and_none_would_be_found(record):
+    path = record(flat, 0.1e-3, count=12, scene=EMPTY.read_text())
+    bare, forced = analyze(path), analyze(path, force=["grammar"])
+    assert "asks for" in left(bare)["grammar"].reason
+    assert bare.detections.detection_limit < bare.scene.survey.smallest_feature
+    assert "grammar" in forced.timings
+    assert bare.model.features == forced.model.features == ()
+
+
+def test_a_stage_that_there_is_not_cannot_be_forced_and_the_possible_ones_are_named(wired):
+    with pytest.raises(UserError, match=r"no stage 'smoothness' to force; possible: .*smoothing"):
+        analyze(wired[0], force=["smoothness"])
+
+
+def test_every_stage_that_is_asked_whether_it_is_needed_can_be_forced():
+    sources = [path.read_text() for path in Path(stages_module.__file__).parent.glob("*.py")]
+    asked = {name for text in sources for name in re.findall(r"stages\.(?:needed|is_forced)\(\s*\"([^\"]+)\"", text)}
+    assert asked == set(OPTIONAL)
 
 
 def test_without_contact_data_the_algorithms_that_need_it_stay_left_out_even_if_forced(wired):
