@@ -24,59 +24,50 @@ FloatArray = NDArray[np.float64]
 # Chords of the chart may sag by this share of the feature's height.
 SAG = 0.005
 MOST_LEGS = 300
-# Rings are tried as Fourier series up to this degree, whatever their crossings ask for.
-SIMPLER_RINGS = 3
 HIGHEST_MODE = 8
+# After so many degrees in a row that are no better than a lower one, no higher one is tried.
+PATIENCE = 2
 
 
 def curve_problem(feature: Feature, around: Surroundings) -> Problem:
     """Pose the posterior of a ridge, groove or step.
 
-    The axis gets the freedom that its crossings ask for; if that is more than a straight course over the base, or an
-    ellipse for a ring, simpler ones are tried too and kept unless the trace itself speaks against them (BIC).
+    The trace decides how freely the axis bends over the base (BIC): few crossings cannot tell a gentle bend from
+    their own scatter, and one that a neighbour pulled aside asks for bends that are not there.
     """
     sizes = sizes_of(feature, around.trace.tip_radius)
     axis, normals, crossings = _axis_of(feature, sizes, around)
+    course = _chart(axis, normals, feature, sizes, crossings, HIGHEST_DEGREE, around)
+    window = window_for(_crest(course, around.trace.tip_radius, sizes), sizes, around)
 
     def posed(most: int, least: int = 1) -> tuple[Problem, int]:
         line, degree = smooth_axis(axis, sizes.position_sd, most, least)
-        lift = _normals_along(line, axis, normals)
-        return _posed(feature, sizes, axis, lift, line, degree, crossings, around), degree
+        chart = _chart(line, _normals_along(line, axis, normals), feature, sizes, crossings, degree, around)
+        ends = chart.coordinates(axis[[0, -1]])[0]
+        modes = _modes(chart, ends, degree, crossings, sizes)
+        shape = _shape(feature.kind, window, chart, modes, ends, crossings, sizes, around)
+        return pose(feature, sizes, shape, window, around, _beginnings(shape, chart, sizes, feature.kind)), degree
 
-    best, highest = posed(HIGHEST_DEGREE)
-    closed = bool(np.array_equal(axis[0], axis[-1]))
-    simpler = range(1, min(highest, SIMPLER_RINGS + 1 if closed else 2))
-    for degree in reversed(simpler):
-        other, _ = posed(degree, degree)
-        freedom = len(best.target.shape.start) - len(other.target.shape.start)
-        gain = _best_fit(best) - _best_fit(other)
-        if gain <= 0.5 * max(freedom, 1) * float(np.log(len(best.window))):
-            best = other
+    best, asked = first = posed(HIGHEST_DEGREE)
+    if len(axis) < 3:
+        return best
+    least, costs = _cost(best), list[float]()
+    for degree in range(1, HIGHEST_DEGREE + 1):
+        other, reached = first if degree == asked else posed(degree, degree)
+        if reached < degree:
+            break
+        costs.append(least if other is best else _cost(other))
+        best, least = (other, costs[-1]) if costs[-1] < least else (best, least)
+        if len(costs) > PATIENCE and min(costs[-PATIENCE:]) >= min(costs[:-PATIENCE]):
+            break
     return best
 
 
-def _best_fit(problem: Problem) -> float:
-    """Log likelihood at the optimum nearest to the detection."""
+def _cost(problem: Problem) -> float:
+    """Bayesian information criterion at the optimum nearest to the detection (Schwarz 1978), halved."""
     best = find_optima(problem.target, problem.beginnings[:1])[0]
-    return float(problem.target.likelihood.log_density(problem.target.templates(best[None]))[0])
-
-
-def _posed(
-    feature: Feature,
-    sizes: Sizes,
-    axis: FloatArray,
-    lift: FloatArray,
-    line: FloatArray,
-    degree: int,
-    crossings: int,
-    around: Surroundings,
-) -> Problem:
-    chart = _chart(line, lift, feature, sizes, crossings, degree, around)
-    ends = chart.coordinates(axis[[0, -1]])[0]
-    modes = _modes(chart, ends, degree, crossings, sizes)
-    window = window_for(_crest(chart, around.trace.tip_radius, sizes), sizes, around)
-    shape = _shape(feature.kind, window, chart, modes, ends, crossings, sizes, around)
-    return pose(feature, sizes, shape, window, around, _beginnings(shape, chart, sizes, feature.kind))
+    fit = float(problem.target.likelihood.log_density(problem.target.templates(best[None]))[0])
+    return 0.5 * len(best) * float(np.log(len(problem.window))) - fit
 
 
 def _axis_of(feature: Feature, sizes: Sizes, around: Surroundings) -> tuple[FloatArray, FloatArray, int]:
