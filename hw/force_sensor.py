@@ -106,7 +106,12 @@ class ForceSensor:
     @property
     def age(self) -> float:
         """Time since the newest sample arrived, s."""
-        return time.monotonic() - self._samples[-1][0] if self._samples else np.inf
+        return time.monotonic() - self.heard
+
+    @property
+    def heard(self) -> float:
+        """When the newest sample arrived, s, time.monotonic; -inf before the first."""
+        return self._samples[-1][0] if self._samples else -np.inf
 
     def fresh(self) -> bool:
         """True if there is a sample at all."""

@@ -21,18 +21,32 @@ def prompt(reports: Sequence[Report]) -> list[Report]:
     return [report for report in reports if report.round_trip <= usual + LATE]
 
 
-def positions_at(times: FloatArray, reported: FloatArray, positions: FloatArray, longest: float = np.inf) -> FloatArray:
-    """(N, 3) stage positions at times (N,) s, between the reports (M,) s, (M, 3) m; NaN where none are near.
+def positions_at(times: FloatArray, reported: FloatArray, positions: FloatArray) -> FloatArray:
+    """(N, 3) stage positions at times (N,) s, between the reports (M,) s, (M, 3) m; NaN outside of them."""
+    inside = (times >= reported[0]) & (times <= reported[-1])
+    found = np.column_stack([np.interp(times, reported, positions[:, k]) for k in range(3)])
+    found[~inside] = np.nan
+    return found
+
+
+def known_at(
+    times: FloatArray, reported: FloatArray, positions: FloatArray, normals: FloatArray, longest: float, apart: float
+) -> NDArray[np.bool_]:
+    """(N,) whether the reports tell where the stage was across the surface, and not only where along it.
+
+    Between two reports the stage may have turned, or stood for a while: that matters as far as they differ along
+    the normal.
 
     Args:
-        longest: time between two reports, s, beyond which what the stage did in between is not known.
+        times: (N,) s.
+        reported, positions: (M,) s and (M, 3) m of the reports.
+        normals: (N, 3) unit normals of the contact.
+        longest: time between two reports that hides nothing, s.
+        apart: distance along the normal that hides nothing, m.
     """
-    after = np.searchsorted(reported, times, side="left")
-    inside = (times >= reported[0]) & (times <= reported[-1])
-    gap = np.diff(reported, prepend=reported[0])[np.minimum(after, len(reported) - 1)]
-    found = np.column_stack([np.interp(times, reported, positions[:, k]) for k in range(3)])
-    found[~inside | (gap > longest)] = np.nan
-    return found
+    after = np.clip(np.searchsorted(reported, times), 1, len(reported) - 1)
+    between = np.einsum("ij,ij->i", positions[after] - positions[after - 1], normals)
+    return np.asarray((reported[after] - reported[after - 1] <= longest) | (np.abs(between) <= apart))
 
 
 def rigid_centers(positions: FloatArray, forces: FloatArray, stiffness: float) -> FloatArray:

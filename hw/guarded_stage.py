@@ -88,13 +88,9 @@ class GuardedStage:
         hit = False
         for number in range(1, count + 1):
             here = start + (target - start) * (number / count)
+            made = time.monotonic()
             self.controller.jog(self.frame.to_machine(here), speed)
-            until = time.monotonic() + PATIENCE
-            while np.linalg.norm(self.position() - here) > 1.5 * way / count and not hit:
-                self.listen(sensor)
-                hit = self._touches(sensor)
-                if time.monotonic() > until:
-                    raise LinkError("the machine does not follow; is it held, or its door open?")
+            hit = self._felt_before(here, 1.5 * way / count, made, sensor)
             if hit:
                 break
         if not hit:
@@ -103,13 +99,36 @@ class GuardedStage:
         self.controller.cancel_jog()
         return self.position(), hit
 
-    def listen(self, sensor: ForceSensor) -> None:
+    def _felt_before(self, here: FloatArray, near: float, made: float, sensor: ForceSensor) -> bool:
+        """True as soon as the sensor feels contact, False once the stage is `near` (m) to `here`.
+
+        The force is looked at once at least, however fast the stage was there: on a busy host it always is, and
+        would be sent into the body step by step.
+        """
+        until = time.monotonic() + PATIENCE
+        while True:
+            self.listen(sensor, made)
+            if self._touches(sensor):
+                return True
+            if np.linalg.norm(self.position() - here) <= near:
+                return False
+            if time.monotonic() > until:
+                raise LinkError("the machine does not follow; is it held, or its door open?")
+
+    def listen(self, sensor: ForceSensor, since: float = -np.inf) -> None:
         """Go on with a fresh force sample only; meanwhile the machine runs out of jogs and stands.
+
+        Args:
+            since: the sample must have come after this, s, time.monotonic: what was done then shows in no older one.
 
         Raises:
             StoppedError: the sensor stays silent.
         """
-        if sensor.age > FRESH and not sensor.wait(lambda: sensor.age <= FRESH, STALE):
+
+        def fresh() -> bool:
+            return sensor.age <= FRESH and sensor.heard > since
+
+        if not fresh() and not sensor.wait(fresh, STALE):
             self.controller.halt(
                 f"no force sample for {sensor.age:.2f} s; check the sensor's cable and power, run again"
             )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hw.errors import LinkError, StoppedError
 from hw.force_sensor import ForceSensor
-from hw.fusion import positions_at, prompt, rigid_centers
+from hw.fusion import known_at, positions_at, prompt, rigid_centers
 from hw.guarded_stage import PATIENCE, GuardedStage
 from hw.moves import Move
 from hw.peck import Touched, spaced
@@ -32,8 +32,9 @@ BATCH = 0.5
 EASE, SLOWEST = 0.25, 0.1
 # A sweep begins when the force is this near to the wanted one, in its share, or after so many control periods
 SETTLED, SETTLING = 0.2, 50
-# Reports further apart than this, in control periods, hide a turn or a stand; than this many usual gaps, if it is more
-BLIND, UNUSUAL = 0.5, 2.0
+# Reports further apart than this, in control periods, hide a turn or a stand; than this many usual gaps, if it is more;
+# unless they differ by no more than so many steps of the stage along the normal
+BLIND, UNUSUAL, STEPS = 0.5, 2.0, 2.0
 # Reports from so long before the samples are looked at: the last one may be that old, s
 BEFORE = 0.1
 # A path of one point is touched for so many control periods
@@ -103,10 +104,11 @@ class Slide:
         queued = [0.0] * QUEUED  # lengths of the last jogs
         settling = SETTLING  # periods to press on before the sweep begins
         left = 0 if end > 0 else DWELL
+        made = -np.inf  # when the last jog was sent
         while True:
             inwards = _between(approach, at)
             inwards /= np.linalg.norm(inwards)
-            missing = move.force - self._pressing(stage, inwards, here, sum(queued))
+            missing = move.force - self._pressing(stage, inwards, here, sum(queued), made)
             settling = 0 if abs(missing) <= SETTLED * move.force else max(0, settling - 1)
             pace = 0.0 if settling else _pace(missing / move.force)
             at = min(end, at + pace)
@@ -121,6 +123,7 @@ class Slide:
             if way > 0:
                 stage.check(target, "sliding")
                 controller.jog(stage.frame.to_machine(target), max(way / self.period, 1e-4))
+                made = time.monotonic()
                 here, queued = target, [*queued[1:], way]
             yield not settling
             if at >= end and not settling:
@@ -128,17 +131,20 @@ class Slide:
                     return
                 left -= 1
 
-    def _pressing(self, stage: GuardedStage, inwards: FloatArray, here: FloatArray, queued: float) -> float:
+    def _pressing(
+        self, stage: GuardedStage, inwards: FloatArray, here: FloatArray, queued: float, made: float
+    ) -> float:
         """Force along the approach, N, as soon as at most `queued` metres of motion are left up to `here`.
 
-        The machine paces the loop: a host that is late makes it stand, never run ahead.
+        The machine paces the loop: a host that is late makes it stand, never run ahead. No force counts twice: a
+        loop that goes on with what it felt before its last jog (`made`, s) would press deeper without feeling it.
         """
         until = time.monotonic() + PATIENCE
         left = max(queued, 1.5 * stage.controller.settings.resolution)
         while np.linalg.norm(stage.position() - here) > left:
             if time.monotonic() > until:
                 raise StoppedError("the machine does not follow; is it held, or its door open?")
-        stage.listen(self.sensor)
+        stage.listen(self.sensor, made)
         force = stage.frame.turn_to_object(self.sensor.force())
         return -float(force @ inwards)
 
@@ -157,15 +163,15 @@ class Slide:
             np.array([stage.controller.machine_position(report.status) for report in reports])
         )
         forces = stage.frame.turn_to_object(forces)
-        centers = positions_at(times - self.delay, stamps, places, self._longest_gap(stamps))
-        touching = (np.linalg.norm(forces, axis=1) > self.contact) & np.isfinite(centers).all(axis=1)
-        touching &= times > after
+        centers = positions_at(times - self.delay, stamps, places)
+        pressing = np.linalg.norm(forces, axis=1)
+        touching = (pressing > self.contact) & np.isfinite(centers).all(axis=1) & (times > after)
+        normals = forces / np.maximum(pressing, self.contact)[:, None]
+        longest = max(BLIND * self.period, UNUSUAL * float(np.median(np.diff(stamps))))
+        step = STEPS * stage.controller.settings.resolution
+        touching &= known_at(times - self.delay, stamps, places, normals, longest, step)
         rigid = rigid_centers(centers[touching], forces[touching], self.stiffness)
         return Touched(times[touching], rigid, forces[touching])
-
-    def _longest_gap(self, stamps: FloatArray) -> float:
-        """Time between reports, s, beyond which the way between them is not known: a host that was late, mostly."""
-        return max(BLIND * self.period, UNUSUAL * float(np.median(np.diff(stamps))))
 
 
 def _between(rows: FloatArray, at: float) -> FloatArray:

@@ -102,12 +102,11 @@ def test_one_fault_of_each_kind_is_survived(kind: str, tmp_path: Path) -> None:
         assert len(said) > 20, "nothing was said"
 
 
-@pytest.mark.slow  # on a host whose cores are all taken the third sweep is sometimes lost as well
 def test_a_sensor_that_comes_back_costs_a_sweep_and_no_more(tmp_path: Path) -> None:
     stage = GrblEmulator(TouchedBody(plate(), R, FRAME, STIFFNESS), np.array([-0.15, -0.15, -0.035]))
     links = [tmp_path / "stage", tmp_path / "sensor"]
     devices = [stage, OptoForceEmulator(stage, noise=0.003)]
-    pulled = Fault("disconnect", at=1e9, device=1, duration=1.0)
+    pulled = Fault("disconnect", at=1e9, device=1, duration=0.3)
     with PtyServer(devices, links=links, faults=[pulled]) as server:
         slide = Slide(OptoForce(str(links[1]), 400.0), STIFFNESS, approach_speed=5e-3)
         finger = GrblFinger(port=str(links[0]), tip_radius=R, frame=FRAME, armed=True, max_force=LIMIT, slide=slide)
@@ -115,9 +114,9 @@ def test_a_sensor_that_comes_back_costs_a_sweep_and_no_more(tmp_path: Path) -> N
             whole = finger.execute(sweep(0))
             finger.notice = lambda batch: setattr(server.faults[0], "at", 0.0) if server.faults else None
             cut = finger.execute(sweep(1))
-            assert 0 < len(cut) < 0.9 * len(whole)
+            assert len(cut) and np.ptp(cut.centers[:, 0]) < 0.9 * np.ptp(whole.centers[:, 0])
             again = finger.execute(sweep(2))
-            assert len(again) > 0.9 * len(whole)
+            assert np.ptp(again.centers[:, 0]) > 0.9 * np.ptp(whole.centers[:, 0])
             assert again.t[0] > cut.t[-1]
             assert np.median(np.abs(again.centers[:, 2] - R)) < 2e-5
             assert slide.sensor.link.reconnections == 1

@@ -8,7 +8,7 @@ import pytest
 from hw.delay import measured_delay
 from hw.force_emulators import OptoForceEmulator
 from hw.frame import Frame
-from hw.fusion import estimate_delay, positions_at, prompt, rigid_centers
+from hw.fusion import estimate_delay, known_at, positions_at, prompt, rigid_centers
 from hw.grbl_controller import GrblController, Report
 from hw.grbl_emulator import GrblEmulator
 from hw.grbl_protocol import parse_status
@@ -54,10 +54,11 @@ def test_positions_between_reports_are_interpolated_and_outside_unknown() -> Non
     assert rigid_centers(found[1:2], np.array([[0.0, 0.0, 2.0]]), 1e4)[0, 2] == pytest.approx(0.75 + 2e-4)
 
 
-def test_positions_in_a_long_silence_between_reports_are_unknown() -> None:
-    stamps, places = np.array([0.0, 0.01, 0.5, 0.51]), np.zeros((4, 3))
-    found = positions_at(np.array([0.005, 0.2, 0.5, 0.505]), stamps, places, longest=0.02)
-    assert np.isfinite(found).all(axis=1).tolist() == [True, False, False, True]
+def test_a_long_silence_hides_the_way_on_a_flank_and_nothing_on_the_flat() -> None:
+    stamps, up = np.array([0.0, 0.01, 0.5, 0.51, 1.0]), np.tile([0.0, 0.0, 1.0], (5, 1))
+    places = np.array([[0.0, 0, 0], [1e-4, 0, 0], [5e-3, 0, 0], [5e-3, 0, 0], [8e-3, 0, 1e-3]])
+    times = np.array([0.005, 0.2, 0.5, 0.505, 0.7])
+    assert known_at(times, stamps, places, up, 0.02, 1e-5).tolist() == [True, True, True, True, False]
 
 
 def test_reports_that_came_late_to_a_busy_host_are_not_trusted() -> None:
