@@ -54,9 +54,9 @@ def line_features(members: list[Crossing], kind: str, around: Around) -> list[Fe
     if len(clusters) < 2:
         return []
     points = np.array([mean_point(cluster) for cluster in clusters])
-    lines = branches(
-        points, half_width, _links(points, members[0].height, half_width, around.tip_radius, around.inspection)
-    )
+    links = _links(points, members[0].height, half_width, around.tip_radius, around.inspection)
+    # a lone point that is left between two meeting places is no line
+    lines = [branch for branch in branches(points, half_width, links) if len(branch.axis) > 1]
     features = []
     for branch in lines:
         others = [other.axis for other in lines if other is not branch]
