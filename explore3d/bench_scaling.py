@@ -9,20 +9,26 @@ from __future__ import annotations
 import json
 import resource
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, field
+from itertools import groupby
 from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
 
 AXES = ("samples", "triangles", "features")
 SAMPLES = (10_000, 100_000, 1_000_000, 3_000_000, 10_000_000)
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 FEATURES = (0, 10, 50, 200)
 HUGE = (100_000_000,)
+# Sizes from which on what the program costs to start does not count
+LARGE = {"samples": 1_000_000}
 QUERIES = 20_000
 LOG_OF_FEATURES = 3_000_000  # samples of the log in which features are counted
 
@@ -103,38 +109,53 @@ def _peak() -> int:
 
 
 def exponents(costs: Sequence[Cost]) -> dict[str, tuple[float, float]]:
-    """Of each axis: the exponents of time and of memory in its size, by least squares on the upper half of sizes.
+    """Of each axis: the exponents of time and of memory in its size, by least squares on the larger sizes.
 
-    For features, which begin at none, the cost of none is taken off first.
+    For features, which begin at none, the cost of none is taken off the time first; NaN where nothing is left.
     """
     fitted = {}
     for axis in AXES:
         own = sorted((cost for cost in costs if cost.axis == axis), key=lambda cost: cost.size)
-        bare = own[0] if own and own[0].size == 0 else None
-        used = [cost for cost in own if cost.size > 0]
-        used = used[len(used) // 2 - (1 if len(used) < 4 else 0) :] if len(used) > 2 else used
-        if len(used) < 2:
-            continue
-        size = np.log([cost.size for cost in used])
-        seconds = np.array([cost.seconds - (bare.seconds if bare else 0.0) for cost in used])
-        memory = np.array([float(cost.memory) for cost in used])
-        slopes = [float(np.polyfit(size, np.log(np.maximum(each, 1e-9)), 1)[0]) for each in (seconds, memory)]
-        fitted[axis] = (slopes[0], slopes[1])
+        bare = own[0].seconds if own and own[0].size == 0 else 0.0
+        used = _larger(axis, [cost for cost in own if cost.size > 0])
+        if len(used) >= 2:
+            size = np.array([cost.size for cost in used], dtype=np.float64)
+            seconds = np.array([cost.seconds - bare for cost in used])
+            memory = np.array([float(cost.memory) for cost in used])
+            fitted[axis] = (_slope(size, seconds), _slope(size, memory))
     return fitted
 
 
+def _larger(axis: str, costs: list[Cost]) -> list[Cost]:
+    """Those costs, in the order of size, that growth and not the start of the program decides."""
+    if len(large := [cost for cost in costs if cost.size >= LARGE.get(axis, np.inf)]) >= 2:
+        return large
+    return costs[-max(2, min(3, len(costs))) :]
+
+
+def _slope(size: FloatArray, cost: FloatArray) -> float:
+    return float(np.polyfit(np.log(size), np.log(cost), 1)[0]) if (cost > 0).all() else float("nan")
+
+
 def lines(costs: Iterator[Cost]) -> Iterator[str]:
-    """A line for each size as it is done, the exponents at the end."""
+    """A line for each size as it is done, the exponents after each axis and, all together, at the end."""
     every: list[Cost] = []
     yield f"{'axis':10}{'size':>12}{'s':>9}{'MB':>8}{'found':>7}  stages"
-    for cost in costs:
-        every.append(cost)
-        stages = ", ".join(f"{name} {seconds:.1f}" for name, seconds in cost.stages.items() if seconds >= 0.05)
-        yield f"{cost.axis:10}{cost.size:12,}{cost.seconds:9.2f}{cost.memory / 1e6:8.0f}{cost.found:7}  {stages}"
-    told = [
-        f"{axis}: time ~ n^{time:.2f}, memory ~ n^{memory:.2f}" for axis, (time, memory) in exponents(every).items()
-    ]
-    yield "scaling: " + "; ".join(told)
+    for axis, own in groupby(costs, key=lambda cost: cost.axis):
+        for cost in own:
+            every.append(cost)
+            stages = ", ".join(f"{name} {seconds:.1f}" for name, seconds in cost.stages.items() if seconds >= 0.05)
+            yield f"{axis:10}{cost.size:12,}{cost.seconds:9.2f}{cost.memory / 1e6:8.0f}{cost.found:7}  {stages}"
+        yield _told({axis: exponents(every).get(axis)})
+    fitted = exponents(every)
+    yield "scaling: " + _told({axis: fitted.get(axis) for axis in dict.fromkeys(cost.axis for cost in every)})
+
+
+def _told(fitted: Mapping[str, tuple[float, float] | None]) -> str:
+    return "; ".join(
+        f"{axis}: too few sizes to fit" if each is None else f"{axis}: time ~ n^{each[0]:.2f}, memory ~ n^{each[1]:.2f}"
+        for axis, each in fitted.items()
+    )
 
 
 def _read(store: Path) -> list[Cost]:

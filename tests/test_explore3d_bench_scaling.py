@@ -22,6 +22,16 @@ def test_exponents_are_those_of_the_costs():
     assert "samples: time ~ n^1.00" in list(lines(iter(costs)))[-1]
 
 
+def test_small_logs_do_not_count_and_what_features_cannot_tell_is_said():
+    costs = [Cost("samples", 10**k, max(1.0, 1e-6 * 10**k), 1000) for k in (4, 5, 6, 7)]
+    costs += [Cost("triangles", 1000, 1.0, 1000)]
+    costs += [Cost("features", n, 5.0 - 0.001 * n, 1000) for n in (0, 10, 50)]
+    told = list(lines(iter(costs)))
+    assert "samples: time ~ n^1.00, memory ~ n^0.00" in told
+    assert "triangles: too few sizes to fit" in told
+    assert told[-1].endswith("features: time ~ n^nan, memory ~ n^0.00")
+
+
 def test_wires_do_not_touch_each_other():
     for count in (1, 4, 50, 200):
         axes = wire_axes(count, 0.8, 0.09)
