@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,14 @@ from planners.crest import is_step, seen_again
 from planners.plan import Outcome, Plan
 from planners.ridge_end import Crest, EndFinder
 from planners.sense import Sense
-from planners.strokes import Strokes
+from planners.strokes import Strokes, to_and_fro
 
 FloatArray = NDArray[np.float64]
 Crossed = Generator[Move, Trace, Crossing | None]
 
-# A crossing lower than this share of the ridge's last heights lies beyond its end
-STILL_HIGH = 0.7
+# A crossing lower than this share of the ridge's last heights lies beyond its end; a faint line's height is too
+# uncertain for more than the middle between all and nothing
+STILL_HIGH, STILL_SEEN = 0.7, 0.5
 FALLING = 0.9
 
 
@@ -60,6 +61,7 @@ class RidgeFollower:
         precision: wanted standard deviation of an end, m.
         longest_step: largest distance between two crossings, m; None: one tip radius.
         known: tells whether a point lies on an axis found before (there the ridge joins it).
+        passes: sweeps to and fro at every crossing, taken together: a single one does not show a faint line.
     """
 
     strokes: Strokes
@@ -68,6 +70,7 @@ class RidgeFollower:
     precision: float
     longest_step: float | None = None
     known: Callable[[FloatArray], bool] = lambda point: False
+    passes: int = 1
 
     def follow(self, seed: Crossing, ways: list[FloatArray]) -> Plan:
         """Follow from a seed in one or two directions (3,); the outcome's value is an AxisTrack or None."""
@@ -101,7 +104,7 @@ class RidgeFollower:
             if walk.cut and walk.along[-1] < 0.5 * step:
                 return AxisEnd(walk.points[-1], 0.0, "edge of the model", walk.directions[-1])
             reach = max(0.6 * line.half_width, 0.25 * step)
-            lowest = STILL_HIGH * line.height
+            lowest = (STILL_HIGH if self.passes == 1 else STILL_SEEN) * line.height
             found = yield from self._cross(walk.points[-1], walk.directions[-1], last, sign, reach, lowest)
             if found is None:
                 gone = float(walk.along[-1])
@@ -129,6 +132,8 @@ class RidgeFollower:
     def _first(self, seed: Crossing, heading: FloatArray, sign: float) -> Crossed:
         """The seed crossed squarely: a sweep that met the ridge at a slant saw it too wide."""
         half = 2.5 * seed.half_width
+        if self.passes > 1:
+            return (yield from self._cross(seed.point, heading, seed, sign, seed.half_width, 0.3 * abs(seed.height)))
         trace = yield self.strokes.line(seed.point, np.cross(seed.normal, heading), half, half)
         if is_step(seed) and self._stays_high(trace, sign * abs(seed.height)):
             return seed
@@ -148,15 +153,37 @@ class RidgeFollower:
     def _cross(
         self, point: FloatArray, heading: FloatArray, like: Crossing, sign: float, reach: float, lowest: float
     ) -> Crossed:
-        """Cross the ridge at a predicted point, square to its heading; a sweep that felt nothing is repeated once."""
+        """Cross the ridge at a predicted point, square to its heading.
+
+        A sweep that felt nothing is repeated once, and so are the passes over a faint line that did not show it.
+        """
         _, normal = self.strokes.onto(point)
         way = np.cross(normal, heading)
         half = (2.5 if is_step(like) else 1.6) * like.half_width + reach
         move = self.strokes.line(point, way, half, half)
-        trace = yield move
-        if len(trace) == 0:
-            trace = yield move
-        found = seen_again(trace, self.sense.base, self.noise, point, way, like, reach)
+        felt: list[Trace] = []
+        for _ in range(2):
+            felt.extend((yield from to_and_fro(move, self.passes)))
+            if felt and (found := self._seen(felt, point, way, like, sign, reach, lowest)) is not None:
+                return found
+            if felt and self.passes == 1:
+                break
+        return None
+
+    def _seen(
+        self,
+        felt: list[Trace],
+        point: FloatArray,
+        way: FloatArray,
+        like: Crossing,
+        sign: float,
+        reach: float,
+        lowest: float,
+    ) -> Crossing | None:
+        """The crossing that several sweeps over one line show together, if it is high enough."""
+        # the correlated part of the noise averages out over the passes, not along them
+        noise = replace(self.noise, correlated=self.noise.correlated / np.sqrt(len(felt)))
+        found = seen_again(Trace.concatenate(felt), self.sense.base, noise, point, way, like, reach)
         return found if found is not None and sign * found.height >= lowest else None
 
     def _end(self, line: Line, ahead: Course, gone: float, sign: float) -> Generator[Move, Trace, AxisEnd]:
@@ -165,16 +192,22 @@ class RidgeFollower:
             return AxisEnd(line.crossings[-1].point, 0.5 * gone, "end", ahead.heading, gone)
         farthest = line.crossings[-1].point
         # where the crest has begun to fall it has ended already, and what lies beside it pulls at the crossing
-        while len(line.crossings) > 2 and abs(line.crossings[-1].height) < FALLING * line.height:
+        while len(line.crossings) > 2 and self._is_falling(line):
             line.crossings.pop()
         last = line.crossings[-1]
         gone += float(np.linalg.norm(farthest - last.point))
         ahead = course(line.points, last.normal, ahead.heading, self.strokes.tip_radius)
         rough = AxisEnd(ahead.point, np.inf, "end", ahead.heading, gone, ahead.turn)
-        finder = EndFinder(self.strokes, self.sense.base, self.noise)
+        finder = EndFinder(self.strokes, self.sense.base, self.noise, self.passes)
         # the last crossing may lie beyond the end already
         height, sd = mean_height(line.crossings[:-1] or line.crossings)
         return (yield from finder.slide(rough, Crest(height, sd, line.half_width, sign)))
+
+    def _is_falling(self, line: Line) -> bool:
+        """True if the last crossing is lower than the line."""
+        last = line.crossings[-1]
+        doubt = 0.0 if self.passes == 1 else 2.0 * last.height_sd
+        return abs(last.height) + doubt < FALLING * line.height
 
 
 def _returned(line: Line) -> bool:

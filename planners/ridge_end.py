@@ -15,7 +15,7 @@ from mapping.trace import Trace
 from planners.axis_track import AxisEnd, Slides
 from planners.crest import flattening
 from planners.shape_fit import ShapeFit, end_shape, fit_shape
-from planners.strokes import Strokes, tangential
+from planners.strokes import Strokes, tangential, to_and_fro
 
 FloatArray = NDArray[np.float64]
 
@@ -43,11 +43,13 @@ class EndFinder:
         strokes: how to touch.
         base: the global model.
         noise: of the samples.
+        passes: sweeps of the first slide, which must find the end: a single one does not show a faint line.
     """
 
     strokes: Strokes
     base: Base
     noise: Noise
+    passes: int = 1
 
     def slide(self, end: AxisEnd, crest: Crest) -> Generator[Move, Trace, AxisEnd]:
         """A better estimate of an end from one more sweep along the crest; the old one if that shows nothing."""
@@ -62,11 +64,14 @@ class EndFinder:
         here = float(along[len(back.points) - 1])
         swept = slice(None) if end.felt is None else self._swept(along - here, half, crest.sign)
         turn = 1 if end.felt is None or end.felt.count % 2 == 0 else -1
-        trace = yield self.strokes.over(points[swept][::turn], normals[swept][::turn])
-        if len(trace) < 32:
+        move = self.strokes.over(points[swept][::turn], normals[swept][::turn])
+        traces = yield from to_and_fro(move, self.passes if end.felt is None else 1)
+        felt = end.felt
+        for trace in traces:
+            feet = self.base.foot(trace.centers, tip)
+            felt = Slides.joined(felt, feet.points, feet.height)
+        if felt is None or sum(len(trace) for trace in traces) < 32:
             return end
-        feet = self.base.foot(trace.centers, tip)
-        felt = Slides.joined(end.felt, feet.points, feet.height)
         fit = self._fitted(felt, points, normals, along, crest, float(along[-1]) - 0.5 * half)
         inside = 0.02 * tip < fit.place < float(along[-1]) - 0.5 * half - 0.02 * tip
         if not inside or fit.sd > 0.2 * tip or abs(fit.height) < 0.4 * crest.height:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Generator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hw.moves import Move
 from mapping.base import Base
+from mapping.trace import Trace
 from planners.pressed_path import pressed_sweep
 
 FloatArray = NDArray[np.float64]
@@ -117,6 +119,17 @@ class Strokes:
         more = int(np.ceil(overlap / (2.0 * np.pi * radius) * count)) + 1
         index = np.arange(count + more) % count
         return self.over(points[index], normals[index])
+
+
+def to_and_fro(move: Move, times: int) -> Generator[Move, Trace, list[Trace]]:
+    """Make a sweep so many times, every second time backwards; what each felt, if it felt anything."""
+    back = replace(move, path=move.path[::-1], approach=move.approach[::-1])
+    felt = []
+    for number in range(times):
+        trace = yield move if number % 2 == 0 else back
+        if len(trace):
+            felt.append(trace)
+    return felt
 
 
 def _walked(points: FloatArray, normals: FloatArray, directions: FloatArray, going: NDArray[np.bool_]) -> Walk:
