@@ -53,7 +53,8 @@ def jet_curvature(
     """Curvature from polynomials of degree 2, 4 and 6 over neighbourhoods of 25 to 547 points.
 
     Each candidate's variance follows from the noise, its bias from how much it disagrees around the point with
-    narrower and higher ones; the weights of the mean fall with a power of their sum.
+    narrower and higher ones; the weights of the mean fall with a power of their sum. Ordinates are bent by the larger
+    curvature, found on a sample beforehand, so that wide neighbourhoods of tubes and balls are as good as flat ones.
 
     Args:
         body: mesh or points (N, 3), m.
@@ -75,6 +76,8 @@ def jet_curvature(
     jets = _Jets(place / size, rough[index], degree)
     sizes = np.array([s for s in SIZES if s <= max(len(index), SIZES[0])] if neighbours is None else [neighbours])
     level = jets.noise() if noise is None else noise / size
+    if neighbours is None:
+        jets.bend(sizes, level)
     if len(index) > LARGE:
         sizes = jets.worthwhile(sizes, level)
     operators, slopes, sd = jets.weighed(sizes, level, fixed=neighbours is not None)
@@ -140,13 +143,14 @@ class _Jets:
         self.place, self.degree = place, degree
         self.tree = cKDTree(place)
         self.normals = _smoothed_normals(place, rough, self.tree)
+        self.bends = np.zeros(len(place))
 
     def fit(self, chosen: IntArray, sizes: IntArray) -> _Candidates:
         """Every candidate at the chosen points."""
         from mapping.jet_kernels import fit_jets
 
         near = self.near(chosen, int(sizes[-1]))
-        return _Candidates(*fit_jets(self.place, self.normals, near, chosen, sizes, self.degree))
+        return _Candidates(*fit_jets(self.place, self.normals, near, chosen, self.bends[chosen], sizes, self.degree))
 
     def near(self, chosen: IntArray, count: int) -> IntArray:
         """(M, count) nearest points, nearest first; N where there are no more."""
@@ -171,6 +175,19 @@ class _Jets:
         first, second = np.median(rests, axis=0) ** 2 / (1 - 2 / (9 * free)) ** 3
         growth = (SMALL[1] / SMALL[0]) ** (self.degree + 1)
         return float(np.sqrt(max((growth * first - second) / (growth - 1), NOISE_FLOOR**2 * first)))
+
+    def bend(self, sizes: IntArray, noise: float) -> None:
+        """Bend all ordinates by the larger curvature at the nearest point of a sample, found without bending."""
+        from scipy.spatial import cKDTree
+
+        sample = self.sample()
+        found, tree = self.fit(sample, sizes), cKDTree(self.place[sample])
+        pools = tree.query(self.place[sample], k=min(POOL // POOL_STEP, len(sample)))[1].reshape(len(sample), -1)
+        weights = self._weights(found, found.deviations(noise), np.arange(len(sample)), pools, sizes, noise)[0]
+        a, b, c = np.einsum("msd,msdk->km", weights, np.nan_to_num(found.operators))
+        mean, half = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
+        larger = np.nan_to_num(np.where(mean < 0, mean - half, mean + half))
+        self.bends = larger[tree.query(self.place, workers=-1)[1]]
 
     def worthwhile(self, sizes: IntArray, noise: float) -> IntArray:
         """The sizes that points of a sample give most weight to, with those that judge them."""
@@ -202,7 +219,7 @@ class _Jets:
             return (
                 np.einsum("msd,msdk->mk", weights, np.nan_to_num(every.operators[part])),
                 np.einsum("msd,msdk->mk", weights, every.slopes[part]),
-                np.sqrt(error / 2),
+                error / np.sqrt(2),
             )
 
         _in_threads(fill, parts)
@@ -216,7 +233,7 @@ class _Jets:
     def _weights(
         self, every: _Candidates, own: FloatArray, part: IntArray, pools: IntArray, sizes: IntArray, noise: float
     ) -> tuple[FloatArray, FloatArray]:
-        """(M, S, D) weights, NaN where no candidate has a value, and (M,) squared errors of the weighed means."""
+        """(M, S, D) weights, NaN where no candidate has a value, and (M,) errors of the weighed means."""
         from mapping.jet_kernels import pooled_bias
 
         bias = np.empty((len(part), *own.shape[1:]))
@@ -225,10 +242,10 @@ class _Jets:
         trust = np.maximum(own[part] ** 2 + bias, np.finfo(float).tiny ** 0.25) ** -SHARPNESS
         total = trust.sum(axis=(1, 2))
         weights = trust / np.where(total > 0, total, np.nan)[:, None, None]
-        # errors of the candidates partly cancel: the mean is about as good as its best member
-        error = every.part(part).misfits(noise) ** 2 + bias
-        least = error.reshape(len(part), -1).min(axis=1)
-        return weights, np.where(np.isfinite(least), least, np.nan)
+        # errors of nested fits go together: that of the mean is not below the mean of theirs by much
+        error = np.sqrt(every.part(part).misfits(noise) ** 2 + bias)
+        known = np.multiply(weights, error, where=weights > 0, out=np.zeros_like(error)).sum(axis=(1, 2))
+        return weights, np.where(np.isfinite(known) & (total > 0), known, np.nan)
 
     def bases(self, slopes: FloatArray) -> FloatArray:
         """(N, 2, 3) orthonormal bases of the tangent planes with the given slopes in the normals' frames."""

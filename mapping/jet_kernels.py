@@ -102,14 +102,21 @@ def _solve(triangle, columns, coefficients, row):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
-def _weingarten(coefficients, scale, out):  # type: ignore[no-untyped-def]
+def _weingarten(coefficients, scale, bend, out):  # type: ignore[no-untyped-def]
     """Symmetric 2 x 2 shape operator (a, b, c), outward positive, in an orthonormal basis of the tangent plane."""
-    p, q = coefficients[1], coefficients[2]
+    # derivatives of z from those of the bent ordinate z + bend z^2 / 2
+    rise = np.sqrt(max(1 + 2 * bend * coefficients[0], 0.25))
+    p, q = coefficients[1] / rise, coefficients[2] / rise
+    zuu, zuv, zvv = (
+        2 * coefficients[3] - bend * p * p,
+        coefficients[4] - bend * p * q,
+        2 * coefficients[5] - bend * q * q,
+    )
     first = np.sqrt(1 + p * p)
     cross = p * q / first
     second = np.sqrt(1 + p * p + q * q) / first
-    root = np.sqrt(1 + p * p + q * q) * scale
-    uu, uv, vv = -2 * coefficients[3] / root, -coefficients[4] / root, -2 * coefficients[5] / root
+    root = np.sqrt(1 + p * p + q * q) * scale * rise
+    uu, uv, vv = -zuu / root, -zuv / root, -zvv / root
     out[0] = uu / (first * first)
     out[1] = (uv - cross * uu / first) / (first * second)
     out[2] = (vv - 2 * cross * uv / first + cross * cross * uu / (first * first)) / (second * second)
@@ -131,8 +138,8 @@ def _frame(n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather(points, normals, near, centre, e1, e2, sizes, place, ends):  # type: ignore[no-untyped-def]
-    """Coordinates of the neighbours on this side of the body; `ends` counts them for each size."""
+def _gather(points, normals, near, centre, e1, e2, bend, sizes, place, ends):  # type: ignore[no-untyped-def]
+    """Coordinates of the neighbours on this side of the body, z bent; `ends` counts them for each size."""
     n, used, s = normals[centre], 0, 0
     for i in range(len(near)):
         while s < len(sizes) and i == sizes[s]:
@@ -150,7 +157,8 @@ def _gather(points, normals, near, centre, e1, e2, sizes, place, ends):  # type:
         )
         place[0, used] = dx * e1[0] + dy * e1[1] + dz * e1[2]
         place[1, used] = dx * e2[0] + dy * e2[1] + dz * e2[2]
-        place[2, used] = dx * n[0] + dy * n[1] + dz * n[2]
+        z = dx * n[0] + dy * n[1] + dz * n[2]
+        place[2, used] = z + 0.5 * bend * z * z
         used += 1
     ends[s:] = used
     return used
@@ -165,16 +173,20 @@ def _reach(place, first, last, reach):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def fit_jets(points, normals, neighbours, chosen, sizes, degree):  # type: ignore[no-untyped-def]
+def fit_jets(points, normals, neighbours, chosen, bends, sizes, degree):  # type: ignore[no-untyped-def]
     """Shape operators of chosen points by every neighbourhood size and every even degree up to the given one.
 
     The sizes are nested: each adds its new points to the triangle of the one before, and one triangle serves all
     degrees, so that all candidates together cost one fit over the largest neighbourhood.
 
+    The ordinate of the fits is z + k z^2 / 2, which is quadratic on a sphere or cylinder of curvature k, however much
+    of it the neighbourhood holds: a polynomial of z over the tangent plane would have to follow a square root.
+
     Args:
         points, normals: (N, 3) positions and the normals of the frames; neighbours on another side are left out.
         neighbours: (M, K) indices of the nearest points of each chosen point, nearest first; others are skipped.
         chosen: (M,) indices.
+        bends: (M,) about the curvature of larger absolute value there, outward positive; 0 if not known.
         sizes: (S,) neighbourhood sizes, ascending, at most K.
         degree: 2, 4 or 6.
 
@@ -195,7 +207,7 @@ def fit_jets(points, normals, neighbours, chosen, sizes, degree):  # type: ignor
     ends = np.zeros(len(sizes), dtype=np.int64)
     for m in range(count):
         e1, e2 = _frame(normals[chosen[m]])
-        used = _gather(points, normals, neighbours[m], chosen[m], e1, e2, sizes, place, ends)
+        used = _gather(points, normals, neighbours[m], chosen[m], e1, e2, bends[m], sizes, place, ends)
         scale = np.sqrt(_reach(place, 0, used, 0.0))
         if scale == 0.0:
             continue
@@ -219,7 +231,7 @@ def fit_jets(points, normals, neighbours, chosen, sizes, degree):  # type: ignor
                 if not _determined(triangle, terms, scale / np.sqrt(reach)):
                     continue
                 factors[m, s, d] = np.sqrt(_solve(triangle, terms, coefficients, row)) / (scale * scale)
-                _weingarten(coefficients, scale, operators[m, s, d])
+                _weingarten(coefficients, scale, bends[m] * scale, operators[m, s, d])
                 slopes[m, s, d] = coefficients[1:3]
                 rests[m, s, d] = np.sqrt(over / (last - terms)) * scale
     return operators, factors, rests, slopes
