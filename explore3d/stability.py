@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, TimeoutError
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from math import inf, isnan, log10, nan
+from math import isnan, log10, nan
 from multiprocessing import get_context
 from time import perf_counter
 
@@ -168,8 +168,10 @@ def summary(rows: Sequence[Row]) -> str:
     failed = [f"{row.group}: {row.name}" for row in rows if not row.passed]
     crashed = sum(row.fault.startswith("the process died") for row in rows)
     slowest = max((row.seconds for row in rows), default=0.0)
-    spare = min((digits(r.answer.error) - digits(min(r.allowed, 1.0)) for r in rows if r.answer.error > 0), default=inf)
-    end = f"fails: {'; '.join(failed)}" if failed else f"none fails (closest: {spare:.1f} digits to spare)"
+    numeric = [row for row in rows if not row.fault and not isnan(row.answer.error)]
+    spare = min((digits(row.answer.error) - digits(min(row.allowed, 1.0)) for row in numeric), default=nan)
+    closest = "" if isnan(spare) else f" (closest: {spare:.1f} digits to spare)"
+    end = f"fails: {'; '.join(failed)}" if failed else f"none fails{closest}"
     return f"stability: {len(rows)} cases, {len(failed)} failed, {crashed} crashed, slowest {slowest:.1f} s; {end}"
 
 

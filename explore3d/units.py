@@ -75,9 +75,19 @@ def unit_factor(unit: str, dimension: str = "length") -> float:
     for other, names in UNITS.items():
         if unit in names:
             raise UnitError(f"{unit!r} is a unit of {other}, not of {dimension}; possible: {', '.join(units)}")
-    near = get_close_matches(unit, units, n=1)
-    hint = f" did you mean {near[0]!r}?" if near else ""
+    # one letter off in a unit of two is no close match by length, yet the likeliest slip
+    near = [name for name in units if _one_key_off(unit, name)] or get_close_matches(unit, units, n=1)
+    hint = f" did you mean {' or '.join(map(repr, near))}?" if near else ""
     raise UnitError(f"unknown unit of {dimension} {unit!r};{hint} possible: {', '.join(units)}")
+
+
+def _one_key_off(one: str, other: str) -> bool:
+    """True if two names of one length differ in a single letter, or in the order of two."""
+    if len(one) != len(other) or len(one) < 2:
+        return False
+    wrong = [k for k, (a, b) in enumerate(zip(one, other, strict=True)) if a != b]
+    swapped = len(wrong) == 2 and one[wrong[0]] + one[wrong[1]] == other[wrong[1]] + other[wrong[0]]
+    return len(wrong) == 1 or swapped
 
 
 def parse_length(value: object) -> float:

@@ -165,7 +165,7 @@ def _read(file: Path) -> tuple[Record, dict[str, FloatArray]]:
     try:
         record = json.loads(file.read_text("utf-8"))
     except (OSError, ValueError) as error:
-        raise ModelError(f"{file} is not a readable model: {error}") from error
+        raise ModelError(f"{file} is not a readable model: {_why(error)}") from error
     if not isinstance(record, dict) or record.get("schema") != SCHEMA:
         found = record.get("schema") if isinstance(record, dict) else type(record).__name__
         raise ModelError(f"{file}: expected schema {SCHEMA!r}, found {found!r}")
@@ -174,4 +174,9 @@ def _read(file: Path) -> tuple[Record, dict[str, FloatArray]]:
         with np.load(arrays, allow_pickle=False) as bundle:
             return record, dict(bundle)
     except (OSError, ValueError, BadZipFile) as error:
-        raise ModelError(f"{arrays}, which holds the arrays of {file.name}, cannot be read: {error}") from error
+        raise ModelError(f"{arrays}, which holds the arrays of {file.name}, cannot be read: {_why(error)}") from error
+
+
+def _why(error: Exception) -> str:
+    """The error in words, without its number and the file that the message names already."""
+    return str(getattr(error, "strerror", None) or error)

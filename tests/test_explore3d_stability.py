@@ -32,6 +32,8 @@ def test_a_case_may_lose_what_its_condition_number_explains_and_no_more():
     assert not row(Answer("", error=nan, holds=False)).passed
     assert not row(Answer(""), seconds=61.0).passed
     assert not row(Answer(""), fault="the process died").passed
+    assert "closest" not in summary([row(Answer("an outcome"))])
+    assert "(closest: 2.2 digits to spare)" in summary([row(Answer("", error=0.0)), row(Answer("an outcome"))])
     assert "fails: group: case" in summary([row(Answer("", error=1.0))])
 
 

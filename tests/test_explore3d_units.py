@@ -59,6 +59,7 @@ def test_the_first_unit_of_each_dimension_is_the_si_unit(dimension: str) -> None
     ("value", "message"),
     [
         ("0.65", "unit missing in '0.65'; write for example \"0.65 mm\""),
+        ("1 mn", "unknown unit of length 'mn'; did you mean 'mm' or 'nm' or 'in'? possible: m, km, cm, mm"),
         ("1 mmm", "unknown unit of length 'mmm'; did you mean 'mm'? possible: m, km, cm, mm"),
         ("1 furlong", "unknown unit of length 'furlong'; possible: m, km"),
         ("1 N", "'N' is a unit of force, not of length; possible: m, km"),
