@@ -8,8 +8,8 @@ import numpy as np
 
 from mapping.noise import FloatArray, Noise, NoiseError
 
-# Degrees of freedom of what is stated: its tails let measurements that contradict it prevail.
-TAIL = 3.0
+# Degrees of freedom of what is stated (1: Cauchy's): its tails let measurements that contradict it prevail.
+TAIL = 1.0
 
 
 @dataclass(frozen=True)
