@@ -18,6 +18,8 @@ FloatArray = NDArray[np.float64]
 
 # Samples are averaged over this share of the explored size: about three pixels of a picture.
 FINEST = 0.0025
+# Samples that tell the explored size.
+ENOUGH = 50_000
 # Blocks from which the true length of a noisy path is taken.
 COARSE = 64
 
@@ -41,7 +43,7 @@ def sweep_paths(trace: Trace, base: Base, crossings: Sequence[Crossing] = ()) ->
     """
     if len(trace) == 0:
         return []
-    spacing = FINEST * float(np.linalg.norm(np.ptp(trace.centers, axis=0)))
+    spacing = FINEST * float(np.linalg.norm(np.ptp(trace.centers[:: 1 + len(trace) // ENOUGH], axis=0)))
     marked = _noticed(trace, crossings)
     means, middles = [], []
     for start, stop in _runs(trace):

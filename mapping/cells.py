@@ -30,12 +30,14 @@ class Cells:
     def of(cls, trace: Trace, most: int) -> Cells:
         """At most about `most` cells of equally many samples each; no cell spans two sweeps."""
         group = np.arange(len(trace)) * most // max(len(trace), most)
-        order = np.argsort(trace.sweep, kind="stable")  # by sweep and, within each, by group
-        sweep, group = trace.sweep[order], group[order]
+        if (np.diff(trace.sweep) < 0).any():  # by sweep and, within each, by group
+            order = np.argsort(trace.sweep, kind="stable")
+            trace, group = trace.select(order), group[order]
+        sweep = trace.sweep
         starts = np.flatnonzero((np.diff(sweep, prepend=sweep[:1] - 1) != 0) | (np.diff(group, prepend=-1) != 0))
         counts = np.diff(np.append(starts, len(trace)))[:, None]
-        centers = np.add.reduceat(trace.centers[order], starts) / counts
-        normals = None if trace.normals is None else np.add.reduceat(trace.normals[order], starts) / counts
+        centers = np.add.reduceat(trace.centers, starts) / counts
+        normals = None if trace.normals is None else np.add.reduceat(trace.normals, starts) / counts
         return cls(centers, sweep[starts], normals)
 
     def trace(self, tip_radius: float, keep: NDArray[np.bool_]) -> Trace:

@@ -16,8 +16,6 @@ FloatArray = NDArray[np.float64]
 LADDER = 1.2
 # Bins per half-width: averaging over a bin loses less than 1 %.
 BINS_PER_HALF_WIDTH = 12
-# Products up to which a convolution is summed directly.
-DIRECT = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,35 +40,16 @@ class MatchedFilter:
 
     def heights(self, profile: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Estimated height of a cap centred at each coarse bin of a profile (n,), and its standard deviation."""
+        from mapping.filter_kernels import filtered
+
         whole = len(profile) // self.coarse * self.coarse
-        bins = np.add.reduceat(profile[:whole], np.arange(0, whole, self.coarse)) / self.coarse
-        reach = len(self.weights) // 2
-        padded = np.zeros(len(bins) + 2 * reach)
-        padded[reach : reach + len(bins)] = bins
-        heights = _filtered(padded, self.weights)
-        sd = np.full(len(bins), self.sd)
+        bins = profile[:whole].reshape(-1, self.coarse).sum(axis=1) / self.coarse if self.coarse > 1 else profile
+        heights, sd = np.empty(len(bins)), np.full(len(bins), self.sd)
+        filtered(bins, self.weights, self.edge, heights)
         count = min(len(self.edge), len(bins))
-        heights[:count] = _at_edge(padded, self.edge[:count])
-        heights[len(bins) - count :] = _at_edge(padded[::-1], self.edge[:count])[::-1]
         sd[:count] = self.edge_sd[:count]
         sd[len(bins) - count :] = np.maximum(sd[len(bins) - count :], self.edge_sd[:count][::-1])
         return heights, sd
-
-
-def _at_edge(padded: FloatArray, weights: FloatArray) -> FloatArray:
-    """Sums weighted by a row of (m, k) weights for each of the first m places of a padded profile."""
-    stride = padded.strides[0]
-    windows = np.lib.stride_tricks.as_strided(padded, weights.shape, (stride, stride), writeable=False)
-    return np.asarray(np.einsum("ij,ij->i", windows, weights))
-
-
-def _filtered(values: FloatArray, weights: FloatArray) -> FloatArray:
-    """Weighted sums at every place where all weights find a value: directly if short, else by Fourier transforms."""
-    if len(values) * len(weights) < DIRECT:
-        return np.convolve(values, weights[::-1], mode="valid")
-    from scipy.signal import oaconvolve
-
-    return np.asarray(oaconvolve(values, weights[::-1], mode="valid"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,7 +48,7 @@ def block_likelihood(values, steps, samples, white, correlated, length):  # type
     power = correlated * correlated
     scatter = white * white / samples
     state, variance = 0.0, power
-    last, total_before, logarithm = -1.0, -1.0, 0.0
+    last, before, logarithm, gain, inverse, settled = -1.0, -1.0, 0.0, 0.0, 0.0, 0.0
     decay = pull = within = shared = fresh = 0.0
     result = 0.0
     for i in range(len(values)):
@@ -66,18 +66,19 @@ def block_likelihood(values, steps, samples, white, correlated, length):  # type
                 within = power * (2.0 * (x - 1.0 + decay) / (x * x) - pull * pull)
             shared = power * pull * (1.0 - decay)
             fresh = -power * np.expm1(-2.0 * x)
-            last = step
+            last, before = step, -1.0
         if np.isnan(values[i]):
             state *= decay
             variance = decay * decay * variance + fresh
             continue
-        total = pull * pull * variance + within + scatter
-        gain = (decay * pull * variance + shared) / total
         error = values[i] - pull * state
-        if total != total_before:
-            logarithm = np.log(total)
-            total_before = total
-        result += error * error / total + logarithm
+        if variance != before:  # along a run of equal blocks it soon stands still
+            before = variance
+            total = pull * pull * variance + within + scatter
+            gain = (decay * pull * variance + shared) / total
+            inverse, logarithm = 1.0 / total, np.log(total)
+            settled = decay * decay * variance + fresh - gain * gain * total
+        variance = settled
+        result += error * error * inverse + logarithm
         state = decay * state + gain * error
-        variance = decay * decay * variance + fresh - gain * gain * total
     return result

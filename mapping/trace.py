@@ -63,8 +63,8 @@ class Trace:
         if array.shape != shape:
             raise TraceError(f"trace field {name} must have shape {shape} to match centers; found {array.shape}")
         finite = np.isfinite(array)
-        bad = ~(finite if array.ndim == 1 else finite.all(axis=1))
-        if bad.any():
+        if not finite.all():
+            bad = ~(finite if array.ndim == 1 else finite.all(axis=1))
             raise TraceError(
                 f"trace field {name} must be finite; {int(bad.sum())} of {len(array)} samples are not, "
                 f"the first is sample {int(bad.argmax())}"
