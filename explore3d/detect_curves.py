@@ -57,8 +57,9 @@ def _short(value: Any) -> Any:
 
 def _picture(cells: list[Cell], feature: str, kind: str) -> Any:
     """Recall above, false alarms per metre below, one column for each level of noise."""
-    noises = sorted({c.noise for c in cells})
-    figure = new_figure(3.4 * len(noises) + 0.6, 5.2)
+    noises, sizes = sorted({c.noise for c in cells}), sorted({c.size for c in cells})
+    alone = len(noises) == 1  # a narrow figure: its legend needs more rows
+    figure = new_figure(4.6 if alone else 3.4 * len(noises) + 0.6, 5.8 if alone else 5.2)
     axes = figure.subplots(2, len(noises), sharex=True, squeeze=False)
     for column, noise in enumerate(noises):
         recall, alarms = axes[:, column]
@@ -75,12 +76,15 @@ def _picture(cells: list[Cell], feature: str, kind: str) -> Any:
             recall.plot(
                 [c.size for c in bound], [c.bound for c in bound], "--", color=MUTED, label="matched-filter bound"
             )
-        alarms.axhline(RATE, color=MUTED, lw=0.8, ls=":", label="asked for")
+        alarms.axhline(RATE, color=MUTED, lw=0.8, ls=":", label="false alarms asked for")
         recall.set(title=f"noise / r = {noise:g}, {kind}", ylim=(-0.03, 1.03), xscale="log")
         alarms.set(yscale="log", ylim=(NONE / 2, 1e4), xlabel="diameter / r" if feature == "wire" else "width / r")
+        alarms.set_xticks(sizes, [f"{size:g}" for size in sizes])
+        alarms.set_xticks([], minor=True)
         alarms.set_yticks([NONE, 1e-2, 1, 1e2, 1e4], ["none", "0.01", "1", "100", "10 000"])
     axes[0, 0].set_ylabel(f"recall of a {feature}")
     axes[1, 0].set_ylabel("false alarms per metre")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    pairs = [pair for panel in axes[:, 0] for pair in zip(*panel.get_legend_handles_labels(), strict=True)]
+    entries = {label: handle for handle, label in pairs}
+    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=2 if alone else 4)
     return figure
