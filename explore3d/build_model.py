@@ -103,7 +103,9 @@ def _base(trace: Trace, base: Base | None, stages: Stages) -> Base:
 def _placed(trace: Trace, base: Base, scene: Scene | None, stages: Stages) -> Base:
     """The base where the object really stands, by everything that was felt; the first sweeps told it roughly."""
     why_not = "" if scene is not None and scene.model.pose == "estimate" else "the model's pose was given"
-    if not stages.needed("pose", why_not) or scene is None or scene.model.pose != "estimate":
+    # without a scene nothing says how far off the object may stand; a base that was felt stands where it was felt
+    possible = scene is not None and base.kind == "mesh"
+    if not stages.needed("pose", why_not, possible=possible) or scene is None:
         return base
     from mapping.pose import Pose, estimate_pose
 
@@ -238,7 +240,7 @@ def _curvature(estimate: Estimate | None, stages: Stages) -> Curvature | None:
         why_not = "a single profile has no surface: its curvature is in the crossings"
     else:
         why_not = ""
-    if not stages.needed("curvature", why_not) or estimate is None or estimate.surface is None:
+    if not stages.needed("curvature", why_not, possible=False) or estimate is None or estimate.surface is None:
         return None
     from mapping.curvature import principal_curvatures
 
@@ -250,7 +252,7 @@ def _time_curve(
     model: ObjectModel, truth: tuple[TrueFeature, ...], trace: Trace, detections: Detections, stages: Stages
 ) -> tuple[tuple[float, float], ...]:
     why_not = "" if truth and model.features else "the truth is not known, or nothing was found"
-    if not stages.needed("error against time", why_not) or not truth or not model.features:
+    if not stages.needed("error against time", why_not, possible=False):
         return ()
     from explore3d.time_curve import time_curve
 

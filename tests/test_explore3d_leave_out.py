@@ -97,6 +97,26 @@ def test_a_trace_without_noise_needs_no_smoothing_and_one_moves_no_point(record)
     assert raw.model.features[0].height == smoothed.model.features[0].height
 
 
+def test_a_given_pose_needs_no_search_and_one_finds_the_object_where_it_is(record):
+    path = record(wire(), 0.02e-3, scene=EMPTY.read_text())
+    given, sought = analyze(path), analyze(path, force=["pose"])
+    assert "pose" in left(given)
+    assert "pose" in sought.timings
+    assert np.abs(sought.base.surface.vertices - given.base.surface.vertices)[:, 2].max() < 0.05e-3
+    (one,), (other,) = given.model.features, sought.model.features
+    assert abs(one.height.median - other.height.median) < 0.01e-3
+
+
+@pytest.mark.slow
+def test_a_bare_object_needs_no_rendering_and_a_picture_of_it_changes_no_number(record, tmp_path):
+    path = record(flat, 0.1e-3)
+    bare, drawn = analyze(path, tmp_path / "bare"), analyze(path, tmp_path / "drawn", force=["rendered pictures"])
+    assert not (tmp_path / "bare" / "pictures" / "object.png").exists()
+    assert (tmp_path / "drawn" / "pictures" / "object.png").exists()
+    assert bare.model.features == drawn.model.features
+    assert bare.detections.threshold == drawn.detections.threshold
+
+
 NOTHING = ("grammar", "posterior", "estimated surface", "curvature", "error against time")
 
 
