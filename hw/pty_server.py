@@ -109,10 +109,12 @@ class PtyServer:
                 readable, _, _ = select.select(list(masters), [], [], TICK)
                 wall = time.monotonic() - self._begun
                 self._strike(wall)
+                # all come to the present first: what one is told now must not show in another's past
+                for device in reversed(self.devices):
+                    device.advance(wall * self.pace)
                 for master in readable:
                     self._hear(masters[master], wall)
-                for index, device in reversed(list(enumerate(self.devices))):
-                    device.advance(wall * self.pace)
+                for index, device in enumerate(self.devices):
                     self._speak(index, device, wall)
         except BaseException as error:  # shown to whoever asks why the device fell silent
             self.error = error
