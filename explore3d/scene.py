@@ -35,7 +35,8 @@ SCHEMA = "explore3d/scene/1"
 class Tip(Table):
     """The spherical fingertip: `radius` in metres, or a `profile` of explore3d calibrate that says it.
 
-    With a `radius_sd` (m) above 0 the radius is known only up to that, and each posterior asks for it too.
+    With a `radius_sd` (m) above 0 the radius is known only up to that, and each posterior asks for it too; a profile
+    says it unless the scene does.
     """
 
     radius: Length
@@ -250,16 +251,17 @@ def parse_scene(text: str, path: Path | str) -> Scene:
 
 
 def _with_profile(tables: dict[str, Any], path: Path) -> dict[str, Any]:
-    """The tables with the tip radius of the tip profile that they name."""
+    """The tables with the tip radius of the tip profile that they name, and how well it is known."""
     tip = tables.get("tip")
     if not isinstance(tip, dict) or not isinstance(tip.get("profile"), str) or "radius" in tip:
         return tables  # beside a radius the profile only says where it came from, as in a resolved scene
     profile = path.resolve().parent / tip["profile"]
     try:
-        radius = tomllib.loads(profile.read_text(encoding="utf-8"))["radius"]
+        known = tomllib.loads(profile.read_text(encoding="utf-8"))
+        radius, doubt = known["radius"], {"radius_sd": known["radius_sd"]}
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError) as error:
         raise SceneError(f"{path}: tip.profile: {profile}: not a tip profile of calibrate ({error})") from error
-    return tables | {"tip": tip | {"radius": radius, "profile": str(profile)}}
+    return tables | {"tip": doubt | tip | {"radius": radius, "profile": str(profile)}}
 
 
 def _with_absolute_paths(scene: Scene, folder: Path) -> Scene:
