@@ -61,11 +61,10 @@ def test_exploring_survives_a_fault_at_the_beginning_in_the_midst_and_late(fault
     record, outcome = ended("explore", fault, {0, 7, 14, 17, 18, 23, 26, 30, 31, 32})
     assert outcome.reason in REASONS and outcome.detail
     assert outcome.reason == "done" and outcome.value.tracks, outcome.detail
-    # the ridge may come in pieces, and a crossing that was cut short lies beside, but they are where it is
+    # the ridge may come in pieces, but they lie where it is
     for track in outcome.value.tracks:
         beside = np.cross(track.points - AXIS[0], (AXIS[1] - AXIS[0]) / np.linalg.norm(AXIS[1] - AXIS[0]))
-        assert np.median(np.linalg.norm(beside, axis=1)) < 1e-3
-        assert np.linalg.norm(beside, axis=1).max() < 0.5 * R
+        assert np.linalg.norm(beside, axis=1).max() < 1e-3
     assert len(record) > 20 and all(np.isfinite(trace.centers).all() for _, trace in record)
 
 
