@@ -83,7 +83,7 @@ def from_operators(operators: FloatArray, bases: FloatArray, sd: FloatArray, val
     angle = 0.5 * np.arctan2(2 * b, a - c)
     d1 = np.cos(angle)[:, None] * bases[:, 0] + np.sin(angle)[:, None] * bases[:, 1]
     d2 = -np.sin(angle)[:, None] * bases[:, 0] + np.cos(angle)[:, None] * bases[:, 1]
-    umbilic = ~(2 * half > 2 * np.nan_to_num(sd, nan=0.0) + 1e-9 * np.abs(mean)) | ~valid
+    umbilic = ~(half > np.nan_to_num(sd, nan=0.0) + 0.5e-9 * np.abs(mean)) | ~valid
     d1[umbilic], d2[umbilic] = np.nan, np.nan
     k1, k2 = np.where(valid, mean + half, np.nan), np.where(valid, mean - half, np.nan)
     return Curvature(k1, k2, d1, d2, np.where(valid, sd, np.nan), valid)
