@@ -31,6 +31,8 @@ METHODS = ("envelope", "contact", "normals", "alpha")
 TOLERANCE = 1e-9
 # The doubt of a slope is an estimate, no bound: it must be this much smaller than what would be harmless.
 CAUTION = 2.0
+# More points of a mesh than this cost memory and minutes of curvature, on bodies that no picture shows so finely.
+MOST_POINTS = 300_000
 
 
 def estimate_surface(
@@ -54,7 +56,7 @@ def estimate_surface(
         noise: if given, the trace is smoothed at the scale that this noise demands (paper, section 3.3);
             without it the trace is taken as exact, and ball operators on noise are biased.
         spacing: distance to which points are thinned along the sweeps, m; None takes all points of a single
-            sweep and a quarter of the distance between several.
+            sweep and a quarter of the distance between several, or more where that were more than MOST_POINTS.
 
     Returns:
         The estimate; contacts that lie inside another ball are impossible and left out.
@@ -86,11 +88,17 @@ def estimate_surface(
     if not possible.any():
         raise EnvelopeError("every contact lies inside another ball: the trace is no ball's path; give its noise")
     points = points.select(np.flatnonzero(possible))
-    step = pitch(trace.centers, trace.sweep) / 4 if spacing is None else spacing
+    step = _step(points, pitch(trace.centers, trace.sweep)) if spacing is None else spacing
     # Thinned by their own distances, and by their balls': over a sharp edge many balls share one contact.
     points = points.select(thinned(points.points, points.sweep, step, _bounding(points)))
     estimate = _meshed(points, trace, slack)
     return estimate if smoothed is None else replace(estimate, sd=smoothed.sd)
+
+
+def _step(points: Estimate, apart: float) -> float:
+    """Distance between points along sweeps that lie so far apart, m; 0 takes all."""
+    length = float(np.linalg.norm(np.diff(points.points, axis=0), axis=1).sum())
+    return max(apart / 4, length / MOST_POINTS) if apart > 0 else 0.0
 
 
 def _outward(trace: Trace, base: Base | None, outward: ArrayLike | None) -> FloatArray:

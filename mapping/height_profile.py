@@ -17,6 +17,8 @@ IntArray = NDArray[np.int64]
 # the path does not.
 LENGTH_TOLERANCE = 0.01
 LARGEST_FIRST_BLOCK_COUNT = 2000
+# Steps in time that exceed the mean by this factor hold samples that were left out.
+UNEVEN = 1.5
 # A gap of more than this many bins, and of more than this share of the tip radius, cuts a profile: nothing was
 # touched there. A shorter one is a tip that was thrown off for a moment; the ball saw no detail that narrow.
 LONGEST_GAP, NARROW = 2, 0.03
@@ -81,11 +83,24 @@ def arclength(trace: Trace, base: Base) -> FloatArray:
     feet = base.foot(means, trace.tip_radius)
     lowered = feet.points + trace.tip_radius * feet.normals
     knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(lowered, axis=0), axis=1))])
-    index = (np.arange(count) - 0.5 * (size - 1)) / size
-    inner = np.interp(index, np.arange(len(knots)), knots)
-    before, after = knots[1] - knots[0], knots[-1] - knots[-2]
-    inner += np.minimum(index, 0.0) * before + np.maximum(index - (len(knots) - 1), 0.0) * after
+    place, middles = _progress(trace, size, len(knots))
+    inner = np.interp(place, middles, knots)
+    before, after = np.diff(knots[[0, 1, -2, -1]])[::2] / np.diff(middles[[0, 1, -2, -1]])[::2]
+    inner += np.minimum(place - middles[0], 0.0) * before + np.maximum(place - middles[-1], 0.0) * after
     return np.asarray(inner - inner[0])
+
+
+def _progress(trace: Trace, size: int, blocks: int) -> tuple[FloatArray, FloatArray]:
+    """(N,) how far each sample is along its sweep, and the means of that over so many blocks.
+
+    The samples' count, as they come evenly; their times where many were left out between some of them.
+    """
+    steps = np.diff(trace.t)
+    even = steps.min() <= 0 or steps.max() <= UNEVEN * steps.mean()
+    place = np.arange(len(trace), dtype=np.float64) if even else trace.t - trace.t[0]
+    if blocks * size > len(trace):  # two blocks of a sample each: its ends
+        return place, place[[0, -1]]
+    return place, place[: blocks * size].reshape(blocks, size).mean(axis=1)
 
 
 def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing: float) -> tuple[HeightProfile, ...]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.base import Base
+from mapping.crossing import Crossing
 from mapping.height_profile import arclength, height_profiles
 from mapping.noise import Noise
 from mapping.trace import Trace
@@ -96,14 +98,21 @@ class Inspection:
             return False
         return bool((np.sign(height) * self.height[places] + 3 * self.sd < 0.5 * abs(height)).any())
 
+    def nearest(self, points: FloatArray) -> IntArray:
+        """(K,) index of the place nearest to each of the points (K, 3)."""
+        return np.asarray(self._tree.query(points)[1], dtype=np.int64)
+
     def inspected(self, point: FloatArray, reach: float) -> bool:
         """True if a sweep passed within `reach` of the point."""
         return bool(self._tree.query(point)[0] <= reach)
 
 
-def inspect(trace: Trace, base: Base, noise: Noise, spacing: float) -> Inspection:
-    """Mean heights over stretches of the given length along every sweep of the trace."""
-    points, height, sweep = [], [], []
+def inspect(trace: Trace, base: Base, noise: Noise, spacing: float, crossings: Sequence[Crossing] = ()) -> Inspection:
+    """Mean heights over stretches of the given length along every sweep of the trace.
+
+    What is known of a mean is stated for the places of the crossings: elsewhere many samples may have been left out.
+    """
+    points, height, sweep, count = [], [], [], []
     samples = 1.0
     for number, part in trace.sweeps():
         s = arclength(part, base)
@@ -113,8 +122,12 @@ def inspect(trace: Trace, base: Base, noise: Noise, spacing: float) -> Inspectio
             points.append(base.foot(profile.centers, part.tip_radius).points)
             height.append(profile.height)
             sweep.append(np.full(len(profile.height), number))
+            count.append(np.diff(profile.first))
             samples = max(profile.samples, 1.0)
     if not points:
         return Inspection(np.zeros((0, 3)), np.zeros(0), 0.0, np.zeros(0, dtype=np.int64), spacing)
-    sd = float(np.sqrt(noise.block_covariances(1, spacing, samples)[0]))
-    return Inspection(np.concatenate(points), np.concatenate(height), sd, np.concatenate(sweep), spacing)
+    found = Inspection(np.concatenate(points), np.concatenate(height), 0.0, np.concatenate(sweep), spacing)
+    if crossings:
+        there = found.nearest(np.array([crossing.point for crossing in crossings]))
+        samples = max(float(np.median(np.concatenate(count)[there])), 1.0)
+    return replace(found, sd=float(np.sqrt(noise.block_covariances(1, spacing, samples)[0])))

@@ -10,12 +10,14 @@ import pytest
 
 from explore3d import condense as module
 from explore3d.base_record import read_base
-from explore3d.bench_log import write_long_log
+from explore3d.bench_log import RADIUS, write_long_log
 from explore3d.condense import Condensed, condense
 from explore3d.log_reader import read_log
 from explore3d.log_stream import LogStream, count_samples, head, large_log
 from mapping.base import Base
 from mapping.detectors import detect
+from mapping.grammar import assemble
+from mapping.height_profile import arclength
 
 SAMPLES, CHUNK = 60_000, 12_000
 
@@ -105,6 +107,27 @@ def same(one: Condensed, other: Condensed) -> None:
     for a, b in zip(one.detections.crossings, other.detections.crossings, strict=True):
         np.testing.assert_array_equal(a.point, b.point)
         assert (a.start, a.stop, a.height, a.kind) == (b.start, b.stop, b.height, b.kind)
+
+
+def test_one_sample_in_sixty_is_enough_between_the_crossings(tmp_path: Path, monkeypatch):
+    (axis,) = write_long_log(tmp_path / "log.mcap", 400_000, wires=1)
+    monkeypatch.setattr(module, "KEPT", 400_000 // 60)
+    base = base_of(tmp_path / "log.mcap")
+    found = condense(LogStream(tmp_path / "log.mcap"), base, None)
+    assert len(found.trace) < found.samples / 2
+    (ridge,) = assemble(found.detections, found.trace, base)
+    assert ridge.evidence.crossings == len(found.detections.crossings) >= 10
+    assert ridge.height.median == pytest.approx(2 * RADIUS, abs=0.02e-3)
+    ends = ridge.axis[[0, -1]] if ridge.axis[0, 0] < ridge.axis[-1, 0] else ridge.axis[[-1, 0]]
+    assert np.linalg.norm((ends - axis)[:, :2], axis=1).max() < 1e-3
+
+
+def test_lengths_along_a_sweep_survive_samples_left_out_of_it(log: Path):
+    base = base_of(log)
+    _, sweep = next(read_log(log).trace.sweeps())
+    keep = np.r_[0:900:60, 900:1500, 1500 : len(sweep) : 60]
+    whole, part = arclength(sweep, base), arclength(sweep.select(keep), base)
+    assert np.abs(part - (whole[keep] - whole[0])).max() < 0.1e-3  # half the noise
 
 
 @pytest.mark.slow
