@@ -213,11 +213,17 @@ def _bin(
 def _without_spikes(
     height: FloatArray, edges: IntArray, count: IntArray, mean: FloatArray, noise_level: float
 ) -> tuple[FloatArray, IntArray]:
-    """Means and counts without single samples far outside their bin (a knock, a lost bit)."""
+    """Means and counts without single samples far outside their bin (a knock, a lost bit).
+
+    On a flank the samples of a bin differ by more than the noise: what lies between the medians of the bins beside it
+    is no spike.
+    """
     bins = np.repeat(np.arange(len(edges)), count)
     order = np.lexsort((height, bins))
     middle = height[order][edges + count // 2]
-    spike = (np.abs(height - middle[bins]) > 6.0 * noise_level) & (count[bins] >= 5)
+    beside = np.stack([middle, np.append(middle[:1], middle[:-1]), np.append(middle[1:], middle[-1:])])
+    low, high = beside.min(axis=0) - 6.0 * noise_level, beside.max(axis=0) + 6.0 * noise_level
+    spike = ((height < low[bins]) | (height > high[bins])) & (count[bins] >= 5)
     if not spike.any():
         return mean, count
     kept = np.where(spike, 0.0, height)

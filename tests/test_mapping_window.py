@@ -1,0 +1,45 @@
+"""Bins of a run: what is no noise stays in them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mapping.base import Base
+from mapping.shapes import cap_height
+from mapping.surface import Surface
+from mapping.trace import Trace
+from mapping.window import bin_samples, gather
+
+R, RADIUS, WIDTH, SIGMA = 5e-3, 0.325e-3, 85e-6, 1e-6
+
+
+def crossing(spikes: int = 0) -> Trace:
+    """A sweep of 15 mm across a wire, 5 um between samples, with noise far below what a flank rises over a bin."""
+    rng = np.random.default_rng(1)
+    x = np.arange(-7.5e-3, 7.5e-3, 5e-6)
+    height = cap_height(x, 2.0 * RADIUS, RADIUS, R) + SIGMA * rng.standard_normal(len(x))
+    height[rng.choice(len(x), spikes, replace=False)] += 1e-3
+    centers = np.column_stack([x, np.zeros_like(x), R + height])
+    return Trace(1e-3 * np.arange(len(x)), centers, np.zeros(len(x), dtype=np.int64), R)
+
+
+def window_of(trace: Trace):
+    corners = 0.02 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    base = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
+    return bin_samples(gather(trace, base, np.array([[0.0, 0.0, R]]), 7e-3), WIDTH, SIGMA, 2.5e-3)
+
+
+def test_the_samples_of_a_steep_flank_are_no_spikes() -> None:
+    trace = crossing()
+    window = window_of(trace)
+    assert window.samples == int((np.linalg.norm(trace.centers - [0.0, 0.0, R], axis=1) <= 7e-3).sum())
+    fine = np.linspace(-1.0, 1.0, 401) * window.half[:, None] + window.feet[:, :1]
+    expected = cap_height(fine, 2.0 * RADIUS, RADIUS, R).mean(axis=1)
+    assert np.abs(window.height - expected).max() < 2.5e-6  # the ends of a bin fall between samples
+
+
+def test_a_lost_bit_is_left_out_of_its_bin() -> None:
+    clean, spiked = window_of(crossing()), window_of(crossing(spikes=40))
+    assert clean.samples - 40 <= spiked.samples < clean.samples - 30
+    assert spiked.height == pytest.approx(clean.height, abs=3e-6)
