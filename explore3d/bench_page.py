@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 LEAD = (
     "A round fingertip slides over a body and has to find what is finer than itself. Every step on the way trades time "
     "for error. Each diagram shows one step: to the left is faster, down is more exact, so the lower left corner wins. "
-    "One curve is one method; its points are settings of that method."
+    "One curve is one method; its points are settings of that method, of which the first and the last are named."
 )
 
 
