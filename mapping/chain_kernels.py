@@ -87,14 +87,16 @@ def chain_heights(
                         continue
                     ux, uy, uz = unit[k, 0], unit[k, 1], unit[k, 2]
                     o_along = ox * ux + oy * uy + oz * uz
-                    ax, ay, az = ox - o_along * ux, oy - o_along * uy, oz - o_along * uz
                     n_along = nx * ux + ny * uy + nz * uz
+                    along = ox * nx + oy * ny + oz * nz - o_along * n_along
+                    # most bins are far from most legs: they are told by the cheapest form, which cancels a little
+                    if along > 0.0 and ox * ox + oy * oy + oz * oz - o_along * o_along > far:
+                        continue
+                    ax, ay, az = ox - o_along * ux, oy - o_along * uy, oz - o_along * uz
                     bx, by, bz = nx - n_along * ux, ny - n_along * uy, nz - n_along * uz
                     along = ax * bx + ay * by + az * bz
                     square = bx * bx + by * by + bz * bz
                     distance = ax * ax + ay * ay + az * az
-                    if distance > far and along > 0.0:
-                        continue
                     distance = np.sqrt(distance)
                     t = _last_exit(square, along, (distance - total) * (distance + total))
                     place = o_along + max(t, -total) * n_along

@@ -12,6 +12,8 @@ from mapping.target import Target
 FloatArray = NDArray[np.float64]
 
 ITERATIONS = 60
+# Gain in chi-square of a step after which the optimum is known: a thirtieth of a standard deviation.
+SETTLED = 1e-3
 # Log density below the best optimum at which another one does not matter, and how many are kept.
 NEGLIGIBLE = 12.0
 MODES = 3
@@ -88,7 +90,7 @@ def _descend(target: Target, start: FloatArray) -> FloatArray:
         theta, damping = candidates[pick], max(float(dampings[pick]), 1e-12)
         residual, jacobian = _jacobian(target, theta, 0.1 * scale)
         cost = float(residual @ residual)
-        if gain < 1e-5:
+        if gain < SETTLED:
             break
     return np.asarray(theta)
 

@@ -12,7 +12,7 @@ from mapping.base import Base
 from mapping.evidence import log_evidence_of_nothing
 from mapping.feature import Feature
 from mapping.free_tip_shape import with_free_tip
-from mapping.importance import TRUSTED_K_HAT, Importance, importance_sample
+from mapping.importance import TRUSTED_K_HAT, USABLE_K_HAT, Importance, importance_sample
 from mapping.laplace import find_optima, laplace
 from mapping.misfit import account_for_misfit
 from mapping.noise import Noise
@@ -160,12 +160,11 @@ def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool =
     if adapt:
         problem, optima = account_for_misfit(problem, optima)
     fast = importance_sample(problem.target, [laplace(problem.target, optimum) for optimum in optima], rng)
-    trusted = fast.k_hat < TRUSTED_K_HAT
-    if not confirm and trusted:
+    if not confirm and fast.k_hat < TRUSTED_K_HAT:
         return Solution(problem, _from_importance(problem, fast, rng), fast, None)
     walkers = walkers_for(len(problem.window), fast.draws.shape[1])
     starts = _starts(problem, fast, rng, walkers)
-    chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal, trusted=trusted)
+    chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal, covers=fast.k_hat < USABLE_K_HAT)
     return Solution(problem, _from_chain(problem, fast, chain, rng), fast, chain)
 
 
