@@ -2,8 +2,8 @@
 
 A wire lies on a plate, or a groove is cut into it, somewhere under a sweep of the paper's finger; the trace is the
 closed form of theory section 4. Detectors are the significance test on heights, with the noise estimated from the
-same sweep or known, and the paper's algorithms 1 to 4 by curvature alone. Every sweep is one line of a JSONL file;
-what is already in the file is not run again.
+same sweep, stated beforehand, or known, and the paper's algorithms 1 to 4 by curvature with the noise known. Every
+sweep is one line of a JSONL file; what is already in the file is not run again.
 
     explore3d bench detect --store OUT.jsonl --out FOLDER
 """
@@ -28,6 +28,7 @@ from mapping.base import Base
 from mapping.detectors import detect
 from mapping.noise import Noise
 from mapping.shapes import cap_height, groove_height
+from mapping.stated_noise import StatedNoise
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -44,7 +45,8 @@ ANGLE_PER_NOISE = np.deg2rad(1.0) / 0.2e-3
 SIZES = {"wire": (0.005, 0.01, 0.02, 0.035, 0.065, 0.1, 0.15), "groove": (0.05, 0.1, 0.2, 0.4)}
 NOISES = (0.002, 0.01, 0.02)
 KINDS = ("white", "correlated")
-DETECTORS = ("height", "height, noise known", "algorithm 1", "algorithm 2", "algorithm 3", "algorithm 4")
+HEIGHTS = ("height", "height, noise stated", "height, noise known")
+DETECTORS = (*HEIGHTS, "algorithm 1", "algorithm 2", "algorithm 3", "algorithm 4")
 
 
 @dataclass(frozen=True)
@@ -122,12 +124,10 @@ def run_case(case: Case) -> dict[str, dict[str, Any]]:
     """For each detector: whether it found the feature, how far off (m), its false alarms, and the path for them (m)."""
     trace, place, extent = simulated_sweep(case)
     base, noise, sign = plate(), noise_of(case), 1 if case.feature == "wire" else -1
-    found = {
-        "height": detect(trace, base, false_alarms_per_metre=RATE).crossings,
-        "height, noise known": detect(trace, base, false_alarms_per_metre=RATE, noise=noise).crossings,
-    }
     result = {}
-    for name, crossings in found.items():
+    settings: tuple[dict[str, Any], ...] = ({}, {"stated": StatedNoise(noise)}, {"noise": noise})
+    for name, known in zip(HEIGHTS, settings, strict=True):
+        crossings = detect(trace, base, false_alarms_per_metre=RATE, **known).crossings
         spans = [(c.point[0], c.point[0], np.sign(c.height), c.point[0]) for c in crossings]
         result[name] = _judged(spans, place, extent, sign)
     for number in (1, 2, 3, 4):

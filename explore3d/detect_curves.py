@@ -18,7 +18,7 @@ from mapping.whole_file import write_whole
 
 # Where a logarithmic axis shows that no false alarm was seen, 1/m.
 NONE = 1e-3
-COLOURS = dict(zip(DETECTORS, (INK, "#829ab1", "#b7791f", "#6b46c1", "#c62828", "#1b7f4d"), strict=True))
+COLOURS = dict(zip(DETECTORS, (INK, "#486581", "#829ab1", "#b7791f", "#6b46c1", "#c62828", "#1b7f4d"), strict=True))
 
 
 def write_curves(cells: Sequence[Cell], out: Path) -> list[Path]:
