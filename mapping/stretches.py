@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,12 +83,12 @@ def _stretches(
     are strong enough to hide others, and looks again, until nothing new exceeds the threshold.
     """
     height = profile.height.copy()
-    certainties = _certainties(profile, bank)
+    certainty = _certainties(profile, bank)
     weak: list[tuple[int, float]] = []
     changed = True
     for _ in range(ROUNDS):
         if changed:
-            candidates = _candidates(height, bank, threshold, tip_radius, certainties)
+            candidates = _candidates(height, bank, threshold, tip_radius, certainty)
         accepted, changed = _dominant(candidates, weak), False
         if not accepted:
             return
@@ -110,12 +111,15 @@ def _scarcity(profile: HeightProfile, bank: Bank) -> FloatArray:
     return np.asarray(share * (bank.samples / counts - 1.0))
 
 
-def _certainties(profile: HeightProfile, bank: Bank) -> list[FloatArray | None]:
-    """At most 1, in each bin (n,): expected over actual sd of what each filter sees; None where it is 1 throughout."""
+def _certainties(profile: HeightProfile, bank: Bank) -> Callable[[int], FloatArray | None]:
+    """Of the k-th filter, when asked: expected over actual sd of what it sees in each bin (n,), at most 1.
+
+    None where it is 1 throughout.
+    """
     scarcity = _scarcity(profile, bank)
     if scarcity.max(initial=0.0) <= SCARCE:
-        return [None] * len(bank.filters)
-    return [_certainty(scarcity, int(f.half_width / bank.spacing)) for f in bank.filters]
+        return lambda _: None
+    return cache(lambda k: _certainty(scarcity, int(bank.filters[k].half_width / bank.spacing)))
 
 
 def _certainty(scarcity: FloatArray, bins: int) -> FloatArray | None:
@@ -126,19 +130,19 @@ def _certainty(scarcity: FloatArray, bins: int) -> FloatArray | None:
 
 
 def _candidates(
-    height: FloatArray, bank: Bank, threshold: float, tip_radius: float, certainties: Sequence[FloatArray | None]
+    height: FloatArray, bank: Bank, threshold: float, tip_radius: float, certainty: Callable[[int], FloatArray | None]
 ) -> list[tuple[float, int, float, float]]:
     """(signal-to-noise, bin, half-width in bins, height) of local maxima over place for every width."""
     result = []
-    for f, certainty in zip(bank.filters, certainties, strict=True):
+    for k, f in enumerate(bank.filters):
         if f.half_width > LARGEST_SHARE * len(height) * bank.spacing or len(height) < 2 * f.coarse:
             continue
         crest, sd = f.heights(height)
         snr = np.abs(crest) / sd
-        if certainty is not None:
-            snr *= certainty[: len(crest) * f.coarse : f.coarse]
         if snr.max() <= threshold:
             continue
+        if (share := certainty(k)) is not None:
+            snr *= share[: len(crest) * f.coarse : f.coarse]
         snr[np.abs(crest) > PHYSICAL * f.half_width**2 / (2 * tip_radius)] = 0.0
         around = np.concatenate([[-1.0], snr, [-1.0]])
         peaks = np.flatnonzero((snr > threshold) & (snr >= around[:-2]) & (snr > around[2:]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -162,7 +162,15 @@ class Trace:
             return
         cuts = np.flatnonzero(np.diff(self.sweep)) + 1
         for start, stop in zip([0, *cuts], [*cuts, len(self)], strict=True):
-            yield int(self.sweep[start]), self.select(slice(int(start), int(stop)))
+            yield int(self.sweep[start]), self._view(slice(int(start), int(stop)))
+
+    def _view(self, cut: slice) -> Trace:
+        """Consecutive samples; not checked again, and sharing the memory of these."""
+        part = object.__new__(Trace)
+        for each in fields(self):
+            value = getattr(self, each.name)
+            object.__setattr__(part, each.name, value[cut] if isinstance(value, np.ndarray) else value)
+        return part
 
     def arclength(self) -> FloatArray:
         """(N,) distance travelled by the centre since the first sample, m (noise lengthens it)."""

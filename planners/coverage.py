@@ -76,7 +76,7 @@ def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limi
     while _sample_count(surface, step) > MOST_SAMPLES:
         step *= 1.5  # a coarser answer is a more cautious one
     points, owner = face_samples(surface, step)
-    distance, _ = cKDTree(touched).query(points, distance_upper_bound=0.9 * tip_radius)
+    distance, _ = cKDTree(touched).query(points, distance_upper_bound=0.9 * tip_radius, workers=-1)
     distance = np.asarray(distance) + 0.55 * step  # as far as a place of the face may lie from the nearest sample
     passed = distance < tip_radius
     lost = np.full(len(points), np.inf)
