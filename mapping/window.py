@@ -199,7 +199,7 @@ def _bin(
     spacing = float(path[-1]) / max(len(path) - 1, 1)
     extent = last - path[edges] + spacing
     if noise_level > 0.0:
-        feet, mean_normals = _smooth(feet, width, scale), _smooth(mean_normals, width, scale)
+        feet, mean_normals = _smooth(feet, place, width, scale), _smooth(mean_normals, place, width, scale)
     mean_normals = mean_normals / np.linalg.norm(mean_normals, axis=1, keepdims=True)
     mean_height = np.add.reduceat(height, edges) / count
     if noise_level > 0.0:
@@ -231,11 +231,21 @@ def _without_spikes(
     return np.add.reduceat(kept, edges) / np.maximum(left, 1), np.maximum(left, 1)
 
 
-def _smooth(values: FloatArray, width: float, scale: float) -> FloatArray:
+def _smooth(values: FloatArray, place: FloatArray, width: float, scale: float) -> FloatArray:
     """Local parabolas over a quarter of the feature's half width: the path's own noise goes, its course stays.
 
-    The filter of Savitzky & Golay (1964); at both ends the parabola of the outermost stretch is read off.
+    A bin's few samples do not lie evenly in it: what the filter makes of their `place` (n,) says for where it holds,
+    and each value is brought back to its own place.
     """
+    smooth = _filtered(np.column_stack([values, place]), width, scale)
+    smooth, at = smooth[:, :-1], smooth[:, -1]
+    if len(at) < 2 or not (np.diff(at) > 0.0).all():
+        return smooth
+    return np.asarray(smooth + np.gradient(smooth, at, axis=0) * (place - at)[:, None])
+
+
+def _filtered(values: FloatArray, width: float, scale: float) -> FloatArray:
+    """The filter of Savitzky & Golay (1964); at both ends the parabola of the outermost stretch is read off."""
     half = min(int(0.25 * scale / width), (len(values) - 1) // 2)
     if half < 2:
         return values

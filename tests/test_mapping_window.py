@@ -14,10 +14,10 @@ from mapping.window import bin_samples, gather
 R, RADIUS, WIDTH, SIGMA = 5e-3, 0.325e-3, 85e-6, 1e-6
 
 
-def crossing(spikes: int = 0) -> Trace:
-    """A sweep of 15 mm across a wire, 5 um between samples, with noise far below what a flank rises over a bin."""
+def crossing(spikes: int = 0, spacing: float = 5e-6) -> Trace:
+    """A sweep of 15 mm across a wire with noise far below what a flank rises over a bin."""
     rng = np.random.default_rng(1)
-    x = np.arange(-7.5e-3, 7.5e-3, 5e-6)
+    x = np.arange(-7.5e-3, 7.5e-3, spacing)
     height = cap_height(x, 2.0 * RADIUS, RADIUS, R) + SIGMA * rng.standard_normal(len(x))
     height[rng.choice(len(x), spikes, replace=False)] += 1e-3
     centers = np.column_stack([x, np.zeros_like(x), R + height])
@@ -43,3 +43,9 @@ def test_a_lost_bit_is_left_out_of_its_bin() -> None:
     clean, spiked = window_of(crossing()), window_of(crossing(spikes=40))
     assert clean.samples - 40 <= spiked.samples < clean.samples - 30
     assert spiked.height == pytest.approx(clean.height, abs=3e-6)
+
+
+def test_a_bin_of_few_samples_stands_where_they_lie() -> None:
+    window = window_of(crossing(spacing=17.7e-6))  # four or five a bin of 85 um
+    own = window.feet[:, 0] - window.place
+    assert np.ptp(own[2:-2]) < 1e-6
