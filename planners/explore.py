@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -11,32 +11,24 @@ from numpy.typing import NDArray
 
 from mapping.base import Base
 from mapping.crossing import Crossing
-from mapping.detectors import detect
 from mapping.noise import Noise
-from mapping.trace import Trace
 from planners.axis_track import AxisTrack
 from planners.budget import Spent, within
 from planners.bump import BumpSize, BumpSizer
 from planners.circuit import Circuit, headings
-from planners.coverage import Coverage
 from planners.crest import is_step, slender
 from planners.errors import PlannerError
+from planners.found import Found
 from planners.plan import Outcome, Plan
 from planners.ridge import RidgeFollower
 from planners.ridge_end import Crest, EndFinder
 from planners.sense import Sense
-from planners.strokes import Strokes, tangential
+from planners.strokes import Strokes
 from planners.survey import Survey
+from planners.surveyor import Surveyor
 
 FloatArray = NDArray[np.float64]
 
-# Path of the first survey sweeps, in tip radii, that tell the noise if it is not given; later ones are detected singly
-LEARNING = 50.0
-# False alarms of the survey against those accepted in the end: a look at each of them costs seconds, and what the
-# analysis of all sweeps may report at its own estimate of the noise must have been looked at
-CANDIDATES = 4.0
-# Height that must stay visible between two sweeps, in detection limits
-MARGIN = 1.25
 # Slides off one end, at most, and in one go
 MOST_SLIDES, AT_ONCE = 150, 8
 
@@ -49,59 +41,6 @@ class Action:
     gain: float
     seconds: float
     start: Callable[[], Plan]
-
-
-@dataclass
-class Found:
-    """What the exploration knows so far; the outcome's value.
-
-    `actions` names everything that was done after the survey, with its outcome; `left_out` what was not, `unseen` what
-    the survey may have missed.
-    """
-
-    tip_radius: float
-    survey: Coverage | None = None
-    noise: Noise | None = None
-    tracks: list[AxisTrack] = field(default_factory=list)
-    bumps: list[BumpSize] = field(default_factory=list)
-    crossings: list[Crossing] = field(default_factory=list)
-    tried: list[Crossing] = field(default_factory=list)
-    slides: dict[tuple[int, int], int] = field(default_factory=dict)
-    actions: list[str] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
-    unseen: list[str] = field(default_factory=list)
-
-    def unexplained(self) -> list[Crossing]:
-        """Crossings that no track or bump accounts for and that were not looked into yet.
-
-        The highest come first, but those that are wider than a wire of their height would be come later: they
-        were met at a slant, or beside a neighbour.
-        """
-        known: list[AxisTrack | BumpSize] = [*self.tracks, *self.bumps]
-        rest = [c for c in self.crossings if not any(k.explains(c) for k in known) and not self._tried(c)]
-        return sorted(rest, key=lambda c: -abs(c.height) * min(1.0, slender(c, self.tip_radius)))
-
-    def step_heading(self, seed: Crossing, reach: float) -> FloatArray | None:
-        """Direction from a step to the nearest one on another sweep, or None if the seed is no open step.
-
-        A sweep crosses the edge of an open step once; along a ridge it goes up at one end and down at the other.
-        """
-        steps = [c for c in self.crossings if is_step(c)]
-        sweeps = [c.sweep for c in steps]
-        if not is_step(seed) or sweeps.count(seed.sweep) != 1:
-            return None
-        others = [c for c in steps if c.sweep != seed.sweep and sweeps.count(c.sweep) == 1]
-        others = [c for c in others if 0 < np.linalg.norm(c.point - seed.point) < reach]
-        if not others:
-            return None
-        nearest = min(others, key=lambda c: float(np.linalg.norm(c.point - seed.point)))
-        return tangential(nearest.point - seed.point, seed.normal)
-
-    def _tried(self, crossing: Crossing) -> bool:
-        return any(
-            crossing is other or np.linalg.norm(crossing.point - other.point) < 0.7 * other.half_width
-            for other in self.tried
-        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -173,7 +112,11 @@ class Explore:
         """The whole exploration; the outcome's value is a Found. Nothing in it is random: `rng` is not used."""
         found = Found(self.tip_radius, noise=self.noise)
         spent = Spent(25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed)
-        outcome = yield from within(self._everything(found), spent, self.time_budget, self.path_budget)
+        surveyor = Surveyor(self.survey, found, self.false_alarms_per_metre)
+        everything = self._everything(surveyor, found)
+        outcome = yield from within(everything, spent, self.time_budget, self.path_budget)
+        if found.surveyed:
+            self._account(surveyor, found)
         if outcome.reason == "budget":
             found.left_out.append(f"{_counted(len(found.unexplained()), 'detection')} not looked into: budget spent")
         why = f"{self._why(outcome.reason, found)}, after {spent.seconds:.0f} s and {spent.metres:.3g} m of finger path"
@@ -188,75 +131,34 @@ class Explore:
             return "the survey found nothing to look into"
         return "every detection was looked into and nothing was left to sharpen"
 
-    def _everything(self, found: Found) -> Plan:
-        yield from self._survey(found)
+    def _account(self, surveyor: Surveyor, found: Found) -> None:
+        """What the survey covered, told when the finger has nothing to wait for any more."""
+        found.survey = surveyor.covered()
+        if surveyor.survey.crossed(surveyor.visible) is not None:
+            found.unseen.append(
+                f"features smaller than a ridge that spans {1e3 * (self.shortest_ridge or 0.0):g} mm: "
+                f"{100 * found.survey.fraction:.0f} % of the surface lies near enough to a sweep to see them"
+            )
+
+    def _everything(self, surveyor: Surveyor, found: Found) -> Plan:
+        yield from surveyor.plan()
+        found.surveyed = True
         if not found.crossings:
             found.left_out.append("circuits, ridge following and sizing: the survey found nothing")
             return Outcome("nothing found")
-        strokes = self.strokes
         sense = Sense(self.base, found.noise, self.false_alarms_per_metre)
-        while actions := self._actions(found, strokes, sense):
+        while actions := self._actions(found, sense):
             best = max(actions, key=lambda action: action.gain / action.seconds)
             outcome = yield from best.start()
             found.actions.append(f"{best.name}: {outcome.reason}" + (f" ({outcome.detail})" if outcome.detail else ""))
         return Outcome("done")
 
-    def _survey(self, found: Found) -> Plan:
-        """Every sweep of the survey; the first ones are detected together, for they tell the noise."""
-        survey, waiting, paths, felt = self.survey, list[Trace](), list[FloatArray](), 0.0
-        pitch = survey.pitch
-        if survey.slices is None and (first := next(survey.sweeps(), None)) is not None:
-            trace = yield first
-            pitch = self._widened(survey, trace, found)
-        for move in survey.sweeps(pitch):
-            trace = yield move
-            paths.append(move.path + self.tip_radius * move.approach)
-            if len(trace) == 0:
-                found.left_out.append("a survey sweep felt no contact")
-                continue
-            waiting.append(trace)
-            felt += move.length
-            if found.noise is not None or felt >= LEARNING * self.tip_radius:
-                self._detect(waiting, found)
-        if waiting:
-            self._detect(waiting, found)
-        found.survey = survey.covered(paths, pitch)
-        if survey.slices is not None:
-            found.unseen.append(
-                f"features smaller than a ridge that spans {1e3 * (self.shortest_ridge or 0.0):g} mm: "
-                f"{100 * found.survey.fraction:.0f} % of the surface lies near enough to a sweep to see them"
-            )
-        return Outcome("done")
-
-    def _widened(self, survey: Survey, trace: Trace, found: Found) -> float:
-        """Strips (m) as wide as the noise of a first sweep allows the smallest feature to be seen."""
-        if len(trace) < 16:
-            return survey.pitch
-        limit = detect(trace, self.base, noise=found.noise).detection_limit
-        if limit > self.smallest:
-            found.unseen.append(
-                f"features lower than {1e3 * limit:.2g} mm: a single sweep does not show them through the noise, "
-                f"though {1e3 * self.smallest:.2g} mm were asked for"
-            )
-        return survey.strip(float(np.clip(MARGIN * limit / self.smallest, 0.1, survey.visible)))
-
-    def _detect(self, waiting: list[Trace], found: Found) -> None:
-        felt = detect(
-            Trace.concatenate(waiting),
-            self.base,
-            noise=found.noise,
-            false_alarms_per_metre=CANDIDATES * self.false_alarms_per_metre,
-        )
-        found.noise = felt.noise
-        found.crossings.extend(felt.crossings)
-        waiting.clear()
-
-    def _actions(self, found: Found, strokes: Strokes, sense: Sense) -> list[Action]:
+    def _actions(self, found: Found, sense: Sense) -> list[Action]:
         actions = []
         for seed in found.unexplained()[:1]:
             pitch = self.survey.pitch
             seconds = 2.0 * np.pi * self._circuit_radius(seed) / self.speed
-            actions.append(Action("look into", pitch, seconds, partial(self._look_into, seed, found, strokes, sense)))
+            actions.append(Action("look into", pitch, seconds, partial(self._look_into, seed, found, sense)))
         for index, track in enumerate(found.tracks):
             for which, end in enumerate(track.ends):
                 done = found.slides.get((index, which), 0)
@@ -265,7 +167,7 @@ class Explore:
                     # n slides leave 1 / sqrt(n) of the uncertainty of one
                     left = float(np.sqrt((done + 1.0) / (done + 2.0)))
                     gain = end.sd * (1.0 - left) if np.isfinite(end.sd) else self.survey.pitch
-                    start = partial(self._slide, index, which, found, strokes)
+                    start = partial(self._slide, index, which, found)
                     actions.append(Action("slide off an end", gain, seconds, start))
         return actions
 
@@ -274,27 +176,27 @@ class Explore:
         half_width = seed.half_width * min(1.0, 1.3 * slender(seed, self.tip_radius))
         return 1.4 * half_width + 0.5 * self.survey.pitch
 
-    def _look_into(self, seed: Crossing, found: Found, strokes: Strokes, sense: Sense) -> Plan:
+    def _look_into(self, seed: Crossing, found: Found, sense: Sense) -> Plan:
         """Circle a detection, then follow the ridge or size the bump that it belongs to."""
         found.tried.append(seed)
         edge = found.step_heading(seed, 3.0 * self.survey.pitch)
         if edge is not None:
-            followed = yield from self._follower(found, strokes, sense).follow(seed, [edge, -edge])
+            followed = yield from self._follower(found, sense).follow(seed, [edge, -edge])
             found.tracks.extend([] if followed.value is None else [followed.value])
             return Outcome("step", followed.detail)
-        circled = yield from Circuit(strokes, sense, self._circuit_radius(seed)).around(seed)
+        circled = yield from Circuit(self.strokes, sense, self._circuit_radius(seed)).around(seed)
         branches: tuple[Crossing, ...] = circled.value
         if branches:
             seed, ways = _typed(seed, branches), headings(seed, branches, self.tip_radius)
         else:
-            sized = yield from BumpSizer(strokes, sense, self.wanted_sd).size(seed)
+            sized = yield from BumpSizer(self.strokes, sense, self.wanted_sd).size(seed)
             bump: BumpSize | None = sized.value
             if bump is None or bump.long_way is None:
                 found.bumps.extend([] if bump is None else [bump])
                 return Outcome(circled.reason, sized.detail)
             ways = [bump.long_way, -bump.long_way]
             seed = replace(seed, point=bump.point)
-        followed = yield from self._follower(found, strokes, sense).follow(seed, ways)
+        followed = yield from self._follower(found, sense).follow(seed, ways)
         found.crossings.extend(branches)
         track: AxisTrack | None = followed.value
         if track is not None and any(track.repeats(other) for other in found.tracks):
@@ -303,18 +205,19 @@ class Explore:
             found.tracks.append(track)
         return Outcome(circled.reason, followed.detail)
 
-    def _follower(self, found: Found, strokes: Strokes, sense: Sense) -> RidgeFollower:
+    def _follower(self, found: Found, sense: Sense) -> RidgeFollower:
         tracks = tuple(found.tracks)
 
         def known(point: FloatArray) -> bool:
             return any(track.distance(point) < 0.5 * track.half_width for track in tracks)
 
-        return RidgeFollower(strokes, sense, found.noise or Noise(0.0), self.wanted_sd, known=known)
+        noise = found.noise or Noise(0.0)
+        return RidgeFollower(self.strokes, sense, noise, self.wanted_sd, known=known)
 
-    def _slide(self, index: int, which: int, found: Found, strokes: Strokes) -> Plan:
+    def _slide(self, index: int, which: int, found: Found) -> Plan:
         """More sweeps to and fro off an end that is not known well enough; the way to it is paid once for all."""
         track = found.tracks[index]
-        finder = EndFinder(strokes, self.base, found.noise or Noise(0.0))
+        finder = EndFinder(self.strokes, self.base, found.noise or Noise(0.0))
         crest = Crest(track.height, track.height_sd, track.half_width, track.sign)
         end = track.ends[which]
         for _ in range(AT_ONCE):

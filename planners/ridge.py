@@ -95,7 +95,7 @@ class RidgeFollower:
 
     def _one_way(self, line: Line, way: FloatArray, sign: float) -> Generator[Move, Trace, AxisEnd | None]:
         """Extend the line until it ends; None if it closes upon itself."""
-        gone = np.inf
+        gone, empty = np.inf, np.full(3, np.inf)
         for _ in range(10_000):
             last = line.crossings[-1]
             ahead = course(line.points, last.normal, way, self.strokes.tip_radius)
@@ -107,15 +107,16 @@ class RidgeFollower:
             lowest = (STILL_HIGH if self.passes == 1 else STILL_SEEN) * line.height
             found = yield from self._cross(walk.points[-1], walk.directions[-1], last, sign, reach, lowest)
             if found is None:
-                gone = float(walk.along[-1])
+                gone, empty = float(walk.along[-1]), walk.points[-1]
                 if gone <= max(0.15 * self.strokes.tip_radius, 4.0 * self.precision):
                     return (yield from self._end(line, ahead, gone, sign))
                 continue
             missed = float(np.linalg.norm(found.point - walk.points[-1]))
-            # a crossing far beside the prediction says that the heading was wrong, not that the ridge had ended
-            gone = np.inf if missed > 0.5 * reach else gone - float(walk.along[-1])
             self._adapt(line, missed / reach)
             line.crossings.append(found)
+            gone -= float(walk.along[-1])
+            if missed > 0.5 * reach or self._passes_by(line, ahead, gone, empty, 0.5 * reach):
+                gone = np.inf
             if self.known(found.point):
                 return AxisEnd(found.point, found.position_sd, "joins another", ahead.heading)
             if _returned(line):
@@ -123,6 +124,17 @@ class RidgeFollower:
             if gone <= 0.1 * self.strokes.tip_radius:
                 return (yield from self._end(line, ahead, max(gone, 0.0), sign))
         return AxisEnd(line.points[-1], np.inf, "lost", way)
+
+    def _passes_by(self, line: Line, ahead: Course, gone: float, empty: FloatArray, near: float) -> bool:
+        """True if the line, as its last crossing bends it, does not lead to the place that was found empty.
+
+        The heading was wrong then; nothing says that the ridge ends before it.
+        """
+        if not 0.0 < gone < np.inf:
+            return False
+        onward = course(line.points, line.crossings[-1].normal, ahead.heading, self.strokes.tip_radius)
+        there = self.strokes.walk(onward.point, onward.heading, gone, onward.turn).points[-1]
+        return bool(np.linalg.norm(there - empty) > near)
 
     def _adapt(self, line: Line, miss: float) -> None:
         """A longer step after a good prediction, a shorter one after a bad one."""

@@ -41,23 +41,28 @@ class Slices:
         return np.asarray(low + (np.arange(count) + 0.5) * (high - low) / count)
 
 
-def slices_for(surface: Surface, faces: IntArray, span: float, reach: float) -> Slices:
-    """The slices of some faces (M,) of a body that cross every ridge of a span (m).
+def slices_for(axes: FloatArray, span: float, reach: float) -> Slices:
+    """The slices across some axes (k, 3) that cross every ridge of a span (m).
 
     Args:
+        axes: of `slice_axes`.
         span: distance between the farthest points of the shortest ridge, m.
         reach: distance beyond the ridge's end at which a sweep still sees it, m.
     """
+    return Slices(axes, span / float(np.sqrt(len(axes))) + 2.0 * reach)
+
+
+def slice_axes(surface: Surface, faces: IntArray) -> FloatArray:
+    """(k, 3) perpendicular axes of some faces (M,) of a body: two in the plane of flat ones, otherwise three."""
     areas, normals = surface.face_areas[faces], surface.face_normals[faces]
     mean = areas @ normals
     spread = np.einsum("f,fi,fj->ij", areas / areas.sum(), normals, normals)
     value, vector = np.linalg.eigh(spread)
     flat = bool(value[:2].sum() < FLAT) and np.linalg.norm(mean) > 0
-    axes = vector.T
-    if flat:
-        corners = surface.vertices[np.unique(surface.faces[faces])] @ vector[:, :2]
-        axes = _upright(corners) @ vector[:, :2].T
-    return Slices(axes, span / np.sqrt(len(axes)) + 2.0 * reach)
+    if not flat:
+        return np.asarray(vector.T)
+    corners = surface.vertices[np.unique(surface.faces[faces])] @ vector[:, :2]
+    return np.asarray(_upright(corners) @ vector[:, :2].T)
 
 
 def _upright(points: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ from planners.isolines import Isoline, isolines
 from planners.level_field import LevelField, level_field
 from planners.plan import Outcome, Plan
 from planners.pressed_path import pressed_sweep, thinned, touched_points
-from planners.slices import Slices, slices_for
+from planners.slices import Slices, slice_axes, slices_for
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -42,6 +42,7 @@ class Survey:
         shortest_ridge: distance between the ends of the shortest ridge to be found, m; None: bumps as well.
         region: (low, high) corners in m of the part to be inspected; everything if None.
         visible: share of the smallest feature's height that every sweep pair must leave visible.
+        crossings: how often a straight ridge of the shortest span must be crossed.
     """
 
     base: Base
@@ -52,6 +53,7 @@ class Survey:
     shortest_ridge: float | None = None
     region: tuple[FloatArray, FloatArray] | None = None
     visible: float = 0.35
+    crossings: int = 1
 
     def __post_init__(self) -> None:
         if not 0 < self.smallest < np.inf:
@@ -87,25 +89,34 @@ class Survey:
         points = np.concatenate(dense) if dense else np.zeros((0, 3))
         return coverage(self.base.surface, points, 0.55 * pitch, self._inside())
 
-    @cached_property
-    def slices(self) -> Slices | None:
-        """The crossed plane sections, or None where strips are asked for or are shorter."""
-        faces = np.concatenate(self._charts) if self._charts else np.zeros(0, dtype=np.int64)
-        if self.shortest_ridge is None or len(faces) == 0:
+    def crossed(self, visible: float) -> Slices | None:
+        """The crossed plane sections that see a visible share, or None where strips are asked for or are shorter."""
+        if self.shortest_ridge is None or not self._charts:
             return None
-        crossed = slices_for(self.base.surface, faces, self.shortest_ridge, 0.5 * self.pitch)
-        return crossed if len(crossed.axes) * self.pitch < crossed.pitch else None
+        if self.crossings > 1:
+            return Slices(self._axes, self.shortest_ridge / self.crossings)
+        strip = self.strip(visible)
+        slices = slices_for(self._axes, self.shortest_ridge, 0.5 * strip)
+        return slices if len(slices.axes) * strip < slices.pitch else None
+
+    @cached_property
+    def _axes(self) -> FloatArray:
+        return slice_axes(self.base.surface, np.concatenate(self._charts))
 
     @cached_property
     def _charts(self) -> list[IntArray]:
         return crease_charts(self.base.surface, self._inside())
 
-    def sweeps(self, pitch: float | None = None) -> Iterator[Move]:
-        """All sweeps, each begun near the end of the one before it; strips may be given another pitch (m)."""
-        return self._strips(pitch or self.pitch) if self.slices is None else self._crossed(self.slices)
+    def sweeps(self, visible: float | None = None) -> Iterator[Move]:
+        """All sweeps, each begun near the end of the one before it; another visible share may be given."""
+        visible = visible or self.visible
+        slices = self.crossed(visible)
+        lines = self._strips(self.strip(visible)) if slices is None else self._sections(slices)
+        for line in lines:
+            yield from self._pressed(line)
 
-    def _crossed(self, slices: Slices) -> Iterator[Move]:
-        """Sweeps along one family of plane sections after the other."""
+    def _sections(self, slices: Slices) -> Iterator[Isoline]:
+        """Lines along one family of plane sections after the other."""
         surface = self.base.surface
         used = surface.vertices[np.unique(surface.faces[np.concatenate(self._charts)])]
         here: FloatArray | None = None
@@ -119,15 +130,15 @@ class Survey:
                 ]
                 for line in _in_turn(lines, here, self.pitch):
                     here = line.points[-1]
-                    yield from self._pressed(line)
+                    yield line
 
     @cached_property
     def _fields(self) -> dict[int, LevelField]:
         """The fields solved so far, by the number of the chart."""
         return {}
 
-    def _strips(self, pitch: float) -> Iterator[Move]:
-        """Sweeps along the level sets of one chart after the other, a pitch apart."""
+    def _strips(self, pitch: float) -> Iterator[Isoline]:
+        """Lines along the level sets of one chart after the other, a pitch apart."""
         surface = self.base.surface
         here: FloatArray | None = None
         done = np.zeros(len(surface.faces), dtype=bool)
@@ -143,7 +154,7 @@ class Survey:
                 for line in _in_turn(lines, here, pitch):
                     here = line.points[-1]
                     touched.append(line.points)
-                    yield from self._pressed(line)
+                    yield line
             if len(chart) < len(surface.faces):
                 done |= self.covered(touched, pitch).share > 0.999
 

@@ -184,7 +184,7 @@ def test_no_ridge_of_the_asked_span_slips_between_crossed_sweeps_however_it_lies
 def test_crossed_sweeps_are_several_times_shorter_than_strips() -> None:
     strips = sum(sweep.length for sweep in survey(plate()).sweeps())
     assert sum(sweep.length for sweep in crossed(plate(), 0.03).sweeps()) < strips / 2.5
-    assert crossed(plate(), 2e-3).slices is None  # strips are shorter there
+    assert crossed(plate(), 2e-3).crossed(0.35) is None  # strips are shorter there
 
 
 def test_crossed_sweeps_on_a_sphere_meet_every_arc_of_the_asked_span() -> None:
@@ -192,7 +192,8 @@ def test_crossed_sweeps_on_a_sphere_meet_every_arc_of_the_asked_span() -> None:
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.04)
     plan = crossed(Surface(ball.vertices, ball.faces), 0.03)
     sweeps = list(plan.sweeps())
-    assert plan.slices is not None and len(plan.slices.axes) == 3
+    slices = plan.crossed(plan.visible)
+    assert slices is not None and len(slices.axes) == 3
     rng = np.random.default_rng(6)
     for _ in range(100):
         first, second = np.linalg.qr(rng.standard_normal((3, 2)))[0].T
