@@ -37,3 +37,18 @@ def test_a_peer_that_is_not_installed_is_named_with_the_way_to_get_it(monkeypatc
     methods, missing = bench.available()
     assert "pymeshlab, quadric" not in methods
     assert "explore3d[peers]" in missing[0]
+
+
+@pytest.mark.parametrize(
+    ("noise", "median"),
+    [
+        pytest.param(0.0, 6e-4, marks=pytest.mark.slow),
+        (1e-4, 3.7e-3),
+        pytest.param(1e-3, 3e-2, marks=pytest.mark.slow),
+        pytest.param(1e-2, 0.13, marks=pytest.mark.slow),
+    ],
+)
+def test_a_torus_is_as_exact_at_every_noise(noise, median):
+    found = bench.measure("explore3d", "torus", 10_000, noise)
+    assert found.median <= median
+    assert found.valid > 0.999
