@@ -18,6 +18,7 @@ from planners.bump import BumpSize, BumpSizer
 from planners.circuit import Circuit, headings
 from planners.crest import is_step, slender
 from planners.errors import PlannerError
+from planners.faint import CloserLook, FaintSearch
 from planners.found import Found
 from planners.plan import Outcome, Plan
 from planners.ridge import RidgeFollower
@@ -25,7 +26,7 @@ from planners.ridge_end import Crest, EndFinder
 from planners.sense import Sense
 from planners.strokes import Strokes
 from planners.survey import Survey
-from planners.surveyor import Surveyor
+from planners.surveyor import CANDIDATES, Surveyor
 
 FloatArray = NDArray[np.float64]
 
@@ -143,7 +144,8 @@ class Explore:
     def _everything(self, surveyor: Surveyor, found: Found) -> Plan:
         yield from surveyor.plan()
         found.surveyed = True
-        if not found.crossings:
+        yield from self._faint(surveyor, found)
+        if not found.crossings and not found.tracks:
             found.left_out.append("circuits, ridge following and sizing: the survey found nothing")
             return Outcome("nothing found")
         sense = Sense(self.base, found.noise, self.false_alarms_per_metre)
@@ -152,6 +154,26 @@ class Explore:
             outcome = yield from best.start()
             found.actions.append(f"{best.name}: {outcome.reason}" + (f" ({outcome.detail})" if outcome.detail else ""))
         return Outcome("done")
+
+    def _faint(self, surveyor: Surveyor, found: Found) -> Plan:
+        """Where no single sweep shows the smallest ridge asked for, look for lines that many show, and follow them."""
+        rate = CANDIDATES * self.false_alarms_per_metre
+        search = FaintSearch(self.survey, surveyor.limit, found.noise or Noise(0.0), rate)
+        if self.survey.crossed(self.survey.visible) is None or search.crossings == 1:
+            return Outcome("not needed")
+        searched = yield from search.plan()
+        look: CloserLook = searched.value
+        found.crossings.extend(look.crossings)
+        found.actions.append(f"closer survey: {searched.detail}")
+        sense = Sense(self.base, found.noise, self.false_alarms_per_metre)
+        for lead in look.leads:
+            if any(track.distance(lead.seed.point) < track.half_width for track in found.tracks):
+                continue
+            follower = replace(self._follower(found, sense), passes=lead.passes)
+            followed = yield from follower.follow(lead.seed, [lead.way, -lead.way])
+            found.tracks.extend([] if followed.value is None else [followed.value])
+            found.actions.append(f"follow a faint line by {lead.passes} passes: {followed.detail}")
+        return searched
 
     def _actions(self, found: Found, sense: Sense) -> list[Action]:
         actions = []

@@ -1,0 +1,119 @@
+"""Faint: ridges and grooves that only many sweeps together show, sought by a closer survey."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping.base import Base
+from mapping.crossing import Crossing
+from mapping.detectors import Detections, detect
+from mapping.faint_feature import with_faint_lines
+from mapping.feature import Feature
+from mapping.noise import Noise
+from mapping.trace import Trace
+from planners.crest import SEEN
+from planners.plan import Outcome, Plan
+from planners.survey import Survey
+
+FloatArray = NDArray[np.float64]
+
+# A line may lie anywhere and run in any direction: together its crossings must say so much more (in squares of the
+# signal-to-noise ratio) than a single crossing that is detected
+ANYWHERE = 1.3
+# Passes over a line show it by so many times what a crossing is believed for
+SURE = 1.5
+MOST_PASSES = 60
+# Signal-to-noise ratio of a dip between two rims against that of a crest as high, in white noise (theory section 4:
+# the integrals of (1 - x)^4 and (1 - x^2)^2)
+DIP = float(np.sqrt(3.0 / 8.0))
+
+
+@dataclass(frozen=True, eq=False)
+class FaintLead:
+    """Where to begin following a faint line: a crossing, the way (3,) that the line goes, and passes that show it."""
+
+    seed: Crossing
+    way: FloatArray
+    passes: int
+
+
+@dataclass(frozen=True, eq=False)
+class CloserLook:
+    """What a closer survey shows: lines seen by no single sweep, the clearest first, and crossings that one shows."""
+
+    leads: tuple[FaintLead, ...] = ()
+    crossings: tuple[Crossing, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class FaintSearch:
+    """Crossed sweeps so close that every line of the span asked for is crossed often enough.
+
+    The signal-to-noise ratio of a crossing grows with the height to the power 5/4 (theory section 6: the square of
+    the height times the half-width), that of k crossings together with the root of k.
+
+    Args:
+        survey: that was made already.
+        limit: least height that a single sweep of it detects, m.
+        noise: of the samples.
+        false_alarms_per_metre: accepted rate of false lines, 1/m.
+    """
+
+    survey: Survey
+    limit: float
+    noise: Noise
+    false_alarms_per_metre: float
+
+    @property
+    def crossings(self) -> int:
+        """Crossings that a line as low as the smallest asked for needs; 1 if a single one shows it."""
+        ratio = self.limit / self.survey.smallest
+        return 1 if ratio <= 1.0 else int(np.ceil(ANYWHERE * ratio**2.5))
+
+    def plan(self) -> Plan:
+        """Make the sweeps; the outcome's value is a CloserLook."""
+        felt = []
+        for move in replace(self.survey, crossings=self.crossings).sweeps():
+            trace = yield move
+            if len(trace):
+                felt.append(trace)
+        if not felt:
+            return Outcome("no contact", value=CloserLook())
+        trace, base = Trace.concatenate(felt), self.survey.base
+        seen = detect(trace, base, noise=self.noise, false_alarms_per_metre=self.false_alarms_per_metre)
+        lines = with_faint_lines([], seen, trace, base, self.false_alarms_per_metre)
+        found = CloserLook(tuple(lead(line, seen, base, self.survey.tip_radius) for line in lines), seen.crossings)
+        return Outcome("done", f"{len(lines)} lines seen by no single sweep", found)
+
+
+def lead(line: Feature, seen: Detections, base: Base, tip_radius: float) -> FaintLead:
+    """Where to begin following a faint ridge or groove: in its middle, by passes that follow from its height."""
+    from scipy.stats import norm
+
+    way = (line.axis[-1] - line.axis[0]) / np.linalg.norm(line.axis[-1] - line.axis[0])
+    middle = base.nearest.query(line.axis.mean(axis=0)[None])
+    point, normal, height = middle.points[0], middle.normals[0], line.height.median
+    half_width = float(np.sqrt(2.0 * tip_radius * abs(height)))
+    share = (abs(height) / seen.detection_limit) ** 1.25 * (1.0 if height > 0 else DIP)
+    one = share * float(seen.threshold + norm.ppf(seen.probability))
+    seed = Crossing(
+        sweep=-1,
+        t=0.0,
+        point=point,
+        normal=normal,
+        tangent=np.cross(normal, way),
+        kind="convex" if height > 0 else "concave",
+        height=height,
+        height_sd=(line.height.high - line.height.low) / 3.29,
+        position_sd=line.position_sd,
+        half_width=half_width,
+        trace_curvature=-2.0 * height / half_width**2,
+        snr=one,
+        curvature_feature=line.curvature_feature,
+        start=0,
+        stop=0,
+    )
+    return FaintLead(seed, way, int(np.clip(np.ceil(SURE * SEEN / one**2), 1, MOST_PASSES)))

@@ -1,0 +1,62 @@
+"""Lines that no single sweep shows: how closely to survey, and where to begin to follow them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from explore3d.bench_bodies import plate
+from mapping.base import Base
+from mapping.detectors import Detections
+from mapping.feature import Evidence, Feature, Interval
+from mapping.noise import Noise
+from mapping.surface import Surface
+from planners.faint import FaintSearch, lead
+from planners.survey import Survey
+
+PLATE = Base(Surface(*plate(0.1, 0.08)))
+
+
+def survey(**changes) -> Survey:
+    return Survey(base=PLATE, tip_radius=0.01, smallest=4e-5, shortest_ridge=0.04, **changes)
+
+
+def test_a_single_crossing_is_enough_where_one_sweep_shows_the_smallest_line() -> None:
+    assert FaintSearch(survey(), 4e-5, Noise(2e-4), 0.01).crossings == 1
+
+
+def test_half_the_height_needs_six_times_the_crossings() -> None:
+    one, other = (FaintSearch(survey(), limit, Noise(2e-4), 0.01).crossings for limit in (1.6e-4, 3.2e-4))
+    assert other / one == pytest.approx(2.0**2.5, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_every_line_of_the_span_is_crossed_as_often_as_asked(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    angle, middle = rng.uniform(0.0, np.pi), rng.uniform(-0.015, 0.015, 2)
+    way = np.array([np.cos(angle), np.sin(angle)])
+    count = 0
+    for move in survey(crossings=12).sweeps():
+        offset = move.path[:, :2] - middle
+        beside = offset @ [-way[1], way[0]]
+        for k in np.flatnonzero(np.sign(beside[1:]) != np.sign(beside[:-1])):
+            share = beside[k] / (beside[k] - beside[k + 1])
+            count += abs((offset[k] + share * (offset[k + 1] - offset[k])) @ way) <= 0.02
+    assert count >= 11  # planes begin half a pitch within the border: one crossing more or less at an end
+
+
+def test_a_lead_begins_in_the_middle_with_passes_that_follow_from_the_height() -> None:
+    axis, up = np.array([[-0.02, 0.0, 0.0], [0.02, 0.01, 0.0]]), np.tile([0.0, 0.0, 1.0], (2, 1))
+    height = Interval(-4.5e-5, -5.3e-5, -3.7e-5)
+
+    def line(snr: float) -> Feature:
+        size = Interval(2e-3, 2e-3, 2e-3)
+        return Feature("groove", axis, up, height, size, size, Evidence(snr, 36), True, 3e-4)
+
+    seen = Detections((), Noise(2e-4), 3, 1.3e-4, 0.95, 4.8, 10.0)
+    begun = lead(line(12.0), seen, PLATE, 0.01)
+    assert np.linalg.norm(begun.seed.point - axis.mean(axis=0)) < 1e-9
+    assert abs(begun.seed.tangent @ begun.way) < 1e-9 and begun.seed.kind == "concave"
+    alone = np.sqrt(3.0 / 8.0) * 6.445 * (4.5 / 13.0) ** 1.25  # signal-to-noise ratio of one pass over such a dip
+    assert begun.passes == np.ceil(1.5 * 25.0 / alone**2)
+    assert lead(line(30.0), seen, PLATE, 0.01).passes == begun.passes  # a sweep along it tells nothing of a crossing
