@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,12 +64,18 @@ class Noise:
         return float(np.hypot(self.white, self.correlated))
 
     def rounded(self, step: float) -> Noise:
-        """This noise of positions that are rounded to a step, m, where the finger crosses many of them.
+        """This noise together with that of positions rounded to a step, m.
 
-        What a finger that moves along one step shows there is no measure of it: on a flank each sample falls
-        elsewhere within its step, and is wrong by up to half of it.
+        What a finger that moves along one step shows is no measure of it: on a flank each sample falls elsewhere
+        within its step, and is wrong by up to half of it. Samples within a step of each other are wrong together,
+        however many there are where the finger is slow. The two correlated parts are joined into one of the same
+        variance and of the same weight in long means.
         """
-        return replace(self, white=max(self.white, step / np.sqrt(12.0)))
+        if step == 0.0:
+            return self
+        own, rounding = self.correlated**2, step**2 / 12.0
+        length = (own * self.length + rounding * step) / (own + rounding)
+        return Noise(self.white, float(np.sqrt(own + rounding)), length)
 
     def covariance(self, s: ArrayLike) -> FloatArray:
         """(N, N) covariance of samples at arclengths s (N,), m^2."""

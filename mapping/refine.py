@@ -99,10 +99,12 @@ def refine(
         note = f"no posterior: a {feature.kind} has no closed-form trace"
         return replace(feature, notes=(*feature.notes, note))
     base = base or _fitted(trace)
-    noise = (noise or noise_of_trace(trace, base)).rounded(trace.resolution)
+    noise = noise or noise_of_trace(trace, base)
     solution = solve(feature, trace, rng, base=base, noise=noise, others=others, tip_sd=tip_sd, confirm=confirm)
     found = describe(solution.problem, solution.posterior, base)
-    if solution.problem.noise != noise:  # see mapping.misfit: intervals hold within the family only
+    if solution.problem.noise != noise.rounded(
+        trace.resolution
+    ):  # see mapping.misfit: intervals hold within the family only
         note = f"no ideal {found.kind} fits the trace within its noise: the sizes are those of the closest one"
         found = replace(found, notes=(*found.notes, note))
     odds = odds_against_nothing(solution)

@@ -90,9 +90,20 @@ def test_block_variances_of_correlated_noise_keep_their_digits_at_every_length()
     assert math.isclose(below, above, rel_tol=2e-9)
 
 
-def test_rounded_positions_are_never_better_than_their_step_allows():
+def test_rounded_positions_are_wrong_by_their_step_and_together_within_it():
     rng = np.random.default_rng(0)
-    flank = np.cumsum(rng.uniform(3e-6, 8e-6, 20_000))
+    flank = np.cumsum(rng.uniform(0.0, 1e-6, 40_000))
     rounding = np.round(flank / 4e-6) * 4e-6 - flank
-    assert Noise(1e-7).rounded(4e-6).white == pytest.approx(rounding.std(), rel=0.02)
-    assert Noise(2e-6, 1e-6, 1e-3).rounded(4e-6) == Noise(2e-6, 1e-6, 1e-3)
+    noise = Noise(1e-7).rounded(4e-6)
+    assert noise.correlated == pytest.approx(rounding.std(), rel=0.02)
+    # one step further on the errors have nothing in common: a bin of 400 samples over 50 steps is worth about 50
+    means = rounding.reshape(-1, 400).mean(axis=1)
+    assert means.std() < np.sqrt(noise.block_covariances(1, 200e-6, 400.0)[0]) < rounding.std() / 3.0
+
+
+def test_rounding_joins_what_is_correlated_already():
+    noise = Noise(2e-6, 1e-6, 1e-3).rounded(4e-6)
+    rounding = 16e-12 / 12.0
+    assert noise.white == 2e-6 and noise.correlated**2 == pytest.approx(1e-12 + rounding)
+    assert noise.correlated**2 * noise.length == pytest.approx(1e-12 * 1e-3 + rounding * 4e-6)
+    assert Noise(2e-6, 1e-6, 1e-3).rounded(0.0) == Noise(2e-6, 1e-6, 1e-3)
