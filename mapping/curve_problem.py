@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.chart import Chart, chart_along
+from mapping.crest_trace import distances
 from mapping.curve_modes import CurveModes
 from mapping.feature import Feature
 from mapping.hollow_shape import GrooveShape
@@ -25,6 +26,9 @@ FloatArray = NDArray[np.float64]
 SAG = 0.005
 MOST_LEGS = 300
 HIGHEST_MODE = 8
+# An end at which a line meets another lies that near to where it was detected, in half-widths: what the other one
+# covers does not tell it.
+MEETING = 0.5
 # After so many degrees in a row that are no better than a lower one, no higher one is tried.
 PATIENCE = 2
 
@@ -45,7 +49,8 @@ def curve_problem(feature: Feature, around: Surroundings) -> Problem:
         chart = _chart(line, _normals_along(line, axis, normals), feature, sizes, crossings, degree, around)
         ends = chart.coordinates(axis[[0, -1]])[0]
         modes = _modes(chart, ends, degree, crossings, sizes)
-        shape = _shape(feature.kind, window, chart, modes, ends, crossings, sizes, around)
+        limits = _end_limits(axis, chart, ends, feature, sizes, around)
+        shape = _shape(feature.kind, window, chart, modes, ends, limits, crossings, sizes, around)
         return pose(feature, sizes, shape, window, around, _beginnings(shape, chart, sizes, feature.kind)), degree
 
     best, asked = first = posed(HIGHEST_DEGREE)
@@ -138,6 +143,7 @@ def _shape(
     chart: Chart,
     modes: CurveModes,
     ends: FloatArray,
+    limits: list[tuple[float, float]],
     crossings: int,
     sizes: Sizes,
     around: Surroundings,
@@ -154,12 +160,10 @@ def _shape(
         ]
         return max(sides, key=lambda shape: _rough_fit(shape, around))
     if not chart.closed:
-        low, high = float(chart.s[0]), float(chart.s[-1])
-        middle = min(max(float(ends.mean()), low + 1e-3 * (high - low)), high - 1e-3 * (high - low))
         if kind == "ridge":
             priors.append(Uniform(0.0, 1.0))
             start, step = [*start, 0.5], [*step, 0.2]
-        priors += [Uniform(low, middle), Uniform(middle, high)]
+        priors += [Uniform(*limit) for limit in limits]
         start, step = [*start, float(ends.min()), float(ends.max())], [*step, *[0.1 * sizes.half_width] * 2]
     if kind == "ridge":
         priors += [height_prior(sizes), radius_prior(sizes, tip)]
@@ -168,6 +172,24 @@ def _shape(
     priors += hollow_priors(sizes, tip)
     start, step = [*start, np.log(2.0 * sizes.radius), np.log(2.0 * sizes.height)], [*step, 0.02, 0.05]
     return GrooveShape(window, chart, modes, tip, tuple(priors), np.array(start), np.array(step))
+
+
+def _end_limits(
+    axis: FloatArray, chart: Chart, ends: FloatArray, feature: Feature, sizes: Sizes, around: Surroundings
+) -> list[tuple[float, float]]:
+    """Places between which the beginning and the end of an open line lie, m along the chart."""
+    low, high = float(chart.s[0]), float(chart.s[-1])
+    middle = min(max(float(ends.mean()), low + 1e-3 * (high - low)), high - 1e-3 * (high - low))
+    limits = []
+    for k, (least, most) in zip(np.argsort(ends), ((low, middle), (middle, high)), strict=True):
+        tip = axis[[0, -1][k]]
+        others = [other.axis for other in around.others if other is not feature and len(other.axis) > 1]
+        if any(distances(tip[None], other)[0] < MEETING * sizes.half_width for other in others):
+            reach = MEETING * sizes.half_width
+            at = float(np.clip(ends[k], least + 0.1 * reach, most - 0.1 * reach))
+            least, most = max(least, at - reach), min(most, at + reach)
+        limits.append((least, most))
+    return limits
 
 
 def _rough_fit(shape: StepShape, around: Surroundings) -> float:

@@ -57,3 +57,27 @@ def test_a_crossing_that_was_pulled_aside_bends_nothing() -> None:
     around = Surroundings(crossed(course(0.0)), PLATE, NOISE)
     names = pose_problem(guess(pulled, 0.06e-3), around).target.shape.names
     assert [name for name in names if name.startswith("bend")] == []
+
+
+def test_an_arm_that_meets_another_line_ends_where_they_meet() -> None:
+    arm = np.linspace([0.0, 0.0, 0.0], [0.02, 0.0, 0.0], 30)
+    bar = np.linspace([0.0, -0.02, 0.0], [0.0, 0.02, 0.0], 30)
+    paths = [np.linspace([x, -0.012, 0.0], [x, 0.012, 0.0], 2000) for x in np.linspace(-0.012, 0.018, 6)]
+    paths += [np.linspace([-0.012, y, 0.0], [0.03, y, 0.0], 2000) for y in (-0.014, -0.005, 0.0, 0.006, 0.015)]
+    feet, up = np.concatenate(paths), np.tile(UP, (11 * 2000, 1))
+    height = np.maximum(*(chain_height(feet, up, axis + 0.5 * D * UP, 0.5 * D, TIP) for axis in (arm, bar)))
+    height += NOISE.white * np.random.default_rng(1).standard_normal(len(feet))
+    trace = Trace(np.arange(len(feet)) * 1e-3, feet + np.outer(TIP + height, UP), np.repeat(np.arange(11), 2000), TIP)
+    beside = guess(bar[::5] + np.array([0.3e-3, 0.0, 0.0]), 0.1e-3)  # where the detection put the other line
+    mine = guess(arm[[0, 7, 15, 22, 29]], 0.1e-3)
+    found = refine(mine, trace, np.random.default_rng(0), base=PLATE, noise=NOISE, others=[mine, beside])
+    tips = found.axis[[0, -1]] if found.axis[0, 0] < found.axis[-1, 0] else found.axis[[-1, 0]]
+    assert np.linalg.norm(tips[0]) < 2e-3 and np.linalg.norm(tips[1] - arm[-1]) < 0.3e-3
+    assert np.abs(found.axis[:, 1]).max() < 0.15e-3
+    assert not found.length.censored
+    for others, widest in (([mine, beside], 3.7e-3), ([mine], np.inf)):
+        target = pose_problem(mine, Surroundings(trace, PLATE, NOISE, others)).target
+        start = target.shape.names.index("start")
+        assert (target.high - target.low)[start] < widest
+        assert (target.high - target.low)[start] > 1e-3
+    assert (target.high - target.low)[start] > 8e-3  # where nothing else is, only the sweeps tell where it ends
