@@ -192,28 +192,44 @@ def _bin(
     cell = np.floor(path / width).astype(np.int64)
     edges = np.flatnonzero(np.diff(cell, prepend=-1))
     count = np.diff(np.append(edges, len(path)))
-    feet = np.add.reduceat(points, edges) / count[:, None]
-    mean_normals = np.add.reduceat(normals, edges)
-    place = np.add.reduceat(path, edges) / count
+    share = _shares(path, edges, count)
+    feet = np.add.reduceat(share[:, None] * points, edges)
+    mean_normals = np.add.reduceat(share[:, None] * normals, edges)
+    place = np.add.reduceat(share * path, edges)
     last = path[edges + count - 1]
     spacing = float(path[-1]) / max(len(path) - 1, 1)
     extent = last - path[edges] + spacing
     if noise_level > 0.0:
         feet, mean_normals = _smooth(feet, place, width, scale), _smooth(mean_normals, place, width, scale)
     mean_normals = mean_normals / np.linalg.norm(mean_normals, axis=1, keepdims=True)
-    mean_height = np.add.reduceat(height, edges) / count
     if noise_level > 0.0:
-        mean_height, count = _without_spikes(height, edges, count, mean_height, noise_level)
+        share, count = _without_spikes(height, edges, count, share, noise_level)
+    mean_height = np.add.reduceat(share * height, edges)
+    # as many samples of equal share as would be known as well: where the finger stood, they are worth fewer
+    worth = np.maximum(np.rint(1.0 / np.add.reduceat(share**2, edges)), 1.0).astype(np.int64)
     whole = np.array([0, len(count)], dtype=np.int64)
     return Window(
-        feet, mean_normals, _tangents(feet), mean_height, count, place, last, 0.5 * extent, whole, int(count.sum())
+        feet, mean_normals, _tangents(feet), mean_height, worth, place, last, 0.5 * extent, whole, int(count.sum())
     )
 
 
+def _shares(path: FloatArray, edges: IntArray, count: IntArray) -> FloatArray:
+    """(N,) weight of each sample in the mean over its bin: of the way it stands for, not of the time spent there.
+
+    A template is averaged over the way; a finger that slows down at a flank leaves most samples of a bin there.
+    """
+    way = (
+        np.maximum(np.gradient(path), 1e-3 * path[-1] / len(path))
+        if len(path) > 1 and path[-1] > 0
+        else 0.0 * path + 1.0
+    )
+    return np.asarray(way / np.repeat(np.add.reduceat(way, edges), count))
+
+
 def _without_spikes(
-    height: FloatArray, edges: IntArray, count: IntArray, mean: FloatArray, noise_level: float
+    height: FloatArray, edges: IntArray, count: IntArray, share: FloatArray, noise_level: float
 ) -> tuple[FloatArray, IntArray]:
-    """Means and counts without single samples far outside their bin (a knock, a lost bit).
+    """Shares and counts without single samples far outside their bin (a knock, a lost bit).
 
     On a flank the samples of a bin differ by more than the noise: what lies between the medians of the bins beside it
     is no spike.
@@ -225,10 +241,10 @@ def _without_spikes(
     low, high = beside.min(axis=0) - 6.0 * noise_level, beside.max(axis=0) + 6.0 * noise_level
     spike = ((height < low[bins]) | (height > high[bins])) & (count[bins] >= 5)
     if not spike.any():
-        return mean, count
-    kept = np.where(spike, 0.0, height)
+        return share, count
+    kept = np.where(spike, 0.0, share)
     left = count - np.add.reduceat(spike.astype(np.int64), edges)
-    return np.add.reduceat(kept, edges) / np.maximum(left, 1), np.maximum(left, 1)
+    return kept / np.repeat(np.maximum(np.add.reduceat(kept, edges), 1e-300), count), np.maximum(left, 1)
 
 
 def _smooth(values: FloatArray, place: FloatArray, width: float, scale: float) -> FloatArray:
