@@ -69,7 +69,7 @@ def test_the_bench_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
     assert len([json.loads(text) for text in out.read_text().splitlines()]) == 3
 
 
-RIDGES = ("straight", "curved", "o-ring", "junction", "two", "edge", "helix", "wrong pose", "free form")
+RIDGES = ("groove", "straight", "curved", "o-ring", "junction", "two", "edge", "helix", "wrong pose", "free form")
 
 
 @pytest.mark.slow
