@@ -143,7 +143,8 @@ class PtyServer:
             if fault is not None and not fault.incoming:
                 device.out[:] = self._spoiled(index, bytes(device.out))
             with suppress(BlockingIOError):
-                sent = os.write(port[0], device.out)
+                # a copy: a test may make the device speak from its own thread meanwhile
+                sent = os.write(port[0], bytes(device.out))
                 del device.out[:sent]
 
     # faults
