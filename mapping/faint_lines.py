@@ -88,11 +88,14 @@ def faint_lines(
         best = max((line for line in lines if line is not None), key=lambda line: line.snr, default=None)
         if best is None or best.snr < needed:
             break
+        rough = best
         for _ in range(POLISHINGS):
-            best = _polished(best, inspection, inflation)
+            best = _polished(best, inspection, free, inflation)
         found.append(best)
-        near = inspection.near(best.axis, 1.5 * best.half_width)
-        free[near[distances(inspection.points[near], best.axis) <= 1.5 * best.half_width]] = False
+        # where it was before it was polished, too, or its remains would be found again
+        for axis in (rough.axis, best.axis):
+            near = inspection.near(axis, 1.5 * best.half_width)
+            free[near[distances(inspection.points[near], axis) <= 1.5 * best.half_width]] = False
         for k, tile in enumerate(tiles):
             if not free[tile].all():
                 tiles[k] = tile[free[tile]]
@@ -177,12 +180,13 @@ def _frame(normal: FloatArray, way: FloatArray) -> FloatArray:
     return np.stack([first, np.cross(normal, first)])
 
 
-def _polished(line: FaintLine, inspection: Inspection, inflation: float) -> FaintLine:
-    """The line turned and moved aside by less than what was tried, and as long as all places along it say."""
+def _polished(line: FaintLine, inspection: Inspection, free: BoolArray, inflation: float) -> FaintLine:
+    """The line turned and moved aside by less than what was tried, and as long as all free places along it say."""
     middle, length = line.axis.mean(axis=0), float(np.linalg.norm(line.axis[1] - line.axis[0]))
     frame = _frame(line.normal, np.cross(line.normal, line.axis[1] - line.axis[0]))
     reach = max(length, LENGTHS[-1] * ALONG * line.half_width)
     near = inspection.near(middle + reach / length * (line.axis - line.axis[::-1]), 3.0 * line.half_width)
+    near = near[free[near]]
     flat = (inspection.points[near] - middle) @ frame.T
     edges = np.arange(-reach, reach + line.half_width, line.half_width)
     widest, step = 2.0 * ASIDE * line.half_width / length, 2.0 * ASIDE * line.half_width / reach
