@@ -35,7 +35,7 @@ def lifted(point, lateral, normal, bend, aside, lift, out):  # type: ignore[no-u
         out[c] = point[c] + over * lateral[c] + up * normal[c]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def axes_about(
     s: FloatArray,
     points: FloatArray,

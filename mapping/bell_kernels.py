@@ -15,7 +15,7 @@ STEPS = 600
 PLACES = 500
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def bell_trace(height: float, scale: float, exponent: float, tip: float, table: FloatArray, spacing: float) -> None:
     """Heights of the ball over the plane at distances 0, spacing, ... from the axis, written to `table`.
 
@@ -47,7 +47,7 @@ def bell_trace(height: float, scale: float, exponent: float, tip: float, table: 
         rho0, t0, slope0 = rho, t, slope
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def bell_heights(
     x: FloatArray,
     y: FloatArray,

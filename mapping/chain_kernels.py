@@ -26,7 +26,7 @@ def _last_exit(square, along, gap):  # type: ignore[no-untyped-def]
     return (root - along) / square
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def chain_heights(
     feet: FloatArray,
     normals: FloatArray,

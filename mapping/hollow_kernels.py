@@ -23,7 +23,7 @@ def _rim(distance, tip, depth, bend):  # type: ignore[no-untyped-def]
     return -min(dip, depth)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def groove_heights(
     s: FloatArray,
     lateral: FloatArray,
@@ -54,7 +54,7 @@ def groove_heights(
             out[w, i] = total / nodes
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def pit_heights(
     x: FloatArray,
     y: FloatArray,
@@ -77,7 +77,7 @@ def pit_heights(
             out[w, i] = total / nodes
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def step_heights(
     lateral: FloatArray,
     basis: FloatArray,

@@ -18,6 +18,8 @@ FloatArray = NDArray[np.float64]
 ROUNDS = 12
 DRAWS = 1000
 FINAL_DRAWS = 4000
+# The proposal learns from the final draws, too, if they cannot be trusted yet: so often at most are they drawn.
+FINALS = 3
 # Below this k-hat importance sampling may stand for the posterior (theory section 8).
 TRUSTED_K_HAT = 0.5
 # Below this its proposal still covers the posterior (Vehtari et al. 2024): good enough to propose to a chain.
@@ -62,8 +64,13 @@ def importance_sample(target: Target, modes: Sequence[Laplace], rng: np.random.G
         if effective_size(weights) > EFFICIENT * DRAWS and k_hat < TRUSTED_K_HAT:
             break
         proposal = proposal.learned(draws, _tempered(ratios, at_least=20.0 * draws.shape[1]))
-    draws, ratios = _weigh(target, proposal, rng, FINAL_DRAWS)
-    weights, k_hat = smooth_weights(ratios)
+    for final in range(FINALS):
+        if final:
+            proposal = proposal.learned(draws, _tempered(ratios, at_least=20.0 * draws.shape[1]))
+        draws, ratios = _weigh(target, proposal, rng, FINAL_DRAWS)
+        weights, k_hat = smooth_weights(ratios)
+        if k_hat < TRUSTED_K_HAT:
+            break
     top = float(ratios.max())
     log_evidence = top + float(np.log(np.mean(np.exp(ratios - top))))
     return Importance(proposal, draws, weights, k_hat, effective_size(weights), log_evidence)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mapping.likelihood import Likelihood
 from mapping.priors import Prior
+from mapping.row_shares import by_shares
 
 FloatArray = NDArray[np.float64]
 
@@ -81,15 +82,21 @@ class Target:
         if sound.any():
             inside = theta if sound.all() else theta[sound]
             prior = sum(p.log_density(inside[:, i]) for i, p in enumerate(self.shape.priors))
-            out[sound] = prior + self.likelihood.log_density(self.templates(inside))
+            out[sound] = prior + by_shares(self._log_likelihood, inside, len(self.likelihood.window))
         return out
+
+    def _log_likelihood(self, theta: FloatArray) -> FloatArray:
+        return self.likelihood.log_density(self.templates(theta))
 
     def residuals(self, theta: FloatArray) -> FloatArray:
         """(W, n + P) residuals whose squares sum to -2 log density up to a constant."""
         theta = np.clip(np.atleast_2d(theta), self.low, self.high)
-        data = self.likelihood.residuals(self.templates(theta))
+        data = by_shares(self._data_residuals, theta, len(self.likelihood.window))
         prior = np.column_stack([p.residual(theta[:, i]) for i, p in enumerate(self.shape.priors)])
         return np.concatenate([data, prior], axis=1)
+
+    def _data_residuals(self, theta: FloatArray) -> FloatArray:
+        return self.likelihood.residuals(self.templates(theta))
 
     def with_likelihood(self, likelihood: Likelihood) -> Target:
         """The same shape under another noise."""

@@ -12,7 +12,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def whiten(
     values: FloatArray, starts: IntArray, carry: FloatArray, observe: FloatArray, gain: FloatArray, scale: FloatArray
 ) -> FloatArray:
@@ -32,7 +32,7 @@ def whiten(
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def chi_square(
     height: FloatArray,
     templates: FloatArray,
@@ -71,7 +71,7 @@ def chi_square(
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def project(white: FloatArray, starts: IntArray, basis: FloatArray, shrink: FloatArray) -> None:
     """Take the marginalised nuisance out of whitened series (W, n) in place, so that |e|^2 is `chi_square`."""
     walkers = white.shape[0]
