@@ -77,7 +77,8 @@ def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limi
         step *= 1.5  # a coarser answer is a more cautious one
     points, owner = face_samples(surface, step)
     distance, _ = cKDTree(touched).query(points, distance_upper_bound=0.9 * tip_radius, workers=-1)
-    distance = np.asarray(distance) + 0.55 * step  # as far as a place of the face may lie from the nearest sample
+    # as far as a place of the face may lie from the nearest sample
+    distance = np.asarray(distance) + 0.55 * (_longest_sides(surface) / _parts(surface, step))[owner]
     passed = distance < tip_radius
     lost = np.full(len(points), np.inf)
     lost[passed] = distance[passed] ** 2 / (tip_radius + np.sqrt(tip_radius**2 - distance[passed] ** 2))
@@ -110,10 +111,15 @@ def found_probability(
 
 def _parts(surface: Surface, spacing: float) -> NDArray[np.int64]:
     """(F,) subdivisions of each face's sides."""
-    corners = surface.vertices[surface.faces]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    longest = _longest_sides(surface)
     # a face of 200 subdivisions already has 40 000 samples
     return np.asarray(np.clip(np.ceil(longest / spacing), 1, 200).astype(np.int64))
+
+
+def _longest_sides(surface: Surface) -> FloatArray:
+    """(F,) m."""
+    corners = surface.vertices[surface.faces]
+    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1))
 
 
 def _sample_count(surface: Surface, spacing: float) -> int:
