@@ -17,6 +17,8 @@ IntArray = NDArray[np.int64]
 
 # Samples are looked at in blocks of this many: the cost of the rest of a long log is that of its boxes.
 BLOCK = 64
+# A path that leaves its smoothed course by more than so many standard deviations of a sample is not smooth.
+WANDERS = 1.5
 
 
 class EmptyWindowError(MappingError):
@@ -200,7 +202,10 @@ def _bin(
     spacing = float(path[-1]) / max(len(path) - 1, 1)
     extent = last - path[edges] + spacing
     if noise_level > 0.0:
-        feet, mean_normals = _smooth(feet, place, width, scale), _smooth(mean_normals, place, width, scale)
+        course = _smooth(feet, place, width, scale)
+        # a stage that moves by steps, now along and now up, has no smooth path: each bin is where it was felt
+        if np.sqrt(((course - feet) ** 2).sum(axis=1).mean()) <= WANDERS * noise_level:
+            feet, mean_normals = course, _smooth(mean_normals, place, width, scale)
     mean_normals = mean_normals / np.linalg.norm(mean_normals, axis=1, keepdims=True)
     if noise_level > 0.0:
         share, count = _without_spikes(height, edges, count, share, noise_level)

@@ -49,3 +49,16 @@ def test_a_bin_of_few_samples_stands_where_they_lie() -> None:
     window = window_of(crossing(spacing=17.7e-6))  # four or five a bin of 85 um
     own = window.feet[:, 0] - window.place
     assert np.ptp(own[2:-2]) < 1e-6
+
+
+def test_a_stage_that_goes_by_steps_is_where_it_was_felt() -> None:
+    """Along and up in turns: the way goes by jumps, and each sample is right where it lies."""
+    s = np.linspace(-7.5e-3, 7.5e-3, 700)
+    climbing = (np.abs(s) > 0.8e-3) & (np.abs(s) < 2.3e-3)
+    s = np.where(climbing, 150e-6 * np.round(s / 150e-6), s) + 1e-6 * np.random.default_rng(1).standard_normal(len(s))
+    height = cap_height(s, 2.0 * RADIUS, RADIUS, R)
+    centers = np.column_stack([s, np.zeros_like(s), R + height])
+    window = window_of(Trace(1e-3 * np.arange(len(s)), centers, np.zeros(len(s), dtype=np.int64), R))
+    flank = (np.abs(window.feet[:, 0]) > 0.5e-3) & (np.abs(window.feet[:, 0]) < 2.2e-3)
+    expected = cap_height(window.feet[:, 0], 2.0 * RADIUS, RADIUS, R)
+    assert np.abs(window.height - expected)[flank].max() < 1e-6
