@@ -17,8 +17,6 @@ IntArray = NDArray[np.int64]
 
 # Samples are looked at in blocks of this many: the cost of the rest of a long log is that of its boxes.
 BLOCK = 64
-# A path that leaves its smoothed course by more than so many standard deviations of a sample is not smooth.
-WANDERS = 1.5
 
 
 class EmptyWindowError(MappingError):
@@ -118,7 +116,8 @@ def bin_samples(samples: Samples, width: float, noise_level: float, scale: float
         samples: what `gather` found.
         width: wanted length of a bin along the sweep, m.
         noise_level: standard deviation of a sample, m: how far the path can be trusted.
-        scale: half width of the feature's disturbance, m: the path is smooth over a small part of it.
+        scale: half width of the feature's disturbance, m: the path is smooth over a small part of it; 0: it is not,
+            and each bin lies where it was felt (a stage moves by steps, now along and now up).
     """
     feet, count = samples.feet, len(samples.feet.height)
     runs = []
@@ -202,10 +201,7 @@ def _bin(
     spacing = float(path[-1]) / max(len(path) - 1, 1)
     extent = last - path[edges] + spacing
     if noise_level > 0.0:
-        course = _smooth(feet, place, width, scale)
-        # a stage that moves by steps, now along and now up, has no smooth path: each bin is where it was felt
-        if np.sqrt(((course - feet) ** 2).sum(axis=1).mean()) <= WANDERS * noise_level:
-            feet, mean_normals = course, _smooth(mean_normals, place, width, scale)
+        feet, mean_normals = _smooth(feet, place, width, scale), _smooth(mean_normals, place, width, scale)
     mean_normals = mean_normals / np.linalg.norm(mean_normals, axis=1, keepdims=True)
     if noise_level > 0.0:
         share, count = _without_spikes(height, edges, count, share, noise_level)

@@ -24,10 +24,10 @@ def crossing(spikes: int = 0, spacing: float = 5e-6) -> Trace:
     return Trace(1e-3 * np.arange(len(x)), centers, np.zeros(len(x), dtype=np.int64), R)
 
 
-def window_of(trace: Trace):
+def window_of(trace: Trace, scale: float = 2.5e-3):
     corners = 0.02 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     base = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
-    return bin_samples(gather(trace, base, np.array([[0.0, 0.0, R]]), 7e-3), WIDTH, SIGMA, 2.5e-3)
+    return bin_samples(gather(trace, base, np.array([[0.0, 0.0, R]]), 7e-3), WIDTH, SIGMA, scale)
 
 
 def test_the_samples_of_a_steep_flank_are_no_spikes() -> None:
@@ -58,7 +58,7 @@ def test_a_stage_that_goes_by_steps_is_where_it_was_felt() -> None:
     s = np.where(climbing, 150e-6 * np.round(s / 150e-6), s) + 1e-6 * np.random.default_rng(1).standard_normal(len(s))
     height = cap_height(s, 2.0 * RADIUS, RADIUS, R)
     centers = np.column_stack([s, np.zeros_like(s), R + height])
-    window = window_of(Trace(1e-3 * np.arange(len(s)), centers, np.zeros(len(s), dtype=np.int64), R))
+    window = window_of(Trace(1e-3 * np.arange(len(s)), centers, np.zeros(len(s), dtype=np.int64), R), scale=0.0)
     flank = (np.abs(window.feet[:, 0]) > 0.5e-3) & (np.abs(window.feet[:, 0]) < 2.2e-3)
     expected = cap_height(window.feet[:, 0], 2.0 * RADIUS, RADIUS, R)
     assert np.abs(window.height - expected)[flank].max() < 1e-6
