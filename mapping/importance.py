@@ -22,8 +22,6 @@ FINAL_DRAWS = 4000
 FINALS = 3
 # Below this k-hat importance sampling may stand for the posterior (theory section 8).
 TRUSTED_K_HAT = 0.5
-# Below this its proposal still covers the posterior (Vehtari et al. 2024): good enough to propose to a chain.
-USABLE_K_HAT = 0.7
 # The proposal is good enough when this share of the draws is effective.
 EFFICIENT = 0.5
 

@@ -12,7 +12,7 @@ from mapping.base import Base
 from mapping.evidence import log_evidence_of_nothing
 from mapping.feature import Feature
 from mapping.free_tip_shape import with_free_tip
-from mapping.importance import TRUSTED_K_HAT, USABLE_K_HAT, Importance, importance_sample
+from mapping.importance import TRUSTED_K_HAT, Importance, importance_sample
 from mapping.laplace import find_optima, laplace
 from mapping.misfit import account_for_misfit
 from mapping.noise import Noise
@@ -166,7 +166,7 @@ def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool =
         return Solution(problem, _from_importance(problem, fast, rng), fast, None)
     walkers = walkers_for(len(problem.window), fast.draws.shape[1])
     starts = _starts(problem, fast, rng, walkers)
-    chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal, covers=fast.k_hat < USABLE_K_HAT)
+    chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal)
     return Solution(problem, _from_chain(problem, fast, chain, rng), fast, chain)
 
 

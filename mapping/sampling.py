@@ -18,8 +18,9 @@ FloatArray = NDArray[np.float64]
 # Walkers at least and at most; so many bins a step cost no more than what emcee does beside them, whoever sees them.
 WALKERS, MOST_WALKERS = 20, 48
 FREE_BINS = 12_000
-# Share of the steps that propose from an adapted proposal, if that covers the target and if it may not.
-COVERS, DOUBTED = 0.9, 0.5
+# Share of the steps that propose from an adapted proposal: where its tails are too light walkers stick, and the others
+# set them free.
+INDEPENDENT = 0.5
 # A chain counts as long when it holds this many autocorrelation times, and their estimate has settled.
 TIMES = 100
 SETTLED = 0.01
@@ -65,13 +66,12 @@ def sample_ensemble(
     rng: np.random.Generator,
     *,
     proposal: Proposal | None = None,
-    covers: bool = False,
     max_steps: int = 6000,
 ) -> Chain:
     """Draw from a target by an ensemble of walkers.
 
-    Differential evolution with an occasional jump of full length between modes (gamma0 = 1); half of the steps, or
-    nine in ten, propose from `proposal` instead, independently of the walker (Metropolis-Hastings), which costs
+    Differential evolution with an occasional jump of full length between modes (gamma0 = 1); half of the steps
+    propose from `proposal` instead, independently of the walker (Metropolis-Hastings), which costs
     nothing where the proposal is good and is refused where it is not. The snooker move of emcee 3.1.6 is wrong and
     not used.
 
@@ -80,7 +80,6 @@ def sample_ensemble(
         starts: (W, P) places of the walkers, W even and at least 2 P, inside the support.
         rng: all randomness comes from here.
         proposal: the adapted importance proposal, or None.
-        covers: True if its k-hat says that its draws, reweighted, represent the target.
         max_steps: steps after which the run ends unconverged.
 
     Reference: Foreman-Mackey et al. (2013); ter Braak (2006); theory section 8.
@@ -89,9 +88,8 @@ def sample_ensemble(
 
     moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
     if proposal is not None:
-        share = COVERS if covers else DOUBTED
-        moves = [(move, (1.0 - share) * weight) for move, weight in moves]
-        moves.append((emcee.moves.MHMove(_independent(proposal)), share))
+        moves = [(move, (1.0 - INDEPENDENT) * weight) for move, weight in moves]
+        moves.append((emcee.moves.MHMove(_independent(proposal)), INDEPENDENT))
     sampler = emcee.EnsembleSampler(*starts.shape, target.log_density, moves=moves, vectorize=True)
     _seed(sampler, rng)
     state, tau, look = starts, np.inf, FIRST_LOOK
