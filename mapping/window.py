@@ -199,7 +199,8 @@ def _bin(
     place = np.add.reduceat(share * path, edges)
     last = path[edges + count - 1]
     spacing = float(path[-1]) / max(len(path) - 1, 1)
-    extent = last - path[edges] + spacing
+    # a single sample was felt at a point, however far the next one is (a machine that pecks)
+    extent = np.where(count > 1, last - path[edges] + spacing, 0.0)
     if noise_level > 0.0:
         feet, mean_normals = _smooth(feet, place, width, scale), _smooth(mean_normals, place, width, scale)
     mean_normals = mean_normals / np.linalg.norm(mean_normals, axis=1, keepdims=True)

@@ -62,3 +62,9 @@ def test_a_stage_that_goes_by_steps_is_where_it_was_felt() -> None:
     flank = (np.abs(window.feet[:, 0]) > 0.5e-3) & (np.abs(window.feet[:, 0]) < 2.2e-3)
     expected = cap_height(window.feet[:, 0], 2.0 * RADIUS, RADIUS, R)
     assert np.abs(window.height - expected)[flank].max() < 1e-6
+
+
+def test_a_single_sample_was_felt_at_a_point() -> None:
+    window = window_of(crossing(spacing=0.3e-3))  # far wider than a bin
+    assert (window.count == 1).all() and (window.half == 0.0).all()
+    assert (window_of(crossing()).half > 0.4 * WIDTH).sum() > 100
