@@ -102,6 +102,7 @@ def test_one_fault_of_each_kind_is_survived(kind: str, tmp_path: Path) -> None:
         assert len(said) > 20, "nothing was said"
 
 
+@pytest.mark.slow
 def test_a_sensor_that_comes_back_costs_a_sweep_and_no_more(tmp_path: Path) -> None:
     stage = GrblEmulator(TouchedBody(plate(), R, FRAME, STIFFNESS), np.array([-0.15, -0.15, -0.035]))
     links = [tmp_path / "stage", tmp_path / "sensor"]
