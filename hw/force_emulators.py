@@ -51,7 +51,7 @@ class ForceEmulator:
         while self.rate > 0 and self._next / (self.rate * self._clock) <= now:
             t = self._next / (self.rate * self._clock)
             self.stage.advance(t)
-            force = self.stage.body.force(self.stage.motion.position)
+            force = self.stage.body.force(self.stage.position)
             self.strongest = max(self.strongest, float(np.linalg.norm(force)))
             felt = force + self.noise * self._rng.standard_normal(3)
             self._due.append((t + self.latency, self.frame(self._next, felt)))

@@ -172,7 +172,9 @@ class GrblFinger:
     def info(self) -> dict[str, Any]:
         """What is connected, and what the connection has counted so far."""
         controller = self.stage.controller
-        sensor = {} if self.slide is None else {"sensor": self.slide.sensor.info}
+        sensor = {}
+        if self.slide is not None:
+            sensor = {"sensor": self.slide.sensor.info, "lag": self.slide.lag.seconds}
         return {
             "kind": "grbl",
             "touch": "peck" if self.slide is None else "slide",

@@ -130,20 +130,25 @@ class GrblEmulator:
         return np.asarray(np.round(position * per_metre) / per_metre)
 
     @property
+    def position(self) -> FloatArray:
+        """(3,) m, machine coordinates: stepping motors stand on their steps, and the step counts are what is told."""
+        return self._steps(self.motion.position)
+
+    @property
     def offset(self) -> FloatArray:
         """(3,) work coordinate offset, m."""
         return np.asarray(self.systems[self.modes["system"]] + self._g92)
 
     def report(self) -> str:
         """The status report."""
-        position, mask = self._steps(self.motion.position), int(self.settings[10])
+        position, mask = self.position, int(self.settings[10])
         place = f"MPos:{self._units(position)}" if mask & 1 else f"WPos:{self._units(position - self.offset)}"
         fields = [self.state, place]
         if mask & 2:
             fields.append(f"Bf:{BLOCKS - len(self.motion.queue)},{RECEIVE_BUFFER - len(self._buffer)}")
         speed = self.motion.queue[0].speed * 60e3 if self.motion.queue and not self.motion.held else 0.0
         fields.append(f"FS:{speed:.0f},0")
-        if np.any(self.body.force(self.motion.position)):
+        if np.any(self.body.force(position)):
             fields.append("Pn:P")
         if self._reports % 10 == 0:
             fields.append(f"WCO:{self._units(self.offset)}")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from hw.errors import LinkError, StoppedError
 from hw.force_sensor import ForceSensor
 from hw.fusion import known_at, positions_at, prompt, rigid_centers
 from hw.guarded_stage import PATIENCE, GuardedStage
+from hw.lag import Lag
 from hw.moves import Move
 from hw.peck import Touched, spaced
 
@@ -55,6 +56,7 @@ class Slide:
             periods, 0.2 leaves a phase margin of about 60 degrees.
         delay: by how much the force is stamped later than the stage's reports, s (hw.fusion.estimate_delay).
         contact: force above which a sample counts as contact, N.
+        lag: what of the delay is left, learnt from one batch of samples to the next.
     """
 
     sensor: ForceSensor
@@ -65,6 +67,7 @@ class Slide:
     gain: float = 0.2
     delay: float = 0.0
     contact: float = 0.05
+    lag: Lag = field(default_factory=Lag)
 
     def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
         """Samples in contact with their forces, about every BATCH seconds; what was felt before a stop as well."""
@@ -163,15 +166,22 @@ class Slide:
             np.array([stage.controller.machine_position(report.status) for report in reports])
         )
         forces = stage.frame.turn_to_object(forces)
-        centers = positions_at(times - self.delay, stamps, places)
         pressing = np.linalg.norm(forces, axis=1)
-        touching = (pressing > self.contact) & np.isfinite(centers).all(axis=1) & (times > after)
         normals = forces / np.maximum(pressing, self.contact)[:, None]
         longest = max(BLIND * self.period, UNUSUAL * float(np.median(np.diff(stamps))))
         step = STEPS * stage.controller.settings.resolution
-        touching &= known_at(times - self.delay, stamps, places, normals, longest, step)
-        rigid = rigid_centers(centers[touching], forces[touching], self.stiffness)
-        return Touched(times[touching], rigid, forces[touching])
+
+        def touching(delay: float) -> tuple[NDArray[np.bool_], FloatArray]:
+            centers = positions_at(times - delay, stamps, places)
+            sound = (pressing > self.contact) & np.isfinite(centers).all(axis=1) & (times > after)
+            return sound & known_at(times - delay, stamps, places, normals, longest, step), centers
+
+        sound, centers = touching(self.delay)
+        rigid = rigid_centers(centers[sound], forces[sound], self.stiffness)
+        self.lag.learn(times[sound], centers[sound], rigid, normals[sound])
+        sound, centers = touching(self.delay + self.lag.seconds)
+        rigid = rigid_centers(centers[sound], forces[sound], self.stiffness)
+        return Touched(times[sound], rigid, forces[sound])
 
 
 def _between(rows: FloatArray, at: float) -> FloatArray:

@@ -81,6 +81,7 @@ def chain_heights(
                 start = min(max(first[i], first_leg), last_leg)
                 stop = max(min(last[i] - 1, last_leg), start) + 1
             for k in range(start, stop):
+                beside = -1
                 ox, oy, oz = qx - chain[k, 0], qy - chain[k, 1], qz - chain[k, 2]
                 if last_leg >= 0:
                     if length[k] == 0.0:
@@ -125,16 +126,25 @@ def chain_heights(
                             x = -x if place < 0.0 else x
                             best, mx, my, mz = t, share * cx + x * ux, share * cy + x * uy, share * cz + x * uz
                         continue
-                    if place > length[k]:
+                    beyond = place > length[k]
+                    if beyond:
                         ox, oy, oz = qx - chain[k + 1, 0], qy - chain[k + 1, 1], qz - chain[k + 1, 2]
+                    beside = k + 1 if beyond else k - 1
                 along = ox * nx + oy * ny + oz * nz
                 distance = ox * ox + oy * oy + oz * oz
                 if distance > far and along > 0.0:
                     continue
                 distance = np.sqrt(distance)
                 t = _last_exit(1.0, along, (distance - total) * (distance + total))
-                if t > best:
-                    best, mx, my, mz = t, ox + t * nx, oy + t * ny, oz + t * nz
+                if t <= best:
+                    continue
+                sx, sy, sz = ox + t * nx, oy + t * ny, oz + t * nz
+                if last_leg >= 0 and rounding[w] < 1.0 and first_leg <= beside and beside <= last_leg:
+                    # half of a joint's sphere is in the leg beside it, unless that ends there, cut square
+                    into = sx * unit[beside, 0] + sy * unit[beside, 1] + sz * unit[beside, 2]
+                    if (into if beside > k else -into) > 0.0:
+                        continue
+                best, mx, my, mz = t, sx, sy, sz
             if best <= -half_bin[i]:
                 out[w, i] = 0.0
                 continue

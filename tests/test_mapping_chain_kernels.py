@@ -64,3 +64,15 @@ def test_a_bin_holds_the_mean_of_the_trace_over_it():
     binned = heights(feet, up, chain, radius, half_bin=half, tangents=along)
     plain = heights(feet, up, chain, radius)
     assert np.abs(binned - exact).max() < 0.1e-6 < np.abs(plain - exact).max()
+
+
+@pytest.mark.parametrize("rounding", [0.0, 0.3])
+def test_where_a_chart_has_its_vertices_does_not_matter_to_the_ends_of_a_ridge(rounding):
+    # a joint close to an end was felt as a sphere that sticks out of the cut: the length of a wire was 19 um short
+    feet, normals = scattered(5, tilt=0.0)
+    axis, radius = np.array([[-3e-3, 0, 0.2e-3], [4e-3, 1e-3, 0.2e-3]]), 0.5e-3
+    plain = heights(feet, normals, axis, radius, rounding)
+    for shares in ([1e-6], [0.02, 0.98], [0.01, 0.03, 0.5, 0.999]):
+        joints = axis[0] + np.outer([0.0, *shares, 1.0], axis[1] - axis[0])
+        np.testing.assert_allclose(heights(feet, normals, joints, radius, rounding), plain, atol=1e-12)
+    assert (plain > 0).sum() > 100
