@@ -51,10 +51,11 @@ class NoiseSource:
 
 def ornstein_uhlenbeck(rng: np.random.Generator, shape: tuple[int, int], step: float, deviation: float) -> FloatArray:
     """Stationary paths (N, M) with covariance deviation^2 exp(-|i - j| step), exact for any step."""
-    from scipy.signal import lfilter
+    from hw.noise_kernels import decaying_sum
 
-    keep = np.exp(-step)
+    keep = float(np.exp(-step))
     drive = rng.standard_normal(shape)
     # -expm1 keeps the innovation accurate when the samples lie much closer than the correlation length
     drive[1:] *= np.sqrt(-np.expm1(-2.0 * step))
-    return np.asarray(deviation * lfilter([1.0], [1.0, -keep], drive, axis=0))
+    decaying_sum(drive, keep)
+    return np.asarray(deviation * drive)

@@ -91,14 +91,14 @@ class FaintSearch:
 
 def lead(line: Feature, seen: Detections, base: Base, tip_radius: float) -> FaintLead:
     """Where to begin following a faint ridge or groove: in its middle, by passes that follow from its height."""
-    from scipy.stats import norm
+    from scipy.special import ndtri
 
     way = (line.axis[-1] - line.axis[0]) / np.linalg.norm(line.axis[-1] - line.axis[0])
     middle = base.nearest.query(line.axis.mean(axis=0)[None])
     point, normal, height = middle.points[0], middle.normals[0], line.height.median
     half_width = float(np.sqrt(2.0 * tip_radius * abs(height)))
     share = (abs(height) / seen.detection_limit) ** 1.25 * (1.0 if height > 0 else DIP)
-    one = share * float(seen.threshold + norm.ppf(seen.probability))
+    one = share * float(seen.threshold + ndtri(seen.probability))
     seed = Crossing(
         sweep=-1,
         t=0.0,
