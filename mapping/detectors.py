@@ -21,6 +21,8 @@ from mapping.stretches import find_disturbances
 from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
+# Number, samples and arclengths (N,) m of a sweep
+Sweep = tuple[int, Trace, FloatArray]
 
 # Half-width of the widest disturbance that counts as fine, in tip radii.
 LARGEST = 4.0
@@ -30,6 +32,8 @@ PROBABILITY = 0.95
 # Height, in steps of positions that are rounded, up to which a detail may be the rounding's: half a step to either
 # side, and a step and a half of motion between two reports.
 UNRESOLVED = 2.5
+# Distances between samples that differ by no more than this factor are as good as equal.
+ALIKE = 1.15
 
 
 class DetectionError(MappingError):
@@ -111,16 +115,20 @@ def detect(
     )
     if not usable:
         return Detections((), noise or Noise(0.0), algorithm, np.inf, PROBABILITY, np.inf, 0.0, left_out)
-    raw = float(np.median([s[-1] / (len(s) - 1) for _, _, s in usable]))
+    raw = float(np.median([_step(sweep) for sweep in usable]))
     stretches = [] if noise else raw_stretches(usable, base)
     first = floored(noise, tip) if noise else first_noise(stretches, raw, tip)
     widest = LARGEST * tip if largest is None else largest
-    profiles = _profiles(usable, base, first, raw, tip)
+    profiles = _profiles(usable, base, first, tip)
     behind = background(profiles, base, noise, stretches, first, tip, widest, stated)
-    level, bank = behind.noise, behind.bank
-    threshold = threshold_for(bank, false_alarms_per_metre, behind.uncertainty)
+    level = behind.noise
+    thresholds = {
+        spacing: threshold_for(bank, false_alarms_per_metre, behind.uncertainties[spacing])
+        for spacing, bank in behind.banks.items()
+    }
     crossings = []
     for profile in profiles:
+        bank, threshold = behind.banks[profile.spacing], thresholds[profile.spacing]
         disturbances = find_disturbances(profile, bank, level, threshold, tip)
         if base.kind == "profile":
             disturbances = tuple(d for d in disturbances if _stands_out(d, profile, level, tip))
@@ -130,8 +138,11 @@ def detect(
     left_out += unresolved
     if algorithm != 3:
         crossings = _judged(crossings, usable, algorithm, level)
-    length = sum(p.length for p in profiles)
-    limit = max(bank.detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
+    lengths = {spacing: sum(p.length for p in profiles if p.spacing == spacing) for spacing in thresholds}
+    # what is stated of the whole trace holds for the sweeps that make most of it
+    usual = max(lengths, key=lambda spacing: lengths[spacing])
+    threshold, length = thresholds[usual], sum(lengths.values())
+    limit = max(behind.banks[usual].detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
     return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out)
 
 
@@ -145,13 +156,33 @@ def _resolved(crossings: list[Crossing], resolution: float) -> tuple[list[Crossi
     return kept, (f"{lost} details of at most {low:.3g} m may be rounding: the positions come in steps",)
 
 
-def _profiles(
-    usable: list[tuple[int, Trace, FloatArray]], base: Base, noise: Noise, raw: float, tip: float
-) -> list[HeightProfile]:
+def _step(sweep: Sweep) -> float:
+    """Mean distance of a sweep's samples, m."""
+    s = sweep[2]
+    return float(s[-1] / (len(s) - 1))
+
+
+def _profiles(usable: list[Sweep], base: Base, noise: Noise, tip: float) -> list[HeightProfile]:
     """Profiles of every sweep in bins that the smallest visible crest spans BINS_PER_HALF_WIDTH times."""
-    smallest = smallest_half_width(noise, raw, 1.0, tip, CERTAIN)
-    spacing = raw * max(1, int(smallest / (BINS_PER_HALF_WIDTH * raw)))
-    return [p for number, part, s in usable for p in height_profiles(number, part, s, base, spacing)]
+    spacings = np.empty(len(usable))
+    for alike in _alike(np.array([_step(sweep) for sweep in usable])):
+        raw = float(np.median([_step(usable[i]) for i in alike]))
+        smallest = smallest_half_width(noise, raw, 1.0, tip, CERTAIN)
+        spacings[alike] = raw * max(1, int(smallest / (BINS_PER_HALF_WIDTH * raw)))
+    each = zip(usable, spacings.tolist(), strict=True)
+    return [p for (number, part, s), spacing in each for p in height_profiles(number, part, s, base, spacing)]
+
+
+def _alike(steps: FloatArray) -> list[NDArray[np.int64]]:
+    """Indices of the sweeps that were sampled about as densely as each other: filters know one density."""
+    order = np.argsort(steps, kind="stable")
+    groups, least = [], steps[order[0]]
+    begin = 0
+    for i, step in enumerate(steps[order]):
+        if step > ALIKE * least:
+            groups.append(order[begin:i])
+            begin, least = i, step
+    return [*groups, order[begin:]]
 
 
 def _stands_out(found: Disturbance, profile: HeightProfile, noise: Noise, tip: float) -> bool:
@@ -167,9 +198,7 @@ def _stands_out(found: Disturbance, profile: HeightProfile, noise: Noise, tip: f
     return bool(abs(found.height) > ROUGHNESS * np.sqrt(variance))
 
 
-def _judged(
-    crossings: list[Crossing], usable: list[tuple[int, Trace, FloatArray]], algorithm: int, noise: Noise
-) -> list[Crossing]:
+def _judged(crossings: list[Crossing], usable: list[Sweep], algorithm: int, noise: Noise) -> list[Crossing]:
     """Crossings whose `curvature_feature` says whether the paper's algorithm reports a feature of their sign there."""
     from mapping.algorithms import along_chord, curvature_features
 

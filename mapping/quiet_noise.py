@@ -54,13 +54,13 @@ class Background:
 
     Args:
         noise: of single samples.
-        bank: filters for it.
-        uncertainty: relative standard deviation of the filters' noise.
+        banks: filters for it, by the width of the bins (m) of the profiles that they look at.
+        uncertainties: relative standard deviation of each bank's noise.
     """
 
     noise: Noise
-    bank: Bank
-    uncertainty: float = 0.0
+    banks: dict[float, Bank]
+    uncertainties: dict[float, float]
 
 
 def raw_stretches(usable: Sequence[tuple[int, Trace, FloatArray]], base: Base) -> list[Stretch]:
@@ -115,19 +115,20 @@ def background(
     """
     drift = 0 if base.kind == "mesh" else 2
     if given is not None:
-        return Background(
-            floored(given, tip_radius), _bank(profiles, floored(given, tip_radius), tip_radius, largest, drift)
-        )
-    level, fit, bank = first, NoiseFit(first), _bank(profiles, first, tip_radius, largest, drift)
+        banks = _banks(profiles, floored(given, tip_radius), tip_radius, largest, drift)
+        return Background(floored(given, tip_radius), banks, dict.fromkeys(banks, 0.0))
+    level, fit, banks = first, NoiseFit(first), _banks(profiles, first, tip_radius, largest, drift)
     before: list[BoolArray] = []
     for _ in range(ROUNDS):
-        quiet = [quiet_bins(p, bank, level, SUSPECT, tip_radius) & _likely(p, level, drift) for p in profiles]
+        quiet = [
+            quiet_bins(p, banks[p.spacing], level, SUSPECT, tip_radius) & _likely(p, level, drift) for p in profiles
+        ]
         if before and all(np.array_equal(a, b) for a, b in zip(quiet, before, strict=True)):
             break
         fit = _fit(profiles, quiet, stretches, level, first, base, stated)
         level = floored(fit.noise, tip_radius)
-        bank, before = _bank(profiles, level, tip_radius, largest, drift), quiet
-    return Background(level, bank, _uncertainty(fit, bank))
+        banks, before = _banks(profiles, level, tip_radius, largest, drift), quiet
+    return Background(level, banks, {spacing: _uncertainty(fit, bank) for spacing, bank in banks.items()})
 
 
 def _likely(profile: HeightProfile, noise: Noise, drift: int) -> BoolArray:
@@ -138,10 +139,16 @@ def _likely(profile: HeightProfile, noise: Noise, drift: int) -> BoolArray:
     return np.asarray(np.abs(profile.height) <= UNLIKELY * sd)
 
 
-def _bank(profiles: Sequence[HeightProfile], noise: Noise, tip_radius: float, largest: float, drift: int) -> Bank:
-    spacing, samples = profiles[0].spacing, float(np.mean([p.samples for p in profiles]))
-    smallest = smallest_half_width(noise, spacing, samples, tip_radius, CERTAIN)
-    return build_bank(noise, spacing, samples, smallest, max(largest, smallest), drift)
+def _banks(
+    profiles: Sequence[HeightProfile], noise: Noise, tip_radius: float, largest: float, drift: int
+) -> dict[float, Bank]:
+    """Filters for the profiles of each width of bins."""
+    banks = {}
+    for spacing in dict.fromkeys(p.spacing for p in profiles):
+        samples = float(np.mean([p.samples for p in profiles if p.spacing == spacing]))
+        smallest = smallest_half_width(noise, spacing, samples, tip_radius, CERTAIN)
+        banks[spacing] = build_bank(noise, spacing, samples, smallest, max(largest, smallest), drift)
+    return banks
 
 
 def _fit(

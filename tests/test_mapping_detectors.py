@@ -261,3 +261,21 @@ def test_a_tip_thrown_off_for_moments_changes_neither_the_noise_nor_the_wire() -
     assert 3e-7 < found.noise.sd < 2e-6
     strongest = max(found.crossings, key=lambda crossing: crossing.snr)
     np.testing.assert_allclose(strongest.height, 0.65e-3, rtol=0.02)
+
+
+def test_sparse_sweeps_among_dense_ones_raise_no_more_false_alarms_than_asked() -> None:
+    # bins narrower than a sweep's own samples were filled in between them, and counted as samples of their own
+    rng, white = np.random.default_rng(8), 5e-6
+    parts = []
+    for number in range(160):
+        step, count = (0.34e-3, 25) if number % 4 else (0.5e-3, 121)
+        x = step * np.arange(count) - 0.03
+        z = TIP + white * rng.standard_normal(count)
+        centers = np.column_stack([x, np.full(count, 1e-4 * number), z])
+        parts.append(Trace(number + x / 0.01, centers, np.full(count, number), TIP))
+    trace = Trace.concatenate(parts)
+    found = detect(trace, plate(), false_alarms_per_metre=4.0, noise=Noise(white))
+    sparse = [c for c in found.crossings if c.sweep % 4 == 0]
+    # 2.4 m of sparse sweeps: 9.6 expected; about 33 were found
+    assert len(sparse) <= 20
+    assert {round(1e5 * p) for p in np.diff(trace.centers[:25, 0])} == {50}
