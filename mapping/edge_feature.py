@@ -58,9 +58,10 @@ def _hinge(crossing: Crossing, inspection: Inspection) -> Hinge | None:
     """The hinge of a sweep whose height runs off in a straight line to one of its ends."""
     own = inspection.of_sweep(crossing.sweep)
     points, heights = inspection.points[own], np.sign(crossing.height) * inspection.height[own]
+    sd = float(np.median(inspection.sd[own]))
     for order in (slice(None), slice(None, None, -1)):
         place, height = points[order], heights[order]
-        off = height > max(CLEAR * inspection.sd, 0.03 * height.max())
+        off = height > max(CLEAR * sd, 0.03 * height.max())
         count = int(off.argmin())
         if count < LEAST_PLACES:
             continue
@@ -70,7 +71,7 @@ def _hinge(crossing: Crossing, inspection: Inspection) -> Hinge | None:
         rise = abs(np.ptp(np.polyval([bend, slope, start], s[keep])))
         line = np.polyfit(s[keep], height[:count][keep], 1)
         straight = abs(bend) * np.ptp(s[keep]) ** 2 / 4 < STRAIGHT * rise
-        if straight and line[0] < 0 and rise > max(0.4 * line[1], 10 * inspection.sd):
+        if straight and line[0] < 0 and rise > max(0.4 * line[1], 10 * sd):
             way = (place[0] - place[count - 1]) / np.linalg.norm(place[0] - place[count - 1])
             at = place[0] + way * line[1] / line[0]
             return Hinge(crossing, at, way, float(-line[0] * np.sign(crossing.height)))

@@ -9,12 +9,13 @@ from numba import njit
 
 
 @njit(cache=True)
-def best_segment(flat, height, angles, size, cell_u, cell_v, section, lengths, least):  # type: ignore[no-untyped-def]
+def best_segment(flat, height, weight, angles, size, cell_u, cell_v, section, lengths, least):  # type: ignore[no-untyped-def]
     """(signal-to-noise, angle, place across, beginning, end) of the clearest segment in any direction; zeros if none.
 
     Args:
         flat: (N, 2) places.
         height: (N,) in standard deviations.
+        weight: (N,) usual standard deviation over that of the place.
         angles: (A,) directions, rad.
         size: diameter of a circle about the origin that holds all places.
         cell_u, cell_v: cells along and across the line.
@@ -33,8 +34,8 @@ def best_segment(flat, height, angles, size, cell_u, cell_v, section, lengths, l
         for i in range(len(height)):
             u, v = flat[i, 0] * c + flat[i, 1] * s, flat[i, 1] * c - flat[i, 0] * s
             row, column = int((v - low_v) / cell_v), int((u - low_u) / cell_u)
-            total[row, column] += height[i]
-            count[row, column] += 1.0
+            total[row, column] += height[i] * weight[i]
+            count[row, column] += weight[i] ** 2
         for row in range(wings, rows - wings):
             for column in range(columns):
                 match, power = 0.0, 0.0

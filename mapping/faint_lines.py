@@ -157,20 +157,23 @@ def _clearest_in(
     angles = np.arange(0.0, np.pi, 4 * ASIDE / (LENGTHS[-1] * ALONG))
     cell_u, cell_v = ALONG * half_width, ACROSS * half_width
     section = crest_trace(np.arange(-2.0, 3.0) * cell_v, 1.0, half_width)
-    heights, lengths = height / inspection.sd, np.array(LENGTHS)
-    best = best_segment(flat, heights, angles, size, cell_u, cell_v, section, lengths, LEAST_POWER)
+    sd, lengths = inspection.sd[tile], np.array(LENGTHS)
+    best = best_segment(
+        flat, height / sd, inspection.level / sd, angles, size, cell_u, cell_v, section, lengths, LEAST_POWER
+    )
     if best[0] == 0.0:
         return None
     _, angle, row, begin, end = best
     way, aside = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     inside = (flat @ way >= begin) & (flat @ way <= end) & (np.abs(flat @ aside - row) < half_width)
-    line = _Support.of(height[inside], flat[inside] @ aside - row, inspection.sweep[tile][inside], half_width)
-    if not line.agreed(inspection.sd * inflation):
+    worth = (inspection.level / sd[inside]) ** 2
+    line = _Support.of(height[inside], worth, flat[inside] @ aside - row, inspection.sweep[tile][inside], half_width)
+    if not line.agreed(inspection.level * inflation):
         return None
-    sd = inspection.sd * inflation / float(np.sqrt(line.square.sum()))
+    crest_sd = inspection.level * inflation / float(np.sqrt(line.square.sum()))
     crest = float(line.signal.sum() / line.square.sum())
     ends = np.array([at * way + row * aside for at in (begin, end)]) @ frame
-    return FaintLine(origin + ends, normal, crest, sd, half_width, abs(crest) / sd, len(line.signal))
+    return FaintLine(origin + ends, normal, crest, crest_sd, half_width, abs(crest) / crest_sd, len(line.signal))
 
 
 def _frame(normal: FloatArray, way: FloatArray) -> FloatArray:
@@ -187,7 +190,7 @@ def _polished(line: FaintLine, inspection: Inspection, free: BoolArray, inflatio
     reach = max(length, LENGTHS[-1] * ALONG * line.half_width)
     near = inspection.near(middle + reach / length * (line.axis - line.axis[::-1]), 3.0 * line.half_width)
     near = near[free[near]]
-    flat = (inspection.points[near] - middle) @ frame.T
+    flat, worth = (inspection.points[near] - middle) @ frame.T, (inspection.level / inspection.sd[near]) ** 2
     edges = np.arange(-reach, reach + line.half_width, line.half_width)
     widest, step = 2.0 * ASIDE * line.half_width / length, 2.0 * ASIDE * line.half_width / reach
     best = (0.0, 0.0, 0.0, *(frame @ (line.axis - middle).T)[0], 0.0)
@@ -196,7 +199,8 @@ def _polished(line: FaintLine, inspection: Inspection, free: BoolArray, inflatio
         across = flat @ [-np.sin(angle), np.cos(angle)]
         for row in np.linspace(-1.0, 1.0, 7) * ACROSS * line.half_width:
             shape = crest_trace(across - row, np.sign(line.height), line.half_width)
-            sums = [np.histogram(along, edges, weights=w)[0] for w in (shape * inspection.height[near], shape**2)]
+            terms = (worth * shape * inspection.height[near], worth * shape**2)
+            sums = [np.histogram(along, edges, weights=term)[0] for term in terms]
             signal, square = (np.append(0.0, np.cumsum(values)) for values in sums)
             power = np.maximum(square[None] - square[:, None], LEAST_POWER)
             match = np.triu(signal[None] - signal[:, None], LENGTHS[0]) / np.sqrt(power)
@@ -210,22 +214,26 @@ def _polished(line: FaintLine, inspection: Inspection, free: BoolArray, inflatio
         return line
     way, aside = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     axis = middle + np.array([at * way + row * aside for at in (begin, end)]) @ frame
-    sd = inspection.sd * inflation * height / match
+    sd = inspection.level * inflation * height / match
     return replace(line, axis=axis, height=np.sign(line.height) * height, height_sd=sd, snr=height / sd)
 
 
 @dataclass(frozen=True, eq=False)
 class _Support:
-    """What each sweep says of a line: its match with the section, and the section's own square."""
+    """What each sweep says of a line: its match with the section, and the section's own square; both weighted by
+    what its places are worth, in places of the usual standard deviation."""
 
     signal: FloatArray
     square: FloatArray
 
     @classmethod
-    def of(cls, height: FloatArray, across: FloatArray, sweep: IntArray, half_width: float) -> _Support:
+    def of(
+        cls, height: FloatArray, worth: FloatArray, across: FloatArray, sweep: IntArray, half_width: float
+    ) -> _Support:
         shape = crest_trace(across, 1.0, half_width)
         number = np.unique(sweep, return_inverse=True)[1]
-        return cls(np.asarray(np.bincount(number, shape * height)), np.asarray(np.bincount(number, shape**2)))
+        signal, square = (np.bincount(number, worth * term) for term in (shape * height, shape**2))
+        return cls(np.asarray(signal), np.asarray(square))
 
     def agreed(self, sd: float) -> bool:
         """True if enough sweeps show the line, and it stands without the one that shows it best.

@@ -64,7 +64,7 @@ def assemble(
 def _linked(detections: Detections, trace: Trace, base: Base) -> list[Feature]:
     """Features of the crossings that single sweeps detected."""
     tip, scale = trace.tip_radius, _scale(detections.crossings, trace.tip_radius)
-    around = Around(inspect(trace, base, detections.noise, 0.2 * scale, detections.crossings), base, detections, tip)
+    around = Around(inspect(trace, base, detections.noise, 0.2 * scale), base, detections, tip)
     edges, crossings = edge_features(detections.crossings, around)
     crests, steps = _crests_and_steps(crossings, around, scale)
     certain, doubtful = _grouped(crests, around.inspection, scale)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -11,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.base import Base
-from mapping.crossing import Crossing
 from mapping.height_profile import arclength, height_profiles
 from mapping.noise import Noise
 from mapping.trace import Trace
@@ -21,6 +19,8 @@ IntArray = NDArray[np.int64]
 
 # Sweeps that tell the typical distance between neighbours.
 PROBED = 200
+# Samples that a place without any, between others of its sweep, is worth.
+FILLED = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,14 +30,14 @@ class Inspection:
     Args:
         points: (M, 3) places on the base, m.
         height: (M,) mean height there, m.
-        sd: standard deviation of each mean, m.
+        sd: (M,) standard deviation of each mean, m: a slow sweep has more samples to a place than a fast one.
         sweep: (M,) number of the sweep.
         spacing: distance between neighbouring places of a sweep, m.
     """
 
     points: FloatArray
     height: FloatArray
-    sd: float
+    sd: FloatArray
     sweep: IntArray
     spacing: float
 
@@ -46,6 +46,11 @@ class Inspection:
         from scipy.spatial import cKDTree
 
         return cKDTree(self.points)
+
+    @cached_property
+    def level(self) -> float:
+        """Usual standard deviation of a place's mean, m."""
+        return float(np.median(self.sd)) if len(self.sd) else 0.0
 
     @cached_property
     def pitch(self) -> float:
@@ -96,7 +101,7 @@ class Inspection:
         places = list({place for some in near for place in some})
         if not places:
             return False
-        return bool((np.sign(height) * self.height[places] + 3 * self.sd < 0.5 * abs(height)).any())
+        return bool((np.sign(height) * self.height[places] + 3 * self.sd[places] < 0.5 * abs(height)).any())
 
     def nearest(self, points: FloatArray) -> IntArray:
         """(K,) index of the place nearest to each of the points (K, 3)."""
@@ -107,13 +112,9 @@ class Inspection:
         return bool(self._tree.query(point)[0] <= reach)
 
 
-def inspect(trace: Trace, base: Base, noise: Noise, spacing: float, crossings: Sequence[Crossing] = ()) -> Inspection:
-    """Mean heights over stretches of the given length along every sweep of the trace.
-
-    What is known of a mean is stated for the places of the crossings: elsewhere many samples may have been left out.
-    """
+def inspect(trace: Trace, base: Base, noise: Noise, spacing: float) -> Inspection:
+    """Mean heights over stretches of the given length along every sweep of the trace."""
     points, height, sweep, count = [], [], [], []
-    samples = 1.0
     for number, part in trace.sweeps():
         s = arclength(part, base)
         if len(part) < 2 or not s[-1] > 0:
@@ -123,11 +124,14 @@ def inspect(trace: Trace, base: Base, noise: Noise, spacing: float, crossings: S
             height.append(profile.height)
             sweep.append(np.full(len(profile.height), number))
             count.append(np.diff(profile.first))
-            samples = max(profile.samples, 1.0)
     if not points:
-        return Inspection(np.zeros((0, 3)), np.zeros(0), 0.0, np.zeros(0, dtype=np.int64), spacing)
-    found = Inspection(np.concatenate(points), np.concatenate(height), 0.0, np.concatenate(sweep), spacing)
-    if crossings:
-        there = found.nearest(np.array([crossing.point for crossing in crossings]))
-        samples = max(float(np.median(np.concatenate(count)[there])), 1.0)
-    return replace(found, sd=float(np.sqrt(noise.block_covariances(1, spacing, samples)[0])))
+        return Inspection(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), spacing)
+    sd = _sd_of_means(noise, spacing, np.concatenate(count))
+    return Inspection(np.concatenate(points), np.concatenate(height), sd, np.concatenate(sweep), spacing)
+
+
+def _sd_of_means(noise: Noise, spacing: float, count: IntArray) -> FloatArray:
+    """(M,) standard deviations of means over so many samples each, m; what is only filled in says little."""
+    counts, index = np.unique(count, return_inverse=True)
+    worth = np.where(counts > 0, counts, FILLED)
+    return np.sqrt([noise.block_covariances(1, spacing, float(samples))[0] for samples in worth])[index]

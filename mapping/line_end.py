@@ -60,7 +60,9 @@ def line_end(axis: FloatArray, height: float, half_width: float, inspection: Ins
     reach = step * np.arange(1, STEPS + 1)
     beyond = np.maximum(along[near][:, None] - reach, 0.0)
     model = crest_trace(np.hypot(beyond, across[near][:, None]), height, half_width)
-    rise = misfit(inspection.height[places[near]][:, None] - model, inspection.sd, height).sum(axis=0)
+    rise = misfit(inspection.height[places[near]][:, None] - model, inspection.sd[places[near], None], height).sum(
+        axis=0
+    )
     rise -= rise.min()
     likely = reach[rise <= INTERVAL]
     seen = bool(rise[-1] > SEEN)

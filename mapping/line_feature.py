@@ -170,14 +170,14 @@ def _section(axis: FloatArray, members: list[Crossing], around: Around) -> tuple
     near = inner & (distance < 1.5 * width)
     if near.sum() < 8:
         return guess, width, float(np.median([c.height_sd for c in members]))
-    found = inspection.height[places[near]]
+    found, sd = inspection.height[places[near]], inspection.sd[places[near]]
     best = (np.inf, guess, width, 0.0)
     for half_width in width * np.geomspace(0.6, 2.0, 25):
         shape = crest_trace(distance[near], np.sign(guess), half_width) * np.sign(guess)
-        square = max(float(shape @ shape), np.finfo(float).tiny)
-        height = float(np.clip(shape @ found / square / guess, 0.3, 3.0)) * guess
-        cost = float(misfit(found - height * shape, inspection.sd, height).sum())
-        best = min(best, (cost, height, float(half_width), inspection.sd / float(np.sqrt(square))))
+        square = max(float((shape / sd) @ (shape / sd)), np.finfo(float).tiny)
+        height = float(np.clip((shape / sd) @ (found / sd) / square / guess, 0.3, 3.0)) * guess
+        cost = float(misfit(found - height * shape, sd, height).sum())
+        best = min(best, (cost, height, float(half_width), 1.0 / float(np.sqrt(square))))
     scatter = 0.5 * float(np.std([c.height for c in highest])) / np.sqrt(len(highest))
     return best[1], best[2], float(np.hypot(best[3], scatter))
 

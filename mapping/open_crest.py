@@ -25,7 +25,7 @@ def is_open(crossing: Crossing, inspection: Inspection) -> bool:
     if len(heights) < 4:
         return True
     sides = (heights[:2].mean(), heights[-2:].mean())
-    up = max(STILL_UP * abs(crossing.height), 4 * inspection.sd)
+    up = max(STILL_UP * abs(crossing.height), 4 * float(np.median(inspection.sd[own])))
     # the two ends of the disturbance itself, in places of this sweep
     nearest = int(np.linalg.norm(inspection.points[own] - crossing.point, axis=1).argmin())
     return any(

@@ -55,10 +55,10 @@ def outline(members: list[Crossing], inspection: Inspection, half_width: float) 
     reach = float(np.linalg.norm(points - middle, axis=1).max()) + AROUND * half_width
     near = inspection.near(middle[None], reach)
     near = near[np.linalg.norm(inspection.points[near] - middle, axis=1) < reach]
-    places, height = (inspection.points[near] - middle) @ frame.T, inspection.height[near]
+    places, height, sd = (inspection.points[near] - middle) @ frame.T, inspection.height[near], inspection.sd[near]
     flat = (points - middle) @ frame.T
-    spot = _fit(places, height, inspection.sd, flat, highest.height, half_width, elongated=False)
-    line = _fit(places, height, inspection.sd, flat, highest.height, half_width, elongated=True)
+    spot = _fit(places, height, sd, flat, highest.height, half_width, elongated=False)
+    line = _fit(places, height, sd, flat, highest.height, half_width, elongated=True)
     is_line = spot[-1] - line[-1] > BETTER and 2 * line[3] > LONGER * line[5]
     x, y, angle, half, crest, wide, chi_square = line if is_line else spot
     heading = np.cos(angle) * frame[0] + np.sin(angle) * frame[1]
@@ -81,7 +81,7 @@ def _tangent_frame(offsets: FloatArray, normal: FloatArray) -> FloatArray:
 def _fit(
     places: FloatArray,
     height: FloatArray,
-    sd: float,
+    sd: FloatArray,
     crossings: FloatArray,
     crest: float,
     half_width: float,
@@ -90,7 +90,7 @@ def _fit(
     """(x, y, angle, half-length, height, half-width, misfit) by robust least squares."""
     from scipy.optimize import least_squares
 
-    level = float(np.hypot(sd, SHAPE_ERROR * crest))
+    level = np.hypot(sd, SHAPE_ERROR * crest)
     spread = 0.5 * float(np.ptp(crossings[:, 0]))
     # lengths in half-widths, heights in crests
     start = np.array([0.0, 0.0, 0.0, spread / half_width if elongated else 0.0, 1.0, 1.0])

@@ -24,5 +24,5 @@ def is_plateau_end(crossing: Crossing, inspection: Inspection) -> bool:
         return False
     tall = abs(crossing.height)
     beside = heights[gap < NEAR * crossing.half_width]
-    felt = bool(heights[middle].mean() + 3 * inspection.sd / np.sqrt(middle.sum()) > FELT * tall)
+    felt = bool(heights[middle].mean() + 3 * inspection.sd[own][middle].mean() / np.sqrt(middle.sum()) > FELT * tall)
     return not felt and bool(np.sort(-beside)[-2:].min() > PLATEAU * tall)

@@ -27,6 +27,6 @@ def is_unseen(crossing: Crossing, inspection: Inspection) -> bool:
         return False
     shape = np.sign(crossing.height) * crest_trace(gap[inside], np.sign(crossing.height), crossing.half_width)
     level = float(np.median(heights[beside])) if beside.any() else 0.0
-    sd = inspection.sd / float(np.sqrt(max(shape @ shape, 1e-3)))
+    sd = float(np.median(inspection.sd[own][inside]) / np.sqrt(max(shape @ shape, 1e-3)))
     seen = [np.sign(crossing.height) * (shape @ (heights[inside] - base)) / (shape @ shape) for base in (0.0, level)]
     return bool(max(seen) < SHARE * crossing.snr * sd)

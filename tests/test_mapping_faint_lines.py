@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mapping.base import Base
 from mapping.crest_trace import crest_trace, distances
 from mapping.faint_lines import faint_lines, threshold
-from mapping.inspection import Inspection
+from mapping.inspection import Inspection, inspect
+from mapping.noise import Noise
+from mapping.surface import Surface
+from mapping.trace import Trace
 
 WIDTH, SD = 1.4e-3, 0.03e-3
 AXIS = np.array([[-0.015, -0.004, 0.0], [0.014, 0.006, 0.0]])
@@ -21,7 +25,9 @@ def places(height: float, seed: int, axis=AXIS, white: float = SD) -> Inspection
     points = np.concatenate([np.column_stack([x, y, 0 * x]), np.column_stack([y, x, 0 * x])])
     number = np.concatenate([np.searchsorted(across, y), 100 + np.searchsorted(across, y)])
     felt = crest_trace(distances(points, axis), height, WIDTH) if height else np.zeros(len(points))
-    return Inspection(points, felt + white * rng.standard_normal(len(points)), white, number, 4e-4)
+    return Inspection(
+        points, felt + white * rng.standard_normal(len(points)), np.full(len(points), white), number, 4e-4
+    )
 
 
 def found(inspection: Inspection, alarms: float = 0.01):
@@ -61,7 +67,7 @@ def test_a_sweep_that_happens_to_run_along_the_line_speaks_for_it_too():
     both = Inspection(
         np.concatenate([crossed.points, along]),
         np.concatenate([crossed.height, felt]),
-        SD,
+        np.full(len(crossed.points) + 75, SD),
         np.concatenate([crossed.sweep, np.full(75, 999)]),
         crossed.spacing,
     )
@@ -76,3 +82,32 @@ def test_a_long_line_is_found_in_any_direction(angle):
         (line,) = found(places(-2.4 * SD, seed, axis=np.stack([-way, way])))
         heading = (line.axis[1] - line.axis[0]) / np.linalg.norm(line.axis[1] - line.axis[0])
         assert abs(heading @ way) / 0.021 > np.cos(0.1)
+
+
+def test_places_that_are_known_less_well_count_for_less():
+    # half of the sweeps were four times as fast: their means are twice as uncertain
+    rng, worse = np.random.default_rng(3), 2.0 * SD
+    for seed in range(6):
+        calm = places(0.0, seed)
+        fast = calm.sweep % 2 == 0
+        height = np.where(fast, worse * rng.standard_normal(len(fast)), calm.height)
+        sd = np.where(fast, worse, SD)
+        assert found(Inspection(calm.points, height, sd, calm.sweep, calm.spacing)) == ()
+    faint = places(1.7 * SD, 0)
+    height = faint.height + np.where(fast, np.sqrt(3.0) * SD * rng.standard_normal(len(fast)), 0.0)
+    (line,) = found(Inspection(faint.points, height, sd, faint.sweep, faint.spacing))
+    assert line.height == pytest.approx(1.7 * SD, abs=4.0 * line.height_sd)
+    # a slow half carries the line: it is as certain as by the slow half and a quarter of the rest
+    assert line.height_sd == pytest.approx(found(faint)[0].height_sd * np.sqrt(1.0 / 0.625), rel=0.1)
+
+
+def test_slow_sweeps_are_known_better_than_fast_ones():
+    base = Base(Surface(0.1 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2], [0, 2, 3]]))
+    parts = []
+    for number, step in enumerate((1e-4, 1e-5)):
+        x = np.arange(-0.02, 0.02, step)
+        centers = np.column_stack([x, np.full(len(x), 1e-3 * number), np.full(len(x), 5e-3)])
+        parts.append(Trace(number + x, centers, np.full(len(x), number), 5e-3))
+    both = inspect(Trace.concatenate(parts), base, Noise(1e-5), 1e-3)
+    assert np.median(both.sd[both.sweep == 0]) == pytest.approx(1e-5 / np.sqrt(10), rel=1e-6)
+    assert np.median(both.sd[both.sweep == 1]) == pytest.approx(1e-5 / np.sqrt(100), rel=1e-6)

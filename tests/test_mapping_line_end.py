@@ -21,7 +21,7 @@ def inspected(far: float, pitch: float = 4e-3, sd: float = 1e-5, height: float =
     stop = LENGTH if height > 0 else LENGTH - WIDTH
     truth = crest_trace(distances(points, np.array([[0.0, 0, 0], [stop, 0, 0]])), height, WIDTH)
     sweep = np.repeat(np.arange(len(x)), x.shape[1])
-    return Inspection(points, truth + sd * rng.standard_normal(len(points)), sd, sweep, 5e-4)
+    return Inspection(points, truth + sd * rng.standard_normal(len(points)), np.full(len(points), sd), sweep, 5e-4)
 
 
 @pytest.mark.parametrize("height", [HEIGHT, -HEIGHT])

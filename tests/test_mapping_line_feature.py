@@ -29,7 +29,7 @@ def test_a_lone_point_between_meeting_places_is_no_line():
     for seed in range(5):
         rng = np.random.default_rng(seed)
         places = np.column_stack([rng.uniform(0, 8 * WIDTH, (12, 2)), np.zeros(12)])
-        inspection = Inspection(places, np.full(12, HEIGHT), 1e-6, np.arange(12), 1e-3)
+        inspection = Inspection(places, np.full(12, HEIGHT), np.full(12, 1e-6), np.arange(12), 1e-3)
         crossings = [crossed_at(place, k) for k, place in enumerate(places)]
         detections = Detections(tuple(crossings), Noise(1e-6), 3, 1e-5, 0.95, 5.0, 1.0)
         found = line_features(crossings, "ridge", Around(inspection, base, detections, TIP))

@@ -49,7 +49,7 @@ def seen(axis, height: float, angle: float, sd: float = 2e-5, seed: int = 0) -> 
                     1,
                 )
             )
-    return crossings, Inspection(points, felt, sd, sweep, 5e-4)
+    return crossings, Inspection(points, felt, np.full(len(points), sd), sweep, 5e-4)
 
 
 @pytest.mark.parametrize("height", [0.65e-3, -0.65e-3])

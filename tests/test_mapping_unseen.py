@@ -13,7 +13,9 @@ from mapping.unseen import is_unseen
 
 def along_x(height):
     x = np.linspace(-0.02, 0.02, 81)
-    return Inspection(np.column_stack([x, 0 * x, 0 * x]), height(x), 1e-5, np.zeros(81, dtype=np.int64), 5e-4)
+    return Inspection(
+        np.column_stack([x, 0 * x, 0 * x]), height(x), np.full(81, 1e-5), np.zeros(81, dtype=np.int64), 5e-4
+    )
 
 
 def crossing(height: float, snr: float) -> Crossing:
