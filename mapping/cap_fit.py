@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from mapping.disturbance import Disturbance
 from mapping.height_profile import HeightProfile
-from mapping.matched_filter import cap_bins
 from mapping.noise import Noise
 
 FloatArray = NDArray[np.float64]
@@ -44,10 +43,11 @@ class _Whitened:
         self, place: FloatArray, half_width: FloatArray, flat: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Gain in twice the log-likelihood, height and its information for caps (C,), by least squares."""
-        template = cap_bins(self.x[:, None] - place, half_width, self.step, flat * half_width)
-        seen = self.root @ template
-        information = np.maximum(np.einsum("ij,ij->j", seen, seen), np.finfo(float).tiny)
-        height = self.values @ seen / information
+        from mapping.cap_kernels import caps
+
+        seen = caps(self.x[0], self.step, len(self.x), place, half_width, flat * half_width) @ self.root.T
+        information = np.maximum(np.einsum("ij,ij->i", seen, seen), np.finfo(float).tiny)
+        height = seen @ self.values / information
         return height * np.abs(height) * information, height, information
 
 

@@ -33,6 +33,8 @@ NEIGHBOURS = 8
 CLUMP = 1.5
 # Threshold at which clump sizes are measured; they change slowly with it.
 TYPICAL_THRESHOLD = 5.0
+# Thresholds this near have clumps of the same size, to one or two per cent: a thousandth of the threshold.
+THRESHOLD_STEP = 0.125
 # Steps an octave of the ladder of banks that thresholds are remembered for.
 COARSE = 16
 # Relative uncertainty of the noise that changes a threshold by less than one part in a thousand.
@@ -54,9 +56,16 @@ def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float 
         uncertainty: relative standard deviation of the filters' noise.
     """
     colour, _ = colour_in_bins(bank.noise, bank.spacing, bank.samples)
-    sizes = (colour.correlated, colour.length if colour.correlated else 0.0, bank.filters[0].half_width / bank.spacing)
-    rate = rung(false_alarms_per_metre * bank.spacing)
-    normal = _threshold(*(rung(size, COARSE) for size in sizes), len(bank.filters), bank.drift, rate)
+    sizes = (
+        min(rung(colour.correlated, COARSE), 1.0),
+        rung(colour.length, COARSE) if colour.correlated else 0.0,
+        rung(bank.filters[0].half_width / bank.spacing, COARSE),
+    )
+
+    def solved(near: float) -> float:
+        return _solve(_intensity(*sizes, len(bank.filters), bank.drift, near), false_alarms_per_metre * bank.spacing)
+
+    normal = solved(round(solved(TYPICAL_THRESHOLD) / THRESHOLD_STEP) * THRESHOLD_STEP)
     if uncertainty < NEGLIGIBLE:
         return normal
     from scipy.special import ndtr, stdtrit
@@ -66,12 +75,11 @@ def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float 
 
 
 @lru_cache(maxsize=256)
-def _threshold(correlated: float, length: float, smallest: float, count: int, drift: int, rate: float) -> float:
-    correlated = min(correlated, 1.0)
+def _intensity(correlated: float, length: float, smallest: float, count: int, drift: int, threshold: float) -> float:
+    """`_intensities` of a bank in units of its bins and its noise, remembered."""
     noise = Noise(float(np.sqrt(1.0 - correlated**2)), correlated, length or 1.0)
     bank = build_bank(noise, 1.0, 1.0, smallest, smallest * LADDER ** (count - 1), drift)
-    threshold = _solve(_intensities(bank, TYPICAL_THRESHOLD), rate)
-    return _solve(_intensities(bank, threshold), rate)
+    return _intensities(bank, threshold)
 
 
 def false_alarm_rate(bank: Bank, threshold: float) -> float:

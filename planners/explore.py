@@ -21,6 +21,7 @@ from planners.errors import PlannerError
 from planners.faint import CloserLook, FaintSearch
 from planners.found import Found
 from planners.plan import Outcome, Plan
+from planners.ready import get_ready
 from planners.ridge import RidgeFollower
 from planners.ridge_end import Crest, EndFinder
 from planners.sense import Sense
@@ -111,6 +112,7 @@ class Explore:
 
     def plan(self, rng: np.random.Generator | None = None) -> Plan:
         """The whole exploration; the outcome's value is a Found. Nothing in it is random: `rng` is not used."""
+        get_ready(self.tip_radius)
         found = Found(self.tip_radius, noise=self.noise)
         spent = Spent(25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed)
         surveyor = Surveyor(self.survey, found, self.false_alarms_per_metre)

@@ -11,7 +11,7 @@ import pytest
 
 from mapping.base import Base
 from mapping.detectors import DetectionError, Detections, detect
-from mapping.false_alarms import _threshold, false_alarm_rate, threshold_for
+from mapping.false_alarms import _intensity, false_alarm_rate, threshold_for
 from mapping.height_profile import HeightProfile, height_profiles
 from mapping.matched_filter import build_bank, filter_sd
 from mapping.noise import Noise
@@ -153,10 +153,10 @@ def test_false_alarms_come_as_often_as_asked(drift):
 def test_a_threshold_is_worked_out_once_for_sweeps_that_differ_little():
     noise = Noise(2e-4, 1e-4, 1e-3)
     first = threshold_for(build_bank(noise, 1.2e-4, 20.0, 1.45e-3, 0.04), 0.01)
-    known = _threshold.cache_info().misses
+    known = _intensity.cache_info().misses
     others = [threshold_for(build_bank(noise, 1.2e-4 * f, 20.0 * f, 1.45e-3 * f, 0.04), 0.01) for f in (0.9999, 1.0001)]
     np.testing.assert_allclose(others, first, rtol=1e-3)
-    assert _threshold.cache_info().misses == known
+    assert _intensity.cache_info().misses == known
 
 
 def test_a_threshold_on_uncertain_noise_is_that_of_student():
