@@ -211,11 +211,11 @@ def _refine(
 
 
 def _believed(features: tuple[Feature, ...], stages: Stages) -> tuple[Feature, ...]:
-    """Without what all sweeps together say is more likely nothing: a false alarm that later sweeps passed by."""
+    """Without what all sweeps together hardly speak for: a false alarm that later sweeps passed by."""
     kept = tuple(f for f in features if f.evidence.likely)
     for feature in (f for f in features if f not in kept):
         x, y, z = np.round(1e3 * feature.axis[0], 2)
-        reason = f"with all sweeps together it is more likely nothing (log odds {feature.evidence.log_odds:.1f})"
+        reason = f"all sweeps together hardly speak for it (log odds {feature.evidence.log_odds:.1f})"
         stages.left_out.append(LeftOut(f"a {feature.kind} at ({x:g}, {y:g}, {z:g}) mm", reason))
     return kept
 

@@ -1,4 +1,4 @@
-"""Compiled means of caps over bins (what matched_filter.cap_bins says, for many caps on one even grid)."""
+"""Compiled means of many caps over the bins of one even grid."""
 
 # mypy: disable-error-code="untyped-decorator"
 

@@ -137,6 +137,9 @@ def _inverse_clump_size(bank: Bank, index: int, threshold: float) -> float:
 def _on_grid(half_width: float, reach: int, step: float, correlation: FloatArray, bank: Bank) -> FloatArray:
     """Weights, normalised to unit output noise, of the filter of a half-width in bins of the given step."""
     x = np.arange(-reach, reach + 1, dtype=np.float64) * step
+    template = cap_bins(x, half_width, step)
+    if not bank.drift and not correlation[1 : len(x)].any():
+        return np.asarray(template / np.sqrt(template @ template * correlation[0]))
     nuisance = (x[:, None] / (reach * step)) ** np.arange(bank.drift, dtype=np.float64)
-    weights, sd = best_linear(correlation[: len(x)], cap_bins(x, half_width, step), nuisance)
+    weights, sd = best_linear(correlation[: len(x)], template, nuisance)
     return np.asarray(weights[0] / sd[0])

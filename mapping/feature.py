@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +14,11 @@ from mapping.posterior import Posterior
 FloatArray = NDArray[np.float64]
 
 KINDS = ("bump", "ridge", "pit", "groove", "step", "convex edge", "concave corner")
+
+
+# Log Bayes factor below which evidence is "barely worth mentioning" (Jeffreys, Theory of Probability, appendix B): what
+# was sought in many places has odds against it before.
+SUBSTANTIAL = 0.5 * math.log(10.0)
 
 
 @dataclass(frozen=True)
@@ -74,8 +80,8 @@ class Evidence:
 
     @property
     def likely(self) -> bool:
-        """False if all sweeps together say that it is more likely nothing: a false alarm that later ones passed by."""
-        return self.log_odds is None or self.log_odds >= 0.0
+        """False if all sweeps together hardly speak for it: a false alarm that later ones passed by."""
+        return self.log_odds is None or self.log_odds >= SUBSTANTIAL
 
 
 @dataclass(frozen=True, eq=False)

@@ -147,17 +147,12 @@ def smallest_half_width(noise: Noise, spacing: float, samples: float, tip_radius
     return float(widths[visible.argmax()] if visible.any() else widths[-1])
 
 
-def cap_bins(
-    positions: FloatArray, half_width: float | FloatArray, spacing: float, flat: float | FloatArray = 0.0
-) -> FloatArray:
-    """Means over bins of a cap of unit height with a flat top of the given half-length and parabolic flanks."""
+def cap_bins(positions: FloatArray, half_width: float, spacing: float) -> FloatArray:
+    """Means of a cap of unit height over bins whose middles (n,) are `spacing` apart, m; its crest is at 0."""
+    from mapping.cap_kernels import caps
 
-    def integral(x: FloatArray) -> FloatArray:
-        edge = half_width - flat
-        u = np.clip((np.abs(x) - flat) / edge, 0.0, 1.0)
-        return np.asarray(np.sign(x) * (np.minimum(np.abs(x), flat) + edge * (u - u**3 / 3)))
-
-    return (integral(positions + spacing / 2) - integral(positions - spacing / 2)) / spacing
+    crest = np.zeros(1)
+    return np.asarray(caps(positions[0], spacing, len(positions), crest, np.array([half_width]), crest)[0])
 
 
 def toeplitz(first: FloatArray) -> FloatArray:
