@@ -147,10 +147,12 @@ def _without_shadows(features: list[Feature], tip_radius: float) -> list[Feature
     kept: list[Feature] = []
     for feature in sorted(features, key=lambda f: -abs(f.height.median)):
         shadow = False
+        # where a line was crossed; its ends lie as far beyond as the sweeps allow
+        crossed = feature.axis[1:-1] if len(feature.axis) > 3 else feature.axis
         for other in kept:
             reach = 1.3 * np.sqrt(2 * tip_radius * abs(other.height.median))
             small = abs(feature.height.median) < 0.5 * abs(other.height.median)
-            if small and distances(feature.axis, other.axis).max() < reach:
+            if small and distances(crossed, other.axis).max() < reach:
                 shadow = True
         if not shadow:
             kept.append(feature)

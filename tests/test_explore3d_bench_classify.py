@@ -63,3 +63,9 @@ def test_every_body_has_the_truth_that_it_is_named_for(name: str) -> None:
     expected = {"junction Y": "ridge", "junction T": "ridge", "O-ring": "ridge", "crossing": "ridge"}
     expected |= {"curved ridge": "ridge", "fine groove": "groove"}
     assert kinds == (set() if name == "empty" else {expected.get(name, name)})
+
+
+def test_two_slight_crossings_by_the_rim_of_a_pit_are_the_pits_own() -> None:
+    # at the placement of seed 3 two sweeps touch the rim; a groove was drawn through both
+    result = bench_classify.trial("pit", "none", "two ways", 3)
+    assert result["right"], result
