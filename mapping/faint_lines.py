@@ -91,7 +91,8 @@ def faint_lines(
         rough = best
         for _ in range(POLISHINGS):
             best = _polished(best, inspection, free, inflation)
-        found.append(best)
+        if best.snr >= needed:  # noise fits the cells of the search better than a line
+            found.append(best)
         # where it was before it was polished, too, or its remains would be found again
         for axis in (rough.axis, best.axis):
             near = inspection.near(axis, 1.5 * best.half_width)

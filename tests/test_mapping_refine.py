@@ -25,6 +25,7 @@ from recorded_features import (
 from mapping.base import Base
 from mapping.noise import Noise
 from mapping.onto_base import onto_base
+from mapping.psis import resample
 from mapping.refine import refine, sample_posterior, solve
 from mapping.shapes import cap_height, groove_height, rim_height, step_height
 from mapping.surface import Surface
@@ -49,7 +50,10 @@ def test_importance_sampling_and_emcee_agree():
     sd = np.sqrt(fast.weights @ (fast.draws - mean) ** 2)
     assert fast.k_hat < 0.7
     np.testing.assert_array_less(np.abs(chain.mean(axis=0) - mean) / sd, 0.15)
-    np.testing.assert_allclose(chain.std(axis=0) / sd, 1.0, atol=0.12)
+    # the spread by quantiles: the tails of the radius are so long that the standard deviation of 2000 draws is 8 % off
+    draws = fast.draws[resample(np.random.default_rng(1), fast.weights, 20_000)]
+    spreads = [np.ptp(np.quantile(each, [0.05, 0.95], axis=0), axis=0) for each in (chain, draws)]
+    np.testing.assert_allclose(spreads[0] / spreads[1], 1.0, atol=0.12)
 
 
 def test_the_fast_path_answers_alone_where_it_can_be_trusted():
