@@ -23,6 +23,7 @@ from mapping.sampling import Chain, sample_ensemble, walkers_for
 from mapping.summary import describe
 from mapping.trace import Trace
 from mapping.trace_noise import noise_of_trace
+from mapping.window import EmptyWindowError
 
 FloatArray = NDArray[np.float64]
 
@@ -93,14 +94,19 @@ def refine(
 ) -> Feature:
     """The feature with posterior, intervals and axis from the draws; arguments as for `sample_posterior`.
 
-    Kinds without a closed form ("convex edge", "concave corner") come back as they are, with a note.
+    Kinds without a closed form ("convex edge", "concave corner") come back as they are, with a note; so does, with no
+    evidence, a feature without any sample near it.
     """
     if feature.kind not in SAMPLED_KINDS:
         note = f"no posterior: a {feature.kind} has no closed-form trace"
         return replace(feature, notes=(*feature.notes, note))
     base = base or _fitted(trace)
     noise = noise or noise_of_trace(trace, base)
-    solution = solve(feature, trace, rng, base=base, noise=noise, others=others, tip_sd=tip_sd, confirm=confirm)
+    try:
+        solution = solve(feature, trace, rng, base=base, noise=noise, others=others, tip_sd=tip_sd, confirm=confirm)
+    except EmptyWindowError as error:  # one feature that nothing speaks for must not cost all others
+        nothing = replace(feature.evidence, log_odds=0.0)
+        return replace(feature, evidence=nothing, notes=(*feature.notes, f"no posterior: {error}"))
     found = describe(solution.problem, solution.posterior, base)
     if solution.problem.noise != noise.rounded(
         trace.resolution

@@ -120,8 +120,11 @@ def test_three_samples_give_a_wide_answer_not_an_error():
     assert found.height.high - found.height.low > 0.2e-3
 
 
-def test_no_sample_near_by_is_refused():
+def test_a_feature_without_a_sample_near_by_has_no_evidence_and_costs_no_other():
     trace = record(CROSSINGS, wire(ENDS))
     far = feature("ridge", [(70e-3, 70e-3, 0), (80e-3, 70e-3, 0)], D, D)
     with pytest.raises(EmptyWindowError, match="no sample of the trace"):
-        refine(far, trace, np.random.default_rng(0), base=plate(), noise=WHITE)
+        sample_posterior(far, trace, np.random.default_rng(0), base=plate(), noise=WHITE)
+    found = refine(far, trace, np.random.default_rng(0), base=plate(), noise=WHITE)
+    assert found.posterior is None and not found.evidence.likely
+    assert "no sample of the trace" in found.notes[-1]
