@@ -19,6 +19,8 @@ FloatArray = NDArray[np.float64]
 
 MOST_CELLS = 4000
 L1_ROUNDS, BISQUARE_ROUNDS = 40, 40
+# Moves smaller than these shares of the heights' scatter end the rounds; the first kind only leads to the second
+L1_NEAR, NEAR = 0.05, 1e-3
 # A direction is observed if the trace tells it to this share of the bound
 TOLD = 0.2
 # Cells whose height a motion changes by less than this share of itself say nothing: facets of a mesh do that
@@ -189,14 +191,15 @@ class _Search:
 
     def settled(self, motion: _Motion) -> _Settled:
         """Gauss-Newton steps along observed motions: least absolute heights first, then the bisquare."""
-        for step in range(L1_ROUNDS + BISQUARE_ROUNDS):
-            view = self.view(motion, step >= L1_ROUNDS)
-            observed, _ = view.motions(self.bound, self.tilt)
-            slopes, heights = view.root[:, None] * (view.slopes @ observed), view.root * view.heights
-            move = observed @ np.linalg.lstsq(slopes, heights, rcond=None)[0]
-            motion = motion.then(move, self.middle, self.length)
-            if step > L1_ROUNDS and np.abs(move).max(initial=0.0) < 1e-3 * view.scatter:
-                break
+        for robust, rounds, near in ((False, L1_ROUNDS, L1_NEAR), (True, BISQUARE_ROUNDS, NEAR)):
+            for _ in range(rounds):
+                view = self.view(motion, robust)
+                observed, _ = view.motions(self.bound, self.tilt)
+                slopes, heights = view.root[:, None] * (view.slopes @ observed), view.root * view.heights
+                move = observed @ np.linalg.lstsq(slopes, heights, rcond=None)[0]
+                motion = motion.then(move, self.middle, self.length)
+                if np.abs(move).max(initial=0.0) < near * view.scatter:
+                    break
         return _Settled(motion, self.view(motion, robust=True))
 
     def better_start(self, settled: _Settled) -> _Motion | None:
