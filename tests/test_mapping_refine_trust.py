@@ -61,7 +61,11 @@ def test_location_reaches_the_cramer_rao_bound(diameter):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ridge", "bump", "step"])
 def test_emcee_and_importance_sampling_agree_closely_in_regular_cases(kind):
-    """Means within 0.1 and standard deviations within 5 %, from 20 000 effective draws each."""
+    """Means within 0.1 and spreads within 5 %, from 20 000 effective draws each.
+
+    Spreads from 5 to 95 %: a wire may be as thin as it likes, and the standard deviation of 20 000 logarithms of its
+    radius is 4 % uncertain.
+    """
     problem = regular_problem(kind)
     rng = np.random.default_rng(0)
     optima = find_optima(problem.target, problem.beginnings)
@@ -75,7 +79,9 @@ def test_emcee_and_importance_sampling_agree_closely_in_regular_cases(kind):
     samples = np.concatenate([each.samples for each in (chain, *longer)])
     assert max(each.k_hat for each in fast) < 0.5
     np.testing.assert_array_less(np.abs(samples.mean(axis=0) - mean) / sd, 0.1)
-    np.testing.assert_allclose(samples.std(axis=0) / sd, 1.0, atol=0.05)
+    draws = draws[resample(rng, weights, 200_000)]
+    spreads = [np.ptp(np.quantile(each, [0.05, 0.95], axis=0), axis=0) for each in (samples, draws)]
+    np.testing.assert_allclose(spreads[0] / spreads[1], 1.0, atol=0.05)
 
 
 def regular_problem(kind):
@@ -111,9 +117,9 @@ def test_ten_million_samples_are_read_in_seconds():
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ridge", "bump", "groove", "pit", "step"])
 def test_intervals_cover_and_ranks_are_uniform(kind):
-    rows = [run_case(Case(kind, NOISES[i % len(NOISES)], i)) for i in range(100)]
+    rows = [run_case(Case(kind, NOISES[i % len(NOISES)], i)) for i in range(300)]
     for name, verdict in verdicts(rows).items():
-        assert verdict.coverage == pytest.approx(0.9, abs=0.085), name
+        assert verdict.coverage == pytest.approx(0.9, abs=0.05), name
         assert verdict.p_value > 1e-4, name
 
 
