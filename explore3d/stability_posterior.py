@@ -69,7 +69,11 @@ def sweeps_of(trace: Trace, noise: Noise) -> Trace:
 
 
 def in_unit(scale: float) -> Callable[[], Answer]:
-    """The same question with every length in another unit: the same draws, scaled."""
+    """The same question with every length in another unit: the same posterior.
+
+    The ends of this ridge are not in the data, so its density has many equal optima; which of them rounding leads to
+    changes the proposal, and with it the draws.
+    """
 
     def run() -> Answer:
         trace, base, feature = crossings(3)
@@ -83,8 +87,8 @@ def in_unit(scale: float) -> Callable[[], Answer]:
         shifts = np.array([np.log(scale) if unit == "ln m" else 0.0 for unit in home.units])
         back, sd = (there.samples - shifts) / factors, home.samples.std(axis=0)
         error = float((np.abs(np.median(back, axis=0) - np.median(home.samples, axis=0)) / sd).max())
-        reason = "medians in posterior sds; the search for the optimum ends at 1e-3 of one"
-        return Answer(f"medians agree within {error:.1e} sd", error, 1.0, 0.1, reason)
+        reason = "medians of 1000 draws each, in posterior sds: 0.25 is three of their Monte Carlo errors"
+        return Answer(f"medians agree within {error:.1e} sd", error, 1.0, 0.25, reason)
 
     return run
 
