@@ -108,7 +108,8 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
         touch = finger.execute if replay is None else replay.before(finger.execute, getattr(finger, "skip", None))
         execute = _logged(touch, log, scene.explore.time_budget, share)
         outcome = Expedition(scene, finger, execute, log).go()
-        log.event("outcome", {"reason": outcome.reason, "detail": outcome.detail})
+        # what the connection counted and learnt of its clocks on the way
+        log.event("outcome", {"reason": outcome.reason, "detail": outcome.detail, "finger": finger.info})
         if not log.samples:
             raise UserError(f"{session.folder}: nothing was felt: {outcome.detail or outcome.reason}")
         log.close()  # its digest goes into the model
