@@ -50,10 +50,6 @@ class CurveModes:
         """(W, K) lateral distances at the places s (K,) for coefficients (W, count), m."""
         return np.asarray(coefficients @ self.basis(s))
 
-    def lateral_at(self, coefficients: FloatArray, s: FloatArray) -> FloatArray:
-        """(W,) lateral distances, each at its own place s (W,), m."""
-        return np.asarray(np.einsum("wc,cw->w", coefficients, self.basis(s)))
-
     def slope(self, coefficients: FloatArray, s: float) -> FloatArray:
         """(W,) change of the lateral distance per metre along the chart."""
         step = 1e-3 * self.reach

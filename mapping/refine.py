@@ -108,9 +108,7 @@ def refine(
         nothing = replace(feature.evidence, log_odds=0.0)
         return replace(feature, evidence=nothing, notes=(*feature.notes, f"no posterior: {error}"))
     found = describe(solution.problem, solution.posterior, base)
-    if solution.problem.noise != noise.rounded(
-        trace.resolution
-    ):  # see mapping.misfit: intervals hold within the family only
+    if solution.problem.noise != noise.rounded(trace.resolution):  # intervals hold within the family only
         note = f"no ideal {found.kind} fits the trace within its noise: the sizes are those of the closest one"
         found = replace(found, notes=(*found.notes, note))
     odds = odds_against_nothing(solution)
