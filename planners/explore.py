@@ -186,7 +186,7 @@ class Explore:
         for index, track in enumerate(found.tracks):
             for which, end in enumerate(track.ends):
                 done = found.slides.get((index, which), 0)
-                if end.reason == "end" and end.sd > self.wanted_sd and done < MOST_SLIDES and track.kind != "step":
+                if end.reason == "end" and end.sd > self._enough(track) and done < MOST_SLIDES and track.kind != "step":
                     seconds = 1.65 * track.half_width / self.speed
                     # n slides leave 1 / sqrt(n) of the uncertainty of one
                     left = float(np.sqrt((done + 1.0) / (done + 2.0)))
@@ -194,6 +194,11 @@ class Explore:
                     start = partial(self._slide, index, which, found)
                     actions.append(Action("slide off an end", gain, seconds, start))
         return actions
+
+    def _enough(self, track: AxisTrack) -> float:
+        """Standard deviation down to which slides are worth it, m: what they cannot tell is left beside it."""
+        unknown = Crest.of(track).rounding_sd(self.tip_radius)
+        return float(np.sqrt(max(self.wanted_sd**2 - unknown**2, unknown**2)))
 
     def _circuit_radius(self, seed: Crossing) -> float:
         """Wide enough to go round a bump whose top lies up to half a survey pitch beside the sweep."""
@@ -242,12 +247,12 @@ class Explore:
         """More sweeps to and fro off an end that is not known well enough; the way to it is paid once for all."""
         track = found.tracks[index]
         finder = EndFinder(self.strokes, self.base, found.noise or Noise(0.0))
-        crest = Crest(track.height, track.height_sd, track.half_width, track.sign)
+        crest = Crest.of(track)
         end = track.ends[which]
         for _ in range(AT_ONCE):
             end = yield from finder.slide(end, crest)
             found.slides[index, which] = found.slides.get((index, which), 0) + 1
-            if end.reason != "end" or end.sd <= self.wanted_sd:
+            if end.reason != "end" or end.sd <= self._enough(track):
                 break
         found.tracks[index] = track.with_end(which, end)
         return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")

@@ -16,9 +16,10 @@ SPEEDS = 24
 def fastest_speed(
     noise: Noise, rate: float, tip_radius: float, smallest: float, slowest: float, fastest: float
 ) -> float:
-    """The fastest speed (m/s) at which a sweep across the smallest feature finds it; the slowest if none does.
+    """The fastest speed (m/s) at which a sweep across the smallest feature finds it.
 
-    Samples of a faster sweep lie further apart, so white noise averages less; correlated noise is the same.
+    Samples of a faster sweep lie further apart, so white noise averages less; correlated noise is the same. Where no
+    single sweep finds it, many must: fast ones tell more per second, for correlated noise averages over sweeps only.
 
     Args:
         noise: of a sample.
@@ -29,7 +30,7 @@ def fastest_speed(
     """
     speeds = np.geomspace(fastest, slowest, SPEEDS)
     found = (v for v in speeds if MARGIN * least_height(noise, v / rate, tip_radius, CERTAIN) <= smallest)
-    return float(next(found, slowest))
+    return float(next(found, fastest))
 
 
 def least_height(noise: Noise, spacing: float, tip_radius: float, ratio: float) -> float:

@@ -17,7 +17,7 @@ from planners.crest import is_step, seen_again
 from planners.plan import Outcome, Plan
 from planners.ridge_end import Crest, EndFinder
 from planners.sense import Sense
-from planners.strokes import Strokes, to_and_fro
+from planners.strokes import Strokes, tangential, to_and_fro
 
 FloatArray = NDArray[np.float64]
 Crossed = Generator[Move, Trace, Crossing | None]
@@ -26,14 +26,23 @@ Crossed = Generator[Move, Trace, Crossing | None]
 # uncertain for more than the middle between all and nothing
 STILL_HIGH, STILL_SEEN = 0.7, 0.5
 FALLING = 0.9
+# In tip radii: the first step and the longest, and how closely crossings bracket an end before a slide finds it; once
+# more, more closely, where the slide did not
+FIRST_STEP, LONGEST_STEP = 0.4, 2.0
+BRACKETS = (0.6, 0.15)
+# By how much the heading may turn in one step, rad
+MOST_TURN = 0.6
+# Cosine of the angle up to which a line is said to go straight on
+STRAIGHT = 0.95
 
 
 @dataclass
 class Line:
-    """Crossings of one ridge in the order of its axis, while it is being followed one way."""
+    """Crossings of one ridge in the order of its axis, while it is being followed one way from that of the `seed`."""
 
     crossings: list[Crossing]
     step: float
+    seed: int = 0
 
     @property
     def points(self) -> FloatArray:
@@ -59,7 +68,7 @@ class RidgeFollower:
         strokes, sense: how to touch and to feel.
         noise: of the samples.
         precision: wanted standard deviation of an end, m.
-        longest_step: largest distance between two crossings, m; None: one tip radius.
+        longest_step: largest distance between two crossings, m; None: two tip radii.
         known: tells whether a point lies on an axis found before (there the ridge joins it).
         passes: sweeps to and fro at every crossing, taken together: a single one does not show a faint line.
     """
@@ -80,7 +89,7 @@ class RidgeFollower:
             return Outcome("lost", "the crossing that began the ridge was not found again")
         halves: list[tuple[Line, AxisEnd | None]] = []
         for way in ways[:2]:
-            line = Line([first], min(0.4 * self.strokes.tip_radius, self._longest))
+            line = self._begun(first, way, halves)
             end = yield from self._one_way(line, way, sign)
             halves.append((line, end))
             if end is None:
@@ -91,25 +100,41 @@ class RidgeFollower:
 
     @property
     def _longest(self) -> float:
-        return self.strokes.tip_radius if self.longest_step is None else self.longest_step
+        return LONGEST_STEP * self.strokes.tip_radius if self.longest_step is None else self.longest_step
+
+    def _begun(self, first: Crossing, way: FloatArray, halves: list[tuple[Line, AxisEnd | None]]) -> Line:
+        """A line that begins at the seed; where it only goes on backwards, what was crossed so far leads it."""
+        step = min(FIRST_STEP * self.strokes.tip_radius, self._longest)
+        if not halves or len(halves[0][0].crossings) < 3:
+            return Line([first], step)
+        forth = halves[0][0]
+        ahead = course(forth.points[::-1], first.normal, way, self.strokes.tip_radius)
+        if float(ahead.heading @ tangential(way, first.normal)) < STRAIGHT:
+            return Line([first], step)
+        return Line(forth.crossings[::-1], forth.step, len(forth.crossings) - 1)
 
     def _one_way(self, line: Line, way: FloatArray, sign: float) -> Generator[Move, Trace, AxisEnd | None]:
         """Extend the line until it ends; None if it closes upon itself."""
         gone, empty = np.inf, np.full(3, np.inf)
+        brackets = [share * self.strokes.tip_radius for share in BRACKETS]
         for _ in range(10_000):
             last = line.crossings[-1]
             ahead = course(line.points, last.normal, way, self.strokes.tip_radius)
-            step = min(line.step, 0.5 * gone)
+            step = min(line.step, 0.5 * gone, MOST_TURN / max(abs(ahead.turn), np.finfo(float).tiny))
             walk = self.strokes.walk(ahead.point, ahead.heading, step, ahead.turn)
             if walk.cut and walk.along[-1] < 0.5 * step:
                 return AxisEnd(walk.points[-1], 0.0, "edge of the model", walk.directions[-1])
-            reach = max(0.6 * line.half_width, 0.25 * step)
+            reach = max(0.6 * line.half_width, 0.2 * step)
             lowest = (STILL_HIGH if self.passes == 1 else STILL_SEEN) * line.height
-            found = yield from self._cross(walk.points[-1], walk.directions[-1], last, sign, reach, lowest)
+            heading = walk.directions[-1] if len(line.crossings) % 2 else -walk.directions[-1]
+            found = yield from self._cross(walk.points[-1], heading, last, sign, reach, lowest)
             if found is None:
                 gone, empty = float(walk.along[-1]), walk.points[-1]
-                if gone <= max(0.15 * self.strokes.tip_radius, 4.0 * self.precision):
-                    return (yield from self._end(line, ahead, gone, sign))
+                if gone <= max(brackets[0], 4.0 * self.precision):
+                    end = yield from self._end(line, ahead, gone, sign)
+                    if end.reason == "end" or len(brackets) == 1:
+                        return end
+                    del brackets[0]
                 continue
             missed = float(np.linalg.norm(found.point - walk.points[-1]))
             self._adapt(line, missed / reach)
@@ -165,7 +190,7 @@ class RidgeFollower:
     def _cross(
         self, point: FloatArray, heading: FloatArray, like: Crossing, sign: float, reach: float, lowest: float
     ) -> Crossed:
-        """Cross the ridge at a predicted point, square to its heading.
+        """Cross the ridge at a predicted point, square to its heading, from the right to the left.
 
         A sweep that felt nothing is repeated once, and so are the passes over a faint line that did not show it.
         """
@@ -202,7 +227,8 @@ class RidgeFollower:
         """Slide along the crest and off the end, where the crossings have bracketed it."""
         if is_step(line.crossings[-1]):
             return AxisEnd(line.crossings[-1].point, 0.5 * gone, "end", ahead.heading, gone)
-        farthest = line.crossings[-1].point
+        farthest, whole = line.crossings[-1].point, line
+        line = replace(line, crossings=list(line.crossings))
         # where the crest has begun to fall it has ended already, and what lies beside it pulls at the crossing
         while len(line.crossings) > 2 and self._is_falling(line):
             line.crossings.pop()
@@ -213,7 +239,10 @@ class RidgeFollower:
         finder = EndFinder(self.strokes, self.sense.base, self.noise, self.passes)
         # the last crossing may lie beyond the end already
         height, sd = mean_height(line.crossings[:-1] or line.crossings)
-        return (yield from finder.slide(rough, Crest(height, sd, line.half_width, sign)))
+        end = yield from finder.slide(rough, Crest(height, sd, line.half_width, sign))
+        if end.reason == "end":
+            whole.crossings = line.crossings
+        return end
 
     def _is_falling(self, line: Line) -> bool:
         """True if the last crossing is lower than the line."""
@@ -239,7 +268,7 @@ def _joined(halves: list[tuple[Line, AxisEnd | None]], sign: float) -> AxisTrack
     last_end = end
     if end is not None and len(halves) > 1:
         back, first_end = halves[1]
-        crossings = [*back.crossings[:0:-1], *crossings]
+        crossings = [*back.crossings[: back.seed : -1], *crossings]
     else:
         first_end = AxisEnd(crossings[0].point, np.inf, "lost", -_first_step(crossings))
     points = [c.point for c in crossings]

@@ -12,7 +12,7 @@ from hw.moves import Move
 from mapping.base import Base
 from mapping.noise import Noise
 from mapping.trace import Trace
-from planners.axis_track import AxisEnd, Slides
+from planners.axis_track import AxisEnd, AxisTrack, Slides
 from planners.crest import flattening
 from planners.shape_fit import ShapeFit, end_shape, fit_shape
 from planners.strokes import Strokes, tangential, to_and_fro
@@ -23,6 +23,9 @@ FloatArray = NDArray[np.float64]
 # the end; the others pass only over what its place changes, the fall of the crest
 FIRST = (1.2, 1.8)
 NEXT = (0.4, 1.25)
+# A round end against a square one, in a / (r + a) half-widths: two traces that differ by less than a hundredth of the
+# height; and the standard deviation of a rounding of which nothing is known (mapping.ridge_shape)
+ROUNDED, UNKNOWN = 0.4, 0.35
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,21 @@ class Crest:
     height_sd: float
     half_width: float
     sign: float
+
+    @classmethod
+    def of(cls, track: AxisTrack) -> Crest:
+        """The crest of a followed axis."""
+        return cls(track.height, track.height_sd, track.half_width, track.sign)
+
+    def rounding_sd(self, tip_radius: float) -> float:
+        """Standard deviation of an end's place that no number of slides takes away, m: whether it is round or square.
+
+        A groove's end is an edge, whatever its outline.
+        """
+        if self.sign < 0:
+            return 0.0
+        radius = min(0.5 * self.height, max(self.half_width**2 / (2.0 * self.height) - tip_radius, 0.0))
+        return UNKNOWN * ROUNDED * self.half_width * radius / (tip_radius + radius)
 
 
 @dataclass(frozen=True, eq=False)
