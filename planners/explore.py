@@ -33,6 +33,8 @@ FloatArray = NDArray[np.float64]
 
 # Slides off one end, at most, and in one go
 MOST_SLIDES, AT_ONCE = 150, 8
+# A faint line is straight, and every crossing of it costs many passes: the step, in its length so far
+LEAD_STEP = 0.25
 
 
 @dataclass(frozen=True)
@@ -171,7 +173,8 @@ class Explore:
         for lead in look.leads:
             if any(track.distance(lead.seed.point) < track.half_width for track in found.tracks):
                 continue
-            follower = replace(self._follower(found, sense), passes=lead.passes)
+            step = max(LEAD_STEP * lead.length, self.tip_radius)
+            follower = replace(self._follower(found, sense), passes=lead.passes, first_step=step, longest_step=step)
             followed = yield from follower.follow(lead.seed, [lead.way, -lead.way])
             found.tracks.extend([] if followed.value is None else [followed.value])
             found.actions.append(f"follow a faint line by {lead.passes} passes: {followed.detail}")

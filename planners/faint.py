@@ -23,6 +23,9 @@ FloatArray = NDArray[np.float64]
 # A line may lie anywhere and run in any direction: together its crossings must say so much more (in squares of the
 # signal-to-noise ratio) than a single crossing that is detected
 ANYWHERE = 1.3
+# Share of these crossings that shows where a line may lie, if so many false leads are put up with: passes over a lead
+# cost seconds, a closer survey minutes
+LEADS, FALSE_LEADS = 0.6, 3.0
 # Passes over a line show it by so many times what a crossing is believed for
 SURE = 1.5
 MOST_PASSES = 60
@@ -33,11 +36,13 @@ DIP = float(np.sqrt(3.0 / 8.0))
 
 @dataclass(frozen=True, eq=False)
 class FaintLead:
-    """Where to begin following a faint line: a crossing, the way (3,) that the line goes, and passes that show it."""
+    """Where to begin following a faint line: a crossing, the way (3,) that the line goes, passes that show it, and
+    its length so far, m."""
 
     seed: Crossing
     way: FloatArray
     passes: int
+    length: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +81,7 @@ class FaintSearch:
     def plan(self) -> Plan:
         """Make the sweeps; the outcome's value is a CloserLook."""
         felt = []
-        for move in replace(self.survey, crossings=self.crossings).sweeps():
+        for move in replace(self.survey, crossings=max(2, int(np.ceil(LEADS * self.crossings)))).sweeps():
             trace = yield move
             if len(trace):
                 felt.append(trace)
@@ -84,7 +89,7 @@ class FaintSearch:
             return Outcome("no contact", value=CloserLook())
         trace, base = Trace.concatenate(felt), self.survey.base
         seen = detect(trace, base, noise=self.noise, false_alarms_per_metre=self.false_alarms_per_metre)
-        lines = with_faint_lines([], seen, trace, base, self.false_alarms_per_metre)
+        lines = with_faint_lines([], seen, trace, base, FALSE_LEADS / seen.inspected_length)
         found = CloserLook(tuple(lead(line, seen, base, self.survey.tip_radius) for line in lines), seen.crossings)
         return Outcome("done", f"{len(lines)} lines seen by no single sweep", found)
 
@@ -116,4 +121,5 @@ def lead(line: Feature, seen: Detections, base: Base, tip_radius: float) -> Fain
         start=0,
         stop=0,
     )
-    return FaintLead(seed, way, int(np.clip(np.ceil(SURE * SEEN / one**2), 1, MOST_PASSES)))
+    passes = int(np.clip(np.ceil(SURE * SEEN / one**2), 1, MOST_PASSES))
+    return FaintLead(seed, way, passes, float(np.linalg.norm(line.axis[-1] - line.axis[0])))

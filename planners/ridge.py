@@ -13,7 +13,7 @@ from mapping.crossing import Crossing
 from mapping.noise import Noise
 from mapping.trace import Trace
 from planners.axis_track import AxisEnd, AxisTrack, Course, course, polyline_distance
-from planners.crest import is_step, seen_again
+from planners.crest import SEEN, is_step, seen_again
 from planners.plan import Outcome, Plan
 from planners.ridge_end import Crest, EndFinder
 from planners.sense import Sense
@@ -26,10 +26,12 @@ Crossed = Generator[Move, Trace, Crossing | None]
 # uncertain for more than the middle between all and nothing
 STILL_HIGH, STILL_SEEN = 0.7, 0.5
 FALLING = 0.9
-# In tip radii: the first step and the longest, and how closely crossings bracket an end before a slide finds it; once
-# more, more closely, where the slide did not
+# In tip radii: the first step and the longest unless they are given, and how closely crossings bracket an end before a
+# slide finds it; once more, more closely, where the slide did not
 FIRST_STEP, LONGEST_STEP = 0.4, 2.0
 BRACKETS = (0.6, 0.15)
+# Passes over a faint line are looked at in so many batches; they leave it open if chi-squared falls by so much
+BATCHES, LEFT_OPEN = 3, 4.0
 # By how much the heading may turn in one step, rad
 MOST_TURN = 0.6
 # Cosine of the angle up to which a line is said to go straight on
@@ -68,7 +70,7 @@ class RidgeFollower:
         strokes, sense: how to touch and to feel.
         noise: of the samples.
         precision: wanted standard deviation of an end, m.
-        longest_step: largest distance between two crossings, m; None: two tip radii.
+        first_step, longest_step: distance between the first two crossings and the largest between any two, m.
         known: tells whether a point lies on an axis found before (there the ridge joins it).
         passes: sweeps to and fro at every crossing, taken together: a single one does not show a faint line.
     """
@@ -77,6 +79,7 @@ class RidgeFollower:
     sense: Sense
     noise: Noise
     precision: float
+    first_step: float | None = None
     longest_step: float | None = None
     known: Callable[[FloatArray], bool] = lambda point: False
     passes: int = 1
@@ -104,7 +107,8 @@ class RidgeFollower:
 
     def _begun(self, first: Crossing, way: FloatArray, halves: list[tuple[Line, AxisEnd | None]]) -> Line:
         """A line that begins at the seed; where it only goes on backwards, what was crossed so far leads it."""
-        step = min(FIRST_STEP * self.strokes.tip_radius, self._longest)
+        step = FIRST_STEP * self.strokes.tip_radius if self.first_step is None else self.first_step
+        step = min(step, self._longest)
         if not halves or len(halves[0][0].crossings) < 3:
             return Line([first], step)
         forth = halves[0][0]
@@ -192,36 +196,42 @@ class RidgeFollower:
     ) -> Crossed:
         """Cross the ridge at a predicted point, square to its heading, from the right to the left.
 
-        A sweep that felt nothing is repeated once, and so are the passes over a faint line that did not show it.
+        A sweep that felt nothing is repeated once. The passes over a faint line end as soon as they show it; they go
+        on for as long again only if they leave it open whether it is there.
         """
         _, normal = self.strokes.onto(point)
         way = np.cross(normal, heading)
         half = (2.5 if is_step(like) else 1.6) * like.half_width + reach
         move = self.strokes.line(point, way, half, half)
         felt: list[Trace] = []
-        for _ in range(2):
-            felt.extend((yield from to_and_fro(move, self.passes)))
-            if felt and (found := self._seen(felt, point, way, like, sign, reach, lowest)) is not None:
-                return found
-            if felt and self.passes == 1:
-                break
+        batches = min(self.passes, BATCHES)
+        for number in range(1, 2 * batches + 1):
+            felt.extend((yield from to_and_fro(move, int(np.ceil(self.passes / batches)))))
+            if not felt:
+                continue
+            found = self._seen(felt, point, way, like, reach, SEEN)
+            if found is not None:
+                return found if sign * found.height >= lowest else None
+            if number >= batches and not self._is_open(felt, point, way, like, reach, sign * lowest):
+                return None
         return None
 
     def _seen(
-        self,
-        felt: list[Trace],
-        point: FloatArray,
-        way: FloatArray,
-        like: Crossing,
-        sign: float,
-        reach: float,
-        lowest: float,
+        self, felt: list[Trace], point: FloatArray, way: FloatArray, like: Crossing, reach: float, gain: float
     ) -> Crossing | None:
-        """The crossing that several sweeps over one line show together, if it is high enough."""
+        """The crossing that several sweeps over one line show together."""
         # the correlated part of the noise averages out over the passes, not along them
         noise = replace(self.noise, correlated=self.noise.correlated / np.sqrt(len(felt)))
-        found = seen_again(Trace.concatenate(felt), self.sense.base, noise, point, way, like, reach)
-        return found if found is not None and sign * found.height >= lowest else None
+        return seen_again(Trace.concatenate(felt), self.sense.base, noise, point, way, like, reach, gain)
+
+    def _is_open(
+        self, felt: list[Trace], point: FloatArray, way: FloatArray, like: Crossing, reach: float, lowest: float
+    ) -> bool:
+        """True if passes over a faint line leave it open whether it is there."""
+        if self.passes == 1:
+            return False
+        faint = self._seen(felt, point, way, like, reach, LEFT_OPEN)
+        return faint is not None and abs(faint.height) + 2.0 * faint.height_sd > abs(lowest)
 
     def _end(self, line: Line, ahead: Course, gone: float, sign: float) -> Generator[Move, Trace, AxisEnd]:
         """Slide along the crest and off the end, where the crossings have bracketed it."""
