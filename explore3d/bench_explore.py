@@ -52,7 +52,8 @@ def _explore(precision: float) -> Strategy:
 def _exploration(scene: BenchScene, precision: float) -> Plan:
     base = Base(scene.base)
     if scene.misplaced:
-        located = yield from Locate(base=base, tip_radius=TIP_RADIUS, smallest=scene.smallest).plan()
+        locate = Locate(base=base, tip_radius=TIP_RADIUS, smallest=scene.smallest, speed=_speed(scene))
+        located = yield from locate.plan()
         if located.value is None:
             return located
         base = located.value.moved(base)

@@ -2,7 +2,7 @@
 
 Outputs above a threshold come in clumps: neighbouring places and widths see the same noise. The rate of clumps is
 the rate of single exceedances, each counted by one over the size of its clump (Aldous, Probability Approximations
-via the Poisson Clumping Heuristic, 1989). The size is averaged over noise drawn given that one output exceeds.
+via the Poisson Clumping Heuristic, 1989).
 """
 
 from __future__ import annotations
@@ -10,27 +10,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.matched_filter import (
-    LADDER,
-    Bank,
-    best_linear,
-    build_bank,
-    cap_bins,
-    colour_in_bins,
-    filter_reach,
-    rung,
-    toeplitz,
-)
+from mapping.clumps import BankClumps, clumps_of
+from mapping.matched_filter import LADDER, Bank, build_bank, colour_in_bins, rung
 from mapping.noise import Noise
 
-FloatArray = NDArray[np.float64]
-
-DRAWS = 128
-# A clump reaches over so many neighbouring widths, and over so many half-widths of path.
-NEIGHBOURS = 8
-CLUMP = 1.5
 # Threshold at which clump sizes are measured; they change slowly with it.
 TYPICAL_THRESHOLD = 5.0
 # Thresholds this near have clumps of the same size, to one or two per cent: a thousandth of the threshold.
@@ -76,17 +60,22 @@ def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float 
 
 @lru_cache(maxsize=256)
 def _intensity(correlated: float, length: float, smallest: float, count: int, drift: int, threshold: float) -> float:
-    """`_intensities` of a bank in units of its bins and its noise, remembered."""
+    """Intensity of the clumps of a bank in units of its bins and its noise, remembered."""
+    return _clumps(correlated, length, smallest, count, drift).intensity(threshold)
+
+
+@lru_cache(maxsize=2)
+def _clumps(correlated: float, length: float, smallest: float, count: int, drift: int) -> BankClumps:
+    """The clumps of a bank in such units: one threshold is asked for after another."""
     noise = Noise(float(np.sqrt(1.0 - correlated**2)), correlated, length or 1.0)
-    bank = build_bank(noise, 1.0, 1.0, smallest, smallest * LADDER ** (count - 1), drift)
-    return _intensities(bank, threshold)
+    return clumps_of(build_bank(noise, 1.0, 1.0, smallest, smallest * LADDER ** (count - 1), drift))
 
 
 def false_alarm_rate(bank: Bank, threshold: float) -> float:
     """Expected number of clumps of exceedances per metre of path, 1/m."""
     from scipy.special import ndtr
 
-    return float(2 * ndtr(-threshold) * _intensities(bank, threshold))
+    return float(2 * ndtr(-threshold) * clumps_of(bank).intensity(threshold))
 
 
 def _solve(intensity: float, rate: float) -> float:
@@ -94,52 +83,3 @@ def _solve(intensity: float, rate: float) -> float:
     from scipy.special import ndtri
 
     return float(max(-ndtri(min(rate / (2 * intensity), 0.5)), 1.5))
-
-
-def _intensities(bank: Bank, threshold: float) -> float:
-    """Outputs per metre of path, each weighted by one over the size of its clump, 1/m."""
-    return sum(_inverse_clump_size(bank, k, threshold) / (f.coarse * bank.spacing) for k, f in enumerate(bank.filters))
-
-
-def _inverse_clump_size(bank: Bank, index: int, threshold: float) -> float:
-    """Mean of one over the number of outputs above the threshold around an output of one filter that is."""
-    from scipy.special import ndtr, ndtri
-
-    own = bank.filters[index]
-    step = own.coarse * bank.spacing
-    near = bank.filters[max(0, index - NEIGHBOURS) : index + NEIGHBOURS + 1]
-    reaches = [filter_reach(f.half_width, bank.noise, step, bank.drift) for f in near]
-    reach, shift = max(reaches), int(np.ceil(CLUMP * own.half_width / step))
-    count = 2 * (reach + shift) + 1
-    correlation = bank.noise.block_covariances(count, step, bank.samples * own.coarse)
-    covariance = toeplitz(correlation)
-    # A fixed seed: these draws are the nodes of a quadrature, and the same bank has one threshold.
-    rng = np.random.default_rng(0)
-    noise = np.linalg.cholesky(covariance + 1e-12 * covariance[0, 0] * np.eye(count)) @ rng.standard_normal(
-        (count, DRAWS)
-    )
-    weights = {
-        f.half_width: _on_grid(f.half_width, r, step, correlation, bank) for f, r in zip(near, reaches, strict=True)
-    }
-    centred = np.zeros(count)
-    half = len(weights[own.half_width]) // 2
-    centred[reach + shift - half : reach + shift + half + 1] = weights[own.half_width]
-    exceeding = -ndtri(ndtr(-threshold) * rng.permutation((np.arange(DRAWS) + 0.5) / DRAWS))
-    noise += np.outer(covariance @ centred, exceeding - centred @ noise)
-    size = np.zeros(DRAWS)
-    for f, r in zip(near, reaches, strict=True):
-        seen = noise[reach - r : count - (reach - r)]
-        outputs = np.lib.stride_tricks.sliding_window_view(seen, 2 * r + 1, axis=0) @ weights[f.half_width]
-        size += (outputs > threshold).sum(axis=0) * own.coarse / f.coarse
-    return float(np.mean(1 / np.maximum(size, 1.0)))
-
-
-def _on_grid(half_width: float, reach: int, step: float, correlation: FloatArray, bank: Bank) -> FloatArray:
-    """Weights, normalised to unit output noise, of the filter of a half-width in bins of the given step."""
-    x = np.arange(-reach, reach + 1, dtype=np.float64) * step
-    template = cap_bins(x, half_width, step)
-    if not bank.drift and not correlation[1 : len(x)].any():
-        return np.asarray(template / np.sqrt(template @ template * correlation[0]))
-    nuisance = (x[:, None] / (reach * step)) ** np.arange(bank.drift, dtype=np.float64)
-    weights, sd = best_linear(correlation[: len(x)], template, nuisance)
-    return np.asarray(weights[0] / sd[0])

@@ -162,7 +162,7 @@ def _mean_variance(x: FloatArray) -> FloatArray:
     """Variance of the mean of a unit OU process over x correlation lengths; series where the form cancels."""
     safe = np.maximum(x, SHORT)
     series = np.polynomial.polynomial.polyval(np.minimum(x, SHORT), 2.0 * SIGNS / FACTORIALS)
-    return np.where(x < SHORT, series, 2 * (safe + np.expm1(-safe)) / safe**2)
+    return np.where(x < SHORT, series, 2 * ((safe + np.expm1(-safe)) / safe) / safe)
 
 
 def _allan_of_ou(x: FloatArray) -> FloatArray:
