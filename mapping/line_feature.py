@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from mapping.line_end import LineEnd, line_end
 from mapping.linking import FELT, LONGEST_LINK, between
 from mapping.point_feature import body_width, evidence
 from mapping.polyline import arclengths
+from mapping.rejoining import rejoined
 from mapping.runs import RunPoint
 
 FloatArray = NDArray[np.float64]
@@ -54,9 +56,10 @@ def line_features(members: list[Crossing], kind: str, around: Around) -> list[Fe
     if len(clusters) < 2:
         return []
     points = np.array([mean_point(cluster) for cluster in clusters])
-    links = _links(points, members[0].height, half_width, around.tip_radius, around.inspection)
+    links = _links(points, members[0].height, half_width, around)
     # a lone point that is left between two meeting places is no line
     lines = [branch for branch in branches(points, half_width, links) if len(branch.axis) > 1]
+    lines = rejoined(lines, half_width, partial(_denied, members[0].height, half_width, around))
     features = []
     for branch in lines:
         others = [other.axis for other in lines if other is not branch]
@@ -65,12 +68,17 @@ def line_features(members: list[Crossing], kind: str, around: Around) -> list[Fe
     return features
 
 
-def _links(points: FloatArray, sign: float, half_width: float, tip_radius: float, inspection: Inspection) -> FloatArray:
+def _denied(sign: float, half_width: float, around: Around, start: FloatArray, stop: FloatArray) -> bool:
+    """True if a place between two points of crests was found too low."""
+    low = np.sign(sign) * half_width**2 / (2 * around.tip_radius)
+    return around.inspection.denies(between(start, stop, half_width), low, FELT * half_width)
+
+
+def _links(points: FloatArray, sign: float, half_width: float, around: Around) -> FloatArray:
     """(K, K) distances between points of the crests, longer where a place between them was found too low."""
     length = np.linalg.norm(points[:, None] - points[None], axis=2)
-    low = np.sign(sign) * half_width**2 / (2 * tip_radius)
     for i, j in zip(*np.nonzero(np.triu(length < LONGEST_LINK * half_width, 1)), strict=True):
-        if inspection.denies(between(points[i], points[j], half_width), low, FELT * half_width):
+        if _denied(sign, half_width, around, points[i], points[j]):
             length[i, j] = length[j, i] = DENIED * length[i, j]
     return np.asarray(length)
 
