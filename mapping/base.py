@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mapping.nearest import NearestPoint
+from mapping.nearest import MovedNearestPoint, NearestPoint
 from mapping.surface import Surface
 
 FloatArray = NDArray[np.float64]
@@ -52,18 +52,20 @@ class Base:
     parameters: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
-    def _nearest(self) -> NearestPoint:
-        return NearestPoint(self.surface)
-
-    @property
     def nearest(self) -> NearestPoint:
         """Nearest points of the surface, with the tree that `foot` searches."""
-        return self._nearest
+        return NearestPoint(self.surface)
 
     @property
     def edge_normals(self) -> FloatArray:
         """(F, 3, 3) mean normal of the faces on either side of the edge opposite to each corner of a face."""
-        return self._nearest.edge_normals
+        return self.nearest.edge_normals
+
+    def moved(self, rotation: FloatArray, translation: FloatArray, parameters: dict[str, Any]) -> Base:
+        """The base after a rigid motion, x to rotation @ x + translation, with other parameters."""
+        moved = Base(self.surface.moved(rotation, translation), self.kind, parameters)
+        moved.__dict__["nearest"] = MovedNearestPoint(moved.surface, self.nearest, rotation, translation)
+        return moved
 
     def foot(self, centers: ArrayLike, tip_radius: float) -> Feet:
         """Foot points and heights of ball centres (N, 3), m.
@@ -72,7 +74,7 @@ class Base:
         the height is distance - r and the base's own edges explain themselves.
         """
         query = np.asarray(centers, dtype=np.float64)
-        nearest = self._nearest.query(query)
+        nearest = self.nearest.query(query)
         signed = nearest.side * nearest.distance
         away = nearest.side[:, None] * (query - nearest.points)
         # On the surface itself the direction to the centre has no digits left; the mesh normal has.

@@ -61,6 +61,9 @@ class NearestPoint:
         if len(query) == 0:
             empty = np.zeros((0, 3))
             return Nearest(empty, np.zeros(0), np.zeros(0), empty, np.zeros(0, dtype=np.int64), empty)
+        return self._answered(query)
+
+    def _answered(self, query: FloatArray) -> Nearest:
         face, closest = self._closest(query)
         barycentric = self._barycentric(closest, face)
         normals = self._pseudonormals(face, barycentric)
@@ -127,6 +130,30 @@ class NearestPoint:
             angle = np.arccos(np.clip(np.einsum("ij,ij->i", u, v), -1.0, 1.0))
             np.add.at(sums, faces[:, corner], angle[:, None] * self.surface.face_normals)
         return _unit(sums)
+
+
+@dataclass(frozen=True, eq=False)
+class MovedNearestPoint(NearestPoint):
+    """Answers queries on a rigidly moved surface by those on the surface as it was: no tree is built again.
+
+    Args:
+        surface: the moved one.
+        still: answers queries on the surface before the motion.
+        rotation, translation: of the motion, x to rotation @ x + translation; (3, 3) and (3,) m.
+    """
+
+    still: NearestPoint
+    rotation: FloatArray
+    translation: FloatArray
+
+    def _answered(self, query: FloatArray) -> Nearest:
+        near = self.still.query((query - self.translation) @ self.rotation)
+        points, normals = near.points @ self.rotation.T + self.translation, near.normals @ self.rotation.T
+        return Nearest(points, near.distance, near.side, normals, near.face, near.barycentric)
+
+    @cached_property
+    def edge_normals(self) -> FloatArray:
+        return np.asarray(self.still.edge_normals @ self.rotation.T)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,12 @@ from mapping.base import Base
 from mapping.cells import Cells
 from mapping.errors import TraceError
 from mapping.robust import BISQUARE, MAD_TO_SD
-from mapping.surface import Surface
 from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
 
-MOST_CELLS = 4000
+# Cells that the pose is fitted to, and of these the share that leads there: a few rounds with all of them then do
+MOST_CELLS, LEADING = 4000, 4
 L1_ROUNDS, BISQUARE_ROUNDS = 40, 40
 # Moves smaller than these shares of the heights' scatter end the rounds; the first kind only leads to the second
 L1_NEAR, NEAR = 0.05, 1e-3
@@ -87,8 +87,7 @@ class Pose:
         """The base where it really stands; its parameters keep the whole motion from the given mesh as "pose"."""
         before = base.parameters.get("pose")
         whole = self if before is None else self.after(Pose.read(before))
-        surface = Surface(self.onto(base.surface.vertices), base.surface.faces)
-        return Base(surface, base.kind, base.parameters | {"pose": whole.record()})
+        return base.moved(self.rotation, self.translation, base.parameters | {"pose": whole.record()})
 
     def record(self) -> dict[str, Any]:
         """JSON values that `read` understands, SI units."""
@@ -191,16 +190,24 @@ class _Search:
 
     def settled(self, motion: _Motion) -> _Settled:
         """Gauss-Newton steps along observed motions: least absolute heights first, then the bisquare."""
-        for robust, rounds, near in ((False, L1_ROUNDS, L1_NEAR), (True, BISQUARE_ROUNDS, NEAR)):
-            for _ in range(rounds):
-                view = self.view(motion, robust)
-                observed, _ = view.motions(self.bound, self.tilt)
-                slopes, heights = view.root[:, None] * (view.slopes @ observed), view.root * view.heights
-                move = observed @ np.linalg.lstsq(slopes, heights, rcond=None)[0]
-                motion = motion.then(move, self.middle, self.length)
-                if np.abs(move).max(initial=0.0) < near * view.scatter:
-                    break
+        few = replace(self, centers=self.centers[::LEADING]) if len(self.centers) > MOST_CELLS / LEADING else self
+        motion = few.descended(motion, False, L1_ROUNDS, L1_NEAR)
+        if few is not self:
+            motion = few.descended(motion, True, BISQUARE_ROUNDS, L1_NEAR)
+        motion = self.descended(motion, True, BISQUARE_ROUNDS, NEAR)
         return _Settled(motion, self.view(motion, robust=True))
+
+    def descended(self, motion: _Motion, robust: bool, rounds: int, near: float) -> _Motion:
+        """The motion after at most so many steps, until one moves less than a share of the scatter."""
+        for _ in range(rounds):
+            view = self.view(motion, robust)
+            observed, _ = view.motions(self.bound, self.tilt)
+            slopes, heights = view.root[:, None] * (view.slopes @ observed), view.root * view.heights
+            move = observed @ np.linalg.lstsq(slopes, heights, rcond=None)[0]
+            motion = motion.then(move, self.middle, self.length)
+            if np.abs(move).max(initial=0.0) < near * view.scatter:
+                break
+        return motion
 
     def better_start(self, settled: _Settled) -> _Motion | None:
         """A place from which another descent promises more, or None.

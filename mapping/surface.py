@@ -55,6 +55,24 @@ class Surface:
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
     @cached_property
+    def neighbours(self) -> tuple[IntArray, IntArray]:
+        """Pairs of faces that share an edge; on an edge of more than two faces, the consecutive pairs."""
+        faces = self.faces
+        edges = np.sort(np.concatenate([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]]), axis=1)
+        owner = np.tile(np.arange(len(faces)), 3)
+        order = np.lexsort((edges[:, 1], edges[:, 0]))
+        edges, owner = edges[order], owner[order]
+        same = (edges[1:] == edges[:-1]).all(axis=1)
+        return owner[:-1][same], owner[1:][same]
+
+    def moved(self, rotation: FloatArray, translation: FloatArray) -> Surface:
+        """The mesh after a rigid motion, x to rotation @ x + translation; what is known of its shape is kept."""
+        surface = Surface(self.vertices @ rotation.T + translation, self.faces)
+        known: dict[str, object] = {name: getattr(self, name) for name in ("face_areas", "neighbours")}
+        surface.__dict__.update(known | {"face_normals": self.face_normals @ rotation.T})
+        return surface
+
+    @cached_property
     def size(self) -> float:
         """Diagonal of the bounding box, m."""
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))

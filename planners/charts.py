@@ -26,7 +26,7 @@ def crease_charts(surface: Surface, inside: NDArray[np.bool_] | None = None, cre
     wanted = surface.face_areas > 0
     if inside is not None:
         wanted &= inside
-    first, second = face_neighbours(surface.faces)
+    first, second = surface.neighbours
     turn = (surface.face_normals[first] * surface.face_normals[second]).sum(axis=1)
     smooth = (turn > np.cos(crease)) & wanted[first] & wanted[second]
     graph = coo_matrix((np.ones(smooth.sum()), (first[smooth], second[smooth])), shape=(count, count))
@@ -35,13 +35,3 @@ def crease_charts(surface: Surface, inside: NDArray[np.bool_] | None = None, cre
     order = members[np.argsort(label[members], kind="stable")]
     groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1) if len(order) else []
     return sorted(groups, key=lambda group: (-float(surface.face_areas[group].sum()), int(group[0])))
-
-
-def face_neighbours(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Pairs of faces that share an edge; on an edge of more than two faces, the consecutive pairs."""
-    edges = np.sort(np.concatenate([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]]), axis=1)
-    owner = np.tile(np.arange(len(faces)), 3)
-    order = np.lexsort((edges[:, 1], edges[:, 0]))
-    edges, owner = edges[order], owner[order]
-    same = (edges[1:] == edges[:-1]).all(axis=1)
-    return owner[:-1][same], owner[1:][same]

@@ -11,6 +11,7 @@ from mapping.errors import TraceError
 from mapping.pose import estimate_pose
 from mapping.trace import Trace
 from planners.plan import Outcome, Plan
+from planners.ready import get_ready
 from planners.survey import Survey
 
 # Sweeps that locate
@@ -41,6 +42,7 @@ class Locate:
 
     def plan(self) -> Plan:
         """The outcome's value is the Pose, or None if the object was not met or stands further off than allowed."""
+        get_ready(self.tip_radius)
         survey = Survey(
             base=self.base, tip_radius=self.tip_radius, smallest=self.smallest, speed=self.speed, force=self.force
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from mapping.base import Base
@@ -14,6 +16,7 @@ from mapping.trace import Trace
 SIDE, SAMPLES = 20.0, 400
 
 
+@lru_cache
 def get_ready(tip_radius: float) -> None:
     """Detect a made-up wire: loads the compiled code of detection, and scipy's optimizers for what follows."""
     import scipy.optimize  # noqa: F401
