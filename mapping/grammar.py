@@ -21,6 +21,7 @@ from mapping.open_crest import comes_down, is_open, on_a_step
 from mapping.outline import outline
 from mapping.plateau_end import is_plateau_end
 from mapping.point_feature import point_feature
+from mapping.run_crest import along, told_crests
 from mapping.runs import split_runs
 from mapping.step_feature import step_features
 from mapping.trace import Trace
@@ -83,6 +84,8 @@ def _crests_and_steps(
     wrong = [c for c in crests if is_plateau_end(c, around.inspection) or is_unseen(c, around.inspection)]
     crossings = [c for c in crossings if c not in wrong]
     crests = [c for c in crests if c not in wrong]
+    for slanted in [along(c, scale, around.base, around.tip_radius) for c in crests]:
+        crests += told_crests(slanted, around.inspection, around.tip_radius)
     runs, steps = split_runs([c for c in crossings if c not in crests and comes_down(c, around.inspection)])
     edges = [c for run in runs for c in (run.first, run.last)] + steps
     pitch = around.inspection.pitch
@@ -90,8 +93,14 @@ def _crests_and_steps(
         if run.is_band(edges, pitch, around.tip_radius):
             steps += [run.first, run.last]
         else:
-            crests += run.points(max(min(pitch, run.length), scale), around.base, around.tip_radius)
+            crests += _on_crest(run.points(max(min(pitch, run.length), scale), around.base, around.tip_radius), around)
     return crests, steps
+
+
+def _on_crest(places: Sequence[Crossing], around: Around) -> list[Crossing]:
+    """Places on a run, or the crests beside them where other sweeps tell these."""
+    told = told_crests(places, around.inspection, around.tip_radius)
+    return told if len(told) >= 0.5 * len(places) else list(places)
 
 
 def _grouped(

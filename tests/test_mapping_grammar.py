@@ -106,6 +106,25 @@ def test_a_step_is_one_step():
     assert len(step.axis) >= 10
 
 
+@pytest.mark.parametrize("pitch", [1e-3, 2e-3, 4e-3])
+def test_an_arc_that_a_raster_runs_along_is_one_ridge(pitch):
+    turn = np.linspace(0.2, 0.2 + 0.9 * np.pi, 40)
+    arc = np.column_stack([0.015 * np.cos(turn), 0.015 * np.sin(turn), 0 * turn + RADIUS])
+    (ridge,) = features(ridges(arc), pitch=pitch)
+    assert ridge.kind == "ridge" and not ridge.closed
+    assert np.abs(np.linalg.norm(ridge.axis[1:-1, :2], axis=1) - 0.015).max() < 0.25 * pitch + 0.5e-3
+    # few sweeps tell the ends roughly, until the posterior is sought
+    assert ridge.length.median == pytest.approx(0.015 * 0.9 * np.pi, abs=1e-3 + 1.5 * pitch)
+
+
+@pytest.mark.parametrize("slope", [0.02, 0.1, 0.2])
+def test_a_ridge_at_a_slant_to_a_raster_is_one_ridge_with_its_ends(slope):
+    line = np.array([[-0.03, 0.3e-3, RADIUS], [0.03, 0.3e-3 + 0.06 * slope, RADIUS]])
+    (ridge,) = features(ridges(line), pitch=2e-3)
+    ends = ridge.axis[np.argsort(ridge.axis[:, 0])][[0, -1], :2]
+    assert np.linalg.norm(ends - line[:, :2], axis=1).max() < 1.5e-3
+
+
 def test_a_tee_is_a_junction():
     found = features(ridges([[0.01, -0.035, RADIUS], [0.01, 0.035, RADIUS]], [[0.01, 0, RADIUS], [0.05, 0.02, RADIUS]]))
     assert {f.kind for f in found} == {"ridge"}
