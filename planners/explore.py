@@ -18,7 +18,7 @@ from planners.bump import BumpSize, BumpSizer
 from planners.circuit import Circuit, headings
 from planners.crest import is_step, slender
 from planners.errors import PlannerError
-from planners.faint import CloserLook, FaintSearch
+from planners.faint import CloserLook, FaintLead, FaintSearch
 from planners.found import Found
 from planners.plan import Outcome, Plan
 from planners.ready import get_ready
@@ -149,7 +149,7 @@ class Explore:
         yield from surveyor.plan()
         found.surveyed = True
         yield from self._faint(surveyor, found)
-        if not found.crossings and not found.tracks:
+        if not found.crossings and not found.leads:
             found.left_out.append("circuits, ridge following and sizing: the survey found nothing")
             return Outcome("nothing found")
         sense = Sense(self.base, found.noise, self.false_alarms_per_metre)
@@ -160,7 +160,7 @@ class Explore:
         return Outcome("done")
 
     def _faint(self, surveyor: Surveyor, found: Found) -> Plan:
-        """Where no single sweep shows the smallest ridge asked for, look for lines that many show, and follow them."""
+        """Where no single sweep shows the smallest ridge asked for, look for lines that many show."""
         rate = CANDIDATES * self.false_alarms_per_metre
         search = FaintSearch(self.survey, surveyor.limit, found.noise or Noise(0.0), rate)
         if self.survey.crossed(self.survey.visible) is None or search.crossings == 1:
@@ -169,16 +169,19 @@ class Explore:
         look: CloserLook = searched.value
         found.crossings.extend(look.crossings)
         found.actions.append(f"closer survey: {searched.detail}")
-        sense = Sense(self.base, found.noise, self.false_alarms_per_metre)
-        for lead in look.leads:
-            if any(track.distance(lead.seed.point) < track.half_width for track in found.tracks):
-                continue
-            step = max(LEAD_STEP * lead.length, self.tip_radius)
-            follower = replace(self._follower(found, sense), passes=lead.passes, first_step=step, longest_step=step)
-            followed = yield from follower.follow(lead.seed, [lead.way, -lead.way])
-            found.tracks.extend([] if followed.value is None else [followed.value])
-            found.actions.append(f"follow a faint line by {lead.passes} passes: {followed.detail}")
+        found.leads.extend(look.leads)
         return searched
+
+    def _follow_lead(self, lead: FaintLead, found: Found, sense: Sense) -> Plan:
+        """Follow a faint line, unless what was followed since explains it."""
+        found.leads.remove(lead)
+        if any(track.distance(lead.seed.point) < 1.5 * track.half_width for track in found.tracks):
+            return Outcome("known", "it lies on an axis that was followed before")
+        step = max(LEAD_STEP * lead.length, self.tip_radius)
+        follower = replace(self._follower(found, sense), passes=lead.passes, first_step=step, longest_step=step)
+        followed = yield from follower.follow(lead.seed, [lead.way, -lead.way])
+        found.tracks.extend([] if followed.value is None else [followed.value])
+        return Outcome(f"by {lead.passes} passes", followed.detail)
 
     def _actions(self, found: Found, sense: Sense) -> list[Action]:
         actions = []
@@ -186,6 +189,11 @@ class Explore:
             pitch = self.survey.pitch
             seconds = 2.0 * np.pi * self._circuit_radius(seed) / self.speed
             actions.append(Action("look into", pitch, seconds, partial(self._look_into, seed, found, sense)))
+        for lead in [] if actions else found.leads[:1]:
+            # what single sweeps show comes first: it may be what the faint line is a part of
+            seconds = lead.passes * lead.length / self.speed
+            start = partial(self._follow_lead, lead, found, sense)
+            actions.append(Action("follow a faint line", self.survey.pitch, seconds, start))
         for index, track in enumerate(found.tracks):
             for which, end in enumerate(track.ends):
                 done = found.slides.get((index, which), 0)

@@ -13,6 +13,7 @@ from planners.axis_track import AxisTrack
 from planners.bump import BumpSize
 from planners.coverage import Coverage
 from planners.crest import is_step, slender
+from planners.faint import FaintLead
 from planners.strokes import tangential
 
 FloatArray = NDArray[np.float64]
@@ -33,6 +34,7 @@ class Found:
     tracks: list[AxisTrack] = field(default_factory=list)
     bumps: list[BumpSize] = field(default_factory=list)
     crossings: list[Crossing] = field(default_factory=list)
+    leads: list[FaintLead] = field(default_factory=list)
     tried: list[Crossing] = field(default_factory=list)
     slides: dict[tuple[int, int], int] = field(default_factory=dict)
     actions: list[str] = field(default_factory=list)

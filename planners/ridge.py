@@ -32,6 +32,8 @@ FIRST_STEP, LONGEST_STEP = 0.4, 2.0
 BRACKETS = (0.6, 0.15)
 # Passes over a faint line are looked at in so many batches; they leave it open if chi-squared falls by so much
 BATCHES, LEFT_OPEN = 3, 4.0
+# Standard deviation of a crossing's place, against the precision wanted of an end, from which steps are shorter
+DOUBT = 2.2
 # By how much the heading may turn in one step, rad
 MOST_TURN = 0.6
 # Cosine of the angle up to which a line is said to go straight on
@@ -105,6 +107,13 @@ class RidgeFollower:
     def _longest(self) -> float:
         return LONGEST_STEP * self.strokes.tip_radius if self.longest_step is None else self.longest_step
 
+    def _told_by(self, crossing: Crossing) -> float:
+        """Longest step after which as uncertain crossings still tell the course, m."""
+        if self.passes > 1:
+            return np.inf
+        share = min(1.0, (DOUBT * self.precision / max(crossing.position_sd, np.finfo(float).tiny)) ** 2)
+        return max(share * self._longest, FIRST_STEP * self.strokes.tip_radius)
+
     def _begun(self, first: Crossing, way: FloatArray, halves: list[tuple[Line, AxisEnd | None]]) -> Line:
         """A line that begins at the seed; where it only goes on backwards, what was crossed so far leads it."""
         step = FIRST_STEP * self.strokes.tip_radius if self.first_step is None else self.first_step
@@ -124,7 +133,9 @@ class RidgeFollower:
         for _ in range(10_000):
             last = line.crossings[-1]
             ahead = course(line.points, last.normal, way, self.strokes.tip_radius)
-            step = min(line.step, 0.5 * gone, MOST_TURN / max(abs(ahead.turn), np.finfo(float).tiny))
+            step = min(
+                line.step, 0.5 * gone, self._told_by(last), MOST_TURN / max(abs(ahead.turn), np.finfo(float).tiny)
+            )
             walk = self.strokes.walk(ahead.point, ahead.heading, step, ahead.turn)
             if walk.cut and walk.along[-1] < 0.5 * step:
                 return AxisEnd(walk.points[-1], 0.0, "edge of the model", walk.directions[-1])
