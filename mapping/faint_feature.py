@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 
 # Places to a half-width of the narrowest section looked for.
 PLACES = 2.5
-# A point feature of no more crossings, and no clearer than so many thresholds, may be a part of a faint line.
+# A feature of no more crossings, and no clearer than so many thresholds, may be a part of a faint line.
 FEW, CLEAR = 2, 2.0
 # Standard deviations above which a single place stands out.
 PLAIN = 5.0
@@ -33,7 +33,7 @@ LEAST_SAMPLES, MOST_PLACES = 4.0, 150_000
 def with_faint_lines(
     features: Sequence[Feature], detections: Detections, trace: Trace, base: Base, false_alarms_per_metre: float
 ) -> list[Feature]:
-    """The features, and the lines that no single sweep showed; spots that are a part of such a line become the line.
+    """The features, and the lines that no single sweep showed; what is a weak part of such a line becomes the line.
 
     Nothing is sought where `why_none_sought` says so.
     """
@@ -82,8 +82,7 @@ def _scales(detections: Detections, tip_radius: float) -> tuple[float, float]:
 
 
 def _is_weak(feature: Feature, detections: Detections) -> bool:
-    few = feature.evidence.crossings <= FEW and feature.evidence.snr < CLEAR * detections.threshold
-    return few and len(feature.axis) == 1
+    return feature.evidence.crossings <= FEW and feature.evidence.snr < CLEAR * detections.threshold
 
 
 def _inflation(inspection: Inspection, detections: Detections, samples: int, half_width: float) -> float:

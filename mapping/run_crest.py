@@ -23,6 +23,8 @@ STEPS = 49
 # A crest is told if places so near felt it on both sides, in half-widths, and its place is known to this share of one;
 # it is as high as what was felt, up to this factor.
 BESIDE, TOLD, HIGH = 0.9, 0.25, 1.35
+# Signal-to-noise ratio from which the other sweeps show the crest there by themselves.
+PLAIN = 6.0
 # A crossing wider than so many thin wires of its height was made at a slant: the sweep ran along for a while.
 SLANT = 2.0
 
@@ -75,9 +77,12 @@ def _told(place: Crossing, inspection: Inspection, tip_radius: float) -> Crossin
     best = int(costs.argmin())
     likely = offsets[costs < costs[best] + 1.0]
     sd = max(float(np.ptp(likely)), float(offsets[1] - offsets[0])) / 2.0
+    others = inspection.sweep[near] != place.sweep
+    said = shapes[best][others] / sds[others]
+    seen = float(said @ (heights / sds)[others]) / max(float(np.linalg.norm(said)), np.finfo(float).tiny)
     beside = (across - offsets[best])[np.abs(across - offsets[best]) < BESIDE * width]
     bracketed = len(beside) > 0 and beside.min() < 0.0 < beside.max()
-    if sd > TOLD * width or not bracketed or not 1.0 / HIGH < crests[best] / place.height < HIGH:
+    if seen < PLAIN or sd > TOLD * width or not bracketed or not 1.0 / HIGH < crests[best] / place.height < HIGH:
         return None
     fields = {name: getattr(place, name) for name in Crossing.__dataclass_fields__}
     fields |= {
