@@ -15,6 +15,7 @@ from mapping.inspection import Inspection
 from mapping.runs import RunPoint
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 # Half-widths to either side, within which the crest may lie and places tell it; and along the sweep, within which the
 # line is straight.
@@ -25,6 +26,8 @@ STEPS = 49
 BESIDE, TOLD, HIGH = 0.9, 0.25, 1.35
 # Signal-to-noise ratio from which the other sweeps show the crest there by themselves.
 PLAIN = 6.0
+# Square of the usual residual, in standard deviations, up to which it is a crest: a step's edge is not.
+FITS = 3.0
 # A crossing wider than so many thin wires of its height was made at a slant: the sweep ran along for a while.
 SLANT = 2.0
 
@@ -63,33 +66,43 @@ def _told(place: Crossing, inspection: Inspection, tip_radius: float) -> Crossin
     aside = np.cross(place.normal, place.tangent)
     near = inspection.near(place.point[None], 2.0 * ASIDE * width)
     offset = inspection.points[near] - place.point
-    inside = (np.abs(offset @ place.tangent) < ALONG * width) & (np.abs(offset @ place.normal) < width)
-    near, across = near[inside], (offset @ aside)[inside]
-    if len(np.unique(inspection.sweep[near])) < 2:
+    near_by = (np.abs(offset @ place.tangent) < ALONG * width) & (np.abs(offset @ place.normal) < width)
+    near, across = near[near_by], (offset @ aside)[near_by]
+    other = inspection.sweep[near] != place.sweep
+    if not other.any():
         return None
-    heights, sds = inspection.height[near], inspection.sd[near]
+    crest = _fitted(across, inspection.height[near], inspection.sd[near], other, place.height, width)
+    if crest is None:
+        return None
+    fields = {name: getattr(place, name) for name in Crossing.__dataclass_fields__}
+    fields |= {"point": place.point + crest.pop("aside") * aside, "half_width": width}
+    return Crossing(**fields | crest)
+
+
+def _fitted(
+    across: FloatArray, heights: FloatArray, sds: FloatArray, other: BoolArray, height: float, width: float
+) -> dict[str, float] | None:
+    """Place aside, height and standard deviations of the crest of a given width that (M,) heights show, or None.
+
+    Args:
+        across: (M,) places, m.
+        other: (M,) True for those of other sweeps than the one that ran along.
+        height: felt by that sweep, m.
+    """
     offsets = np.linspace(-ASIDE, ASIDE, STEPS) * width
-    sign = float(np.sign(place.height))
+    sign = float(np.sign(height))
     shapes = sign * crest_trace(across[None] - offsets[:, None], sign, width)
     square = np.maximum((shapes**2 / sds**2).sum(axis=1), np.finfo(float).tiny)
     crests = (shapes * heights / sds**2).sum(axis=1) / square
-    costs = misfit(heights - crests[:, None] * shapes, sds, place.height).sum(axis=1)
+    costs = misfit(heights - crests[:, None] * shapes, sds, height).sum(axis=1)
     best = int(costs.argmin())
-    likely = offsets[costs < costs[best] + 1.0]
-    sd = max(float(np.ptp(likely)), float(offsets[1] - offsets[0])) / 2.0
-    others = inspection.sweep[near] != place.sweep
-    said = shapes[best][others] / sds[others]
-    seen = float(said @ (heights / sds)[others]) / max(float(np.linalg.norm(said)), np.finfo(float).tiny)
+    sd = 0.5 * max(float(np.ptp(offsets[costs < costs[best] + 1.0])), float(offsets[1] - offsets[0]))
+    said = (shapes[best] / sds)[other]
+    seen = float(said @ (heights / sds)[other]) / max(float(np.linalg.norm(said)), np.finfo(float).tiny)
     beside = (across - offsets[best])[np.abs(across - offsets[best]) < BESIDE * width]
     bracketed = len(beside) > 0 and beside.min() < 0.0 < beside.max()
-    if seen < PLAIN or sd > TOLD * width or not bracketed or not 1.0 / HIGH < crests[best] / place.height < HIGH:
+    alike = 1.0 / HIGH < crests[best] / height < HIGH
+    if not (alike and bracketed and seen > PLAIN and sd < TOLD * width and costs[best] < FITS * len(across)):
         return None
-    fields = {name: getattr(place, name) for name in Crossing.__dataclass_fields__}
-    fields |= {
-        "point": place.point + offsets[best] * aside,
-        "height": float(crests[best]),
-        "height_sd": 1.0 / float(np.sqrt(square[best])),
-        "position_sd": sd,
-        "half_width": width,
-    }
-    return Crossing(**fields)
+    height_sd = 1.0 / float(np.sqrt(square[best]))
+    return {"aside": float(offsets[best]), "height": float(crests[best]), "height_sd": height_sd, "position_sd": sd}
