@@ -33,6 +33,9 @@ NAMES = {1: ("bump", "ridge"), -1: ("pit", "groove")}
 # A group of crossings that spreads over more than this many half-widths cannot be one round bump: sweeps further
 # than one half-width from its crest miss it.
 WIDEST_SPOT = 2.6
+# A crossing lower than this share of its group's is a stray if it lies so many half-widths off the others, and so many
+# from any other low one.
+STRAY, BESIDE, MATES = 0.6, 1.3, 3.0
 
 
 def assemble(
@@ -112,11 +115,31 @@ def _grouped(
     for kind in ("convex", "concave"):
         alike = [c for c in crests if c.kind == kind]
         for members in groups(alike, inspection, scale) if alike else []:
-            group = [alike[i] for i in members]
-            top = max(abs(c.height) for c in group)
-            high = [c for c in group if abs(c.height) > 0.5 * top]
-            (doubtful if all(is_open(c, inspection) for c in high) else certain).append(group)
+            for group in _without_strays([alike[i] for i in members], scale):
+                top = max(abs(c.height) for c in group)
+                high = [c for c in group if abs(c.height) > 0.5 * top]
+                (doubtful if all(is_open(c, inspection) for c in high) else certain).append(group)
     return certain, doubtful
+
+
+def _without_strays(group: list[Crossing], scale: float) -> list[list[Crossing]]:
+    """The group, and each low crossing that lies alone off its crest as one of its own: it is no arm of the line."""
+    top = float(np.quantile([abs(c.height) for c in group], 0.8))
+    low = [c for c in group if abs(c.height) + 2 * c.height_sd < STRAY * top]
+    crest = [c.point for c in group if not any(c is other for other in low)]
+    strays = []
+    for c in low:
+        alike = [other.point for other in low if other.sweep != c.sweep]
+        alone = _nearest(c.point, alike) > MATES * scale
+        if alone and _nearest(c.point, crest) > BESIDE * scale:
+            strays.append(c)
+    rest = [c for c in group if not any(c is stray for stray in strays)]
+    return [*([rest] if rest else []), *([stray] for stray in strays)]
+
+
+def _nearest(point: FloatArray, others: list[FloatArray]) -> float:
+    """Distance of a point (3,) from the nearest of others, m."""
+    return float(np.linalg.norm(np.array(others) - point, axis=1).min()) if others else float("inf")
 
 
 def _name(crossing: Crossing) -> str:

@@ -33,9 +33,11 @@ BRACKETS = (0.6, 0.15)
 # Passes over a faint line are looked at in so many batches; they leave it open if chi-squared falls by so much
 BATCHES, LEFT_OPEN = 3, 4.0
 # Standard deviation of a crossing's place, against the precision wanted of an end, from which steps are shorter
-DOUBT = 2.2
+DOUBT = 1.9
 # By how much the heading may turn in one step, rad
 MOST_TURN = 0.6
+# Crossings that tell a course so well that a slide may look for the end some way ahead
+WELL_KNOWN = 4
 # Cosine of the angle up to which a line is said to go straight on
 STRAIGHT = 0.95
 
@@ -133,9 +135,8 @@ class RidgeFollower:
         for _ in range(10_000):
             last = line.crossings[-1]
             ahead = course(line.points, last.normal, way, self.strokes.tip_radius)
-            step = min(
-                line.step, 0.5 * gone, self._told_by(last), MOST_TURN / max(abs(ahead.turn), np.finfo(float).tiny)
-            )
+            bend = max(abs(ahead.turn), np.finfo(float).tiny)
+            step = min(line.step, 0.5 * gone, self._told_by(last), MOST_TURN / bend)
             walk = self.strokes.walk(ahead.point, ahead.heading, step, ahead.turn)
             if walk.cut and walk.along[-1] < 0.5 * step:
                 return AxisEnd(walk.points[-1], 0.0, "edge of the model", walk.directions[-1])
@@ -145,9 +146,11 @@ class RidgeFollower:
             found = yield from self._cross(walk.points[-1], heading, last, sign, reach, lowest)
             if found is None:
                 gone, empty = float(walk.along[-1]), walk.points[-1]
+                if len(line.crossings) < WELL_KNOWN:
+                    del brackets[:-1]
                 if gone <= max(brackets[0], 4.0 * self.precision):
                     end = yield from self._end(line, ahead, gone, sign)
-                    if end.reason == "end" or len(brackets) == 1:
+                    if len(brackets) == 1 or (end.reason == "end" and (yield from self._leads_to(line, end, sign))):
                         return end
                     del brackets[0]
                 continue
@@ -165,6 +168,26 @@ class RidgeFollower:
                 return (yield from self._end(line, ahead, max(gone, 0.0), sign))
         return AxisEnd(line.points[-1], np.inf, "lost", way)
 
+    def _leads_to(self, line: Line, end: AxisEnd, sign: float) -> Generator[Move, Trace, bool]:
+        """True if the crest is found, where the course says, shortly before an end that a slide found.
+
+        A slide that leaves a bend straight on looks as if the crest ended there.
+        """
+        last = line.crossings[-1]
+        way = float(np.linalg.norm(end.point - last.point)) - 0.5 * line.half_width
+        if is_step(last) or way < BRACKETS[-1] * self.strokes.tip_radius:
+            return True
+        ahead = course(line.points, last.normal, end.heading, self.strokes.tip_radius)
+        walk = self.strokes.walk(ahead.point, ahead.heading, way, ahead.turn)
+        reach = 0.6 * line.half_width
+        found = yield from self._cross(
+            walk.points[-1], walk.directions[-1], last, sign, reach, STILL_HIGH * line.height
+        )
+        if found is None:
+            return False
+        line.crossings.append(found)
+        return bool(np.linalg.norm(found.point - walk.points[-1]) < 0.5 * reach)
+
     def _passes_by(self, line: Line, ahead: Course, gone: float, empty: FloatArray, near: float) -> bool:
         """True if the line, as its last crossing bends it, does not lead to the place that was found empty.
 
@@ -178,7 +201,8 @@ class RidgeFollower:
 
     def _adapt(self, line: Line, miss: float) -> None:
         """A longer step after a good prediction, a shorter one after a bad one."""
-        factor = 1.5 if miss < 0.15 else 0.6 if miss > 0.45 else 1.0
+        # two crossings say nothing of a bend
+        factor = 1.5 if miss < 0.15 and len(line.crossings) > 2 else 0.6 if miss > 0.45 else 1.0
         line.step = float(np.clip(line.step * factor, 0.2 * self.strokes.tip_radius, self._longest))
 
     def _first(self, seed: Crossing, heading: FloatArray, sign: float) -> Crossed:
