@@ -22,7 +22,8 @@ FloatArray = NDArray[np.float64]
 
 # Places to a half-width of the narrowest section looked for.
 PLACES = 2.5
-# A feature of no more crossings, and no clearer than so many thresholds, may be a part of a faint line.
+# A feature of no more crossings, and no clearer than so many thresholds, may be a part of a faint line; so may a spot
+# lower than a single sweep detects with certainty.
 FEW, CLEAR = 2, 2.0
 # Standard deviations above which a single place stands out.
 PLAIN = 5.0
@@ -82,7 +83,10 @@ def _scales(detections: Detections, tip_radius: float) -> tuple[float, float]:
 
 
 def _is_weak(feature: Feature, detections: Detections) -> bool:
-    return feature.evidence.crossings <= FEW and feature.evidence.snr < CLEAR * detections.threshold
+    few = feature.evidence.crossings <= FEW and feature.evidence.snr < CLEAR * detections.threshold
+    # sweeps that leave a groove by its end feel a dip there, each for itself
+    low = len(feature.axis) == 1 and abs(feature.height.median) < detections.detection_limit
+    return few or low
 
 
 def _inflation(inspection: Inspection, detections: Detections, samples: int, half_width: float) -> float:
