@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.ties import Tree, untied, way_from
+
 FloatArray = NDArray[np.float64]
-Tree = dict[int, set[int]]
 ArmEnd = tuple[int, int]
 
 # In half-widths of the disturbance: shorter twigs are scatter; meeting places nearer to each other are one; points so
@@ -68,6 +69,11 @@ def branches(points: FloatArray, half_width: float, length: FloatArray | None = 
     if length is None:
         length = np.linalg.norm(points[:, None] - points[None], axis=2)
     tree = _without_twigs(spanning_tree(length), points, TWIG * half_width)
+    return [branch for part in untied(tree, points, half_width) for branch in _branches_of(part, points, half_width)]
+
+
+def _branches_of(tree: Tree, points: FloatArray, half_width: float) -> list[Branch]:
+    """The lines of one tree."""
     forks = [i for i, near in tree.items() if len(near) > 2 or _is_corner(i, tree, points, half_width)]
     if not forks:
         return [Branch(points[_path(tree)], (True, True), junction=False)]
@@ -188,14 +194,8 @@ def _is_corner(i: int, tree: Tree, points: FloatArray, half_width: float) -> boo
     """True where the line through a point turns sharply: two lines met there and the tree took the wrong turn."""
     if len(tree[i]) != 2:
         return False
-    ways = []
-    for first in tree[i]:
-        path = [i, first]
-        while len(tree[path[-1]]) == 2 and np.linalg.norm(points[path[-1]] - points[i]) < half_width:
-            path.append(next(j for j in tree[path[-1]] if j != path[-2]))
-        ways.append(points[path[-1]] - points[i])
-    cosine = ways[0] @ ways[1] / max(float(np.linalg.norm(ways[0]) * np.linalg.norm(ways[1])), 1e-300)
-    return bool(cosine > CORNER)
+    ways = [way_from(i, first, tree, points, half_width) for first in tree[i]]
+    return bool(ways[0] @ ways[1] > CORNER)
 
 
 def _meetings(

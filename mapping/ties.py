@@ -1,0 +1,64 @@
+"""Ties: links of a tree of crest points that hold two lines together which only run side by side."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+# Neighbours of each point
+Tree = dict[int, set[int]]
+
+# A tie is longer than so many half-widths: what really joins two lines over such a way would have been crossed
+LONG = 1.5
+# Cosine of the angle between the two ways on of a line that goes straight past a tie, at most
+STRAIGHT_PAST = -0.85
+
+
+def untied(tree: Tree, points: FloatArray, half_width: float) -> list[Tree]:
+    """The trees that are left without ties.
+
+    Where no sweep passed between two lines, nothing denies that they are one detail, and a tree of all points has a
+    link across. At both its ends a line goes straight past it, and no crossing lies on it.
+
+    Args:
+        tree: of points (K, 3), m; not all points need be in it.
+        half_width: of the disturbance, m.
+    """
+    tree = {i: set(near) for i, near in tree.items()}
+    for i, j in [(one, other) for one in tree for other in tree[one] if one < other]:
+        is_long = np.linalg.norm(points[i] - points[j]) > LONG * half_width
+        if is_long and _passes(i, j, tree, points, half_width) and _passes(j, i, tree, points, half_width):
+            tree[i].discard(j)
+            tree[j].discard(i)
+    return _parts(tree)
+
+
+def way_from(i: int, first: int, tree: Tree, points: FloatArray, reach: float) -> FloatArray:
+    """Unit direction (3,) in which the line goes from a point by way of a neighbour, over at least `reach` m."""
+    path = [i, first]
+    while len(tree[path[-1]]) == 2 and np.linalg.norm(points[path[-1]] - points[i]) < reach:
+        path.append(next(j for j in tree[path[-1]] if j != path[-2]))
+    way = points[path[-1]] - points[i]
+    return np.asarray(way / max(float(np.linalg.norm(way)), np.finfo(float).tiny))
+
+
+def _passes(i: int, tied: int, tree: Tree, points: FloatArray, half_width: float) -> bool:
+    """True if a line goes straight on through a point, past its link to another one."""
+    ways = [way_from(i, near, tree, points, half_width) for near in sorted(tree[i]) if near != tied]
+    return any(float(a @ b) < STRAIGHT_PAST for a, b in combinations(ways, 2))
+
+
+def _parts(tree: Tree) -> list[Tree]:
+    """The connected parts of a forest."""
+    left, parts = dict(tree), []
+    while left:
+        part, waiting = set[int](), [next(iter(left))]
+        while waiting:
+            i = waiting.pop()
+            part.add(i)
+            waiting += [j for j in tree[i] if j not in part]
+        parts.append({i: left.pop(i) for i in sorted(part)})
+    return parts
