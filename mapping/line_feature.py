@@ -198,7 +198,7 @@ def _ended(
     longest = 3 * half_width + 2 * min(around.inspection.pitch, 3 * half_width)
     for free in branch.free[::-1]:
         if free:
-            axis = _without_low_end(axis, members)
+            axis = _without_low_end(axis, members, half_width)
             end = line_end(axis, height, half_width, around.inspection, longest)
             axis = np.vstack([axis[: len(axis) - end.dropped], end.point])
             ends.append(end)
@@ -211,8 +211,13 @@ def _exactly(axis: FloatArray) -> Interval:
     return Interval(length, length, length)
 
 
-def _without_low_end(axis: FloatArray, members: list[Crossing]) -> FloatArray:
-    """The axis less a last point that is lower than the one before: that crossing passed beside the end."""
+def _without_low_end(axis: FloatArray, members: list[Crossing], half_width: float) -> FloatArray:
+    """The axis less a last point that is lower than the one before: that crossing passed beside the end.
+
+    One that is far from the one before stays: without it a bend would go straight on.
+    """
+    if np.linalg.norm(axis[-1] - axis[-2]) > half_width:
+        return axis
     places = np.array([c.point for c in members])
     last, before = (members[int(np.linalg.norm(places - point, axis=1).argmin())] for point in axis[[-1, -2]])
     low = abs(last.height) + 2 * last.height_sd < END_HEIGHT * abs(before.height)

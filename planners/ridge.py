@@ -35,7 +35,7 @@ BATCHES, LEFT_OPEN = 3, 4.0
 # Standard deviation of a crossing's place, against the precision wanted of an end, from which steps are shorter
 DOUBT = 1.9
 # By how much the heading may turn in one step, rad
-MOST_TURN = 0.6
+MOST_TURN = 0.45
 # Crossings that tell a course so well that a slide may look for the end some way ahead
 WELL_KNOWN = 4
 # Cosine of the angle up to which a line is said to go straight on
