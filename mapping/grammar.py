@@ -34,8 +34,8 @@ NAMES = {1: ("bump", "ridge"), -1: ("pit", "groove")}
 # than one half-width from its crest miss it.
 WIDEST_SPOT = 2.6
 # A crossing lower than this share of its group's is a stray if it lies so many half-widths off the others, and so many
-# from any other low one.
-STRAY, BESIDE, MATES = 0.6, 1.3, 3.0
+# from any other low one; where others are so many that they are a line, not a spot with low rims.
+STRAY, BESIDE, MATES, LINE = 0.6, 1.3, 3.0, 5
 
 
 def assemble(
@@ -127,6 +127,8 @@ def _without_strays(group: list[Crossing], scale: float) -> list[list[Crossing]]
     top = float(np.quantile([abs(c.height) for c in group], 0.8))
     low = [c for c in group if abs(c.height) + 2 * c.height_sd < STRAY * top]
     crest = [c.point for c in group if not any(c is other for other in low)]
+    if len(crest) < LINE:
+        return [group]
     strays = []
     for c in low:
         alike = [other.point for other in low if other.sweep != c.sweep]
