@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mapping.base import Base
 from mapping.onto_base import onto_base
+from mapping.window import EmptyWindowError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -91,6 +92,9 @@ def chart_along(
         spacing: wanted distance of the chart's points, m.
         extension: length added at both ends of an open curve, m; less where the base ends.
         reach: lateral distance over which the bend of the base is measured, m.
+
+    Raises:
+        EmptyWindowError: the line does not lie over the base.
     """
     closed = len(axis) > 3 and bool(np.array_equal(axis[0], axis[-1]))
     line, lift = _resampled(axis, normals, spacing)
@@ -99,7 +103,7 @@ def chart_along(
     points, up = onto_base(line, lift, base, tip_radius, smooth=int(0.5 * reach / spacing))
     if not closed:
         keep = _on_base(points - line, up, 0.1 * reach)
-        points, up = points[keep], up[keep]
+        points, up = _apart(points[keep], up[keep])
     if closed:
         points[-1], up[-1] = points[0], up[0]
     tangents = _tangents(points, closed)
@@ -141,6 +145,15 @@ def _on_base(moved: FloatArray, up: FloatArray, tolerance: float) -> slice:
     middle = len(moved) // 2
     low, high = int(out[out < middle].max(initial=-1)), int(out[out >= middle].min(initial=len(moved)))
     return slice(max(low, 0), min(high + 1, len(moved)))
+
+
+def _apart(points: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The points without those that stand where the one before them does: on the base's border feet gather."""
+    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    apart = np.concatenate([[True], step > 1e-9 * step.max(initial=0.0)])
+    if apart.sum() < 2:
+        raise EmptyWindowError("its axis does not lie over the base")
+    return points[apart], up[apart]
 
 
 def _tangents(points: FloatArray, closed: bool) -> FloatArray:

@@ -20,7 +20,7 @@ BLOCK = 64
 
 
 class EmptyWindowError(MappingError):
-    """No sample of the trace is near the feature."""
+    """No sample of the trace is near the feature, or it does not lie over the base."""
 
 
 @dataclass(frozen=True, eq=False)
