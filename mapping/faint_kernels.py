@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def best_segment(flat, height, weight, angles, size, cell_u, cell_v, section, lengths, least):  # type: ignore[no-untyped-def]
     """(signal-to-noise, angle, place across, beginning, end) of the clearest segment in any direction; zeros if none.
 

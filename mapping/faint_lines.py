@@ -8,7 +8,9 @@ noise alone would hardly ever look so like a line anywhere.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,9 +85,10 @@ def faint_lines(
     free = ~masked
     needed = threshold(len(inspection.points) * inspection.spacing, inspection.pitch, half_width, alarms)
     tiles = _tiles(inspection, normals, free, half_width)
-    lines = [_clearest(inspection, tile, normals, half_width, inflation) for tile in tiles]
+    search = partial(_clearest_of_each, inspection, normals, half_width, inflation)
+    lines = dict(enumerate(search(tiles)))
     for _ in range(MOST_LINES):
-        best = max((line for line in lines if line is not None), key=lambda line: line.snr, default=None)
+        best = max((line for line in lines.values() if line is not None), key=lambda line: line.snr, default=None)
         if best is None or best.snr < needed:
             break
         rough = best
@@ -97,10 +100,10 @@ def faint_lines(
         for axis in (rough.axis, best.axis):
             near = inspection.near(axis, 1.5 * best.half_width)
             free[near[distances(inspection.points[near], axis) <= 1.5 * best.half_width]] = False
-        for k, tile in enumerate(tiles):
-            if not free[tile].all():
-                tiles[k] = tile[free[tile]]
-                lines[k] = _clearest(inspection, tiles[k], normals, half_width, inflation)
+        changed = [k for k, tile in enumerate(tiles) if not free[tile].all()]
+        for k in changed:
+            tiles[k] = tiles[k][free[tiles[k]]]
+        lines.update(zip(changed, search([tiles[k] for k in changed]), strict=True))
     return tuple(found)
 
 
@@ -130,6 +133,14 @@ def _tiles(inspection: Inspection, normals: FloatArray, free: BoolArray, half_wi
         near, gap = near[free[near]], gap[free[near]]
         tiles.append(np.append(centre, near[(gap < TILE * half_width) & (near != centre)]))
     return tiles
+
+
+def _clearest_of_each(
+    inspection: Inspection, normals: FloatArray, half_width: float, inflation: float, tiles: list[IntArray]
+) -> list[FaintLine | None]:
+    """The clearest line of each tile; they are independent, and the kernel leaves other threads free to work."""
+    with ThreadPoolExecutor() as pool:
+        return list(pool.map(lambda tile: _clearest(inspection, tile, normals, half_width, inflation), tiles))
 
 
 def _clearest(
