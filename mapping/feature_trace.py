@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 
 from mapping.feature import Feature
 from mapping.section import radius_of_cap
-from mapping.shapes import chain_height, rim_height
+from mapping.shapes import chain_height, contact_half_width, rim_height
 
 FloatArray = NDArray[np.float64]
+
+# A crest disturbs the trace up to its half-width over a flat base, and hardly further over a hollow one
+BESIDE = 1.5
 
 
 def feature_trace(feature: Feature, feet: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
@@ -29,7 +32,11 @@ def feature_trace(feature: Feature, feet: FloatArray, normals: FloatArray, tip_r
         return _bell(feature, feet, tip_radius)
     if feature.kind in ("ridge", "bump") and height > 0.0:
         radius = float(feature.extra.get("radius", radius_of_cap(height, width)))
-        return chain_height(feet, normals, feature.axis + (height - radius) * feature.normals, radius, tip_radius)
+        # a low and wide one is a part of a large ball, which on a bent base comes out again elsewhere
+        near = _distance(feet, feature.axis) < BESIDE * contact_half_width(height, radius, tip_radius)
+        crest = feature.axis + (height - radius) * feature.normals
+        over = np.minimum(chain_height(feet, normals, crest, radius, tip_radius), height)
+        return np.where(near, over, 0.0)
     if feature.kind in ("groove", "pit") and height < 0.0:
         return rim_height(0.5 * width - _distance(feet, feature.axis), tip_radius, -height)
     return np.zeros(len(feet))
