@@ -49,7 +49,8 @@ class Crest:
         """
         if self.sign < 0:
             return 0.0
-        radius = min(0.5 * self.height, max(self.half_width**2 / (2.0 * self.height) - tip_radius, 0.0))
+        section = 0.5 * (self.half_width**2 / self.height + self.height) - tip_radius
+        radius = min(0.5 * self.height, max(section, 0.0))
         return UNKNOWN * ROUNDED * self.half_width * radius / (tip_radius + radius)
 
 

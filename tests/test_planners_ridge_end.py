@@ -67,3 +67,9 @@ def test_a_slide_that_feels_nothing_leaves_the_end_as_it_was() -> None:
     with pytest.raises(StopIteration) as done:
         plan.send(trace.select(slice(0, 0)))
     assert done.value.value is end
+
+
+def test_whether_an_end_is_round_leaves_the_place_of_a_wire_open_by_a_fiftieth_of_a_millimetre() -> None:
+    # laid over each other, the traces over a round and over a square end are shifted by 0.045 mm
+    assert 0.35 * 0.7 < Crest(WIRE, 5e-6, WIDE, 1.0).rounding_sd(R) / 0.045e-3 < 0.35 * 1.3
+    assert Crest(WIRE, 5e-6, WIDE, -1.0).rounding_sd(R) == 0.0
