@@ -22,9 +22,9 @@ FloatArray = NDArray[np.float64]
 
 # Places to a half-width of the narrowest section looked for.
 PLACES = 2.5
-# A feature of no more crossings, and no clearer than so many thresholds, may be a part of a faint line; so may a spot
-# lower than a single sweep detects with certainty.
-FEW, CLEAR = 2, 2.0
+# A feature of no more crossings, and no clearer than so many thresholds, may be a part of a faint line; so may a spot,
+# or a line of some crossings, that is lower than a single sweep detects with certainty.
+FEW, CLEAR, SOME = 2, 2.0, 6
 # Standard deviations above which a single place stands out.
 PLAIN = 5.0
 # Samples to a place, below which there is no noise to be averaged away; and places that are looked through in seconds.
@@ -85,8 +85,8 @@ def _scales(detections: Detections, tip_radius: float) -> tuple[float, float]:
 def _is_weak(feature: Feature, detections: Detections) -> bool:
     few = feature.evidence.crossings <= FEW and feature.evidence.snr < CLEAR * detections.threshold
     # sweeps that leave a groove by its end feel a dip there, each for itself
-    low = len(feature.axis) == 1 and abs(feature.height.median) < detections.detection_limit
-    return few or low
+    alone = len(feature.axis) == 1 or feature.evidence.crossings <= SOME
+    return few or (alone and abs(feature.height.median) < detections.detection_limit)
 
 
 def _inflation(inspection: Inspection, detections: Detections, samples: int, half_width: float) -> float:
