@@ -19,20 +19,25 @@ FloatArray = NDArray[np.float64]
 CELLS = 4000
 # So far from a place where the finger felt nothing, or rolled off, the body is taken to go on, in tip radii
 EDGE = 0.5
+# Cosine of the angle to the side from which a face is felt, at most
+FACING = 0.5
 # A sweep that ends this deep (tip radii) below the base rolled off the body's edge
 ROLLED_OFF = 0.05
 # A centre this far off the base's normal (rad) stands beside the base, not over it
 BESIDE = float(np.radians(5.0))
 
 
-def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray) -> Base:
+def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray, sides: FloatArray) -> Base:
     """The faces of a base inside a box whose nearest known place was touched, and that stay clear of empty ones.
+
+    What faces away from all sides is left out as well: a body that stands on a table is not felt from below.
 
     Args:
         base: as fitted, larger than the body.
         trace: what was felt. Where a sweep rolled off an edge counts as empty.
-        empty: (M, 3) places of ball centres where nothing was felt, m.
+        empty: (M, 3) places of ball centres where nothing was felt, m; those clear of the base tell nothing of it.
         box: (2, 3) low and high corners, m.
+        sides: (S, 3) outward directions of the sides from which the body may be felt.
 
     Raises:
         SurfaceError: nothing is left.
@@ -42,7 +47,8 @@ def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray) -
     cells = Cells.of(trace, CELLS)
     feet = base.foot(cells.centers, trace.tip_radius)
     off = rolled_off(feet.height, cells.sweep, trace.tip_radius)
-    bare = base.foot(empty, trace.tip_radius).points if len(empty) else np.zeros((0, 3))
+    free = base.foot(empty, trace.tip_radius) if len(empty) else None
+    bare = np.zeros((0, 3)) if free is None else free.points[free.height < -ROLLED_OFF * trace.tip_radius]
     places = np.concatenate([feet.points, bare])
     touched = np.concatenate([~off, np.zeros(len(bare), dtype=bool)])
     middle = base.surface.vertices[base.surface.faces].mean(axis=1)
@@ -50,9 +56,13 @@ def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray) -
     keep = touched[nearest]
     if not touched.all():
         keep &= cKDTree(places[~touched]).query(middle)[0] > EDGE * trace.tip_radius
+    keep &= (base.surface.face_normals @ sides.T > FACING).any(axis=1)
     keep = keep & (middle >= box[0]).all(axis=1) & (middle <= box[1]).all(axis=1)
     if not keep.any():
-        raise SurfaceError("no part of the fitted base lies inside the region; is the region where the body is?")
+        raise SurfaceError(
+            "no part of the fitted base lies inside the region and faces the sides it is felt from; is the region "
+            "where the body is?"
+        )
     used, faces = np.unique(base.surface.faces[keep], return_inverse=True)
     return replace(base, surface=Surface(base.surface.vertices[used], faces.reshape(-1, 3)))
 

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mapping.base import Base
-from mapping.base_shapes import FAMILIES, Cloud, Fitted
+from mapping.base_polyhedron import polyhedron
+from mapping.base_shapes import FAMILIES, Cloud, Family, Fitted, sheet
+from mapping.base_star import star
+from mapping.base_tube import tube
 from mapping.errors import TraceError
 from mapping.profile_fit import fit_profile, profile_frame
 from mapping.robust import OUTLIER, robust_scale
@@ -15,6 +21,14 @@ from mapping.trace import Trace
 FloatArray = NDArray[np.float64]
 
 MOST_CELLS = 4000
+# The freer families, and by how many times the scatter of neighbouring cells half of all cells may miss a simple body
+FREE: tuple[Family, ...] = (
+    polyhedron,
+    *(partial(sheet, shortest=shortest) for shortest in (5.0, 2.5)),
+    *(partial(tube, waves=waves, shortest=shortest) for waves in (0, 2, 4, 6, 9) for shortest in (4.0, 2.0)),
+    *(partial(star, degree=degree) for degree in (3, 5, 8, 12)),
+)
+EXPLAINED = 5.0
 
 
 def fit_base(trace: Trace, spacing: float | None = None) -> Base:
@@ -42,10 +56,21 @@ def fit_base(trace: Trace, spacing: float | None = None) -> Base:
         surface, parameters = fit_profile(trace, frame)
         return Base(surface, "profile", dict(parameters))
     cloud = Cloud.of(trace, MOST_CELLS)
-    fits: list[Fitted] = [fitted for family in FAMILIES if (fitted := family(cloud)) is not None]
+    fits = _fits(FAMILIES, cloud)
+    if not any(_explains(fit, cloud) for fit in fits):
+        fits += _fits(FREE, cloud)
     scale, share = _noise_of(min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual, cloud.floor)
     best = min(fits, key=lambda fitted: fitted.cost(scale, share))
     return Base(best.surface(cloud, spacing), best.kind, best.parameters)
+
+
+def _fits(families: Iterable[Family], cloud: Cloud) -> list[Fitted]:
+    return [fitted for family in families if (fitted := family(cloud)) is not None]
+
+
+def _explains(fit: Fitted, cloud: Cloud) -> bool:
+    """True if most of the cells lie as near to the fitted surface as their neighbours to each other."""
+    return float(np.median(np.abs(fit.residual))) < EXPLAINED * cloud.floor
 
 
 def _noise_of(residual: FloatArray, floor: float) -> tuple[float, float]:

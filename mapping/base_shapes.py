@@ -17,6 +17,9 @@ from mapping.trace import Trace
 
 FloatArray = NDArray[np.float64]
 
+# Upward part of the mean direction from a round body's middle of what was felt inside it, without contact normals
+BELOW = -0.6
+
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
@@ -57,6 +60,15 @@ class Cloud:
     def world(self, points: FloatArray) -> FloatArray:
         """Points (N, 3) of the frame in the object frame."""
         return np.asarray(self.origin + points @ self.axes)
+
+    def hollow(self, away: FloatArray) -> bool:
+        """True if the ball runs inside a round body: directions `away` (C, 3) from its middle point into the body.
+
+        The contact normals tell; without them it is so if all was felt below the middle, as in a bowl.
+        """
+        if self.outward is not None:
+            return float((self.outward * away).sum(axis=1).mean()) < 0.0
+        return float((away.mean(axis=0) @ self.axes)[2]) < BELOW
 
     @property
     def floor(self) -> float:
@@ -104,10 +116,17 @@ class Fitted:
         return self.mesh(cloud, spacing)
 
 
-def _sheet(design: Callable[[FloatArray, FloatArray], FloatArray], kind: str, cloud: Cloud) -> Fitted:
-    """A height field z = design(x, y) @ coefficients over the principal plane."""
+def _sheet(
+    design: Callable[[FloatArray, FloatArray], FloatArray], kind: str, cloud: Cloud, bends: FloatArray | None = None
+) -> Fitted:
+    """A height field z = design(x, y) @ coefficients over the principal plane.
+
+    Args:
+        bends: (B, P) rows of which each times the coefficients is 0 +- 1: what holds where nothing was felt.
+    """
     x, y, z = cloud.points.T
-    fit = robust_fit(design(x, y), z, cloud.scale)
+    prior = np.zeros((0, design(x[:1], y[:1]).shape[1])) if bends is None else cloud.floor * bends
+    fit = robust_fit(np.vstack([design(x, y), prior]), np.append(z, np.zeros(len(prior))), cloud.scale)
 
     def height(u: FloatArray, v: FloatArray) -> FloatArray:
         return np.asarray(design(u, v) @ fit.coefficients)
@@ -116,7 +135,7 @@ def _sheet(design: Callable[[FloatArray, FloatArray], FloatArray], kind: str, cl
     return Fitted(
         kind,
         {"coefficients": fit.coefficients.tolist()},
-        fit.residual,
+        fit.residual[: len(z)],
         len(fit.coefficients),
         lambda cloud, spacing: _height_mesh(height, cells, cloud, spacing),
     )
@@ -129,7 +148,7 @@ def _height_mesh(
     low, high = cloud.extent
     margin = 2.0 * cloud.tip_radius
     ends = [(float(low[i]) - margin, float(high[i]) + margin) for i in range(2)]
-    u, v = (np.linspace(*end, 1 + max(cells, _pieces(end[1] - end[0], spacing))) for end in ends)
+    u, v = (np.linspace(*end, 1 + max(cells, pieces_of(end[1] - end[0], spacing))) for end in ends)
     # Beyond the data a polynomial says nothing: the sheet goes on straight from its border.
     uu, vv = (g.ravel() for g in np.meshgrid(u, v, indexing="ij"))
     step = 1e-4 * max(float(high[0] - low[0]), float(high[1] - low[1]))
@@ -143,7 +162,8 @@ def _height_mesh(
     return Surface(cloud.world(points), _grid_faces(len(u), len(v)))
 
 
-def _pieces(length: float, spacing: float | None) -> int:
+def pieces_of(length: float, spacing: float | None) -> int:
+    """Into how many pieces a length (m) is cut so that none is longer than a spacing."""
     return 1 if spacing is None else int(np.clip(np.ceil(length / spacing), 1, 500))
 
 
@@ -163,12 +183,12 @@ def quadric(cloud: Cloud) -> Fitted:
     return _sheet(lambda x, y: np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y]), "quadric", cloud)
 
 
-def sheet(cloud: Cloud) -> Fitted | None:
-    """A bicubic spline sheet; its pieces are no shorter than SHORTEST_BEND tip radii."""
+def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
+    """A bicubic spline sheet; its pieces are no shorter than so many tip radii."""
     from scipy.interpolate import BSpline
 
     low, high = cloud.extent
-    pieces = [int(min(8, (high[i] - low[i]) / (SHORTEST_BEND * cloud.tip_radius))) for i in range(2)]
+    pieces = [int(min(8, (high[i] - low[i]) / (shortest * cloud.tip_radius))) for i in range(2)]
     if min(pieces) < 1 or len(cloud.points) < 4 * (pieces[0] + 3) * (pieces[1] + 3):
         return None
     knots = [
@@ -181,7 +201,14 @@ def sheet(cloud: Cloud) -> Fitted | None:
         )
         return np.asarray((bx[:, :, None] * by[:, None, :]).reshape(len(x), -1))
 
-    return _sheet(design, "sheet", cloud)
+    count = [pieces[i] + 3 for i in range(2)]
+    # the sheet bends no more than the ball: second differences of the coefficients, in squared pieces over its radius
+    along, across = (
+        np.diff(np.eye(count[i]), 2, axis=0) * cloud.tip_radius * (pieces[i] / (high[i] - low[i])) ** 2
+        for i in range(2)
+    )
+    bends = np.vstack([np.kron(along, np.eye(count[1])), np.kron(np.eye(count[0]), across)])
+    return _sheet(design, "sheet", cloud, bends)
 
 
 def sphere(cloud: Cloud) -> Fitted | None:
@@ -196,20 +223,29 @@ def sphere(cloud: Cloud) -> Fitted | None:
         return np.asarray(np.linalg.norm(p - q[:3], axis=1) - q[3])
 
     q = least_squares(residual, [*start[:3], radius], loss="soft_l1", f_scale=max(cloud.scale, 1e-9 * radius)).x
-    if not q[3] > cloud.tip_radius:
+    centre = q[:3]
+    hollow = cloud.hollow((p - centre) / np.linalg.norm(p - centre, axis=1, keepdims=True))
+    body = float(q[3]) + (cloud.tip_radius if hollow else -cloud.tip_radius)
+    if not 0.0 < body < 20.0 * float(np.ptp(p, axis=0).max()):
         return None
-    centre, body = q[:3], float(q[3]) - cloud.tip_radius
-    if body > 20.0 * float(np.ptp(p, axis=0).max()):
-        return None
-    parameters = {"centre": cloud.world(centre[None])[0].tolist(), "radius": body}
-    return Fitted("sphere", parameters, residual(q), 4, lambda cloud, spacing: _sphere_mesh(centre, body, cloud))
+    parameters = {"centre": cloud.world(centre[None])[0].tolist(), "radius": body} | (
+        {"hollow": True} if hollow else {}
+    )
+    return Fitted(
+        "sphere", parameters, residual(q), 4, lambda cloud, spacing: _sphere_mesh(centre, body, hollow, cloud)
+    )
 
 
-def _sphere_mesh(centre: FloatArray, radius: float, cloud: Cloud) -> Surface:
+def _sphere_mesh(centre: FloatArray, radius: float, hollow: bool, cloud: Cloud) -> Surface:
     import trimesh
 
     ball = trimesh.creation.icosphere(subdivisions=6, radius=radius)
-    return Surface(cloud.world(np.asarray(ball.vertices) + centre), np.asarray(ball.faces, dtype=np.int64))
+    return Surface(cloud.world(np.asarray(ball.vertices) + centre), outside(np.asarray(ball.faces), hollow))
+
+
+def outside(faces: NDArray[np.int64], hollow: bool) -> NDArray[np.int64]:
+    """Faces of a closed body, turned over if it is hollow."""
+    return np.asarray(faces[:, ::-1] if hollow else faces, dtype=np.int64)
 
 
 def cylinder(cloud: Cloud) -> Fitted | None:
@@ -235,7 +271,9 @@ def cylinder(cloud: Cloud) -> Fitted | None:
             best, missed = (cost, found.x, axis, across), misses
     assert best is not None
     _, q, axis, across = best
-    body = float(q[4]) - cloud.tip_radius
+    away = _across(p, q, axis, across)
+    hollow = cloud.hollow(away / np.linalg.norm(away, axis=1, keepdims=True))
+    body = float(q[4]) + (cloud.tip_radius if hollow else -cloud.tip_radius)
     if not 0.0 < body < 20.0 * float(np.ptp(p, axis=0).max()):
         return None
     direction, point = np.zeros(3), np.zeros(3)
@@ -246,9 +284,13 @@ def cylinder(cloud: Cloud) -> Fitted | None:
         "point": cloud.world(point[None])[0].tolist(),
         "axis": (direction @ cloud.axes).tolist(),
         "radius": body,
-    }
+    } | ({"hollow": True} if hollow else {})
     return Fitted(
-        "cylinder", parameters, missed, 5, lambda cloud, spacing: _cylinder_mesh(point, direction, body, cloud, spacing)
+        "cylinder",
+        parameters,
+        missed,
+        5,
+        lambda cloud, spacing: _cylinder_mesh(point, direction, body, hollow, cloud, spacing),
     )
 
 
@@ -263,7 +305,7 @@ def _across(p: FloatArray, q: FloatArray, axis: int, across: list[int]) -> Float
 
 
 def _cylinder_mesh(
-    point: FloatArray, direction: FloatArray, radius: float, cloud: Cloud, spacing: float | None
+    point: FloatArray, direction: FloatArray, radius: float, hollow: bool, cloud: Cloud, spacing: float | None
 ) -> Surface:
     """A tube over the cloud's length; its facets stay within a millionth of the radius (20 with a spacing)."""
     height = (cloud.points - point) @ direction
@@ -273,15 +315,20 @@ def _cylinder_mesh(
     u /= np.linalg.norm(u)
     v = np.cross(direction, u)
     low, high = float(height.min()) - margin, float(height.max()) + margin
-    around, along = 2048 if spacing is None else 512, _pieces(high - low, spacing)
+    around, along = 2048 if spacing is None else 512, pieces_of(high - low, spacing)
     angle = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
     ring = radius * (np.outer(np.cos(angle), u) + np.outer(np.sin(angle), v))
     levels = point + np.linspace(low, high, along + 1)[:, None] * direction
     vertices = (levels[:, None, :] + ring[None, :, :]).reshape(-1, 3)
+    return Surface(cloud.world(vertices), outside(ring_faces(around, along), hollow))
+
+
+def ring_faces(around: int, along: int) -> NDArray[np.int64]:
+    """Triangles of a tube whose vertices are rings of `around` corners, one after the other."""
     level, k = (grid.ravel() for grid in np.meshgrid(np.arange(along), np.arange(around), indexing="ij"))
     a, b = level * around + k, level * around + (k + 1) % around
-    faces = np.concatenate([np.column_stack([a, b, b + around]), np.column_stack([a, b + around, a + around])])
-    return Surface(cloud.world(vertices), faces)
+    return np.concatenate([np.column_stack([a, b, b + around]), np.column_stack([a, b + around, a + around])])
 
 
-FAMILIES: tuple[Callable[[Cloud], Fitted | None], ...] = (plane, sphere, cylinder, quadric, sheet)
+Family = Callable[[Cloud], Fitted | None]
+FAMILIES: tuple[Family, ...] = (plane, sphere, cylinder, quadric, sheet)

@@ -17,7 +17,7 @@ from mapping.errors import SurfaceError, TraceError
 from mapping.robust import MAD_TO_SD, robust_scale
 from mapping.trace import Trace
 from planners.errors import PlannerError
-from planners.feel_line import Felt, FeltLine
+from planners.feel_line import Felt, FeltLine, facing
 from planners.plan import Outcome, Plan
 from planners.survey import Survey
 
@@ -84,9 +84,9 @@ class Discover:
             for move in self._testing(base, number):
                 trace = yield move
                 if len(trace):
-                    fresh.append(trace)
+                    fresh.append(facing(trace, move))
                 else:
-                    felt.empty.append(move.path[len(move.path) // 2])
+                    felt.empty.append(move.path[len(move.path) // 2][None])
             if not fresh:
                 return Outcome("lost", "the fitted surface was not met again", base)
             miss, allowed = self._miss(Trace.concatenate(fresh), base)
@@ -98,10 +98,10 @@ class Discover:
 
     def _lines(self, side: str) -> Iterator[FeltLine]:
         """Lines along the longer way over a side of the box, then some across, to and fro."""
-        axis, sign = "xyz".index(side[1]), 1.0 if side[0] == "+" else -1.0
+        outward = _outward(side)
+        axis, sign = int(np.abs(outward).argmax()), float(outward.sum())
         low, high = np.asarray(self.low, dtype=np.float64), np.asarray(self.high, dtype=np.float64)
         first, second = sorted((i for i in range(3) if i != axis), key=lambda i: low[i] - high[i])
-        outward = sign * np.eye(3)[axis]
         top = (high if sign > 0 else low)[axis] + sign * self.tip_radius
         for along, across, count in ((first, second, ALONG), (second, first, ACROSS)):
             for number in range(count):
@@ -122,7 +122,8 @@ class Discover:
         kept = cells.trace(self.tip_radius, ~rolled_off(height, cells.sweep, self.tip_radius))
         base = fit_base(kept, spacing=0.5 * self.tip_radius)
         box = np.stack([self.low, self.high])
-        return touched_part(base, trace, np.array(felt.empty).reshape(-1, 3), box)
+        outward = np.array([_outward(side) for side in self.sides])
+        return touched_part(base, trace, np.concatenate([np.zeros((0, 3)), *felt.empty]), box, outward)
 
     def _testing(self, base: Base, number: int) -> list[Move]:
         """Some sweeps of a survey, in each round others."""
@@ -138,3 +139,8 @@ class Discover:
         height = base.foot(Cells.of(trace, CELLS).centers, self.tip_radius).height
         noise = robust_scale(np.diff(height, 2)) / np.sqrt(6.0)
         return float(MAD_TO_SD * np.median(np.abs(height))), float(max(2.0 * noise, GOOD * self.smallest))
+
+
+def _outward(side: str) -> FloatArray:
+    """Unit vector (3,) that points out of a side of the box, as "+x"."""
+    return np.asarray((1.0 if side[0] == "+" else -1.0) * np.eye(3)["xyz".index(side[1])])

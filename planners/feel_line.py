@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ STEEPEST = 2.0
 
 @dataclass
 class Felt:
-    """What was felt: `traces` of the sweeps in contact, and `empty` places (3,) m under which there was nothing."""
+    """What was felt: `traces` of the sweeps in contact, and `empty` places (K, 3), m, where the ball met nothing."""
 
     traces: list[Trace] = field(default_factory=list)
     empty: list[FloatArray] = field(default_factory=list)
@@ -58,7 +58,7 @@ class FeltLine:
         while place < self._length - TOUCH * self.tip_radius:
             contact = yield from self._approach(place, felt)
             if contact is None:
-                felt.empty.append(self._at(place, 0.0))
+                felt.empty.append(self._below(place))
                 place += 2.0 * self.tip_radius
             else:
                 place = yield from self._follow(place, contact, felt)
@@ -74,13 +74,19 @@ class FeltLine:
     def _at(self, place: float, depth: float) -> FloatArray:
         return np.asarray(self.start + place * self._ahead + depth * self.inward)
 
+    def _below(self, place: float) -> FloatArray:
+        """Places (K, 3) of the ball under one of the line, as deep as the body may lie."""
+        levels = np.linspace(0.0, self.depth, 2 + int(2.0 * self.depth / self.tip_radius))
+        return self._at(place, 0.0) + levels[:, None] * self.inward
+
     def _approach(self, place: float, felt: Felt) -> Generator[Move, Trace, float | None]:
         """Depth of the first contact below the line at a place, found step by step; None if there is no body."""
         levels = np.arange(0.0, self.depth + self.tip_radius, self.tip_radius)
         for level in np.minimum(levels, self.depth):
-            trace = yield self._sweep(place, place + TOUCH * self.tip_radius, float(level), float(level))
+            move = self._sweep(place, place + TOUCH * self.tip_radius, float(level), float(level))
+            trace = yield move
             if len(trace):
-                felt.traces.append(trace)
+                felt.traces.append(facing(trace, move))
                 return float(np.median((trace.centers - self.start) @ self.inward))
         return None
 
@@ -89,12 +95,13 @@ class FeltLine:
         slope, stretch = 0.0, SHORT * self.tip_radius
         while place < self._length - 1e-9:
             onward = min(place + stretch, self._length)
-            trace = yield self._sweep(place, onward, depth, depth + slope * (onward - place))
+            move = self._sweep(place, onward, depth, depth + slope * (onward - place))
+            trace = yield move
             if len(trace):
-                felt.traces.append(trace)
+                felt.traces.append(facing(trace, move))
             reached = place + self.tip_radius if len(trace) < 2 else self._reached(trace)
             if reached < onward - 0.5 * self.tip_radius or len(trace) < 2:
-                felt.empty.append(self._at(0.5 * (reached + onward), 0.0))
+                felt.empty.append(self._below(0.5 * (reached + onward)))
                 return max(reached, place) + 0.5 * self.tip_radius
             predicted = depth + slope * (onward - place)
             depth, slope = self._end(trace)
@@ -120,3 +127,11 @@ class FeltLine:
             return float(np.median(depth)), 0.0
         slope, level = np.polyfit(along[last] - along[-1], depth[last], 1)
         return float(level), float(np.clip(slope, -STEEPEST, STEEPEST))
+
+
+def facing(trace: Trace, move: Move) -> Trace:
+    """A trace that tells from which side its body was felt: if no contact normals were, against the approach."""
+    if trace.has_contact_data:
+        return trace
+    outward = -np.atleast_2d(move.approach).mean(axis=0)
+    return replace(trace, normals=np.tile(outward / np.linalg.norm(outward), (len(trace), 1)))
