@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -24,6 +25,7 @@ from mapping.noise import Noise
 from mapping.object_model import ObjectModel
 from mapping.trace import Trace
 from planners.baselines import RandomSweeps, Raster
+from planners.discover import Discover
 from planners.drive import drive
 from planners.ergodic import Ergodic
 from planners.explore import Explore
@@ -50,6 +52,7 @@ def _explore(precision: float) -> Strategy:
 
 
 def _exploration(scene: BenchScene, precision: float) -> Plan:
+    """Find the base and explore it; the outcome's value is the base."""
     base = Base(scene.base)
     if scene.misplaced:
         locate = Locate(base=base, tip_radius=TIP_RADIUS, smallest=scene.smallest, speed=_speed(scene))
@@ -57,6 +60,15 @@ def _exploration(scene: BenchScene, precision: float) -> Plan:
         if located.value is None:
             return located
         base = located.value.moved(base)
+    if scene.sides:
+        low, high = scene.region
+        discover = Discover(
+            low=low, high=high, tip_radius=TIP_RADIUS, smallest=scene.smallest, sides=scene.sides, speed=_speed(scene)
+        )
+        discovered = yield from discover.plan()
+        if discovered.value is None:
+            return discovered
+        base = discovered.value
     explore = Explore(
         base=base,
         tip_radius=TIP_RADIUS,
@@ -65,7 +77,8 @@ def _exploration(scene: BenchScene, precision: float) -> Plan:
         precision=precision,
         speed=_speed(scene),
     )
-    return (yield from explore.plan())
+    explored = yield from explore.plan()
+    return replace(explored, value=base)
 
 
 def _speed(scene: BenchScene) -> float:
@@ -138,7 +151,7 @@ def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus"
     after = clock.idle
     trace = Trace.concatenate([felt for _, felt in record if len(felt)])
     start = perf_counter()
-    model = modelled(trace, body, seed)
+    model = modelled(trace, body, seed, outcome.value if body.sides else None)
     modelling = perf_counter() - start
     return {
         "finger_seconds": finger.clock,
@@ -151,14 +164,15 @@ def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus"
     } | errors(model, body)
 
 
-def modelled(trace: Trace, body: BenchScene, seed: int) -> ObjectModel:
-    """The annotated model of all samples, by the stages of `explore3d analyze`."""
+def modelled(trace: Trace, body: BenchScene, seed: int, found: Base | None = None) -> ObjectModel:
+    """The annotated model of all samples, by the stages of `explore3d analyze`, on the base that was found, if any."""
+    from mapping.base_extent import refined as base_refined
     from mapping.detectors import detect
     from mapping.grammar import assemble
     from mapping.pose import estimate_pose
     from mapping.refine import refine
 
-    base = Base(body.base)
+    base = Base(body.base) if found is None else base_refined(found, trace)
     if body.misplaced:
         base = estimate_pose(trace, base).moved(base)
     detections = detect(trace, base)

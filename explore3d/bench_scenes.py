@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from explore3d.bench_bodies import (
 )
 from explore3d.truth import TrueFeature
 from mapping.surface import Surface
+from planners.discover import SIDES
 
 FloatArray = NDArray[np.float64]
 
@@ -30,6 +31,8 @@ UP = np.array([0.0, 0.0, 1.0])
 LONG, SHORT = 0.1, 0.08
 # The span that no ridge on these bodies falls short of, m
 SPAN = 0.025
+# The box that an unknown body is looked for in is so much larger, m
+SPARE = 0.004
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,8 @@ class BenchScene:
         shortest_ridge: the survey's setting, m; None where there may be bumps.
         smallest: height of the smallest feature that the survey must find, m.
         misplaced: the object stands off the global model, and the finger must find out how.
+        sides: from which to feel it without a model, as planners.discover has them; none: the model is known.
+        region: (2, 3) low and high corners, m, of the box that it is looked for in then.
     """
 
     base: Surface
@@ -51,6 +56,8 @@ class BenchScene:
     shortest_ridge: float | None = SPAN
     smallest: float = 0.3e-3
     misplaced: bool = False
+    sides: tuple[str, ...] = ()
+    region: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
 
 
 def wires(
@@ -182,6 +189,13 @@ def misplaced(scene: BenchScene, rng: np.random.Generator) -> BenchScene:
     )
 
 
+def unknown(scene: BenchScene, sides: tuple[str, ...], inside: float = 0.0) -> BenchScene:
+    """The same without a model; the box that it is looked for in stays clear of the edges by so much, m."""
+    low, high = scene.object.bounds
+    border = np.array([inside, inside, 0.0]) - SPARE
+    return replace(scene, sides=sides, region=np.stack([low + border, high - border]))
+
+
 SCENES: dict[str, Callable[[np.random.Generator], BenchScene]] = {
     "straight": straight,
     "curved": lambda rng: wires(placed(arc(0.015, 2.7), rng)),
@@ -194,4 +208,6 @@ SCENES: dict[str, Callable[[np.random.Generator], BenchScene]] = {
     "free form": free_form,
     "wrong pose": lambda rng: misplaced(free_form(rng, bumps=False), rng),
     "empty": lambda rng: wires(),
+    "unknown fold": lambda rng: unknown(edge(rng), ("+z",), 0.01),
+    "unknown form": lambda rng: unknown(free_form(rng, bumps=False), SIDES),
 }

@@ -90,14 +90,16 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
 
 
 def _base(trace: Trace, base: Base | None, stages: Stages) -> Base:
-    if base is not None:
-        found = base.kind not in ("mesh", "profile")
-        if not stages.needed("base fit", "it was made while exploring" if found else "the global model was given"):
-            return base
+    from mapping.base_extent import refined
     from mapping.base_fit import fit_base
 
+    found = None if base is None or base.kind in ("mesh", "profile") else base
+    why_not = "" if base is None or found is not None else "the global model was given"
+    if base is not None and not stages.needed("base fit", why_not):
+        return base
     with stages.stage("base fit"):
-        return fit_base(trace)
+        # a base that was found by feeling is known better by all that was felt since
+        return fit_base(trace) if found is None else refined(found, trace)
 
 
 def _placed(trace: Trace, base: Base, scene: Scene | None, stages: Stages) -> Base:

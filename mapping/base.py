@@ -43,13 +43,19 @@ class Base:
     Args:
         surface: its mesh.
         kind: "mesh" if it was given, else the fitted family: "profile", "plane", "sphere", "cylinder",
-            "quadric", "cloud".
-        parameters: what the fit found (JSON values, SI), empty for a given mesh.
+            "quadric", "sheet", "polyhedron", "tube", "star body".
+        parameters: what the fit found (JSON values, SI), empty for a given mesh; "missed" (m) of a base that was
+            tested: by how much it missed sweeps that it was not fitted to.
     """
 
     surface: Surface
     kind: str = "mesh"
     parameters: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def known(self) -> bool:
+        """True of a given mesh and of a base that predicted further sweeps: what it does not explain is a feature."""
+        return self.kind == "mesh" or "missed" in self.parameters
 
     @cached_property
     def nearest(self) -> NearestPoint:

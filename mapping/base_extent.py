@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.base import Base
+from mapping.base import Base, Feet
+from mapping.base_fit import fit_base
 from mapping.cells import Cells
 from mapping.errors import SurfaceError
 from mapping.robust import robust_scale
@@ -25,6 +26,10 @@ FACING = 0.5
 ROLLED_OFF = 0.05
 # A centre this far off the base's normal (rad) stands beside the base, not over it
 BESIDE = float(np.radians(5.0))
+# Barycentric coordinate below which a foot stands on a side
+ON_SIDE = 1e-6
+# Triangles that sweeps are planned on, and how far a better fit may lie from the first, in tip radii
+SPACING, AWAY = 0.5, 0.5
 
 
 def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray, sides: FloatArray) -> Base:
@@ -63,8 +68,7 @@ def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray, s
             "no part of the fitted base lies inside the region and faces the sides it is felt from; is the region "
             "where the body is?"
         )
-    used, faces = np.unique(base.surface.faces[keep], return_inverse=True)
-    return replace(base, surface=Surface(base.surface.vertices[used], faces.reshape(-1, 3)))
+    return part_of(base, keep)
 
 
 def rolled_off(height: FloatArray, sweep: NDArray[np.int64], tip_radius: float) -> NDArray[np.bool_]:
@@ -83,6 +87,30 @@ def rolled_off(height: FloatArray, sweep: NDArray[np.int64], tip_radius: float) 
 
 def over_base(trace: Trace, base: Base) -> NDArray[np.bool_]:
     """(N,) True where the ball's centre stands over the base, False where it stands beyond its border."""
-    feet = base.foot(trace.centers, trace.tip_radius)
-    straight = (feet.normals * base.surface.face_normals[feet.face]).sum(axis=1)
-    return np.asarray(np.abs(straight) > np.cos(BESIDE))
+    return ~_beyond(base, base.foot(trace.centers, trace.tip_radius))
+
+
+def _beyond(base: Base, feet: Feet) -> NDArray[np.bool_]:
+    """(N,) True of what stands aslant over the base's border."""
+    aslant = np.abs((feet.normals * base.surface.face_normals[feet.face]).sum(axis=1)) < np.cos(BESIDE)
+    at_side = (feet.barycentric < ON_SIDE) & base.surface.open_sides[feet.face]
+    return np.asarray(aslant & at_side.any(axis=1))
+
+
+def refined(base: Base, trace: Trace) -> Base:
+    """A base that was found by feeling, fitted again to all that was felt over it, as far as it reached before."""
+    again = fit_base(trace.select(over_base(trace, base)), spacing=SPACING * trace.tip_radius)
+    middle = again.surface.vertices[again.surface.faces].mean(axis=1)
+    feet = base.foot(middle, trace.tip_radius)
+    near = np.abs(feet.height + trace.tip_radius) < AWAY * trace.tip_radius
+    keep = near & ~_beyond(base, feet)
+    if not keep.any():
+        return base
+    tested = {name: base.parameters[name] for name in ("missed",) if name in base.parameters}
+    return part_of(replace(again, parameters=again.parameters | tested), keep)
+
+
+def part_of(base: Base, keep: NDArray[np.bool_]) -> Base:
+    """Some of a base's faces (F,)."""
+    used, faces = np.unique(base.surface.faces[keep], return_inverse=True)
+    return replace(base, surface=Surface(base.surface.vertices[used], faces.reshape(-1, 3)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -58,7 +59,7 @@ def fit_base(trace: Trace, spacing: float | None = None) -> Base:
     cloud = Cloud.of(trace, MOST_CELLS)
     fits = _fits(FAMILIES, cloud)
     if not any(_explains(fit, cloud) for fit in fits):
-        fits += _fits(FREE, cloud)
+        fits += [replace(fit, last_resort=True) for fit in _fits(FREE, cloud)]
     scale, share = _noise_of(min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual, cloud.floor)
     best = min(fits, key=lambda fitted: fitted.cost(scale, share))
     return Base(best.surface(cloud, spacing), best.kind, best.parameters)
@@ -79,7 +80,8 @@ def _noise_of(residual: FloatArray, floor: float) -> tuple[float, float]:
     Noise that is correlated along the path makes neighbours agree: by the scatter from cell to cell alone, a
     plane would be bent to follow it.
     """
-    scale = max(floor, robust_scale(residual))
+    # the scatter from cell to cell is too large where sweeps are short and bend over features
+    scale = max(0.5 * floor, robust_scale(residual))
     kept = np.clip(residual / scale, -OUTLIER, OUTLIER)
     correlation = float(np.clip((kept[1:] * kept[:-1]).mean() / max((kept**2).mean(), 1e-12), 0.0, 0.98))
     return scale, (1.0 - correlation) / (1.0 + correlation)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mapping.cells import Cells
 from mapping.profile_fit import SHORTEST_BEND
-from mapping.robust import OUTLIER, robust_fit, robust_scale
+from mapping.robust import MAD_TO_SD, OUTLIER, robust_fit, robust_scale
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -19,6 +19,8 @@ FloatArray = NDArray[np.float64]
 
 # Upward part of the mean direction from a round body's middle of what was felt inside it, without contact normals
 BELOW = -0.6
+# Share of the scatter of second differences below which that of fourth ones shows that the sweeps bend
+BENT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,25 +84,40 @@ class Cloud:
 
 
 def _roughness(points: FloatArray) -> float:
-    """Scatter of neighbouring cells about a straight line through them, across the line."""
-    bend = np.diff(points, 2, axis=0)
+    """Scatter of neighbouring cells about a smooth curve through them, across the curve.
+
+    Second differences tell it on flat bodies; on round ones they tell the bend of the sweeps, and fourth ones the
+    scatter.
+    """
     along = points[2:] - points[:-2]
-    length = np.linalg.norm(along, axis=1)
+    bend, length = np.diff(points, 2, axis=0), np.linalg.norm(along, axis=1)
     even = (np.linalg.norm(bend, axis=1) < 0.5 * length) & (length > 0)
     if even.sum() < 8:
         return 0.0
-    return float(robust_scale(bend[even, 2]) / np.sqrt(6.0))
+    flat = float(robust_scale(bend[even, 2]) / np.sqrt(6.0))
+    smooth = even[2:] & even[1:-1] & even[:-2]
+    if smooth.sum() < 8:
+        return flat
+    rest, way = np.diff(points, 4, axis=0)[smooth], along[1:-1][smooth] / length[1:-1][smooth, None]
+    rest -= (rest * way).sum(axis=1)[:, None] * way
+    bent = float(MAD_TO_SD * np.median(np.linalg.norm(rest, axis=1)) / np.sqrt(70.0))
+    return bent if bent < BENT * flat else flat
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A fitted family: its kind, its parameters (JSON values), the misses (C,) m, their freedom, and how to mesh it."""
+    """A fitted family: its kind, its parameters (JSON values), the misses (C,) m, their freedom, and how to mesh it.
+
+    A parameter of a simple family must pay as much as makes it true in the end (Schwarz's criterion); of families that
+    nothing simple stands in for, the one that predicts best is wanted (Akaike's).
+    """
 
     kind: str
     parameters: dict[str, Any]
     residual: FloatArray
     freedom: int
     mesh: Callable[[Cloud, float | None], Surface]
+    last_resort: bool = False
 
     def cost(self, scale: float, share: float = 1.0) -> float:
         """Truncated chi-square at a scale (m) plus the price of the parameters; lower is better.
@@ -109,7 +126,7 @@ class Fitted:
             share: of the cells that count as independent.
         """
         misfit = float(np.minimum((self.residual / scale) ** 2, OUTLIER**2).sum())
-        return share * misfit + self.freedom * float(np.log(len(self.residual)))
+        return share * misfit + self.freedom * (2.0 if self.last_resort else float(np.log(len(self.residual))))
 
     def surface(self, cloud: Cloud, spacing: float | None = None) -> Surface:
         """The base's mesh in the object frame, covering the cloud; triangles no longer than `spacing` m."""

@@ -67,6 +67,8 @@ def _hinge(crossing: Crossing, inspection: Inspection) -> Hinge | None:
             continue
         s = np.linalg.norm(place[:count] - place[0], axis=1)
         keep = s < (1 - ROLLING) * s[-1]
+        if keep.sum() < LEAST_PLACES:  # a sweep that comes back to where it began
+            continue
         bend, slope, start = np.polyfit(s[keep], height[:count][keep], 2)
         rise = abs(np.ptp(np.polyval([bend, slope, start], s[keep])))
         line = np.polyfit(s[keep], height[:count][keep], 1)

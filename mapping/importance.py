@@ -36,7 +36,7 @@ class Importance:
         weights: (S,) smoothed, summing to one.
         k_hat: Pareto shape of the raw weights.
         ess: effective number of draws.
-        log_evidence: log of the integral of the unnormalised density.
+        log_evidence: log of the integral of the unnormalised density; -inf if no draw hit the target's support.
     """
 
     proposal: Proposal
@@ -61,16 +61,16 @@ def importance_sample(target: Target, modes: Sequence[Laplace], rng: np.random.G
         weights, k_hat = smooth_weights(ratios)
         if effective_size(weights) > EFFICIENT * DRAWS and k_hat < TRUSTED_K_HAT:
             break
-        proposal = proposal.learned(draws, _tempered(ratios, at_least=20.0 * draws.shape[1]))
+        proposal = _learned(proposal, draws, ratios)
     for final in range(FINALS):
         if final:
-            proposal = proposal.learned(draws, _tempered(ratios, at_least=20.0 * draws.shape[1]))
+            proposal = _learned(proposal, draws, ratios)
         draws, ratios = _weigh(target, proposal, rng, FINAL_DRAWS)
         weights, k_hat = smooth_weights(ratios)
         if k_hat < TRUSTED_K_HAT:
             break
     top = float(ratios.max())
-    log_evidence = top + float(np.log(np.mean(np.exp(ratios - top))))
+    log_evidence = top + float(np.log(np.mean(np.exp(ratios - top)))) if np.isfinite(top) else -np.inf
     return Importance(proposal, draws, weights, k_hat, effective_size(weights), log_evidence)
 
 
@@ -86,6 +86,13 @@ def _weigh(target: Target, proposal: Proposal, rng: np.random.Generator, size: i
     count = proposal.means.shape[1]
     draws = proposal.draw(rng.random(size), rng.standard_normal((size, count)), rng.chisquare(DEGREES, size))
     return draws, target.log_density(draws) - proposal.log_density(draws)
+
+
+def _learned(proposal: Proposal, draws: FloatArray, ratios: FloatArray) -> Proposal:
+    """The proposal adapted by its weighted draws; as it was if none of them hit the target's support."""
+    if not np.isfinite(ratios).any():
+        return proposal
+    return proposal.learned(draws, _tempered(ratios, at_least=20.0 * draws.shape[1]))
 
 
 def _tempered(ratios: FloatArray, at_least: float) -> FloatArray:

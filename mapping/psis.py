@@ -20,15 +20,17 @@ def smooth_weights(log_ratios: FloatArray) -> tuple[FloatArray, float]:
         log_ratios: (S,) log target minus log proposal; -inf outside the target's support.
 
     Returns:
-        Weights that sum to one, and k-hat (inf if too few draws have any weight).
+        Weights that sum to one, and k-hat (inf if too few draws have any weight; the weights are even if none has).
     """
     count = len(log_ratios)
+    if not np.isfinite(log_ratios).any():
+        return np.full(count, 1.0 / count), float("inf")
     shifted = log_ratios - np.max(log_ratios)
     weights = np.exp(shifted)
     tail = int(np.ceil(min(0.2 * count, 3.0 * np.sqrt(count))))
     order = np.argsort(weights, kind="stable")
     cutoff = weights[order[-tail - 1]]
-    if tail < 5 or cutoff <= np.finfo(float).tiny or not np.isfinite(shifted).any():
+    if tail < 5 or cutoff <= np.finfo(float).tiny:
         return weights / weights.sum(), float("inf")
     exceed = weights[order[-tail:]] - cutoff
     if exceed[-1] <= 1e-12 * weights[order[-1]]:

@@ -113,7 +113,7 @@ def background(
         largest: half-width of the widest feature, m.
         stated: what was known of the noise before, if it is not given.
     """
-    drift = 0 if base.kind == "mesh" else 2
+    drift = 0 if base.known else 2
     if given is not None:
         banks = _banks(profiles, floored(given, tip_radius), tip_radius, largest, drift)
         return Background(floored(given, tip_radius), banks, dict.fromkeys(banks, 0.0))
@@ -161,7 +161,7 @@ def _fit(
     stated: StatedNoise | None,
 ) -> NoiseFit:
     """Noise of what is quiet: by likelihood over a known base, else by what an unknown base disturbs less."""
-    if base.kind != "mesh":
+    if not base.known:
         return NoiseFit(_robust(profiles, quiet, first))
     size = max(1, -(-sum(len(stretch.s) for stretch in stretches) // BLOCKS))
     blocks = [_raw_blocks(stretches, profiles, quiet, size)]

@@ -55,6 +55,14 @@ class Surface:
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
     @cached_property
+    def open_sides(self) -> NDArray[np.bool_]:
+        """(F, 3) True where the side opposite to a face's corner belongs to no other face."""
+        one, other = np.roll(self.faces, -1, axis=1), np.roll(self.faces, -2, axis=1)
+        sides = np.minimum(one, other) * len(self.vertices) + np.maximum(one, other)
+        _, number, counts = np.unique(sides, return_inverse=True, return_counts=True)
+        return np.asarray(counts[number.reshape(sides.shape)] == 1)
+
+    @cached_property
     def neighbours(self) -> tuple[IntArray, IntArray]:
         """Pairs of faces that share an edge; on an edge of more than two faces, the consecutive pairs."""
         faces = self.faces

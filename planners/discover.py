@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hw.moves import Move
 from mapping.base import Base
-from mapping.base_extent import rolled_off, touched_part
+from mapping.base_extent import SPACING, rolled_off, touched_part
 from mapping.base_fit import fit_base
 from mapping.cells import Cells
 from mapping.errors import SurfaceError, TraceError
@@ -93,7 +93,8 @@ class Discover:
             felt.traces.extend(fresh)
             base = self._fit(felt)
             if miss <= allowed:
-                return Outcome("done", f"a {base.kind} that missed the last sweeps by {1e3 * miss:.3f} mm", base)
+                tested = replace(base, parameters=base.parameters | {"missed": miss})
+                return Outcome("done", f"a {base.kind} that missed the last sweeps by {1e3 * miss:.3f} mm", tested)
         return Outcome("done", f"a {base.kind} that still missed the last sweeps by {1e3 * miss:.3f} mm", base)
 
     def _lines(self, side: str) -> Iterator[FeltLine]:
@@ -120,7 +121,7 @@ class Discover:
         height = first.foot(cells.centers, self.tip_radius).height
         # where the ball rolled off the body's edges it does not tell how the body is curved
         kept = cells.trace(self.tip_radius, ~rolled_off(height, cells.sweep, self.tip_radius))
-        base = fit_base(kept, spacing=0.5 * self.tip_radius)
+        base = fit_base(kept, spacing=SPACING * self.tip_radius)
         box = np.stack([self.low, self.high])
         outward = np.array([_outward(side) for side in self.sides])
         return touched_part(base, trace, np.concatenate([np.zeros((0, 3)), *felt.empty]), box, outward)

@@ -101,7 +101,9 @@ class FeltLine:
                 felt.traces.append(facing(trace, move))
             reached = place + self.tip_radius if len(trace) < 2 else self._reached(trace)
             if reached < onward - 0.5 * self.tip_radius or len(trace) < 2:
-                felt.empty.append(self._below(0.5 * (reached + onward)))
+                # deeper than the sweep was commanded the body may go on
+                share = (0.5 * (reached + onward) - place) / (onward - place)
+                felt.empty.append((move.path[0] + share * (move.path[-1] - move.path[0]))[None])
                 return max(reached, place) + 0.5 * self.tip_radius
             predicted = depth + slope * (onward - place)
             depth, slope = self._end(trace)

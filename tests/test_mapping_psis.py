@@ -39,3 +39,9 @@ def test_resampling_keeps_the_weights():
     weights = np.array([0.1, 0.2, 0.7])
     counts = np.bincount(resample(np.random.default_rng(0), weights, 1000))
     np.testing.assert_allclose(counts / 1000, weights, atol=2e-3)
+
+
+def test_draws_that_all_miss_the_support_are_even_and_not_trusted() -> None:
+    weights, k_hat = smooth_weights(np.full(40, -np.inf))
+    assert np.allclose(weights, 1.0 / 40)
+    assert k_hat == np.inf
