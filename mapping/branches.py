@@ -68,8 +68,12 @@ def branches(points: FloatArray, half_width: float, length: FloatArray | None = 
     """
     if length is None:
         length = np.linalg.norm(points[:, None] - points[None], axis=2)
-    tree = _without_twigs(spanning_tree(length), points, TWIG * half_width)
-    return [branch for part in untied(tree, points, half_width) for branch in _branches_of(part, points, half_width)]
+    # once before twigs are cut, which may be all that shows that a line goes on past a tie, and once after it
+    whole = [
+        _without_twigs(part, points, TWIG * half_width) for part in untied(spanning_tree(length), points, half_width)
+    ]
+    parts = [part for tree in whole for part in untied(tree, points, half_width)]
+    return [branch for part in parts for branch in _branches_of(part, points, half_width)]
 
 
 def _branches_of(tree: Tree, points: FloatArray, half_width: float) -> list[Branch]:

@@ -129,11 +129,12 @@ def _without_strays(group: list[Crossing], scale: float) -> list[list[Crossing]]
     crest = [c.point for c in group if not any(c is other for other in low)]
     if len(crest) < LINE:
         return [group]
+    # what lies on the flanks of the crest is no mate of what lies off it
+    off = [c for c in low if _nearest(c.point, crest) > BESIDE * scale]
     strays = []
-    for c in low:
-        alike = [other.point for other in low if other.sweep != c.sweep]
-        alone = _nearest(c.point, alike) > MATES * scale
-        if alone and _nearest(c.point, crest) > BESIDE * scale:
+    for c in off:
+        alike = [other.point for other in off if other.sweep != c.sweep]
+        if _nearest(c.point, alike) > MATES * scale:
             strays.append(c)
     rest = [c for c in group if not any(c is stray for stray in strays)]
     return [*([rest] if rest else []), *([stray] for stray in strays)]

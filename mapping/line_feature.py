@@ -57,9 +57,10 @@ def line_features(members: list[Crossing], kind: str, around: Around) -> list[Fe
         return []
     points = np.array([mean_point(cluster) for cluster in clusters])
     links = _links(points, members[0].height, half_width, around)
-    # a lone point that is left between two meeting places is no line
-    lines = [branch for branch in branches(points, half_width, links) if len(branch.axis) > 1]
+    lines = branches(points, half_width, links)
     lines = rejoined(lines, half_width, partial(_denied, members[0].height, half_width, around))
+    # a lone point that is left between two meeting places is no line
+    lines = [branch for branch in lines if len(branch.axis) > 1]
     features = []
     for branch in lines:
         others = [other.axis for other in lines if other is not branch]

@@ -17,7 +17,8 @@ def rejoined(lines: list[Branch], half_width: float, denied: Callable[[FloatArra
     """The lines, those of them joined that go straight on into each other over a gap that nothing denies.
 
     Where two lines run side by side with few crossings, the way across to the other one may be shorter than the way on:
-    the tree of all points then hangs a line on its neighbour in pieces.
+    the tree of all points then hangs a line on its neighbour in pieces. Such a piece may be a single point, which goes
+    wherever a line leads to it.
 
     Args:
         lines: some of which end free.
@@ -43,10 +44,8 @@ def _straightest(
     lines: list[Branch], half_width: float, denied: Callable[[FloatArray, FloatArray], bool]
 ) -> tuple[FreeEnd, FreeEnd] | None:
     """The two free ends of different lines that continue each other best, if any do."""
-    ends = [
-        (k, e) for k, line in enumerate(lines) if len(line.axis) > 1 and not line.closed for e in (0, 1) if line.free[e]
-    ]
-    way = {(k, e): _outward(lines[k].axis, e, DIRECTION * half_width) for k, e in ends}
+    ends = [(k, e) for k, line in enumerate(lines) if not line.closed for e in (0, 1) if line.free[e]]
+    way = {(k, e): _outward(lines[k].axis, e, DIRECTION * half_width) for k, e in ends if len(lines[k].axis) > 1}
     best, pair = -STRAIGHT_ON, None
     for one in ends:
         for other in ends:
@@ -55,7 +54,9 @@ def _straightest(
             if one[0] >= other[0] or not 0.0 < length < LONGEST_GAP * half_width:
                 continue
             gap = (stop - start) / length
-            straight = min(float(way[one] @ gap), float(-way[other] @ gap), float(-way[one] @ way[other]))
+            turns = [float(sign * way[end] @ gap) for end, sign in ((one, 1), (other, -1)) if end in way]
+            turns += [float(-way[one] @ way[other])] if len(turns) == 2 else []
+            straight = min(turns, default=-1.0)
             if straight > best and not denied(start, stop):
                 best, pair = straight, (one, other)
     return pair

@@ -15,13 +15,16 @@ Tree = dict[int, set[int]]
 LONG = 1.5
 # Cosine of the angle between the two ways on of a line that goes straight past a tie, at most
 STRAIGHT_PAST = -0.85
+# Cosine of the angle between a line that ends and a tie that turns back from its end, at least
+BACK = 0.3
 
 
 def untied(tree: Tree, points: FloatArray, half_width: float) -> list[Tree]:
     """The trees that are left without ties.
 
     Where no sweep passed between two lines, nothing denies that they are one detail, and a tree of all points has a
-    link across. At both its ends a line goes straight past it, and no crossing lies on it.
+    link across. At both its ends a line goes straight past it, or at one of them a line ends from which it turns back,
+    and no crossing lies on it.
 
     Args:
         tree: of points (K, 3), m; not all points need be in it.
@@ -30,7 +33,8 @@ def untied(tree: Tree, points: FloatArray, half_width: float) -> list[Tree]:
     tree = {i: set(near) for i, near in tree.items()}
     for i, j in [(one, other) for one in tree for other in tree[one] if one < other]:
         is_long = np.linalg.norm(points[i] - points[j]) > LONG * half_width
-        if is_long and _passes(i, j, tree, points, half_width) and _passes(j, i, tree, points, half_width):
+        ends = [_passes(*way, tree, points, half_width) for way in ((i, j), (j, i))] if is_long else [False]
+        if all(ends) or (any(ends) and any(_turns_back(*way, tree, points, half_width) for way in ((i, j), (j, i)))):
             tree[i].discard(j)
             tree[j].discard(i)
     return _parts(tree)
@@ -49,6 +53,12 @@ def _passes(i: int, tied: int, tree: Tree, points: FloatArray, half_width: float
     """True if a line goes straight on through a point, past its link to another one."""
     ways = [way_from(i, near, tree, points, half_width) for near in sorted(tree[i]) if near != tied]
     return any(float(a @ b) < STRAIGHT_PAST for a, b in combinations(ways, 2))
+
+
+def _turns_back(i: int, tied: int, tree: Tree, points: FloatArray, half_width: float) -> bool:
+    """True if the one line that ends in a point comes to it from the side to which its link to another one leads."""
+    ways = [way_from(i, near, tree, points, half_width) for near in sorted(tree[i]) if near != tied]
+    return len(ways) == 1 and float(ways[0] @ way_from(i, tied, tree, points, half_width)) > BACK
 
 
 def _parts(tree: Tree) -> list[Tree]:

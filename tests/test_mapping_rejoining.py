@@ -45,3 +45,11 @@ def test_neighbours_turns_and_far_lines_are_no_continuation(other: tuple) -> Non
 def test_an_end_at_which_lines_meet_is_not_joined() -> None:
     met = Branch(piece((0, 0), (20, 0)).axis, (True, False), junction=True)
     assert len(rejoined([met, piece((30, 0), (50, 0))], WIDE, nowhere)) == 2
+
+
+def test_a_single_point_goes_where_a_line_leads_to_it() -> None:
+    lone = Branch(1e-3 * np.array([[35.0, 0.5, 0.0]]), (True, True), junction=False)
+    (whole,) = rejoined([piece((0, 0), (20, 0)), lone], WIDE, nowhere)
+    assert len(whole.axis) == 6
+    beside = Branch(1e-3 * np.array([[15.0, 9.0, 0.0]]), (True, True), junction=False)
+    assert len(rejoined([piece((0, 0), (20, 0)), beside], WIDE, nowhere)) == 2

@@ -39,3 +39,11 @@ def test_a_bar_that_was_crossed_between_two_lines_stays() -> None:
 def test_an_arm_that_ends_at_a_line_stays() -> None:
     arm = 1e-3 * np.column_stack([np.zeros(5), 7.0 + 5.0 * np.arange(5), np.zeros(5)])
     assert trees(np.concatenate([LOWER, arm])) == 1
+
+
+def test_a_link_that_turns_back_from_the_end_of_a_line_to_its_neighbour_is_a_tie() -> None:
+    lower, upper = row(0, np.array([-20.0, -10.0, 0.0, 18.0])), row(8, np.arange(-22.0, 23.0, 11.0))
+    chain = {0: {1}, 1: {0, 2}, 2: {1, 3}, 3: {2, 6}, 4: {5}, 5: {4, 6}, 6: {5, 7, 3}, 7: {6, 8}, 8: {7}}
+    assert len(untied(chain, np.concatenate([lower, upper]), WIDE)) == 2
+    away = {**chain, 3: {2, 8}, 6: {5, 7}, 8: {7, 3}}
+    assert len(untied(away, np.concatenate([lower, upper]), WIDE)) == 1, "a line that goes on to the other's end is not"
