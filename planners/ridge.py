@@ -31,6 +31,8 @@ FALLING = 0.9
 # slide finds it; once more, more closely, where the slide did not
 FIRST_STEP, LONGEST_STEP = 0.4, 2.0
 BRACKETS = (0.6, 0.15)
+# How far from a faint line's supposed place its first crossing may be, in half-widths
+LEAD_REACH = 2.5
 # Passes over a faint line are looked at in so many batches; they leave it open if chi-squared falls by so much
 BATCHES, LEFT_OPEN = 3, 4.0
 # Standard deviation of a crossing's place, against the precision wanted of an end, from which steps are shorter
@@ -186,7 +188,8 @@ class RidgeFollower:
         """The seed crossed squarely: a sweep that met the ridge at a slant saw it too wide."""
         half = 2.5 * seed.half_width
         if self.passes > 1:
-            return (yield from self._cross(seed.point, heading, seed, sign, seed.half_width, 0.3 * abs(seed.height)))
+            reach = LEAD_REACH * seed.half_width
+            return (yield from self._cross(seed.point, heading, seed, sign, reach, 0.3 * abs(seed.height)))
         trace = yield self.strokes.line(seed.point, np.cross(seed.normal, heading), half, half)
         if is_step(seed) and self._stays_high(trace, sign * abs(seed.height)):
             return seed
