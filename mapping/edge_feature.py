@@ -25,6 +25,8 @@ FloatArray = NDArray[np.float64]
 # ball rolls over the edge.
 STRAIGHT, ROLLING = 0.08, 0.35
 CLEAR, LEAST_PLACES = 4.0, 8
+# Places that a parabola needs, and one more that tells whether it fits
+BENT = 4
 # Hinges further from each other than so many tip radii belong to different edges.
 SAME_EDGE = 2.0
 
@@ -67,7 +69,7 @@ def _hinge(crossing: Crossing, inspection: Inspection) -> Hinge | None:
             continue
         s = np.linalg.norm(place[:count] - place[0], axis=1)
         keep = s < (1 - ROLLING) * s[-1]
-        if keep.sum() < LEAST_PLACES:  # a sweep that comes back to where it began
+        if keep.sum() < BENT:  # a sweep that comes back to where it began
             continue
         bend, slope, start = np.polyfit(s[keep], height[:count][keep], 2)
         rise = abs(np.ptp(np.polyval([bend, slope, start], s[keep])))
