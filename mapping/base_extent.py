@@ -40,7 +40,8 @@ def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray, s
     Args:
         base: as fitted, larger than the body.
         trace: what was felt. Where a sweep rolled off an edge counts as empty.
-        empty: (M, 3) places of ball centres where nothing was felt, m; those clear of the base tell nothing of it.
+        empty: (M, 6) places of ball centres where nothing was felt, m, and the outward directions that they were
+            pressed against; those clear of the base, and those beside steep flanks of it, tell nothing.
         box: (2, 3) low and high corners, m.
         sides: (S, 3) outward directions of the sides from which the body may be felt.
 
@@ -52,8 +53,7 @@ def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray, s
     cells = Cells.of(trace, CELLS)
     feet = base.foot(cells.centers, trace.tip_radius)
     off = rolled_off(feet.height, cells.sweep, trace.tip_radius)
-    free = base.foot(empty, trace.tip_radius) if len(empty) else None
-    bare = np.zeros((0, 3)) if free is None else free.points[free.height < -ROLLED_OFF * trace.tip_radius]
+    bare = _bare(base, empty, trace.tip_radius)
     places = np.concatenate([feet.points, bare])
     touched = np.concatenate([~off, np.zeros(len(bare), dtype=bool)])
     middle = base.surface.vertices[base.surface.faces].mean(axis=1)
@@ -108,6 +108,15 @@ def refined(base: Base, trace: Trace) -> Base:
         return base
     tested = {name: base.parameters[name] for name in ("missed",) if name in base.parameters}
     return part_of(replace(again, parameters=again.parameters | tested), keep)
+
+
+def _bare(base: Base, empty: FloatArray, tip_radius: float) -> FloatArray:
+    """Points (K, 3) of the base that the ball would have touched where it felt nothing."""
+    if not len(empty):
+        return np.zeros((0, 3))
+    free = base.foot(empty[:, :3], tip_radius)
+    facing = (base.surface.face_normals[free.face] * empty[:, 3:]).sum(axis=1) > FACING
+    return np.asarray(free.points[facing & (free.height < -ROLLED_OFF * tip_radius)])
 
 
 def part_of(base: Base, keep: NDArray[np.bool_]) -> Base:

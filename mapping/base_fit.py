@@ -1,4 +1,4 @@
-"""The base when no mesh is given: plane, sphere, cylinder, quadric or a smooth sheet, by evidence."""
+"""The base when no mesh is given: a simple family by evidence, a freer one where none explains the trace."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ from mapping.trace import Trace
 FloatArray = NDArray[np.float64]
 
 MOST_CELLS = 4000
-# The freer families, and by how many times the scatter of neighbouring cells half of all cells may miss a simple body
+# Families for what no simple one explains
 FREE: tuple[Family, ...] = (
-    polyhedron,
     *(partial(sheet, shortest=shortest) for shortest in (5.0, 2.5)),
     *(partial(tube, waves=waves, shortest=shortest) for waves in (0, 2, 4, 6, 9) for shortest in (4.0, 2.0)),
     *(partial(star, degree=degree) for degree in (3, 5, 8, 12)),
 )
-EXPLAINED = 5.0
+# By how many times the scatter of neighbouring cells half of all cells may miss what keeps freer families from being
+# tried: a simple one, and a polyhedron, which comes near to anything round with enough faces
+EXPLAINED, EXACTLY = 5.0, 1.0
 
 
 def fit_base(trace: Trace, spacing: float | None = None) -> Base:
@@ -37,10 +38,12 @@ def fit_base(trace: Trace, spacing: float | None = None) -> Base:
 
     A trace along one line gives a profile. Otherwise every family is fitted to the ball centres by robust
     least squares, and the one with the best truncated evidence is taken: a detail counts as an outlier, a
-    further parameter must pay for itself. The base is the fitted surface's parallel, one tip radius inward.
+    further parameter must pay for itself. Where no plane, sphere, cylinder, quadric or stiff sheet comes near most of
+    the trace, polyhedra are tried, then supple sheets, tubes and star-shaped bodies. The base is the fitted surface's
+    parallel, one tip radius inward.
 
     Which side is outside is taken from the contact normals; without them it is the side of +z for sheets
-    and away from the centre for spheres and cylinders.
+    and away from the centre for round bodies, unless all of it was felt below the centre, as in a bowl.
 
     Args:
         trace: ball centres in contact.
@@ -58,8 +61,10 @@ def fit_base(trace: Trace, spacing: float | None = None) -> Base:
         return Base(surface, "profile", dict(parameters))
     cloud = Cloud.of(trace, MOST_CELLS)
     fits = _fits(FAMILIES, cloud)
-    if not any(_explains(fit, cloud) for fit in fits):
-        fits += [replace(fit, last_resort=True) for fit in _fits(FREE, cloud)]
+    if all(_missed(fit, cloud) > EXPLAINED for fit in fits):
+        fits += _last_resort((polyhedron,), cloud)
+        if all(_missed(fit, cloud) > EXACTLY for fit in fits):
+            fits += _last_resort(FREE, cloud)
     scale, share = _noise_of(min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual, cloud.floor)
     best = min(fits, key=lambda fitted: fitted.cost(scale, share))
     return Base(best.surface(cloud, spacing), best.kind, best.parameters)
@@ -69,9 +74,13 @@ def _fits(families: Iterable[Family], cloud: Cloud) -> list[Fitted]:
     return [fitted for family in families if (fitted := family(cloud)) is not None]
 
 
-def _explains(fit: Fitted, cloud: Cloud) -> bool:
-    """True if most of the cells lie as near to the fitted surface as their neighbours to each other."""
-    return float(np.median(np.abs(fit.residual))) < EXPLAINED * cloud.floor
+def _last_resort(families: Iterable[Family], cloud: Cloud) -> list[Fitted]:
+    return [replace(fit, last_resort=True) for fit in _fits(families, cloud)]
+
+
+def _missed(fit: Fitted, cloud: Cloud) -> float:
+    """Distance within which half of the cells lie from the fitted surface, in the scatter of neighbouring cells."""
+    return float(np.median(np.abs(fit.residual))) / cloud.floor
 
 
 def _noise_of(residual: FloatArray, floor: float) -> tuple[float, float]:

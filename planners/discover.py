@@ -17,7 +17,7 @@ from mapping.errors import SurfaceError, TraceError
 from mapping.robust import MAD_TO_SD, robust_scale
 from mapping.trace import Trace
 from planners.errors import PlannerError
-from planners.feel_line import Felt, FeltLine, facing
+from planners.feel_line import Felt, FeltLine, empty_at, facing
 from planners.plan import Outcome, Plan
 from planners.survey import Survey
 
@@ -86,7 +86,7 @@ class Discover:
                 if len(trace):
                     fresh.append(facing(trace, move))
                 else:
-                    felt.empty.append(move.path[len(move.path) // 2][None])
+                    felt.empty.append(empty_at(move.path[len(move.path) // 2], move))
             if not fresh:
                 return Outcome("lost", "the fitted surface was not met again", base)
             miss, allowed = self._miss(Trace.concatenate(fresh), base)
@@ -124,7 +124,7 @@ class Discover:
         base = fit_base(kept, spacing=SPACING * self.tip_radius)
         box = np.stack([self.low, self.high])
         outward = np.array([_outward(side) for side in self.sides])
-        return touched_part(base, trace, np.concatenate([np.zeros((0, 3)), *felt.empty]), box, outward)
+        return touched_part(base, trace, np.concatenate([np.zeros((0, 6)), *felt.empty]), box, outward)
 
     def _testing(self, base: Base, number: int) -> list[Move]:
         """Some sweeps of a survey, in each round others."""

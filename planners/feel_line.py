@@ -23,7 +23,11 @@ STEEPEST = 2.0
 
 @dataclass
 class Felt:
-    """What was felt: `traces` of the sweeps in contact, and `empty` places (K, 3), m, where the ball met nothing."""
+    """What was felt: `traces` of the sweeps in contact, and `empty` places.
+
+    Where the ball met nothing: its place (3,), m, and the outward direction (3,) that it was pressed against, in rows
+    (K, 6).
+    """
 
     traces: list[Trace] = field(default_factory=list)
     empty: list[FloatArray] = field(default_factory=list)
@@ -58,7 +62,7 @@ class FeltLine:
         while place < self._length - TOUCH * self.tip_radius:
             contact = yield from self._approach(place, felt)
             if contact is None:
-                felt.empty.append(self._below(place))
+                felt.empty.append(np.hstack([below := self._below(place), np.tile(-self.inward, (len(below), 1))]))
                 place += 2.0 * self.tip_radius
             else:
                 place = yield from self._follow(place, contact, felt)
@@ -103,7 +107,7 @@ class FeltLine:
             if reached < onward - 0.5 * self.tip_radius or len(trace) < 2:
                 # deeper than the sweep was commanded the body may go on
                 share = (0.5 * (reached + onward) - place) / (onward - place)
-                felt.empty.append((move.path[0] + share * (move.path[-1] - move.path[0]))[None])
+                felt.empty.append(empty_at(move.path[0] + share * (move.path[-1] - move.path[0]), move))
                 return max(reached, place) + 0.5 * self.tip_radius
             predicted = depth + slope * (onward - place)
             depth, slope = self._end(trace)
@@ -137,3 +141,9 @@ def facing(trace: Trace, move: Move) -> Trace:
         return trace
     outward = -np.atleast_2d(move.approach).mean(axis=0)
     return replace(trace, normals=np.tile(outward / np.linalg.norm(outward), (len(trace), 1)))
+
+
+def empty_at(place: FloatArray, move: Move) -> FloatArray:
+    """(1, 6) a place where a move met nothing, and the outward direction it pressed against."""
+    outward = -np.atleast_2d(move.approach).mean(axis=0)
+    return np.concatenate([place, outward / np.linalg.norm(outward)])[None]
