@@ -98,8 +98,16 @@ def _beyond(base: Base, feet: Feet) -> NDArray[np.bool_]:
 
 
 def refined(base: Base, trace: Trace) -> Base:
-    """A base that was found by feeling, fitted again to all that was felt over it, as far as it reached before."""
-    again = fit_base(trace.select(over_base(trace, base)), spacing=SPACING * trace.tip_radius)
+    """A base that was found by feeling, fitted again to all that was felt over it, as far as it reached before.
+
+    It stays as it was if the new fit comes no nearer to half of the places.
+    """
+    over = trace.select(over_base(trace, base))
+    again = fit_base(over, spacing=SPACING * trace.tip_radius)
+    centers = Cells.of(over, CELLS).centers
+    missed = [float(np.median(np.abs(each.foot(centers, trace.tip_radius).height))) for each in (base, again)]
+    if missed[1] > missed[0]:
+        return base
     middle = again.surface.vertices[again.surface.faces].mean(axis=1)
     feet = base.foot(middle, trace.tip_radius)
     near = np.abs(feet.height + trace.tip_radius) < AWAY * trace.tip_radius

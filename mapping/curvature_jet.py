@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.curvature import Curvature, CurvatureError, from_operators
+from mapping.row_shares import cores
 from mapping.surface import Surface
 
 FloatArray = NDArray[np.float64]
@@ -261,7 +261,7 @@ class _Jets:
 
 
 def _in_threads(work: Callable[[IntArray], Any], parts: list[IntArray]) -> list[Any]:
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
+    with ThreadPoolExecutor(cores()) as threads:
         return list(threads.map(work, parts))
 
 

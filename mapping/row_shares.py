@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-# Values that a share must produce to be worth a thread: some ten times what starting one costs.
+# Values that a share must produce to be worth a thread: some ten times what handing it over costs.
 WORTHWHILE = 15_000
 
 
@@ -23,8 +24,18 @@ def by_shares(work: Callable[[FloatArray], FloatArray], rows: FloatArray, each: 
         rows: (W, P).
         each: values behind one row's result.
     """
-    shares = min(os.cpu_count() or 1, len(rows), len(rows) * each // WORTHWHILE)
+    shares = min(cores(), len(rows), len(rows) * each // WORTHWHILE)
     if shares < 2:
         return work(rows)
-    with ThreadPoolExecutor(shares) as threads:
-        return np.concatenate(list(threads.map(work, np.array_split(rows, shares))))
+    return np.concatenate(list(_threads().map(work, np.array_split(rows, shares))))
+
+
+def cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    """One pool for all: a sampler asks for shares thousands of times."""
+    return ThreadPoolExecutor(cores(), thread_name_prefix="rows")

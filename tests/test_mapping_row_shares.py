@@ -17,13 +17,13 @@ def squares(rows: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("count", [1, 2, 7, 100])
 def test_divided_work_is_the_work_at_once(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(row_shares.os, "cpu_count", lambda: 3)
+    monkeypatch.setattr(row_shares, "cores", lambda: 3)
     rows = np.random.default_rng(1).normal(size=(count, 4))
     assert np.array_equal(by_shares(squares, rows, 10**6), squares(rows))
 
 
 def test_little_work_starts_no_thread_and_much_work_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(row_shares.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(row_shares, "cores", lambda: 2)
     seen: list[str] = []
 
     def work(rows: np.ndarray) -> np.ndarray:

@@ -91,3 +91,15 @@ def test_impossible_boxes_and_sides_are_refused() -> None:
         Discover(low=np.zeros(3), high=np.ones(3), tip_radius=R, smallest=1e-4, sides=("up",))
     with pytest.raises(PlannerError, match="below"):
         Discover(low=np.ones(3), high=np.zeros(3), tip_radius=R, smallest=1e-4)
+
+
+def test_a_block_on_a_table_is_a_polyhedron_without_its_underside() -> None:
+    import trimesh
+
+    block = trimesh.creation.box((0.06, 0.05, 0.04))
+    sides = ("+x", "-x", "+y", "-y", "+z")
+    base = found(Surface(block.vertices, block.faces), [-0.034, -0.029, -0.012], [0.034, 0.029, 0.024], sides)
+    assert base is not None and base.kind == "polyhedron" and base.known
+    low, high = base.surface.bounds
+    assert np.allclose([*low[:2], *high], [-0.03, -0.025, 0.03, 0.025, 0.02], atol=2e-5)
+    assert (base.surface.face_normals[:, 2] > -0.5).all(), "the underside was not asked for"
