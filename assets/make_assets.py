@@ -21,7 +21,6 @@ def main() -> None:
     make_plate()
     make_wire()
     make_tile()
-    make_form()
     make_bump_of_revolution()
     make_step()
     make_mug()
@@ -78,52 +77,6 @@ def make_tile() -> None:
     truth = {"kind": "ridge", "axis": ends, "height": 2 * radius, "width": 2 * radius, "length": TILE["length"]}
     for scene in ("grbl_peck", "grbl_slide", "unknown_plate"):
         write_truth(scene, [truth])
-
-
-FORM: Sizes = {"radius": 0.025, "diameter": 0.65e-3, "turn": np.radians(62.0)}
-
-
-def make_form() -> None:
-    """A round body of no simple shape, with a wire along a bent way over its top, for a finger that is told nothing."""
-    rings, around = 64, 128
-    polar, turn = np.linspace(0.0, np.pi, rings + 1)[1:-1], 2 * np.pi * np.arange(around) / around
-    side = np.stack([np.outer(np.sin(polar), np.cos(turn)), np.outer(np.sin(polar), np.sin(turn))], axis=-1)
-    ways = np.concatenate([side, np.repeat(np.cos(polar)[:, None], around, axis=1)[..., None]], axis=-1).reshape(-1, 3)
-    top, bottom = len(ways), len(ways) + 1
-    k = np.arange(around)
-    last = (rings - 2) * around
-    faces = [np.column_stack([k, (k + 1) % around, np.full(around, top)])[:, [2, 0, 1]]]
-    faces += [np.column_stack([last + (k + 1) % around, last + k, np.full(around, bottom)])]
-    for ring in range(rings - 2):
-        a, b = ring * around + k, ring * around + (k + 1) % around
-        faces += [np.column_stack([a, a + around, b]), np.column_stack([b, a + around, b + around])]
-    body = form(np.concatenate([ways, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])), np.concatenate(faces)
-    share = np.linspace(-0.5, 0.5, 61) * FORM["turn"]
-    path = np.column_stack([np.sin(share), 0.3 + 0.2 * np.sin(2.0 * share), np.cos(share)])
-    crest, up, radius = form(path), form_normals(path), FORM["diameter"] / 2
-    wire = tube(crest + radius * up, up, radius, 2 * np.pi * np.arange(48) / 48)
-    write_mesh("wire_on_form", together(body, wire))
-    length = float(np.linalg.norm(np.diff(crest, axis=0), axis=1).sum())
-    truth = {"kind": "ridge", "axis": crest[::4], "height": 2 * radius, "width": 2 * radius, "length": length}
-    write_truth("unknown_form", [truth])
-
-
-def form(ways: FloatArray) -> FloatArray:
-    """Points (N, 3) of the body in directions (N, 3) from its middle."""
-    x, y, z = (ways / np.linalg.norm(ways, axis=1, keepdims=True)).T
-    radius = FORM["radius"] * (1.0 + 0.12 * z + 0.1 * (x**2 - y**2) + 0.05 * (3 * z**2 - 1) * x)
-    return radius[:, None] * np.column_stack([x, y, z])
-
-
-def form_normals(ways: FloatArray) -> FloatArray:
-    """Outward unit normals (N, 3) of the body there, by central differences."""
-    unit = ways / np.linalg.norm(ways, axis=1, keepdims=True)
-    first = np.cross(unit, [0.0, 1.0, 0.0])
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    second = np.cross(unit, first)
-    along, across = (form(unit + 1e-5 * way) - form(unit - 1e-5 * way) for way in (first, second))
-    normal = np.cross(along, across)
-    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
 BUMP: Sizes = {"a": 15.0, "reach": 2.2, "plane": 3.0}

@@ -83,23 +83,6 @@ def test_a_wire_on_an_unknown_plate_is_found(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_wire_on_an_unknown_round_body_is_found(tmp_path: Path) -> None:
-    analysis = run(ASSETS / "scenes" / "unknown_form.toml", tmp_path / "out")
-    assert analysis.base.kind == "star body" and "star body" in analysis.ended
-    bare = form(analysis.base.surface.vertices)
-    assert np.abs(np.linalg.norm(analysis.base.surface.vertices, axis=1) - bare).max() < 6e-5
-    (row,) = analysis.errors
-    assert row.status == "found" and row.found is not None and row.found.kind == "ridge"
-    assert row.axis_rms < 1e-4 and row.end_error < 2e-4 and abs(row.height_error) < 2e-5
-
-
-def form(points: np.ndarray) -> np.ndarray:
-    """(N,) distance of that body's surface from its middle in the direction of points (N, 3), as its maker has it."""
-    x, y, z = (points / np.linalg.norm(points, axis=1, keepdims=True)).T
-    return 0.025 * (1.0 + 0.12 * z + 0.1 * (x**2 - y**2) + 0.05 * (3 * z**2 - 1) * x)
-
-
-@pytest.mark.slow
 def test_an_object_three_millimetres_off_its_mesh_is_explored_where_it_stands(tmp_path: Path) -> None:
     object, true = moved_tile(tmp_path)
     model = f'mesh = "{ASSETS}/meshes/tile.ply"\npose = "estimate"'
