@@ -24,6 +24,8 @@ EDGE = 0.5
 FACING = 0.5
 # A sweep that ends this deep (tip radii) below the base rolled off the body's edge
 ROLLED_OFF = 0.05
+# A ball that overlaps the base by so much (tip radii) would have felt it: half of what sweeps are pressed by
+OVERLAP = 0.01
 # A centre this far off the base's normal (rad) stands beside the base, not over it
 BESIDE = float(np.radians(5.0))
 # Barycentric coordinate below which a foot stands on a side
@@ -124,7 +126,7 @@ def _bare(base: Base, empty: FloatArray, tip_radius: float) -> FloatArray:
         return np.zeros((0, 3))
     free = base.foot(empty[:, :3], tip_radius)
     facing = (base.surface.face_normals[free.face] * empty[:, 3:]).sum(axis=1) > FACING
-    return np.asarray(free.points[facing & (free.height < -ROLLED_OFF * tip_radius)])
+    return np.asarray(free.points[facing & (free.height < -OVERLAP * tip_radius)])
 
 
 def part_of(base: Base, keep: NDArray[np.bool_]) -> Base:

@@ -11,7 +11,7 @@ from mapping.surface import Surface
 
 FloatArray = NDArray[np.float64]
 
-# Trial planes through a centre and two others of those next to it in as many tip radii
+# Trial planes, each through a centre and two of so many that are next to it within so many tip radii
 TRIALS, NEAR, NEIGHBOURS = 300, 4.0, 128
 # Centres so near to a plane belong to it, in tip radii; one of fewer than this share of all is none; the most planes
 THICK, FEWEST, MOST = 0.03, 0.03, 12

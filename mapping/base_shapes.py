@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -265,8 +266,9 @@ def outside(faces: NDArray[np.int64], hollow: bool) -> NDArray[np.int64]:
     return np.asarray(faces[:, ::-1] if hollow else faces, dtype=np.int64)
 
 
+@lru_cache(maxsize=1)
 def cylinder(cloud: Cloud) -> Fitted | None:
-    """Axis and radius by robust distances, started along each principal axis of the cloud."""
+    """Axis and radius by robust distances, started along each principal axis of the cloud; every tube asks for it."""
     from scipy.optimize import least_squares
 
     p = cloud.points
