@@ -170,25 +170,14 @@ def modelled(trace: Trace, body: BenchScene, seed: int, found: Base | None = Non
     from mapping.detectors import detect
     from mapping.grammar import assemble
     from mapping.pose import estimate_pose
-    from mapping.refine import refine
+    from mapping.refine_all import refine_all
 
     base = Base(body.base) if found is None else base_refined(found, trace)
     if body.misplaced:
         base = estimate_pose(trace, base).moved(base)
     detections = detect(trace, base)
     features = assemble(detections, trace, base)
-    refined = [
-        refine(
-            feature,
-            trace,
-            np.random.default_rng([seed, k]),
-            base=base,
-            noise=detections.noise,
-            others=features,
-            confirm=False,
-        )
-        for k, feature in enumerate(features)
-    ]
+    refined = refine_all(features, trace, seed, base=base, noise=detections.noise, confirm=False)
     return ObjectModel.attach(base, tuple(f for f in refined if f.evidence.likely), provenance={})
 
 

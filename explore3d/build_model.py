@@ -194,22 +194,24 @@ def _refine(
 ) -> tuple[Feature, ...]:
     if not stages.needed("posterior", "" if features else "no feature was found, so no chain was run"):
         return ()
-    from mapping.refine import refine
+    from mapping.refine_all import refine_all
 
-    refined, confirm = [], stages.is_forced("long chain")
+    confirm = stages.is_forced("long chain")
     with stages.stage("posterior") as share:
-        for number, feature in enumerate(features):
-            # a stream of its own for each feature: what one draws does not change the next
-            rng = np.random.default_rng([settings.seed, number])
-            noise = detections.noise
-            tip_sd = settings.tip_sd
-            found = refine(feature, trace, rng, base=base, noise=noise, others=features, tip_sd=tip_sd, confirm=confirm)
-            refined.append(found)
-            share((number + 1) / len(features))
+        refined = refine_all(
+            features,
+            trace,
+            settings.seed,
+            base=base,
+            noise=detections.noise,
+            tip_sd=settings.tip_sd,
+            confirm=confirm,
+            progress=share,
+        )
     regular = sum(each.posterior is not None and each.posterior.status == "not needed" for each in refined)
     if regular:
         stages.needed("long chain", f"the posterior of {regular} of {len(refined)} is regular (k-hat below 0.5)")
-    return tuple(refined)
+    return refined
 
 
 def _believed(features: tuple[Feature, ...], stages: Stages) -> tuple[Feature, ...]:

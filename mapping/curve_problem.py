@@ -6,15 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping.chart import Chart, chart_along
-from mapping.crest_trace import distances
 from mapping.curve_modes import CurveModes
+from mapping.development import smooth_on_base
 from mapping.feature import Feature
 from mapping.hollow_shape import GrooveShape
 from mapping.laplace import find_optima
+from mapping.meeting import NEAR, touches
 from mapping.priors import Normal, Prior, Uniform
 from mapping.problem import Problem, Sizes, Surroundings, pose, sizes_of, window_for
 from mapping.ridge_shape import RidgeShape
-from mapping.smooth_axis import HIGHEST_DEGREE, smooth_axis
+from mapping.smooth_axis import HIGHEST_DEGREE
 from mapping.spot_problem import height_prior, hollow_priors, radius_prior
 from mapping.step_shape import StepShape
 from mapping.target import Shape
@@ -26,9 +27,6 @@ FloatArray = NDArray[np.float64]
 SAG = 0.005
 MOST_LEGS = 300
 HIGHEST_MODE = 8
-# An end at which a line meets another lies that near to where it was detected, in half-widths: what the other one
-# covers does not tell it.
-MEETING = 0.5
 # After so many degrees in a row that are no better than a lower one, no higher one is tried.
 PATIENCE = 2
 
@@ -45,7 +43,9 @@ def curve_problem(feature: Feature, around: Surroundings) -> Problem:
     window = window_for(_crest(course, around.trace.tip_radius, sizes), sizes, around)
 
     def posed(most: int, least: int = 1) -> tuple[Problem, int]:
-        line, degree = smooth_axis(axis, sizes.position_sd, most, least)
+        line, degree = smooth_on_base(
+            axis, normals, sizes.position_sd, most, least, around.base, around.trace.tip_radius, sizes.half_width
+        )
         chart = _chart(line, _normals_along(line, axis, normals), feature, sizes, crossings, degree, around)
         ends = chart.coordinates(axis[[0, -1]])[0]
         modes = _modes(chart, ends, degree, crossings, sizes)
@@ -183,9 +183,8 @@ def _end_limits(
     limits = []
     for k, (least, most) in zip(np.argsort(ends), ((low, middle), (middle, high)), strict=True):
         tip = axis[[0, -1][k]]
-        others = [other.axis for other in around.others if other is not feature and len(other.axis) > 1]
-        if any(distances(tip[None], other)[0] < MEETING * sizes.half_width for other in others):
-            reach = MEETING * sizes.half_width
+        if any(touches(tip, other, sizes.half_width) for other in around.others if other is not feature):
+            reach = NEAR * sizes.half_width
             at = float(np.clip(ends[k], least + 0.1 * reach, most - 0.1 * reach))
             least, most = max(least, at - reach), min(most, at + reach)
         limits.append((least, most))

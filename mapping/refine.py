@@ -139,6 +139,24 @@ def solve(
     return solution if bell is None else solve_problem(bell, rng, confirm=confirm)
 
 
+def settle(feature: Feature, around: Surroundings) -> Feature:
+    """The feature at the optimum of its posterior: laid out beside its neighbours, without intervals.
+
+    Kinds without a closed form, and features that no sample speaks for, come back as they are.
+    """
+    if feature.kind not in SAMPLED_KINDS:
+        return feature
+    around = replace(around, noise=around.noise.rounded(around.trace.resolution))
+    try:
+        problem = pose_problem(feature, around)
+    except EmptyWindowError:
+        return feature
+    best = find_optima(problem.target, problem.beginnings[:1])[0]
+    shape, nan = problem.target.shape, float("nan")
+    optimum = Posterior(shape.names, shape.units, best[None], nan, nan, "not needed", "only the optimum was asked for")
+    return describe(problem, optimum, around.base)
+
+
 def odds_against_nothing(solution: Solution) -> float:
     """Log Bayes factor of a solved feature against the bare base (with the neighbours that it was posed with)."""
     return solution.importance.log_evidence - log_evidence_of_nothing(solution.problem.target)

@@ -16,10 +16,10 @@ ROUNDS = 8
 
 
 def smooth_axis(axis: FloatArray, sd: float, most: int = HIGHEST_DEGREE, least: int = 1) -> tuple[FloatArray, int]:
-    """A polyline (K', 3) along polynomials (closed axis: Fourier series) of the degree with the best evidence.
+    """A polyline (K', D) along polynomials (closed axis: Fourier series) of the degree with the best evidence.
 
     Args:
-        axis: (K, 3) crossings in order, m; first equals last if closed.
+        axis: (K, D) crossings in order, in space or in the plane, m; first equals last if closed.
         sd: standard deviation of a crossing, m.
         most, least: degrees to try; a single one is taken whether it fits or not.
 
@@ -38,8 +38,8 @@ def smooth_axis(axis: FloatArray, sd: float, most: int = HIGHEST_DEGREE, least: 
     best, best_cost, best_misfit = lowest, np.inf, np.inf
     for degree in range(lowest, most + 1):
         coefficients, square = _fit(axis[:points], x[:points], degree, closed, sd)
-        # Two of the three coordinates are across the axis; the third is the order of the crossings, not a datum.
-        freedom = 2.0 * len(coefficients)
+        # All coordinates but one are across the axis; that one is the order of the crossings, not a datum.
+        freedom = (axis.shape[1] - 1.0) * len(coefficients)
         cost = float(((TAIL + 2.0) * np.log1p(square / TAIL)).sum()) + freedom * float(np.log(points))
         if cost < best_cost:
             best, best_cost, best_misfit = degree, cost, float(np.median(square)) / MEDIAN

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mapping.base import Base
 from mapping.bell_shape import BellShape, width_at_half_height
 from mapping.bump_shape import BumpShape
-from mapping.extent import explored
+from mapping.extent import explored, with_open_ends
 from mapping.feature import Feature, Interval
 from mapping.free_tip_shape import with_nominal_tip
 from mapping.hollow_shape import GrooveShape, PitShape
@@ -157,8 +157,5 @@ def _length(
         return interval, []
     if not has_ends:
         return replace(interval, censored=True), ["the length of a step is what was explored of it: at least this"]
-    open_ends = [name for name, known in zip(("first", "last"), explored(problem, draws), strict=True) if not known]
-    if not open_ends:
-        return interval, []
-    note = f"the axis goes on beyond what was explored at its {' and its '.join(open_ends)} point: at least this long"
-    return replace(interval, censored=True), [note]
+    seen = explored(problem, draws)
+    return (interval, []) if all(seen) else (replace(interval, censored=True), [*with_open_ends((), seen)])
