@@ -193,7 +193,8 @@ def errors(model: ObjectModel, body: BenchScene) -> dict[str, Any]:
         "missed": sum(pair.status == "missed" for pair in pairs),
         "invented": sum(pair.status == "invented" for pair in pairs),
         "end_error": max(ends, default=None),
-        "axis_rms": max((pair.axis_rms for pair in found), default=None),
+        "axis_rms": max((pair.axis_rms for pair in found if pair.true and len(pair.true.axis) > 1), default=None),
+        "center_error": max((pair.axis_rms for pair in found if pair.true and len(pair.true.axis) == 1), default=None),
         "height_error": max((abs(pair.height_error) for pair in found), default=None),
     }
 

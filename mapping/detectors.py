@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,6 +64,17 @@ class Detections:
     threshold: float
     inspected_length: float
     left_out: tuple[str, ...] = ()
+
+    @classmethod
+    def together(cls, parts: Sequence[Detections]) -> Detections:
+        """What sweeps detected one by one with the same noise and algorithm hold together; one part at least."""
+        usual = max(parts, key=lambda part: part.inspected_length)
+        return replace(
+            usual,
+            crossings=tuple(crossing for part in parts for crossing in part.crossings),
+            inspected_length=sum(part.inspected_length for part in parts),
+            left_out=tuple(reason for part in parts for reason in part.left_out),
+        )
 
 
 def detect(

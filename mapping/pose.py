@@ -17,7 +17,7 @@ from mapping.trace import Trace
 FloatArray = NDArray[np.float64]
 
 # Cells that the pose is fitted to, and of these the share that leads there: a few rounds with all of them then do
-MOST_CELLS, LEADING = 4000, 4
+MOST_CELLS, LEADING = 4000, 8
 L1_ROUNDS, BISQUARE_ROUNDS = 40, 40
 # Moves smaller than these shares of the heights' scatter end the rounds; the first kind only leads to the second
 L1_NEAR, NEAR = 0.05, 1e-3

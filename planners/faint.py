@@ -80,18 +80,25 @@ class FaintSearch:
 
     def plan(self) -> Plan:
         """Make the sweeps; the outcome's value is a CloserLook."""
-        felt = []
+        felt, seen = list[Trace](), list[Detections]()
         for move in replace(self.survey, crossings=max(2, int(np.ceil(LEADS * self.crossings)))).sweeps():
             trace = yield move
             if len(trace):
                 felt.append(trace)
+                # one by one: the finger need not wait for all of them in the end
+                seen.append(self._detected(trace))
         if not felt:
             return Outcome("no contact", value=CloserLook())
         trace, base = Trace.concatenate(felt), self.survey.base
-        seen = detect(trace, base, noise=self.noise, false_alarms_per_metre=self.false_alarms_per_metre)
-        lines = with_faint_lines([], seen, trace, base, FALSE_LEADS / seen.inspected_length)
-        found = CloserLook(tuple(lead(line, seen, base, self.survey.tip_radius) for line in lines), seen.crossings)
+        every = Detections.together(seen)
+        if every.inspected_length == 0.0:
+            return Outcome("no contact", "no sweep felt enough to be looked at", CloserLook())
+        lines = with_faint_lines([], every, trace, base, FALSE_LEADS / every.inspected_length)
+        found = CloserLook(tuple(lead(line, every, base, self.survey.tip_radius) for line in lines), every.crossings)
         return Outcome("done", f"{len(lines)} lines seen by no single sweep", found)
+
+    def _detected(self, trace: Trace) -> Detections:
+        return detect(trace, self.survey.base, noise=self.noise, false_alarms_per_metre=self.false_alarms_per_metre)
 
 
 def lead(line: Feature, seen: Detections, base: Base, tip_radius: float) -> FaintLead:

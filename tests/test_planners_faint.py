@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from explore3d.bench_bodies import plate
+from hw.moves import Move
 from mapping.base import Base
 from mapping.detectors import Detections
 from mapping.feature import Evidence, Feature, Interval
 from mapping.noise import Noise
 from mapping.surface import Surface
+from mapping.trace import Trace
+from planners.drive import drive
 from planners.faint import FaintSearch, lead
 from planners.survey import Survey
 
@@ -60,3 +63,12 @@ def test_a_lead_begins_in_the_middle_with_passes_that_follow_from_the_height() -
     alone = np.sqrt(3.0 / 8.0) * 6.445 * (4.5 / 13.0) ** 1.25  # signal-to-noise ratio of one pass over such a dip
     assert begun.passes == np.ceil(1.5 * 25.0 / alone**2)
     assert lead(line(30.0), seen, PLATE, 0.01).passes == begun.passes  # a sweep along it tells nothing of a crossing
+
+
+def test_sweeps_that_felt_hardly_anything_show_nothing() -> None:
+    def felt(move: Move) -> Trace:
+        number = int(1e6 * move.path[0].sum()) % 1000
+        return Trace(np.arange(3.0), move.path[[0, 0, -1]] + [0.0, 0.0, 0.01], np.full(3, number), 0.01)
+
+    _, outcome = drive(FaintSearch(survey(), 8e-5, Noise(2e-4), 0.01).plan(), felt)
+    assert outcome.reason == "no contact" and outcome.value.leads == () and outcome.value.crossings == ()
