@@ -282,11 +282,10 @@ def test_sparse_sweeps_among_dense_ones_raise_no_more_false_alarms_than_asked() 
 
 
 def test_sweeps_detected_one_by_one_say_the_same_as_all_at_once() -> None:
-    noise, shift = Noise(2e-4), 0.01
-    each = [sweep(lambda x, k=k: wire(x, place=0.01 * k), white=2e-4, seed=k) for k in range(3)]
-    each = [
-        Trace(t.t, t.centers + np.array([0.0, shift * k, 0.0]), np.full(len(t), k), TIP) for k, t in enumerate(each)
-    ]
+    noise, each = Noise(2e-4), []
+    for k in range(3):
+        felt = sweep(lambda x, k=k: wire(x, place=0.01 * k), white=2e-4, seed=k)
+        each.append(Trace(felt.t, felt.centers + np.array([0.0, 0.01 * k, 0.0]), np.full(len(felt), k), TIP))
     parts = Detections.together([detect(trace, plate(), noise=noise) for trace in each])
     whole = detect(Trace.concatenate(each), plate(), noise=noise)
     assert [c.sweep for c in parts.crossings] == [c.sweep for c in whole.crossings] == [0, 1, 2]
