@@ -32,6 +32,8 @@ ACROSS, ALONG = 1.0 / 3.0, 2.0
 LENGTHS = (4, 7, 12, 20)
 # Places at the crest of a line, at least: fewer say nothing of its height.
 LEAST_POWER = 2.0
+# Places that can show a line
+FEWEST = 16
 # Half-widths by which the ends of the longest line may lie beside the nearest direction that is tried.
 ASIDE = 0.5
 # Sweeps that must agree; without the one that says most this share of what the others should say must remain, and
@@ -41,6 +43,9 @@ SWEEPS, WITHOUT_BEST, OTHERS = 4, 0.75, 3.0
 # field of lines is continuous in place, direction, beginning and end. Set by simulation.
 CONTINUUM = 30.0
 MOST_LINES = 8
+# Times that a line which one sweep alone makes is looked for again without that sweep: it may have run along a line
+# that all others cross, and drawn the best direction to its own.
+WITHOUT = 3
 # Times that a line is turned, moved and lengthened.
 POLISHINGS = 2
 
@@ -85,7 +90,7 @@ def faint_lines(
     free = ~masked
     needed = threshold(len(inspection.points) * inspection.spacing, inspection.pitch, half_width, alarms)
     tiles = _tiles(inspection, normals, free, half_width)
-    search = partial(_clearest_of_each, inspection, normals, half_width, inflation)
+    search = partial(_clearest_of_each, inspection, normals, half_width, inflation, needed)
     lines = dict(enumerate(search(tiles)))
     for _ in range(MOST_LINES):
         best = max((line for line in lines.values() if line is not None), key=lambda line: line.snr, default=None)
@@ -136,31 +141,50 @@ def _tiles(inspection: Inspection, normals: FloatArray, free: BoolArray, half_wi
 
 
 def _clearest_of_each(
-    inspection: Inspection, normals: FloatArray, half_width: float, inflation: float, tiles: list[IntArray]
+    inspection: Inspection,
+    normals: FloatArray,
+    half_width: float,
+    inflation: float,
+    needed: float,
+    tiles: list[IntArray],
 ) -> list[FaintLine | None]:
     """The clearest line of each tile; they are independent, and the kernel leaves other threads free to work."""
     with ThreadPoolExecutor() as pool:
-        return list(pool.map(lambda tile: _clearest(inspection, tile, normals, half_width, inflation), tiles))
+        return list(pool.map(lambda tile: _clearest(inspection, tile, normals, half_width, inflation, needed), tiles))
 
 
 def _clearest(
-    inspection: Inspection, tile: IntArray, normals: FloatArray, half_width: float, inflation: float
+    inspection: Inspection, tile: IntArray, normals: FloatArray, half_width: float, inflation: float, needed: float
 ) -> FaintLine | None:
     """The clearest line of any section among the places of one tile."""
     if len(tile) == 0:
         return None
-    lines = [_clearest_in(inspection, tile, normals[tile[0]], w * half_width, inflation) for w in SECTIONS]
+    lines = [_agreed_in(inspection, tile, normals[tile[0]], w * half_width, inflation, needed) for w in SECTIONS]
     return max((line for line in lines if line is not None), key=lambda line: line.snr, default=None)
+
+
+def _agreed_in(
+    inspection: Inspection, tile: IntArray, normal: FloatArray, half_width: float, inflation: float, needed: float
+) -> FaintLine | None:
+    """The clearest line of one section among the places of one tile that enough sweeps agree on."""
+    for _ in range(1 + WITHOUT):
+        if len(tile) < FEWEST or (found := _clearest_in(inspection, tile, normal, half_width, inflation)) is None:
+            return None
+        line, support = found
+        if support.agreed(inspection.level * inflation):
+            return line
+        if line.snr < needed:
+            return None
+        tile = tile[inspection.sweep[tile] != support.loudest]
+    return None
 
 
 def _clearest_in(
     inspection: Inspection, tile: IntArray, normal: FloatArray, half_width: float, inflation: float
-) -> FaintLine | None:
-    """The clearest line among the places of one tile."""
+) -> tuple[FaintLine, _Support] | None:
+    """The clearest line of one section among the places of one tile, and what each sweep says of it."""
     from mapping.faint_kernels import best_segment
 
-    if len(tile) < 16:
-        return None
     origin = inspection.points[tile].mean(axis=0)
     frame = _frame(normal, np.eye(3)[np.abs(normal).argmin()])
     flat = (inspection.points[tile] - origin) @ frame.T
@@ -179,13 +203,12 @@ def _clearest_in(
     way, aside = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     inside = (flat @ way >= begin) & (flat @ way <= end) & (np.abs(flat @ aside - row) < half_width)
     worth = (inspection.level / sd[inside]) ** 2
-    line = _Support.of(height[inside], worth, flat[inside] @ aside - row, inspection.sweep[tile][inside], half_width)
-    if not line.agreed(inspection.level * inflation):
-        return None
-    crest_sd = inspection.level * inflation / float(np.sqrt(line.square.sum()))
-    crest = float(line.signal.sum() / line.square.sum())
+    support = _Support.of(height[inside], worth, flat[inside] @ aside - row, inspection.sweep[tile][inside], half_width)
+    crest_sd = inspection.level * inflation / float(np.sqrt(support.square.sum()))
+    crest = float(support.signal.sum() / support.square.sum())
     ends = np.array([at * way + row * aside for at in (begin, end)]) @ frame
-    return FaintLine(origin + ends, normal, crest, crest_sd, half_width, abs(crest) / crest_sd, len(line.signal))
+    snr, sweeps = abs(crest) / crest_sd, len(support.signal)
+    return FaintLine(origin + ends, normal, crest, crest_sd, half_width, snr, sweeps), support
 
 
 def _frame(normal: FloatArray, way: FloatArray) -> FloatArray:
@@ -235,6 +258,7 @@ class _Support:
     """What each sweep says of a line: its match with the section, and the section's own square; both weighted by
     what its places are worth, in places of the usual standard deviation."""
 
+    numbers: IntArray
     signal: FloatArray
     square: FloatArray
 
@@ -243,9 +267,14 @@ class _Support:
         cls, height: FloatArray, worth: FloatArray, across: FloatArray, sweep: IntArray, half_width: float
     ) -> _Support:
         shape = crest_trace(across, 1.0, half_width)
-        number = np.unique(sweep, return_inverse=True)[1]
-        signal, square = (np.bincount(number, worth * term) for term in (shape * height, shape**2))
-        return cls(np.asarray(signal), np.asarray(square))
+        numbers, place = np.unique(sweep, return_inverse=True)
+        signal, square = (np.bincount(place, worth * term) for term in (shape * height, shape**2))
+        return cls(numbers, np.asarray(signal), np.asarray(square))
+
+    @property
+    def loudest(self) -> int:
+        """Number of the sweep that speaks most for the line."""
+        return int(self.numbers[(np.sign(self.signal.sum()) * self.signal).argmax()])
 
     def agreed(self, sd: float) -> bool:
         """True if enough sweeps show the line, and it stands without the one that shows it best.
@@ -254,9 +283,8 @@ class _Support:
         """
         if len(self.signal) < SWEEPS:
             return False
-        sign = float(np.sign(self.signal.sum()))
-        rest = np.arange(len(self.signal)) != int((sign * self.signal).argmax())
+        sign, rest = float(np.sign(self.signal.sum())), self.numbers != self.loudest
         height = sign * float(self.signal.sum() / self.square.sum())
         others = sign * float(self.signal[rest].sum()) / max(float(self.square[rest].sum()), np.finfo(float).tiny)
-        certain = others * float(np.sqrt(self.square[rest].sum())) > OTHERS * sd
-        return certain and others > WITHOUT_BEST * height
+        certain = others * float(np.sqrt(self.square[rest].sum())) / sd
+        return certain > OTHERS and others > WITHOUT_BEST * height

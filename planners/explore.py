@@ -162,12 +162,14 @@ class Explore:
     def _faint(self, surveyor: Surveyor, found: Found) -> Plan:
         """Where no single sweep shows the smallest ridge asked for, look for lines that many show."""
         rate = CANDIDATES * self.false_alarms_per_metre
-        search = FaintSearch(self.survey, surveyor.limit, found.noise or Noise(0.0), rate)
+        noise, learns = found.noise or Noise(0.0), self.noise is None
+        search = FaintSearch(self.survey, surveyor.limit, noise, rate, learns)
         if self.survey.crossed(self.survey.visible) is None or search.crossings == 1:
             return Outcome("not needed")
         searched = yield from search.plan()
         look: CloserLook = searched.value
         found.crossings.extend(look.crossings)
+        found.noise = look.noise or found.noise
         found.actions.append(f"closer survey: {searched.detail}")
         found.leads.extend(look.leads)
         return searched

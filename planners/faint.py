@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,9 @@ FloatArray = NDArray[np.float64]
 ANYWHERE = 1.3
 # Share of these crossings that shows where a line may lie, if so many false leads are put up with: passes over a lead
 # cost seconds, a closer survey minutes
-LEADS, FALSE_LEADS = 0.6, 3.0
+LEADS, FALSE_LEADS = 0.75, 3.0
+# Path that tells the noise better than the survey did, in tip radii; a need of fewer sweeps more is not seen to
+LEARNING, FEW_MORE = 500.0, 0.1
 # Passes over a line show it by so many times what a crossing is believed for
 SURE = 1.5
 MOST_PASSES = 60
@@ -47,10 +49,12 @@ class FaintLead:
 
 @dataclass(frozen=True, eq=False)
 class CloserLook:
-    """What a closer survey shows: lines seen by no single sweep, the clearest first, and crossings that one shows."""
+    """What a closer survey shows: lines seen by no single sweep, the clearest first, crossings that one shows, and
+    the noise of its samples."""
 
     leads: tuple[FaintLead, ...] = ()
     crossings: tuple[Crossing, ...] = ()
+    noise: Noise | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,40 +69,90 @@ class FaintSearch:
         limit: least height that a single sweep of it detects, m.
         noise: of the samples.
         false_alarms_per_metre: accepted rate of false lines, 1/m.
+        learns: True if the noise was learnt from the survey, and may be learnt better.
     """
 
     survey: Survey
     limit: float
     noise: Noise
     false_alarms_per_metre: float
+    learns: bool = True
 
     @property
     def crossings(self) -> int:
         """Crossings that a line as low as the smallest asked for needs; 1 if a single one shows it."""
-        ratio = self.limit / self.survey.smallest
-        return 1 if ratio <= 1.0 else int(np.ceil(ANYWHERE * ratio**2.5))
+        return self._needed(self.limit)
 
     def plan(self) -> Plan:
         """Make the sweeps; the outcome's value is a CloserLook."""
-        felt, seen = list[Trace](), list[Detections]()
-        for move in replace(self.survey, crossings=max(2, int(np.ceil(LEADS * self.crossings)))).sweeps():
-            trace = yield move
-            if len(trace):
-                felt.append(trace)
-                # one by one: the finger need not wait for all of them in the end
-                seen.append(self._detected(trace))
-        if not felt:
+        look = _Look(self.survey.base, self.noise, self.limit, self.false_alarms_per_metre, learnt=not self.learns)
+        planned = self._planned(self.limit)
+        yield from self._sweep(planned, look)
+        look.learn()
+        more = self._planned(look.limit) - planned
+        if more > FEW_MORE * planned:
+            yield from self._sweep(more, look)
+        if not look.felt:
             return Outcome("no contact", value=CloserLook())
-        trace, base = Trace.concatenate(felt), self.survey.base
-        every = Detections.together(seen)
+        every = Detections.together(look.seen)
         if every.inspected_length == 0.0:
             return Outcome("no contact", "no sweep felt enough to be looked at", CloserLook())
-        lines = with_faint_lines([], every, trace, base, FALSE_LEADS / every.inspected_length)
-        found = CloserLook(tuple(lead(line, every, base, self.survey.tip_radius) for line in lines), every.crossings)
-        return Outcome("done", f"{len(lines)} lines seen by no single sweep", found)
+        rate = FALSE_LEADS / every.inspected_length
+        lines = with_faint_lines([], every, Trace.concatenate(look.felt), look.base, rate)
+        leads = tuple(lead(line, every, look.base, self.survey.tip_radius) for line in lines)
+        return Outcome(
+            "done", f"{len(lines)} lines seen by no single sweep", CloserLook(leads, every.crossings, look.noise)
+        )
 
-    def _detected(self, trace: Trace) -> Detections:
-        return detect(trace, self.survey.base, noise=self.noise, false_alarms_per_metre=self.false_alarms_per_metre)
+    def _needed(self, limit: float) -> int:
+        ratio = limit / self.survey.smallest
+        return 1 if ratio <= 1.0 else int(np.ceil(ANYWHERE * ratio**2.5))
+
+    def _planned(self, limit: float) -> int:
+        return max(2, int(np.ceil(LEADS * self._needed(limit))))
+
+    def _sweep(self, crossings: int, look: _Look) -> Plan:
+        for move in replace(self.survey, crossings=crossings).sweeps():
+            look.take((yield move))
+        return Outcome("done")
+
+
+@dataclass
+class _Look:
+    """A closer survey under way: what was felt, and what each sweep shows by itself.
+
+    Sweeps are looked at one by one, so that the finger need not wait for all of them in the end. The survey before
+    told the noise from a short path; the first sweeps tell it better.
+    """
+
+    base: Base
+    noise: Noise
+    limit: float
+    false_alarms_per_metre: float
+    learnt: bool
+    felt: list[Trace] = field(default_factory=list)
+    seen: list[Detections] = field(default_factory=list)
+
+    def take(self, trace: Trace) -> None:
+        """Look at a sweep's trace, if it touched anything."""
+        if len(trace) == 0:
+            return
+        self.felt.append(trace)
+        self.seen.append(self._detected(trace, self.noise))
+        if not self.learnt and sum(part.inspected_length for part in self.seen) > LEARNING * trace.tip_radius:
+            self.learn()
+
+    def learn(self) -> None:
+        """The noise from all that was felt so far, and what that shows; once is enough."""
+        if self.learnt or not self.felt:
+            return
+        together = self._detected(Trace.concatenate(self.felt), None)
+        if together.inspected_length > 0.0:
+            self.noise, self.limit, self.seen = together.noise, together.detection_limit, [together]
+        self.learnt = True
+
+    def _detected(self, trace: Trace, noise: Noise | None) -> Detections:
+        return detect(trace, self.base, noise=noise, false_alarms_per_metre=self.false_alarms_per_metre)
 
 
 def lead(line: Feature, seen: Detections, base: Base, tip_radius: float) -> FaintLead:
