@@ -75,6 +75,19 @@ def test_a_sweep_that_happens_to_run_along_the_line_speaks_for_it_too():
     assert line.height < 0 and distances(line.axis, 3 * AXIS - 2 * AXIS.mean(axis=0)).max() < WIDTH
 
 
+def test_a_sweep_that_drifted_does_not_hide_a_line_that_all_others_show(monkeypatch):
+    drifted = []
+    for seed in range(4):
+        plain = places(-2.0 * SD, seed)
+        off = (plain.sweep == 8) & (np.abs(plain.points[:, 0]) < 0.012)
+        height = plain.height - 3.0 * SD * off
+        drifted.append(Inspection(plain.points, height, plain.sd, plain.sweep, plain.spacing))
+    for (line,) in map(found, drifted):
+        assert distances(line.axis, 3 * AXIS - 2 * AXIS.mean(axis=0)).max() < WIDTH
+    monkeypatch.setattr("mapping.faint_lines.WITHOUT", 0)
+    assert not any(found(inspection) for inspection in drifted)
+
+
 @pytest.mark.parametrize("angle", np.radians([2.9, 17.2, 48.7, 101.2, 160.3]))
 def test_a_long_line_is_found_in_any_direction(angle):
     way = 0.021 * np.array([np.cos(angle), np.sin(angle), 0.0])

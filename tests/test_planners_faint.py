@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from explore3d.bench_bodies import plate
 from hw.moves import Move
 from mapping.base import Base
-from mapping.detectors import Detections
+from mapping.detectors import Detections, detect
 from mapping.feature import Evidence, Feature, Interval
 from mapping.noise import Noise
 from mapping.surface import Surface
 from mapping.trace import Trace
 from planners.drive import drive
-from planners.faint import FaintSearch, lead
+from planners.faint import LEADS, FaintSearch, lead
 from planners.survey import Survey
 
 PLATE = Base(Surface(*plate(0.1, 0.08)))
@@ -72,3 +74,26 @@ def test_sweeps_that_felt_hardly_anything_show_nothing() -> None:
 
     _, outcome = drive(FaintSearch(survey(), 8e-5, Noise(2e-4), 0.01).plan(), felt)
     assert outcome.reason == "no contact" and outcome.value.leads == () and outcome.value.crossings == ()
+
+
+@pytest.mark.parametrize(("learns", "more"), [(True, True), (False, False)])
+def test_more_sweeps_are_made_where_the_noise_is_larger_than_the_survey_told(learns: bool, more: bool) -> None:
+    """A plate felt every 0.1 mm with twice the noise that was believed: lines need four times the crossings."""
+    believed, rng, moves = Noise(1e-4), np.random.default_rng(0), []
+
+    def felt(move: Move) -> Trace:
+        s = np.linalg.norm(move.path - move.path[0], axis=1)
+        even = np.arange(0.0, s[-1], 1e-4)
+        centers = np.column_stack([np.interp(even, s, move.path[:, i]) for i in range(3)])
+        centers[:, 2] = 0.01 + 2.0 * believed.white * rng.standard_normal(len(even))
+        moves.append(move)
+        return Trace(even / 0.1, centers, np.full(len(even), len(moves)), 0.01)
+
+    first = next(iter(survey().sweeps()))
+    limit = detect(felt(first), PLATE, noise=believed).detection_limit
+    search = FaintSearch(replace(survey(), smallest=0.8 * limit), limit, believed, 0.01, learns)
+    moves.clear()
+    _, outcome = drive(search.plan(), felt)
+    planned = len(list(replace(search.survey, crossings=max(2, int(np.ceil(LEADS * search.crossings)))).sweeps()))
+    assert (len(moves) > 2 * planned) if more else (len(moves) == planned)
+    assert outcome.value.noise.white == pytest.approx((2.0 if learns else 1.0) * believed.white, rel=0.05)
