@@ -18,6 +18,7 @@ from mapping.feature import Feature, Interval
 from mapping.inspection import Inspection
 from mapping.line_end import LineEnd, line_end
 from mapping.linking import FELT, LONGEST_LINK, between
+from mapping.meeting import JUNCTION
 from mapping.point_feature import body_width, evidence
 from mapping.polyline import arclengths
 from mapping.rejoining import rejoined
@@ -139,7 +140,7 @@ def mean_point(cluster: list[Crossing]) -> FloatArray:
 def _line_feature(branch: Branch, members: list[Crossing], kind: str, around: Around) -> Feature:
     axis = branch.axis
     height, half_width, sd = _section(axis, members, around)
-    notes: tuple[str, ...] = ("junction",) if branch.junction else ()
+    notes: tuple[str, ...] = (JUNCTION,) if branch.junction else ()
     if branch.closed or (branch.free == (True, True) and closes(axis, height, half_width, around.inspection)):
         axis = np.vstack([axis, axis[:1]])
         length = _exactly(axis)

@@ -24,6 +24,9 @@ NEAR = 0.5
 # A course is known no better than this share of the half-width; places that settle the meeting place
 LEAST_SD, ROUNDS = 1e-3, 5
 QUANTILE = 1.6448536
+# Note of a line that others meet
+JUNCTION = "junction"
+LINES = ("ridge", "groove")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +50,14 @@ def touches(end: FloatArray, other: Feature, half_width: float) -> bool:
 
 
 def meetings(features: Sequence[Feature], half_widths: Sequence[float]) -> list[Meeting]:
-    """The places at which ridges and grooves, as they were detected, end on one another."""
+    """The places at which ridges and grooves that were detected as one detail end on one another."""
     found: list[Meeting] = []
-    for number, feature in enumerate(features):
-        if feature.kind not in ("ridge", "groove") or feature.closed or len(feature.axis) < 2:
-            continue
-        for end in (0, -1):
-            place, reach = feature.axis[end], NEAR * half_widths[number]
-            met = [k for k, other in enumerate(features) if k != number and touches(place, other, half_widths[number])]
+    lines = [k for k, feature in enumerate(features) if feature.kind in LINES and JUNCTION in feature.notes]
+    for number in lines:
+        feature, half_width = features[number], half_widths[number]
+        for end in () if feature.closed else (0, -1):
+            place, reach = feature.axis[end], NEAR * half_width
+            met = [k for k in lines if k != number and touches(place, features[k], half_width)]
             if not met:
                 continue
             one = Meeting(((number, end),), tuple(sorted([number, *met])), reach)
@@ -145,11 +148,11 @@ def _ended_at(
     foot, at = nearest_on(place[None], line)
     if at[0] <= 0.0:  # the place lies before its other end: the course says nothing
         return feature
-    s, known = arclengths(line), np.linspace(0.0, at[0], len(axis))
-    points = np.column_stack([np.interp(known, s, line[:, i]) for i in range(3)])
-    bent = np.clip(1.0 - (at[0] - known) / half_width, 0.0, 1.0)
+    s, even = arclengths(line), np.linspace(0.0, at[0], len(axis))
+    points = np.column_stack([np.interp(even, s, line[:, i]) for i in range(3)])
+    bent = np.clip(1.0 - (at[0] - even) / half_width, 0.0, 1.0)
     points += bent[:, None] * (place - foot[0])
-    along = np.interp(known, arclengths(axis), np.arange(len(axis)))
+    along = np.interp(even, arclengths(axis), np.arange(len(axis)))
     nearest = feature.normals[order][np.round(along).astype(int)]
     points, normals = onto_base(points, nearest, base, tip)
     points[-1] = place

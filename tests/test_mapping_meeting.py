@@ -9,7 +9,7 @@ import pytest
 from recorded_features import TIP, UP, D, feature, plate
 
 from mapping.feature import Feature, Interval
-from mapping.meeting import brought_together, meetings
+from mapping.meeting import JUNCTION, brought_together, meetings
 from mapping.polyline import arclengths
 
 HALF_WIDTH = 3.7e-3
@@ -19,8 +19,9 @@ def arm(start: np.ndarray, stop: np.ndarray, sd: float = 30e-6, count: int = 9) 
     """A refined ridge: its ends known to 0.05 mm, its course to `sd`."""
     found = feature("ridge", np.linspace(start, stop, count), D, D)
     extra = {"axis_sd": [sd] * count, "end_intervals": [[-5e-5, 5e-5]] * 2, "ends_seen": [True, True]}
-    length = float(np.linalg.norm(np.subtract(stop, start)))
-    return replace(found, extra=extra, length=Interval(length, length - 7e-5, length + 7e-5))
+    far = float(np.linalg.norm(np.subtract(stop, start)))
+    length = Interval(far, far - 7e-5, far + 7e-5)
+    return replace(found, extra=extra, length=length, notes=(JUNCTION,))
 
 
 def star(hub: np.ndarray, angles: tuple[float, ...] = (10.0, 130.0, 250.0)) -> list[Feature]:
@@ -97,8 +98,11 @@ def test_lines_that_do_not_meet_and_closed_ones_are_left_alone() -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 60)
     ring = np.column_stack([0.02 * np.cos(turn) - 0.02, 0.02 * np.sin(turn), 0 * turn])
     ring[-1] = ring[0]
-    closed = feature("ridge", ring, D, D)
+    closed = replace(feature("ridge", ring, D, D), notes=(JUNCTION,))
     assert together([one, closed], [one, closed]) == [one, closed]
+    # an end that was seen near another line is an end
+    apart = [replace(each, notes=()) for each in star(np.zeros(3))]
+    assert together(apart, apart) == apart
 
 
 def test_an_end_that_was_not_seen_is_known_once_it_meets_another_line() -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from recorded_features import D, feature, line, plate, record, wire
 
+from mapping.meeting import JUNCTION
 from mapping.noise import Noise
 from mapping.refine import refine
 from mapping.refine_all import refine_all
@@ -31,7 +34,7 @@ def trace_over_arms():
 def guesses(off):
     """The arms as they may be detected: with a wrong meeting place."""
     axes = [np.linspace(HUB + off, arm[1], 5) for arm in ARMS]
-    return [feature("ridge", axis, D, D, 6, 0.1e-3) for axis in axes]
+    return [replace(feature("ridge", axis, D, D, 6, 0.1e-3), notes=(JUNCTION,)) for axis in axes]
 
 
 def test_arms_that_meet_share_the_place_where_they_do():
