@@ -16,6 +16,8 @@ FloatArray = NDArray[np.float64]
 DENSE, FEWEST, MOST = 10.0, 64, 400
 # Normals that differ by less are those of a plane
 PLANE = 1e-9
+# Height from which a point's own face is looked for, in tip radii
+CLOSE = 1e-3
 ROUNDS = 2
 
 
@@ -91,8 +93,9 @@ def smooth_on_base(
     count = int(np.clip(np.ceil(DENSE * arclengths(line)[-1] / half_width), FEWEST, MOST))
     for _ in range(ROUNDS):
         dense = resample(line, count)
-        points = onto_base(dense, _nearest(dense, axis, normals), base, tip_radius)[0]
-        up = base.foot(points + tip_radius * _nearest(dense, axis, normals), tip_radius).normals
+        points, lift = onto_base(dense, _nearest(dense, axis, normals), base, tip_radius)
+        # the ball itself would rest on a fold while its foot goes from one side to the other
+        up = base.foot(points + CLOSE * tip_radius * lift, tip_radius).normals
         if np.ptp(up, axis=0).max() < PLANE:
             return line, degree
         line, degree = _smoothed(points, up, axis, sd, most, least)
