@@ -73,6 +73,14 @@ def test_a_line_over_a_fold_is_smoothed_as_the_straight_line_that_it_is() -> Non
     assert off(smooth_axis(axis, 0.1e-3)[0]) > 0.5e-3  # a curve in space cuts the corner
 
 
+def test_sparse_exact_crossings_of_a_line_over_a_fold_give_the_line_itself() -> None:
+    u = np.linspace(-0.03, 0.03, 8)
+    line, degree = smooth_on_base(*folded(u, 0.5 * u), 1e-6, 8, 1, roof(), TIP, HALF_WIDTH)
+    places = np.linspace(-0.032, 0.032, 20001)
+    true = folded(places, 0.5 * places)[0]
+    assert degree == 1 and np.linalg.norm(line - nearest_on(line, true)[0], axis=1).max() < 2e-6
+
+
 def test_on_a_plane_nothing_is_rolled() -> None:
     plane = Base(Surface([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]], [[0, 1, 2], [0, 2, 3]]))
     x = np.linspace(-0.02, 0.02, 9)
