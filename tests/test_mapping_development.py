@@ -7,6 +7,7 @@ import pytest
 
 from mapping.base import Base
 from mapping.development import developed, smooth_on_base
+from mapping.onto_base import onto_base
 from mapping.polyline import arclengths, nearest_on
 from mapping.smooth_axis import smooth_axis
 from mapping.surface import Surface
@@ -89,3 +90,11 @@ def test_on_a_plane_nothing_is_rolled() -> None:
     line, degree = smooth_on_base(axis, up, 0.05e-3, 8, 1, plane, TIP, HALF_WIDTH)
     plain, same = smooth_axis(axis, 0.05e-3)
     assert degree == same and np.array_equal(line, plain)
+
+
+def test_points_on_a_folded_base_stay_where_they_are() -> None:
+    u = np.linspace(-0.01, 0.01, 201)
+    points, normals = folded(u, 0.3 * u)
+    lifts = np.tile(NORMALS[0], (len(u), 1))  # as for points whose nearest crossing lies on the other side
+    np.testing.assert_allclose(onto_base(points, normals, roof(), TIP)[0], points, atol=1e-9)
+    np.testing.assert_allclose(onto_base(points, lifts, roof(), TIP)[0], points, atol=1e-5)
