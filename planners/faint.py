@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mapping.base import Base
 from mapping.crossing import Crossing
-from mapping.detectors import Detections, detect
+from mapping.detectors import Detections
 from mapping.faint_feature import with_faint_lines
 from mapping.feature import Feature
 from mapping.noise import Noise
@@ -17,6 +17,7 @@ from mapping.trace import Trace
 from planners.crest import SEEN
 from planners.plan import Outcome, Plan
 from planners.survey import Survey
+from planners.sweep_by_sweep import SweepBySweep
 
 FloatArray = NDArray[np.float64]
 
@@ -26,8 +27,8 @@ ANYWHERE = 1.3
 # Share of these crossings that shows where a line may lie, if so many false leads are put up with: passes over a lead
 # cost seconds, a closer survey minutes
 LEADS, FALSE_LEADS = 0.75, 3.0
-# Path that tells the noise better than the survey did, in tip radii; a need of fewer sweeps more is not seen to
-LEARNING, FEW_MORE = 500.0, 0.1
+# A need of fewer sweeps more, once the noise is known better, is not seen to
+FEW_MORE = 0.1
 # Passes over a line show it by so many times what a crossing is believed for
 SURE = 1.5
 MOST_PASSES = 60
@@ -85,7 +86,9 @@ class FaintSearch:
 
     def plan(self) -> Plan:
         """Make the sweeps; the outcome's value is a CloserLook."""
-        look = _Look(self.survey.base, self.noise, self.limit, self.false_alarms_per_metre, learnt=not self.learns)
+        look = SweepBySweep(
+            self.survey.base, self.noise, self.limit, self.false_alarms_per_metre, learnt=not self.learns
+        )
         planned = self._planned(self.limit)
         yield from self._sweep(planned, look)
         look.learn()
@@ -111,48 +114,10 @@ class FaintSearch:
     def _planned(self, limit: float) -> int:
         return max(2, int(np.ceil(LEADS * self._needed(limit))))
 
-    def _sweep(self, crossings: int, look: _Look) -> Plan:
+    def _sweep(self, crossings: int, look: SweepBySweep) -> Plan:
         for move in replace(self.survey, crossings=crossings).sweeps():
             look.take((yield move))
         return Outcome("done")
-
-
-@dataclass
-class _Look:
-    """A closer survey under way: what was felt, and what each sweep shows by itself.
-
-    Sweeps are looked at one by one, so that the finger need not wait for all of them in the end. The survey before
-    told the noise from a short path; the first sweeps tell it better.
-    """
-
-    base: Base
-    noise: Noise
-    limit: float
-    false_alarms_per_metre: float
-    learnt: bool
-    felt: list[Trace] = field(default_factory=list)
-    seen: list[Detections] = field(default_factory=list)
-
-    def take(self, trace: Trace) -> None:
-        """Look at a sweep's trace, if it touched anything."""
-        if len(trace) == 0:
-            return
-        self.felt.append(trace)
-        self.seen.append(self._detected(trace, self.noise))
-        if not self.learnt and sum(part.inspected_length for part in self.seen) > LEARNING * trace.tip_radius:
-            self.learn()
-
-    def learn(self) -> None:
-        """The noise from all that was felt so far, and what that shows; once is enough."""
-        if self.learnt or not self.felt:
-            return
-        together = self._detected(Trace.concatenate(self.felt), None)
-        if together.inspected_length > 0.0:
-            self.noise, self.limit, self.seen = together.noise, together.detection_limit, [together]
-        self.learnt = True
-
-    def _detected(self, trace: Trace, noise: Noise | None) -> Detections:
-        return detect(trace, self.base, noise=noise, false_alarms_per_metre=self.false_alarms_per_metre)
 
 
 def lead(line: Feature, seen: Detections, base: Base, tip_radius: float) -> FaintLead:
