@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,9 +50,31 @@ def way_from(i: int, first: int, tree: Tree, points: FloatArray, reach: float) -
 
 
 def _passes(i: int, tied: int, tree: Tree, points: FloatArray, half_width: float) -> bool:
+    """True if a line goes straight on through a point, or close beside it, past its link to another one."""
+    others = sorted(tree[i] - {tied})
+    close = [near for near in others if np.linalg.norm(points[near] - points[i]) < half_width]
+    return (
+        _goes_on(i, tied, tree, points, half_width)
+        or any(_goes_on(near, i, tree, points, half_width) for near in close)
+        or any(_goes_beside(i, *pair, tree, points, half_width) for pair in permutations(others, 2))
+    )
+
+
+def _goes_on(i: int, tied: int, tree: Tree, points: FloatArray, half_width: float) -> bool:
     """True if a line goes straight on through a point, past its link to another one."""
     ways = [way_from(i, near, tree, points, half_width) for near in sorted(tree[i]) if near != tied]
     return any(float(a @ b) < STRAIGHT_PAST for a, b in combinations(ways, 2))
+
+
+def _goes_beside(i: int, first: int, last: int, tree: Tree, points: FloatArray, half_width: float) -> bool:
+    """True if a line goes straight on from one neighbour of a point to another, the point lying off it by chance."""
+    leg = points[last] - points[first]
+    leg = leg / max(float(np.linalg.norm(leg)), np.finfo(float).tiny)
+    off = points[i] - points[first]
+    if np.linalg.norm(off - (off @ leg) * leg) > half_width:
+        return False
+    before = [way_from(first, near, tree, points, half_width) for near in tree[first] if near != i]
+    return any(float(way @ leg) < STRAIGHT_PAST for way in before)
 
 
 def _turns_back(i: int, tied: int, tree: Tree, points: FloatArray, half_width: float) -> bool:

@@ -10,7 +10,7 @@ from mapping.noise import Noise
 from mapping.trace import Trace
 
 # Path that tells the noise, in tip radii
-LEARNING = 500.0
+LEARNING = 200.0
 
 
 @dataclass

@@ -47,3 +47,11 @@ def test_a_link_that_turns_back_from_the_end_of_a_line_to_its_neighbour_is_a_tie
     assert len(untied(chain, np.concatenate([lower, upper]), WIDE)) == 2
     away = {**chain, 3: {2, 8}, 6: {5, 7}, 8: {7, 3}}
     assert len(untied(away, np.concatenate([lower, upper]), WIDE)) == 1, "a line that goes on to the other's end is not"
+
+
+def test_a_stray_between_two_lines_does_not_tie_them() -> None:
+    # one hangs on its line; the other is a point of it
+    for stray, xs in (([20.5, 2.2], np.arange(-29.0, 30.0, 5.5)), ([21.5, 5.9], np.array([10.0, 15.0, 20.8, 26.3]))):
+        points = np.concatenate([LOWER, 1e-3 * np.array([[*stray, 0.0]]), row(8, xs)])
+        assert trees(points) == 2
+        assert all(line.free == (True, True) for line in branches(points, WIDE))
