@@ -20,6 +20,9 @@ from mapping.trace_noise import noise_of_trace
 
 FloatArray = NDArray[np.float64]
 
+# What fewer crossings show may be false, and would take its part of a true neighbour's trace and live on that
+CERTAIN = 3
+
 
 def refine_all(
     features: Sequence[Feature],
@@ -34,8 +37,10 @@ def refine_all(
 ) -> tuple[Feature, ...]:
     """The features with their posteriors, each beside the others as well as they are known by then.
 
-    Where the disturbances of two overlap, each is laid out first by the optimum of its posterior: what is a neighbour's
-    and what its own depends on both. Lines that meet end in one place, which the courses of all of them tell.
+    Where the disturbances of two that several sweeps saw overlap, both are laid out first by the optima of their
+    posteriors: what is a neighbour's and what its own depends on both. What fewer sweeps saw is judged beside them, and
+    counts as their neighbour only if it is likely then. Lines that meet end in one place, which the courses of all of
+    them tell.
 
     Args:
         features: as detected.
@@ -51,41 +56,40 @@ def refine_all(
     noise = noise or noise_of_trace(trace, base)
     half_widths = [sizes_of(feature, tip).half_width for feature in features]
     met = meetings(features, half_widths)
-    detected, known = list(features), list(features)
-    crowded = _overlapping(features, half_widths)
-    for k in crowded:
-        known[k] = settle(detected[k], Surroundings(trace, base, noise, _others(known, k), tip_sd))
+    beside = _beside(features, half_widths)
+    certain = [k for k, feature in enumerate(features) if feature.evidence.crossings >= CERTAIN]
+    doubtful = [k for k in range(len(features)) if k not in certain]
+    known = list(features)
+    for k in certain:
+        if beside[k].intersection(certain):
+            around = Surroundings(trace, base, noise, [known[m] for m in certain if m != k], tip_sd)
+            known[k] = settle(features[k], around)
     known = brought_together(known, met, half_widths, base, tip)
-    detected = _begun_at(detected, known, met)
-    for k, feature in enumerate(detected):
-        known[k] = refine(
-            feature,
-            trace,
-            np.random.default_rng([seed, k]),
-            base=base,
-            noise=noise,
-            others=_others(known, k),
-            tip_sd=tip_sd,
-            confirm=confirm,
-        )
-        progress((k + 1) / len(detected))
+    detected = _begun_at(features, known, met)
+
+    def refined(k: int, others: Sequence[int]) -> Feature:
+        near, rng = [known[m] for m in others if m != k], np.random.default_rng([seed, k])
+        return refine(detected[k], trace, rng, base=base, noise=noise, others=near, tip_sd=tip_sd, confirm=confirm)
+
+    for done, k in enumerate([*certain, *doubtful]):
+        known[k] = refined(k, certain if k in certain else range(len(features)))
+        progress((done + 1) / len(features))
+    true = [k for k in range(len(features)) if known[k].evidence.likely]
+    for k in certain:
+        if beside[k].intersection(true, doubtful):
+            known[k] = refined(k, true)
     return tuple(brought_together(known, met, half_widths, base, tip))
 
 
-def _others(features: Sequence[Feature], number: int) -> list[Feature]:
-    return [feature for k, feature in enumerate(features) if k != number]
-
-
-def _overlapping(features: Sequence[Feature], half_widths: Sequence[float]) -> list[int]:
-    """Numbers of the features whose disturbance touches another's."""
+def _beside(features: Sequence[Feature], half_widths: Sequence[float]) -> list[set[int]]:
+    """For each feature the numbers of those whose disturbances touch its own."""
     return [
-        k
-        for k, feature in enumerate(features)
-        if any(
-            distances(feature.axis, other.axis).min() < half_widths[k] + half_widths[m]
+        {
+            m
             for m, other in enumerate(features)
-            if m != k
-        )
+            if m != k and distances(feature.axis, other.axis).min() < half_widths[k] + half_widths[m]
+        }
+        for k, feature in enumerate(features)
     ]
 
 

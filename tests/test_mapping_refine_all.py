@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from recorded_features import D, feature, line, plate, record, wire
+from recorded_features import CROSSINGS, ENDS, SLIDES, D, feature, line, plate, record, wire
 
 from mapping.meeting import JUNCTION
 from mapping.noise import Noise
@@ -75,6 +75,16 @@ def test_features_far_from_each_other_are_refined_each_for_itself():
         confirm=False,
     )
     assert np.array_equal(both[1].posterior.samples, alone.posterior.samples)
+
+
+def test_a_false_detail_beyond_the_end_of_a_ridge_takes_nothing_of_it():
+    trace = record(CROSSINGS + SLIDES, wire(ENDS), NOISE)
+    end = np.array([16e-3, -0.2e-3, 0.0])
+    ridge = feature("ridge", [(-15e-3, 0.3e-3, 0.0), end - np.array([1.2e-3, 0.0, 0.0])], D, D, 6)
+    false = feature("bump", end + np.array([5e-3, 0.5e-3, 0.0]), 0.2e-3, 3e-3, 1)
+    found = refine_all([ridge, false], trace, 0, base=plate(), noise=NOISE, confirm=False)
+    np.testing.assert_allclose(found[0].axis[-1], end, atol=0.12e-3)
+    assert found[0].evidence.likely and not found[1].evidence.likely
 
 
 def test_nothing_detected_is_nothing_refined():
