@@ -67,7 +67,7 @@ def _panel(axes: Any, feature: Feature, true: FloatArray | None) -> None:
     axes.set_title(f"{feature.id}: {_worst(feature, sd)}", fontweight="bold")
     axes.set_xlabel(f"along ({x_name})")
     axes.set_ylabel(f"across ({y_name})")
-    axes.legend(loc="best", fontsize=7)
+    axes.legend(loc="best", fontsize=7, frameon=True, facecolor="white", edgecolor="none", framealpha=0.8)
 
 
 def _end(axes: Any, feature: Feature, end: int, direction: float, place: tuple[float, float], factor: float) -> None:
