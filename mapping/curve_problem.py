@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mapping.chart import Chart, chart_along
 from mapping.curve_modes import CurveModes
-from mapping.development import smooth_on_base
+from mapping.development import normals_along, smooth_on_base
 from mapping.feature import Feature
 from mapping.hollow_shape import GrooveShape
 from mapping.laplace import find_optima
@@ -46,7 +46,7 @@ def curve_problem(feature: Feature, around: Surroundings) -> Problem:
         line, degree = smooth_on_base(
             axis, normals, sizes.position_sd, most, least, around.base, around.trace.tip_radius, sizes.half_width
         )
-        chart = _chart(line, _normals_along(line, axis, normals), feature, sizes, crossings, degree, around)
+        chart = _chart(line, normals_along(line, axis, normals), feature, sizes, crossings, degree, around)
         ends = chart.coordinates(axis[[0, -1]])[0]
         modes = _modes(chart, ends, degree, crossings, sizes)
         limits = _end_limits(axis, chart, ends, feature, sizes, around)
@@ -85,12 +85,6 @@ def _axis_of(feature: Feature, sizes: Sizes, around: Surroundings) -> tuple[Floa
     across = np.cross(normals[0], window.tangents[nearest])
     half = 0.5 * sizes.half_width * across / max(float(np.linalg.norm(across)), np.finfo(float).tiny)
     return np.stack([axis[0] - half, axis[0] + half]), np.repeat(normals[:1], 2, axis=0), 1
-
-
-def _normals_along(line: FloatArray, axis: FloatArray, normals: FloatArray) -> FloatArray:
-    from scipy.spatial import cKDTree
-
-    return np.asarray(normals[cKDTree(axis).query(line)[1]])
 
 
 def _chart(

@@ -93,7 +93,7 @@ def smooth_on_base(
     count = int(np.clip(np.ceil(DENSE * arclengths(line)[-1] / half_width), FEWEST, MOST))
     for _ in range(ROUNDS):
         dense = resample(line, count)
-        points, lift = onto_base(dense, _nearest(dense, axis, normals), base, tip_radius)
+        points, lift = onto_base(dense, normals_along(dense, axis, normals), base, tip_radius)
         # the ball itself would rest on a fold while its foot goes from one side to the other
         up = base.foot(points + CLOSE * tip_radius * lift, tip_radius).normals
         if np.ptp(up, axis=0).max() < PLANE:
@@ -122,7 +122,8 @@ def _smoothed(
     return points + shift[:, None] * aside, degree
 
 
-def _nearest(points: FloatArray, axis: FloatArray, normals: FloatArray) -> FloatArray:
+def normals_along(points: FloatArray, axis: FloatArray, normals: FloatArray) -> FloatArray:
+    """(N, 3) for points (N, 3) the normals (K, 3) of the nearest points of an axis (K, 3)."""
     from scipy.spatial import cKDTree
 
     return np.asarray(normals[cKDTree(axis).query(points)[1]])

@@ -160,9 +160,9 @@ def _ended_at(
     spread = QUANTILE * float(np.sqrt(way @ covariance @ way))
     extra, length = _measured(feature, end, points, spread)
     notes = with_open_ends(feature.notes, extra.get("ends_seen", (True, True)))
-    if "axis_sd" in extra:
-        sd = np.asarray(extra["axis_sd"], dtype=np.float64)[order]
-        extra["axis_sd"] = np.interp(along, np.arange(len(axis)), sd)[order].tolist() if len(sd) == len(axis) else sd
+    sd = np.asarray(extra.get("axis_sd", ()), dtype=np.float64)[order]
+    if len(sd) == len(axis):
+        extra["axis_sd"] = np.interp(along, np.arange(len(axis)), sd)[order].tolist()
     return replace(feature, axis=points[order], normals=normals[order], length=length, extra=extra, notes=notes)
 
 
