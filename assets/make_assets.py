@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from triangles import FloatArray, Mesh, dome, grid_faces, height_field, together, tube, walls, welded, write_ply
+from triangles import Mesh, dome, grid_faces, height_field, together, tube, walls, welded, write_ply
+
+from mapping.arrays import FloatArray
 
 Sizes = dict[str, Any]
 FOLDER = Path(__file__).resolve().parent

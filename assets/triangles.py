@@ -6,10 +6,9 @@ import itertools
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from mapping.arrays import FloatArray, IntArray
+
 Mesh = tuple[FloatArray, IntArray]
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mapping.base import Base
-from mapping.left_out import LeftOut
+from mapping.feature import LeftOut
 from mapping.object_model import ObjectModel
 from mapping.trace import Trace
 

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from explore3d.analysis import Analysis
-from explore3d.base_record import read_base
 from explore3d.build_model import build_model
-from explore3d.forecast import Forecast, forecast, worst_errors
+from explore3d.conclude import conclude
 from explore3d.load_logs import load_logs
 from explore3d.log_stream import large_log
 from explore3d.meshes import load_mesh
-from explore3d.recording import Log
-from explore3d.scene import Scene, parse_scene
+from explore3d.recording import read_base
+from explore3d.scene import parse_scene
 from explore3d.session import Session
 from explore3d.stages import Progress, Stages, silent
 from explore3d.units import parse_length
@@ -64,19 +62,3 @@ def analyze(
         return build_model(log, scene, base, stages)
     with Session(out, keep=log.sources) as session:
         return conclude(session, log, scene, base, stages)
-
-
-def conclude(session: Session, log: Log, scene: Scene | None, base: Base | None, stages: Stages) -> Analysis:
-    """Build the model of a log and write it, with its pictures and report, into a session's folder."""
-    from explore3d.report import write_report
-
-    analysis = build_model(log, scene, base, stages)
-    with session.staging() as folder:
-        with stages.stage("report"):
-            write_report(analysis, folder, stages.is_forced("rendered pictures"))
-        about = {"forecast": forecast(analysis), "errors": worst_errors(analysis.errors)}
-        known = {name: each.record() if isinstance(each, Forecast) else each for name, each in about.items() if each}
-        provenance = analysis.model.provenance | known
-        model = replace(analysis.model, provenance=provenance, timings=dict(stages.timings))
-        model.save(folder)
-    return replace(analysis, model=model, timings=dict(stages.timings))

@@ -14,18 +14,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.bench_bodies import joined, tube
 from explore3d.figure import BAND, ESTIMATED, FAINT, INK, MUTED, TRACED, TRUTH, new_figure, png, styled
 from hw.moves import Move
 from hw.simulated import SimulatedFinger
 from mapping.algorithms import along_chord, curvature_profile
+from mapping.arrays import FloatArray
 from mapping.surface import Surface
 from mapping.trace import Trace
 from mapping.whole_file import write_whole
-
-FloatArray = NDArray[np.float64]
 
 TIP, RATE, SPEED, FORCE = 10e-3, 5000.0, 0.03, 1.0
 CENTRE, CONTACT, ANGLE = 0.2e-3, 0.5e-3, np.radians(1.0)

@@ -6,26 +6,16 @@ import csv
 import io
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
 
 from explore3d.bench_picture import diagram
 from explore3d.page import machine
-from explore3d.work_precision import Omission, Point, Stage
+from explore3d.work_precision import Measured, Omission, Point, Stage
 from mapping.whole_file import write_whole
 
 PAGE = "bench.html"
-
-
-@dataclass(frozen=True)
-class Measured:
-    """A stage and what came of it; `seconds` is what measuring it took."""
-
-    stage: Stage
-    points: tuple[Point, ...]
-    omissions: tuple[Omission, ...]
-    seconds: float
 
 
 def stages() -> tuple[Stage, ...]:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.surface import Surface
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Mesh = tuple[FloatArray, IntArray]
 
 

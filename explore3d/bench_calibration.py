@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from explore3d.bench_noise import SPACING, simulate_noise
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.feature import Evidence, Feature, Interval
 from mapping.noise import Noise
@@ -31,10 +32,7 @@ from mapping.shapes import chain_height, groove_height, rim_height, step_height
 from mapping.surface import Surface
 from mapping.trace import Trace
 
-FloatArray = NDArray[np.float64]
-
 TIP_RADIUS = 10e-3
-SPACING = 6e-6
 # Wire of the paper; the other features are of sizes that the same tip feels about as well.
 HEIGHT = 0.65e-3
 NOISES = ("white", "ell 0.3 mm", "ell 1 mm", "ell 3 mm", "low white")
@@ -145,20 +143,6 @@ def record(paths: list[FloatArray], heights: FloatArray) -> Trace:
     centers[:, 2] += TIP_RADIUS + heights
     sweep = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
     return Trace(2e-4 * np.arange(float(len(centers))), centers, sweep, TIP_RADIUS)
-
-
-def simulate_noise(noise: Noise, paths: list[FloatArray], rng: np.random.Generator) -> FloatArray:
-    """(N,) white plus Ornstein-Uhlenbeck noise along each path, m."""
-    from scipy.signal import lfilter
-
-    parts = []
-    for path in paths:
-        white = noise.white * rng.standard_normal(len(path))
-        keep = np.exp(-SPACING / noise.length)
-        kicks = np.sqrt(1.0 - keep**2) * rng.standard_normal(len(path))
-        kicks[0] = rng.standard_normal()
-        parts.append(white + noise.correlated * lfilter([1.0], [1.0, -keep], kicks))
-    return np.concatenate(parts)
 
 
 def _with_priors(problem: Problem) -> Problem:

@@ -16,20 +16,18 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.bench_classify_scenes import BODIES, MIDDLE, WINDOW
 from explore3d.truth import Comparison, TrueFeature, compare
 from hw.moves import Move
 from hw.noise_source import NoiseSource
 from hw.simulated import SimulatedFinger
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.feature import Feature
 from mapping.object_model import ObjectModel
 from mapping.trace import Trace
 from planners.strokes import Strokes
-
-FloatArray = NDArray[np.float64]
 
 TIP_RADIUS, RATE, SPEED = 0.01, 5000.0, 0.03
 PITCH = 4e-3

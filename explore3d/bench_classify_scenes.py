@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.bench_bodies import Mesh, folded, joined, plate
 from explore3d.bench_scenes import LONG, SHORT, UP, WIRE, BenchScene, wires
 from explore3d.truth import TrueFeature
+from mapping.arrays import FloatArray
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 MIDDLE = np.zeros(3)
 # Half of the side of the square that the sweeps inspect, m.

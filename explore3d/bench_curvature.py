@@ -15,16 +15,13 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.bench_trace import bump_mesh
+from mapping.arrays import BoolArray, FloatArray
 from mapping.bump_of_revolution import BumpOfRevolution
-from mapping.curvature import principal_curvatures
+from mapping.principal_curvatures import principal_curvatures
 from mapping.surface import Surface
 from mapping.whole_file import write_whole
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 # Both bodies measure 2 across; noise is isotropic and given as a share of that.
 SIZE = 2.0

@@ -20,9 +20,8 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from explore3d.bench_calibration import SPACING, simulate_noise
+from explore3d.bench_noise import SPACING, simulate_noise
 from mapping.algorithms import curvature_features
 from mapping.base import Base
 from mapping.detectors import detect
@@ -31,8 +30,6 @@ from mapping.shapes import cap_height, groove_height
 from mapping.stated_noise import StatedNoise
 from mapping.surface import Surface
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 TIP = 0.01
 LENGTH = 0.1

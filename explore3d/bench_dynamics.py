@@ -6,11 +6,9 @@ import time
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.dynamics import Dynamics
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 SPEED, TIP, WIRE = 0.03, 0.01, 0.65e-3
 

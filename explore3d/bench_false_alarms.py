@@ -18,18 +18,16 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from explore3d.bench_calibration import SPACING, simulate_noise
 from explore3d.bench_detect import plate
+from explore3d.bench_noise import SPACING, simulate_noise
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.contact import BallContact
 from mapping.detectors import detect
 from mapping.noise import Noise
 from mapping.surface import Surface
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 TIP = 0.01
 # Enough to be counted: a hundred times the paper's.

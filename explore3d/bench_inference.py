@@ -7,12 +7,12 @@ from functools import partial
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.bench_posterior import DIAMETER, NOISE, crossings
 from explore3d.stability_traces import plate, sweeps, wire
 from explore3d.work_precision import Omission, Point, Stage, timed
 from mapping.algorithms import along_chord, curvature_features
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.detectors import detect
 from mapping.feature import Feature
@@ -21,7 +21,6 @@ from mapping.refine import pose_problem, sample_posterior
 from mapping.trace import Trace
 
 Result = list[Point | Omission]
-FloatArray = NDArray[np.float64]
 
 WHITE = 0.2e-3
 PLACES = np.linspace(-40e-3, 40e-3, 21)

@@ -10,17 +10,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from explore3d.base_record import KIND, base_event
 from explore3d.log import LogWriter
+from explore3d.recording import KIND, base_event
 from hw.moves import Move
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.shapes import chain_height
 from mapping.surface import Surface
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 TIP_RADIUS = 10e-3
 RADIUS = 0.325e-3  # of the wires

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.bench_calibration import plate, record, straight_path
+from mapping.arrays import FloatArray
 from mapping.broken_ridge_shape import BrokenRidgeShape
 from mapping.bump_shape import BumpShape
 from mapping.evidence import log_evidence, log_evidence_of_nothing
@@ -28,8 +28,6 @@ from mapping.kind_odds import as_broken, as_bump
 from mapping.noise import Noise
 from mapping.problem import Problem, Surroundings
 from mapping.refine import pose_problem
-
-FloatArray = NDArray[np.float64]
 
 # So low that most of what the priors hold is not plain to see.
 HEIGHT = 0.04e-3

@@ -10,7 +10,7 @@ from explore3d.page import machine_section, page
 from explore3d.work_precision import Omission, Point
 
 if TYPE_CHECKING:
-    from explore3d.bench import Measured
+    from explore3d.work_precision import Measured
 
 LEAD = (
     "A round fingertip slides over a body and has to find what is finer than itself. Every step on the way trades time "

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from explore3d.figure import DPI, ESTIMATED, MUTED, TRUTH, new_figure, styled
-from explore3d.quantity import length_text
+from explore3d.units import length_text
 from explore3d.work_precision import Point, Stage
 
 COLOURS = (ESTIMATED, "#1d4e89", TRUTH, "#b7791f", "#6b46c1", MUTED, "#0e7490", "#9d174d")

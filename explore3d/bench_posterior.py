@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d.bench_calibration import SPACING, simulate_noise
+from explore3d.bench_noise import SPACING, simulate_noise
 from mapping.base import Base
 from mapping.feature import Evidence, Feature, Interval
 from mapping.noise import Noise

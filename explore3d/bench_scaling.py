@@ -18,9 +18,8 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 AXES = ("samples", "triangles", "features")
 SAMPLES = (10_000, 100_000, 1_000_000, 3_000_000, 10_000_000)

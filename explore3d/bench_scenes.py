@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.bench_bodies import (
     Mesh,
@@ -21,10 +20,9 @@ from explore3d.bench_bodies import (
     tube,
 )
 from explore3d.truth import TrueFeature
+from mapping.arrays import FloatArray
 from mapping.surface import Surface
 from planners.discover import SIDES
-
-FloatArray = NDArray[np.float64]
 
 WIRE = 0.65e-3
 UP = np.array([0.0, 0.0, 1.0])

@@ -8,21 +8,21 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.bench_trace import bump_mesh
 from explore3d.stability_traces import DIAMETER, TIP, sweeps, wire
 from explore3d.work_precision import Omission, Point, Stage, timed
+from mapping.arrays import FloatArray
 from mapping.bump_of_revolution import BumpOfRevolution
 from mapping.contact import BallContact
-from mapping.curvature import principal_curvatures
 from mapping.envelope import estimate_surface
-from mapping.estimate import EXTRAPOLATED, Estimate
+from mapping.estimate import Estimate
+from mapping.labels import EXTRAPOLATED
 from mapping.noise import Noise
+from mapping.principal_curvatures import principal_curvatures
 from mapping.surface import Surface
 from mapping.trace import Trace
 
-FloatArray = NDArray[np.float64]
 Result = list[Point | Omission]
 
 SHARPNESS, RADIUS = 15.0, 0.5

@@ -19,13 +19,11 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.errors import UserError
+from mapping.arrays import FloatArray, IntArray
 from mapping.contact import BallContact
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 STEEPNESS = 15.0  # a of the paper's bump, figure 3
 SIZE = 2.0  # side of the square under it
@@ -40,7 +38,7 @@ class Answers:
     """Heights (K,) of the ball centres, m, of queries `which` (K,), and processor time for all queries, s."""
 
     heights: FloatArray
-    which: NDArray[np.int64]
+    which: IntArray
     seconds: float
 
 
@@ -158,7 +156,7 @@ def _by_opencamlib(mesh: Surface, radius: float, start: FloatArray) -> Answers:
     floor = -10.0 * (SIZE + radius)
     cutter = ocl.BallCutter(2.0 * radius, -2.0 * floor)  # OpenCAMLib keeps no reference to it
 
-    def drop(which: NDArray[np.int64]) -> tuple[FloatArray, float]:
+    def drop(which: IntArray) -> tuple[FloatArray, float]:
         begin = process_time()
         batch = ocl.BatchDropCutter()
         batch.setThreads(1)
@@ -179,7 +177,7 @@ def _by_opencamlib(mesh: Surface, radius: float, start: FloatArray) -> Answers:
     return Answers(heights, which, seconds)
 
 
-def _spread(count: int, few: int) -> NDArray[np.int64]:
+def _spread(count: int, few: int) -> IntArray:
     """`few` of `count` indices, evenly spread but in no step with the rows of a grid."""
     return np.sort(np.random.default_rng(1).permutation(count)[:few])
 

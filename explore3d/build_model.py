@@ -10,16 +10,14 @@ import numpy as np
 
 from explore3d import __version__
 from explore3d.analysis import Analysis, TipCount
-from explore3d.base_reach import base_reach
-from explore3d.inspected import Inspected
+from explore3d.inspected import Inspected, base_reach
 from explore3d.leave_out import with_savings
 from explore3d.recording import Log
 from explore3d.settings import Settings
 from explore3d.stages import Stages
 from explore3d.truth import TrueFeature, compare
 from mapping.base import Base
-from mapping.feature import Feature
-from mapping.left_out import LeftOut
+from mapping.feature import Feature, LeftOut
 from mapping.object_model import ObjectModel
 from mapping.trace import Trace
 
@@ -246,7 +244,7 @@ def _curvature(estimate: Estimate | None, stages: Stages) -> Curvature | None:
         why_not = ""
     if not stages.needed("curvature", why_not, possible=False) or estimate is None or estimate.surface is None:
         return None
-    from mapping.curvature import principal_curvatures
+    from mapping.principal_curvatures import principal_curvatures
 
     with stages.stage("curvature"):
         return principal_curvatures(estimate.surface, noise=estimate.sd)

@@ -1,4 +1,7 @@
-"""calibrate, selftest: what a reference sphere says of the tip, its noise, and how well and fast it scans."""
+"""calibrate, selftest: what a reference sphere says of the tip, its noise, and how well and fast it scans.
+
+Sweeps over a reference sphere: the lines along which a tip is calibrated and a finger tested.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explore3d import __version__
 from explore3d.errors import UserError
-from explore3d.reference_sphere import meridians
 from explore3d.run import scene_finger
 from explore3d.scene import Scene, load_scene
 from explore3d.scene_text import scene_text
 from hw.grbl import GrblFinger
+from hw.moves import Move
 from mapping.tip_calibration import TipCalibration, calibrate_tip
 from mapping.trace import Trace
 
@@ -138,3 +142,32 @@ def _swept(finger: Any, scene: Scene, radius: float, center: tuple[float, float,
     speed = min(scene.survey.speed, finger.workspace.max_speed)
     moves = meridians(center, radius, scene.tip.radius, lines, speed=speed, force=scene.survey.force)
     return Trace.concatenate([finger.execute(move) for move in moves])
+
+
+def meridians(
+    center: ArrayLike,
+    radius: float,
+    tip_radius: float,
+    lines: int,
+    *,
+    reach: float = np.pi / 3,
+    speed: float = 0.03,
+    force: float = 1.0,
+) -> list[Move]:
+    """Sweeps from one side of a sphere over its top (+z) to the other.
+
+    Args:
+        center: (3,) of the sphere, m, object frame.
+        radius: of the sphere, m.
+        lines: how many, evenly turned about z.
+        reach: how far down they go from the top, rad.
+    """
+    angle = np.linspace(-reach, reach, 121)
+    moves = []
+    for number in range(lines):
+        turn = np.pi * number / lines
+        unit = np.column_stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)])
+        unit = unit if number % 2 == 0 else unit[::-1]
+        path = np.asarray(center) + (radius + 0.98 * tip_radius) * unit
+        moves.append(Move(path, -unit, speed=speed, force=force))
+    return moves

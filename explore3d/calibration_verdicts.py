@@ -9,12 +9,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.bench_calibration import KINDS, NOISES, Row
+from mapping.arrays import FloatArray
 from mapping.whole_file import write_whole
-
-FloatArray = NDArray[np.float64]
 
 BINS = 10
 

@@ -11,12 +11,12 @@ import typer
 from explore3d import __version__
 from explore3d.cli_analyze import analyze
 from explore3d.cli_bench import bench
-from explore3d.cli_doctor import doctor
 from explore3d.cli_figures import figures
 from explore3d.cli_hw import calibrate, emulate, reprobe, selftest
 from explore3d.cli_merge import merge
 from explore3d.cli_run import plan, run
 from explore3d.cli_stability import stability
+from explore3d.doctor import doctor
 
 ABOUT = "Find, follow and measure surface features that are finer than the fingertip that touches them."
 

@@ -32,8 +32,9 @@ def all_stages(
     """
     if context.invoked_subcommand is not None:
         return
-    from explore3d.bench import Measured, summary, write
     from explore3d.bench import bench as run
+    from explore3d.bench import summary, write
+    from explore3d.work_precision import Measured
 
     def told(each: Measured) -> None:
         print(f"{each.stage.name:20}{len(each.points):4} points{each.seconds:8.1f} s", flush=True)

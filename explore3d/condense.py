@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d import __version__
 from explore3d.log_stream import LogStream, count_samples
 from explore3d.recording import Event
+from mapping.arrays import BoolArray
 from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.detectors import Detections, detect
@@ -125,7 +125,7 @@ def _condensed(trace: Trace, base: Base, every: int, settings: dict[str, Any]) -
     return Condensed(trace.select(index), placed, len(trace))
 
 
-def _kept(trace: Trace, crossings: tuple[Crossing, ...], every: int) -> NDArray[np.bool_]:
+def _kept(trace: Trace, crossings: tuple[Crossing, ...], every: int) -> BoolArray:
     """(N,) every k-th sample, and all within reach of a crossing, of its own sweep or another."""
     keep = np.zeros(len(trace), dtype=bool)
     keep[::every] = True

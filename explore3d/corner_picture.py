@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.figure import BAND, ESTIMATED, INK, new_figure, png, styled
-from explore3d.quantity import length_unit
+from explore3d.units import length_unit
+from mapping.arrays import FloatArray
 from mapping.feature import Feature
 from mapping.posterior import Posterior
-
-FloatArray = NDArray[np.float64]
 
 BINS = 24
 # Shares of the draws inside the drawn contours.

@@ -6,18 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.base import Base
 from mapping.crossing import Crossing
-from mapping.estimate import BRIDGED, Estimate
+from mapping.estimate import Estimate
 from mapping.feature import Feature, Interval
 from mapping.feature_trace import feature_trace
+from mapping.labels import BRIDGED
 from mapping.polyline import directions, middle, nearest_on
 from mapping.shapes import step_height
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 # The section reaches so many half-widths of the disturbance to either side.
 REACH = 2.4
@@ -54,7 +53,7 @@ class CrossSection:
     high: FloatArray
     body_x: FloatArray
     body_z: FloatArray
-    bridged: NDArray[np.bool_]
+    bridged: BoolArray
     across: bool
 
 
@@ -130,7 +129,7 @@ def _nearest_crossing(feature: Feature, tip_radius: float, crossings: Sequence[C
     return min(close, key=lambda crossing: float(np.linalg.norm(crossing.point - reference)), default=None)
 
 
-def _window(feature: Feature, crossing: Crossing | None, trace: Trace) -> NDArray[np.int64]:
+def _window(feature: Feature, crossing: Crossing | None, trace: Trace) -> IntArray:
     """Samples of the sweep around the crossing; without one, of the sweep that passes nearest to the middle."""
     if crossing is None:
         above = middle(feature.axis)[0] + trace.tip_radius * feature.normals[len(feature.axis) // 2]
@@ -221,7 +220,7 @@ def _binned(x: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 def _body(
     feature: Feature, sweep: int, half: float, estimate: Estimate | None, base: Base, tip_radius: float
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+) -> tuple[FloatArray, FloatArray, BoolArray]:
     """The estimated surface along the sweep: places, heights over the base, and where it was bridged."""
     if estimate is None:
         return np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool)

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.figure import png, styled
 from explore3d.object_picture import SUPERSAMPLING, cameras_for, panels_for, view_directions
 from explore3d.raycast import Body, render
+from mapping.arrays import BoolArray, FloatArray
 from mapping.surface import Surface
 
 if TYPE_CHECKING:
     from mapping.curvature import Curvature
-
-FloatArray = NDArray[np.float64]
 
 # Values within so many standard deviations of zero are drawn flat: their colour would be noise.
 SIGNIFICANT = 3.0
@@ -58,7 +56,7 @@ def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float)
         return png(figure)
 
 
-def _span(values: list[FloatArray], valid: NDArray[np.bool_]) -> tuple[float, float]:
+def _span(values: list[FloatArray], valid: BoolArray) -> tuple[float, float]:
     """A symmetric range that 99 % of the values fit in, at most twice the tip's own curvature."""
     known = np.concatenate([each[valid] for each in values])
     known = known[np.isfinite(known)]

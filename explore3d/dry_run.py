@@ -58,7 +58,7 @@ class DryRun:
 
     def lines(self) -> list[str]:
         """The plan in words."""
-        from explore3d.quantity import count_text, length_text, seconds_text
+        from explore3d.units import count_text, length_text, seconds_text
 
         sweeps = count_text(sum(move.purpose == "sweep" for move in self.moves), "sweep")
         first = f"{sweeps}, {length_text(self.metres)} of finger path, {seconds_text(self.seconds)}"

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from explore3d.figure import ESTIMATED, INK, MUTED, TRUTH, new_figure, png, styled
-from explore3d.quantity import length_unit
 from explore3d.truth import Comparison
+from explore3d.units import length_unit
 
 QUANTITIES = ("height", "width", "length")
 

@@ -19,3 +19,7 @@ class MeshFileError(UserError):
 
 class FolderError(UserError):
     """An output folder that cannot be written."""
+
+
+class PointCloudError(ValueError):
+    """Bytes that are not a foxglove.PointCloud message."""

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from explore3d.base_record import KIND, base_event
 from explore3d.errors import SceneError
 from explore3d.log import LogWriter
+from explore3d.recording import KIND, base_event
 from hw.finger import Finger
 from hw.moves import Move
 from mapping.base import Base

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.figure import BAND, ESTIMATED, INK, TRUTH, new_figure, png, styled
-from explore3d.quantity import length_text, length_unit
+from explore3d.units import length_text, length_unit
+from mapping.arrays import FloatArray
 from mapping.feature import Feature
 from mapping.polyline import arclengths
-
-FloatArray = NDArray[np.float64]
 
 COLUMNS = 2
 QUANTILE = 1.6448536

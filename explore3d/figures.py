@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.figure import BAND, ESTIMATED, FAINT, INK, MUTED, TRACED, TRUTH, new_figure, png, styled
+from mapping.arrays import FloatArray
 from mapping.bump_of_revolution import BumpOfRevolution
 from mapping.trace import Trace
 from mapping.whole_file import write_whole
-
-FloatArray = NDArray[np.float64]
 
 # The paper's bump and tip (figure 3), in units of the bump's height; variance 0.01 is that of its section 4.1.
 BUMP, TIP = BumpOfRevolution(15.0), 1.0

@@ -6,7 +6,7 @@ from math import isfinite
 from pathlib import Path
 
 from explore3d.analysis import Analysis
-from explore3d.quantity import count_text, interval_text, length_text
+from explore3d.units import count_text, interval_text, length_text
 from mapping.feature import Feature, Interval
 
 MOST = 20  # features that are listed one by one; the report has them all

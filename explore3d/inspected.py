@@ -1,4 +1,7 @@
-"""Inspected: which faces of the base are free of features above which height, and with which probability."""
+"""Inspected: which faces of the base are free of features above which height, and with which probability.
+
+The certainty map of the base: which of its vertices the ball touched, bridged, or never came near.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.cells import Cells
 from mapping.detectors import Detections
+from mapping.estimate import Estimate
+from mapping.labels import EXTRAPOLATED
+from mapping.surface import Surface
 from mapping.trace import Trace
 from planners.coverage import found_heights
-
-FloatArray = NDArray[np.float64]
 
 CELLS = 20_000
 # Heights that the record states the inspected share for, in detection limits
@@ -75,7 +79,7 @@ class Inspected:
 
     def sentence(self) -> str:
         """The same for people."""
-        from explore3d.quantity import length_text
+        from explore3d.units import length_text
 
         height = self.limit if self.asked is None else self.asked
         if not np.isfinite(height):
@@ -87,3 +91,20 @@ class Inspected:
         if self.untouched > 5e-4:
             sentence += f" No sweep came near {100 * self.untouched:.1f} % of it."
         return sentence
+
+
+# A vertex takes the label of the nearest estimated point within this many distances between points or sweeps.
+NEAR = 3.0
+
+
+def base_reach(surface: Surface, estimate: Estimate) -> FloatArray:
+    """(V,) label of each vertex (mapping.estimate): that of the nearest estimated point, EXTRAPOLATED far from any."""
+    from scipy.spatial import cKDTree
+
+    from mapping.sweep_rows import pitch
+
+    tree = cKDTree(estimate.points)
+    apart = np.asarray(tree.query(estimate.points, k=[2])[0])
+    reach = NEAR * max(float(np.median(apart)), pitch(estimate.points, estimate.sweep))
+    distance, nearest = tree.query(surface.vertices)
+    return np.where(distance <= reach, estimate.labels[nearest].astype(np.float64), float(EXTRAPOLATED))

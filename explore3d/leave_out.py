@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from explore3d.quantity import seconds_text
-from mapping.left_out import LeftOut
+from explore3d.units import seconds_text
+from mapping.feature import LeftOut
 
 if TYPE_CHECKING:
     from explore3d.scene import Scene

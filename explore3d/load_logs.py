@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from explore3d.errors import UserError
+from explore3d.log_format import LOG
 from explore3d.log_reader import is_log, read_log
 from explore3d.recording import Log, merge
-from explore3d.session import LOG
 from explore3d.units import parse_length
 
 

@@ -2,6 +2,8 @@
 
 Each `write` ends in a flush, so that a killed program loses nothing that `write` had returned from. Apart from
 `started` the writer looks at no clock: the same samples and metadata give the same bytes.
+
+Recorder: a log writer that remembers what it wrote, so that a run's analysis need not read the log again.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ import os
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +24,8 @@ from numpy.typing import NDArray
 
 from explore3d import log_format, point_cloud
 from explore3d.errors import UserError
+from explore3d.log_reader import Reading, as_log, note
+from explore3d.recording import Log
 from hw.moves import Move
 from mapping.trace import Trace
 
@@ -240,3 +245,34 @@ def _json(data: Any) -> str:
         raise TypeError(f"a log keeps JSON values; found {type(value).__name__}: {value!r}")
 
     return json.dumps(data, default=plain, allow_nan=False)
+
+
+_TOPICS = {name: topic for name, (topic, _) in log_format.EVENTS.items()}
+
+
+class Recorder(LogWriter):
+    """Writes like a LogWriter; what it wrote is held in memory as well."""
+
+    def __init__(self, path: Path | str, **settings: Any) -> None:
+        self._reading = Reading(Path(path), None, events=[])
+        self._traces: list[Trace] = []
+        super().__init__(path, **settings)
+
+    def write(self, move: Move, trace: Trace) -> None:
+        """Append a move and what it gave, as LogWriter.write does."""
+        super().write(move, trace)
+        if len(trace):
+            self._traces.append(trace)
+            self._reading.samples += len(trace)
+
+    def recorded(self) -> Log:
+        """What explore3d.log_reader.read_log would read from the closed file."""
+        trace = Trace.concatenate(self._traces)
+        resolution = float(self._reading.start["resolution"])
+        stated = trace if trace.resolution == resolution else replace(trace, resolution=resolution)
+        return as_log(stated, self._reading)
+
+    def _add(self, name: str, log_time: int, data: bytes) -> None:
+        super()._add(name, log_time, data)
+        if name in _TOPICS:
+            note(_TOPICS[name], data, self._reading)

@@ -111,3 +111,6 @@ PATH_SCHEMA = _schema(
     "Waypoints of the commanded move; the x axis of each pose is the direction of pressing.",
     {"timestamp": _STAMP, "frame_id": {"type": "string"}, "poses": {"type": "array", "items": _POSE}},
 )
+
+
+LOG = "log.mcap"

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from explore3d import log_format, point_cloud
 from explore3d.errors import UserError
 from explore3d.recording import Event, Log, merge
+from mapping.arrays import FloatArray
 from mapping.errors import TraceError
 from mapping.trace import Trace
 
@@ -213,7 +214,7 @@ def _need_start(reading: Reading) -> None:
 
 
 def _trace(batches: list[NDArray[np.void]], reading: Reading) -> Trace:
-    def column(names: Sequence[str]) -> NDArray[np.float64]:
+    def column(names: Sequence[str]) -> FloatArray:
         values, begin = np.empty((sum(map(len, batches)), len(names))), 0
         for batch in batches:
             for axis, name in enumerate(names):

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explore3d.errors import UserError
-from explore3d.log_format import SAMPLES_PER_MESSAGE, TRACE_TOPIC
+from explore3d.log_format import LOG, SAMPLES_PER_MESSAGE, TRACE_TOPIC
 from explore3d.log_reader import Reading, _batches, _loss, _trace, is_log
 from explore3d.recording import Event
-from explore3d.session import LOG
 from mapping.trace import Trace
 
 # Bytes of a sample in a log with positions alone: only where the log was never closed, and cannot say how many it holds

@@ -6,19 +6,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.camera import Camera
 from explore3d.figure import DPI, INK, new_figure, png, styled
-from explore3d.quantity import length_text
 from explore3d.raycast import Body, Picture, render
 from explore3d.sweep_paths import SweepPath, densified
+from explore3d.units import length_text
+from mapping.arrays import FloatArray
 from mapping.feature import Feature
 from mapping.feature_mesh import drawn_at_least, feature_mesh
 from mapping.model_glb import COLOURS, OTHER_COLOUR
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 # Width of a picture of one panel, and of each of two, pixels; and the most that a panel is high for its width.
 WIDTHS = {1: 1080, 2: 760}

@@ -15,9 +15,8 @@ from explore3d.object_picture import object_picture
 from explore3d.profile_picture import profile_picture
 from explore3d.section_picture import section_picture
 from explore3d.sweep_paths import SweepPath
-from mapping.feature import Feature
-from mapping.left_out import LeftOut
-from mapping.open3d_import import Open3DError
+from mapping.errors import Open3DError
+from mapping.feature import Feature, LeftOut
 
 # So many features get a panel of their own.
 MOST_SECTIONS = 12

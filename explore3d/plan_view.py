@@ -6,7 +6,6 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.figure import ESTIMATED, INK, MUTED, png, styled
 from explore3d.object_picture import (
@@ -18,13 +17,12 @@ from explore3d.object_picture import (
     pixel_size,
     view_directions,
 )
-from explore3d.quantity import count_text, length_text, seconds_text
 from explore3d.raycast import Body, Picture, render
 from explore3d.sweep_paths import densified
+from explore3d.units import count_text, length_text, seconds_text
 from hw.moves import Move
+from mapping.arrays import FloatArray
 from mapping.base import Base
-
-FloatArray = NDArray[np.float64]
 
 AIR = np.array([0.72, 0.76, 0.80])
 WRONG = np.array([0.78, 0.16, 0.16])

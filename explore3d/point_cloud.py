@@ -17,16 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from explore3d.errors import PointCloudError
+
 SCHEMA_NAME = "foxglove.PointCloud"
 
 # proto.NumericType of foxglove/PackedElementField.proto
 _NUMERIC = {"u1": 1, "i1": 2, "<u2": 3, "<i2": 4, "<u4": 5, "<i4": 6, "<f4": 7, "<f8": 8}
 _DTYPE = {number: name for name, number in _NUMERIC.items()}
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
-
-
-class PointCloudError(ValueError):
-    """Bytes that are not a foxglove.PointCloud message."""
 
 
 def encode_prefix(dtype: np.dtype[np.void], frame: str) -> bytes:

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.figure import ESTIMATED, INK, MUTED, TRACED, new_figure, png, styled
-from explore3d.quantity import length_text, length_unit
+from explore3d.units import length_text, length_unit
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.feature import Feature
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 
 def profile_picture(trace: Trace, base: Base, features: Sequence[Feature], limit: float) -> bytes:

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explore3d.camera import Camera
+from mapping.arrays import FloatArray, IntArray
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 BACKGROUND = np.ones(3)
 # Creases sharper than this keep their edge; flatter ones are shaded round.
@@ -106,7 +105,7 @@ def _shade(body: Body, face: NDArray[np.uint32], uv: FloatArray, ray: FloatArray
     return np.asarray(np.clip(colour * (AMBIENT + (1.06 - AMBIENT) * shine)[:, None], 0.0, 1.0))
 
 
-def _mixed(values: FloatArray, corners: NDArray[np.int64], weights: FloatArray) -> FloatArray:
+def _mixed(values: FloatArray, corners: IntArray, weights: FloatArray) -> FloatArray:
     """(N, 3) values at the corners (N, 3) of faces, weighted by barycentric coordinates (N, 3)."""
     return np.asarray(sum(values[corners[:, i]] * weights[:, i, None] for i in range(3)))
 

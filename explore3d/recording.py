@@ -1,4 +1,7 @@
-"""Log: what was recorded, as the analysis takes it, be it from our own log or from a table."""
+"""Log: what was recorded, as the analysis takes it, be it from our own log or from a table.
+
+The base as an event of the log: a log can be analysed where the scene's mesh files are not at hand.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from explore3d.errors import UserError
+from mapping.base import Base
+from mapping.errors import SurfaceError
+from mapping.surface import Surface
 from mapping.trace import Trace
 
 if TYPE_CHECKING:
@@ -99,3 +105,32 @@ def _shifted(event: Event, samples: int) -> Event:
 
 def _name(log: Log) -> str:
     return ", ".join(log.sources) or "a log"
+
+
+KIND = "base"
+
+
+def base_event(base: Base) -> dict[str, Any]:
+    """JSON values that `read_base` turns back into the same base, bit for bit."""
+    return {
+        "kind": base.kind,
+        "parameters": base.parameters,
+        "vertices": base.surface.vertices.tolist(),
+        "faces": base.surface.faces.tolist(),
+    }
+
+
+def read_base(events: Sequence[Event]) -> Base | None:
+    """The last base that the events hold, None if none does.
+
+    Raises:
+        UserError: a base event that is not one.
+    """
+    for event in reversed(events):
+        if event.kind == KIND:
+            try:
+                surface = Surface(event.data["vertices"], event.data["faces"])
+                return Base(surface, event.data["kind"], event.data["parameters"])
+            except (KeyError, SurfaceError) as error:
+                raise UserError(f"the log's base event is not readable: {error}") from error
+    return None

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from explore3d.analysis import Analysis
 from explore3d.markup import Html, element, text
+from explore3d.page import STYLE
 from explore3d.pictures import Pictures, draw_pictures, is_profile
 from explore3d.report_account import account_of_time, provenance, what_was_left_out
 from explore3d.report_evidence import compared_with_truth, cross_sections, curvature_maps, posteriors
 from explore3d.report_findings import facts, headline, what_was_found
-from explore3d.report_style import STYLE
 from explore3d.sweep_paths import SweepPath, sweep_paths
 from explore3d.view3d import object_view, plotly_script, profile_view
 from mapping.whole_file import write_whole

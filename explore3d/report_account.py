@@ -8,8 +8,8 @@ from explore3d.analysis import Analysis
 from explore3d.forecast import forecast
 from explore3d.markup import Html, Row, element, paragraph, section, table
 from explore3d.pictures import Pictures
-from explore3d.quantity import length_text, seconds_text
-from mapping.left_out import LeftOut
+from explore3d.units import length_text, seconds_text
+from mapping.feature import LeftOut
 
 
 def what_was_left_out(analysis: Analysis, pictures: Pictures) -> Html:

@@ -7,8 +7,8 @@ from math import isfinite
 from explore3d.analysis import Analysis
 from explore3d.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.pictures import Pictures, shown_features
-from explore3d.quantity import UNKNOWN, length_text
 from explore3d.truth import Comparison
+from explore3d.units import UNKNOWN, length_text
 
 BADGES = {"found": "good", "missed": "bad", "invented": "bad"}
 

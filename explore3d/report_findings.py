@@ -9,7 +9,7 @@ from explore3d.analysis import Analysis
 from explore3d.findings import limit_sentence
 from explore3d.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.pictures import Pictures, is_profile
-from explore3d.quantity import UNKNOWN, count_text, interval_text, length_text
+from explore3d.units import UNKNOWN, count_text, interval_text, length_text
 from mapping.feature import Feature, Interval
 from mapping.polyline import arclengths
 

@@ -6,20 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d import __version__
 from explore3d.errors import UserError
 from explore3d.log import LogWriter
+from explore3d.log_format import LOG
 from explore3d.log_reader import read_log
 from explore3d.recording import Log
 from explore3d.run import scene_finger
 from explore3d.scene import load_scene
-from explore3d.session import LOG
 from hw.moves import Move
+from mapping.arrays import BoolArray, FloatArray
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 # Samples this close to the place, in tip radii, were taken of it
 NEAR = 5e-3
@@ -64,7 +62,7 @@ class Reprobed:
 
     def lines(self) -> list[str]:
         """The same in words."""
-        from explore3d.quantity import count_text, length_text
+        from explore3d.units import count_text, length_text
 
         offsets = self.offsets
         spread = f"; the touches scatter by {length_text(float(offsets.std(ddof=1)), 2)}" if len(offsets) > 1 else ""
@@ -131,7 +129,7 @@ def _nearest(log: Log, at: FloatArray) -> int:
     return int(near[_beside(log.trace.centers[near] - at, _approach(log, nearest)).argmin()])
 
 
-def _neighbours(trace: Trace, sample: int, approach: FloatArray) -> NDArray[np.bool_]:
+def _neighbours(trace: Trace, sample: int, approach: FloatArray) -> BoolArray:
     """(N,) True for the samples of that sweep within NEAR tip radii of its line of approach."""
     away = trace.centers - trace.centers[sample]
     close = (_beside(away, approach) <= NEAR * trace.tip_radius) & (np.abs(away @ approach) <= trace.tip_radius)

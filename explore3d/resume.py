@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from explore3d.errors import UserError
+from explore3d.log_format import LOG
 from explore3d.log_reader import read_log
 from explore3d.recording import Log
-from explore3d.session import LOG
 from hw.moves import Move
 from mapping.trace import Trace
 

@@ -7,13 +7,12 @@ from pathlib import Path
 
 from explore3d import __version__
 from explore3d.analysis import Analysis
-from explore3d.analyze import conclude
-from explore3d.base_record import read_base
+from explore3d.conclude import conclude
 from explore3d.errors import UserError
 from explore3d.expedition import known_base
 from explore3d.leave_out import without_needless_dynamics
-from explore3d.recorder import Recorder
-from explore3d.recording import Log
+from explore3d.log import Recorder
+from explore3d.recording import Log, read_base
 from explore3d.resume import EARLIER, Replay, earlier_log
 from explore3d.scene import Scene, load_scene
 from explore3d.session import Session

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.cross_section import CrossSection
 from explore3d.figure import BAND, ESTIMATED, INK, MUTED, TRACED, TRUTH, new_figure, png, styled
-from explore3d.quantity import length_unit
-
-FloatArray = NDArray[np.float64]
+from explore3d.units import length_unit
+from mapping.arrays import FloatArray
 
 COLUMNS = 3
 # Dots beyond so many hide each other.

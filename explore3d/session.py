@@ -15,11 +15,11 @@ from typing import Any
 
 from explore3d import __version__
 from explore3d.errors import FolderError, UserError
-from explore3d.recorder import Recorder
+from explore3d.log import Recorder
+from explore3d.log_format import LOG
 
 MARKER = "session.json"
 SCHEMA = "explore3d/session/1"
-LOG = "log.mcap"
 _PART = ".part-"
 
 

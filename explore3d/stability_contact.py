@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from explore3d.bench_trace import bump_mesh
 from explore3d.exact_decimal import condition, exact, relative_error
 from explore3d.stability import EPS, Answer, Case
+from mapping.arrays import FloatArray
 from mapping.contact import BallContact
 from mapping.nearest import NearestPoint
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 RADIUS = 0.3
 SCALES = tuple(10.0**k for k in (-9, -6, -3, 3, 6))

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.stability import Answer, Case
+from mapping.arrays import FloatArray
 from mapping.bump_of_revolution import BumpOfRevolution
-from mapping.curvature import principal_curvatures
-
-FloatArray = NDArray[np.float64]
+from mapping.principal_curvatures import principal_curvatures
 
 # Error of quartic jets on meshes of this fineness, from their order of convergence; the bench draws the whole curve.
 TRUNCATION = 2e-3

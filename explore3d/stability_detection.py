@@ -7,19 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from explore3d.stability import Answer, Case
-from explore3d.stability_traces import (
-    DIAMETER,
-    HALF,
-    SPACING,
-    TIP,
-    FloatArray,
-    Heights,
-    features,
-    plate,
-    scaled,
-    sweeps,
-    wire,
-)  # fmt: skip
+from explore3d.stability_traces import DIAMETER, HALF, SPACING, TIP, Heights, features, plate, scaled, sweeps, wire
+from mapping.arrays import FloatArray  # fmt: skip
 from mapping.base import Base
 from mapping.detectors import Detections, detect
 from mapping.errors import MappingError

@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.bench_trace import bump_mesh
 from explore3d.stability import Answer, Case
 from mapping.contact import BallContact
-from mapping.curvature import principal_curvatures
 from mapping.errors import MappingError
 from mapping.nearest import NearestPoint
+from mapping.principal_curvatures import principal_curvatures
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 TRIANGLE = ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])
 

@@ -56,7 +56,7 @@ def wires(count: int, noise: Noise, assumed: Noise | None = None, confirm: bool 
 
 def sweeps_of(trace: Trace, noise: Noise) -> Trace:
     """The same sweeps with another noise."""
-    from explore3d.bench_calibration import simulate_noise
+    from explore3d.bench_noise import simulate_noise
     from mapping.shapes import chain_height
 
     paths = [np.column_stack([part.centers[:, :2], np.zeros(len(part))]) for _, part in trace.sweeps()]

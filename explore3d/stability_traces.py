@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.detectors import Detections, detect
 from mapping.feature import Feature
@@ -15,7 +15,6 @@ from mapping.shapes import chain_height
 from mapping.surface import Surface
 from mapping.trace import Trace
 
-FloatArray = NDArray[np.float64]
 Heights = Callable[[FloatArray], FloatArray]
 
 TIP = 10e-3

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from explore3d.errors import UserError
-from mapping.left_out import LeftOut
+from mapping.feature import LeftOut
 
 # Stages that a job may leave out, and that can be forced back in
 OPTIONAL = (

@@ -7,19 +7,18 @@ from collections.abc import Collection
 from pathlib import Path
 
 from explore3d.analysis import Analysis
-from explore3d.analyze import conclude
-from explore3d.base_record import read_base
 from explore3d.build_model import build_model
+from explore3d.conclude import conclude
 from explore3d.condense import CHUNK, KEPT, Condensed, condense
 from explore3d.log_reader import digest
 from explore3d.log_stream import LogStream, count_samples, head
-from explore3d.recording import Log
+from explore3d.recording import Log, read_base
 from explore3d.scene import parse_scene
 from explore3d.session import Session
 from explore3d.settings import Settings
 from explore3d.stages import Progress, Stages, silent
 from mapping.base import Base
-from mapping.left_out import LeftOut
+from mapping.feature import LeftOut
 from mapping.trace import Trace
 
 

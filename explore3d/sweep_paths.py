@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import BoolArray, FloatArray
 from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.polyline import arclengths
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 # Samples are averaged over this share of the explored size: about three pixels of a picture.
 FINEST = 0.0025
@@ -30,7 +28,7 @@ class SweepPath:
 
     points: FloatArray
     normals: FloatArray
-    noticed: NDArray[np.bool_]
+    noticed: BoolArray
 
 
 def sweep_paths(trace: Trace, base: Base, crossings: Sequence[Crossing] = ()) -> list[SweepPath]:
@@ -74,7 +72,7 @@ def _runs(trace: Trace) -> list[tuple[int, int]]:
     return list(pairwise(cuts))
 
 
-def _noticed(trace: Trace, crossings: Sequence[Crossing]) -> NDArray[np.bool_]:
+def _noticed(trace: Trace, crossings: Sequence[Crossing]) -> BoolArray:
     """(N,) True for the samples that a crossing covers."""
     mask = np.zeros(len(trace), dtype=bool)
     first = {int(trace.sweep[start]): start for start, _ in reversed(_runs(trace))}

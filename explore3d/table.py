@@ -7,19 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.errors import UserError
 from explore3d.recording import Log
 from explore3d.table_columns import LENGTHS, VECTORS, find_columns, length_factors, time_factor
 from explore3d.table_settings import TableSettings, load_settings
 from explore3d.table_text import TableText, read_text
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.errors import TraceError
 from mapping.trace import Trace
 
 JUMP = 10.0  # median steps: noise alone never makes a step so long, a lifted finger nearly always does
 
-FloatArray = NDArray[np.float64]
 Columns = dict[str, FloatArray]
 
 
@@ -89,11 +88,11 @@ def read_table(
     )
 
 
-def _good_rows(text: TableText, roles: dict[str, int]) -> tuple[NDArray[np.bool_], list[str]]:
+def _good_rows(text: TableText, roles: dict[str, int]) -> tuple[BoolArray, list[str]]:
     """Mask of the usable rows, and what is said of the others."""
     used = [index for role, index in roles.items() if role != "valid"]
-    finite: NDArray[np.bool_] = np.all(np.isfinite(text.rows[:, used]), axis=1)
-    valid: NDArray[np.bool_] = np.ones(len(text.rows), dtype=np.bool_)
+    finite: BoolArray = np.all(np.isfinite(text.rows[:, used]), axis=1)
+    valid: BoolArray = np.ones(len(text.rows), dtype=np.bool_)
     if "valid" in roles:
         mark = text.rows[:, roles["valid"]]
         valid = np.isfinite(mark) & (mark != 0)
@@ -133,7 +132,7 @@ def _trace(values: Columns, settings: TableSettings, text: TableText) -> Trace:
         raise UserError(f"{text.path}: {error}") from error
 
 
-def _sweeps(values: Columns, points: FloatArray, jump: float | None, text: TableText) -> NDArray[np.int64]:
+def _sweeps(values: Columns, points: FloatArray, jump: float | None, text: TableText) -> IntArray:
     """(N,) number of the sweep: the file's own, one for a profile, else counted up at each jump."""
     if "sweep" in values:
         numbers = values["sweep"]

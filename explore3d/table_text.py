@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.errors import UserError
 from explore3d.units import UNITS
+from mapping.arrays import FloatArray
 
 COMMENTS = ("#", "%", "//")
 MISSING = frozenset({"", "-", "--", "---", "nan", "na", "n/a", "null", "none", "inf", "-inf", "+inf", "***"})
@@ -52,7 +52,7 @@ class TableText:
     path: Path
     names: tuple[str, ...]
     units: tuple[str, ...]
-    rows: NDArray[np.float64]
+    rows: FloatArray
     delimiter: str | None
     decimal: str
     first_line: int
@@ -170,7 +170,7 @@ def _is_unit(cell: str) -> bool:
 
 def _numbers(
     path: Path, lines: Sequence[str], wanted: Sequence[int], columns: int, dialect: tuple[str | None, str]
-) -> NDArray[np.float64]:
+) -> FloatArray:
     delimiter, decimal = dialect
     body = [lines[n].rstrip("; ,") if delimiter in (";", ",") else lines[n] for n in wanted]
     if decimal == ",":

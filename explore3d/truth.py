@@ -8,13 +8,12 @@ from math import nan
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.arrays import FloatArray
 from mapping.feature import Feature, Interval
 from mapping.object_model import ObjectModel
 from mapping.polyline import arclengths, directions, nearest_on, resample
-
-FloatArray = NDArray[np.float64]
 
 STATUSES = ("found", "missed", "invented")
 

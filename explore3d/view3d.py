@@ -6,21 +6,19 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explore3d.figure import ESTIMATED, INK, TRACED
 from explore3d.markup import Html, element
 from explore3d.profile_picture import profile_line
-from explore3d.quantity import interval_text, length_unit
 from explore3d.sweep_paths import SweepPath
+from explore3d.units import interval_text, length_unit
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.feature import Feature
 from mapping.feature_mesh import drawn_at_least, feature_mesh
 from mapping.model_glb import COLOURS, OTHER_COLOUR
 from mapping.surface import Surface
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 # More than this makes pages slow without showing more.
 MOST_FACES = 60_000

@@ -82,3 +82,13 @@ def timed(work: Callable[[], Value], repeats: int = 3) -> tuple[float, int, Valu
         if seconds[-1] > LONG_ENOUGH:
             break
     return median(seconds), len(seconds), value
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A stage and what came of it; `seconds` is what measuring it took."""
+
+    stage: Stage
+    points: tuple[Point, ...]
+    omissions: tuple[Omission, ...]
+    seconds: float

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.dynamics import Dynamics
 from hw.moves import Move
 from hw.simulated import SimulatedFinger
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.contact import Contacts
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(kw_only=True)
@@ -36,7 +34,7 @@ class DynamicFinger(SimulatedFinger):
         self._force = move.force
         return super().execute(move)
 
-    def _pressed(self, path: FloatArray, approach: FloatArray) -> tuple[Contacts, NDArray[np.bool_]]:
+    def _pressed(self, path: FloatArray, approach: FloatArray) -> tuple[Contacts, BoolArray]:
         felt, keep = super()._pressed(path, approach)
         centers, touching = felt.centers.copy(), keep.copy()
         times = np.arange(len(path)) / self.rate
@@ -57,6 +55,6 @@ class DynamicFinger(SimulatedFinger):
         return replace(felt, centers=centers), touching
 
 
-def _runs(mask: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+def _runs(mask: BoolArray) -> list[IntArray]:
     index = np.flatnonzero(mask)
     return np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(index) else []

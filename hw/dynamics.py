@@ -13,11 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.errors import FingerError
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 # Halvings of the interval between two control instants, at most: 2^-30 of 6 um is below an atom
 DEEPEST = 30

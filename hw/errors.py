@@ -15,3 +15,11 @@ class StoppedError(FingerError):
 
 class MoveError(ValueError):
     """A move that is malformed."""
+
+
+class GcodeError(ValueError):
+    """A line that is answered by error:`number`."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"error:{number}")
+        self.number = number

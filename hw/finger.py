@@ -7,14 +7,10 @@ from importlib import import_module
 from types import TracebackType
 from typing import Any, Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hw.errors import FingerError
 from hw.moves import Move
+from mapping.arrays import FloatArray
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

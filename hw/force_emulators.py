@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw import line_sensor, optoforce
 from hw.grbl_emulator import GrblEmulator
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 
 class ForceEmulator:

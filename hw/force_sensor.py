@@ -11,14 +11,12 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.errors import LinkError
 from hw.framing import Framing
 from hw.link import Link
 from hw.sensor_clock import SensorClock, missing, unwrapped
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray, IntArray
 
 # Samples that are kept: a minute at 5 kHz
 KEPT = 300_000
@@ -136,7 +134,7 @@ class ForceSensor:
             raise LinkError(f"{self.link.port}: no samples from the {self.name} for {duration:g} s")
         self.zero = np.median(recent, axis=0)  # a first sample after a reconnection may be anything
 
-    def recorded(self, since: float = -np.inf) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    def recorded(self, since: float = -np.inf) -> tuple[IntArray, FloatArray, FloatArray]:
         """Ticks (N,), arrivals (N,) s and raw forces (N, 3) N of the samples that arrived after `since`."""
         with self._news:
             kept = list(takewhile(lambda sample: sample[0] >= since, reversed(self._samples)))[::-1]

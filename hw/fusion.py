@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.grbl_controller import Report
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import BoolArray, FloatArray
 
 # A report that took longer than usual by this, s, came late to a busy host: nobody knows when it was true
 LATE = 5e-4
@@ -31,7 +29,7 @@ def positions_at(times: FloatArray, reported: FloatArray, positions: FloatArray)
 
 def known_at(
     times: FloatArray, reported: FloatArray, positions: FloatArray, normals: FloatArray, longest: float, apart: float
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """(N,) whether the reports tell where the stage was across the surface, and not only where along it.
 
     Between two reports the stage may have turned, or stood for a while: that matters as far as they differ along

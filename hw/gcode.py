@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+from hw.errors import GcodeError
+
 _WORD = re.compile(r"([A-Z])([-+]?(?:\d+\.?\d*|\.\d+))")
 MOTIONS = {"G0": "G0", "G1": "G1", "G38.2": "G38.2", "G38.3": "G38.3", "G38.4": "G38.4", "G38.5": "G38.5"}
 MODES = {
@@ -14,14 +16,6 @@ MODES = {
 }  # fmt: skip
 ONCE = ("G4", "G10", "G53", "G92", "G92.1")
 PROGRAM = ("M0", "M1", "M2", "M30", "M3", "M4", "M5", "M7", "M8", "M9")
-
-
-class GcodeError(ValueError):
-    """A line that is answered by error:`number`."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(f"error:{number}")
-        self.number = number
 
 
 @dataclass

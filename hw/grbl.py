@@ -10,7 +10,6 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.errors import FingerError, LinkError, StoppedError
 from hw.finger import Workspace
@@ -21,9 +20,8 @@ from hw.moves import Move
 from hw.peck import Peck, Touched
 from hw.safety import StopOnSignal
 from hw.slide import Slide
+from mapping.arrays import FloatArray
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 # How long to wait for a sensor to come back, s
 RECONNECT = 5.0
@@ -229,7 +227,7 @@ class GrblFinger:
         Raises:
             FingerError: there is no sensor, not armed, or nothing was touched yet.
         """
-        from hw.delay import measured_delay
+        from hw.lag import measured_delay
 
         if self.slide is None or self._away is None or not self.armed:
             raise FingerError("the delay is measured with a force sensor, armed, after a first sweep")

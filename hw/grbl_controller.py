@@ -11,15 +11,13 @@ from itertools import takewhile
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw import grbl_protocol as protocol
 from hw.errors import FingerError, LinkError, StoppedError
 from hw.framing import Lines
 from hw.grbl_protocol import Probed, Settings, Status
 from hw.link import Link
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 # A status is asked for this often while something is waited for (10 to 50 Hz), s
 POLL = 0.05

@@ -10,14 +10,13 @@ import re
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hw.gcode import Block, GcodeError, parse_block
+from hw.errors import GcodeError
+from hw.gcode import Block, parse_block
 from hw.grbl_protocol import RECEIVE_BUFFER
 from hw.stage_motion import Segment, StageMotion
 from hw.touched_body import TouchedBody
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 BLOCKS = 15  # of the planner
 SETTINGS = {

@@ -6,14 +6,12 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.errors import FingerError, LinkError, StoppedError
 from hw.force_sensor import ForceSensor
 from hw.frame import Frame
 from hw.grbl_controller import GrblController
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 # Shorter ways are not worth a command: the controller refuses to probe towards where it stands
 STANDING = 5e-6

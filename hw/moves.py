@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.errors import MoveError
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 PURPOSES = ("travel", "approach", "sweep", "retreat")
 

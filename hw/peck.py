@@ -10,13 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.errors import FingerError
 from hw.guarded_stage import GuardedStage
 from hw.moves import Move
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

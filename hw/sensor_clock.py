@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -51,13 +50,13 @@ class SensorClock:
         return cls(period, float(late.min()), jitter)
 
 
-def unwrapped(counter: NDArray[np.int64], bits: int) -> NDArray[np.int64]:
+def unwrapped(counter: IntArray, bits: int) -> IntArray:
     """(N,) running count from a counter (N,) that starts anew after 2^bits."""
     steps = np.diff(counter) % (1 << bits)
     return np.concatenate([counter[:1], counter[0] + np.cumsum(steps)]) if len(counter) else counter
 
 
-def missing(ticks: NDArray[np.int64]) -> int:
+def missing(ticks: IntArray) -> int:
     """How many samples are missing between ticks (N,): by the most common step."""
     if len(ticks) < 3:
         return 0

@@ -7,17 +7,15 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.errors import FingerError
 from hw.finger import Workspace
 from hw.moves import Move
 from hw.noise_source import NoiseSource
+from mapping.arrays import BoolArray, FloatArray
 from mapping.contact import BallContact, Contacts
 from mapping.surface import Surface
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(kw_only=True)
@@ -152,7 +150,7 @@ class SimulatedFinger:
         sweep = np.full(len(centers), self._sweeps)
         return Trace(start + times[keep], centers, sweep, self.tip_radius, normals, contacts)
 
-    def _pressed(self, path: FloatArray, approach: FloatArray) -> tuple[Contacts, NDArray[np.bool_]]:
+    def _pressed(self, path: FloatArray, approach: FloatArray) -> tuple[Contacts, BoolArray]:
         stroke = 2.0 * self.tip_radius if self.stroke is None else self.stroke
         felt = self._ball.first_contact(path - stroke * approach, approach)
         against = -(felt.normals * approach).sum(axis=1)

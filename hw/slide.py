@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.errors import LinkError, StoppedError
 from hw.force_sensor import ForceSensor
@@ -21,9 +20,7 @@ from hw.guarded_stage import PATIENCE, GuardedStage
 from hw.lag import Lag
 from hw.moves import Move
 from hw.peck import Touched, spaced
-
-FloatArray = NDArray[np.float64]
-
+from mapping.arrays import BoolArray, FloatArray
 
 # Jogs that may be under way or waiting when the next is made, in control periods
 QUEUED = 2
@@ -171,7 +168,7 @@ class Slide:
         longest = max(BLIND * self.period, UNUSUAL * float(np.median(np.diff(stamps))))
         step = STEPS * stage.controller.settings.resolution
 
-        def touching(delay: float) -> tuple[NDArray[np.bool_], FloatArray]:
+        def touching(delay: float) -> tuple[BoolArray, FloatArray]:
             centers = positions_at(times - delay, stamps, places)
             sound = (pressing > self.contact) & np.isfinite(centers).all(axis=1) & (times > after)
             return sound & known_at(times - delay, stamps, places, normals, longest, step), centers

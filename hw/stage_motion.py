@@ -6,11 +6,9 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.touched_body import TouchedBody
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 
 @dataclass

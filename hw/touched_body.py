@@ -7,13 +7,11 @@ it back. In a corner it rests against both sides, and the force points between t
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.frame import Frame
+from mapping.arrays import FloatArray
 from mapping.contact import BallContact
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 # What may be left of an overlap, in tip radii, and how many sides are looked for to push it out
 CLOSE, SIDES = 1e-6, 6

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from mapping.base_fit import fit_base
     from mapping.contact import BallContact
     from mapping.crossing import Crossing
-    from mapping.curvature import Curvature, principal_curvatures
+    from mapping.curvature import Curvature
     from mapping.detectors import Detections, detect
     from mapping.envelope import estimate_surface
     from mapping.errors import MappingError
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from mapping.grammar import assemble
     from mapping.object_model import ObjectModel
     from mapping.posterior import Posterior
+    from mapping.principal_curvatures import principal_curvatures
     from mapping.refine import refine, sample_posterior
     from mapping.surface import Surface
     from mapping.trace import Trace
@@ -32,7 +33,7 @@ _PUBLIC = {
     "BallContact": "mapping.contact",
     "estimate_surface": "mapping.envelope",
     "Estimate": "mapping.estimate",
-    "principal_curvatures": "mapping.curvature",
+    "principal_curvatures": "mapping.principal_curvatures",
     "Curvature": "mapping.curvature",
     "detect": "mapping.detectors",
     "Detections": "mapping.detectors",

@@ -18,14 +18,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.detectors import DetectionError
+from mapping.arrays import FloatArray
+from mapping.errors import DetectionError
 from mapping.noise import Noise, robust_sd
 from mapping.sweep_curvature import CurvatureFeature, curvature_along, features_beyond, half_width_for, joined
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 # A curve is put on this many steps per fit: more only cost time.
 STEPS = 40

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.bridging import resting_points
-from mapping.estimate import EXTRAPOLATED, EnvelopeError, Estimate
+from mapping.errors import EnvelopeError
+from mapping.estimate import Estimate
+from mapping.labels import EXTRAPOLATED
 from mapping.surface import Surface
 from mapping.sweep_mesh import oriented, sweep_faces
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 TOLERANCE = 1e-9  # of the radius, by which balls through three centres may hold a fourth
 

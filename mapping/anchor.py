@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.feature import Anchor
 from mapping.nearest import NearestPoint
 from mapping.polyline import middle
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 
 def anchor(axis: FloatArray, surface: Surface) -> Anchor:

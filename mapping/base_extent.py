@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.base import Base, Feet
 from mapping.base_fit import fit_base
 from mapping.cells import Cells
@@ -14,8 +14,6 @@ from mapping.errors import SurfaceError
 from mapping.robust import robust_scale
 from mapping.surface import Surface
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 CELLS = 4000
 # So far from a place where the finger felt nothing, or rolled off, the body is taken to go on, in tip radii
@@ -73,7 +71,7 @@ def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray, s
     return part_of(base, keep)
 
 
-def rolled_off(height: FloatArray, sweep: NDArray[np.int64], tip_radius: float) -> NDArray[np.bool_]:
+def rolled_off(height: FloatArray, sweep: IntArray, tip_radius: float) -> BoolArray:
     """(N,) True for the ends of sweeps that sink ever deeper: there the ball rolls off the body's edge."""
     off = np.zeros(len(height), dtype=bool)
     low = -3.0 * robust_scale(height) - 1e-3 * tip_radius
@@ -87,12 +85,12 @@ def rolled_off(height: FloatArray, sweep: NDArray[np.int64], tip_radius: float) 
     return off
 
 
-def over_base(trace: Trace, base: Base) -> NDArray[np.bool_]:
+def over_base(trace: Trace, base: Base) -> BoolArray:
     """(N,) True where the ball's centre stands over the base, False where it stands beyond its border."""
     return ~_beyond(base, base.foot(trace.centers, trace.tip_radius))
 
 
-def _beyond(base: Base, feet: Feet) -> NDArray[np.bool_]:
+def _beyond(base: Base, feet: Feet) -> BoolArray:
     """(N,) True of what stands aslant over the base's border."""
     aslant = np.abs((feet.normals * base.surface.face_normals[feet.face]).sum(axis=1)) < np.cos(BESIDE)
     at_side = (feet.barycentric < ON_SIDE) & base.surface.open_sides[feet.face]
@@ -129,7 +127,7 @@ def _bare(base: Base, empty: FloatArray, tip_radius: float) -> FloatArray:
     return np.asarray(free.points[facing & (free.height < -OVERLAP * tip_radius)])
 
 
-def part_of(base: Base, keep: NDArray[np.bool_]) -> Base:
+def part_of(base: Base, keep: BoolArray) -> Base:
     """Some of a base's faces (F,)."""
     used, faces = np.unique(base.surface.faces[keep], return_inverse=True)
     return replace(base, surface=Surface(base.surface.vertices[used], faces.reshape(-1, 3)))

@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.base_polyhedron import polyhedron
 from mapping.base_shapes import FAMILIES, Cloud, Family, Fitted, sheet
@@ -18,8 +18,6 @@ from mapping.errors import TraceError
 from mapping.profile_fit import fit_profile, profile_frame
 from mapping.robust import OUTLIER, robust_scale
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 MOST_CELLS = 4000
 # Families for what no simple one explains

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.base import Base
 from mapping.base_shapes import Cloud, Fitted
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 # Trial planes, each through a centre and two of so many that are next to it within so many tip radii
 TRIALS, NEAR, NEIGHBOURS = 300, 4.0, 128
@@ -123,9 +121,7 @@ def _refined(normals: FloatArray, offsets: FloatArray, sign: float, cloud: Cloud
     return normals, offsets
 
 
-def _bounded(
-    normals: FloatArray, offsets: FloatArray, cloud: Cloud
-) -> tuple[FloatArray, NDArray[np.int64], NDArray[np.int64]] | None:
+def _bounded(normals: FloatArray, offsets: FloatArray, cloud: Cloud) -> tuple[FloatArray, IntArray, IntArray] | None:
     """Vertices, faces and their planes, of the body below all planes, without what closes it beyond the cloud."""
     from scipy.optimize import linprog
     from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError

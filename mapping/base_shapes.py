@@ -8,15 +8,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.cells import Cells
 from mapping.profile_fit import SHORTEST_BEND
 from mapping.robust import MAD_TO_SD, OUTLIER, robust_fit, robust_scale
 from mapping.surface import Surface
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 # Upward part of the mean direction from a round body's middle of what was felt inside it, without contact normals
 BELOW = -0.6
@@ -185,7 +183,7 @@ def pieces_of(length: float, spacing: float | None) -> int:
     return 1 if spacing is None else int(np.clip(np.ceil(length / spacing), 1, 500))
 
 
-def _grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
+def _grid_faces(rows: int, columns: int) -> IntArray:
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     right, up = corner + columns, corner + 1
     return np.concatenate([np.column_stack([corner, right, up]), np.column_stack([right, right + 1, up])])
@@ -261,7 +259,7 @@ def _sphere_mesh(centre: FloatArray, radius: float, hollow: bool, cloud: Cloud) 
     return Surface(cloud.world(np.asarray(ball.vertices) + centre), outside(np.asarray(ball.faces), hollow))
 
 
-def outside(faces: NDArray[np.int64], hollow: bool) -> NDArray[np.int64]:
+def outside(faces: IntArray, hollow: bool) -> IntArray:
     """Faces of a closed body, turned over if it is hollow."""
     return np.asarray(faces[:, ::-1] if hollow else faces, dtype=np.int64)
 
@@ -342,7 +340,7 @@ def _cylinder_mesh(
     return Surface(cloud.world(vertices), outside(ring_faces(around, along), hollow))
 
 
-def ring_faces(around: int, along: int) -> NDArray[np.int64]:
+def ring_faces(around: int, along: int) -> IntArray:
     """Triangles of a tube whose vertices are rings of `around` corners, one after the other."""
     level, k = (grid.ravel() for grid in np.meshgrid(np.arange(along), np.arange(around), indexing="ij"))
     a, b = level * around + k, level * around + (k + 1) % around

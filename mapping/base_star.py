@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.base_shapes import Cloud, Fitted, outside
 from mapping.robust import robust_fit
 from mapping.surface import Surface
 
-FloatArray = NDArray[np.float64]
 Radius = Callable[[FloatArray], FloatArray]
 
 # Waves round the body are at least so many tip radii long; shorter ones would follow the fine features
@@ -104,7 +103,7 @@ def _ball(middle: FloatArray, reach: Radius, hollow: bool, cloud: Cloud) -> Surf
     )
 
 
-def touched(centers: FloatArray, away: FloatArray, faces: NDArray[np.int64], hollow: bool, cloud: Cloud) -> Surface:
+def touched(centers: FloatArray, away: FloatArray, faces: IntArray, hollow: bool, cloud: Cloud) -> Surface:
     """The surface that balls at the centres (N, 3) touch, in the object frame; `away` (N, 3) from the body's middle."""
     way = (1.0 if hollow else -1.0) * away / np.linalg.norm(away, axis=1, keepdims=True)
     return Surface(cloud.world(centers + cloud.tip_radius * way), faces)

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.base_shapes import Cloud, Fitted, cylinder, outside, pieces_of, ring_faces
 from mapping.base_star import STEP, bears, fitted, one_sided, touched
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 # Corners of the mesh around the body, and its rings along it if nobody asks for a spacing
 AROUND, RINGS = 512, 128
@@ -62,7 +60,7 @@ def tube(cloud: Cloud, waves: int, shortest: float) -> Fitted | None:
     )
 
 
-def _rings(angle: FloatArray, height: FloatArray, each: NDArray[np.int64], knots: FloatArray) -> FloatArray:
+def _rings(angle: FloatArray, height: FloatArray, each: IntArray, knots: FloatArray) -> FloatArray:
     """(N, P) products of Fourier waves of the angle (in turn cosine and sine) and splines of the height."""
     from scipy.interpolate import BSpline
 

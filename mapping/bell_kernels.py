@@ -6,9 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 # Steps along the meridian, and places of the table of the trace: its error is 1e-5 of the bump's height or less.
 STEPS = 600

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.arrays import FloatArray
 from mapping.bump_shape import Spot
 from mapping.hollow_shape import bin_nodes
 from mapping.priors import Prior, Uniform
 from mapping.problem import Sizes
 from mapping.window import Window
-
-FloatArray = NDArray[np.float64]
 
 # Exponents from flatter skirts than the paper's bump (1) to what cannot be told from a Gaussian.
 EXPONENTS = (0.5, 30.0)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.sweep_tangents import unit
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # A concave turn between neighbours must exceed what their own curvature predicts by this factor.
 OUTSTANDING = 3.0
@@ -18,7 +15,7 @@ UNKNOWN = 3.0
 
 def bridged_faces(
     centers: FloatArray, normals: FloatArray, faces: IntArray, tip_radius: float, curvature: FloatArray
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """(F,) which faces of the traced mesh hold a kink that lies between their corners.
 
     Args:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.priors import Prior, Uniform
 from mapping.ridge_shape import RidgeShape
-
-FloatArray = NDArray[np.float64]
 
 # Gaps from this share of the half width of the disturbance: narrower ones are not felt.
 NARROWEST = 0.1

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.errors import MappingError
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -147,7 +146,7 @@ class BumpOfRevolution:
         return float(1 + tip_radius * self.curvatures(u)[0])
 
 
-def _polar_faces(rings: int, sectors: int) -> NDArray[np.int64]:
+def _polar_faces(rings: int, sectors: int) -> IntArray:
     """Counter-clockwise faces of a disc: a fan round vertex 0, then strips between rings."""
     here, following = np.arange(sectors), (np.arange(sectors) + 1) % sectors
     fan = np.column_stack([np.zeros(sectors, dtype=np.int64), 1 + here, 1 + following])

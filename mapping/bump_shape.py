@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.priors import Prior
 from mapping.window import Window
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,17 +1,17 @@
-"""Cap fit: the cap, or the flat-topped plateau, that explains a stretch of a profile best."""
+"""Cap fit: the cap, or the flat-topped plateau, that explains a stretch of a profile best.
+
+Disturbance: one crest, dip or plateau of a height profile, measured.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.disturbance import Disturbance
+from mapping.arrays import FloatArray
 from mapping.height_profile import HeightProfile
 from mapping.noise import Noise
-
-FloatArray = NDArray[np.float64]
 
 # Improvement in twice the log-likelihood that a plateau must bring over a cap.
 PLATEAU_GAIN = 12.0
@@ -164,3 +164,30 @@ def _zoom(
         places = np.clip(np.linspace(best[1] - reach, best[1] + reach, 9), low, high)
         widths = np.maximum(best[2] * np.geomspace(1 / factor, factor, 9), narrowest)
     return best
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """What one stretch of a profile holds.
+
+    Args:
+        place: arclength of the crest, or of the plateau's middle, m.
+        start, stop: arclengths between which the profile is disturbed, m.
+        height: signed height of the crest, m.
+        height_sd, place_sd: standard deviations, m.
+        half_width: of the fitted cap, m.
+        flat: half-length of the flat top, m; 0 for a crest.
+        curvature: of the trace at the crest (of the flanks for a plateau), 1/m.
+        snr: signal-to-noise ratio.
+    """
+
+    place: float
+    start: float
+    stop: float
+    height: float
+    height_sd: float
+    place_sd: float
+    half_width: float
+    flat: float
+    curvature: float
+    snr: float

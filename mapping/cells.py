@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +21,7 @@ class Cells:
     """
 
     centers: FloatArray
-    sweep: NDArray[np.int64]
+    sweep: IntArray
     normals: FloatArray | None
 
     @classmethod
@@ -40,7 +38,7 @@ class Cells:
         normals = None if trace.normals is None else np.add.reduceat(trace.normals, starts) / counts
         return cls(centers, sweep[starts], normals)
 
-    def trace(self, tip_radius: float, keep: NDArray[np.bool_]) -> Trace:
+    def trace(self, tip_radius: float, keep: BoolArray) -> Trace:
         """Some of the cells as a trace of their own; their times count cells."""
         normals = None if self.normals is None else self.normals[keep]
         return Trace(np.flatnonzero(keep).astype(np.float64), self.centers[keep], self.sweep[keep], tip_radius, normals)

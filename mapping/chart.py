@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.base import Base
+from mapping.errors import EmptyWindowError
 from mapping.onto_base import onto_base
-from mapping.window import EmptyWindowError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.arrays import FloatArray
 from mapping.errors import ContactError
-
-FloatArray = NDArray[np.float64]
 
 MOST_SAMPLES = 100_000_000
 

@@ -10,12 +10,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.commanded_path import CommandedPath, checked_points, unit_directions
 from mapping.errors import ContactError
 from mapping.surface import Surface
 from mapping.triangle_tree import TriangleTree
-
-FloatArray = NDArray[np.float64]
 
 NONE, FACE, EDGE, VERTEX = 0, 1, 2, 3
 
@@ -41,9 +40,9 @@ class Contacts:
     points: FloatArray
     normals: FloatArray
     feature: NDArray[np.int8]
-    count: NDArray[np.int64]
+    count: IntArray
     distance: FloatArray
-    overlap: NDArray[np.bool_]
+    overlap: BoolArray
 
     def __post_init__(self) -> None:
         for array in vars(self).values():
@@ -53,11 +52,11 @@ class Contacts:
         return len(self.distance)
 
     @property
-    def interference(self) -> NDArray[np.bool_]:
+    def interference(self) -> BoolArray:
         """(N,) True at interference points: the ball touches two places or more."""
         return np.asarray(self.count >= 2)
 
-    def select(self, index: NDArray[np.bool_] | NDArray[np.int64]) -> Contacts:
+    def select(self, index: BoolArray | IntArray) -> Contacts:
         """The queries that a mask or an index array picks."""
         return Contacts(**{name: array[index] for name, array in vars(self).items()})
 
@@ -110,6 +109,7 @@ class BallContact:
             ContactError: wrong shapes, values that are not finite, a direction of length zero.
         """
         from mapping import contact_kernels
+        from mapping.triangle_rows import BLOCK
 
         start = checked_points(origins, "origins")
         way = unit_directions(directions, len(start))
@@ -124,7 +124,7 @@ class BallContact:
                 where[part], feature[part], count[part], distance[part], state[part],
             )  # fmt: skip
 
-        _in_parts(some, len(start), contact_kernels.BLOCK, threads)
+        _in_parts(some, len(start), BLOCK, threads)
         return Contacts(
             tree.out(where[:, 0]),
             tree.out(where[:, 1]),

@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit
 
 from mapping.bvh_kernels import STACK, WIDTH, push_lanes
-from mapping.triangle_kernels import closest_on_triangle, enter_triangle, leave_triangle, unit_normal
+from mapping.triangle_kernels import closest_on_triangle, enter_triangle, leave_triangle
+from mapping.triangle_rows import BLOCK, closest, corners
 from mapping.vector_kernels import cross, dot, moved, scaled, sub, vector
 
 PASSES, TOUCHES, OVERLAPS = 0, 1, 2
@@ -21,36 +22,6 @@ TOUCH = 1e-9  # relative to the radius: what lies this close to the resting ball
 APART = 9e-5  # relative to the radius, sqrt(8 TOUCH): dents narrower than this are shallower than TOUCH
 GLANCING = 1e-3  # cosine below which a step along the way says little about the gap
 MOST = 16  # distinct contacts that are told apart
-BLOCK = 1024  # queries that share their guesses: threads that take whole blocks give the same answers
-
-
-@njit(cache=True, error_model="numpy")
-def lay_out(vertices, faces, order):  # type: ignore[no-untyped-def]
-    """(F, 12) rows of the faces in the given order."""
-    rows = np.empty((len(order), 12))
-    for i in range(len(order)):
-        for j in range(3):
-            for k in range(3):
-                rows[i, 3 * j + k] = vertices[faces[order[i], j], k]
-        a, b, c, _ = corners(rows, i, (0.0, 0.0, 0.0))
-        rows[i, 9], rows[i, 10], rows[i, 11] = unit_normal(a, b, c)
-    return rows
-
-
-@njit(cache=True, error_model="numpy")
-def corners(rows, i, o):  # type: ignore[no-untyped-def]
-    """Corners of a triangle relative to o, and its normal."""
-    a = (rows[i, 0] - o[0], rows[i, 1] - o[1], rows[i, 2] - o[2])
-    b = (rows[i, 3] - o[0], rows[i, 4] - o[1], rows[i, 5] - o[2])
-    c = (rows[i, 6] - o[0], rows[i, 7] - o[1], rows[i, 8] - o[2])
-    return a, b, c, (rows[i, 9], rows[i, 10], rows[i, 11])
-
-
-@njit(cache=True, error_model="numpy")
-def closest(rows, i, o):  # type: ignore[no-untyped-def]
-    """Point of a triangle closest to o, relative to o."""
-    a, b, c, n = corners(rows, i, o)
-    return closest_on_triangle(a, b, c, n)
 
 
 @njit(cache=True, error_model="numpy", inline="always")

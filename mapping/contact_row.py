@@ -8,12 +8,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.estimate import BRIDGED, EXTRAPOLATED, TOUCHED
+from mapping.arrays import FloatArray, IntArray
 from mapping.interference import NO_KINKS, Kinks, find_kinks
+from mapping.labels import BRIDGED, EXTRAPOLATED, TOUCHED
 from mapping.sweep_tangents import tangents, unit
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # No more points than this across one bridged strip, however finely the sweep is sampled.
 LARGEST_FAN = 64
@@ -82,7 +80,7 @@ def in_plane(along: FloatArray, outward: FloatArray) -> FloatArray:
     return unit(outward - np.einsum("ij,ij->i", outward, along)[:, None] * along)
 
 
-_Part = tuple[FloatArray, FloatArray, FloatArray, FloatArray, NDArray[np.int64], IntArray, IntArray]
+_Part = tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray, IntArray]
 
 
 def _fan(kinks: Kinks, k: int, outward: FloatArray, tip_radius: float, usual: float) -> _Part:

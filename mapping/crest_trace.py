@@ -3,21 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.polyline import nearest_on
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 # Share of a crest by which an ideal shape may be wrong about a real detail.
 SHAPE_ERROR = 0.04
 # Places that contradict a shape by more than this many standard deviations belong to something else.
 OUTLIER = 5.0
-
-
-def distances(points: FloatArray, axis: FloatArray) -> FloatArray:
-    """(N,) distances of points (N, 3) from a polyline (K, 3), m."""
-    return np.asarray(np.linalg.norm(points - nearest_on(points, axis)[0], axis=1))
 
 
 def crest_trace(distance: FloatArray, height: float, half_width: float) -> FloatArray:

@@ -8,15 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.curvature import Curvature, CurvatureError, from_operators
+from mapping.arrays import BoolArray, FloatArray, IntArray
+from mapping.curvature import Curvature, from_operators
+from mapping.errors import CurvatureError
 from mapping.row_shares import cores
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 # Neighbourhoods from which points choose. Regular grids are symmetric in 25, 37, 49, 69 and 97 neighbours, which
 # cancels odd errors; 33 are the fewest that a jet of degree 6 needs with some to spare.

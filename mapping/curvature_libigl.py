@@ -13,14 +13,11 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.curvature import Curvature, CurvatureError
+from mapping.arrays import FloatArray, IntArray
+from mapping.curvature import Curvature
+from mapping.errors import CurvatureError
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 # A component needs this many vertices for six neighbours everywhere and a fit that is more than interpolation.
 SMALLEST_COMPONENT = 20

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.chart import Chart, chart_along
 from mapping.curve_modes import CurveModes
 from mapping.development import normals_along, smooth_on_base
 from mapping.feature import Feature
 from mapping.hollow_shape import GrooveShape
 from mapping.laplace import find_optima
-from mapping.meeting import NEAR, touches
 from mapping.priors import Normal, Prior, Uniform
-from mapping.problem import Problem, Sizes, Surroundings, pose, sizes_of, window_for
+from mapping.problem import NEAR, Problem, Sizes, Surroundings, pose, sizes_of, touches, window_for
 from mapping.ridge_shape import RidgeShape
 from mapping.smooth_axis import HIGHEST_DEGREE
 from mapping.spot_problem import height_prior, hollow_priors, radius_prior
 from mapping.step_shape import StepShape
 from mapping.target import Shape
 from mapping.window import Window
-
-FloatArray = NDArray[np.float64]
 
 # Chords of the chart may sag by this share of the feature's height.
 SAG = 0.005

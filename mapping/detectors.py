@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.base import Base
+from mapping.cap_fit import Disturbance
 from mapping.crossing import Crossing
-from mapping.disturbance import Disturbance
-from mapping.errors import MappingError
+from mapping.errors import DetectionError
 from mapping.false_alarms import threshold_for
 from mapping.height_profile import HeightProfile, arclength, height_profiles
 from mapping.matched_filter import BINS_PER_HALF_WIDTH, smallest_half_width
@@ -21,7 +21,6 @@ from mapping.stated_noise import StatedNoise
 from mapping.stretches import find_disturbances
 from mapping.trace import Trace
 
-FloatArray = NDArray[np.float64]
 # Number, samples and arclengths (N,) m of a sweep
 Sweep = tuple[int, Trace, FloatArray]
 
@@ -35,10 +34,6 @@ PROBABILITY = 0.95
 UNRESOLVED = 2.5
 # Distances between samples that differ by no more than this factor are as good as equal.
 ALIKE = 1.15
-
-
-class DetectionError(MappingError):
-    """Detection asked for something that does not exist or cannot be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +180,7 @@ def _profiles(usable: list[Sweep], base: Base, noise: Noise, tip: float) -> list
     return [p for (number, part, s), spacing in each for p in height_profiles(number, part, s, base, spacing)]
 
 
-def _alike(steps: FloatArray) -> list[NDArray[np.int64]]:
+def _alike(steps: FloatArray) -> list[IntArray]:
     """Indices of the sweeps that were sampled about as densely as each other: filters know one density."""
     order = np.argsort(steps, kind="stable")
     groups, least = [], steps[order[0]]

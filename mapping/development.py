@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.onto_base import onto_base
 from mapping.polyline import arclengths, directions, nearest_on, resample
 from mapping.smooth_axis import smooth_axis
-
-FloatArray = NDArray[np.float64]
 
 # Points that follow a curve over the base: to a half-width of the feature, and in all
 DENSE, FEWEST, MOST = 10.0, 64, 400

@@ -10,16 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.branches import main_line
 from mapping.crossing import Crossing
 from mapping.feature import Evidence, Feature, Interval
 from mapping.inspection import Inspection
 from mapping.line_feature import Around
 from mapping.polyline import arclengths, nearest_on
-
-FloatArray = NDArray[np.float64]
 
 # A stretch is straight if it bends by less than this share of its rise, once its first part is left out, where the
 # ball rolls over the edge.

@@ -5,15 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mapping.alpha_shape import alpha_estimate
+from mapping.arrays import BoolArray, FloatArray
 from mapping.base import Base
 from mapping.bridging import bridged_faces, resting_points, split
 from mapping.contact_row import ContactRow, contact_row, in_plane
-from mapping.estimate import BRIDGED, EXTRAPOLATED, LABELS, TOUCHED, EnvelopeError, Estimate
+from mapping.errors import EnvelopeError
+from mapping.estimate import Estimate
+from mapping.labels import BRIDGED, EXTRAPOLATED, LABELS, TOUCHED
 from mapping.noise import Noise
-from mapping.penetration import penetration
+from mapping.profile_envelope import penetration
 from mapping.smoothing import Smoothed, smooth
 from mapping.surface import Surface
 from mapping.sweep_mesh import sweep_faces
@@ -23,8 +26,6 @@ from mapping.trace_normals import at_kinks, surface_normals
 
 __all__ = ["BRIDGED", "EXTRAPOLATED", "LABELS", "TOUCHED", "EnvelopeError", "Estimate", "estimate_surface"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 METHODS = ("envelope", "contact", "normals", "alpha")
 # Balls may overlap a contact by this share of their radius before it counts as impossible.
@@ -136,7 +137,7 @@ def _contacts(trace: Trace, method: str, outward: FloatArray, slack: float) -> E
     return Estimate(None, points, normals, row.centers, labels, sample, np.concatenate(sweeps), across)
 
 
-def _bounding(points: Estimate) -> NDArray[np.bool_]:
+def _bounding(points: Estimate) -> BoolArray:
     """(N,) which points are the contacts at interference points: they bound a bridged strip, however sure they are."""
     bridged = np.pad(points.labels == BRIDGED, 1)
     return np.asarray((points.sample < 0) & ~bridged[1:-1] & (bridged[:-2] | bridged[2:]))

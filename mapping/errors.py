@@ -19,3 +19,47 @@ class ModelError(MappingError):
 
 class ContactError(MappingError):
     """A contact query with an impossible ball, start or direction."""
+
+
+class SamplerError(MappingError):
+    """emcee did not take the state it was given."""
+
+
+class SweepMeshError(MappingError):
+    """Points that do not make a mesh."""
+
+
+class CalibrationError(MappingError):
+    """Samples that do not determine the tip."""
+
+
+class EnvelopeError(MappingError):
+    """A trace from which no surface can be estimated as asked."""
+
+
+class EmptyWindowError(MappingError):
+    """No sample of the trace is near the feature, or it does not lie over the base."""
+
+
+class CurvatureError(MappingError):
+    """Points whose curvature cannot be asked for."""
+
+
+class DetectionError(MappingError):
+    """Detection asked for something that does not exist or cannot be."""
+
+
+class Open3DError(MappingError, ImportError):
+    """Open3D or a system library that it needs cannot be loaded."""
+
+
+class ShapeError(MappingError):
+    """A size that no shape can have."""
+
+
+class NoiseError(MappingError):
+    """Noise parameters or residuals that cannot describe a noise."""
+
+
+class ParallelError(MappingError):
+    """Normals or curvatures that do not fit a surface."""

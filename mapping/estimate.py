@@ -7,18 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping.errors import MappingError
+from mapping.arrays import FloatArray, IntArray
+from mapping.labels import BRIDGED
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
-TOUCHED, BRIDGED, EXTRAPOLATED = 0, 1, 2
-LABELS = ("touched", "bridged", "extrapolated")
-
-
-class EnvelopeError(MappingError):
-    """A trace from which no surface can be estimated as asked."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,20 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapping.base import Base
-from mapping.crest_trace import distances
 from mapping.detectors import Detections
 from mapping.faint_lines import SECTIONS, SWEEPS, FaintLine, faint_lines
 from mapping.feature import Evidence, Feature, Interval
 from mapping.inspection import Inspection, inspect
 from mapping.line_end import line_end
 from mapping.point_feature import body_width
-from mapping.polyline import arclengths
+from mapping.polyline import arclengths, distances
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 # Places to a half-width of the narrowest section looked for.
 PLACES = 2.5

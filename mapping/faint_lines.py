@@ -13,14 +13,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.crest_trace import crest_trace, distances
+from mapping.arrays import BoolArray, FloatArray, IntArray
+from mapping.crest_trace import crest_trace
 from mapping.inspection import Inspection
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
+from mapping.polyline import distances
 
 # Half-widths of the sections looked for, against that of the smallest crest which a single sweep detects.
 SECTIONS = (1.0, 0.65)

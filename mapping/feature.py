@@ -1,4 +1,7 @@
-"""Feature: a detail of the object finer than its global model, and the values that describe it."""
+"""Feature: a detail of the object finer than its global model, and the values that describe it.
+
+LeftOut: a stage that a run did without, and why.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.posterior import Posterior
-
-FloatArray = NDArray[np.float64]
 
 KINDS = ("bump", "ridge", "pit", "groove", "step", "convex edge", "concave corner")
 
@@ -125,3 +126,22 @@ class Feature:
     def closed(self) -> bool:
         """True for a ridge or groove that returns to its beginning."""
         return len(self.axis) > 2 and bool(np.array_equal(self.axis[0], self.axis[-1]))
+
+
+# Note of a line that others meet
+JUNCTION = "junction"
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """One stage that was not needed or could not be done.
+
+    Args:
+        stage: name of the stage, for example "contact algorithms".
+        reason: one sentence saying why.
+        saved: what leaving it out saved, in words ("" if not known).
+    """
+
+    stage: str
+    reason: str
+    saved: str = ""

@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapping.anchor import tangent_frame
+from mapping.arrays import FloatArray, IntArray
 from mapping.bell_shape import width_at_half_height
 from mapping.feature import Feature, Interval
 from mapping.polyline import directions
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Corners of half a cross-section, and of a turn round a bump: smooth to the eye, light on disk.
 CORNERS = 17

@@ -5,13 +5,11 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.feature import Feature
 from mapping.section import radius_of_cap
 from mapping.shapes import chain_height, contact_half_width, rim_height
-
-FloatArray = NDArray[np.float64]
 
 # A crest disturbs the trace up to its half-width over a flat base, and hardly further over a hollow one
 BESIDE = 1.5

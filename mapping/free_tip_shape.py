@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.priors import Normal, Prior
 from mapping.problem import Problem
 from mapping.target import Shape
-
-FloatArray = NDArray[np.float64]
 
 # A tip is at least this share of its nominal radius.
 SMALLEST = 0.1

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
-from mapping.crest_trace import distances
 from mapping.crossing import Crossing
 from mapping.detectors import Detections
 from mapping.edge_feature import edge_features
@@ -17,17 +16,12 @@ from mapping.feature import Feature
 from mapping.inspection import Inspection, inspect
 from mapping.line_feature import Around, line_features
 from mapping.linking import groups
-from mapping.open_crest import comes_down, is_open, on_a_step
-from mapping.outline import outline
-from mapping.plateau_end import is_plateau_end
-from mapping.point_feature import point_feature
-from mapping.run_crest import along, told_crests
-from mapping.runs import split_runs
+from mapping.point_feature import outline, point_feature
+from mapping.polyline import distances
+from mapping.runs import along, split_runs, told_crests
 from mapping.step_feature import step_features
 from mapping.trace import Trace
-from mapping.unseen import is_unseen
-
-FloatArray = NDArray[np.float64]
+from mapping.unseen import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
 
 NAMES = {1: ("bump", "ridge"), -1: ("pit", "groove")}
 # A group of crossings that spreads over more than this many half-widths cannot be one round bump: sweeps further

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.base import Base
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Blocks of a sweep are long enough once doubling them shortens its length by less than this: noise zigzags,
 # the path does not.

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.bump_shape import Spot
 from mapping.chart import Chart
 from mapping.curve_modes import CurveModes
 from mapping.priors import Prior
 from mapping.window import Window
-
-FloatArray = NDArray[np.float64]
 
 # Two Gauss points average a template over its bin: exact for cubics between kinks.
 NODES = np.array([-1.0, 1.0]) / np.sqrt(3.0)

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.laplace import Laplace
 from mapping.proposal import DEGREES, Proposal, root_of
 from mapping.psis import effective_size, smooth_weights
 from mapping.target import Target
-
-FloatArray = NDArray[np.float64]
 
 ROUNDS = 12
 DRAWS = 1000

@@ -7,15 +7,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.base import Base
 from mapping.height_profile import arclength, height_profiles
 from mapping.noise import Noise
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Sweeps that tell the typical distance between neighbours.
 PROBED = 200

@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.sweep_tangents import STENCIL, chord_lengths, lagrange, unit
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # The concave turn at a kink must exceed the turns beside it by this factor.
 OUTSTANDING = 3.0

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.arrays import BoolArray, FloatArray
 from mapping.commanded_path import CommandedPath
 from mapping.contact import BallContact, Contacts
-
-FloatArray = NDArray[np.float64]
 
 HALVINGS = 60  # of the spacing: to the last bit of a place
 
@@ -63,7 +62,7 @@ def _travel(before: Contacts, after: Contacts) -> FloatArray:
     return np.asarray(np.nan_to_num(np.linalg.norm(after.centers - before.centers, axis=1), nan=np.inf))
 
 
-def _append(first: Contacts, second: Contacts, of_first: NDArray[np.bool_], of_second: NDArray[np.bool_]) -> Contacts:
+def _append(first: Contacts, second: Contacts, of_first: BoolArray, of_second: BoolArray) -> Contacts:
     one, other = vars(first.select(of_first)), vars(second.select(of_second))
     return Contacts(**{name: np.concatenate([one[name], other[name]]) for name in one})
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.target import Target
-
-FloatArray = NDArray[np.float64]
 
 ITERATIONS = 60
 # Gain in chi-square of a step after which the optimum is known: a thirtieth of a standard deviation.

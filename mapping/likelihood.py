@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.bin_filter import BinFilter, bin_filter
 from mapping.noise import Noise
 from mapping.window import Window
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,25 +6,20 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
-from mapping.branches import Branch, branches
-from mapping.closing import closes
-from mapping.crest_trace import crest_trace, distances, misfit
+from mapping.branches import Branch, branches, rejoined
+from mapping.crest_trace import crest_trace, misfit
 from mapping.crossing import Crossing
 from mapping.detectors import Detections
-from mapping.feature import Feature, Interval
+from mapping.feature import JUNCTION, Feature, Interval
 from mapping.inspection import Inspection
-from mapping.line_end import LineEnd, line_end
+from mapping.line_end import LineEnd, closes, line_end
 from mapping.linking import FELT, LONGEST_LINK, between
-from mapping.meeting import JUNCTION
 from mapping.point_feature import body_width, evidence
-from mapping.polyline import arclengths
-from mapping.rejoining import rejoined
+from mapping.polyline import arclengths, distances
 from mapping.runs import RunPoint
-
-FloatArray = NDArray[np.float64]
 
 # A crossing lower than this share of a neighbour, or of one within a half-width, passed beside an end;
 # so did the last crossing of a line if it is lower than this share of the one before.

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.crossing import Crossing
 from mapping.inspection import Inspection
-
-FloatArray = NDArray[np.float64]
 
 # Crossings further apart than this many sweep distances are not linked, whatever lies between.
 LONGEST_LINK = 6.0

@@ -6,11 +6,9 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.noise import Noise
-
-FloatArray = NDArray[np.float64]
 
 # Ratio of neighbouring half-widths: a cap between two templates loses less than 0.6 % of its signal-to-noise.
 LADDER = 1.2

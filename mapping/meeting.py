@@ -7,25 +7,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
-from mapping.crest_trace import distances
-from mapping.extent import with_open_ends
-from mapping.feature import Feature, Interval
+from mapping.feature import JUNCTION, Feature, Interval
 from mapping.onto_base import onto_base
 from mapping.polyline import arclengths, nearest_on
+from mapping.problem import NEAR, touches
+from mapping.summary import with_open_ends
 
-FloatArray = NDArray[np.float64]
-
-# An end at which a line meets another lies that near to where it was detected, in half-widths: what the other one
-# covers does not tell it
-NEAR = 0.5
 # A course is known no better than this share of the half-width; places that settle the meeting place
 LEAST_SD, ROUNDS = 1e-3, 5
 QUANTILE = 1.6448536
-# Note of a line that others meet
-JUNCTION = "junction"
 LINES = ("ridge", "groove")
 
 
@@ -42,11 +35,6 @@ class Meeting:
     ends: tuple[tuple[int, int], ...]
     lines: tuple[int, ...]
     reach: float
-
-
-def touches(end: FloatArray, other: Feature, half_width: float) -> bool:
-    """True if a line whose end (3,) this is meets another feature there."""
-    return len(other.axis) > 1 and bool(distances(end[None], other.axis)[0] < NEAR * half_width)
 
 
 def meetings(features: Sequence[Feature], half_widths: Sequence[float]) -> list[Meeting]:

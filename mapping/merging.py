@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import BoolArray, FloatArray
 from mapping.feature import Evidence, Feature, Interval
 from mapping.object_model import ObjectModel
 from mapping.polyline import arclengths, nearest_on, resample
-
-FloatArray = NDArray[np.float64]
 
 # Two axes further apart than this many standard deviations of their distance belong to two features.
 SAME = 4.0
@@ -84,7 +82,7 @@ def _share_a_body(a: Feature, b: Feature) -> bool:
     return axis_gap(a, b) < 0.5 * min(a.width.median, b.width.median)
 
 
-def _gaps(points: FloatArray, axis: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _gaps(points: FloatArray, axis: FloatArray) -> tuple[FloatArray, BoolArray]:
     """(N,) distances of points from a polyline, and whether they lie beside it, not beyond its ends."""
     if len(axis) == 1:
         return np.linalg.norm(points - axis[0], axis=1), np.ones(len(points), dtype=bool)

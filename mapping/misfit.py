@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.bin_filter import bin_filter
 from mapping.laplace import find_optima
 from mapping.noise import Noise
 from mapping.problem import MODEL_FLOOR, Problem
-
-FloatArray = NDArray[np.float64]
 
 # A whitened bin further out than this is an outlier, as long as few are.
 OUTLIER = 4.5

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.feature import Feature
 from mapping.feature_mesh import feature_mesh
 from mapping.model_json import SCHEMA, feature_record
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 BASE_COLOUR = (0.78, 0.80, 0.83, 1.0)
 COLOURS = {

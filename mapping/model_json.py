@@ -6,17 +6,15 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.errors import ModelError
-from mapping.feature import KINDS, Anchor, Evidence, Feature, Interval
-from mapping.left_out import LeftOut
+from mapping.feature import KINDS, Anchor, Evidence, Feature, Interval, LeftOut
 from mapping.posterior import Posterior
 
 SCHEMA = "explore3d/model/1"
 
 Record = dict[str, Any]
-FloatArray = NDArray[np.float64]
 
 
 def plain(value: Any, where: str = "value") -> Any:

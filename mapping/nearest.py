@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.errors import MappingError
 from mapping.surface import Surface
 from mapping.triangle_tree import TriangleTree
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # A barycentric coordinate below this counts as zero: the point lies on an edge or a vertex.
 ON_BORDER = 1e-9

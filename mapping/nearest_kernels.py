@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from mapping.bvh_kernels import ROUNDING, STACK, WIDTH, push_lanes
-from mapping.contact_kernels import BLOCK, closest
+from mapping.triangle_rows import BLOCK, closest
 from mapping.vector_kernels import dot, moved, vector
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mapping.errors import MappingError
-
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
+from mapping.errors import NoiseError
 
 # The median of |x| of a standard normal variable: turns a median absolute deviation into a standard deviation.
 MEDIAN_OF_ABSOLUTE_NORMAL = 0.6744897501960817
@@ -22,10 +21,6 @@ SHORT = 0.5
 TERMS = np.arange(20)
 SIGNS = (-1.0) ** TERMS
 FACTORIALS = np.cumprod(np.arange(1.0, 22.0))[TERMS + 1]
-
-
-class NoiseError(MappingError):
-    """Noise parameters or residuals that cannot describe a noise."""
 
 
 @dataclass(frozen=True)

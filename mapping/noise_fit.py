@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mapping.noise import FloatArray, Noise
+from mapping.arrays import FloatArray
+from mapping.noise import Noise
 from mapping.stated_noise import StatedNoise
 
 # A correlated part must raise twice the log-likelihood by this much over white noise alone.

@@ -12,20 +12,18 @@ from typing import Any, Self
 from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapping.anchor import anchor
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.errors import ModelError
-from mapping.feature import Feature
-from mapping.left_out import LeftOut
+from mapping.feature import Feature, LeftOut
 from mapping.model_json import SCHEMA, Record, feature_record, left_out_record, plain, read_feature
 from mapping.surface import Surface
 from mapping.whole_file import write_whole
 
 __all__ = ["LeftOut", "ObjectModel"]
 
-FloatArray = NDArray[np.float64]
 
 # Fields over the base's vertices or faces that are kept beside it
 FIELDS = ("reach", "sigma", "inspected")

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.detectors import detect
 from mapping.noise import Noise
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 # In half-widths of the widest feature: what must lie behind a crest before it is reported, the path between two
 # looks, and what is remembered.

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
-
-FloatArray = NDArray[np.float64]
 
 # Each round leaves of a sideways error the share by which facet and smooth normal differ: 1e-2 for 1 degree, but a
 # third beside a fold of 40 degrees, where rounds go on until a point moves by less than this share of the tip's radius.

@@ -8,11 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from mapping.errors import MappingError
-
-
-class Open3DError(MappingError, ImportError):
-    """Open3D or a system library that it needs cannot be loaded."""
+from mapping.errors import Open3DError
 
 
 @cache

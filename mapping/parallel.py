@@ -5,16 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mapping.errors import MappingError
+from mapping.arrays import BoolArray, FloatArray, IntArray
+from mapping.errors import ParallelError
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
-
-
-class ParallelError(MappingError):
-    """Normals or curvatures that do not fit a surface."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +28,10 @@ class ParallelSurface:
     surface: Surface
     stretch: FloatArray
     caustics: FloatArray
-    edges: NDArray[np.int64]
+    edges: IntArray
 
     @property
-    def reachable(self) -> NDArray[np.bool_]:
+    def reachable(self) -> BoolArray:
         """(V,) whether the ball can touch the vertex as far as its neighbourhood says."""
         return np.asarray((self.stretch >= 0).all(axis=1))
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 
 def arclengths(points: FloatArray) -> FloatArray:
@@ -61,3 +60,8 @@ def nearest_on(points: FloatArray, polyline: FloatArray) -> tuple[FloatArray, Fl
     best = np.linalg.norm(points[:, None] - candidates, axis=2).argmin(axis=1)
     row = np.arange(len(points))
     return candidates[row, best], arclengths(polyline)[best] + share[row, best] * np.sqrt(square[best])
+
+
+def distances(points: FloatArray, axis: FloatArray) -> FloatArray:
+    """(N,) distances of points (N, 3) from a polyline (K, 3), m."""
+    return np.asarray(np.linalg.norm(points - nearest_on(points, axis)[0], axis=1))

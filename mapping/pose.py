@@ -6,15 +6,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.base import Base
 from mapping.cells import Cells
 from mapping.errors import TraceError
 from mapping.robust import BISQUARE, MAD_TO_SD
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 # Cells that the pose is fitted to, and of these the share that leads there: a few rounds with all of them then do
 MOST_CELLS, LEADING = 4000, 8
@@ -277,7 +276,7 @@ class _View:
         seen = (strong.sum(axis=0) >= FEWEST_CELLS) & (information * allowed**2 > 1.0)
         return vectors[:, seen], vectors[:, ~seen]
 
-    def covariance(self, bound: FloatArray, tilt: float, sweep: NDArray[np.int64]) -> tuple[FloatArray, int]:
+    def covariance(self, bound: FloatArray, tilt: float, sweep: IntArray) -> tuple[FloatArray, int]:
         """(6, 6) in the scaled motions, widened for the correlation of neighbouring cells; number observed."""
         observed, others = self.motions(bound, tilt)
         kept = self.root > 0

@@ -6,20 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.feature import Feature
 from mapping.feature_trace import feature_trace
 from mapping.likelihood import Likelihood, Nuisance, build_likelihood
 from mapping.noise import Noise
+from mapping.polyline import distances
 from mapping.section import radius_of_cap
 from mapping.shapes import contact_half_width
 from mapping.target import Shape, Target
 from mapping.trace import Trace
 from mapping.window import Window, bin_samples, gather
-
-FloatArray = NDArray[np.float64]
 
 # Bins of x_c/30 lose 0.7 % of the information (theory section 8); windows reach 3 x_c to either side of the crest.
 BINS_PER_HALF_WIDTH = 30.0
@@ -158,3 +157,13 @@ def _likelihood(
     window: Window, noise: Noise, nuisance: Nuisance, height: float, inflation: FloatArray | None
 ) -> Likelihood:
     return build_likelihood(window, noise, nuisance, MODEL_FLOOR * height, inflation)
+
+
+# An end at which a line meets another lies that near to where it was detected, in half-widths: what the other one
+# covers does not tell it
+NEAR = 0.5
+
+
+def touches(end: FloatArray, other: Feature, half_width: float) -> bool:
+    """True if a line whose end (3,) this is meets another feature there."""
+    return len(other.axis) > 1 and bool(distances(end[None], other.axis)[0] < NEAR * half_width)

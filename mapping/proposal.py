@@ -7,9 +7,8 @@ from functools import cached_property
 from math import lgamma, log, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 DEGREES = 6.0
 # A component that explains less than this share of the draws is left as it is, to keep watch.

@@ -8,9 +8,8 @@ Zhang & Stephens, "A New and Efficient Estimation Method for the Generalized Par
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray, IntArray
 
 
 def smooth_weights(log_ratios: FloatArray) -> tuple[FloatArray, float]:
@@ -48,7 +47,7 @@ def effective_size(weights: FloatArray) -> float:
     return float(1.0 / np.sum(weights**2))
 
 
-def resample(rng: np.random.Generator, weights: FloatArray, size: int) -> NDArray[np.int64]:
+def resample(rng: np.random.Generator, weights: FloatArray, size: int) -> IntArray:
     """(size,) indices drawn with the weights by systematic resampling, in random order."""
     places = (np.arange(size) + rng.random()) / size
     index = np.minimum(np.searchsorted(np.cumsum(weights), places), len(weights) - 1)

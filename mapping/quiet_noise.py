@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import BoolArray, FloatArray
 from mapping.base import Base
 from mapping.height_profile import HeightProfile
 from mapping.matched_filter import Bank, build_bank, filter_sd, smallest_half_width
@@ -16,9 +16,6 @@ from mapping.noise_fit import Blocks, NoiseFit, fit_noise, perturbed, relative_s
 from mapping.stated_noise import StatedNoise
 from mapping.stretches import quiet_bins
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 # Rounding of contact geometry, in tip radii: the noise is never taken to be smaller.
 ROUNDING = 1e-8

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
+from mapping.errors import EmptyWindowError
 from mapping.evidence import log_evidence_of_nothing
 from mapping.feature import Feature
 from mapping.free_tip_shape import with_free_tip
@@ -23,9 +24,6 @@ from mapping.sampling import Chain, sample_ensemble, walkers_for
 from mapping.summary import describe
 from mapping.trace import Trace
 from mapping.trace_noise import noise_of_trace
-from mapping.window import EmptyWindowError
-
-FloatArray = NDArray[np.float64]
 
 # Kinds that have a closed-form trace here; the others are reported as detected.
 SAMPLED_KINDS = ("bump", "ridge", "pit", "groove", "step")
@@ -133,7 +131,7 @@ def solve(
     solution = solve_problem(pose_problem(feature, around), rng, confirm=confirm)
     if feature.kind != "bump" or solution.problem.noise == noise:
         return solution
-    from mapping.bump_profile import better_profile
+    from mapping.evidence import better_profile
 
     bell = better_profile(solution.problem, around, rng)
     return solution if bell is None else solve_problem(bell, rng, confirm=confirm)

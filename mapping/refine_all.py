@@ -6,19 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapping.base import Base
-from mapping.crest_trace import distances
 from mapping.feature import Feature
 from mapping.meeting import Meeting, brought_together, meetings
 from mapping.noise import Noise
+from mapping.polyline import distances
 from mapping.problem import Surroundings, sizes_of
 from mapping.refine import refine, settle
 from mapping.trace import Trace
 from mapping.trace_noise import noise_of_trace
-
-FloatArray = NDArray[np.float64]
 
 # What fewer crossings show may be false, and would take its part of a true neighbour's trace and live on that
 CERTAIN = 3

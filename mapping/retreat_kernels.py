@@ -8,8 +8,9 @@ import numpy as np
 from numba import njit
 
 from mapping.bvh_kernels import STACK, WIDTH, push_lanes
-from mapping.contact_kernels import corners, way_to_body
+from mapping.contact_kernels import way_to_body
 from mapping.triangle_kernels import closest_on_triangle, leave_triangle
+from mapping.triangle_rows import corners
 from mapping.vector_kernels import dot, moved, scaled, sub, vector
 
 

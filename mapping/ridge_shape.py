@@ -6,15 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.chart import Chart
 from mapping.curve_modes import CurveModes
 from mapping.priors import Prior
 from mapping.window import Window
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # A bin looks at the legs of the chart within this share of a tip radius of the one nearest to it: an axis that is
 # turned a little against the chart is nearest at a place a little further along.

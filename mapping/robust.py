@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 # Tukey's bisquare at 4.685 standard deviations keeps 95 % efficiency on Gaussian residuals.
 BISQUARE = 4.685

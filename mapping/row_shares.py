@@ -8,9 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 # Values that a share must produce to be worth a thread: some ten times what handing it over costs.
 WORTHWHILE = 15_000

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.errors import MappingError
+from mapping.arrays import FloatArray
+from mapping.errors import SamplerError
 from mapping.proposal import DEGREES, Proposal
 from mapping.target import Target
-
-FloatArray = NDArray[np.float64]
 
 # Walkers at least and at most; so many bins a step cost no more than what emcee does beside them, whoever sees them.
 WALKERS, MOST_WALKERS = 20, 48
@@ -26,10 +24,6 @@ TIMES = 100
 SETTLED = 0.01
 FIRST_LOOK = 200
 GROWTH = 1.06
-
-
-class SamplerError(MappingError):
-    """emcee did not take the state it was given."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 
 def width_of_cap(height: ArrayLike, radius: ArrayLike) -> FloatArray:

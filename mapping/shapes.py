@@ -11,15 +11,10 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mapping.errors import MappingError
-
-FloatArray = NDArray[np.float64]
-
-
-class ShapeError(MappingError):
-    """A size that no shape can have."""
+from mapping.arrays import FloatArray
+from mapping.errors import ShapeError
 
 
 def contact_half_width(height: ArrayLike, radius: ArrayLike, tip_radius: float) -> FloatArray:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 HIGHEST_DEGREE = 8
 # A fit whose typical square residual exceeds this many variances follows the axis at no degree: the axis is kept.

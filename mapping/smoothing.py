@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.noise import Noise, estimate_noise
-from mapping.smoothing_scale import position_sd, smoothing_length
+from mapping.smoothing_spline import position_sd, smoothing_length
 from mapping.sweep_tangents import chord_lengths, unit
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Samples are averaged over this share of the smoothing length: finer ones carry no more information.
 BLOCK = 1 / 8
@@ -45,7 +43,7 @@ class Smoothed:
     noise: Noise
 
     @property
-    def dented(self) -> NDArray[np.bool_]:
+    def dented(self) -> BoolArray:
         """(M,) where the trace may hold a kink: within two smoothing lengths of dents beyond k_t = -1/r.
 
         A kink that is smoothed over the length h is indistinguishable from a dent of a few h.
@@ -136,7 +134,7 @@ class _Sweep:
         middles = ((blocks[:-1] + blocks[1:]) // 2)[kept]
         return _Fit(self._trace(positions, blocks, kept), middles, curvature[kept], int(weight[~kept].sum()))
 
-    def _trace(self, positions: FloatArray, blocks: IntArray, kept: NDArray[np.bool_]) -> Trace:
+    def _trace(self, positions: FloatArray, blocks: IntArray, kept: BoolArray) -> Trace:
         def mean(values: FloatArray | None) -> FloatArray | None:
             return None if values is None else self._means(values, blocks)[kept]
 
@@ -168,7 +166,7 @@ class _Sweep:
         return np.asarray(sums / counts)
 
 
-def _impossible(curvature: FloatArray, tip_radius: float) -> NDArray[np.bool_]:
+def _impossible(curvature: FloatArray, tip_radius: float) -> BoolArray:
     """Local maxima of curvature beyond 1/r by more than its noise, which three times over is 1/r too."""
     beyond = curvature > 2 / tip_radius
     peak = (curvature >= np.r_[-np.inf, curvature[:-1]]) & (curvature >= np.r_[curvature[1:], -np.inf])
@@ -180,7 +178,7 @@ def _spline(
     centers: FloatArray,
     weight: IntArray,
     outward: FloatArray,
-    kept: NDArray[np.bool_],
+    kept: BoolArray,
     scale: float,
     spacing: float,
 ) -> tuple[FloatArray, FloatArray]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.bell_shape import bell_shape
 from mapping.bump_shape import BumpShape, Spot, spot_at
 from mapping.feature import Feature
@@ -13,8 +13,6 @@ from mapping.priors import Prior, StudentT, Uniform
 from mapping.problem import Problem, Sizes, Surroundings, pose, sizes_of, window_for
 from mapping.target import Shape
 from mapping.window import Window
-
-FloatArray = NDArray[np.float64]
 
 # A position across the sweeps is asked for only if they spread over this share of the disturbance.
 SPREAD = 0.1

@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping.noise import FloatArray, Noise, NoiseError
+from mapping.arrays import FloatArray
+from mapping.errors import NoiseError
+from mapping.noise import Noise
 
 # Degrees of freedom of what is stated (1: Cauchy's): its tails let measurements that contradict it prevail.
 TAIL = 1.0

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapping.branches import main_line
-from mapping.crest_trace import distances
 from mapping.crossing import Crossing
 from mapping.feature import Evidence, Feature, Interval
 from mapping.line_feature import ONE_POINT, Around, mean_point, merged
 from mapping.linking import groups
-from mapping.polyline import arclengths
+from mapping.polyline import arclengths, distances
 
 
 def step_features(

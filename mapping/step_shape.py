@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.chart import Chart
 from mapping.curve_modes import CurveModes
 from mapping.hollow_shape import bin_nodes
 from mapping.priors import Prior
 from mapping.window import Window
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

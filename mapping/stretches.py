@@ -8,16 +8,12 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mapping.cap_fit import fit_cap
-from mapping.disturbance import Disturbance
+from mapping.arrays import BoolArray, FloatArray
+from mapping.cap_fit import Disturbance, fit_cap
 from mapping.height_profile import HeightProfile
 from mapping.matched_filter import Bank
 from mapping.noise import Noise
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 # A stretch reaches as far as the smoothed height exceeds this share of the crest, or 2.5 standard deviations.
 SKIRT = 0.03

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.errors import SurfaceError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +53,7 @@ class Surface:
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
     @cached_property
-    def open_sides(self) -> NDArray[np.bool_]:
+    def open_sides(self) -> BoolArray:
         """(F, 3) True where the side opposite to a face's corner belongs to no other face."""
         one, other = np.roll(self.faces, -1, axis=1), np.roll(self.faces, -2, axis=1)
         sides = np.minimum(one, other) * len(self.vertices) + np.maximum(one, other)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.noise import Noise
-
-FloatArray = NDArray[np.float64]
 
 # Standard deviations of the curvature's noise that a threshold must be apart from zero.
 CERTAINTY = 3.0

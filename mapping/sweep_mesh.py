@@ -5,24 +5,18 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mapping.errors import MappingError
+from mapping.arrays import FloatArray, IntArray
+from mapping.errors import SweepMeshError
 from mapping.surface import Surface
 from mapping.sweep_rows import parallel_rows, pitch, thinned
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Points whose outward directions all lie in this cone are a height field over their mean direction.
 HEIGHT_FIELD_CONE = np.cos(np.deg2rad(60.0))
 # Triangles of a triangulated cloud with an edge this many times the usual spacing span a hole.
 LONGEST_EDGE = 6.0
-
-
-class SweepMeshError(MappingError):
-    """Points that do not make a mesh."""
 
 
 def mesh_sweeps(trace: Trace, outward: ArrayLike = (0.0, 0.0, 1.0), spacing: float | None = None) -> Surface:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from mapping.arrays import BoolArray, FloatArray, IntArray
 
 
 def parallel_rows(points: FloatArray, sweep: IntArray) -> list[IntArray] | None:
@@ -65,7 +63,7 @@ def pitch(points: FloatArray, sweep: IntArray) -> float:
     return float(np.median(distances))
 
 
-def thinned(points: FloatArray, sweep: IntArray, spacing: float, keep: NDArray[np.bool_] | None = None) -> IntArray:
+def thinned(points: FloatArray, sweep: IntArray, spacing: float, keep: BoolArray | None = None) -> IntArray:
     """Indices of samples at least `spacing` apart along each sweep, with its ends and whatever `keep` marks."""
     if spacing <= 0:
         return np.arange(len(points))

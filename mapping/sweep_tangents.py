@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from mapping.arrays import FloatArray, IntArray
 
 STENCIL = 5
 # A window of points must be smoother than the central one by this factor to displace it.
@@ -41,7 +39,7 @@ def tangents(points: FloatArray, cuts: IntArray) -> FloatArray:
     (Harten et al. 1987): the central five, unless others are much smoother, so that a jump of curvature
     spoils none of them. Pieces of fewer points use what they have.
     """
-    from mapping.envelope_kernels import sweep_tangents as kernel
+    from mapping.tangent_kernels import sweep_tangents as kernel
 
     count = len(points)
     s = chord_lengths(points)

@@ -7,13 +7,11 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.likelihood import Likelihood
 from mapping.priors import Prior
 from mapping.row_shares import by_shares
-
-FloatArray = NDArray[np.float64]
 
 
 class Shape(Protocol):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from itertools import combinations, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
+
 # Neighbours of each point
 Tree = dict[int, set[int]]
 

@@ -6,22 +6,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mapping.errors import MappingError
+from mapping.arrays import FloatArray
+from mapping.errors import CalibrationError
 from mapping.noise import Noise, estimate_noise
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
 
 SHAPES = ("sphere", "ring")
 # 90 % of a normal distribution lie within so many standard deviations
 NINETY = 1.6448536269514722
 SECTORS, BANDS = 12, 3
-
-
-class CalibrationError(MappingError):
-    """Samples that do not determine the tip."""
 
 
 @dataclass(frozen=True, eq=False)

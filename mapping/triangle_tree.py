@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mapping.arrays import FloatArray
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
 
 
 class TriangleTree:
@@ -22,7 +21,7 @@ class TriangleTree:
     """
 
     def __init__(self, surface: Surface, length: float = 0.0) -> None:
-        from mapping import bvh_kernels, contact_kernels
+        from mapping import bvh_kernels, triangle_rows
 
         low, high = bvh_kernels.bounds(surface.vertices, surface.faces)
         self.extent = float((0.5 * high - 0.5 * low).max()) * 2.0
@@ -30,7 +29,7 @@ class TriangleTree:
         self._center = np.ldexp(np.round(np.ldexp(0.5 * low + 0.5 * high, -self._exponent)), self._exponent)
         vertices = self.into(surface.vertices)
         self.order: NDArray[np.int32] = bvh_kernels.leaf_order(vertices, surface.faces)
-        self.rows: FloatArray = contact_kernels.lay_out(vertices, surface.faces, self.order)
+        self.rows: FloatArray = triangle_rows.lay_out(vertices, surface.faces, self.order)
         self.leaves, self.boxes, self.links = bvh_kernels.build_tree(self.rows)
         self.size = float(np.linalg.norm(np.abs(self.into(np.stack([low, high]))).max(axis=0)))
 

@@ -6,10 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from mapping.arrays import FloatArray, IntArray
 
 
 @njit(cache=True, nogil=True)

@@ -8,19 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.base import Base, Feet
-from mapping.errors import MappingError
+from mapping.errors import EmptyWindowError
 from mapping.trace import Trace
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Samples are looked at in blocks of this many: the cost of the rest of a long log is that of its boxes.
 BLOCK = 64
-
-
-class EmptyWindowError(MappingError):
-    """No sample of the trace is near the feature, or it does not lie over the base."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.crossing import Crossing
 from planners.strokes import tangential
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

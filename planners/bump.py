@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.crossing import Crossing
 from planners.plan import Outcome, Plan
 from planners.sense import Sense
 from planners.strokes import Strokes
-
-FloatArray = NDArray[np.float64]
 
 # Ratio of half-widths from which a bump is taken for a short ridge
 ELONGATED = 1.25

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import BoolArray, IntArray
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 CREASE = float(np.radians(30.0))
 
 
-def crease_charts(surface: Surface, inside: NDArray[np.bool_] | None = None, crease: float = CREASE) -> list[IntArray]:
+def crease_charts(surface: Surface, inside: BoolArray | None = None, crease: float = CREASE) -> list[IntArray]:
     """Faces grouped into charts whose neighbours turn by less than `crease` rad, largest area first.
 
     Args:

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.finger import Workspace
 from hw.moves import Move
 from mapping.base import Base
 from planners.travel import DEEP, gap, sunk
-
-FloatArray = NDArray[np.float64]
 
 # The sensor's field about its axis (paper, section 4)
 FIELD = float(np.radians(75.0))

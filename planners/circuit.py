@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.crossing import Crossing
 from planners.crest import slender
 from planners.plan import Outcome, Plan
 from planners.sense import Sense
 from planners.strokes import Strokes, tangential
-
-FloatArray = NDArray[np.float64]
 
 # Cosine of the angle between two branches of one line, at most
 OPPOSITE = -0.4

@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
-
 
 # Samples of faces looked at, at most
 MOST_SAMPLES = 2_000_000
@@ -31,7 +28,7 @@ class Coverage:
     reach: float
 
 
-def coverage(surface: Surface, touched: FloatArray, reach: float, region: NDArray[np.bool_] | None = None) -> Coverage:
+def coverage(surface: Surface, touched: FloatArray, reach: float, region: BoolArray | None = None) -> Coverage:
     """Coverage of a mesh by the points (N, 3) that sweeps touched.
 
     Every face is sampled three times as finely as `reach`; a sample is inspected if a touched point lies within
@@ -109,7 +106,7 @@ def found_probability(
     return np.where(seen > 0, ndtr(signal - threshold), 0.0)
 
 
-def _parts(surface: Surface, spacing: float) -> NDArray[np.int64]:
+def _parts(surface: Surface, spacing: float) -> IntArray:
     """(F,) subdivisions of each face's sides."""
     longest = _longest_sides(surface)
     # a face of 200 subdivisions already has 40 000 samples
@@ -128,7 +125,7 @@ def _sample_count(surface: Surface, spacing: float) -> int:
     return int((parts**2).sum()) if parts.max(initial=1) > 1 else 0
 
 
-def face_samples(surface: Surface, spacing: float) -> tuple[FloatArray, NDArray[np.int64]]:
+def face_samples(surface: Surface, spacing: float) -> tuple[FloatArray, IntArray]:
     """Points (N, 3) spread evenly over every face, at most about `spacing` apart, and the face of each."""
     corners, parts = surface.vertices[surface.faces], _parts(surface, spacing)
     points, owner = [], []

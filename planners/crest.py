@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.noise import Noise
 from mapping.trace import Trace
 from planners.shape_fit import ShapeFit, crest_shape, dip_shape, edge_shape, fit_shape
-
-FloatArray = NDArray[np.float64]
 
 # Fall of chi-squared below which a sweep shows nothing: five standard deviations
 SEEN = 25.0

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.moves import Move
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.base_extent import SPACING, rolled_off, touched_part
 from mapping.base_fit import fit_base
@@ -20,8 +20,6 @@ from planners.errors import PlannerError
 from planners.feel_line import Felt, FeltLine, empty_at, facing
 from planners.plan import Outcome, Plan
 from planners.survey import Survey
-
-FloatArray = NDArray[np.float64]
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
 # Lines along and across each side of the box, and sweeps that test a fit

@@ -6,15 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from planners.coverage import face_samples
 from planners.plan import Outcome, Plan
 from planners.strokes import Strokes, tangential
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Distance of the places that visits are counted at, in footprints; steps of one sweep
 SPACING, STEPS = 0.7, 24

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.noise import Noise
@@ -28,8 +28,6 @@ from planners.sense import Sense
 from planners.strokes import Strokes
 from planners.survey import Survey
 from planners.surveyor import CANDIDATES, Surveyor
-
-FloatArray = NDArray[np.float64]
 
 # Slides off one end, at most, and in one go
 MOST_SLIDES, AT_ONCE = 150, 8

@@ -6,13 +6,11 @@ from collections.abc import Generator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.moves import Move
+from mapping.arrays import FloatArray
 from mapping.trace import Trace
 from planners.pressed_path import PRESS
-
-FloatArray = NDArray[np.float64]
 
 # In tip radii: of a guarded approach, of the first and the longest stretch that is followed at once
 TOUCH, SHORT, LONG = 0.2, 1.0, 4.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.crossing import Crossing
 from mapping.noise import Noise
 from planners.axis_track import AxisTrack
@@ -15,8 +15,6 @@ from planners.coverage import Coverage
 from planners.crest import is_step, slender
 from planners.faint import FaintLead
 from planners.strokes import tangential
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass

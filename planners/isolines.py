@@ -6,10 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from mapping.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +72,7 @@ def _chains(pairs: IntArray, count: int) -> Iterator[tuple[IntArray, IntArray]]:
             yield _walk(start, pairs, touching, used)
 
 
-def _walk(start: int, pairs: IntArray, touching: list[list[int]], used: NDArray[np.bool_]) -> tuple[IntArray, IntArray]:
+def _walk(start: int, pairs: IntArray, touching: list[list[int]], used: BoolArray) -> tuple[IntArray, IntArray]:
     nodes, node = [start], start
     segments: list[int] = []
     while True:

@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray, IntArray
 from mapping.surface import Surface
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # A linear field serves where its slope along the surface stays above this (1 is perfect)
 ENOUGH_SLOPE = 0.8

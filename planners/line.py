@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.crossing import Crossing
 from planners.axis_track import AxisEnd, AxisTrack, polyline_distance
 from planners.crest import is_step
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.moves import Move
+from mapping.arrays import FloatArray
 from mapping.surface import Surface
 from planners.isolines import Isoline
-
-FloatArray = NDArray[np.float64]
 
 # Commanded depth below contact, in tip radii: enough to keep contact over a shallow groove
 PRESS = 0.02

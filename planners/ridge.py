@@ -6,9 +6,9 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.moves import Move
+from mapping.arrays import FloatArray
 from mapping.crossing import Crossing
 from mapping.noise import Noise
 from mapping.trace import Trace
@@ -20,7 +20,6 @@ from planners.ridge_end import Crest, EndFinder
 from planners.sense import Sense
 from planners.strokes import Strokes, tangential, to_and_fro
 
-FloatArray = NDArray[np.float64]
 Crossed = Generator[Move, Trace, Crossing | None]
 
 # A crossing lower than this share of the ridge's last heights lies beyond its end; a faint line's height is too

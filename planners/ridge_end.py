@@ -6,9 +6,9 @@ from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.moves import Move
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.noise import Noise
 from mapping.trace import Trace
@@ -16,8 +16,6 @@ from planners.axis_track import AxisEnd, AxisTrack, Slides
 from planners.crest import flattening
 from planners.shape_fit import ShapeFit, end_shape, fit_shape
 from planners.strokes import Strokes, tangential, to_and_fro
-
-FloatArray = NDArray[np.float64]
 
 # A slide in half-widths of the disturbance: from so far before the end to so far beyond it. The first one must find
 # the end; the others pass only over what its place changes, the fall of the crest

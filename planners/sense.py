@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.detectors import detect
 from mapping.noise import Noise
 from mapping.trace import Trace
 from planners.crest import is_step
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

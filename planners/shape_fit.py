@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.noise import Noise
 from mapping.shapes import cap_height
 
-FloatArray = NDArray[np.float64]
 # |Height| of a trace at offsets x from the shape's place, for a crest of a given |height|, m
 Shape = Callable[[FloatArray, float], FloatArray]
 

@@ -6,14 +6,13 @@ from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hw.moves import Move
+from mapping.arrays import BoolArray, FloatArray
 from mapping.base import Base
 from mapping.trace import Trace
 from planners.pressed_path import pressed_sweep
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +131,7 @@ def to_and_fro(move: Move, times: int) -> Generator[Move, Trace, list[Trace]]:
     return felt
 
 
-def _walked(points: FloatArray, normals: FloatArray, directions: FloatArray, going: NDArray[np.bool_]) -> Walk:
+def _walked(points: FloatArray, normals: FloatArray, directions: FloatArray, going: BoolArray) -> Walk:
     count = int(going.sum())
     points = points[:count]
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.moves import Move
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.base import Base
 from planners.charts import crease_charts
 from planners.coverage import Coverage, coverage
@@ -19,9 +19,6 @@ from planners.level_field import LevelField, level_field
 from planners.plan import Outcome, Plan
 from planners.pressed_path import pressed_sweep, thinned, touched_points
 from planners.slices import Slices, slice_axes, slices_for
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -166,11 +163,11 @@ class Survey:
             if len(run) > 1:
                 yield pressed_sweep(points[run], normals[run], self.tip_radius, self.speed, self.force)
 
-    def _reachable(self, points: FloatArray, normals: FloatArray) -> NDArray[np.bool_]:
+    def _reachable(self, points: FloatArray, normals: FloatArray) -> BoolArray:
         """(K,) False where the ball that touches here would be deep in another part of the body."""
         return self.base.foot(points + self.tip_radius * normals, self.tip_radius).height > -0.3 * self.tip_radius
 
-    def _inside(self) -> NDArray[np.bool_] | None:
+    def _inside(self) -> BoolArray | None:
         if self.region is None:
             return None
         middle = self.base.surface.vertices[self.base.surface.faces].mean(axis=1)
@@ -208,7 +205,7 @@ def _begun_near(line: Isoline, here: FloatArray | None, overlap: float) -> Isoli
     return line
 
 
-def _runs(mask: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+def _runs(mask: BoolArray) -> list[IntArray]:
     index = np.flatnonzero(mask)
     return np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(index) else []
 

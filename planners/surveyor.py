@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.detectors import detect
 from mapping.trace import Trace
 from planners.coverage import Coverage
 from planners.found import Found
 from planners.plan import Outcome, Plan
 from planners.survey import Survey
-
-FloatArray = NDArray[np.float64]
 
 # Path of the first survey sweeps, in tip radii, that tell the noise if it is not given; later ones are detected singly
 LEARNING = 50.0

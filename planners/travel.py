@@ -7,14 +7,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hw.moves import Move
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.trace import Trace
 from planners.plan import Outcome, Plan
-
-FloatArray = NDArray[np.float64]
 
 # How far a finger backs off before it goes elsewhere, in tip radii (hw.grbl does the same)
 LIFT = 0.5

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mapping.arrays import FloatArray
 
 
 def first_contact_distance(corners: FloatArray, origin: FloatArray, d: FloatArray, radius: float) -> float:

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from explore3d.scene import Scene, load_scene
+from mapping.arrays import FloatArray
 from mapping.surface import Surface
 
 ASSETS = Path(__file__).parents[1] / "assets"
@@ -59,7 +59,7 @@ def test_the_plain_plate_is_its_own_model() -> None:
     assert scene("empty_plate").truth == ()
 
 
-def plate_frame(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def plate_frame(points: FloatArray) -> FloatArray:
     """Object frame to plate frame (u, v, outward): the tilt of 45 degrees about x taken back."""
     h = np.sqrt(0.5)
     return np.asarray(points @ np.array([[1, 0, 0], [0, h, -h], [0, h, h]]))
@@ -88,7 +88,7 @@ def test_the_wire_is_round_straight_and_lies_on_the_plate() -> None:
     np.testing.assert_allclose(radius[radius > 1e-6], 0.325e-3, atol=2e-9)
 
 
-def parts(surface: Surface) -> list[NDArray[np.float64]]:
+def parts(surface: Surface) -> list[FloatArray]:
     """The vertices of each connected component, in the order of the file."""
     edges = np.concatenate([surface.faces[:, [0, 1]], surface.faces[:, [1, 2]]]).T
     graph = coo_array((np.ones(edges.shape[1]), edges), shape=(len(surface.vertices),) * 2)

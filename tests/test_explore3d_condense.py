@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from explore3d import condense as module
-from explore3d.base_record import read_base
 from explore3d.bench_log import RADIUS, write_long_log
 from explore3d.condense import Condensed, condense
 from explore3d.log_reader import read_log
 from explore3d.log_stream import LogStream, count_samples, head, large_log
+from explore3d.recording import read_base
 from mapping.base import Base
 from mapping.detectors import detect
 from mapping.grammar import assemble

@@ -9,10 +9,10 @@ import pytest
 
 from explore3d.analysis import Analysis
 from explore3d.analyze import analyze
-from explore3d.base_record import read_base
 from explore3d.errors import UserError
 from explore3d.log_reader import read_log
 from explore3d.meshes import load_mesh
+from explore3d.recording import read_base
 from explore3d.run import run
 from mapping.pose import Pose
 

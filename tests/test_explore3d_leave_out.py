@@ -14,17 +14,17 @@ import pytest
 from explore3d import stages as stages_module
 from explore3d.analysis import Analysis
 from explore3d.analyze import analyze
-from explore3d.base_record import KIND, base_event
 from explore3d.errors import UserError
 from explore3d.leave_out import with_savings, without_needless_dynamics
 from explore3d.log import LogWriter
+from explore3d.recording import KIND, base_event
 from explore3d.scene import parse_scene
 from explore3d.stability_traces import DIAMETER, TIP, Heights, plate, sweeps, wire
 from explore3d.stages import OPTIONAL, Stages
 from hw.moves import Move
 from hw.simulated import SimulatedFinger
-from mapping.estimate import TOUCHED
-from mapping.left_out import LeftOut
+from mapping.feature import LeftOut
+from mapping.labels import TOUCHED
 
 SCENE = Path(__file__).parents[1] / "assets" / "scenes" / "wire_on_plate.toml"
 EMPTY = SCENE.with_name("empty_plate.toml")

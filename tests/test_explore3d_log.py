@@ -18,9 +18,8 @@ from sample_logs import MOVE, RADIUS, assert_same_samples, trace_of, write_log
 
 from explore3d import log_format, point_cloud
 from explore3d.load_logs import load_logs
-from explore3d.log import LogWriter
+from explore3d.log import LogWriter, Recorder
 from explore3d.log_reader import iter_log, read_log
-from explore3d.recorder import Recorder
 from hw.moves import Move
 from mapping.trace import Trace
 

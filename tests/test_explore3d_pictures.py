@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from explore3d.camera import Camera
-from explore3d.quantity import count_text, interval_text, length_text, seconds_text
 from explore3d.sweep_paths import sweep_paths
+from explore3d.units import count_text, interval_text, length_text, seconds_text
 from mapping.base import Base
 from mapping.feature import Interval
 from mapping.surface import Surface

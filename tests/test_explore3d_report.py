@@ -14,8 +14,7 @@ from explore3d.truth import TrueFeature, compare
 from mapping.base import Base
 from mapping.crossing import Crossing
 from mapping.detectors import Detections
-from mapping.feature import Evidence, Feature, Interval
-from mapping.left_out import LeftOut
+from mapping.feature import Evidence, Feature, Interval, LeftOut
 from mapping.noise import Noise
 from mapping.object_model import ObjectModel
 from mapping.shapes import chain_height

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from explore3d.base_record import KIND, base_event
-from explore3d.recording import Event, Log
-from explore3d.same_object import unlike
+from explore3d.merge import unlike
+from explore3d.recording import KIND, Event, Log, base_event
 from mapping.base import Base
 from mapping.surface import Surface
 from mapping.trace import Trace

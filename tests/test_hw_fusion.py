@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hw.delay import measured_delay
 from hw.force_emulators import OptoForceEmulator
 from hw.frame import Frame
 from hw.fusion import estimate_delay, known_at, positions_at, prompt, rigid_centers
@@ -13,6 +12,7 @@ from hw.grbl_controller import GrblController, Report
 from hw.grbl_emulator import GrblEmulator
 from hw.grbl_protocol import parse_status
 from hw.guarded_stage import GuardedStage
+from hw.lag import measured_delay
 from hw.optoforce import OptoForce
 from hw.pty_server import PtyServer
 from hw.sensor_clock import SensorClock, missing, unwrapped

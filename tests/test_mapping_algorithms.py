@@ -9,7 +9,8 @@ import pytest
 
 from mapping.algorithms import curvature_features
 from mapping.base import Base
-from mapping.detectors import DetectionError, detect
+from mapping.detectors import detect
+from mapping.errors import DetectionError
 from mapping.noise import Noise
 from mapping.online import OnlineDetector
 from mapping.shapes import cap_height, groove_height

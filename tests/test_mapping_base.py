@@ -6,15 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.base_fit import fit_base
 from mapping.errors import TraceError
 from mapping.surface import Surface
 from mapping.trace import Trace
 
-FloatArray = NDArray[np.float64]
 TIP, BODY, NOISE = 2e-3, 40e-3, 2e-5
 
 CENTERS: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {

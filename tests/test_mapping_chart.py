@@ -7,8 +7,8 @@ import pytest
 
 from mapping.base import Base
 from mapping.chart import chart_along
+from mapping.errors import EmptyWindowError
 from mapping.surface import Surface
-from mapping.window import EmptyWindowError
 
 TIP = 0.01
 UP = np.array([0.0, 0.0, 1.0])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mapping.bump_of_revolution import BumpOfRevolution
-from mapping.curvature import CurvatureError, principal_curvatures
-from mapping.errors import SurfaceError
+from mapping.errors import CurvatureError, SurfaceError
+from mapping.principal_curvatures import principal_curvatures
 from mapping.surface import Surface
 
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from mapping.base import Base
-from mapping.detectors import DetectionError, Detections, detect
+from mapping.detectors import Detections, detect
+from mapping.errors import DetectionError
 from mapping.false_alarms import _intensity, false_alarm_rate, threshold_for
 from mapping.height_profile import HeightProfile, height_profiles
 from mapping.matched_filter import build_bank, filter_sd

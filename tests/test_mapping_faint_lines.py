@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from mapping.base import Base
-from mapping.crest_trace import crest_trace, distances
+from mapping.crest_trace import crest_trace
 from mapping.faint_lines import faint_lines, threshold
 from mapping.inspection import Inspection, inspect
 from mapping.noise import Noise
+from mapping.polyline import distances
 from mapping.surface import Surface
 from mapping.trace import Trace
 

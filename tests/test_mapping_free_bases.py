@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.base_fit import fit_base
 from mapping.trace import Trace
 
-FloatArray = NDArray[np.float64]
 TIP, NOISE = 0.01, 2e-5
 TURN = np.linspace(0.0, 2.0 * np.pi, 500)
 

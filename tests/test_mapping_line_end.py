@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mapping.crest_trace import crest_trace, distances
+from mapping.crest_trace import crest_trace
 from mapping.inspection import Inspection
 from mapping.line_end import line_end
+from mapping.polyline import distances
 
 HEIGHT, WIDTH, LENGTH = 0.65e-3, 3.6e-3, 0.03
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from recorded_features import TIP, UP, D, feature, plate
 
-from mapping.feature import Feature, Interval
-from mapping.meeting import JUNCTION, brought_together, meetings
+from mapping.feature import JUNCTION, Feature, Interval
+from mapping.meeting import brought_together, meetings
 from mapping.polyline import arclengths
 
 HALF_WIDTH = 3.7e-3

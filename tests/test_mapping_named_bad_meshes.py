@@ -7,9 +7,9 @@ import pytest
 from brute_force_contact import distances
 
 from mapping.contact import BallContact, ContactError
-from mapping.curvature import principal_curvatures
 from mapping.errors import SurfaceError
 from mapping.nearest import NearestPoint
+from mapping.principal_curvatures import principal_curvatures
 from mapping.surface import Surface
 
 DOWN = np.array([0.0, 0.0, -1.0])

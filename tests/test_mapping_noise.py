@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from mapping.noise import Noise, NoiseError, estimate_noise
+from mapping.errors import NoiseError
+from mapping.noise import Noise, estimate_noise
 
 
 def drawn(noise: Noise, count: int, spacing: float, rng: np.random.Generator) -> np.ndarray:

@@ -7,7 +7,8 @@ import sys
 import pytest
 
 from mapping import open3d_import
-from mapping.open3d_import import Open3DError, open3d, preload
+from mapping.errors import Open3DError
+from mapping.open3d_import import open3d, preload
 
 
 @pytest.fixture

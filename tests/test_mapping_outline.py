@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mapping.crest_trace import crest_trace, distances
+from mapping.crest_trace import crest_trace
 from mapping.crossing import Crossing
 from mapping.inspection import Inspection
-from mapping.outline import outline
+from mapping.point_feature import outline
+from mapping.polyline import distances
 
 WIDTH = 3.6e-3
 

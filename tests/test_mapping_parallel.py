@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mapping.bump_of_revolution import BumpOfRevolution
-from mapping.parallel import ParallelError, parallel_surface
+from mapping.errors import ParallelError
+from mapping.parallel import parallel_surface
 from mapping.surface import Surface
 
 

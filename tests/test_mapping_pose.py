@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from explore3d.meshes import load_mesh
 from hw.simulated import SimulatedFinger
@@ -17,7 +16,6 @@ from mapping.surface import Surface
 from mapping.trace import Trace
 from planners.survey import Survey
 
-FloatArray = NDArray[np.float64]
 MESHES = Path(__file__).resolve().parents[1] / "assets" / "meshes"
 
 

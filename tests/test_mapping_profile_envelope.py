@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mapping.estimate import EnvelopeError
-from mapping.height_map import envelope_map
-from mapping.profile_envelope import envelope_heights
+from mapping.errors import EnvelopeError
+from mapping.profile_envelope import envelope_heights, envelope_map
 
 
 def brute_force(x, z, r, at):

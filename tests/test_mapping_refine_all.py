@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from recorded_features import CROSSINGS, ENDS, SLIDES, D, feature, line, plate, record, wire
 
-from mapping.meeting import JUNCTION
+from mapping.feature import JUNCTION
 from mapping.noise import Noise
 from mapping.refine import refine
 from mapping.refine_all import refine_all

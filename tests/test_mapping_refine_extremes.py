@@ -22,10 +22,10 @@ from recorded_features import (
     wire,
 )
 
+from mapping.errors import EmptyWindowError
 from mapping.noise import Noise
 from mapping.refine import refine, sample_posterior
 from mapping.trace import Trace
-from mapping.window import EmptyWindowError
 
 
 @pytest.mark.slow

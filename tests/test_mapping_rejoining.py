@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mapping.branches import Branch
-from mapping.rejoining import rejoined
+from mapping.branches import Branch, rejoined
 
 WIDE = 3.6e-3
 

@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
+from mapping.errors import ShapeError
 from mapping.shapes import (
-    ShapeError,
     cap_height,
     chain_height,
     contact_half_width,

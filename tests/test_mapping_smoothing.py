@@ -6,7 +6,7 @@ import pytest
 from mapping.noise import Noise
 from mapping.profile_envelope import envelope_heights
 from mapping.smoothing import smooth
-from mapping.smoothing_scale import curvature_sd, position_sd, smoothing_length
+from mapping.smoothing_spline import curvature_sd, position_sd, smoothing_length
 from mapping.trace import Trace
 
 R, SIGMA, SPACING = 0.01, 2e-4, 6e-6  # the paper's apparatus (theory section 6)

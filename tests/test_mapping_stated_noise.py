@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mapping.noise import Noise, NoiseError, estimate_noise
+from mapping.errors import NoiseError
+from mapping.noise import Noise, estimate_noise
 from mapping.noise_fit import Blocks, NoiseFit, fit_noise
 from mapping.stated_noise import StatedNoise
 

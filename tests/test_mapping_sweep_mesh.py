@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from mapping.errors import SweepMeshError
 from mapping.surface import Surface
-from mapping.sweep_mesh import SweepMeshError, mesh_sweeps, zipper
+from mapping.sweep_mesh import mesh_sweeps, zipper
 from mapping.sweep_rows import parallel_rows, pitch, thinned
 from mapping.trace import Trace
 

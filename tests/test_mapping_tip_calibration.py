@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hw.noise_source import NoiseSource
-from mapping.tip_calibration import CalibrationError, calibrate_tip
+from mapping.errors import CalibrationError
+from mapping.tip_calibration import calibrate_tip
 from mapping.trace import Trace
 
 REFERENCE, TIP = 0.0125, 0.010

@@ -7,8 +7,7 @@ import pytest
 
 from mapping.crossing import Crossing
 from mapping.inspection import Inspection
-from mapping.plateau_end import is_plateau_end
-from mapping.unseen import is_unseen
+from mapping.unseen import is_plateau_end, is_unseen
 
 
 def along_x(height):

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from explore3d.meshes import load_mesh
 from hw.simulated import SimulatedFinger
@@ -16,7 +15,6 @@ from planners.discover import Discover
 from planners.drive import drive
 from planners.errors import PlannerError
 
-FloatArray = NDArray[np.float64]
 R = 5e-3
 MESHES = Path(__file__).resolve().parents[1] / "assets" / "meshes"
 

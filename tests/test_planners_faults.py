@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from faulty_finger import faulty
-from numpy.typing import NDArray
 
 from explore3d.meshes import load_mesh
 from hw.moves import Move
 from hw.simulated import SimulatedFinger
+from mapping.arrays import FloatArray
 from mapping.base import Base
 from mapping.surface import Surface
 from mapping.trace import Trace
@@ -32,7 +32,7 @@ EMPTY = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), R)
 REASONS = {"done", "budget", "nothing found", "finger refuses", "lost", "misplaced"}
 
 
-def at(path: list[list[float]], approach: NDArray[np.float64]) -> Move:
+def at(path: list[list[float]], approach: FloatArray) -> Move:
     return Move(np.array(path), approach)
 
 
