@@ -6,7 +6,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SCENE := assets/scenes/wire_on_plate.toml
 DEMO := out/wire_on_plate
-SOURCES := $(wildcard explore3d/*.py planners/*.py mapping/*.py hw/*.py) $(wildcard assets/meshes/*)
+SOURCES := $(shell find explore3d planners mapping hw -name "*.py") $(wildcard assets/meshes/*)
 SETUP := pyproject.toml $(wildcard .ci/*.py)
 
 .PHONY: setup setup-dev demo test test-all lint clean

@@ -1,7 +1,7 @@
 """System libraries that Open3D loads and that a bare Linux lacks.
 
 They are installed where that is allowed, else unpacked into the environment, from where
-mapping/open3d_import.py loads them, else it is said what to ask an administrator for.
+mapping/geometry/mesh/open3d_import.py loads them, else it is said what to ask an administrator for.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def open3d_loads(python: Path) -> bool:
 
 def reason(python: Path) -> str:
     """Why open3d cannot be imported, "" if it can."""
-    test = "from mapping.open3d_import import open3d; open3d()"
+    test = "from mapping.geometry.mesh import open3d; open3d()"
     result = subprocess.run([python, "-c", test], capture_output=True, text=True)
     return result.stderr.strip().splitlines()[-1] if result.returncode else ""
 

@@ -10,7 +10,7 @@ import re
 from difflib import get_close_matches
 
 from explore3d.errors import UnitError
-from mapping.feature import Interval
+from mapping import Interval
 
 UNITS: dict[str, dict[str, float]] = {
     "length": {

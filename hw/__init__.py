@@ -1,34 +1,31 @@
 """What physically touches: a Move, and fingers that execute it and return a Trace."""
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from hw.errors import FingerError, MoveError
-    from hw.finger import Finger, Workspace, open_finger
-    from hw.moves import Move
-    from hw.simulated import SimulatedFinger
+    from hw.errors import (
+        FingerError as FingerError,
+        GcodeError as GcodeError,
+        LinkError as LinkError,
+        MoveError as MoveError,
+        StoppedError as StoppedError,
+    )
+    from hw.finger import Finger as Finger, Workspace as Workspace, open_finger as open_finger
+    from hw.framing import Frames as Frames, Framing as Framing, Lines as Lines
+    from hw.link import Link as Link
+    from hw.move import Move as Move
+    from hw.safety import StopOnSignal as StopOnSignal
+    from hw.simulated.finger import SimulatedFinger as SimulatedFinger
 
-# public name: where it lives; loaded when it is first asked for, so that importing the package stays light
 _PUBLIC = {
-    "Move": "hw.moves",
-    "Finger": "hw.finger",
-    "Workspace": "hw.finger",
-    "open_finger": "hw.finger",
-    "SimulatedFinger": "hw.simulated",
-    "FingerError": "hw.errors",
-    "MoveError": "hw.errors",
+    "errors": ("FingerError", "GcodeError", "LinkError", "MoveError", "StoppedError"),
+    "finger": ("Finger", "Workspace", "open_finger"),
+    "framing": ("Frames", "Framing", "Lines"),
+    "link": ("Link",),
+    "move": ("Move",),
+    "safety": ("StopOnSignal",),
+    "simulated.finger": ("SimulatedFinger",),
 }
-__all__ = ["Finger", "FingerError", "Move", "MoveError", "SimulatedFinger", "Workspace", "open_finger"]
-
-
-def __getattr__(name: str) -> Any:
-    if name in _PUBLIC:
-        return getattr(import_module(_PUBLIC[name]), name)
-    raise AttributeError(f"module 'hw' has no attribute {name!r}; its public names: {', '.join(__all__)}")
-
-
-def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+doorway(__name__, _PUBLIC)

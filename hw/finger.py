@@ -8,9 +8,8 @@ from types import TracebackType
 from typing import Any, Protocol, runtime_checkable
 
 from hw.errors import FingerError
-from hw.moves import Move
-from mapping.arrays import FloatArray
-from mapping.trace import Trace
+from hw.move import Move
+from mapping import FloatArray, Trace
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +57,9 @@ class Finger(Protocol):
 
 
 FINGERS: dict[str, str] = {
-    "simulated": "hw.simulated:SimulatedFinger",
-    "dynamic": "hw.dynamic_finger:DynamicFinger",
-    "grbl": "hw.grbl:GrblFinger",
+    "simulated": "hw.simulated.finger:SimulatedFinger",
+    "dynamic": "hw.simulated.dynamic_finger:DynamicFinger",
+    "grbl": "hw.probing.grbl_finger:GrblFinger",
 }
 
 

@@ -1,81 +1,89 @@
 """Surfaces and inference: arrays in, values out. It knows no machine, no file dialogue, no clock."""
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.base import Base
-    from mapping.base_fit import fit_base
-    from mapping.contact import BallContact
-    from mapping.crossing import Crossing
-    from mapping.curvature import Curvature
-    from mapping.detectors import Detections, detect
-    from mapping.envelope import estimate_surface
-    from mapping.errors import MappingError
-    from mapping.estimate import Estimate
-    from mapping.feature import Feature, Interval
-    from mapping.grammar import assemble
-    from mapping.object_model import ObjectModel
-    from mapping.posterior import Posterior
-    from mapping.principal_curvatures import principal_curvatures
-    from mapping.refine import refine, sample_posterior
-    from mapping.surface import Surface
-    from mapping.trace import Trace
+    from mapping.arrays import BoolArray as BoolArray, FloatArray as FloatArray, IntArray as IntArray
+    from mapping.assembly.assemble import assemble as assemble
+    from mapping.base.base import Base as Base
+    from mapping.base.fit import fit_base as fit_base
+    from mapping.detection.crossing import Crossing as Crossing
+    from mapping.detection.detect import Detections as Detections, detect as detect
+    from mapping.errors import (
+        CalibrationError as CalibrationError,
+        ContactError as ContactError,
+        CurvatureError as CurvatureError,
+        DetectionError as DetectionError,
+        EmptyWindowError as EmptyWindowError,
+        EnvelopeError as EnvelopeError,
+        MappingError as MappingError,
+        ModelError as ModelError,
+        NoiseError as NoiseError,
+        Open3DError as Open3DError,
+        ParallelError as ParallelError,
+        SamplerError as SamplerError,
+        ShapeError as ShapeError,
+        SurfaceError as SurfaceError,
+        SweepMeshError as SweepMeshError,
+        TraceError as TraceError,
+    )
+    from mapping.estimate.envelope.envelope import estimate_surface as estimate_surface
+    from mapping.estimate.envelope.estimate import Estimate as Estimate
+    from mapping.feature import (
+        JUNCTION as JUNCTION,
+        KINDS as KINDS,
+        Anchor as Anchor,
+        Evidence as Evidence,
+        Feature as Feature,
+        Interval as Interval,
+        LeftOut as LeftOut,
+    )
+    from mapping.geometry.contact.first_contact import BallContact as BallContact
+    from mapping.geometry.curvature.curvature import Curvature as Curvature
+    from mapping.geometry.curvature.principal_curvatures import principal_curvatures as principal_curvatures
+    from mapping.inference.feature_posterior import refine as refine, sample_posterior as sample_posterior
+    from mapping.model.object_model import ObjectModel as ObjectModel
+    from mapping.posterior import Posterior as Posterior
+    from mapping.surface import Surface as Surface
+    from mapping.trace import Trace as Trace
 
-# public name: where it lives; loaded when it is first asked for, so that importing the package stays light
 _PUBLIC = {
-    "Surface": "mapping.surface",
-    "Trace": "mapping.trace",
-    "Base": "mapping.base",
-    "fit_base": "mapping.base_fit",
-    "BallContact": "mapping.contact",
-    "estimate_surface": "mapping.envelope",
-    "Estimate": "mapping.estimate",
-    "principal_curvatures": "mapping.principal_curvatures",
-    "Curvature": "mapping.curvature",
-    "detect": "mapping.detectors",
-    "Detections": "mapping.detectors",
-    "Crossing": "mapping.crossing",
-    "assemble": "mapping.grammar",
-    "sample_posterior": "mapping.refine",
-    "refine": "mapping.refine",
-    "Posterior": "mapping.posterior",
-    "Feature": "mapping.feature",
-    "Interval": "mapping.feature",
-    "ObjectModel": "mapping.object_model",
-    "MappingError": "mapping.errors",
+    "arrays": ("BoolArray", "FloatArray", "IntArray"),
+    "assembly.assemble": ("assemble",),
+    "base.base": ("Base",),
+    "base.fit": ("fit_base",),
+    "detection.crossing": ("Crossing",),
+    "detection.detect": ("Detections", "detect"),
+    "errors": (
+        "CalibrationError",
+        "ContactError",
+        "CurvatureError",
+        "DetectionError",
+        "EmptyWindowError",
+        "EnvelopeError",
+        "MappingError",
+        "ModelError",
+        "NoiseError",
+        "Open3DError",
+        "ParallelError",
+        "SamplerError",
+        "ShapeError",
+        "SurfaceError",
+        "SweepMeshError",
+        "TraceError",
+    ),
+    "estimate.envelope.envelope": ("estimate_surface",),
+    "estimate.envelope.estimate": ("Estimate",),
+    "feature": ("Anchor", "Evidence", "Feature", "Interval", "JUNCTION", "KINDS", "LeftOut"),
+    "geometry.contact.first_contact": ("BallContact",),
+    "geometry.curvature.curvature": ("Curvature",),
+    "geometry.curvature.principal_curvatures": ("principal_curvatures",),
+    "inference.feature_posterior": ("refine", "sample_posterior"),
+    "model.object_model": ("ObjectModel",),
+    "posterior": ("Posterior",),
+    "surface": ("Surface",),
+    "trace": ("Trace",),
 }
-__all__ = [
-    "BallContact",
-    "Base",
-    "Crossing",
-    "Curvature",
-    "Detections",
-    "Estimate",
-    "Feature",
-    "Interval",
-    "MappingError",
-    "ObjectModel",
-    "Posterior",
-    "Surface",
-    "Trace",
-    "assemble",
-    "detect",
-    "estimate_surface",
-    "fit_base",
-    "principal_curvatures",
-    "refine",
-    "sample_posterior",
-]
-
-
-def __getattr__(name: str) -> Any:
-    if name in _PUBLIC:
-        return getattr(import_module(_PUBLIC[name]), name)
-    raise AttributeError(f"module 'mapping' has no attribute {name!r}; its public names: {', '.join(__all__)}")
-
-
-def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+doorway(__name__, _PUBLIC)

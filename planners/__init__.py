@@ -1,32 +1,23 @@
 """Where to touch next: exploratory procedures as generators of moves."""
 
-from __future__ import annotations
+from typing import TYPE_CHECKING
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from planners.errors import PlannerError
-    from planners.explore import Explore
-    from planners.plan import Outcome, Plan
-    from planners.survey import Survey
+    from planners.budget import Spent as Spent, within as within
+    from planners.drive import drive as drive, dry_run as dry_run
+    from planners.errors import PlannerError as PlannerError
+    from planners.explore.explore import Explore as Explore
+    from planners.plan import Outcome as Outcome, Plan as Plan
+    from planners.survey.survey import Survey as Survey
 
-# public name: where it lives; loaded when it is first asked for, so that importing the package stays light
 _PUBLIC = {
-    "Plan": "planners.plan",
-    "Outcome": "planners.plan",
-    "Survey": "planners.survey",
-    "Explore": "planners.explore",
-    "PlannerError": "planners.errors",
+    "budget": ("Spent", "within"),
+    "drive": ("drive", "dry_run"),
+    "errors": ("PlannerError",),
+    "explore.explore": ("Explore",),
+    "plan": ("Outcome", "Plan"),
+    "survey.survey": ("Survey",),
 }
-__all__ = ["Explore", "Outcome", "Plan", "PlannerError", "Survey"]
-
-
-def __getattr__(name: str) -> Any:
-    if name in _PUBLIC:
-        return getattr(import_module(_PUBLIC[name]), name)
-    raise AttributeError(f"module 'planners' has no attribute {name!r}; its public names: {', '.join(__all__)}")
-
-
-def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+doorway(__name__, _PUBLIC)

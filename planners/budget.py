@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hw.moves import Move
-from mapping.trace import Trace
+from hw import Move
+from mapping import Trace
 from planners.plan import Outcome, Plan
 
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import islice
 
-from hw.errors import FingerError
-from hw.moves import Move
-from mapping.errors import TraceError
-from mapping.trace import Trace
+from hw import FingerError, Move
+from mapping import Trace, TraceError
 from planners.plan import Outcome, Plan
 
 # After so many refusals in a row the finger is taken for lost, and the plan for one that cannot be carried out
@@ -35,7 +33,7 @@ def drive(
         plan: the generator.
         execute: carries out one move, for example a Finger's execute followed by a log's write.
         check: what is wrong with a move after the last executed one (None before the first), or None if nothing
-            is (planners.checks.Limits.violation).
+            is (planners.paths.limits.Limits.violation).
         note: told about every move that gave nothing for one of these reasons.
         empty: a trace without samples, to go on with where even the first move fails; without it that ends the plan.
     """

@@ -6,8 +6,8 @@ from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Any
 
-from hw.moves import Move
-from mapping.trace import Trace
+from hw import Move
+from mapping import Trace
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from explore3d.scene import Scene, load_scene
+from explore3d.scene.scene import Scene, load_scene
 from mapping.arrays import FloatArray
 from mapping.surface import Surface
 

@@ -109,8 +109,8 @@ def test_the_readme_s_python_names_exist() -> None:
 
 
 def test_every_key_of_a_scene_is_documented() -> None:
-    from explore3d.scene import Scene
-    from explore3d.scene_values import Table
+    from explore3d.scene.scene import Scene
+    from explore3d.scene.values import Table
 
     def keys(table: type[Table]) -> set[str]:
         found = {info.alias or name for name, info in table.model_fields.items()}

@@ -1,0 +1,103 @@
+"""Inspected: which faces of the base are free of features above which height, and with which probability.
+
+The certainty map of the base: which of its vertices the ball touched, bridged, or never came near.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from explore3d import length_text
+from mapping import FloatArray, Surface, Trace
+from mapping.base import Base, Cells
+from mapping.detection import Detections, found_heights
+from mapping.estimate.envelope import Estimate
+from mapping.estimate.sweeps import EXTRAPOLATED, pitch
+
+CELLS = 20_000
+# Heights that the record states the inspected share for, in detection limits
+STATED = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Inspected:
+    """What the sweeps say about the places where nothing was found.
+
+    Args:
+        height: (F,) m: a sharp crest at least so high anywhere on the face would have been found; infinity where
+            no sweep passed within a tip radius.
+        area: (F,) of the faces, m^2.
+        limit: height found where a sweep crosses it, m.
+        probability: with which all this holds.
+        asked: height of the smallest feature that the scene asks for, m, or None.
+    """
+
+    height: FloatArray
+    area: FloatArray
+    limit: float
+    probability: float
+    asked: float | None = None
+
+    @classmethod
+    def of(cls, trace: Trace, base: Base, detections: Detections, asked: float | None) -> Inspected:
+        """What a trace inspected of a base, by the noise and the threshold of its detection."""
+        limit = detections.detection_limit
+        if base.kind == "profile":  # a strip as wide as one likes: all of it lies under the one sweep
+            height = np.full(len(base.surface.faces), limit)
+            return cls(height, base.surface.face_areas, limit, detections.probability, asked)
+        places = base.foot(Cells.of(trace, CELLS).centers, trace.tip_radius).points
+        if not np.isfinite(limit):
+            places = places[:0]
+        height = found_heights(base.surface, places, trace.tip_radius, limit)
+        return cls(height, base.surface.face_areas, limit, detections.probability, asked)
+
+    def share(self, height: float) -> float:
+        """Share of the area on which every crest at least `height` m high would have been found."""
+        return float(self.area[self.height <= height].sum() / self.area.sum())
+
+    @property
+    def untouched(self) -> float:
+        """Share of the area that no sweep came near."""
+        return float(self.area[~np.isfinite(self.height)].sum() / self.area.sum())
+
+    def record(self) -> dict[str, Any]:
+        """JSON values: the share of the area that is inspected for features above some heights, m."""
+        heights = [self.limit * step for step in STATED] if np.isfinite(self.limit) else []
+        heights += [] if self.asked is None else [self.asked]
+        return {
+            "probability": self.probability,
+            "detection_limit": self.limit,
+            "shares": [{"height": height, "share": self.share(height)} for height in sorted(heights)],
+            "untouched": self.untouched,
+        }
+
+    def sentence(self) -> str:
+        """The same for people."""
+        height = self.limit if self.asked is None else self.asked
+        if not np.isfinite(height):
+            return "The trace is too short to say what it inspected."
+        sentence = (
+            f"{100 * self.share(height):.1f} % of the surface is inspected for sharp features above "
+            f"{length_text(height, 2)}, with a probability of at least {100 * self.probability:.0f} % each."
+        )
+        if self.untouched > 5e-4:
+            sentence += f" No sweep came near {100 * self.untouched:.1f} % of it."
+        return sentence
+
+
+# A vertex takes the label of the nearest estimated point within this many distances between points or sweeps.
+NEAR = 3.0
+
+
+def base_reach(surface: Surface, estimate: Estimate) -> FloatArray:
+    """(V,) label of each vertex (mapping.estimate): that of the nearest estimated point, EXTRAPOLATED far from any."""
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(estimate.points)
+    apart = np.asarray(tree.query(estimate.points, k=[2])[0])
+    reach = NEAR * max(float(np.median(apart)), pitch(estimate.points, estimate.sweep))
+    distance, nearest = tree.query(surface.vertices)
+    return np.where(distance <= reach, estimate.labels[nearest].astype(np.float64), float(EXTRAPOLATED))

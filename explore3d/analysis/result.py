@@ -1,0 +1,76 @@
+"""Analysis: everything that one run or one log led to, as the report takes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from mapping import LeftOut, Trace
+from mapping.base import Base
+from mapping.model import ObjectModel
+
+if TYPE_CHECKING:
+    from explore3d.analysis.inspected import Inspected
+    from explore3d.analysis.truth import Comparison, TrueFeature
+    from explore3d.scene import Scene
+    from mapping.detection import Detections
+    from mapping.estimate.envelope import Estimate
+    from mapping.geometry.curvature import Curvature
+
+
+@dataclass(frozen=True)
+class TipCount:
+    """How the same trace would be read with a tip of another radius.
+
+    Args:
+        tip_radius: m.
+        finer: features that meet the paper's definition 1 at this radius (curvature features).
+        gentler: features that stand out of the noise but are gentler than this tip.
+    """
+
+    tip_radius: float
+    finer: int
+    gentler: int
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """The result of `analyze`, and what it rests on.
+
+    Args:
+        title: of the report.
+        trace: every sample that was used.
+        base: the global model.
+        detections: what the detectors said, with noise and detection limit.
+        model: the annotated model.
+        scene: None for a log without one.
+        estimate: the estimated surface, None if it was left out.
+        curvature: principal curvatures at the vertices of `estimate.surface`, None if left out.
+        truth: true features of a simulated scene.
+        errors: found features against the true ones.
+        timings: seconds per stage, in the order of the stages.
+        left_out: stages that were not needed or could not be done.
+        recovered: one sentence if the log was damaged and recovered, else "".
+        ended: one sentence saying why the exploration ended, "" for a log.
+        time_curve: (seconds of finger time, worst error of an axis in m) while exploring, if known.
+        tip_counts: counts of finer and gentler features, this tip's radius first.
+        inspected: above which height each face is free of features that were not found; None if not asked.
+    """
+
+    title: str
+    trace: Trace
+    base: Base
+    detections: Detections
+    model: ObjectModel
+    scene: Scene | None = None
+    estimate: Estimate | None = None
+    curvature: Curvature | None = None
+    truth: tuple[TrueFeature, ...] = ()
+    errors: tuple[Comparison, ...] = ()
+    timings: dict[str, float] = field(default_factory=dict)
+    left_out: tuple[LeftOut, ...] = ()
+    recovered: str = ""
+    ended: str = ""
+    time_curve: tuple[tuple[float, float], ...] = ()
+    tip_counts: tuple[TipCount, ...] = ()
+    inspected: Inspected | None = None

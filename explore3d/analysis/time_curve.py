@@ -1,0 +1,72 @@
+"""Error against finger time: what the features would have been, had the finger stopped earlier."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from explore3d.analysis.truth import SAMPLES, Comparison, TrueFeature, compare
+from mapping import Trace
+from mapping.assembly import assemble
+from mapping.detection import Detections
+from mapping.geometry.mesh import nearest_on, resample
+from mapping.model import ObjectModel
+
+MOMENTS = 8
+
+
+def time_curve(
+    detections: Detections,
+    trace: Trace,
+    model: ObjectModel,
+    truth: Sequence[TrueFeature],
+    share: Callable[[float], None] = lambda _: None,
+) -> tuple[tuple[float, float], ...]:
+    """The worst error of place and extent over the true features, at moments of the exploration.
+
+    At each moment only what had been felt by then is used, and the features are those of the grammar, before
+    any posterior; the last point is the finished model.
+
+    Args:
+        detections: of the whole trace; each crossing knows its time.
+        trace: the whole trace, in the order of time.
+        model: the finished model.
+        truth: the true features; moments at which one of them is not found yet are left out.
+        share: told the share done.
+
+    Returns:
+        (seconds of finger time, worst distance between a true axis and the found one in m), in the order of time.
+    """
+    times = np.array([crossing.t for crossing in detections.crossings])
+    moments = np.unique(np.quantile(times, np.linspace(0.0, 1.0, MOMENTS), method="nearest"))
+    curve = []
+    for done, moment in enumerate(moments):
+        # a sweep is finished before anyone can know what it found
+        sweeps = {crossing.sweep for crossing in detections.crossings if crossing.t <= moment}
+        felt = trace.select((trace.t <= moment) | np.isin(trace.sweep, list(sweeps)))
+        seen = tuple(crossing for crossing in detections.crossings if crossing.sweep in sweeps)
+        features = assemble(replace(detections, crossings=seen), felt, model.base)
+        curve.append((float(felt.t[-1]), _worst(replace(model, features=features), truth, trace.tip_radius)))
+        share((done + 1) / len(moments))
+    curve.append((float(trace.t[-1]), _worst(model, truth, trace.tip_radius)))
+    return tuple((float(t - trace.t[0]), worst) for t, worst in curve if worst is not None)
+
+
+def _worst(model: ObjectModel, truth: Sequence[TrueFeature], tip_radius: float) -> float | None:
+    """The largest distance of an axis, its ends included, over all true features; None if one is missed."""
+    rows = compare(model, truth, tip_radius)
+    if any(row.status == "missed" for row in rows):
+        return None
+    return max(_distance(row) for row in rows if row.status == "found")
+
+
+def _distance(row: Comparison) -> float:
+    """Hausdorff distance between the true axis and the found one, m."""
+    assert row.true is not None and row.found is not None
+    axes = row.true.axis, row.found.axis
+    return max(
+        float(np.linalg.norm(points - nearest_on(points, other)[0], axis=1).max())
+        for points, other in ((resample(axes[0], SAMPLES), axes[1]), (resample(axes[1], SAMPLES), axes[0]))
+    )

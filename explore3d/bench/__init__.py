@@ -1,0 +1,48 @@
+"""Benches: error against run time, beside other programs."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from explore3d.bench.apparatus import write_apparatus as write_apparatus
+    from explore3d.bench.curvature import (
+        CurvatureError as CurvatureError,
+        available as available,
+        bench_curvature as bench_curvature,
+        curvature_table as curvature_table,
+        write_bench as write_bench,
+    )
+    from explore3d.bench.dynamics import (
+        dynamics_curve as dynamics_curve,
+        dynamics_table as dynamics_table,
+        wire_trace as wire_trace,
+    )
+    from explore3d.bench.explore_curves import write_curves as write_curves
+    from explore3d.bench.exploring import (
+        NOISES as NOISES,
+        STRATEGIES as STRATEGIES,
+        bench_exploring as bench_exploring,
+        one_run as one_run,
+        records as records,
+    )
+    from explore3d.bench.figures import write_figures as write_figures
+    from explore3d.bench.scaling import AXES as AXES, bench_scaling as bench_scaling, scaling_lines as scaling_lines
+    from explore3d.bench.trace import (
+        bench_trace as bench_trace,
+        bump_mesh as bump_mesh,
+        by_opencamlib as by_opencamlib,
+        trace_table as trace_table,
+    )
+
+_PUBLIC = {
+    "apparatus": ("write_apparatus",),
+    "curvature": ("CurvatureError", "available", "bench_curvature", "curvature_table", "write_bench"),
+    "dynamics": ("dynamics_curve", "dynamics_table", "wire_trace"),
+    "explore_curves": ("write_curves",),
+    "exploring": ("NOISES", "STRATEGIES", "bench_exploring", "one_run", "records"),
+    "figures": ("write_figures",),
+    "scaling": ("AXES", "bench_scaling", "scaling_lines"),
+    "trace": ("bench_trace", "bump_mesh", "by_opencamlib", "trace_table"),
+}
+doorway(__name__, _PUBLIC)

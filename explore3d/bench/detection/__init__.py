@@ -1,0 +1,27 @@
+"""Rates of detection, of false alarms and of right kinds."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from explore3d.bench.detection.classify import (
+        NOISES as NOISES,
+        SWEEPS as SWEEPS,
+        bench_classify as bench_classify,
+        classify_table as classify_table,
+    )
+    from explore3d.bench.detection.detect import all_cases as all_cases, bench_detect as bench_detect, cells as cells
+    from explore3d.bench.detection.detect_curves import write_curves as write_curves
+    from explore3d.bench.detection.false_alarms import (
+        bench_false_alarms as bench_false_alarms,
+        false_alarm_lines as false_alarm_lines,
+    )
+
+_PUBLIC = {
+    "classify": ("NOISES", "SWEEPS", "bench_classify", "classify_table"),
+    "detect": ("all_cases", "bench_detect", "cells"),
+    "detect_curves": ("write_curves",),
+    "false_alarms": ("bench_false_alarms", "false_alarm_lines"),
+}
+doorway(__name__, _PUBLIC)

@@ -1,0 +1,206 @@
+"""The paper's figures 1, 2, 3 and 5, drawn anew from this project's public functions alone."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from explore3d.pictures import BAND, ESTIMATED, FAINT, INK, MUTED, TRACED, TRUTH, new_figure, png, styled
+from mapping import FloatArray, Trace
+from mapping.detection import detect
+from mapping.estimate.envelope import envelope_heights, estimate_surface
+from mapping.estimate.sweeps import BRIDGED, smooth
+from mapping.geometry.contact import BallContact
+from mapping.geometry.mesh import write_whole
+from mapping.geometry.templates import BumpOfRevolution
+from mapping.instrument import Noise
+
+# The paper's bump and tip (figure 3), in units of the bump's height; variance 0.01 is that of its section 4.1.
+BUMP, TIP = BumpOfRevolution(15.0), 1.0
+SIGMA = 0.1
+SAMPLES = 6000
+EXTENT = 2.6
+
+
+def write_figures(out: Path) -> list[Path]:
+    """Write figures 1, 2, 3 and 5 of the paper as PNG files into a folder, which is made if absent.
+
+    Returns:
+        The files, in the order of the paper.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    figures = {
+        "figure1_traced_and_estimated.png": traced_and_estimated,
+        "figure2_parallel_surface.png": parallel_surface,
+        "figure3_curvature_features.png": curvature_features,
+        "figure5_noise.png": noisy_trace,
+    }
+    written = []
+    for name, draw in figures.items():
+        with styled():
+            written.append(write_whole(out / name, png(draw())))
+    return written
+
+
+@cache
+def section_trace(samples: int = SAMPLES) -> Trace:
+    """The ball's path over a section through the bump's axis, by exact contact with its mesh."""
+    mesh = BUMP.mesh(EXTENT + 2 * TIP, rings=1200, sectors=16)
+    x = np.linspace(-EXTENT, EXTENT, samples)
+    above = np.column_stack([x, np.zeros(samples), np.full(samples, 4 * TIP)])
+    centers = BallContact(mesh, TIP).first_contact(above, np.array([0.0, 0.0, -1.0])).centers
+    return Trace.from_profile(centers[:, 0], centers[:, 2], TIP)
+
+
+def traced_and_estimated() -> Any:
+    """Figure 1: the tip's centre runs along the traced surface; the estimate bridges what the tip cannot reach."""
+    trace = section_trace()
+    estimate = estimate_surface(trace)
+    bridged = estimate.labels == BRIDGED
+    points = np.where(bridged[:, None], np.nan, estimate.points)
+    resting = np.where(bridged[:, None], estimate.points, np.nan)
+    figure = new_figure(7.2, 5.0)
+    axes = figure.subplots()
+    _body(axes)
+    _ball(axes, _meeting(), MUTED, "fingertip of radius r, at rest")
+    axes.plot(trace.centers[:, 0], trace.centers[:, 2], color=TRACED, lw=2.0, label="traced surface (tip centre)")
+    axes.plot(points[:, 0], points[:, 2], color=TRUTH, lw=2.4, label="estimated surface: touched")
+    axes.plot(resting[:, 0], resting[:, 2], color=ESTIMATED, lw=2.4, label="estimated surface: bridged")
+    axes.set_title("Figure 1.  A round fingertip traces a surface finer than itself")
+    _frame(axes, (-2.6, 2.6), (-0.15, 2.75))
+    figure.legend(loc="outside lower center", ncols=3, handlelength=1.6)
+    return figure
+
+
+def parallel_surface() -> Any:
+    """Figure 2: the parallel surface folds at caustic points; at the interference point the ball touches twice."""
+    u = np.linspace(-EXTENT, EXTENT, 4001)
+    x, z = _parallel(u)
+    caustics = np.column_stack(BUMP.parallel(BUMP.caustics(TIP), TIP))
+    meeting = _meeting()
+    trace = section_trace().centers
+    figure = new_figure(7.2, 3.5)
+    wide, close = figure.subplots(1, 2, width_ratios=(1.35, 1.0))
+    for axes in (wide, close):
+        _body(axes)
+        axes.plot(x, z, color=MUTED, lw=1.2, ls=(0, (4, 2)), label="parallel surface (equation 4)")
+        axes.plot(trace[:, 0], trace[:, 2], color=TRACED, lw=2.2, label="traced surface")
+        for sign in (-1, 1):
+            names = ("caustic point, 1 + r k = 0", "interference point") if sign > 0 else ("", "")
+            axes.plot(sign * caustics[:, 0], caustics[:, 1], "D", color=ESTIMATED, ms=3.5, ls="", label=names[0])
+            axes.plot(sign * meeting[0], meeting[1], "o", color=INK, ms=4.0, ls="", label=names[1])
+    _ball(wide, meeting, FAINT)
+    wide.set_title("Figure 2.  Parallel and traced surface")
+    close.set_title("The fold that the tip cannot follow")
+    _frame(wide, (-2.1, 2.1), (-0.15, 2.75))
+    corners = np.vstack([caustics, meeting[None]])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    pad = 0.35 * (high - low).max()
+    _frame(close, (low[0] - pad, high[0] + pad), (low[1] - pad, high[1] + pad))
+    for axes in (wide, close):
+        axes.set_anchor("N")  # else their titles stand at different heights
+    handles, labels = wide.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, handlelength=1.8)
+    return figure
+
+
+def curvature_features() -> Any:
+    """Figure 3: along the bump the curvature leaves the band of +-1/r three times: concave, convex, concave."""
+    from matplotlib.ticker import NullLocator
+
+    u = np.linspace(-1.5, 1.5, 3001)
+    k = BUMP.curvatures(np.abs(u))[0] * TIP
+    figure = new_figure(7.2, 5.0)
+    over, under = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.2))
+    over.fill_between(u, BUMP.height(u), -0.1, color=FAINT, lw=0)
+    over.plot(u, BUMP.height(u), color=INK)
+    under.axhspan(-1, 1, color=FAINT, lw=0)
+    under.plot(u, k, color=INK)
+    for sign, color, name in ((1, ESTIMATED, "convex, k > 1/r"), (-1, TRACED, "concave, k < -1/r")):
+        there = sign * k > 1
+        over.plot(u, np.where(there, BUMP.height(u), np.nan), color=color, lw=4)
+        under.plot(u, np.where(there, k, np.nan), color=color, lw=3, label=f"curvature feature: {name}")
+    over.set_title("Figure 3.  A bump is the sequence {-}{+}{-} of curvature features (a = 15, r = 1)")
+    over.set_ylabel("height")
+    over.set_ylim(-0.1, 1.25)
+    under.set_yscale("asinh", linear_width=1.5)  # smooth, unlike symlog, whose corner looks like a feature
+    under.set_yticks([-2, -1, 0, 1, 2, 10, 30], ["−2", "−1", "0", "1", "2", "10", "30"])
+    under.yaxis.set_minor_locator(NullLocator())
+    under.set_ylabel("curvature along u, times r")
+    under.set_xlabel("u, in heights of the bump")
+    under.legend(loc="upper right")
+    return figure
+
+
+def noisy_trace() -> Any:
+    """Figure 5: the trace under the paper's noise, what ball operators make of it, and what smoothing saves."""
+    exact, noise = section_trace(), Noise(SIGMA)
+    x = exact.centers[:, 0]
+    shaken = exact.centers[:, 2] + SIGMA * np.random.default_rng(1999).standard_normal(len(x))
+    noisy = Trace.from_profile(x, shaken, TIP)
+    smoothed, estimate = smooth(noisy, noise), estimate_surface(noisy, noise=noise)
+    figure = new_figure(7.2, 6.8)
+    over, under = figure.subplots(2, 1, sharex=True, height_ratios=(1.5, 1.0))
+    _body(over)
+    over.plot(x[::4], shaken[::4], ".", color=TRACED, ms=1.2, alpha=0.5, label="trace with noise, variance 0.01")
+    over.plot(*smoothed.trace.centers[:, [0, 2]].T, color=INK, label="smoothed trace")
+    raw = envelope_heights(x, shaken, TIP)[0]
+    over.plot(x, raw, color=MUTED, lw=1.0, ls=(0, (3, 1.5)), label="ball envelope of the raw trace")
+    bridged = (estimate.labels == BRIDGED)[:, None]
+    for mask, color, name in ((bridged, TRUTH, "touched"), (~bridged, ESTIMATED, "bridged")):
+        points = np.where(mask, np.nan, estimate.points)
+        over.plot(points[:, 0], points[:, 2], color=color, lw=2.2, label=f"estimated surface: {name}")
+    over.set_title("Figure 5.  The trace under noise: smoothed at the noise's own scale, without bias")
+    _frame(over, (-EXTENT, EXTENT), (-0.75, 2.5))
+    over.set_aspect("auto")
+    over.set_xlabel("")
+    place = smoothed.trace.centers[:, 0]
+    under.axhspan(0.5, 1.0, color=BAND, lw=0, label="convex: 1/(2r) < k_t < 1/r")
+    under.plot(place, smoothed.curvature * TIP, color=INK, label="k_t of the smoothed trace")
+    for k, crossing in enumerate(detect(noisy, noise=noise, largest=1.5 * TIP).crossings):
+        name = f"bump found: {crossing.height:.2f} high"
+        under.axvline(crossing.point[0], color=ESTIMATED, lw=1.4, label=name if k == 0 else "")
+    under.set_xlabel("x, in heights of the bump")
+    under.set_ylabel("k_t times r")
+    under.set_ylim(-3.2, 2.2)
+    figure.legend(loc="outside lower center", ncols=3, markerscale=6, handlelength=1.6)
+    return figure
+
+
+def _parallel(u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The parallel surface's section through the axis, on both sides of it."""
+    radial, height = BUMP.parallel(np.abs(u), TIP)
+    return np.sign(u) * radial, height
+
+
+def _meeting() -> FloatArray:
+    """Centre (x, z) of the ball at the interference point to the right of the bump."""
+    flank, _ = BUMP.interference(TIP) or (0.0, 0.0)
+    return np.array(BUMP.parallel(flank, TIP))
+
+
+def _body(axes: Any) -> None:
+    u = np.linspace(-EXTENT - TIP, EXTENT + TIP, 4001)
+    axes.fill_between(u, BUMP.height(u), -1.0, color=FAINT, lw=0)
+    axes.plot(u, BUMP.height(u), color=INK, lw=1.0, label="body")
+
+
+def _ball(axes: Any, center: FloatArray, color: str, label: str = "") -> None:
+    angle = np.linspace(0, 2 * np.pi, 241)
+    x, z = center[0] + TIP * np.cos(angle), center[1] + TIP * np.sin(angle)
+    axes.plot(x, z, color=color, lw=1.2, zorder=1.5, label=label)
+    axes.plot(*center, "+", color=color, ms=7, zorder=1.6)
+
+
+def _frame(axes: Any, across: tuple[float, float], up: tuple[float, float]) -> None:
+    axes.set_aspect("equal")
+    axes.set_xlim(*across)
+    axes.set_ylim(*up)
+    axes.set_xlabel("x, in heights of the bump")
+    axes.set_ylabel("z")

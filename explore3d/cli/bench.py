@@ -1,0 +1,279 @@
+"""explore3d bench: error and speed against run time, for one stage at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from explore3d import UserError
+
+if TYPE_CHECKING:
+    from explore3d.bench.precision import Measured
+
+bench = typer.Typer(invoke_without_command=True)
+
+METHODS = ("importance", "emcee")
+
+Store = Annotated[Path, typer.Option("--store", help="JSONL file of finished runs; what it holds is not run again.")]
+
+
+@bench.callback()
+def all_stages(
+    context: typer.Context,
+    quick: Annotated[bool, typer.Option("--quick", help="Few settings and repeats: under two minutes.")] = False,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for page, tables and pictures.")] = Path("out/bench"),
+    peers: Annotated[
+        bool, typer.Option("--peers", help="Measure other programs too, where they are installed.")
+    ] = False,
+) -> None:
+    """Measure error against run time: all stages, or one of them by a command of its own.
+
+    Example: explore3d bench --quick --out out/bench
+    """
+    if context.invoked_subcommand is not None:
+        return
+    from explore3d.bench.precision import bench as run, summary, write
+
+    def told(each: Measured) -> None:
+        print(f"{each.stage.name:20}{len(each.points):4} points{each.seconds:8.1f} s", flush=True)
+
+    measured = run(quick, peers, told)
+    print(f"page: {write(measured, out, quick)}")
+    print(summary(measured))
+
+
+@bench.command()
+def trace(
+    triangles: Annotated[str, typer.Option(help="Sizes of the mesh, separated by commas.")] = "20000,200000,2000000",
+    side: Annotated[int, typer.Option(min=2, help="Queries along each side of the grid.")] = 256,
+    peers: Annotated[bool, typer.Option(help="Time OpenCAMLib as well, if it is installed.")] = False,
+) -> None:
+    """Ball centres per second over the paper's bump, on one core, preparation included.
+
+    Example: explore3d bench trace --triangles 20000,200000 --peers
+    """
+    from explore3d.bench import bench_trace, trace_table
+
+    _print(trace_table(bench_trace([int(n) for n in _numbers(triangles)], side=side, peers=peers)))
+
+
+@bench.command()
+def curvature(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for table and picture.")] = Path("out/curvature"),
+    largest: Annotated[int, typer.Option(min=10_000, help="Most vertices; tenfold steps from 10 000.")] = 100_000,
+    peers: Annotated[bool, typer.Option(help="Measure libigl, pymeshlab and a plain jet too.")] = True,
+) -> None:
+    """Error, speed and memory of principal curvatures on bodies that have them in closed form.
+
+    Example: explore3d bench curvature --largest 1000000 --out out/curvature
+    """
+    from explore3d.bench import CurvatureError, available, bench_curvature, curvature_table, write_bench
+
+    methods, missing = available()
+    if peers:
+        _print(missing)
+    sizes = [count for count in (10_000, 100_000, 1_000_000) if count <= largest]
+    lines: list[CurvatureError] = []
+
+    def kept() -> Iterable[CurvatureError]:
+        for line in bench_curvature(sizes, methods if peers else methods[:1]):
+            lines.append(line)
+            yield line
+
+    _print(curvature_table(kept()))
+    _print(map(str, write_bench(lines, out)))
+
+
+@bench.command()
+def posterior() -> None:
+    """Effective draws per second, beside emcee's default settings.
+
+    Example: explore3d bench posterior
+    """
+    from explore3d.bench.posterior import Timing, bench_posterior
+
+    def line(timing: Timing) -> None:
+        print(
+            f"{timing.name:40}{timing.samples:9} samples{timing.bins:7} bins{timing.seconds:9.2f} s"
+            f"{timing.rate:10.0f} draws/s  {timing.status}",
+            flush=True,
+        )
+
+    bench_posterior(line)
+
+
+@bench.command()
+def calibration(
+    store: Store,
+    seeds: Annotated[int, typer.Option(min=1, help="Simulations of each shape and noise.")] = 12,
+    method: Annotated[str, typer.Option(help="importance (the fast path) or emcee.")] = "importance",
+    shapes: Annotated[str | None, typer.Option(help="Shapes, separated by commas; all if left out.")] = None,
+    believed: Annotated[str, typer.Option(help="true; white: correlated noise taken for white.")] = "true",
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+    ranks: Annotated[Path | None, typer.Option(help="PNG for the rank histograms.")] = None,
+    record: Annotated[Path | None, typer.Option(help="JSON for all verdicts.")] = None,
+) -> None:
+    """Do 90 % intervals cover 90 %? Simulates features from their priors and analyses them.
+
+    Example: explore3d bench calibration --store calibration.jsonl --seeds 100
+    """
+    from explore3d.bench.posterior import KINDS, by_kind, calibrate, campaign, draw_ranks, verdicts, write_record
+
+    for option, found, possible in (("--method", method, METHODS), ("--believed", believed, ("true", "white"))):
+        if found not in possible:
+            raise UserError(f"{option}: expected {' or '.join(possible)}; found {found!r}")
+    chosen = _names(shapes, "--shapes", list(KINDS))
+    rows = calibrate(campaign(chosen, seeds, method, believed), store, seconds)
+    for kind, group in by_kind(rows).items():
+        for name, verdict in verdicts(group).items():
+            print(
+                f"{kind:8}{name:14}{verdict.count:6} simulations, {100 * verdict.coverage:5.1f} % covered"
+                f" (90 +- {100 * verdict.tolerance:.1f} %), uniform with p = {verdict.p_value:.2f}",
+                flush=True,
+            )
+    if ranks and rows:
+        draw_ranks(rows, ranks)
+    if record and rows:
+        write_record(rows, record)
+
+
+@bench.command()
+def odds(
+    store: Store,
+    seeds: Annotated[int, typer.Option(min=1, help="Simulations of each pair.")] = 50,
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+) -> None:
+    """Do stated probabilities come true: bump or nothing, ridge or bump, two ridges or one?
+
+    Example: explore3d bench odds --store odds.jsonl --seeds 200
+    """
+    from explore3d.bench.posterior import bench_odds, odds_table
+
+    odds_table(bench_odds(store, seeds, seconds), print)
+
+
+@bench.command()
+def explore(
+    store: Store,
+    scenes: Annotated[str | None, typer.Option(help="Scenes, separated by commas; all if left out.")] = None,
+    strategies: Annotated[str | None, typer.Option(help="Strategies, separated by commas; all if left out.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds of the features' places and of the noise.")] = 3,
+    noise: Annotated[str, typer.Option(help="apparatus, or correlated: over half a wire's width.")] = "apparatus",
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+    out: Annotated[Path | None, typer.Option(help="Folder for the table and the curves of all finished runs.")] = None,
+) -> None:
+    """Error of the found extents against finger time: exploring beside rasters, random and ergodic sweeps.
+
+    Example: explore3d bench explore --store explore.jsonl --scenes straight,empty --seeds 1
+    """
+    import json
+
+    from explore3d.bench import NOISES, STRATEGIES, bench_exploring, records, write_curves
+    from explore3d.bench.scenes import SCENES
+
+    chosen = _names(scenes, "--scenes", list(SCENES)), _names(strategies, "--strategies", list(STRATEGIES))
+    _names(noise, "--noise", list(NOISES))
+    _print(json.dumps(record) for record in bench_exploring(*chosen, seeds, store, noise, seconds))
+    if out is not None:
+        _print(str(path) for path in write_curves([r for r in records(store) if r["noise"] == noise], out))
+
+
+@bench.command()
+def detect(
+    store: Store,
+    out: Annotated[Path, typer.Option(help="Folder for the table and the pictures.")],
+    seeds: Annotated[int, typer.Option(min=1, help="Sweeps of each size and noise.")] = 20,
+    quick: Annotated[bool, typer.Option(help="Few sizes and one level of noise.")] = False,
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+    bodies: Annotated[bool, typer.Option(help="False alarms on smooth bodies instead.")] = False,
+    mesh: Annotated[Path | None, typer.Option(help="With --bodies: a mesh to sweep over as well.")] = None,
+) -> None:
+    """Recall and false alarms per metre against size and noise, for each detector of a single sweep.
+
+    Example: explore3d bench detect --store detect.jsonl --out curves --quick --seeds 2
+    """
+    from explore3d.bench.detection import (
+        all_cases,
+        bench_detect,
+        bench_false_alarms,
+        cells,
+        false_alarm_lines,
+        write_curves,
+    )
+
+    if bodies:
+        _print(false_alarm_lines(bench_false_alarms(seeds, store, seconds, mesh)))
+        return
+    records = bench_detect(all_cases(seeds, quick), store, seconds)
+    _print(str(path) for path in write_curves(cells(records), out))
+
+
+@bench.command()
+def classify(
+    store: Store,
+    bodies: Annotated[str | None, typer.Option(help="Bodies, separated by commas; all if left out.")] = None,
+    noises: Annotated[str | None, typer.Option(help="none, apparatus or both, separated by a comma.")] = None,
+    sweeps: Annotated[str | None, typer.Option(help="Patterns of sweeps, separated by commas.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds of the noise and of the sweeps' placement.")] = 5,
+) -> None:
+    """Is each kind of feature found and rightly named, and nothing invented? As CSV.
+
+    Example: explore3d bench classify --store classify.jsonl --bodies bump,ridge --seeds 100
+    """
+    from explore3d.bench.detection import NOISES, SWEEPS, bench_classify, classify_table
+    from explore3d.bench.scenes import BODIES
+
+    chosen = _names(bodies, "--bodies", list(BODIES)), _names(noises, "--noises", list(NOISES))
+    patterns = _names(sweeps, "--sweeps", list(SWEEPS))
+    print(classify_table(list(bench_classify(*chosen, patterns, seeds, store))), end="")
+
+
+@bench.command()
+def dynamics() -> None:
+    """Computing time and error of stiff contact over the stiffness, as CSV.
+
+    Example: explore3d bench dynamics
+    """
+    from explore3d.bench import dynamics_curve, dynamics_table
+
+    print(dynamics_table(dynamics_curve()), end="")
+
+
+@bench.command()
+def scaling(
+    store: Store,
+    axes: Annotated[str | None, typer.Option(help="samples, triangles, features, separated by commas; all.")] = None,
+    huge: Annotated[bool, typer.Option("--huge", help="Up to 1e8 samples: 2 GB of disk, many minutes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="The three smallest sizes of each.")] = False,
+) -> None:
+    """Time and memory against the number of samples, triangles and features, and the exponents that fit.
+
+    Example: explore3d bench scaling --store scaling.jsonl --axes samples --quick
+    """
+    from explore3d.bench import AXES, bench_scaling, scaling_lines
+
+    _print(scaling_lines(bench_scaling(store, _names(axes, "--axes", list(AXES)), huge, quick)))
+
+
+def _print(lines: Iterable[str]) -> None:
+    for line in lines:
+        print(line, flush=True)
+
+
+def _numbers(text: str) -> list[str]:
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    wrong = [part for part in parts if not part.isdigit() or int(part) < 2]
+    if wrong or not parts:
+        raise UserError(f"--triangles: expected whole numbers from 2, separated by commas; found {text!r}")
+    return parts
+
+
+def _names(text: str | None, option: str, possible: list[str]) -> list[str]:
+    chosen = possible if text is None else [part.strip() for part in text.split(",")]
+    wrong = [name for name in chosen if name not in possible]
+    if wrong:
+        raise UserError(f"{option}: unknown {wrong[0]!r}; possible: {', '.join(possible)}")
+    return chosen

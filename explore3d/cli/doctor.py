@@ -1,0 +1,159 @@
+"""Doctor: what of the installation works, what is missing, and what it is needed for.
+
+explore3d doctor: is everything there?
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+
+import typer
+
+import mapping
+from explore3d.cli.options import Json
+from mapping.geometry.mesh import open3d
+
+STATES = ("ok", "missing", "note")
+
+
+@dataclass(frozen=True)
+class Check:
+    """One finding.
+
+    Args:
+        subject: what was looked at.
+        state: "ok"; "missing", which something needs; "note", which only some uses need.
+        found: what there is.
+        needed_for: what it serves.
+        remedy: what to do, "" if nothing.
+    """
+
+    subject: str
+    state: str
+    found: str
+    needed_for: str
+    remedy: str = ""
+
+
+# package: module that must load, what it serves
+REQUIRED = {
+    "numpy": ("numpy", "everything"),
+    "scipy": ("scipy.optimize", "fits and statistics"),
+    "numba": ("numba", "contact of the simulated finger, envelopes"),
+    "libigl": ("igl", "curvature of meshes"),
+    "emcee": ("emcee", "posterior distributions of a feature's size and place"),
+    "trimesh": ("trimesh", "reading meshes, writing model.glb"),
+    "matplotlib": ("matplotlib", "the plots of the report"),
+    "plotly": ("plotly", "the interactive view in the report"),
+    "mcap": ("mcap.writer", "logs"),
+    "zstandard": ("zstandard", "compressed logs"),
+    "pydantic": ("pydantic", "scenes"),
+    "pyserial": ("serial", "fingers on a serial port"),
+}
+OPTIONAL = {
+    "opencamlib": ("opencamlib", "comparison with its drop cutter: pip install explore3d[peers]"),
+    "pymeshlab": ("pymeshlab", "comparison with its curvatures: pip install explore3d[peers]"),
+    "arviz": ("arviz", "further diagnostics of the posteriors: pip install explore3d[arviz]"),
+}
+
+
+def examine() -> list[Check]:
+    """Every check, in the order in which one would mend things."""
+    checks = [_python()]
+    checks += [_package(name, *what, absent="missing") for name, what in REQUIRED.items()]
+    checks += [_open3d(), _cache()]
+    checks += [_package(name, *what, absent="note") for name, what in OPTIONAL.items()]
+    return checks + _serial_ports()
+
+
+def _python() -> Check:
+    found = f"{platform.python_version()} on {platform.system()} {platform.machine()}"
+    good = sys.version_info >= (3, 11)
+    return Check(
+        "Python", "ok" if good else "missing", found, "everything", "" if good else "install Python 3.11 or newer"
+    )
+
+
+def _package(name: str, module: str, needed_for: str, absent: str) -> Check:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        found = version(name)
+    except PackageNotFoundError:
+        return Check(name, absent, "not installed", needed_for, "make setup" if absent == "missing" else "")
+    reason = _failure(lambda: import_module(module))
+    if reason:
+        return Check(
+            name, absent, f"{found} does not load: {reason}", needed_for, f"pip install --force-reinstall {name}"
+        )
+    return Check(name, "ok", found, needed_for)
+
+
+def _open3d() -> Check:
+    needed_for = "pictures of the object, meshes from scattered points"
+    reason = _failure(open3d)
+    if reason:
+        return Check("open3d", "missing", reason, needed_for, "make setup installs or unpacks what it lacks")
+    return Check("open3d", "ok", str(open3d().__version__), needed_for)
+
+
+def _cache() -> Check:
+    """Compiled kernels are kept beside the sources, or where NUMBA_CACHE_DIR says."""
+    folder = os.environ.get("NUMBA_CACHE_DIR") or os.path.dirname(mapping.__file__ or "")
+    needed_for = "keeping compiled kernels, else each start compiles them anew"
+    if os.access(folder, os.W_OK):
+        return Check("kernel cache", "ok", folder, needed_for)
+    return Check("kernel cache", "note", f"{folder} cannot be written", needed_for, "set NUMBA_CACHE_DIR")
+
+
+def _serial_ports() -> list[Check]:
+    needed_for = "fingers on a serial port; the simulated finger needs none"
+    try:
+        from serial.tools.list_ports import comports
+    except ImportError:
+        return []
+    ports = sorted(comports())
+    if not ports:
+        return [Check("serial ports", "note", "none found", needed_for)]
+    return [_serial_port(port.device, port.description or "", needed_for) for port in ports]
+
+
+def _serial_port(device: str, description: str, needed_for: str) -> Check:
+    if os.name == "posix" and not os.access(device, os.R_OK | os.W_OK):
+        remedy = "join the group that owns it (usually: sudo usermod -aG dialout $USER) and log in again"
+        return Check(device, "note", f"{description}; no permission", needed_for, remedy)
+    return Check(device, "ok", description, needed_for)
+
+
+def _failure(load: Callable[[], object]) -> str:
+    """Why a module does not load, "" if it does; its own code may raise whatever it likes."""
+    try:
+        load()
+    except Exception as error:
+        return f"{type(error).__name__}: {' '.join(str(error).split())}"
+    return ""
+
+
+def doctor(json: Json = False) -> None:
+    """Check the installation and the serial ports; say what is missing and what it is needed for.
+
+    The exit status is 1 if something is missing that the program cannot do without.
+
+    Example: explore3d doctor
+    """
+    from dataclasses import asdict
+    from json import dumps
+
+    def line(check: Check) -> str:
+        remedy = f" -> {check.remedy}" if check.remedy else ""
+        return f"{check.state:<8}{check.subject:<16}{check.found} ({check.needed_for}){remedy}"
+
+    checks = examine()
+    print(dumps([asdict(check) for check in checks]) if json else "\n".join(line(check) for check in checks))
+    if any(check.state == "missing" for check in checks):
+        raise typer.Exit(1)

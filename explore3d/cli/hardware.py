@@ -1,0 +1,125 @@
+"""explore3d emulate, calibrate, selftest, reprobe: hardware, emulated and real."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from explore3d import UserError
+from explore3d.cli.options import Json
+from explore3d.cli.run import SceneFile
+
+Arm = Annotated[bool, typer.Option("--arm", help="Let a real machine move.")]
+Radius = Annotated[str, typer.Option("--radius", help='Radius of the reference sphere, "12.5 mm".')]
+Center = Annotated[str, typer.Option(metavar="X,Y,Z", help='Its centre in the object frame: "0 mm, 0 mm, 0 mm".')]
+
+
+def emulate(
+    device: Annotated[str, typer.Argument(help="What to emulate: grbl.")],
+    mesh: Annotated[Path, typer.Option(help="Mesh of the body that the tip touches.")],
+    units: Annotated[str, typer.Option(help="Unit of the mesh's coordinates.")] = "m",
+    tip_radius: Annotated[str, typer.Option(help="Radius of the tip.")] = "10 mm",
+    origin: Annotated[
+        str, typer.Option(metavar="X,Y,Z", help="Machine coordinates of the object's origin.")
+    ] = "-150 mm, -150 mm, -50 mm",
+    sensor: Annotated[str | None, typer.Option(help="Force sensor at the tip: optoforce or line.")] = None,
+    stiffness: Annotated[float, typer.Option(help="Of the tip, N/m.")] = 1e4,
+    pace: Annotated[float, typer.Option(help="Emulated seconds per second.")] = 1.0,
+    locked: Annotated[bool, typer.Option(help="Begin locked, as a machine just switched on.")] = False,
+    folder: Annotated[Path, typer.Option(help="Where the ports appear, as links.")] = Path("/tmp/explore3d"),
+    seconds: Annotated[float, typer.Option(help="Stop after so long; 0: when interrupted.")] = 0.0,
+) -> None:
+    """Emulate a Grbl machine with a round tip on a pseudo-terminal, until interrupted.
+
+    Example: explore3d emulate grbl --mesh assets/meshes/wire_on_tile.ply --tip-radius "5 mm" --sensor optoforce
+    """
+    import time
+    from contextlib import suppress
+
+    from explore3d import parse_length
+    from explore3d.jobs import Emulation, serve
+
+    if device != "grbl" or sensor not in (None, "optoforce", "line"):
+        raise UserError(f"cannot emulate {device!r} with sensor {sensor!r}; possible: grbl, optoforce or line sensor")
+    emulation = Emulation(
+        mesh=mesh,
+        units=units,
+        tip_radius=parse_length(tip_radius),
+        origin=_point(origin),
+        sensor=sensor,
+        stiffness=stiffness,
+        pace=pace,
+        locked=locked,
+    )
+    folder.mkdir(parents=True, exist_ok=True)
+    with serve(emulation, folder) as server, suppress(KeyboardInterrupt):
+        for name, port in zip(("stage", "sensor"), server.ports, strict=False):
+            print(f"{name}: {port}", flush=True)
+        until = time.monotonic() + seconds if seconds else float("inf")
+        while time.monotonic() < until and server.error is None:
+            time.sleep(0.1)
+
+
+def calibrate(
+    scene: SceneFile,
+    radius: Radius,
+    center: Center = "0 mm, 0 mm, 0 mm",
+    out: Annotated[Path, typer.Option("--out", "-o", help="Tip profile to write.")] = Path("tip.toml"),
+    lines: Annotated[int, typer.Option(help="Sweeps over the sphere.", min=2)] = 24,
+    radius_sd: Annotated[str, typer.Option(help="Standard uncertainty of the sphere's radius.")] = "0 mm",
+    arm: Arm = False,
+    json: Json = False,
+) -> None:
+    """Find the tip's radius, its noise and the sensor's delay on a reference sphere; write a tip profile.
+
+    Example: explore3d calibrate scene.toml --radius "12.5 mm" --out tip.toml --arm
+    """
+    from explore3d import parse_length
+    from explore3d.jobs import as_json, calibrate as find, write_profile
+
+    profile = find(scene, parse_length(radius), _point(center), lines=lines, radius_sd=parse_length(radius_sd), arm=arm)
+    write_profile(profile, out)
+    print(as_json(profile.record()) if json else "\n".join([*profile.lines(), f"profile: {out}"]))
+
+
+def selftest(
+    scene: SceneFile, radius: Radius, center: Center = "0 mm, 0 mm, 0 mm", arm: Arm = False, json: Json = False
+) -> None:
+    """Scan a reference sphere along four lines; print the range of radii with the time it took.
+
+    Example: explore3d selftest scene.toml --radius "12.5 mm" --arm
+    """
+    from explore3d import parse_length
+    from explore3d.jobs import as_json, selftest as test
+
+    found = test(scene, parse_length(radius), _point(center), arm=arm)
+    words = f"range of radii {1e3 * found['range']:.4f} mm in {found['time']:.1f} s ({found['samples']:.0f} contacts)"
+    print(as_json(found) if json else words)
+
+
+def reprobe(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier session.")],
+    at: Annotated[str, typer.Option(metavar="X,Y,Z", help='A place on the body, object frame: "10 mm, 5 mm, 0 mm".')],
+    touches: Annotated[int, typer.Option(help="How often to touch it.", min=1)] = 3,
+    arm: Arm = False,
+    json: Json = False,
+) -> None:
+    """Touch one place of an earlier session again, and say how far off the record it is.
+
+    Example: explore3d reprobe out/wire --at "12 mm, 3 mm, 0 mm"
+    """
+    from explore3d.jobs import as_json, reprobe as touch
+
+    found = touch(folder, _point(at), touches=touches, arm=arm)
+    print(as_json(found.record()) if json else "\n".join(found.lines()))
+
+
+def _point(text: str) -> tuple[float, float, float]:
+    from explore3d import parse_length
+
+    parts = [parse_length(part.strip()) for part in text.split(",")]
+    if len(parts) != 3:
+        raise UserError(f'expected three lengths, "0 mm, 0 mm, 5 mm"; found {text!r}')
+    return parts[0], parts[1], parts[2]

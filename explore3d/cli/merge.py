@@ -1,0 +1,30 @@
+"""explore3d merge: later logs of the same object join a model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from explore3d.cli.options import Out
+
+
+def merge(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="Folder or model.json of the known model.")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Later logs of the same object.")],
+    out: Out,
+    pose_sd: Annotated[str, typer.Option(help='Standard deviation of the pose between the logs, "0.1 mm".')] = "0 mm",
+) -> None:
+    """Update a model's features by later logs instead of finding them anew; none is removed.
+
+    A log whose mesh or samples lie off the model's base is refused: it shows another object, or another frame.
+
+    Example: explore3d merge out/wire out/second/log.mcap --out out/both
+    """
+    from explore3d import parse_length
+    from explore3d.jobs import merge as join
+    from explore3d.report import feature_line
+
+    merged = join(model, logs, out, parse_length(pose_sd))
+    print("\n".join([*map(feature_line, merged.features), f"model: {out / 'model.json'}"]))

@@ -1,0 +1,59 @@
+"""explore3d run, explore3d plan: exploring what a scene describes, or only planning it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from explore3d.cli.options import Force, Json, Out
+
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene to explore.")]
+
+
+def run(
+    scene: SceneFile,
+    out: Out,
+    force: Force = None,
+    json: Json = False,
+    arm: Annotated[
+        bool, typer.Option("--arm", help="Let a real machine move; without it, its moves are only planned and checked.")
+    ] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on where a broken-off session in that folder stopped.")
+    ] = False,
+) -> None:
+    """Explore the scene with its finger; write the log, the annotated model and the report.
+
+    Example: explore3d run assets/scenes/wire_on_plate.toml --out out/wire
+    """
+    from explore3d.jobs import needs_arming
+    from explore3d.scene import load_scene
+
+    if not arm and needs_arming(load_scene(scene)):
+        plan(scene, out, json)
+        if not json:
+            print("dry run: connected and checked, nothing was moved; add --arm to explore with the real machine")
+        return
+    from explore3d.cli.progress import shown
+    from explore3d.jobs import run as explore
+    from explore3d.report import show
+
+    with shown(quiet=json) as progress:
+        analysis = explore(scene, out, progress=progress, force=force or (), arm=arm, resume=resume)
+    show(analysis, out, json)
+
+
+def plan(
+    scene: SceneFile,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for a picture of the sweeps.")] = None,
+    json: Json = False,
+) -> None:
+    """Show the planned sweeps, their length, time and limit violations; nothing is moved.
+
+    Example: explore3d plan assets/scenes/mug.toml --out out/mug-plan
+    """
+    from explore3d.jobs import plan_scene, show_plan
+
+    show_plan(plan_scene(scene), out, json)

@@ -1,0 +1,32 @@
+"""Jobs: run, analyze, plan, merge, and what serves them."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from explore3d.jobs.analyze import analyze as analyze
+    from explore3d.jobs.calibrate import (
+        as_json as as_json,
+        calibrate as calibrate,
+        selftest as selftest,
+        write_profile as write_profile,
+    )
+    from explore3d.jobs.emulate import Emulation as Emulation, serve as serve
+    from explore3d.jobs.machine_finger import needs_arming as needs_arming
+    from explore3d.jobs.merge import merge as merge
+    from explore3d.jobs.plan import plan_scene as plan_scene, show_plan as show_plan
+    from explore3d.jobs.reprobe import reprobe as reprobe
+    from explore3d.jobs.run import run as run
+
+_PUBLIC = {
+    "analyze": ("analyze",),
+    "calibrate": ("as_json", "calibrate", "selftest", "write_profile"),
+    "emulate": ("Emulation", "serve"),
+    "machine_finger": ("needs_arming",),
+    "merge": ("merge",),
+    "plan": ("plan_scene", "show_plan"),
+    "reprobe": ("reprobe",),
+    "run": ("run",),
+}
+doorway(__name__, _PUBLIC)

@@ -1,0 +1,141 @@
+"""Dry run: what the finger would do if nothing stood out anywhere; nothing is moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from explore3d import count_text, length_text, seconds_text
+from explore3d.jobs.expedition import discoverer, explorer, known_base, locator
+from explore3d.jobs.run import scene_finger
+from explore3d.jobs.session import Session
+from explore3d.pictures import plan_picture
+from explore3d.scene import Scene, load_scene
+from hw import Move
+from hw.simulated import SimulatedFinger
+from mapping import Surface, Trace
+from mapping.base import Base
+from planners import Spent, drive, dry_run
+from planners.paths import Limits, Ways, routed
+
+
+@dataclass(frozen=True, eq=False)
+class DryRun:
+    """The planned moves.
+
+    Args:
+        base: the global model.
+        tip_radius: m.
+        moves: in their order.
+        metres, seconds: finger path and time, the ways between the sweeps included.
+        covered: share of the surface that the sweeps inspect; None if the time budget ends before the survey.
+        reach: distance from a sweep up to which the smallest feature is seen, m; None likewise.
+        violations: (number of the move, what limit it breaks).
+        assumed: what had to be assumed of the object, and what the plan falls short of; a sentence or "".
+    """
+
+    base: Base
+    tip_radius: float
+    moves: tuple[Move, ...]
+    metres: float
+    seconds: float
+    covered: float | None
+    reach: float | None
+    violations: tuple[tuple[int, str], ...]
+    assumed: str = ""
+
+    def record(self) -> dict[str, Any]:
+        """The plan in JSON values: SI units."""
+        return {
+            "sweeps": sum(move.purpose == "sweep" for move in self.moves),
+            "moves": [{"purpose": move.purpose, "path": move.path.tolist()} for move in self.moves],
+            "length": self.metres,
+            "time": self.seconds,
+            "covered": self.covered,
+            "reach": self.reach,
+            "violations": [{"move": number, "what": what} for number, what in self.violations],
+        }
+
+    def lines(self) -> list[str]:
+        """The plan in words."""
+        sweeps = count_text(sum(move.purpose == "sweep" for move in self.moves), "sweep")
+        first = f"{sweeps}, {length_text(self.metres)} of finger path, {seconds_text(self.seconds)}"
+        within = []
+        if self.covered is not None and self.reach is not None:
+            within = [f"{100 * self.covered:.1f} % of the surface lies within {length_text(self.reach)} of a sweep"]
+        broken = [f"move {number}: {what}" for number, what in self.violations]
+        assumed = [self.assumed] if self.assumed else []
+        return [*assumed, first, *within, *(broken or ["no move breaks a limit"])]
+
+    def picture(self) -> bytes:
+        """PNG of the base with the planned sweeps on it."""
+        return plan_picture(self.base, self.moves, self.tip_radius, [number - 1 for number, _ in self.violations])
+
+
+def plan_scene(path: Path | str) -> DryRun:
+    """Plan the exploration of a scene, and check every move against the finger's limits.
+
+    Raises:
+        SceneError: a scene that cannot be used.
+    """
+    scene = load_scene(path)
+    base, finger, tip = known_base(scene), scene_finger(scene), scene.tip.radius
+    with finger:
+        workspace = finger.workspace
+    if base is None:
+        first, base = imagined(scene)
+        assumed = "the body is not known: planned as if it were flat and lay in the middle of the region"
+    else:
+        first, assumed = [], ""
+    nothing = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip)
+    if scene.model.pose == "estimate" and scene.model.mesh is not None:
+        first, _ = dry_run(locator(scene, base).plan(), nothing)
+    ways = Ways(base, tip, workspace.low, workspace.high, workspace.max_speed)
+    explore = explorer(scene, base)
+    plan = routed(explore.plan(), ways)
+    planned, outcome = dry_run(plan, nothing)
+    moves, limits = [*first, *planned], Limits.of(workspace, base, tip)
+    before: list[Move | None] = [None, *moves]
+    checked = enumerate(zip(moves, before, strict=False), 1)
+    violations = [(number, what) for number, (move, last) in checked if (what := limits.violation(move, last))]
+    spent = Spent(25.0 * tip if explore.travel_speed is None else explore.travel_speed)
+    for move in moves:
+        spent.count(move)
+    survey = outcome.value.survey
+    if survey is None:
+        short = "the time budget ends before the survey does: raise explore.time_budget or survey.smallest_feature"
+        assumed = f"{assumed}; {short}" if assumed else short
+    covered, reach = (None, None) if survey is None else (survey.fraction, survey.reach)
+    return DryRun(base, tip, tuple(moves), spent.metres, spent.seconds, covered, reach, tuple(violations), assumed)
+
+
+def imagined(scene: Scene) -> tuple[list[Move], Base]:
+    """How the discovery of an unknown body would go if it were a flat one in the middle of the region; its base."""
+    discover = discoverer(scene)
+    low, high = discover.low, discover.high
+    axis = "xyz".index(discover.sides[0][1])
+    first, second = ((axis + 1) % 3, (axis + 2) % 3)[:: 1 if discover.sides[0][0] == "+" else -1]
+    corners = np.tile(0.5 * (low + high), (4, 1))
+    corners[:, first] = np.array([low, high, high, low])[:, first]
+    corners[:, second] = np.array([low, low, high, high])[:, second]
+    body = Surface(corners, [[0, 1, 2], [0, 2, 3]])
+    finger = SimulatedFinger(object=body, tip_radius=discover.tip_radius, rate=200.0, margin=float(np.ptp([low, high])))
+    record, outcome = drive(replace(discover, sides=discover.sides[:1]).plan(), finger.execute)
+    return [move for move, _ in record], outcome.value
+
+
+def show_plan(plan: DryRun, out: Path | None, as_json: bool) -> None:
+    """Print the plan in words or as JSON; with a folder, write plan.json and plan.png into it."""
+    import json
+
+    if out is not None:
+        with Session(out) as session:
+            session.write("plan.json", json.dumps(plan.record(), indent=1))
+            session.write("plan.png", plan.picture())
+    if as_json:
+        print(json.dumps(plan.record()))
+    else:
+        print("\n".join(plan.lines() + ([] if out is None else [f"picture: {out / 'plan.png'}"])))

@@ -1,0 +1,77 @@
+"""Streaming: the analysis of a log too large for memory, by whole sweeps, in bounded memory, resumable."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Collection
+from pathlib import Path
+
+from explore3d.analysis import Analysis, Progress, Stages, build_model, silent
+from explore3d.jobs.conclude import conclude
+from explore3d.jobs.condense import CHUNK, KEPT, Condensed, condense
+from explore3d.jobs.session import Session
+from explore3d.log import Log, LogStream, count_samples, digest, head, read_base
+from explore3d.scene import Settings, parse_scene
+from mapping import LeftOut, Trace
+from mapping.base import Base, fit_base
+
+
+def analyze_stream(
+    path: Path,
+    out: Path | str | None,
+    *,
+    base: Base | None = None,
+    tip_radius: float | None = None,
+    progress: Progress = silent,
+    force: Collection[str] = (),
+    chunk: int = CHUNK,
+) -> Analysis:
+    """The annotated model of one large log; arguments and errors as for explore3d.jobs.analyze.analyze.
+
+    What came of each chunk stays in `<out>.chunks` until the whole is done: a rerun takes it from there.
+    """
+    stages = Stages(progress, force)
+    scene_text, events = head(path)
+    scene = parse_scene(scene_text, path) if scene_text else None
+    base = base or read_base(events) or _fitted(path, tip_radius, stages)
+    settings = Settings.of(scene)
+    folder = None if out is None else Path(out).with_name(Path(out).name + ".chunks")
+    stream = LogStream(path, tip_radius)
+    with stages.stage("detection") as share:
+        condensed = condense(stream, base, folder, share, chunk, **settings.detection)
+    log = _log(path, scene_text, condensed)
+    far = condensed.samples - len(condensed.trace)
+    searched = f"all {condensed.samples:,} samples were searched; {far:,} of them, away from crossings, were not kept"
+    stages.left_out.append(LeftOut("part of the trace", searched))
+    if out is None:
+        return build_model(log, scene, base, stages)
+    with Session(out, keep=log.sources) as session:
+        analysis = conclude(session, log, scene, base, stages)
+    if folder is not None:
+        shutil.rmtree(folder, ignore_errors=True)
+    return analysis
+
+
+def _log(path: Path, scene_text: str, condensed: Condensed) -> Log:
+    return Log(
+        trace=condensed.trace,
+        scene_text=scene_text,
+        events=condensed.events,
+        complete=condensed.complete,
+        recovered=condensed.recovered,
+        sha256=digest(path),
+        sources=(str(path),),
+        detections=condensed.detections,
+    )
+
+
+def _fitted(path: Path, tip_radius: float | None, stages: Stages) -> Base:
+    """The base of a log that has none, from a first pass over every k-th sample."""
+    every, total, done = max(1, round(count_samples(path) / KEPT)), max(count_samples(path), 1), 0
+    parts = []
+    with stages.stage("base fit") as share:
+        for trace in LogStream(path, tip_radius).sweeps(CHUNK):
+            parts.append(trace.select(slice(None, None, every)))
+            done += len(trace)
+            share(0.9 * min(1.0, done / total))
+        return fit_base(Trace.concatenate(parts))

@@ -1,0 +1,134 @@
+"""Log: what was recorded, as the analysis takes it, be it from our own log or from a table.
+
+The base as an event of the log: a log can be analysed where the scene's mesh files are not at hand.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from explore3d import UserError
+from mapping import Surface, SurfaceError, Trace
+from mapping.base import Base
+
+if TYPE_CHECKING:
+    from mapping.detection import Detections
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something noted beside the samples.
+
+    Args:
+        kind: "move", or the kind that its writer gave.
+        t: time on the clock of the samples, s; None before the first sample.
+        data: JSON values; of a move its path, approach, speed, force, purpose, first sample and count.
+    """
+
+    kind: str
+    t: float | None
+    data: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """A recording.
+
+    Args:
+        trace: all samples in the order of writing.
+        scene_text: the scene file as it was when recorded; "" if there is none (a table).
+        events: what was noted beside the samples, in the order of writing.
+        metadata: versions, seed, finger, columns: what the writer or the import knew.
+        complete: True if the log was closed and every sample that it promised is here.
+        recovered: one sentence on what was lost or left out, "" if nothing.
+        sha256: of the file's bytes (of several files: of their digests joined by newlines).
+        sources: paths of the files.
+        detections: of a log that was searched while it streamed by; `trace` is then what is left of it.
+    """
+
+    trace: Trace
+    scene_text: str = ""
+    events: tuple[Event, ...] = ()
+    metadata: dict[str, Any] = field(default_factory=dict)
+    complete: bool = True
+    recovered: str = ""
+    sha256: str = ""
+    sources: tuple[str, ...] = ()
+    detections: Detections | None = None
+
+
+def merge(logs: Sequence[Log]) -> Log:
+    """Several recordings of one object as one; sweeps of later ones are renumbered so that none coincide.
+
+    Raises:
+        UserError: none given, or tip radii that differ.
+    """
+    if not logs:
+        raise UserError("no logs given; at least one is needed")
+    if len(logs) == 1:
+        return logs[0]
+    first = logs[0]
+    for log in logs[1:]:
+        if log.trace.tip_radius != first.trace.tip_radius:
+            raise UserError(
+                f"{_name(log)}: field tip_radius is {log.trace.tip_radius:g} m, but {first.trace.tip_radius:g} m in "
+                f"{_name(first)}; logs to analyse together must share one fingertip"
+            )
+    traces, events, samples, sweeps = [], [], 0, 0
+    for log in logs:
+        sweep = log.trace.sweep - log.trace.sweep.min() + sweeps
+        traces.append(replace(log.trace, sweep=sweep))
+        events += [_shifted(event, samples) for event in log.events]
+        samples, sweeps = samples + len(log.trace), int(sweep.max()) + 1
+    return Log(
+        trace=Trace.concatenate(traces),
+        scene_text=next((log.scene_text for log in logs if log.scene_text), ""),
+        events=tuple(events),
+        metadata=first.metadata,
+        complete=all(log.complete for log in logs),
+        recovered="; ".join(f"{_name(log)}: {log.recovered}" for log in logs if log.recovered),
+        sha256=hashlib.sha256("\n".join(log.sha256 for log in logs).encode()).hexdigest(),
+        sources=tuple(source for log in logs for source in log.sources),
+    )
+
+
+def _shifted(event: Event, samples: int) -> Event:
+    if "first" not in event.data or event.kind != "move":
+        return event
+    return replace(event, data=event.data | {"first": event.data["first"] + samples})
+
+
+def _name(log: Log) -> str:
+    return ", ".join(log.sources) or "a log"
+
+
+KIND = "base"
+
+
+def base_event(base: Base) -> dict[str, Any]:
+    """JSON values that `read_base` turns back into the same base, bit for bit."""
+    return {
+        "kind": base.kind,
+        "parameters": base.parameters,
+        "vertices": base.surface.vertices.tolist(),
+        "faces": base.surface.faces.tolist(),
+    }
+
+
+def read_base(events: Sequence[Event]) -> Base | None:
+    """The last base that the events hold, None if none does.
+
+    Raises:
+        UserError: a base event that is not one.
+    """
+    for event in reversed(events):
+        if event.kind == KIND:
+            try:
+                surface = Surface(event.data["vertices"], event.data["faces"])
+                return Base(surface, event.data["kind"], event.data["parameters"])
+            except (KeyError, SurfaceError) as error:
+                raise UserError(f"the log's base event is not readable: {error}") from error
+    return None

@@ -1,0 +1,106 @@
+"""TableSettings: what a table of numbers does not say of itself; from options and from a sidecar next to it."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
+
+from explore3d import UserError
+from explore3d.log.table_columns import Role
+from explore3d.scene import Length, LengthUnit, Point, Table, complaint
+
+Row = tuple[float, float, float]
+
+
+def _split_columns(value: object) -> object:
+    """{"x": "X", "z": "Y"} from "x=X, z=Y"; numbers count columns from 1."""
+    if not isinstance(value, str):
+        return value
+    pairs = [pair.partition("=") for pair in value.split(",")]
+    if not all(equals and role.strip() and column.strip() for role, equals, column in pairs):
+        raise ValueError(f'expected "x=NAME, z=NAME" or "x=1, z=2"; found {value!r}')
+    return {role.strip(): int(c) if (c := column.strip()).isdecimal() else c for role, _, column in pairs}
+
+
+def _proper(rotation: tuple[Row, Row, Row]) -> tuple[Row, Row, Row]:
+    matrix = np.array(rotation)
+    if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) or np.linalg.det(matrix) < 0:
+        raise ValueError(f"must be a proper rotation (orthonormal rows, determinant 1); found {matrix.tolist()}")
+    return rotation
+
+
+class Frame(Table):
+    """Pose of the table's frame in the object's: object = rotation @ table + origin."""
+
+    origin: Point = (0.0, 0.0, 0.0)
+    rotation: Annotated[tuple[Row, Row, Row], AfterValidator(_proper)] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+
+
+class TableSettings(Table):
+    """How to read a table.
+
+    Args:
+        units: of the coordinates, one for all or by column role; None: the file's header states them.
+        tip_radius: radius of the fingertip, m.
+        columns: which column (by name, or by number from 1) plays which role; what is not given is found by name.
+        frame: pose of the table's frame in the object's.
+        jump: distance between consecutive samples beyond which a new sweep begins, m; None: ten median steps.
+        reference: the point of the ball that the coordinates give, its "centre" or its "bottom" (centre - r z).
+    """
+
+    units: LengthUnit | dict[Role, LengthUnit] | None = None
+    tip_radius: Length | None = None
+    columns: Annotated[dict[Role, str | int], BeforeValidator(_split_columns)] = Field(default_factory=dict)
+    frame: Frame = Frame()
+    jump: Length | None = None
+    reference: Literal["centre", "bottom"] = "centre"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_schema(cls, data: Any) -> Any:
+        if isinstance(data, dict) and data.get("schema") == "explore3d/table/1":
+            return {key: value for key, value in data.items() if key != "schema"}
+        return data
+
+
+def load_settings(table: Path, **options: Any) -> tuple[TableSettings, Path | None]:
+    """The settings for a table, and its sidecar if it has one; options that are not None win.
+
+    The sidecar of scan.csv is scan.csv.toml or scan.toml (unless that is a scene).
+
+    Raises:
+        UserError: a setting that is unknown or wrong, in one line that names the file and the field.
+    """
+    sidecar = next((path for path in (Path(f"{table}.toml"), table.with_suffix(".toml")) if _is_sidecar(path)), None)
+    stated: dict[str, Any] = {}
+    if sidecar is not None:
+        stated = _parse(sidecar)
+        _validate(stated, sidecar)
+    given = {key: value for key, value in options.items() if value is not None}
+    return _validate(stated | given, table), sidecar
+
+
+def _is_sidecar(path: Path) -> bool:
+    if not path.is_file():
+        return False
+    return not str(_parse(path).get("schema", "")).startswith("explore3d/scene")
+
+
+def _parse(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise UserError(f"{path}: cannot read it: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: is not TOML: {error}") from error
+
+
+def _validate(data: dict[str, Any], path: Path) -> TableSettings:
+    try:
+        return TableSettings.model_validate(data)
+    except ValidationError as error:
+        raise UserError(f"{path}: {complaint(error, TableSettings)}") from error

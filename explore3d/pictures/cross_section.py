@@ -1,0 +1,232 @@
+"""Cross-section: what one sweep felt across a feature, beside what the feature's record predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapping import BoolArray, Feature, FloatArray, IntArray, Interval, Trace
+from mapping.base import Base
+from mapping.detection import Crossing
+from mapping.estimate.envelope import Estimate
+from mapping.estimate.sweeps import BRIDGED
+from mapping.geometry.mesh import directions, middle, nearest_on
+from mapping.geometry.templates import step_height
+from mapping.inference.families import feature_trace
+
+# The section reaches so many half-widths of the disturbance to either side.
+REACH = 2.4
+BINS = 60
+GRID = 241
+
+
+@dataclass(frozen=True, eq=False)
+class CrossSection:
+    """Heights over the base along one sweep, at signed distances from the feature's crest.
+
+    Args:
+        feature: whose crest it is.
+        sweep: number of the sweep.
+        x, height: (N,) samples: distance across the feature, and height of the trace over the base's trace, m.
+        bin_x, bin_height, bin_sd: (M,) means over equal bins, and their standard errors, m.
+        grid, predicted, low, high: (G,) places, and the trace of the recorded feature there: median, and the
+            5 % and 95 % quantiles of its height.
+        body_x, body_z, bridged: (B,) the estimated surface over the base along the sweep, m, and where the tip
+            bridged it; empty if no surface was estimated.
+        across: True if x is measured across a line, False if along the sweep over a point.
+    """
+
+    feature: Feature
+    sweep: int
+    x: FloatArray
+    height: FloatArray
+    bin_x: FloatArray
+    bin_height: FloatArray
+    bin_sd: FloatArray
+    grid: FloatArray
+    predicted: FloatArray
+    low: FloatArray
+    high: FloatArray
+    body_x: FloatArray
+    body_z: FloatArray
+    bridged: BoolArray
+    across: bool
+
+
+def cross_section(
+    feature: Feature,
+    trace: Trace,
+    base: Base,
+    crossings: Sequence[Crossing],
+    estimate: Estimate | None = None,
+) -> CrossSection | None:
+    """The section along the sweep that crosses nearest to the feature's middle; None if no sweep does.
+
+    Args:
+        feature: what was found.
+        trace: all samples.
+        base: the global model.
+        crossings: detections on the trace.
+        estimate: the estimated surface of the same trace.
+    """
+    crossing = _nearest_crossing(feature, trace.tip_radius, crossings)
+    window = _window(feature, crossing, trace)
+    if len(window) == 0:
+        return None
+    feet = base.foot(trace.centers[window], trace.tip_radius)
+    x, beside = _place(feature, feet.points, feet.normals)
+    half = max(half_width(feature, trace.tip_radius), 0.0 if crossing is None else crossing.half_width)
+    near = (np.abs(x) < REACH * half) & (beside < half)
+    index = np.flatnonzero(near)[np.argsort(x[near], kind="stable")]
+    if len(index) < 3:
+        return None
+    x = x[index]
+    grid = np.linspace(x[0], x[-1], GRID)
+    points, normals = (_interpolated(grid, x, getattr(feet, name)[index]) for name in ("points", "normals"))
+    sizes = [feature.height.median, feature.height.low, feature.height.high]
+    curves = [_trace_of(feature, size, grid, points, normals, trace.tip_radius) for size in sizes]
+    bins = _binned(x, feet.height[index])
+    if feature.kind == "step":
+        curves = _aligned(curves, np.interp(grid, x, feet.height[index]))
+    sweep = int(trace.sweep[window[0]])
+    return CrossSection(
+        feature,
+        sweep,
+        x,
+        feet.height[index],
+        *bins,
+        grid,
+        curves[0],
+        np.minimum(curves[1], curves[2]),
+        np.maximum(curves[1], curves[2]),
+        *_body(feature, sweep, half, estimate, base, trace.tip_radius),
+        len(feature.axis) > 1,
+    )
+
+
+def half_width(feature: Feature, tip_radius: float) -> float:
+    """Half of the strip that the feature disturbs on the trace, m (theory section 6)."""
+    width = feature.width.median if np.isfinite(feature.width.median) else 0.0
+    if feature.height.median < 0:
+        return max(0.5 * width, float(np.sqrt(2 * tip_radius * abs(feature.height.median))))
+    return float(np.sqrt(2 * tip_radius * abs(feature.height.median))) + 0.5 * width
+
+
+def _nearest_crossing(feature: Feature, tip_radius: float, crossings: Sequence[Crossing]) -> Crossing | None:
+    """The crossing of the feature, not along it, that lies nearest to its middle."""
+    reference, _ = middle(feature.axis)
+    half = half_width(feature, tip_radius)
+    close = [
+        crossing
+        for crossing in crossings
+        if np.linalg.norm(crossing.point - nearest_on(crossing.point[None], feature.axis)[0][0]) < half
+        and (len(feature.axis) == 1 or _angle(crossing, feature) > 0.5)
+    ]
+    return min(close, key=lambda crossing: float(np.linalg.norm(crossing.point - reference)), default=None)
+
+
+def _window(feature: Feature, crossing: Crossing | None, trace: Trace) -> IntArray:
+    """Samples of the sweep around the crossing; without one, of the sweep that passes nearest to the middle."""
+    if crossing is None:
+        above = middle(feature.axis)[0] + trace.tip_radius * feature.normals[len(feature.axis) // 2]
+        nearest = int(np.linalg.norm(trace.centers - above, axis=1).argmin())
+        return np.flatnonzero(trace.sweep == trace.sweep[nearest])
+    own = np.flatnonzero(trace.sweep == crossing.sweep)
+    # A sweep may cross a feature many times: what is far from this crossing is another one.
+    margin = 1.5 * (crossing.stop - crossing.start) + 10
+    return own[max(0, int(crossing.start - margin)) : int(crossing.stop + margin)]
+
+
+def _interpolated(grid: FloatArray, x: FloatArray, vectors: FloatArray) -> FloatArray:
+    """(len(grid), 3) vectors given at x (N,), between them."""
+    return np.column_stack([np.interp(grid, x, vectors[:, i]) for i in range(3)])
+
+
+def _angle(crossing: Crossing, feature: Feature) -> float:
+    """Sine of the angle between the sweep and the feature's axis at the crossing."""
+    near = int(np.linalg.norm(feature.axis - crossing.point, axis=1).argmin())
+    return float(np.linalg.norm(np.cross(directions(feature.axis)[near], crossing.tangent)))
+
+
+def _place(feature: Feature, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Signed distance of base points (N, 3) across the crest, and how far they lie beside the section, m.
+
+    Across a line the sign is that of normal x tangent, and beside means beyond its ends. Over a point the
+    distance is along the direction in which the samples spread most, and beside is across it.
+    """
+    if len(feature.axis) > 1:
+        closest, s = nearest_on(points, feature.axis)
+        offset = points - closest
+        leg = np.clip(np.searchsorted(_knots(feature), s, side="right") - 1, 0, len(feature.axis) - 2)
+        along = np.diff(feature.axis, axis=0)[leg]
+        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(float).tiny)
+        left = np.cross(normals, along)
+        return np.einsum("ij,ij->i", offset, left), np.abs(np.einsum("ij,ij->i", offset, along))
+    offset = points - feature.axis[0]
+    near = np.linalg.norm(offset, axis=1)
+    nearest = offset[np.argsort(near, kind="stable")[: max(3, len(near) // 50)]]
+    heading = np.linalg.svd(nearest - nearest.mean(axis=0), full_matrices=False)[2][0]
+    heading = heading * np.sign(heading[int(np.abs(heading).argmax())])
+    x = offset @ heading
+    return x, np.sqrt(np.maximum(near**2 - x**2, 0.0))
+
+
+def _knots(feature: Feature) -> FloatArray:
+    steps = np.linalg.norm(np.diff(feature.axis, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _trace_of(
+    feature: Feature, height: float, x: FloatArray, points: FloatArray, normals: FloatArray, tip_radius: float
+) -> FloatArray:
+    """(N,) heights over the base's trace that the feature would leave if it were so high, m."""
+    if feature.kind == "step":
+        return step_height(x, abs(height), tip_radius)
+    # The radius that the record may hold belongs to its median height.
+    own = height == feature.height.median
+    extra = {name: value for name, value in feature.extra.items() if own or name != "radius"}
+    so_high = replace(feature, height=Interval(height, height, height), extra=extra)
+    return feature_trace(so_high, points, normals, tip_radius)
+
+
+def _aligned(curves: list[FloatArray], height: FloatArray) -> list[FloatArray]:
+    """Steps turned and shifted to the samples: the record does not say which side is high."""
+    best: tuple[float, list[FloatArray]] | None = None
+    for turned in (curves, [curve[::-1] for curve in curves]):
+        shift = float(np.median(height - turned[0]))
+        misfit = float(((height - turned[0] - shift) ** 2).sum())
+        if best is None or misfit < best[0]:
+            best = misfit, [curve + shift for curve in turned]
+    assert best is not None
+    return best[1]
+
+
+def _binned(x: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means over at most BINS equal bins of x: places, heights, standard errors (0 for single samples)."""
+    count = min(BINS, max(1, len(x) // 3))
+    bins = np.clip(((x - x[0]) / max(np.ptp(x), np.finfo(float).tiny) * count).astype(np.int64), 0, count - 1)
+    number = np.bincount(bins, minlength=count)
+    # The outermost bins may hold a single stray sample.
+    kept = number > 0.25 * np.median(number)
+    number = np.maximum(number, 1)
+    place, mean = (np.bincount(bins, weights=v, minlength=count) / number for v in (x, height))
+    spread = np.bincount(bins, weights=(height - mean[bins]) ** 2, minlength=count) / np.maximum(number - 1, 1)
+    return place[kept], mean[kept], np.sqrt(spread / number)[kept]
+
+
+def _body(
+    feature: Feature, sweep: int, half: float, estimate: Estimate | None, base: Base, tip_radius: float
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """The estimated surface along the sweep: places, heights over the base, and where it was bridged."""
+    if estimate is None:
+        return np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool)
+    own = np.flatnonzero(estimate.sweep == sweep)
+    near = np.linalg.norm(estimate.points[own] - nearest_on(estimate.points[own], feature.axis)[0], axis=1)
+    own = own[near < 2.0 * REACH * half]
+    foot = base.foot(estimate.points[own], tip_radius)
+    x, beside = _place(feature, foot.points, foot.normals)
+    keep = np.flatnonzero((np.abs(x) < REACH * half) & (beside < half))
+    order = keep[np.argsort(x[keep], kind="stable")]
+    return x[order], foot.height[order] + tip_radius, estimate.labels[own][order] == BRIDGED

@@ -1,0 +1,99 @@
+"""Picture of extents: each axis seen from above with its 90 % band, and its ends with theirs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from explore3d import length_text, length_unit
+from explore3d.pictures.figure import BAND, ESTIMATED, INK, TRUTH, new_figure, png, styled
+from mapping import Feature, FloatArray
+from mapping.geometry.mesh import arclengths
+
+COLUMNS = 2
+QUANTILE = 1.6448536
+
+
+def extent_picture(features: Sequence[Feature], truths: Sequence[FloatArray | None]) -> bytes | None:
+    """PNG with one panel for each feature along a curve: place along its chord, and across it, not to one scale.
+
+    Args:
+        features: those to show; bumps and pits have no extent and are left out.
+        truths: true axis (K, 3) of each, or None.
+    """
+    pairs = [(f, t) for f, t in zip(features, truths, strict=True) if len(f.axis) > 1 and "axis_sd" in f.extra]
+    if not pairs:
+        return None
+    columns = min(COLUMNS, len(pairs))
+    rows = -(-len(pairs) // columns)
+    with styled():
+        figure = new_figure(5.5 * columns, 2.6 * rows)
+        grid = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+        for axes, (feature, true) in zip(grid, pairs, strict=False):
+            _panel(axes, feature, true)
+        for axes in grid[len(pairs) :]:
+            axes.set_visible(False)
+        return png(figure)
+
+
+def _panel(axes: Any, feature: Feature, true: FloatArray | None) -> None:
+    """The axis in a plane: along the chord between its ends (a ring: its first diameter), and across."""
+    along, across, origin = _plane(feature)
+    x, y = (feature.axis - origin) @ along, (feature.axis - origin) @ across
+    sd = np.asarray(feature.extra["axis_sd"], dtype=np.float64)
+    if len(sd) != len(x):
+        sd = np.full(len(x), feature.position_sd)
+    tangent = np.gradient(np.column_stack([x, y]), axis=0)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), np.finfo(float).tiny)
+    side = QUANTILE * sd[:, None] * tangent[:, ::-1] * [-1.0, 1.0]
+    x_factor, x_name = length_unit(float(np.abs(x).max()))
+    spread = [y, y + side[:, 1], y - side[:, 1]]
+    if true is not None:
+        spread.append((true - origin) @ across)
+    y_factor, y_name = length_unit(float(np.max([np.abs(each).max() for each in spread])))
+    band = np.concatenate([np.column_stack([x, y]) + side, (np.column_stack([x, y]) - side)[::-1]])
+    axes.fill(band[:, 0] / x_factor, band[:, 1] / y_factor, color=BAND, linewidth=0, label="axis, 90 %")
+    axes.plot(x / x_factor, y / y_factor, color=ESTIMATED, label="axis, median")
+    if true is not None:
+        place = (true - origin) @ along, (true - origin) @ across
+        axes.plot(place[0] / x_factor, place[1] / y_factor, color=TRUTH, linestyle=(0, (4, 3)), label="truth")
+    for end, direction in ((0, -1.0), (-1, 1.0)):
+        _end(axes, feature, end, direction, (x[end] / x_factor, y[end] / y_factor), x_factor)
+    axes.set_title(f"{feature.id}: {_worst(feature, sd)}", fontweight="bold")
+    axes.set_xlabel(f"along ({x_name})")
+    axes.set_ylabel(f"across ({y_name})")
+    axes.legend(loc="best", fontsize=7, frameon=True, facecolor="white", edgecolor="none", framealpha=0.8)
+
+
+def _end(axes: Any, feature: Feature, end: int, direction: float, place: tuple[float, float], factor: float) -> None:
+    """A bar for an end that was seen; an arrow for one that goes on beyond what was explored."""
+    intervals, seen = feature.extra.get("end_intervals"), feature.extra.get("ends_seen")
+    if feature.closed:
+        return
+    if intervals is None or seen is None or not seen[end]:
+        axes.plot(*place, marker=">" if direction > 0 else "<", color=ESTIMATED, markersize=8, clip_on=False)
+        return
+    low, high = (direction * value / factor for value in intervals[end])
+    low, high = min(low, high), max(low, high)
+    bar = [[max(-low, 0.0)], [max(high, 0.0)]]
+    axes.errorbar(*place, xerr=bar, color=INK, capsize=4, elinewidth=1.4, marker="o", markersize=3, zorder=5)
+
+
+def _plane(feature: Feature) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Unit vectors along and across, and the origin."""
+    axis = feature.axis
+    far = axis[len(axis) // 2] if feature.closed else axis[-1]
+    along = far - axis[0]
+    if not np.any(along):
+        along = axis[1] - axis[0]
+    along = along / np.linalg.norm(along)
+    up = feature.normals.mean(axis=0)
+    across = np.cross(up, along)
+    return along, across / max(float(np.linalg.norm(across)), np.finfo(float).tiny), axis[0]
+
+
+def _worst(feature: Feature, sd: FloatArray) -> str:
+    length = length_text(float(arclengths(feature.axis)[-1]))
+    return f"{length} long, known across to ±{length_text(QUANTILE * float(sd.max()), 2)}"

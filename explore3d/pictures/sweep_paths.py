@@ -1,0 +1,88 @@
+"""Sweep paths: sweeps as the eye should see them, thin lines on the base instead of the jitter of every sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from mapping import BoolArray, FloatArray, Trace
+from mapping.base import Base
+from mapping.detection import Crossing
+from mapping.geometry.mesh import arclengths
+
+# Samples are averaged over this share of the explored size: about three pixels of a picture.
+FINEST = 0.0025
+# Samples that tell the explored size.
+ENOUGH = 50_000
+# Blocks from which the true length of a noisy path is taken.
+COARSE = 64
+
+
+@dataclass(frozen=True, eq=False)
+class SweepPath:
+    """One sweep: points (M, 3) on the base, m, its outward normals (M, 3), and where something was noticed (M,)."""
+
+    points: FloatArray
+    normals: FloatArray
+    noticed: BoolArray
+
+
+def sweep_paths(trace: Trace, base: Base, crossings: Sequence[Crossing] = ()) -> list[SweepPath]:
+    """Every sweep on the base, averaged over stretches that the eye cannot tell apart.
+
+    Args:
+        trace: all samples.
+        base: the global model.
+        crossings: detections; the samples that they cover count as noticed.
+    """
+    if len(trace) == 0:
+        return []
+    spacing = FINEST * float(np.linalg.norm(np.ptp(trace.centers[:: 1 + len(trace) // ENOUGH], axis=0)))
+    marked = _noticed(trace, crossings)
+    means, middles = [], []
+    for start, stop in _runs(trace):
+        firsts = np.arange(start, stop, _block(trace.centers[start:stop], spacing))
+        count = np.diff(np.append(firsts, stop))
+        means.append(np.add.reduceat(trace.centers[:stop], firsts, axis=0) / count[:, None])
+        middles.append(firsts + count // 2)
+    feet = base.foot(np.concatenate(means), trace.tip_radius)
+    cuts = np.cumsum([len(each) for each in means])[:-1]
+    noticed = marked[np.concatenate(middles)]
+    parts = (np.split(array, cuts) for array in (feet.points, feet.normals, noticed))
+    return [SweepPath(*each) for each in zip(*parts, strict=True)]
+
+
+def _block(points: FloatArray, spacing: float) -> int:
+    """Samples per stretch: the path's length without its jitter decides."""
+    size = max(1, len(points) // COARSE)
+    whole = len(points) // size * size
+    length = arclengths(points[:whole].reshape(-1, size, 3).mean(axis=1))[-1]
+    return max(1, int(spacing * len(points) / length)) if length > 0 else len(points)
+
+
+def _runs(trace: Trace) -> list[tuple[int, int]]:
+    """(first, past last) sample of each run with one sweep number."""
+    if len(trace) == 0:
+        return []
+    cuts = [0, *(np.flatnonzero(np.diff(trace.sweep)) + 1).tolist(), len(trace)]
+    return list(pairwise(cuts))
+
+
+def _noticed(trace: Trace, crossings: Sequence[Crossing]) -> BoolArray:
+    """(N,) True for the samples that a crossing covers."""
+    mask = np.zeros(len(trace), dtype=bool)
+    first = {int(trace.sweep[start]): start for start, _ in reversed(_runs(trace))}
+    for crossing in crossings:
+        if crossing.sweep in first:
+            mask[first[crossing.sweep] + crossing.start : first[crossing.sweep] + crossing.stop] = True
+    return mask
+
+
+def densified(points: FloatArray, spacing: float) -> FloatArray:
+    """Points of the polyline (K, 3) at most `spacing` apart, m."""
+    s = arclengths(points)
+    even = np.linspace(0.0, s[-1], 2 + int(s[-1] / spacing))
+    return np.column_stack([np.interp(even, s, points[:, k]) for k in range(3)])

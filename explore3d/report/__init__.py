@@ -1,0 +1,27 @@
+"""The report: one page that opens offline."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from explore3d.report.findings import feature_line as feature_line, show as show
+    from explore3d.report.markup import (
+        Html as Html,
+        badge as badge,
+        element as element,
+        figure as figure,
+        paragraph as paragraph,
+        section as section,
+        table as table,
+    )
+    from explore3d.report.page import machine as machine, machine_section as machine_section, page as page
+    from explore3d.report.report import write_report as write_report
+
+_PUBLIC = {
+    "findings": ("feature_line", "show"),
+    "markup": ("Html", "badge", "element", "figure", "paragraph", "section", "table"),
+    "page": ("machine", "machine_section", "page"),
+    "report": ("write_report",),
+}
+doorway(__name__, _PUBLIC)

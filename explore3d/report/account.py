@@ -1,0 +1,71 @@
+"""The report's last part: what was left out and why, where the time went, and where everything came from."""
+
+from __future__ import annotations
+
+import json
+
+from explore3d import length_text, seconds_text
+from explore3d.analysis import Analysis, forecast
+from explore3d.report.markup import Html, Row, element, paragraph, section, table
+from explore3d.report.pictures import Pictures
+from mapping import LeftOut
+
+
+def what_was_left_out(analysis: Analysis, pictures: Pictures) -> Html:
+    """Stages that were not needed or could not be done."""
+    silent = tuple(LeftOut("part of the trace", sentence) for sentence in analysis.detections.left_out)
+    everything = (*analysis.left_out, *silent, *pictures.left_out)
+    if not everything:
+        return section("What was left out", "left-out", paragraph("Nothing."))
+    rows = [(element("b", each.stage), each.reason, each.saved) for each in everything]
+    return section("What was left out", "left-out", table(("stage", "why", "what that saved"), rows))
+
+
+def account_of_time(analysis: Analysis) -> Html:
+    """Seconds per stage, with bars."""
+    if not analysis.timings:
+        return Html("")
+    longest = max(analysis.timings.values()) or 1.0
+    rows: list[Row] = [
+        (name, seconds_text(seconds), element("span", class_="bar", style=f"width:{14 * seconds / longest:.2f}rem"))
+        for name, seconds in analysis.timings.items()
+    ]
+    rows.append((element("b", "together"), seconds_text(sum(analysis.timings.values())), ""))
+    content = [table(("stage", "time", ""), rows, numeric=(1,)), *_what_time_buys(analysis)]
+    return section("Where the time went", "time", *content)
+
+
+def _what_time_buys(analysis: Analysis) -> list[Html]:
+    """Error now, and predicted for half and double the finger's time."""
+    known = forecast(analysis)
+    if known is None:
+        return []
+    kind = "error of the worst axis" if analysis.time_curve else "largest standard deviation of a place or height"
+    rows: list[Row] = [
+        (name, seconds_text(share * known.seconds), length_text(error, 2))
+        for name, share, error in (
+            ("half the time (predicted)", 0.5, known.half),
+            ("as it was", 1.0, known.error),
+            ("twice the time (predicted)", 2.0, known.double),
+        )
+    ]
+    how = f"Predicted {known.how} (error ~ time^{-known.exponent:.2f}). Computing grows in proportion to the samples."
+    return [table(("what the finger's time buys", "finger", kind), rows, numeric=(1, 2)), paragraph(how)]
+
+
+def provenance(analysis: Analysis) -> Html:
+    """Everything needed to do it again."""
+    about = json.dumps(analysis.model.document()["provenance"], indent=1, ensure_ascii=False)
+    content = [
+        paragraph(
+            "The same in numbers: ",
+            element("code", "model.json"),
+            ". In 3D for any glTF viewer: ",
+            element("code", "model.glb"),
+            ".",
+        ),
+        element("details", element("summary", "Provenance"), element("pre", about)),
+    ]
+    if analysis.scene is not None:
+        content.append(element("details", element("summary", "Scene"), element("pre", analysis.scene.resolved)))
+    return section("Where it came from", "provenance", *content)

@@ -1,0 +1,115 @@
+"""The report's second part: what the findings rest on, and how far they are from the truth where it is known."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from explore3d import UNKNOWN, length_text
+from explore3d.analysis import Analysis, Comparison
+from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
+from explore3d.report.pictures import Pictures, shown_features
+
+BADGES = {"found": "good", "missed": "bad", "invented": "bad"}
+
+
+def cross_sections(analysis: Analysis, pictures: Pictures) -> Html:
+    """Traced against estimated profiles across each feature."""
+    if "sections" not in pictures.files:
+        return Html("")
+    shown, all_of_them = len(shown_features(analysis)), len(analysis.model.features)
+    more = (
+        f" The {shown} features with the strongest evidence of {all_of_them} are shown." if shown < all_of_them else ""
+    )
+    caption = (
+        "Height over the base where a sweep crosses each feature. Dots: what the finger traced. Red: the trace that "
+        "the feature found would leave, with its 90 % band. Black: the body itself, as the balls allow it; dotted "
+        "where the tip bridged it and nothing was touched." + more
+    )
+    picture = figure(pictures.files["sections"], "Profiles across the features", caption)
+    return section("Traced and estimated profiles", "profiles", picture)
+
+
+def posteriors(pictures: Pictures) -> Html:
+    """Extents with their intervals, and the draws behind all intervals."""
+    content: list[str] = []
+    if "extents" in pictures.files:
+        caption = (
+            "Axes seen from above, along and across not to one scale: median and 90 % band; bars: 90 % intervals of "
+            "the ends; triangles: the axis goes on beyond what was explored."
+        )
+        content.append(figure(pictures.files["extents"], "Extents with their intervals", caption))
+    for name, picture in pictures.files.items():
+        if name.startswith("corner-"):
+            caption = "Draws of the posterior, each parameter and each pair: 90 % intervals, contours of 50 and 90 %."
+            content.append(figure(picture, f"Posterior of {name.removeprefix('corner-')}", caption))
+    return section("Posteriors", "posteriors", *content) if content else Html("")
+
+
+def curvature_maps(pictures: Pictures) -> Html:
+    """Principal curvatures of the estimated surface."""
+    if "curvature" not in pictures.files:
+        return Html("")
+    caption = (
+        "Principal curvatures of the estimated surface in units of the tip's own curvature 1/r. Red bulges out, blue "
+        "bends in; pale: within three standard deviations of zero; grey: no valid value. "
+        "A fillet of exactly −1 is the tip's own shape, left where it could not reach."
+    )
+    return section("Curvature", "curvature", figure(pictures.files["curvature"], "Maps of curvature", caption))
+
+
+def compared_with_truth(analysis: Analysis, pictures: Pictures) -> Html:
+    """Errors of the features, and of the exploration over time; nothing if no truth is known."""
+    if not analysis.truth and not analysis.errors and "time" not in pictures.files:
+        return Html("")
+    content: list[str] = []
+    if not analysis.errors:
+        content.append(paragraph("Nothing was there to be found, and nothing was invented."))
+    else:
+        content.append(paragraph(_verdict(analysis.errors)))
+        head = ("feature", "", "axis, rms", "axis, worst", "ends", "height", "width", "length")
+        content.append(table(head, [_row(row) for row in analysis.errors]))
+    if "sizes" in pictures.files:
+        caption = "Errors with 90 % intervals. The green line is the truth; open dots: it lies outside of the interval."
+        content.append(figure(pictures.files["sizes"], "Errors of the sizes found", caption))
+    if "time" in pictures.files:
+        caption = (
+            "Worst distance between a true axis, its ends included, and the one found from what had been felt by then; "
+            "the last point is the finished model, after its posterior."
+        )
+        content.append(figure(pictures.files["time"], "Error against time", caption))
+    return section("Against the truth", "truth", *content)
+
+
+def _verdict(errors: tuple[Comparison, ...]) -> str:
+    number = {status: sum(row.status == status for row in errors) for status in BADGES}
+    true = number["found"] + number["missed"]
+    inside = [
+        flag for row in errors for flag in (row.height_inside, row.width_inside, row.length_inside) if flag is not None
+    ]
+    sentence = (
+        f"The object is simulated, so the truth is known: {number['found']} of {true} features found, "
+        f"{number['missed']} missed, {number['invented']} invented."
+    )
+    if inside:
+        sentence += f" The truth lies within the 90 % interval for {sum(inside)} of {len(inside)} sizes."
+    return sentence
+
+
+def _row(row: Comparison) -> Row:
+    name = row.found.id if row.found else (row.true.kind if row.true else "")
+    status = row.status
+    if row.found and row.true and row.found.kind != row.true.kind:
+        name += f" (truly a {row.true.kind})"
+    distances = [length_text(value, 2) for value in (row.axis_rms, row.axis_max, row.end_error)]
+    sizes = [
+        _error(getattr(row, f"{size}_error"), getattr(row, f"{size}_inside")) for size in ("height", "width", "length")
+    ]
+    return (element("b", name), badge(status, BADGES[status]), *distances, *sizes)
+
+
+def _error(value: float, inside: bool | None) -> Html:
+    if not isfinite(value):
+        return Html(UNKNOWN)
+    sign = "+" if value > 0 else ""
+    remark = "" if inside is None else "truth inside 90 %" if inside else "truth outside 90 %"
+    return Html(element("span", sign + length_text(value, 2)) + element("small", remark))

@@ -1,0 +1,58 @@
+"""Findings: what a run or an analysis found, told on the terminal."""
+
+from __future__ import annotations
+
+from math import isfinite
+from pathlib import Path
+
+from explore3d import count_text, interval_text, length_text
+from explore3d.analysis import Analysis
+from mapping import Feature, Interval
+
+MOST = 20  # features that are listed one by one; the report has them all
+
+
+def show(analysis: Analysis, out: Path, as_json: bool) -> None:
+    """Print the model's record as JSON, or a few lines for people."""
+    import json
+
+    if as_json:
+        print(json.dumps(analysis.model.document(), ensure_ascii=False, allow_nan=False))
+    else:
+        print("\n".join([*summary(analysis), f"report: {out / 'report.html'}"]))
+
+
+def summary(analysis: Analysis) -> list[str]:
+    """One line on the whole, one a feature, and one on what would have been seen."""
+    features = analysis.model.features
+    finer = sum(feature.curvature_feature for feature in features)
+    lines = [f"{count_text(len(features), 'feature')} found"]
+    if features:
+        lines[0] += f", {finer} of them finer than the tip of {length_text(analysis.trace.tip_radius)}"
+    if analysis.recovered:
+        lines.append(analysis.recovered)
+    more = [f"  and {len(features) - MOST} more, see the report"] if len(features) > MOST else []
+    return [*lines, *(feature_line(feature) for feature in features[:MOST]), *more, limit_sentence(analysis)]
+
+
+def limit_sentence(analysis: Analysis) -> str:
+    """What would have been seen."""
+    detections = analysis.detections
+    if not isfinite(detections.detection_limit):
+        return "The trace is too short to say what would have been seen."
+    return (
+        f"A sharp crest {length_text(detections.detection_limit, 2)} high or higher is seen with "
+        f"{100 * detections.probability:.0f} % probability where a sweep crosses it."
+    )
+
+
+def feature_line(feature: Feature) -> str:
+    """A feature's name and its sizes with their intervals, in one line."""
+    sizes = [("height", feature.height), ("width", feature.width), ("length", feature.length)]
+    known = [f"{name} {_text(interval)}" for name, interval in sizes if interval.median or interval.censored]
+    return f"  {feature.id}: {', '.join(known)}"
+
+
+def _text(interval: Interval) -> str:
+    median, spread = interval_text(interval)
+    return f"{median} ({spread})" if spread else median

@@ -1,0 +1,179 @@
+"""The report's first part: what was found, in a sentence, in figures, in a table, and in a picture."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from explore3d import UNKNOWN, count_text, interval_text, length_text
+from explore3d.analysis import Analysis
+from explore3d.report.findings import limit_sentence
+from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
+from explore3d.report.pictures import Pictures, is_profile
+from mapping import Feature, Interval
+from mapping.geometry.mesh import arclengths
+
+
+def headline(analysis: Analysis) -> Html:
+    """The title, and the result in a sentence or two."""
+    warning = element("p", analysis.recovered, class_="warning") if analysis.recovered else Html("")
+    return element(
+        "header",
+        element("p", "Haptic exploration", class_="kind"),
+        element("h1", analysis.title or "Untitled"),
+        element("p", found_sentence(analysis), class_="lead"),
+        warning,
+    )
+
+
+def found_sentence(analysis: Analysis) -> str:
+    """What was found, and what a lone feature measures."""
+    features = analysis.model.features
+    if not features:
+        return "Nothing was found that the base does not explain. " + limit_sentence(analysis)
+    kinds = Counter(feature.kind for feature in features)
+    counts = [count_text(number, kind, _plural(kind)) for kind, number in kinds.items()]
+    sentence = f"{_listed(counts)} {'was' if len(features) == 1 else 'were'} found."
+    if len(features) == 1:
+        sizes = [f"{_described(getattr(features[0], name))} {word}" for name, word in _sizes(features[0])]
+        sentence += f" It is {_listed(sizes)}."
+    return sentence[0].upper() + sentence[1:]
+
+
+def facts(analysis: Analysis) -> Html:
+    """Boxes with the figures that everything else rests on."""
+    trace, detections = analysis.trace, analysis.detections
+    pairs = [
+        (length_text(trace.tip_radius), "radius of the fingertip"),
+        (length_text(detections.inspected_length), "of path inspected"),
+        (f"{len(trace):,}", "samples in contact"),
+        (length_text(detections.noise.sd, 2), "noise of a sample (estimated)"),
+        (length_text(detections.detection_limit, 2), "detection limit of a sharp crest"),
+    ]
+    return element("div", *(element("div", element("b", a), element("span", b)) for a, b in pairs), class_="facts")
+
+
+def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
+    """Counts, the table of features, and the views."""
+    features = analysis.model.features
+    content: list[str] = [_counts(analysis)]
+    if features:
+        head = ("feature", "height", "width", "length", "place", "evidence", "kind of detail", "posterior")
+        shared = _shared_notes(features)
+        content.append(table(head, [_row(feature, analysis, shared) for feature in features]))
+        content.extend(paragraph(f"{_capital(note)} (all of them).") for note in shared)
+        content.append(paragraph("Ranges are central 90 % intervals. ", limit_sentence(analysis)))
+    if analysis.inspected is not None and not is_profile(analysis):
+        content.append(paragraph(analysis.inspected.sentence()))
+    if analysis.ended:
+        content.append(paragraph(f"Why the exploration ended: {analysis.ended.rstrip('.')}."))
+    picture = "profile" if is_profile(analysis) else "object"
+    if picture in pictures.files:
+        content.append(figure(pictures.files[picture], f"Picture of the {picture}", _caption(analysis)))
+    content.append(element("h2", "To look around"))
+    content.append(view)
+    return section("What was found", "found", *content)
+
+
+def _counts(analysis: Analysis) -> Html:
+    """How many details are finer than the tip, how many gentler, for each radius considered."""
+    features = analysis.model.features
+    if not features:
+        return paragraph("No detail stands out of the noise.")
+    finer = sum(feature.curvature_feature for feature in features)
+    intro = paragraph(
+        f"{_capital(count_text(len(features), 'detail'))} {'stands' if len(features) == 1 else 'stand'} out of the "
+        f"noise: {finer} finer than the tip (curvature features, the paper's definition 1), {len(features) - finer} "
+        "gentler than the tip."
+    )
+    if len(analysis.tip_counts) < 2:
+        return intro
+    rows = [(length_text(each.tip_radius), str(each.finer), str(each.gentler)) for each in analysis.tip_counts]
+    head = ("read with a tip of radius", "finer than the tip", "gentler")
+    return Html(intro + table(head, rows, numeric=(1, 2)))
+
+
+def _shared_notes(features: Sequence[Feature]) -> tuple[str, ...]:
+    """Notes that every one of several features has: said once, below the table."""
+    if len(features) < 2:
+        return ()
+    return tuple(note for note in features[0].notes if all(note in feature.notes for feature in features))
+
+
+def _row(feature: Feature, analysis: Analysis, shared: Sequence[str]) -> Row:
+    cells = [_with_range(getattr(feature, name)) for name in ("height", "width")]
+    length = _with_range(feature.length) if len(feature.axis) > 1 else Html("point")
+    evidence = element("span", f"S/N {feature.evidence.snr:.0f}") + element(
+        "small", count_text(feature.evidence.crossings, "crossing")
+    )
+    if feature.curvature_feature:
+        detail = badge("finer than the tip", "good")
+    else:
+        detail = badge("gentler than the tip", "plain")
+    own = [note for note in feature.notes if note not in shared]
+    notes = element("small", "; ".join(own), class_="note") if own else Html("")
+    name = Html(element("b", feature.id) + notes)
+    return (name, *cells, length, _place(feature, analysis), Html(evidence), detail, _posterior(feature))
+
+
+def _place(feature: Feature, analysis: Analysis) -> Html:
+    """Where the feature hangs: its anchor, and how well its place is known."""
+    point = feature.axis[0] if feature.anchor is None else feature.anchor.position
+    factor, name = (1e-3, "mm") if analysis.base.surface.size < 10.0 else (1.0, "m")
+    values = point[:1] if is_profile(analysis) else point
+    text = ", ".join(f"{value / factor:.{4 if is_profile(analysis) else 2}f}" for value in values)
+    where = "along" if is_profile(analysis) else "across"
+    known = f"± {length_text(1.645 * feature.position_sd, 2)} {where}" if feature.position_sd > 0 else ""
+    return Html(element("span", f"{text} {name}") + element("small", known))
+
+
+def _posterior(feature: Feature) -> Html:
+    if feature.posterior is None:
+        return badge("none", "plain")
+    kind = "good" if feature.posterior.status in ("converged", "not needed") else "bad"
+    label = "by Laplace" if feature.posterior.status == "not needed" else feature.posterior.status
+    return Html(badge(label, kind) + element("small", f"{len(feature.posterior.samples)} draws"))
+
+
+def _with_range(interval: Interval) -> Html:
+    if not interval.high and not interval.low:
+        return Html(UNKNOWN)  # the kind has no such size: a step has no width
+    median, span = interval_text(interval)
+    return Html(element("span", median) + (element("small", span) if span else ""))
+
+
+def _caption(analysis: Analysis) -> str:
+    if is_profile(analysis):
+        return (
+            "Above: the profile with its base. Below: its height over the base. Triangles mark what was found: filled "
+            "if finer than the tip, open if gentler."
+        )
+    return (
+        "The base in grey, the sweeps in blue, in orange where a sweep felt something that the base does not explain, "
+        "the features found in colour. Features too small to be seen are drawn larger."
+    )
+
+
+def _sizes(feature: Feature) -> list[tuple[str, str]]:
+    """Sizes worth a word in the first sentence."""
+    height = "deep" if feature.height.median < 0 else "high"
+    return [("height", height)] + ([("length", "long")] if arclengths(feature.axis)[-1] > 0 else [])
+
+
+def _described(interval: Interval) -> str:
+    if interval.median < 0:
+        interval = Interval(-interval.median, -interval.high, -interval.low, interval.censored)
+    median, span = interval_text(interval)
+    return f"{median} ({span})" if span else median
+
+
+def _plural(kind: str) -> str:
+    return kind + "s"
+
+
+def _listed(parts: list[str]) -> str:
+    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
+
+
+def _capital(sentence: str) -> str:
+    return sentence[0].upper() + sentence[1:]

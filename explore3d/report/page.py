@@ -1,0 +1,115 @@
+"""Page: a self-contained HTML page in the report's style, for benches and tables.
+
+The report's style sheet.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+
+from explore3d import __version__
+from explore3d.report.markup import Html, element, section, table
+
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+PACKAGES = ("numpy", "scipy", "numba", "libigl", "open3d-cpu", "open3d", "emcee", "opencamlib", "pymeshlab")
+MORE_STYLE = (
+    ".table { max-height: none; } td { min-width: 5rem; } td b, td small, td span { white-space: normal; }"
+    " td.number, .badge { white-space: nowrap; }"
+)
+
+
+def page(kind: str, title: str, lead: str, *sections: str) -> str:
+    """The whole page; it loads nothing."""
+    header = element(
+        "header", element("p", kind, class_="kind"), element("h1", title), element("p", lead, class_="lead")
+    )
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"{element('title', title + ' · explore3d')}<style>{STYLE}{MORE_STYLE}</style></head>"
+        f"<body>{element('main', header, *sections)}</body></html>\n"
+    )
+
+
+def machine() -> dict[str, str]:
+    """What the figures were measured on: processor, system, versions."""
+    import os
+
+    facts = {
+        "processor": _processor(),
+        "cores": str(os.cpu_count()),
+        "system": f"{platform.system()} {platform.release()}",
+        "Python": platform.python_version(),
+        "explore3d": __version__,
+    }
+    for package in PACKAGES:
+        try:
+            facts[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return facts
+
+
+def machine_section(more: Sequence[tuple[str, str]] = ()) -> Html:
+    """The machine as a section of a page."""
+    rows = [*machine().items(), *more]
+    return section("What it was measured on", "machine", table(("what", "which"), rows))
+
+
+def _processor() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
+    except OSError:
+        names = []
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+STYLE = """
+:root { --ink: #1f2933; --soft: #52606d; --faint: #e4e7eb; --paper: #ffffff; --accent: #c62828; }
+* { box-sizing: border-box; }
+body { margin: 0; background: var(--paper); color: var(--ink);
+  font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
+main { max-width: 1140px; margin: 0 auto; padding: 2.2rem 1.4rem 4rem; }
+header .kind { color: var(--soft); font-size: .85rem; letter-spacing: .06em; text-transform: uppercase; margin: 0; }
+h1 { font-size: 2rem; line-height: 1.2; margin: .2rem 0 .8rem; font-weight: 650; }
+h2 { font-size: 1.25rem; margin: 0 0 .6rem; font-weight: 650; }
+section { margin-top: 2.6rem; padding-top: 1.4rem; border-top: 1px solid var(--faint); }
+p { margin: .5rem 0; max-width: 46rem; }
+p.lead { font-size: 1.2rem; line-height: 1.5; max-width: 52rem; }
+.warning { border-left: 4px solid #d97706; background: #fff8eb; padding: .6rem .9rem; max-width: 52rem; }
+.facts { display: flex; flex-wrap: wrap; gap: 1px; margin: 1.4rem 0 0; background: var(--faint);
+  border: 1px solid var(--faint); border-radius: 8px; overflow: hidden; }
+.facts div { background: var(--paper); padding: .7rem .9rem; flex: 1 1 150px; }
+.facts b { display: block; font-size: 1.2rem; font-weight: 600; font-variant-numeric: tabular-nums; }
+.facts span { color: var(--soft); font-size: .85rem; }
+.table { overflow: auto; max-height: 34rem; margin: .8rem 0; border: 1px solid var(--faint); border-radius: 8px; }
+table { border-collapse: collapse; width: 100%; font-size: .92rem; font-variant-numeric: tabular-nums; }
+th { position: sticky; top: 0; background: #f5f7fa; text-align: left; font-weight: 600; color: var(--soft);
+  white-space: nowrap; }
+th, td { padding: .5rem .8rem; border-bottom: 1px solid var(--faint); vertical-align: top; }
+tr:last-child td { border-bottom: 0; }
+td.number, th.number { text-align: right; white-space: nowrap; }
+td b, td span, td small { white-space: nowrap; } td small.note { white-space: normal; min-width: 9rem; }
+td small { display: block; color: var(--soft); font-size: .82rem; }
+.badge { display: inline-block; padding: .05rem .5rem; border-radius: 999px; font-size: .82rem; white-space: nowrap; }
+.badge.good { background: #e3f5ea; color: #14613c; }
+.badge.bad { background: #fdecea; color: #9b1c1c; }
+.badge.plain { background: #eef1f4; color: #3e4c59; }
+.bar { display: inline-block; height: .7rem; background: #829ab1; border-radius: 2px; min-width: 1px; }
+figure { margin: 1rem 0; }
+figure img { max-width: 100%; height: auto; display: block; border: 1px solid var(--faint); border-radius: 8px; }
+figcaption { color: var(--soft); font-size: .9rem; margin-top: .45rem; max-width: 52rem; }
+.view { height: 600px; border: 1px solid var(--faint); border-radius: 8px; overflow: hidden; }
+.view.flat { height: 440px; }
+nav { font-size: .92rem; margin-top: 1.1rem; } nav a { margin-right: 1.1rem; }
+a { color: #1d4e89; text-decoration: none; } a:hover { text-decoration: underline; }
+details { margin-top: .6rem; } summary { cursor: pointer; color: var(--soft); }
+pre { background: #f5f7fa; padding: .8rem; border-radius: 8px; overflow: auto; font-size: .82rem; }
+code { font-size: .9em; }
+@media (max-width: 640px) { h1 { font-size: 1.5rem; } main { padding: 1.4rem .9rem 3rem; } .view { height: 420px; } }
+@media print { .view { display: none; } section { break-inside: avoid; } .table { max-height: none; } }
+"""

@@ -1,0 +1,84 @@
+"""Report: one page that opens without a network, and a PNG of each of its figures beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from explore3d.analysis import Analysis
+from explore3d.pictures import SweepPath, sweep_paths
+from explore3d.report.account import account_of_time, provenance, what_was_left_out
+from explore3d.report.evidence import compared_with_truth, cross_sections, curvature_maps, posteriors
+from explore3d.report.findings_section import facts, headline, what_was_found
+from explore3d.report.markup import Html, element, text
+from explore3d.report.page import STYLE
+from explore3d.report.pictures import Pictures, draw_pictures, is_profile
+from explore3d.report.view3d import object_view, plotly_script, profile_view
+from mapping.geometry.mesh import write_whole
+
+REPORT = "report.html"
+PICTURES = "pictures"
+
+# Nothing may be fetched: everything that the page shows is inside it.
+POLICY = (
+    "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; "
+    "script-src 'unsafe-inline' 'unsafe-eval'; font-src data:; worker-src blob:; connect-src data: blob:"
+)
+
+
+def write_report(analysis: Analysis, folder: Path | str, rendered: bool = False) -> Path:
+    """Write report.html and pictures/*.png into the folder; returns the page's path.
+
+    The page's title is set when everything on it is drawn: a browser test can wait for it.
+
+    Args:
+        rendered: render the object even where nothing was found on it (the page's own view shows it too).
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    place = Path(folder)
+    sweeps = sweep_paths(analysis.trace, analysis.base, analysis.detections.crossings)
+    pictures = draw_pictures(analysis, sweeps, rendered)
+    page = report_page(analysis, pictures, sweeps)
+    (place / PICTURES).mkdir(parents=True, exist_ok=True)
+    for name, png in pictures.files.items():
+        write_whole(place / PICTURES / f"{name}.png", png)
+    return write_whole(place / REPORT, page)
+
+
+def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPath]) -> str:
+    """The whole page as HTML."""
+    if is_profile(analysis):
+        view = profile_view(analysis.trace, analysis.base, analysis.model.features)
+    else:
+        view = object_view(analysis.base.surface, analysis.model.features, sweeps)
+    content = element(
+        "main",
+        headline(analysis),
+        facts(analysis),
+        what_was_found(analysis, pictures, view),
+        cross_sections(analysis, pictures),
+        posteriors(pictures),
+        curvature_maps(pictures),
+        compared_with_truth(analysis, pictures),
+        what_was_left_out(analysis, pictures),
+        account_of_time(analysis),
+        provenance(analysis),
+    )
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>explore3d: drawing</title><style>{STYLE}</style>{plotly_script()}</head>"
+        f"<body>{content}{_ready(analysis.title)}</body></html>\n"
+    )
+
+
+def _ready(title: str) -> Html:
+    """Sets the page's title once it is drawn; the title travels as text, never as script."""
+    name = element("span", text(title), id="title", hidden="hidden")
+    return Html(
+        f"{name}<script>window.addEventListener('load', () => requestAnimationFrame(() => requestAnimationFrame(() => "
+        "{ document.title = document.getElementById('title').textContent + ' · explore3d'; })));</script>"
+    )

@@ -1,0 +1,25 @@
+"""Scenes: what to explore, with what, how; read from TOML and checked."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from explore3d.scene.complaint import complaint as complaint
+    from explore3d.scene.machine import EMULATOR as EMULATOR, MachineTable as MachineTable, SensorTable as SensorTable
+    from explore3d.scene.mesh_files import load_mesh as load_mesh
+    from explore3d.scene.scene import Scene as Scene, load_scene as load_scene, parse_scene as parse_scene
+    from explore3d.scene.settings import Settings as Settings
+    from explore3d.scene.to_toml import scene_text as scene_text
+    from explore3d.scene.values import Length as Length, LengthUnit as LengthUnit, Point as Point, Table as Table
+
+_PUBLIC = {
+    "complaint": ("complaint",),
+    "machine": ("EMULATOR", "MachineTable", "SensorTable"),
+    "mesh_files": ("load_mesh",),
+    "scene": ("Scene", "load_scene", "parse_scene"),
+    "settings": ("Settings",),
+    "to_toml": ("scene_text",),
+    "values": ("Length", "LengthUnit", "Point", "Table"),
+}
+doorway(__name__, _PUBLIC)

@@ -1,0 +1,75 @@
+"""Tables of a scene whose finger is a real machine: [finger.machine] and [finger.sensor]."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from explore3d.scene.values import Delay, Extent, Force, Length, Point, Rate, Speed, Table, Turn
+
+# The port that means: start the emulator beside the run
+EMULATOR = "emulator"
+
+
+class MachineTable(Table):
+    """A stage of the Grbl family.
+
+    Args:
+        port: its serial port, or "emulator": an emulated machine that touches finger.object is started.
+        origin: machine coordinates of the object's origin (m).
+        turn: rotation vector that turns the object's axes into the machine's (rad).
+        touch: "peck" needs a touch probe, "slide" a force sensor.
+        step, clearance: between pecks along the path, and above the body (m).
+        probe_speed, travel_speed: m/s.
+        over_travel: how far the tip may run on after contact (m).
+        max_force: N.
+        low, high: machine coordinates that the tip may take, within the controller's own limits (m).
+        unlock, home: on connecting; homing moves the machine.
+        pace, repeatability: of the emulator: its seconds per second, and the scatter of its probe (m).
+    """
+
+    port: str
+    baudrate: Annotated[int, Field(gt=0)] = 115200
+    origin: Point = (0.0, 0.0, 0.0)
+    turn: tuple[Turn, Turn, Turn] = (0.0, 0.0, 0.0)
+    touch: Literal["peck", "slide"] = "peck"
+    step: Length = 5e-4
+    clearance: Length = 5e-4
+    probe_speed: Speed = 5e-3
+    travel_speed: Speed = 0.03
+    over_travel: Length = 5e-4
+    max_force: Force = 5.0
+    low: Point | None = None
+    high: Point | None = None
+    unlock: bool = False
+    home: bool = False
+    pace: Annotated[float, Field(gt=0)] = 1.0
+    repeatability: Extent = 0.0
+
+
+class SensorTable(Table):
+    """A force sensor at the fingertip.
+
+    Args:
+        kind: "optoforce", or "line" for the line protocol of home-made sensors.
+        port: its serial port; with an emulated machine it is emulated too, and none is given.
+        counts_per_newton: of an OptoForce, by its sensitivity sheet: one for each axis.
+        rate: Hz.
+        stiffness: of the tip and what carries it, N/m.
+        period: of the control loop (s).
+        approach_speed: m/s.
+        delay: by how much the force is stamped later than the stage's position (s); see explore3d calibrate.
+        noise: of the emulated sensor, each component (N).
+    """
+
+    kind: Literal["optoforce", "line"] = "optoforce"
+    port: str = EMULATOR
+    baudrate: Annotated[int, Field(gt=0)] = 115200
+    counts_per_newton: tuple[float, float, float] = (400.0, 400.0, 400.0)
+    rate: Rate = 1000.0
+    stiffness: Annotated[float, Field(gt=0)] = 1e4
+    period: Delay = 0.01
+    approach_speed: Speed = 2e-3
+    delay: Delay = 0.0
+    noise: Annotated[float, Field(ge=0)] = 0.0

@@ -1,0 +1,261 @@
+"""Scene: one TOML file that says what to explore, with which finger, how finely."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+
+from explore3d import MeshFileError, SceneError, UnitError
+from explore3d.scene.complaint import complaint
+from explore3d.scene.machine import EMULATOR, MachineTable, SensorTable
+from explore3d.scene.mesh_files import load_mesh
+from explore3d.scene.to_toml import scene_text
+from explore3d.scene.values import Angle, Extent, Force, Length, LengthUnit, Point, Rate, Signed, Speed, Table, Time
+from mapping import KINDS, Surface
+
+SCHEMA = "explore3d/scene/1"
+
+
+class Tip(Table):
+    """The spherical fingertip: `radius` in metres, or a `profile` of explore3d calibrate that says it.
+
+    With a `radius_sd` (m) above 0 the radius is known only up to that, and each posterior asks for it too; a profile
+    says it unless the scene does.
+    """
+
+    radius: Length
+    radius_sd: Extent = 0.0
+    profile: Path | None = None
+
+
+class Region(Table):
+    """A box that bounds where to explore: `low` and `high` corners, m, object frame."""
+
+    low: Point
+    high: Point
+
+    @model_validator(mode="after")
+    def _has_volume(self) -> Region:
+        if not all(low < high for low, high in zip(self.low, self.high, strict=True)):
+            raise ValueError(f"low must lie below high in x, y and z; found low {self.low} and high {self.high} m")
+        return self
+
+
+class GlobalModel(Table):
+    """What is known of the object beforehand: a mesh, whose file is in `units`, or merely a region.
+
+    With pose = "estimate" the object may stand off the mesh by up to `shift` (m) and `turn` (rad). An unknown object
+    is approached from the `sides` of the region.
+    """
+
+    mesh: Path | None = None
+    units: LengthUnit = "m"
+    region: Region | None = None
+    pose: Literal["given", "estimate"] = "given"
+    shift: Length = 3e-3
+    turn: Annotated[Angle, Field(gt=0)] = 0.035
+    sides: Annotated[tuple[Literal["+x", "-x", "+y", "-y", "+z", "-z"], ...], Field(min_length=1)] = ("+z",)
+
+    @model_validator(mode="after")
+    def _mesh_or_region(self) -> GlobalModel:
+        if self.mesh is None and self.region is None:
+            raise ValueError("give mesh, region, or both; without a mesh the base is fitted to the survey")
+        return self
+
+
+class FingerNoise(Table):
+    """Noise of the finger: of the centre (white, and correlated along the path), of what it feels.
+
+    The simulated finger has it; of any other it is what its data sheet states. The analysis takes the centre's for
+    known to a share `doubt`.
+    """
+
+    white: Extent = 0.0
+    correlated: Extent = 0.0
+    correlation_length: Length = 1e-3
+    angle: Angle = 0.0
+    contact: Extent = 0.0
+    doubt: Annotated[float, Field(gt=0)] = 0.1
+
+
+class DynamicsTable(Table):
+    """Inertia and stiffness of the simulated finger: mass (kg), stiffness (N/m), force gain (no unit, below 1)."""
+
+    mass: Annotated[float, Field(gt=0)] = 0.1
+    stiffness: Annotated[float, Field(gt=0)] = 1e5
+    gain: Annotated[float, Field(ge=0, lt=1)] = 0.5
+
+
+class FingerTable(Table):
+    """The finger.
+
+    The simulated one touches the mesh `object`, the truth, and samples at `rate` Hz; with `dynamics` it has inertia.
+    A machine of the Grbl family is described in [finger.machine], its force sensor in [finger.sensor]; an emulated
+    one touches `object`.
+    """
+
+    kind: Literal["simulated", "grbl"] = "simulated"
+    object: Path | None = None
+    units: LengthUnit = "m"
+    rate: Rate = 5000.0
+    contact_data: bool = False
+    noise: FingerNoise = FingerNoise()
+    dynamics: DynamicsTable | None = None
+    machine: MachineTable | None = None
+    sensor: SensorTable | None = None
+
+    @model_validator(mode="after")
+    def _has_what_its_kind_needs(self) -> FingerTable:
+        if self.kind == "grbl" and self.machine is None:
+            raise ValueError("a finger of kind grbl needs the table finger.machine; found none")
+        if self.machine is not None and self.machine.touch == "slide" and self.sensor is None:
+            raise ValueError("sliding needs a force sensor: give the table finger.sensor")
+        if self.object is None and (self.machine is None or self.machine.port == EMULATOR):
+            raise ValueError(f"object is missing: the mesh that the {self.kind} finger touches")
+        return self
+
+
+class Survey(Table):
+    """Sweeps over the whole model: the least height to be found (m), the least span of a ridge (m), m/s, N.
+
+    Without `shortest_ridge` nothing of that height is missed, bumps included; with it, ridges that span less may be.
+    """
+
+    smallest_feature: Length
+    shortest_ridge: Length | None = None
+    speed: Speed = 0.03
+    force: Force = 1.0
+
+
+class Detection(Table):
+    """Which of the paper's four algorithms decides, and how many false alarms a metre may have."""
+
+    algorithm: Annotated[int, Field(ge=1, le=4)] = 3
+    false_alarms_per_metre: Annotated[float, Field(gt=0)] = 0.01
+
+
+class Exploration(Table):
+    """When to stop: `precision` of a feature's place (m), and the finger's time (s)."""
+
+    precision: Length = 1e-4
+    time_budget: Time = 600.0
+
+
+class Truth(Table):
+    """A feature that a simulated object really has: the report compares. Lengths in m, object frame."""
+
+    kind: Literal[KINDS]  # type: ignore[valid-type]
+    axis: Annotated[tuple[Point, ...], Field(min_length=1)]
+    height: Signed
+    width: Length | None = None
+    length: Extent | None = None
+
+
+class Scene(Table):
+    """The whole file. Paths are absolute after loading; `path` is the file, `text` what stood in it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+    schema_: Literal["explore3d/scene/1"] = Field(alias="schema")
+    title: str = ""
+    seed: Annotated[int, Field(ge=0)] = 1
+    tip: Tip
+    model: GlobalModel
+    finger: FingerTable
+    survey: Survey
+    detection: Detection = Detection()
+    explore: Exploration = Exploration()
+    truth: tuple[Truth, ...] = ()
+    _path: Path = PrivateAttr(default=Path("scene.toml"))
+    _text: str = PrivateAttr(default="")
+
+    @property
+    def path(self) -> Path:
+        """The file that the scene was read from."""
+        return self._path
+
+    @property
+    def text(self) -> str:
+        """The text of that file."""
+        return self._text
+
+    @property
+    def resolved(self) -> str:
+        """The scene as TOML with every default written out, lengths in SI and paths absolute."""
+        return scene_text(self.model_dump(mode="json", by_alias=True, exclude_none=True))
+
+    def base_surface(self) -> Surface | None:
+        """The global model's mesh in metres, None if only a region is known. Raises SceneError."""
+        return None if self.model.mesh is None else self._surface("model.mesh", self.model.mesh, self.model.units)
+
+    def object_surface(self) -> Surface:
+        """The mesh that the simulated finger touches, in metres. Raises SceneError."""
+        if self.finger.object is None:
+            raise SceneError(
+                f"{self._path}: finger.object: no mesh to touch is given; a real finger touches the real thing"
+            )
+        return self._surface("finger.object", self.finger.object, self.finger.units)
+
+    def _surface(self, field: str, mesh: Path, units: str) -> Surface:
+        try:
+            return load_mesh(mesh, units)
+        except (MeshFileError, UnitError) as error:
+            raise SceneError(f"{self._path}: {field}: {error}") from error
+
+
+def load_scene(path: Path | str) -> Scene:
+    """The scene in a TOML file; its relative paths count from the file's folder.
+
+    Raises:
+        SceneError: no such file, not TOML, an unknown or missing key, a value that is not possible, or a
+            mesh file that does not exist; the message is one line that names the file and the field.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise SceneError(f"{path}: {'a folder, not a scene file' if path.is_dir() else 'no such scene file'}")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(f"{path}: not a readable scene file ({error})") from error
+    return parse_scene(text, path)
+
+
+def parse_scene(text: str, path: Path | str) -> Scene:
+    """The scene in a text that stood, or might have stood, in the file `path`. Raises SceneError."""
+    path = Path(path)
+    try:
+        scene = Scene.model_validate(_with_profile(tomllib.loads(text), path))
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{path}: not valid TOML: {error}") from error
+    except ValidationError as error:
+        raise SceneError(f"{path}: {complaint(error, Scene)}") from error
+    scene = _with_absolute_paths(scene, path.resolve().parent)
+    scene._path, scene._text = path, text
+    return scene
+
+
+def _with_profile(tables: dict[str, Any], path: Path) -> dict[str, Any]:
+    """The tables with the tip radius of the tip profile that they name, and how well it is known."""
+    tip = tables.get("tip")
+    if not isinstance(tip, dict) or not isinstance(tip.get("profile"), str) or "radius" in tip:
+        return tables  # beside a radius the profile only says where it came from, as in a resolved scene
+    profile = path.resolve().parent / tip["profile"]
+    try:
+        known = tomllib.loads(profile.read_text(encoding="utf-8"))
+        radius, doubt = known["radius"], {"radius_sd": known["radius_sd"]}
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError) as error:
+        raise SceneError(f"{path}: tip.profile: {profile}: not a tip profile of calibrate ({error})") from error
+    return tables | {"tip": doubt | tip | {"radius": radius, "profile": str(profile)}}
+
+
+def _with_absolute_paths(scene: Scene, folder: Path) -> Scene:
+    finger = scene.finger
+    if finger.object is not None:
+        finger = finger.model_copy(update={"object": (folder / finger.object).resolve()})
+    model = scene.model
+    if model.mesh is not None:
+        model = model.model_copy(update={"mesh": (folder / model.mesh).resolve()})
+    return scene.model_copy(update={"finger": finger, "model": model})

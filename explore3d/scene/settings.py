@@ -1,0 +1,46 @@
+"""Settings: what a scene asks of the analysis of its recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from mapping.instrument import Noise, StatedNoise
+
+if TYPE_CHECKING:
+    from explore3d.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a recording is asked for.
+
+    Args:
+        algorithm: number in figure 4 of the paper that decides.
+        false_alarms_per_metre: expected number of invented crossings per metre of path.
+        seed: of the posterior's chains.
+        tip_sd: standard deviation of the tip's radius, m.
+        noise: of the centres, as the scene states it; None: not stated.
+    """
+
+    algorithm: int = 3
+    false_alarms_per_metre: float = 0.01
+    seed: int = 1
+    tip_sd: float = 0.0
+    noise: StatedNoise | None = None
+
+    @classmethod
+    def of(cls, scene: Scene | None) -> Settings:
+        """The settings of a scene; the defaults without one."""
+        if scene is None:
+            return cls()
+        told, of = scene.finger.noise, scene.detection
+        noise = Noise(told.white, told.correlated, told.correlation_length)
+        stated = StatedNoise(noise, told.doubt) if noise.sd > 0 else None
+        return cls(of.algorithm, of.false_alarms_per_metre, scene.seed, scene.tip.radius_sd, stated)
+
+    @property
+    def detection(self) -> dict[str, Any]:
+        """Arguments of `mapping.detection.detect.detect`."""
+        rate = self.false_alarms_per_metre
+        return {"algorithm": self.algorithm, "false_alarms_per_metre": rate, "stated": self.noise}

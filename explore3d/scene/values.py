@@ -1,0 +1,35 @@
+"""Values of a scene file: quantities with units, and the base of all its tables."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+
+from explore3d import parse_angle, parse_force, parse_length, parse_rate, parse_speed, parse_time, unit_factor
+
+Signed = Annotated[float, BeforeValidator(parse_length)]
+Length = Annotated[float, BeforeValidator(parse_length), Field(gt=0)]
+Extent = Annotated[float, BeforeValidator(parse_length), Field(ge=0)]
+Angle = Annotated[float, BeforeValidator(parse_angle), Field(ge=0)]
+Turn = Annotated[float, BeforeValidator(parse_angle)]
+Rate = Annotated[float, BeforeValidator(parse_rate), Field(gt=0)]
+Speed = Annotated[float, BeforeValidator(parse_speed), Field(gt=0)]
+Force = Annotated[float, BeforeValidator(parse_force), Field(gt=0)]
+Time = Annotated[float, BeforeValidator(parse_time), Field(gt=0)]
+Delay = Annotated[float, BeforeValidator(parse_time)]
+Point = tuple[Signed, Signed, Signed]
+
+
+def _known_unit(unit: str) -> str:
+    unit_factor(unit)
+    return unit
+
+
+LengthUnit = Annotated[str, AfterValidator(_known_unit)]
+
+
+class Table(BaseModel):
+    """A table of the scene file: immutable, and no key that is not known."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)

@@ -1,0 +1,23 @@
+"""Emulated machines on a pseudo-terminal: what the drivers are tested against."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from hw.emulated.force import (
+        ForceEmulator as ForceEmulator,
+        LineSensorEmulator as LineSensorEmulator,
+        OptoForceEmulator as OptoForceEmulator,
+    )
+    from hw.emulated.grbl import GrblEmulator as GrblEmulator
+    from hw.emulated.pty_server import PtyServer as PtyServer
+    from hw.emulated.touched_body import TouchedBody as TouchedBody
+
+_PUBLIC = {
+    "force": ("ForceEmulator", "LineSensorEmulator", "OptoForceEmulator"),
+    "grbl": ("GrblEmulator",),
+    "pty_server": ("PtyServer",),
+    "touched_body": ("TouchedBody",),
+}
+doorway(__name__, _PUBLIC)

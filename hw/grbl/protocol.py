@@ -1,0 +1,220 @@
+"""The line protocol of Grbl 1.1, grblHAL and FluidNC: what its messages mean.
+
+Reference: gnea/grbl, doc/markdown/interface.md, commands.md and jogging.md (Grbl 1.1).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mapping import FloatArray
+
+STATUS, HOLD, RESUME, RESET, DOOR, JOG_CANCEL = b"?", b"!", b"~", b"\x18", b"\x84", b"\x85"
+RECEIVE_BUFFER = 128  # bytes
+
+ERRORS = {
+    1: "a word has no letter",
+    2: "a number is malformed",
+    3: "unknown $ command",
+    8: "this $ command needs an idle machine",
+    9: "locked by an alarm or while jogging; unlock ($X) or home ($H) first",
+    10: "soft limits need homing to be enabled",
+    11: "line too long",
+    13: "the safety door is open",
+    15: "the jog would leave the machine's travel",
+    16: "malformed jog",
+    20: "unsupported G-code",
+    22: "no feed rate set",
+    24: "two commands that both need axis words",
+    26: "axis words missing",
+    30: "G53 works with G0 and G1 only",
+    33: "the target is not possible, or is where the machine already stands",
+}
+ALARMS = {
+    1: "a hard limit was hit; the position is probably lost: home again ($H)",
+    2: "the target lies outside the machine's travel; the position is kept: unlock ($X)",
+    3: "reset while moving; the position is lost: home again ($H)",
+    4: "the probe was closed before probing began: back off and check its wiring",
+    5: "the probe met nothing",
+    6: "reset while homing: home again",
+    7: "the safety door was opened while homing: home again",
+    8: "homing could not leave the limit switch: check its wiring",
+    9: "homing did not find the limit switch",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Status:
+    """A status report.
+
+    Args:
+        state: Idle, Run, Hold, Jog, Alarm, Door, Check, Home, Sleep (or what else the firmware calls it).
+        substate: the number behind the colon, for example 0 in Hold:0; None without one.
+        position: (3,) as reported, report units.
+        is_machine: True if `position` is in machine, False if in work coordinates.
+        offset: (3,) work coordinate offset, if this report has it.
+        pins: letters of the inputs that are on; P is the probe.
+        blocks, bytes: free planner blocks and receive-buffer bytes, if reported.
+    """
+
+    state: str
+    substate: int | None
+    position: FloatArray
+    is_machine: bool
+    offset: FloatArray | None = None
+    pins: str = ""
+    blocks: int | None = None
+    bytes: int | None = None
+
+    @property
+    def probe_closed(self) -> bool:
+        """True if the probe input is on."""
+        return "P" in self.pins
+
+
+@dataclass(frozen=True, eq=False)
+class Probed:
+    """A [PRB:...] message: (3,) latched machine position in report units, and whether contact was made."""
+
+    position: FloatArray
+    hit: bool
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What `$$` printed; numbers by their code. Lengths are millimetres whatever the report units are."""
+
+    values: dict[int, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, lines: Iterable[str]) -> Settings:
+        """From the answer's lines; others (start-up lines, texts) are left out."""
+        found = (re.fullmatch(r"\$(\d+)=(-?[\d.]+)(?:\s*\(.*\))?", line) for line in lines)
+        return cls({int(m[1]): float(m[2]) for m in found if m})
+
+    @property
+    def report_scale(self) -> float:
+        """Metres per report unit."""
+        return 0.0254 if self.values.get(13, 0.0) else 1e-3
+
+    @property
+    def resolution(self) -> float:
+        """Step of the reported positions, m: of the motors ($100 to $102), or of the digits if that is coarser."""
+        digits = 1e-4 if self.values.get(13, 0.0) else 1e-3
+        steps = [1e-3 / count for count in self._three(100) if count > 0]
+        return float(max([*steps, digits * self.report_scale]))
+
+    @property
+    def max_rate(self) -> FloatArray:
+        """(3,) fastest axis speeds, m/s; NaN where the firmware does not say."""
+        return self._three(110) * (1e-3 / 60.0)
+
+    @property
+    def acceleration(self) -> FloatArray:
+        """(3,) axis accelerations, m/s^2; NaN where the firmware does not say."""
+        return self._three(120) * 1e-3
+
+    @property
+    def travel(self) -> FloatArray:
+        """(3,) length of the axes, m; NaN where the firmware does not say."""
+        return self._three(130) * 1e-3
+
+    @property
+    def bounds(self) -> FloatArray:
+        """(2, 3) lowest and highest machine coordinates, m.
+
+        Machine zero is the end of travel that homing finds ($23 tells which end); with Grbl's default build
+        all coordinates are negative, with HOMING_FORCE_SET_ORIGIN ($22 bit 3 in grblHAL) zero is at that end.
+        """
+        travel, mask = self.travel, int(self.values.get(23, 0.0))
+        forced = bool(int(self.values.get(22, 0.0)) & 8)
+        positive = np.array([bool(mask >> axis & 1) and forced for axis in range(3)])
+        return np.stack([np.where(positive, 0.0, -travel), np.where(positive, travel, 0.0)])
+
+    @property
+    def soft_limits(self) -> bool:
+        """True if the controller itself refuses to leave its travel."""
+        return bool(self.values.get(20, 0.0))
+
+    @property
+    def homing(self) -> bool:
+        """True if the machine has a homing cycle."""
+        return bool(int(self.values.get(22, 0.0)) & 1)
+
+    def _three(self, first: int) -> FloatArray:
+        return np.array([self.values.get(first + axis, np.nan) for axis in range(3)])
+
+
+def parse_status(line: str) -> Status | None:
+    """The report in a line <...>, or None if it is not a whole one."""
+    match = re.fullmatch(r"<([A-Za-z]+)(?::(\d+))?\|([MW])Pos:([-\d.,]+)((?:\|[^|<>]*)*)>", line)
+    position = None if match is None else _vector(match[4])
+    if match is None or position is None:
+        return None
+    fields = dict(part.split(":", 1) for part in match[5].split("|") if ":" in part)
+    blocks, _, free = fields.get("Bf", "").partition(",")
+    return Status(
+        state=match[1],
+        substate=None if match[2] is None else int(match[2]),
+        position=position,
+        is_machine=match[3] == "M",
+        offset=_vector(fields["WCO"]) if "WCO" in fields else None,
+        pins=fields.get("Pn", ""),
+        blocks=int(blocks) if blocks.isdigit() else None,
+        bytes=int(free) if free.isdigit() else None,
+    )
+
+
+def parse_probe(line: str) -> Probed | None:
+    """The result in a line [PRB:x,y,z:1], or None if it is not one."""
+    match = re.fullmatch(r"\[PRB:([-\d.,]+):([01])\]", line)
+    position = None if match is None else _vector(match[1])
+    return None if match is None or position is None else Probed(position, match[2] == "1")
+
+
+def parse_offset(parameters: Iterable[str], modes: Iterable[str]) -> FloatArray:
+    """(3,) work coordinate offset, report units, from the answers to `$#` and `$G`."""
+    tables = {}
+    for line in parameters:
+        match = re.fullmatch(r"\[(G5[4-9](?:\.\d)?|G92|TLO):([-\d.,]+)\]", line)
+        if match:
+            tables[match[1]] = match[2]
+    words = " ".join(modes).strip("[]").removeprefix("GC:").split()
+    active = next((word for word in words if re.fullmatch(r"G5[4-9](\.\d)?", word)), "G54")
+    offset = np.zeros(3)
+    for name in (active, "G92"):
+        part = _vector(tables.get(name, ""))
+        offset += 0.0 if part is None else part
+    length = [float(x) for x in tables.get("TLO", "0").split(",")]
+    offset += length[:3] if len(length) >= 3 else [0.0, 0.0, length[0]]
+    return offset
+
+
+def describe(line: str) -> str:
+    """An error or alarm line in words."""
+    kind, _, code = line.partition(":")
+    table = ALARMS if kind == "ALARM" else ERRORS
+    number = int(code) if code.isdigit() else -1
+    return f"{line} ({table.get(number, code.strip() or 'see the firmware documents')})"
+
+
+def words(axes: FloatArray) -> str:
+    """Axis words of a position or displacement in metres, as millimetres to the tenth of a micrometre."""
+    return "".join(f"{axis}{value:.4f}" for axis, value in zip("XYZ", 1e3 * axes + 0.0, strict=True))
+
+
+def feed_word(speed: float) -> str:
+    """Feed word of a speed in m/s: mm/min."""
+    return f"F{speed * 60e3:.4g}" if speed * 60e3 < 1000 else f"F{speed * 60e3:.0f}"
+
+
+def _vector(text: str) -> FloatArray | None:
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        return None
+    return np.array(values[:3]) if len(values) >= 3 else None

@@ -1,0 +1,270 @@
+"""GrblFinger: a three-axis machine of the Grbl family with a round tip, as a Finger."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from hw import FingerError, LinkError, Move, StopOnSignal, StoppedError, Workspace
+from hw.grbl import Frame, GrblController, GuardedStage
+from hw.probing.lag import measured_delay
+from hw.probing.peck import Peck, Touched
+from hw.probing.slide import Slide
+from mapping import FloatArray, Trace
+
+# How long to wait for a sensor to come back, s
+RECONNECT = 5.0
+
+
+@dataclass(kw_only=True)
+class GrblFinger:
+    """Peck tracing with a touch probe, or sliding under a force sensor. Entering connects and moves nothing.
+
+    Args:
+        port: serial port of the controller.
+        tip_radius: m.
+        frame: where the object stands on the machine.
+        peck: how to peck, or None.
+        slide: how to slide, with its sensor, or None; one of the two.
+        armed: without it every move is refused: a dry run on the real machine.
+        travel_speed: through free space, m/s.
+        over_travel: how far the tip may run on after contact, m.
+        max_force: largest force that a move may ask for, N.
+        limits: (2, 3) machine coordinates within the controller's own that the tip may take, m; None: all.
+        unlock: send $X if the machine is locked on connecting (its position must be right). Moves nothing.
+        home: send $H on connecting. MOVES the machine; needs `armed`.
+        baudrate: of the port.
+        notice: told of what was touched within a second of it: so that a log has it before the sweep ends.
+        beside: a context that lives as long as the connection (an emulator).
+    """
+
+    port: str
+    tip_radius: float
+    frame: Frame = field(default_factory=Frame.of)
+    peck: Peck | None = None
+    slide: Slide | None = None
+    armed: bool = False
+    travel_speed: float = 0.03
+    over_travel: float = 5e-4
+    max_force: float = 5.0
+    limits: FloatArray | None = None
+    unlock: bool = False
+    home: bool = False
+    baudrate: int = 115200
+    notice: Callable[[Trace], None] | None = None
+    beside: AbstractContextManager[Any] = field(default_factory=nullcontext)
+    _stage: GuardedStage | None = field(init=False, default=None, repr=False)
+    _open: ExitStack = field(init=False, repr=False, default_factory=ExitStack)
+    _away: FloatArray | None = field(init=False, default=None)
+    _sweeps: int = field(init=False, default=0)
+    _begun: float = field(init=False, default=0.0)
+    _lost: str | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        if (self.peck is None) == (self.slide is None):
+            raise FingerError("a Grbl finger either pecks or slides; give one of peck and slide")
+        for name in ("tip_radius", "travel_speed", "over_travel", "max_force"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise FingerError(f"grbl finger: {name} must be positive; found {getattr(self, name)}")
+
+    # connection
+
+    def __enter__(self) -> GrblFinger:
+        with ExitStack() as undo:
+            undo.enter_context(self.beside)
+            controller = GrblController(self.port, baudrate=self.baudrate)
+            self._signals = undo.enter_context(StopOnSignal(controller.halt))
+            undo.callback(controller.close)
+            controller.open()
+            if self.slide is not None:
+                undo.enter_context(self.slide.sensor)
+                self.slide.sensor.guard(self.max_force, controller.halt)
+            self._prepare(controller)
+            self._open = undo.pop_all()
+        self._begun = time.monotonic()
+        return self
+
+    def _prepare(self, controller: GrblController) -> None:
+        if self.home:
+            if not self.armed:
+                raise FingerError("homing moves the machine; it needs --arm")
+            controller.home()
+        elif controller.alarm is not None:
+            if not self.unlock:
+                raise FingerError(
+                    f"{self.port}: {controller.alarm}; home it ($H), or set unlock if its position is right"
+                )
+            controller.unlock()
+        bounds = controller.settings.bounds
+        if self.limits is not None:
+            low, high = self.limits
+            bounds = np.stack([np.fmax(bounds[0], low), np.fmin(bounds[1], high)])
+        if not np.isfinite(bounds).all():
+            raise FingerError(f"{self.port}: the controller does not state its travel ($130 to $132); give limits")
+        sensor = None if self.slide is None else self.slide.sensor
+        speed = self._speed_of(controller)
+        over_travel = self.over_travel
+        if self.slide is not None:  # running on must not reach the force limit
+            over_travel = min(over_travel, 0.5 * self.max_force / self.slide.stiffness)
+        self._stage = GuardedStage(controller, self.frame, bounds, speed, over_travel, sensor)
+
+    def _speed_of(self, controller: GrblController) -> float:
+        return float(np.nanmin(np.append(controller.settings.max_rate, self.travel_speed)))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        if self._stage is None:
+            return
+        self._signals.ignore()
+        try:
+            self._retreat(self._stage)
+        finally:
+            self._stage = None
+            self._open.close()
+
+    def _retreat(self, stage: GuardedStage) -> None:
+        """Stop what moves and leave the body; on a machine that is lost or locked nothing can be done."""
+        controller = stage.controller
+        if not self.armed or self._away is None or not controller.link.is_open:
+            return
+        try:
+            if controller.stop_reason is not None or controller.status().state not in ("Idle", "Alarm"):
+                controller.halt("leaving")
+                if not controller.clear():
+                    return  # the position is lost: any motion could do harm
+            if controller.alarm is None:
+                stage.lift(self._away, 2.0 * self.tip_radius)
+        except FingerError as error:
+            self._lost = f"could not retreat: {error}"
+
+    # what a Finger offers
+
+    @property
+    def stage(self) -> GuardedStage:
+        """The connected stage. Raises FingerError."""
+        if self._stage is None:
+            raise FingerError(f"{self.port}: not connected; use the finger as a context manager")
+        return self._stage
+
+    @property
+    def workspace(self) -> Workspace:
+        """The box in the object frame that holds all that the machine can reach; the driver checks exactly."""
+        low, high = self.stage.bounds
+        corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+        reach = self.frame.to_object(corners)
+        return Workspace(reach.min(axis=0), reach.max(axis=0), self.stage.speed, self.max_force)
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """What is connected, and what the connection has counted so far."""
+        controller = self.stage.controller
+        sensor = {}
+        if self.slide is not None:
+            sensor = {"sensor": self.slide.sensor.info, "lag": self.slide.lag.seconds}
+        return {
+            "kind": "grbl",
+            "touch": "peck" if self.slide is None else "slide",
+            "port": self.port,
+            "tip_radius": self.tip_radius,
+            "resolution": controller.settings.resolution,
+            "firmware": controller.version,
+            "settings": {f"${code}": value for code, value in controller.settings.values.items()},
+            "origin": self.frame.origin.tolist(),
+            "rotation": self.frame.rotation.tolist(),
+            "link": controller.link.counters,
+        } | sensor
+
+    def execute(self, move: Move) -> Trace:
+        """Carry out one move; the contacts of a sweep, nothing for any other purpose.
+
+        Raises:
+            FingerError: not armed, beyond a limit, or the machine is lost.
+        """
+        stage = self.stage
+        if not self.armed:
+            raise FingerError("dry run: nothing is moved on a real port without --arm")
+        if self._lost is not None and not self._regained(stage):
+            raise FingerError(self._lost)
+        self._refuse_what_exceeds(move, stage)
+        touched: list[Trace] = []
+        try:
+            self._carry_out(move, stage, touched)
+        except (LinkError, StoppedError) as error:
+            stage.controller.halt(str(error))
+            self._lost = str(error)
+            if not any(map(len, touched)):
+                raise
+        except FingerError:
+            if not any(map(len, touched)):  # one line was refused, a garbled one perhaps: what was felt before it stays
+                raise
+        return Trace.concatenate(touched or [self._trace(Touched(np.zeros(0), np.zeros((0, 3))))])
+
+    def _regained(self, stage: GuardedStage) -> bool:
+        """True if all that was lost was the sensor, and it is back: the machine stood still and knows where it is."""
+        controller = stage.controller
+        if self.slide is None or self.slide.sensor.link.is_open or not controller.link.is_open or controller.alarm:
+            return False
+        if not self.slide.sensor.reconnect(RECONNECT) or not controller.clear():
+            return False
+        self._lost = None
+        return True
+
+    def measured_delay(self) -> tuple[float, float]:
+        """Delay of the force sensor behind the stage and its standard error, s, where the last sweep ended.
+
+        Raises:
+            FingerError: there is no sensor, not armed, or nothing was touched yet.
+        """
+        if self.slide is None or self._away is None or not self.armed:
+            raise FingerError("the delay is measured with a force sensor, armed, after a first sweep")
+        return measured_delay(self.stage, self.slide.sensor, -self._away, self.slide.stiffness)
+
+    def _refuse_what_exceeds(self, move: Move, stage: GuardedStage) -> None:
+        stage.check(move.path, move.purpose)
+        if move.force > self.max_force:
+            raise FingerError(f"the {move.purpose} asks for {move.force} N; at most {self.max_force} N are possible")
+        if move.speed > stage.speed * (1 + 1e-9):
+            raise FingerError(f"the {move.purpose} asks for {move.speed} m/s; at most {stage.speed} m/s is possible")
+
+    def _carry_out(self, move: Move, stage: GuardedStage, touched: list[Trace]) -> None:
+        away = -move.approach[0]
+        lift = 0.5 * self.tip_radius
+        if self._away is not None:
+            stage.lift(self._away, lift)
+        self._away = away
+        if move.purpose in ("travel", "retreat"):
+            for point, inwards in zip(move.path, move.approach, strict=True):
+                self._away = -inwards
+                stage.go(point, -inwards, lift)
+            return
+        self._sweeps += 1
+        stage.go(move.path[0] + lift * away, away, lift)
+        touch = self.peck if self.slide is None else self.slide
+        assert touch is not None
+        for batch in touch.trace(stage, move):
+            touched.append(self._trace(batch))
+            if self.notice is not None and len(batch.times):
+                self.notice(touched[-1])
+        self._away = -move.approach[-1]
+
+    def _trace(self, batch: Touched) -> Trace:
+        force = batch.forces
+        if force is None and self.slide is not None:
+            force = np.zeros((0, 3))
+        normals = None if force is None else force / np.linalg.norm(force, axis=1, keepdims=True)
+        return Trace.of_readings(
+            batch.times - self._begun,
+            batch.centers,
+            np.full(len(batch.times), self._sweeps),
+            self.tip_radius,
+            normals=normals,
+            force=force,
+            resolution=self.stage.controller.settings.resolution,
+        )

@@ -1,0 +1,197 @@
+"""Slide: sweep along the body under a force sensor, position along the path and force along the approach.
+
+Hybrid law (paper, section 4.2.1): the tangential speed is commanded, the normal force is held in proportion to
+its error. It runs on the host and steers the stage in short jogs, each as long as one control period; a jog that
+is queued can be thrown away, so the machine stops within a period of being asked.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hw import LinkError, Move, StoppedError
+from hw.grbl import PATIENCE, GuardedStage
+from hw.probing.fusion import known_at, positions_at, prompt, rigid_centers
+from hw.probing.lag import Lag
+from hw.probing.peck import Touched, spaced
+from hw.sensors import ForceSensor
+from mapping import BoolArray, FloatArray
+
+# Jogs that may be under way or waiting when the next is made, in control periods
+QUEUED = 2
+# Samples are handed on this often, s
+BATCH = 0.5
+# Share of the wanted force that may be missing, or too much, at full tangential speed; and the slowest pace
+EASE, SLOWEST = 0.25, 0.1
+# A sweep begins when the force is this near to the wanted one, in its share, or after so many control periods
+SETTLED, SETTLING = 0.2, 50
+# Reports further apart than this, in control periods, hide a turn or a stand; than this many usual gaps, if it is more;
+# unless they differ by no more than so many steps of the stage along the normal
+BLIND, UNUSUAL, STEPS = 0.5, 2.0, 2.0
+# Reports from so long before the samples are looked at: the last one may be that old, s
+BEFORE = 0.1
+# A path of one point is touched for so many control periods
+DWELL = 10
+
+
+@dataclass(frozen=True)
+class Slide:
+    """How to slide.
+
+    Args:
+        sensor: feels the force.
+        stiffness: of the tip and all that carries it, N/m.
+        period: of the control loop, s.
+        approach_speed: at which the body is approached, m/s.
+        reach: how far beyond the commanded path to follow the body, m.
+        gain: share of the force error that one period takes away; with the stage's delay of two to three
+            periods, 0.2 leaves a phase margin of about 60 degrees.
+        delay: by how much the force is stamped later than the stage's reports, s (hw.probing.fusion.estimate_delay).
+        contact: force above which a sample counts as contact, N.
+        lag: what of the delay is left, learnt from one batch of samples to the next.
+    """
+
+    sensor: ForceSensor
+    stiffness: float
+    period: float = 0.01
+    approach_speed: float = 2e-3
+    reach: float = 2e-3
+    gain: float = 0.2
+    delay: float = 0.0
+    contact: float = 0.05
+    lag: Lag = field(default_factory=Lag)
+
+    def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
+        """Samples in contact with their forces, about every BATCH seconds; what was felt before a stop as well."""
+        self.sensor.tare()
+        path, approach = spaced(move, move.speed * self.period)
+        where, hit = stage.probe(path[0] + self.reach * approach[0], self.approach_speed)
+        if not hit:
+            return
+        last = told = time.monotonic()
+        try:
+            for sliding in self._steer(stage, move, path, approach, float((where - path[0]) @ approach[0])):
+                if not sliding:
+                    last = time.monotonic()  # what the tip feels while it settles is no sweep
+                elif time.monotonic() > told + BATCH:
+                    told = time.monotonic()
+                    batch = self._fused(stage, last)
+                    if len(batch.times):
+                        last = float(batch.times[-1])
+                        yield batch
+        except (StoppedError, LinkError):
+            yield self._fused(stage, last)
+            raise
+        finally:
+            if stage.controller.link.is_open and stage.controller.stop_reason is None:
+                stage.controller.cancel_jog()
+        yield self._fused(stage, last)
+
+    def _steer(
+        self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, depth: float
+    ) -> Iterator[bool]:
+        """Along the path, one jog a period; `depth` (m) behind it along the approach follows the force.
+
+        Each period says whether the sweep has begun.
+        """
+        controller, trend = stage.controller, 0.0
+        here, at, end = path[0] + depth * approach[0], 0.0, len(path) - 1.0
+        queued = [0.0] * QUEUED  # lengths of the last jogs
+        settling = SETTLING  # periods to press on before the sweep begins
+        left = 0 if end > 0 else DWELL
+        made = -np.inf  # when the last jog was sent
+        while True:
+            inwards = _between(approach, at)
+            inwards /= np.linalg.norm(inwards)
+            missing = move.force - self._pressing(stage, inwards, here, sum(queued), made)
+            settling = 0 if abs(missing) <= SETTLED * move.force else max(0, settling - 1)
+            pace = 0.0 if settling else _pace(missing / move.force)
+            at = min(end, at + pace)
+            wanted = self.gain * missing / self.stiffness
+            # the slope of the body, learnt as it comes: else a ramp leaves a lasting error
+            trend = float(np.clip(trend + 0.03 * pace * wanted, *self._step_limits(stage)))
+            depth += float(np.clip(wanted + pace * trend, *self._step_limits(stage)))
+            if depth > self.reach:
+                raise StoppedError("the tip went too deep behind the commanded path: the body ends, or is elsewhere")
+            target = _between(path, at) + depth * inwards
+            way = float(np.linalg.norm(target - here))
+            if way > 0:
+                stage.check(target, "sliding")
+                controller.jog(stage.frame.to_machine(target), max(way / self.period, 1e-4))
+                made = time.monotonic()
+                here, queued = target, [*queued[1:], way]
+            yield not settling
+            if at >= end and not settling:
+                if left == 0:
+                    return
+                left -= 1
+
+    def _pressing(
+        self, stage: GuardedStage, inwards: FloatArray, here: FloatArray, queued: float, made: float
+    ) -> float:
+        """Force along the approach, N, as soon as at most `queued` metres of motion are left up to `here`.
+
+        The machine paces the loop: a host that is late makes it stand, never run ahead. No force counts twice: a
+        loop that goes on with what it felt before its last jog (`made`, s) would press deeper without feeling it.
+        """
+        until = time.monotonic() + PATIENCE
+        left = max(queued, 1.5 * stage.controller.settings.resolution)
+        while np.linalg.norm(stage.position() - here) > left:
+            if time.monotonic() > until:
+                raise StoppedError("the machine does not follow; is it held, or its door open?")
+        stage.listen(self.sensor, made)
+        force = stage.frame.turn_to_object(self.sensor.force())
+        return -float(force @ inwards)
+
+    def _step_limits(self, stage: GuardedStage) -> tuple[float, float]:
+        most = stage.guarded_speed * self.period
+        return -most, 0.5 * most
+
+    def _fused(self, stage: GuardedStage, after: float) -> Touched:
+        """Samples in contact taken after that time, as far as the stage has reported where it was."""
+        reports = prompt(stage.controller.reported(after - BEFORE))
+        if len(reports) < 2:
+            return Touched(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+        times, forces = self.sensor.timed(after)
+        stamps = np.array([report.at for report in reports])
+        places = stage.frame.to_object(
+            np.array([stage.controller.machine_position(report.status) for report in reports])
+        )
+        forces = stage.frame.turn_to_object(forces)
+        pressing = np.linalg.norm(forces, axis=1)
+        normals = forces / np.maximum(pressing, self.contact)[:, None]
+        longest = max(BLIND * self.period, UNUSUAL * float(np.median(np.diff(stamps))))
+        step = STEPS * stage.controller.settings.resolution
+
+        def touching(delay: float) -> tuple[BoolArray, FloatArray]:
+            centers = positions_at(times - delay, stamps, places)
+            sound = (pressing > self.contact) & np.isfinite(centers).all(axis=1) & (times > after)
+            return sound & known_at(times - delay, stamps, places, normals, longest, step), centers
+
+        sound, centers = touching(self.delay)
+        rigid = rigid_centers(centers[sound], forces[sound], self.stiffness)
+        self.lag.learn(times[sound], centers[sound], rigid, normals[sound])
+        sound, centers = touching(self.delay + self.lag.seconds)
+        rigid = rigid_centers(centers[sound], forces[sound], self.stiffness)
+        return Touched(times[sound], rigid, forces[sound])
+
+
+def _between(rows: FloatArray, at: float) -> FloatArray:
+    """(3,) at a fractional row number."""
+    low = min(int(at), len(rows) - 1)
+    high = min(low + 1, len(rows) - 1)
+    return np.asarray(rows[low] + (at - low) * (rows[high] - rows[low]))
+
+
+def _pace(error: float) -> float:
+    """Share of the tangential speed at a force error, in wanted forces: a steep flank is taken slowly.
+
+    At full speed the tip would fly off behind a ridge, and be pressed hard in front of it, since the force
+    follows the body only as fast as the guarded speed lets it.
+    """
+    spare = max(0.0, 1.0 - abs(error)) / (1.0 - EASE)
+    return float(np.clip(spare**2, SLOWEST, 1.0))

@@ -1,0 +1,174 @@
+"""ForceSensor: a three-axis force sensor behind a serial port; samples with their times, and a guard."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from itertools import takewhile
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from hw import Framing, Link, LinkError
+from hw.sensors.clock import SensorClock, missing, unwrapped
+from mapping import FloatArray, IntArray
+
+# Samples that are kept: a minute at 5 kHz
+KEPT = 300_000
+# Before the samples asked for, the clock is known by those of so many seconds
+HISTORY = 10.0
+
+
+class ForceSensor:
+    """Common to all sensors; a device adds its framing, `decode` and `start`.
+
+    Forces are those on the tip, N, in the axes of the machine that carries it.
+
+    Args:
+        port: device name or pyserial URL.
+        framing: of the device's stream.
+        rate: samples per second that it is told or known to send.
+        bits: width of its counter or clock.
+        tick: nominal s per count of that; None: a count per sample.
+        baudrate: of the port.
+    """
+
+    name = "force sensor"
+
+    def __init__(
+        self, port: str, framing: Framing, *, rate: float, bits: int, tick: float | None = None, baudrate: int
+    ) -> None:
+        self.link = Link(port, framing, self._hear, baudrate=baudrate, lost=self._on_lost)
+        self.rate, self.bits = rate, bits
+        self.tick = 1.0 / rate if tick is None else tick
+        self.zero = np.zeros(3)
+        self._samples: deque[tuple[float, int, float, float, float]] = deque(maxlen=KEPT)
+        self._limit = np.inf
+        self._halt: Callable[[str], None] = _nothing
+        self._news = threading.Condition()
+        self.faulty = 0
+
+    def decode(self, frame: bytes) -> tuple[int, float, float, float] | None:
+        """Count and force (N) in a frame; None if the sensor says that it is not to be trusted."""
+        raise NotImplementedError
+
+    def start(self) -> None:
+        """Tell the device to send."""
+
+    def guard(self, limit: float, halt: Callable[[str], None]) -> None:
+        """From now on call `halt`, in the reading thread, as soon as a force exceeds `limit` (N)."""
+        self._limit, self._halt = limit, halt
+
+    def __enter__(self) -> ForceSensor:
+        self.link.open()
+        try:
+            self.start()
+            if not self.wait(self.fresh, 2.0):
+                raise LinkError(
+                    f"{self.link.port}: no samples from the {self.name} within 2 s; is it powered, is the baud rate "
+                    f"right? It sent {self.link.counters}"
+                )
+        except BaseException:
+            self.link.close()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self.link.close()
+
+    def reconnect(self, within: float) -> bool:
+        """Try for some seconds to get back a sensor that was lost; True if it sends again. Tare it anew."""
+        self._samples.clear()
+        if not self.link.reopen(within):
+            return False
+        self.start()
+        return self.wait(self.fresh, 2.0)
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """Kind, port, rate, counters, clock."""
+        ticks, arrivals, _ = self.recorded()
+        record = {"kind": self.name, "port": self.link.port, "rate": self.rate, "faulty": self.faulty}
+        if len(ticks):
+            clock = SensorClock.estimate(ticks.astype(float), arrivals, self.tick)
+            record |= {"period": clock.period, "jitter": clock.jitter, "missing": missing(ticks)}
+        return record | {"link": self.link.counters}
+
+    @property
+    def age(self) -> float:
+        """Time since the newest sample arrived, s."""
+        return time.monotonic() - self.heard
+
+    @property
+    def heard(self) -> float:
+        """When the newest sample arrived, s, time.monotonic; -inf before the first."""
+        return self._samples[-1][0] if self._samples else -np.inf
+
+    def fresh(self) -> bool:
+        """True if there is a sample at all."""
+        return bool(self._samples)
+
+    def force(self) -> FloatArray:
+        """(3,) newest force, N."""
+        return np.array(self._samples[-1][2:]) - self.zero if self._samples else np.zeros(3)
+
+    def wait(self, done: Callable[[], bool], within: float) -> bool:
+        """Wait for samples until `done`; False if that took too long."""
+        with self._news:
+            return self._news.wait_for(done, timeout=within)
+
+    def tare(self, duration: float = 0.2) -> None:
+        """Take the median force of the next moments, free of contact, as zero. Raises LinkError."""
+        since = time.monotonic()
+        self.wait(lambda: time.monotonic() > since + duration, duration + 0.5)
+        _, arrivals, forces = self.recorded()
+        recent = forces[arrivals > since]
+        if len(recent) == 0:
+            raise LinkError(f"{self.link.port}: no samples from the {self.name} for {duration:g} s")
+        self.zero = np.median(recent, axis=0)  # a first sample after a reconnection may be anything
+
+    def recorded(self, since: float = -np.inf) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Ticks (N,), arrivals (N,) s and raw forces (N, 3) N of the samples that arrived after `since`."""
+        with self._news:
+            kept = list(takewhile(lambda sample: sample[0] >= since, reversed(self._samples)))[::-1]
+        table = np.array([(s[0], s[2], s[3], s[4]) for s in kept], dtype=np.float64).reshape(-1, 4)
+        return unwrapped(np.array([s[1] for s in kept], dtype=np.int64), self.bits), table[:, 0], table[:, 1:]
+
+    def timed(self, since: float) -> tuple[FloatArray, FloatArray]:
+        """Host times (N,) s at which the samples since then were taken, and their forces (N, 3) N, zero taken off."""
+        ticks, arrivals, forces = self.recorded(since - HISTORY)
+        if len(ticks) == 0:
+            return np.zeros(0), np.zeros((0, 3))
+        clock = SensorClock.estimate(ticks.astype(float), arrivals, self.tick)
+        recent = arrivals >= since
+        return clock.times(ticks[recent].astype(float)), forces[recent] - self.zero
+
+    def _hear(self, now: float, frames: list[bytes]) -> None:
+        decoded = [self.decode(frame) for frame in frames]
+        good = [sample for sample in decoded if sample is not None]
+        self.faulty += len(decoded) - len(good)
+        limit = self._limit
+        if np.isfinite(limit):
+            zero = self.zero
+            for _, x, y, z in good:
+                felt = ((x - zero[0]) ** 2 + (y - zero[1]) ** 2 + (z - zero[2]) ** 2) ** 0.5
+                if felt > limit:
+                    self._halt(
+                        f"the force reached {felt:.2f} N, above the limit of {limit:g} N; check the path, run again"
+                    )
+                    break
+        with self._news:
+            self._samples.extend((now, *sample) for sample in good)
+            self._news.notify_all()
+
+    def _on_lost(self) -> None:
+        self._halt(f"the {self.name} was lost ({self.link.error})")
+
+
+def _nothing(reason: str) -> None:
+    """Until a stage is there to be halted."""

@@ -1,0 +1,55 @@
+"""LineSensor: the line protocol for home-made force sensors (Arduino class); a sketch is in docs/hardware.md.
+
+    F,<micros>,<fx>,<fy>,<fz>*<hh>
+
+micros: the board's clock, u32, microseconds (wraps); fx, fy, fz: force on the tip, N, decimal; hh: two hex digits,
+the exclusive or of all characters before the `*`. One line per sample, ended by LF or CR LF, at any baud rate.
+Lines that begin with `#` are comments. The board need not listen.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+from operator import xor
+
+from hw import Lines
+from hw.sensors.force_sensor import ForceSensor
+
+
+def encode_line(micros: int, force: tuple[float, float, float]) -> bytes:
+    """A line, with its end."""
+    body = f"F,{micros % 2**32},{force[0]:.5f},{force[1]:.5f},{force[2]:.5f}".encode("ascii")
+    return body + f"*{reduce(xor, body):02X}\n".encode("ascii")
+
+
+def decode(line: bytes) -> tuple[int, float, float, float] | None:
+    """Microseconds and force in a line without its end; None if it is not a whole one."""
+    body, star, check = line.partition(b"*")
+    parts = body.split(b",")
+    if not star or len(parts) != 5 or parts[0] != b"F":
+        return None
+    try:
+        if int(check, 16) != reduce(xor, body):
+            return None
+        return int(parts[1]) % 2**32, float(parts[2]), float(parts[3]), float(parts[4])
+    except ValueError:
+        return None
+
+
+class LineSensor(ForceSensor):
+    """A home-made sensor on a serial port.
+
+    Args:
+        port: device name or pyserial URL.
+        rate: samples per second that it sends, about.
+        baudrate: of the port.
+    """
+
+    name = "line sensor"
+
+    def __init__(self, port: str, *, rate: float = 500.0, baudrate: int = 115200) -> None:
+        super().__init__(port, Lines(), rate=rate, bits=32, tick=1e-6, baudrate=baudrate)
+
+    def decode(self, frame: bytes) -> tuple[int, float, float, float] | None:
+        """Microseconds and force in a line."""
+        return decode(frame)

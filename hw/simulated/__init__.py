@@ -1,0 +1,17 @@
+"""Simulated fingers: exact contact, dynamics, noise."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from hw.simulated.dynamics import Dynamics as Dynamics
+    from hw.simulated.finger import SimulatedFinger as SimulatedFinger
+    from hw.simulated.noise_source import NoiseSource as NoiseSource
+
+_PUBLIC = {
+    "dynamics": ("Dynamics",),
+    "finger": ("SimulatedFinger",),
+    "noise_source": ("NoiseSource",),
+}
+doorway(__name__, _PUBLIC)

@@ -1,0 +1,15 @@
+"""Assembly: crossings become features."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.assembly.assemble import assemble as assemble
+    from mapping.assembly.faint_features import why_none_sought as why_none_sought, with_faint_lines as with_faint_lines
+
+_PUBLIC = {
+    "assemble": ("assemble",),
+    "faint_features": ("why_none_sought", "with_faint_lines"),
+}
+doorway(__name__, _PUBLIC)

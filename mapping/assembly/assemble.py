@@ -1,0 +1,185 @@
+"""Grammar: crossings of sweeps become bumps, ridges, pits, grooves, steps and edges."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mapping import Feature, FloatArray, Trace
+from mapping.assembly.edges import edge_features
+from mapping.assembly.faint_features import with_faint_lines
+from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
+from mapping.assembly.inspection import Inspection, inspect
+from mapping.assembly.lines import Around, line_features
+from mapping.assembly.linking import groups
+from mapping.assembly.points import outline, point_feature
+from mapping.assembly.runs import along, split_runs, told_crests
+from mapping.assembly.steps import step_features
+from mapping.base import Base
+from mapping.detection import Crossing, Detections
+from mapping.geometry.mesh import distances
+
+NAMES = {1: ("bump", "ridge"), -1: ("pit", "groove")}
+# A group of crossings that spreads over more than this many half-widths cannot be one round bump: sweeps further
+# than one half-width from its crest miss it.
+WIDEST_SPOT = 2.6
+# A crossing lower than this share of its group's is a stray if it lies so many half-widths off the others, and so many
+# from any other low one; where others are so many that they are a line, not a spot with low rims.
+STRAY, BESIDE, MATES, LINE = 0.6, 1.3, 3.0, 5
+
+
+def assemble(
+    detections: Detections, trace: Trace, base: Base, *, false_alarms_per_metre: float = 0.01
+) -> tuple[Feature, ...]:
+    """Features of the base, the strongest evidence first, with preliminary intervals.
+
+    Crossings of one sign are linked where no inspected place between them denies a line. A group is one bump (or pit)
+    unless the heights of all places around say that it is longer: then a ridge (or groove), or several that meet,
+    each with its ends, closed if it returns to its beginning. Steps are linked likewise; those that a ridge explains,
+    because a sweep ran along it, are dropped, and crests that the sweep began or ended on are believed only if no step
+    explains them. Ridges and grooves too low for any one sweep are found where many sweeps agree. In a single profile
+    every crossing is a bump, a pit or a step.
+
+    Args:
+        detections: of the trace.
+        trace: any set of sweeps.
+        base: the global model.
+        false_alarms_per_metre: expected number of lines found in noise alone, 1/m of inspected path.
+
+    Reference: paper definitions 2 and 3; theory section 5.
+    """
+    crossings = detections.crossings
+    if len(np.unique(trace.sweep)) == 1:
+        return _strongest_first([point_feature([c], _name(c), detections, trace.tip_radius) for c in crossings])
+    features = _linked(detections, trace, base) if crossings else []
+    return _strongest_first(with_faint_lines(features, detections, trace, base, false_alarms_per_metre))
+
+
+def _linked(detections: Detections, trace: Trace, base: Base) -> list[Feature]:
+    """Features of the crossings that single sweeps detected."""
+    tip, scale = trace.tip_radius, _scale(detections.crossings, trace.tip_radius)
+    around = Around(inspect(trace, base, detections.noise, 0.2 * scale), base, detections, tip)
+    edges, crossings = edge_features(detections.crossings, around)
+    crests, steps = _crests_and_steps(crossings, around, scale)
+    certain, doubtful = _grouped(crests, around.inspection, scale)
+    details = [feature for group in certain for feature in _details(group, around)]
+    stepped = step_features(steps, _without_shadows(details, tip), around, scale)
+    for group in doubtful:
+        details += _details([c for c in group if not on_a_step(c, steps, stepped)], around)
+    return [*_without_shadows(details, tip), *stepped, *edges]
+
+
+def _crests_and_steps(
+    crossings: Sequence[Crossing], around: Around, scale: float
+) -> tuple[list[Crossing], list[Crossing]]:
+    """Crests and hollows, with places along those that a sweep ran along, and the steps that are not such runs."""
+    crests = [c for c in crossings if not c.kind.startswith("step")]
+    wrong = [c for c in crests if is_plateau_end(c, around.inspection) or is_unseen(c, around.inspection)]
+    crossings = [c for c in crossings if c not in wrong]
+    crests = [c for c in crests if c not in wrong]
+    for slanted in [along(c, scale, around.base, around.tip_radius) for c in crests]:
+        crests += told_crests(slanted, around.inspection, around.tip_radius)
+    runs, steps = split_runs([c for c in crossings if c not in crests and comes_down(c, around.inspection)])
+    edges = [c for run in runs for c in (run.first, run.last)] + steps
+    pitch = around.inspection.pitch
+    for run in runs:
+        if run.is_band(edges, pitch, around.tip_radius):
+            steps += [run.first, run.last]
+        else:
+            crests += _on_crest(run.points(max(min(pitch, run.length), scale), around.base, around.tip_radius), around)
+    return crests, steps
+
+
+def _on_crest(places: Sequence[Crossing], around: Around) -> list[Crossing]:
+    """Places on a run, or the crests beside them where other sweeps tell these."""
+    told = told_crests(places, around.inspection, around.tip_radius)
+    return told if len(told) >= 0.5 * len(places) else list(places)
+
+
+def _grouped(
+    crests: list[Crossing], inspection: Inspection, scale: float
+) -> tuple[list[list[Crossing]], list[list[Crossing]]]:
+    """Groups of linked crests of one sign: those that a sweep came down from on both sides, and the others."""
+    certain: list[list[Crossing]] = []
+    doubtful: list[list[Crossing]] = []
+    for kind in ("convex", "concave"):
+        alike = [c for c in crests if c.kind == kind]
+        for members in groups(alike, inspection, scale) if alike else []:
+            for group in _without_strays([alike[i] for i in members], scale):
+                top = max(abs(c.height) for c in group)
+                high = [c for c in group if abs(c.height) > 0.5 * top]
+                (doubtful if all(is_open(c, inspection) for c in high) else certain).append(group)
+    return certain, doubtful
+
+
+def _without_strays(group: list[Crossing], scale: float) -> list[list[Crossing]]:
+    """The group, and each low crossing that lies alone off its crest as one of its own: it is no arm of the line."""
+    top = float(np.quantile([abs(c.height) for c in group], 0.8))
+    low = [c for c in group if abs(c.height) + 2 * c.height_sd < STRAY * top]
+    crest = [c.point for c in group if not any(c is other for other in low)]
+    if len(crest) < LINE:
+        return [group]
+    # what lies on the flanks of the crest is no mate of what lies off it
+    off = [c for c in low if _nearest(c.point, crest) > BESIDE * scale]
+    strays = []
+    for c in off:
+        alike = [other.point for other in off if other.sweep != c.sweep]
+        if _nearest(c.point, alike) > MATES * scale:
+            strays.append(c)
+    rest = [c for c in group if not any(c is stray for stray in strays)]
+    return [*([rest] if rest else []), *([stray] for stray in strays)]
+
+
+def _nearest(point: FloatArray, others: list[FloatArray]) -> float:
+    """Distance of a point (3,) from the nearest of others, m."""
+    return float(np.linalg.norm(np.array(others) - point, axis=1).min()) if others else float("inf")
+
+
+def _name(crossing: Crossing) -> str:
+    """What a crossing of a single profile is called."""
+    return "step" if crossing.kind.startswith("step") else NAMES[1 if crossing.height > 0 else -1][0]
+
+
+def _strongest_first(features: Sequence[Feature]) -> tuple[Feature, ...]:
+    return tuple(sorted(features, key=lambda f: -f.evidence.snr))
+
+
+def _scale(crossings: Sequence[Crossing], tip_radius: float) -> float:
+    """Half-width of a sharp crest of the typical height, m."""
+    heights = np.array([abs(c.height) for c in crossings])
+    return float(np.sqrt(2 * tip_radius * np.median(heights)))
+
+
+def _details(members: list[Crossing], around: Around) -> list[Feature]:
+    """One bump, one ridge, or the ridges that meet; nothing of no crossings."""
+    if not members:
+        return []
+    highest = max(members, key=lambda c: abs(c.height))
+    spot_name, line_name = NAMES[1 if highest.height > 0 else -1]
+    half_width = float(np.sqrt(2 * around.tip_radius * abs(highest.height)))
+    half_width = max(half_width, min(c.half_width for c in members if abs(c.height) > 0.7 * abs(highest.height)))
+    points = np.array([c.point for c in members])
+    if np.linalg.norm(points - highest.point, axis=1).max() <= WIDEST_SPOT * half_width:
+        spot = outline(members, around.inspection, half_width)
+        if spot.length == 0.0:
+            return [point_feature(members, spot_name, around.detections, around.tip_radius, spot)]
+    lines = line_features(members, line_name, around)
+    return lines or [point_feature(members, spot_name, around.detections, around.tip_radius)]
+
+
+def _without_shadows(features: list[Feature], tip_radius: float) -> list[Feature]:
+    """Features less what is only the flank of a higher one of either sign."""
+    kept: list[Feature] = []
+    for feature in sorted(features, key=lambda f: -abs(f.height.median)):
+        shadow = False
+        # where a line was crossed; its ends lie as far beyond as the sweeps allow
+        crossed = feature.axis[1:-1] if len(feature.axis) > 3 else feature.axis
+        for other in kept:
+            reach = 1.3 * np.sqrt(2 * tip_radius * abs(other.height.median))
+            small = abs(feature.height.median) < 0.5 * abs(other.height.median)
+            if small and distances(crossed, other.axis).max() < reach:
+                shadow = True
+        if not shadow:
+            kept.append(feature)
+    return kept

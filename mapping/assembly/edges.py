@@ -1,0 +1,129 @@
+"""Edge feature: convex edges and concave corners of the body that the base does not have.
+
+Beyond such an edge the body runs away from the base in a straight line, to the end of every sweep: no crest and no
+step, but a hinge. Edges that the base has leave no height and are never seen here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import Evidence, Feature, FloatArray, Interval
+from mapping.assembly.branches import main_line
+from mapping.assembly.inspection import Inspection
+from mapping.assembly.lines import Around
+from mapping.detection import Crossing
+from mapping.geometry.mesh import arclengths, nearest_on
+
+# A stretch is straight if it bends by less than this share of its rise, once its first part is left out, where the
+# ball rolls over the edge.
+STRAIGHT, ROLLING = 0.08, 0.35
+CLEAR, LEAST_PLACES = 4.0, 8
+# Places that a parabola needs, and one more that tells whether it fits
+BENT = 4
+# Hinges further from each other than so many tip radii belong to different edges.
+SAME_EDGE = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Hinge:
+    """Where one sweep's height leaves the base: `point` (3,) m, `way` (3,) out along the sweep, `slope` signed."""
+
+    crossing: Crossing
+    point: FloatArray
+    way: FloatArray
+    slope: float
+
+
+def edge_features(crossings: Sequence[Crossing], around: Around) -> tuple[list[Feature], list[Crossing]]:
+    """Edges that at least two sweeps agree on, and the crossings that they do not explain."""
+    crests = [c for c in crossings if c.kind in ("convex", "concave")]
+    hinges = [h for c in crests if (h := _hinge(c, around.inspection)) is not None]
+    features, rest = [], list(crossings)
+    for group in _groups(hinges, SAME_EDGE * around.tip_radius):
+        if len({h.crossing.sweep for h in group}) < 2:
+            continue
+        edge, out = _edge(group, around)
+        features.append(edge)
+        used = {id(h.crossing) for h in group}
+        rest = [c for c in rest if id(c) not in used and not _beyond(c, edge, out, around.tip_radius)]
+    return features, rest
+
+
+def _hinge(crossing: Crossing, inspection: Inspection) -> Hinge | None:
+    """The hinge of a sweep whose height runs off in a straight line to one of its ends."""
+    own = inspection.of_sweep(crossing.sweep)
+    points, heights = inspection.points[own], np.sign(crossing.height) * inspection.height[own]
+    sd = float(np.median(inspection.sd[own]))
+    for order in (slice(None), slice(None, None, -1)):
+        place, height = points[order], heights[order]
+        off = height > max(CLEAR * sd, 0.03 * height.max())
+        count = int(off.argmin())
+        if count < LEAST_PLACES:
+            continue
+        s = np.linalg.norm(place[:count] - place[0], axis=1)
+        keep = s < (1 - ROLLING) * s[-1]
+        if keep.sum() < BENT:  # a sweep that comes back to where it began
+            continue
+        bend, slope, start = np.polyfit(s[keep], height[:count][keep], 2)
+        rise = abs(np.ptp(np.polyval([bend, slope, start], s[keep])))
+        line = np.polyfit(s[keep], height[:count][keep], 1)
+        straight = abs(bend) * np.ptp(s[keep]) ** 2 / 4 < STRAIGHT * rise
+        if straight and line[0] < 0 and rise > max(0.4 * line[1], 10 * sd):
+            way = (place[0] - place[count - 1]) / np.linalg.norm(place[0] - place[count - 1])
+            at = place[0] + way * line[1] / line[0]
+            return Hinge(crossing, at, way, float(-line[0] * np.sign(crossing.height)))
+    return None
+
+
+def _groups(hinges: list[Hinge], distance: float) -> list[list[Hinge]]:
+    """Hinges of one sign that are near each other, directly or through others."""
+    groups: list[list[Hinge]] = []
+    for hinge in hinges:
+        near = [
+            g
+            for g in groups
+            if g[0].slope * hinge.slope > 0
+            and min(float(np.linalg.norm(other.point - hinge.point)) for other in g) < distance
+        ]
+        groups = [g for g in groups if g not in near] + [[hinge, *(h for g in near for h in g)]]
+    return groups
+
+
+def _edge(group: list[Hinge], around: Around) -> tuple[Feature, FloatArray]:
+    """The edge through the hinges, moved by r tan(angle / 2) to where the faces of the body meet; the way out (3,)."""
+    hinges = main_line(np.array([h.point for h in group]))
+    chord = (hinges[-1] - hinges[0]) / max(float(np.linalg.norm(hinges[-1] - hinges[0])), 1e-300)
+    normal = group[0].crossing.normal
+    out = np.cross(chord, normal) * float(np.sign(np.cross(chord, normal) @ np.mean([h.way for h in group], axis=0)))
+    tangents = [abs(h.slope) / max(float(abs(h.way @ out)), 0.2) for h in group]
+    angle = float(np.arctan(np.median(tangents)))
+    convex = group[0].slope < 0
+    shift = around.tip_radius * np.tan(0.5 * angle) * (-1.0 if convex else 1.0)
+    feet = around.base.foot(hinges + shift * out + around.tip_radius * normal, around.tip_radius)
+    length = float(arclengths(feet.points)[-1])
+    rise = around.tip_radius * float(np.tan(angle)) * (-1.0 if convex else 1.0)
+    crossings = [h.crossing for h in group]
+    edge = Feature(
+        kind="convex edge" if convex else "concave corner",
+        axis=feet.points,
+        normals=feet.normals,
+        height=Interval.normal(rise, around.tip_radius * float(np.std(tangents)) / np.sqrt(len(group))),
+        width=Interval(0.0, 0.0, 2 * abs(shift)),
+        length=Interval(length, length, np.inf, censored=True),
+        evidence=Evidence(float(np.sqrt(sum(c.snr**2 for c in crossings))), len(group), (around.detections.algorithm,)),
+        curvature_feature=True,
+        position_sd=float(np.median([c.position_sd for c in crossings])),
+        notes=(f"the body turns by {np.degrees(angle):.1f} degrees; its height is given one tip radius beyond",),
+        extra={"angle": angle},
+    )
+    return edge, out
+
+
+def _beyond(crossing: Crossing, edge: Feature, out: FloatArray, tip_radius: float) -> bool:
+    """True for what lies past the edge, where the base is no model of the body, or within half a tip radius of it."""
+    offset = crossing.point - nearest_on(crossing.point[None], edge.axis)[0][0]
+    return bool(offset @ out > 0 or np.linalg.norm(offset) < 0.5 * tip_radius)

@@ -1,0 +1,118 @@
+"""Unseen: a crossing that claims to be clear, but that the mean heights of its own sweep do not show.
+
+Plateau end: a sweep that came down from a crest to the base, taken for a hollow in the crest's level.
+
+Open crest: a disturbance that the sweep began or ended in, which may as well be a step seen from above.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mapping import Feature
+from mapping.assembly.inspection import Inspection
+from mapping.assembly.linking import uphill
+from mapping.detection import Crossing
+from mapping.geometry.mesh import distances
+from mapping.geometry.templates import crest_trace
+
+# Only what is claimed to be so clear is held to account, and to this share of its claim.
+CLAIM, SHARE = 20.0, 0.3
+
+
+def is_unseen(crossing: Crossing, inspection: Inspection) -> bool:
+    """True if a clear crossing's section is not found in the heights, neither over the base nor over those beside.
+
+    A detection's signal-to-noise ratio is of the whole stretch that was fitted together; a slight crossing beside a
+    strong one may owe all of it to the other.
+    """
+    if crossing.snr < CLAIM or crossing.half_width < 1.2 * inspection.spacing:
+        return False
+    own = inspection.of_sweep(crossing.sweep)
+    heights, gap = inspection.height[own], np.linalg.norm(inspection.points[own] - crossing.point, axis=1)
+    inside, beside = gap < crossing.half_width, (gap > 1.2 * crossing.half_width) & (gap < 3 * crossing.half_width)
+    if not inside.any():
+        return False
+    shape = np.sign(crossing.height) * crest_trace(gap[inside], np.sign(crossing.height), crossing.half_width)
+    level = float(np.median(heights[beside])) if beside.any() else 0.0
+    sd = float(np.median(inspection.sd[own][inside]) / np.sqrt(max(shape @ shape, 1e-3)))
+    seen = [np.sign(crossing.height) * (shape @ (heights[inside] - base)) / (shape @ shape) for base in (0.0, level)]
+    return bool(max(seen) < SHARE * crossing.snr * sd)
+
+
+# A hollow is felt below the base by this share of its depth ...
+FELT = 0.2
+# ... and a plateau stands above it by this share, within so many half-widths of the crossing.
+PLATEAU, NEAR = 0.5, 2.0
+
+
+def is_plateau_end(crossing: Crossing, inspection: Inspection) -> bool:
+    """True if the sweep was at the base's level in the middle of a supposed hollow or crest, and off it on the other
+    side beside: what was detected is the end of what the sweep ran along."""
+    own = inspection.of_sweep(crossing.sweep)
+    heights = np.sign(crossing.height) * inspection.height[own]
+    gap = np.linalg.norm(inspection.points[own] - crossing.point, axis=1)
+    middle = gap < 0.5 * crossing.half_width
+    if not middle.any():
+        return False
+    tall = abs(crossing.height)
+    beside = heights[gap < NEAR * crossing.half_width]
+    felt = bool(heights[middle].mean() + 3 * inspection.sd[own][middle].mean() / np.sqrt(middle.sum()) > FELT * tall)
+    return not felt and bool(np.sort(-beside)[-2:].min() > PLATEAU * tall)
+
+
+# Share of the crest at which a sweep that ends so high is still up.
+STILL_UP = 0.25
+# What is higher than this many heights of a step is more than the step.
+HIGHER = 1.3
+
+
+def is_open(crossing: Crossing, inspection: Inspection) -> bool:
+    """True if the sweep's height had not come back to the base at its first or last place."""
+    own = inspection.of_sweep(crossing.sweep)
+    heights = np.sign(crossing.height) * inspection.height[own]
+    if len(heights) < 4:
+        return True
+    sides = (heights[:2].mean(), heights[-2:].mean())
+    up = max(STILL_UP * abs(crossing.height), 4 * float(np.median(inspection.sd[own])))
+    # the two ends of the disturbance itself, in places of this sweep
+    nearest = int(np.linalg.norm(inspection.points[own] - crossing.point, axis=1).argmin())
+    return any(
+        side > up and bool((part > 0.5 * up).all())
+        for side, part in zip(sides, (heights[: nearest + 1], heights[nearest:]), strict=True)
+    )
+
+
+def comes_down(edge: Crossing, inspection: Inspection) -> bool:
+    """True if the sweep was felt at the lower level beyond a step, and not only up to its own end."""
+    own = inspection.of_sweep(edge.sweep)
+    beyond = (inspection.points[own] - edge.point) @ uphill(edge) * -np.sign(edge.height) > 0
+    low = np.abs(inspection.height[own][beyond]) < 0.5 * abs(edge.height)
+    return bool(low.sum() >= 2)
+
+
+def on_a_step(crest: Crossing, edges: Sequence[Crossing], steps: Sequence[Feature]) -> bool:
+    """True if a crest is no higher than a step, and lies on its displaced side or over its edge."""
+    for step in steps:
+        if abs(crest.height) > HIGHER * step.height.median:
+            continue
+        own = [c for c in edges if distances(c.point[None], step.axis)[0] < c.half_width]
+        if not own:
+            continue
+        nearest = min(own, key=lambda c: float(np.linalg.norm(c.point - crest.point)))
+        side = np.sign(crest.height) * float((crest.point - nearest.point) @ _normal_to(step, nearest))
+        if side > -2 * nearest.half_width:
+            return True
+    return False
+
+
+def _normal_to(step: Feature, edge: Crossing) -> np.ndarray:
+    """(3,) unit direction across a step's axis near one of its crossings, uphill."""
+    k = int(np.linalg.norm(step.axis - edge.point, axis=1).argmin())
+    way = step.axis[min(k + 1, len(step.axis) - 1)] - step.axis[max(k - 1, 0)]
+    across = np.cross(edge.normal, way)
+    norm = float(np.linalg.norm(across))
+    rise = uphill(edge)
+    return rise if norm == 0 else across / norm * (1.0 if across @ rise > 0 else -1.0)

@@ -1,0 +1,133 @@
+"""Inspection: which places of the base the sweeps passed over, and how high they found them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mapping import FloatArray, IntArray, Trace
+from mapping.base import Base
+from mapping.detection import arclength, height_profiles
+from mapping.instrument import Noise
+
+# Sweeps that tell the typical distance between neighbours.
+PROBED = 200
+# Samples that a place without any, between others of its sweep, is worth.
+FILLED = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """Mean heights at places along the sweeps.
+
+    Args:
+        points: (M, 3) places on the base, m.
+        height: (M,) mean height there, m.
+        sd: (M,) standard deviation of each mean, m: a slow sweep has more samples to a place than a fast one.
+        sweep: (M,) number of the sweep.
+        spacing: distance between neighbouring places of a sweep, m.
+    """
+
+    points: FloatArray
+    height: FloatArray
+    sd: FloatArray
+    sweep: IntArray
+    spacing: float
+
+    @cached_property
+    def _tree(self) -> Any:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.points)
+
+    @cached_property
+    def level(self) -> float:
+        """Usual standard deviation of a place's mean, m."""
+        return float(np.median(self.sd)) if len(self.sd) else 0.0
+
+    @cached_property
+    def pitch(self) -> float:
+        """Typical distance from a place to the nearest other sweep, m; infinity for a single sweep."""
+        numbers = sorted(self._places)
+        if len(numbers) < 2:
+            return float("inf")
+        chosen = [numbers[k] for k in np.linspace(0, len(numbers) - 1, min(len(numbers), PROBED)).astype(int)]
+        own = [self._places[number] for number in chosen]
+        probes = np.concatenate([places[np.linspace(0, len(places) - 1, 7).astype(int)[1:-1]] for places in own])
+        gaps = self._to_other_sweeps(probes).reshape(len(own), -1)
+        return float(np.quantile(np.median(gaps, axis=1), 0.75))
+
+    def _to_other_sweeps(self, places: IntArray) -> FloatArray:
+        """Distance from each of the places (indices) to the nearest place of another sweep, m."""
+        gap, left, count = np.full(len(places), np.inf), np.arange(len(places)), 32
+        while len(left):
+            count = min(2 * count, len(self.points))
+            distance, index = self._tree.query(self.points[places[left]], count)
+            other = np.where(self.sweep[index] != self.sweep[places[left], None], distance, np.inf).min(axis=1)
+            gap[left] = other
+            left = left[np.isinf(other)] if count < len(self.points) else left[:0]
+        return gap
+
+    @cached_property
+    def _places(self) -> dict[int, IntArray]:
+        order = np.argsort(self.sweep, kind="stable")
+        cuts = np.flatnonzero(np.diff(self.sweep[order])) + 1
+        return {int(self.sweep[own[0]]): own for own in np.split(order, cuts) if len(own)}
+
+    def of_sweep(self, number: int) -> IntArray:
+        """Indices of one sweep's places in the order in which it passed them."""
+        return self._places.get(number, np.zeros(0, dtype=np.int64))
+
+    def near(self, axis: FloatArray, reach: float) -> IntArray:
+        """Indices, ascending, of all places within `reach` of a polyline (K, 3), and of a few more."""
+        legs = np.linalg.norm(np.diff(axis, axis=0), axis=1)
+        parts = np.maximum(np.ceil(legs / max(reach, np.finfo(float).tiny)).astype(int), 1)
+        share = [k / n for n in parts for k in range(n)]
+        path = np.vstack([np.repeat(axis[:-1], parts, axis=0), axis[-1:]])
+        path[:-1] += np.array(share)[:, None] * np.repeat(np.diff(axis, axis=0), parts, axis=0) if share else 0.0
+        found = self._tree.query_ball_point(path, 1.2 * reach)
+        return np.unique(np.concatenate([np.asarray(some, dtype=np.int64) for some in found]))
+
+    def denies(self, path: FloatArray, height: float, reach: float) -> bool:
+        """True if a place within `reach` of the path (K, 3) was found clearly lower than half the height."""
+        near = self._tree.query_ball_point(path, reach)
+        places = list({place for some in near for place in some})
+        if not places:
+            return False
+        return bool((np.sign(height) * self.height[places] + 3 * self.sd[places] < 0.5 * abs(height)).any())
+
+    def nearest(self, points: FloatArray) -> IntArray:
+        """(K,) index of the place nearest to each of the points (K, 3)."""
+        return np.asarray(self._tree.query(points)[1], dtype=np.int64)
+
+    def inspected(self, point: FloatArray, reach: float) -> bool:
+        """True if a sweep passed within `reach` of the point."""
+        return bool(self._tree.query(point)[0] <= reach)
+
+
+def inspect(trace: Trace, base: Base, noise: Noise, spacing: float) -> Inspection:
+    """Mean heights over stretches of the given length along every sweep of the trace."""
+    points, height, sweep, count = [], [], [], []
+    for number, part in trace.sweeps():
+        s = arclength(part, base)
+        if len(part) < 2 or not s[-1] > 0:
+            continue
+        for profile in height_profiles(number, part, s, base, spacing):
+            points.append(base.foot(profile.centers, part.tip_radius).points)
+            height.append(profile.height)
+            sweep.append(np.full(len(profile.height), number))
+            count.append(np.diff(profile.first))
+    if not points:
+        return Inspection(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), spacing)
+    sd = _sd_of_means(noise, spacing, np.concatenate(count))
+    return Inspection(np.concatenate(points), np.concatenate(height), sd, np.concatenate(sweep), spacing)
+
+
+def _sd_of_means(noise: Noise, spacing: float, count: IntArray) -> FloatArray:
+    """(M,) standard deviations of means over so many samples each, m; what is only filled in says little."""
+    counts, index = np.unique(count, return_inverse=True)
+    worth = np.where(counts > 0, counts, FILLED)
+    return np.sqrt([noise.block_covariances(1, spacing, float(samples))[0] for samples in worth])[index]

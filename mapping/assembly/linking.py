@@ -1,0 +1,77 @@
+"""Linking: which crossings of different sweeps belong to one detail on the base."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.assembly.inspection import Inspection
+from mapping.detection import Crossing
+
+# Crossings further apart than this many sweep distances are not linked, whatever lies between.
+LONGEST_LINK = 6.0
+# Linked crossings differ in height by less than this factor: sweeps beside an end see less of it.
+HEIGHT_RATIO = 0.2
+# A place so near to a supposed line, in half-widths, must have felt it.
+FELT = 0.4
+
+
+def groups(crossings: Sequence[Crossing], inspection: Inspection, scale: float) -> list[list[int]]:
+    """Connected components of the crossings under `linked` (indices), by a minimum spanning forest."""
+    parent = list(range(len(crossings)))
+
+    def root(i: int) -> int:
+        while parent[i] != i:
+            parent[i] = parent[parent[i]]
+            i = parent[i]
+        return i
+
+    points = np.array([c.point for c in crossings])
+    pairs = _pairs(points, LONGEST_LINK * max(min(inspection.pitch, 1e300), scale))
+    for i, j in pairs:
+        if root(i) != root(j) and linked(crossings[i], crossings[j], inspection, scale):
+            parent[root(i)] = root(j)
+    members: dict[int, list[int]] = {}
+    for i in range(len(crossings)):
+        members.setdefault(root(i), []).append(i)
+    return sorted(members.values())
+
+
+def _pairs(points: FloatArray, reach: float) -> list[tuple[int, int]]:
+    """Pairs of points no further apart than `reach`, m, the nearest first."""
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    return [(int(i), int(j)) for i, j in pairs[np.lexsort((pairs[:, 1], pairs[:, 0], distance))]]
+
+
+def linked(a: Crossing, b: Crossing, inspection: Inspection, scale: float) -> bool:
+    """True if both may be the same line: like heights, and no place between them denies it."""
+    low, high = sorted((abs(a.height), abs(b.height)))
+    if low < HEIGHT_RATIO * high or a.normal @ b.normal < 0:
+        return False
+    if a.kind.startswith("step") and uphill(a) @ uphill(b) < 0:
+        return False
+    if a.kind.startswith("step") and low < 0.5 * high:
+        return False
+    if a.kind.startswith("step"):
+        return True
+    return not inspection.denies(between(a.point, b.point, scale), np.sign(a.height) * low, FELT * scale)
+
+
+def uphill(crossing: Crossing) -> FloatArray:
+    """(3,) direction along the sweep in which a step rises."""
+    return crossing.tangent if crossing.kind == "step up" else -crossing.tangent
+
+
+def between(start: FloatArray, stop: FloatArray, scale: float) -> FloatArray:
+    """Points of the segment, half a half-width off its ends."""
+    length = float(np.linalg.norm(stop - start))
+    off = 0.5 * scale
+    if length <= 2 * off:
+        return np.zeros((0, 3))
+    at = np.linspace(off, length - off, max(2, int((length - 2 * off) / (0.25 * scale)) + 1)) / length
+    return np.asarray(start + at[:, None] * (stop - start))

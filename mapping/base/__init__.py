@@ -1,0 +1,33 @@
+"""The base: the global model, its families, extent and pose, and the trace laid on it."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.base.anchor import anchor as anchor, tangent_frame as tangent_frame
+    from mapping.base.base import Base as Base, Feet as Feet
+    from mapping.base.cells import Cells as Cells
+    from mapping.base.extent import (
+        SPACING as SPACING,
+        over_base as over_base,
+        refined as refined,
+        rolled_off as rolled_off,
+        touched_part as touched_part,
+    )
+    from mapping.base.fit import fit_base as fit_base
+    from mapping.base.pose import Pose as Pose, estimate_pose as estimate_pose
+    from mapping.base.projection import onto_base as onto_base
+    from mapping.base.robust import MAD_TO_SD as MAD_TO_SD, robust_scale as robust_scale
+
+_PUBLIC = {
+    "anchor": ("anchor", "tangent_frame"),
+    "base": ("Base", "Feet"),
+    "cells": ("Cells",),
+    "extent": ("SPACING", "over_base", "refined", "rolled_off", "touched_part"),
+    "fit": ("fit_base",),
+    "pose": ("Pose", "estimate_pose"),
+    "projection": ("onto_base",),
+    "robust": ("MAD_TO_SD", "robust_scale"),
+}
+doorway(__name__, _PUBLIC)

@@ -1,0 +1,92 @@
+"""The base when no mesh is given: a simple family by evidence, a freer one where none explains the trace."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from mapping import FloatArray, Trace, TraceError
+from mapping.base.base import Base
+from mapping.base.polyhedron import polyhedron
+from mapping.base.profile import fit_profile, profile_frame
+from mapping.base.quadrics import FAMILIES, Cloud, Family, Fitted, sheet
+from mapping.base.robust import OUTLIER, robust_scale
+from mapping.base.star import star
+from mapping.base.tube import tube
+
+MOST_CELLS = 4000
+# Families for what no simple one explains
+FREE: tuple[Family, ...] = (
+    *(partial(sheet, shortest=shortest) for shortest in (5.0, 2.5)),
+    *(partial(tube, waves=waves, shortest=shortest) for waves in (0, 2, 4, 6, 9) for shortest in (4.0, 2.0)),
+    *(partial(star, degree=degree) for degree in (3, 5, 8, 12)),
+)
+# By how many times the scatter of neighbouring cells half of all cells may miss what keeps freer families from being
+# tried: a simple one, and a polyhedron, which comes near to anything round with enough faces
+EXPLAINED, EXACTLY = 5.0, 1.0
+
+
+def fit_base(trace: Trace, spacing: float | None = None) -> Base:
+    """The smooth body that explains most of a trace; details shorter than about eight tip radii are left out.
+
+    A trace along one line gives a profile. Otherwise every family is fitted to the ball centres by robust
+    least squares, and the one with the best truncated evidence is taken: a detail counts as an outlier, a
+    further parameter must pay for itself. Where no plane, sphere, cylinder, quadric or stiff sheet comes near most of
+    the trace, polyhedra are tried, then supple sheets, tubes and star-shaped bodies. The base is the fitted surface's
+    parallel, one tip radius inward.
+
+    Which side is outside is taken from the contact normals; without them it is the side of +z for sheets
+    and away from the centre for round bodies, unless all of it was felt below the centre, as in a bowl.
+
+    Args:
+        trace: ball centres in contact.
+        spacing: longest side of the mesh's triangles, m, for bases that sweeps are planned on; None: as long as the
+            shape allows.
+
+    Raises:
+        TraceError: fewer than three samples, or all samples in one place.
+    """
+    if len(trace) < 3 or not np.ptp(trace.centers, axis=0).any():
+        raise TraceError(f"a base needs at least three samples in different places; found {len(trace)} samples")
+    frame = profile_frame(trace)
+    if frame is not None:
+        surface, parameters = fit_profile(trace, frame)
+        return Base(surface, "profile", dict(parameters))
+    cloud = Cloud.of(trace, MOST_CELLS)
+    fits = _fits(FAMILIES, cloud)
+    if all(_missed(fit, cloud) > EXPLAINED for fit in fits):
+        fits += _last_resort((polyhedron,), cloud)
+        if all(_missed(fit, cloud) > EXACTLY for fit in fits):
+            fits += _last_resort(FREE, cloud)
+    scale, share = _noise_of(min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual, cloud.floor)
+    best = min(fits, key=lambda fitted: fitted.cost(scale, share))
+    return Base(best.surface(cloud, spacing), best.kind, best.parameters)
+
+
+def _fits(families: Iterable[Family], cloud: Cloud) -> list[Fitted]:
+    return [fitted for family in families if (fitted := family(cloud)) is not None]
+
+
+def _last_resort(families: Iterable[Family], cloud: Cloud) -> list[Fitted]:
+    return [replace(fit, last_resort=True) for fit in _fits(families, cloud)]
+
+
+def _missed(fit: Fitted, cloud: Cloud) -> float:
+    """Distance within which half of the cells lie from the fitted surface, in the scatter of neighbouring cells."""
+    return float(np.median(np.abs(fit.residual))) / cloud.floor
+
+
+def _noise_of(residual: FloatArray, floor: float) -> tuple[float, float]:
+    """Scale of the cells' scatter about the freest fit, m, and the share of them that count as independent.
+
+    Noise that is correlated along the path makes neighbours agree: by the scatter from cell to cell alone, a
+    plane would be bent to follow it.
+    """
+    # the scatter from cell to cell is too large where sweeps are short and bend over features
+    scale = max(0.5 * floor, robust_scale(residual))
+    kept = np.clip(residual / scale, -OUTLIER, OUTLIER)
+    correlation = float(np.clip((kept[1:] * kept[:-1]).mean() / max((kept**2).mean(), 1e-12), 0.0, 0.98))
+    return scale, (1.0 - correlation) / (1.0 + correlation)

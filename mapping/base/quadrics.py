@@ -1,0 +1,349 @@
+"""Families of smooth bodies fitted to ball centres: plane, sphere, cylinder, quadric, smooth sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from mapping import FloatArray, IntArray, Surface, Trace
+from mapping.base.cells import Cells
+from mapping.base.profile import SHORTEST_BEND
+from mapping.base.robust import MAD_TO_SD, OUTLIER, robust_fit, robust_scale
+
+# Upward part of the mean direction from a round body's middle of what was felt inside it, without contact normals
+BELOW = -0.6
+# Share of the scatter of second differences below which that of fourth ones shows that the sweeps bend
+BENT = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """Ball centres thinned to cell medians, in the principal frame of the cloud.
+
+    Args:
+        points: (C, 3) in the frame, m; the third coordinate is outward.
+        origin: (3,) and rows `axes` (3, 3): object frame = origin + points @ axes.
+        scale: standard deviation of the points about a smooth surface, m.
+        tip_radius: m.
+        outward: (C, 3) measured contact normals in the frame, or None.
+    """
+
+    points: FloatArray
+    origin: FloatArray
+    axes: FloatArray
+    scale: float
+    tip_radius: float
+    outward: FloatArray | None
+
+    @classmethod
+    def of(cls, trace: Trace, most: int) -> Cloud:
+        """The thinned cloud of a trace: means of consecutive samples, at most `most` of them."""
+        cells = Cells.of(trace, most)
+        means, normals = cells.centers, cells.normals
+        origin = means.mean(axis=0)
+        axes = np.linalg.svd(means - origin, full_matrices=False)[2]
+        hint = np.array([0.0, 0.0, 1.0]) if normals is None else normals.mean(axis=0)
+        if axes[2] @ hint < 0:
+            axes = np.stack([axes[0], -axes[1], -axes[2]])
+        if np.linalg.det(axes) < 0:
+            axes = np.stack([axes[0], -axes[1], axes[2]])
+        points = (means - origin) @ axes.T
+        return cls(
+            points, origin, axes, _roughness(points), trace.tip_radius, None if normals is None else normals @ axes.T
+        )
+
+    def world(self, points: FloatArray) -> FloatArray:
+        """Points (N, 3) of the frame in the object frame."""
+        return np.asarray(self.origin + points @ self.axes)
+
+    def hollow(self, away: FloatArray) -> bool:
+        """True if the ball runs inside a round body: directions `away` (C, 3) from its middle point into the body.
+
+        The contact normals tell; without them it is so if all was felt below the middle, as in a bowl.
+        """
+        if self.outward is not None:
+            return float((self.outward * away).sum(axis=1).mean()) < 0.0
+        return float((away.mean(axis=0) @ self.axes)[2]) < BELOW
+
+    @property
+    def floor(self) -> float:
+        """The scale, but no less than rounding errors, m."""
+        return max(self.scale, 1e-12 * float(np.abs(self.points).max()), float(np.finfo(float).tiny))
+
+    @property
+    def extent(self) -> FloatArray:
+        """(2, 3) bounds of the points in the frame."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+
+
+def _roughness(points: FloatArray) -> float:
+    """Scatter of neighbouring cells about a smooth curve through them, across the curve.
+
+    Second differences tell it on flat bodies; on round ones they tell the bend of the sweeps, and fourth ones the
+    scatter.
+    """
+    along = points[2:] - points[:-2]
+    bend, length = np.diff(points, 2, axis=0), np.linalg.norm(along, axis=1)
+    even = (np.linalg.norm(bend, axis=1) < 0.5 * length) & (length > 0)
+    if even.sum() < 8:
+        return 0.0
+    flat = float(robust_scale(bend[even, 2]) / np.sqrt(6.0))
+    smooth = even[2:] & even[1:-1] & even[:-2]
+    if smooth.sum() < 8:
+        return flat
+    rest, way = np.diff(points, 4, axis=0)[smooth], along[1:-1][smooth] / length[1:-1][smooth, None]
+    rest -= (rest * way).sum(axis=1)[:, None] * way
+    bent = float(MAD_TO_SD * np.median(np.linalg.norm(rest, axis=1)) / np.sqrt(70.0))
+    return bent if bent < BENT * flat else flat
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A fitted family: its kind, its parameters (JSON values), the misses (C,) m, their freedom, and how to mesh it.
+
+    A parameter of a simple family must pay as much as makes it true in the end (Schwarz's criterion); of families that
+    nothing simple stands in for, the one that predicts best is wanted (Akaike's).
+    """
+
+    kind: str
+    parameters: dict[str, Any]
+    residual: FloatArray
+    freedom: int
+    mesh: Callable[[Cloud, float | None], Surface]
+    last_resort: bool = False
+
+    def cost(self, scale: float, share: float = 1.0) -> float:
+        """Truncated chi-square at a scale (m) plus the price of the parameters; lower is better.
+
+        Args:
+            share: of the cells that count as independent.
+        """
+        misfit = float(np.minimum((self.residual / scale) ** 2, OUTLIER**2).sum())
+        return share * misfit + self.freedom * (2.0 if self.last_resort else float(np.log(len(self.residual))))
+
+    def surface(self, cloud: Cloud, spacing: float | None = None) -> Surface:
+        """The base's mesh in the object frame, covering the cloud; triangles no longer than `spacing` m."""
+        return self.mesh(cloud, spacing)
+
+
+def _sheet(
+    design: Callable[[FloatArray, FloatArray], FloatArray], kind: str, cloud: Cloud, bends: FloatArray | None = None
+) -> Fitted:
+    """A height field z = design(x, y) @ coefficients over the principal plane.
+
+    Args:
+        bends: (B, P) rows of which each times the coefficients is 0 +- 1: what holds where nothing was felt.
+    """
+    x, y, z = cloud.points.T
+    prior = np.zeros((0, design(x[:1], y[:1]).shape[1])) if bends is None else cloud.floor * bends
+    fit = robust_fit(np.vstack([design(x, y), prior]), np.append(z, np.zeros(len(prior))), cloud.scale)
+
+    def height(u: FloatArray, v: FloatArray) -> FloatArray:
+        return np.asarray(design(u, v) @ fit.coefficients)
+
+    cells = 1 if kind == "plane" else 96
+    return Fitted(
+        kind,
+        {"coefficients": fit.coefficients.tolist()},
+        fit.residual[: len(z)],
+        len(fit.coefficients),
+        lambda cloud, spacing: _height_mesh(height, cells, cloud, spacing),
+    )
+
+
+def _height_mesh(
+    height: Callable[[FloatArray, FloatArray], FloatArray], cells: int, cloud: Cloud, spacing: float | None
+) -> Surface:
+    """A grid over the cloud's extent, moved one tip radius inward along the sheet's normals."""
+    low, high = cloud.extent
+    margin = 2.0 * cloud.tip_radius
+    ends = [(float(low[i]) - margin, float(high[i]) + margin) for i in range(2)]
+    u, v = (np.linspace(*end, 1 + max(cells, pieces_of(end[1] - end[0], spacing))) for end in ends)
+    # Beyond the data a polynomial says nothing: the sheet goes on straight from its border.
+    uu, vv = (g.ravel() for g in np.meshgrid(u, v, indexing="ij"))
+    step = 1e-4 * max(float(high[0] - low[0]), float(high[1] - low[1]))
+    cu, cv = np.clip(uu, low[0] + step, high[0] - step), np.clip(vv, low[1] + step, high[1] - step)
+    du = (height(cu + step, cv) - height(cu - step, cv)) / (2 * step)
+    dv = (height(cu, cv + step) - height(cu, cv - step)) / (2 * step)
+    w = height(cu, cv) + du * (uu - cu) + dv * (vv - cv)
+    normal = np.column_stack([-du, -dv, np.ones_like(du)])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    points = np.column_stack([uu, vv, w]) - cloud.tip_radius * normal
+    return Surface(cloud.world(points), _grid_faces(len(u), len(v)))
+
+
+def pieces_of(length: float, spacing: float | None) -> int:
+    """Into how many pieces a length (m) is cut so that none is longer than a spacing."""
+    return 1 if spacing is None else int(np.clip(np.ceil(length / spacing), 1, 500))
+
+
+def _grid_faces(rows: int, columns: int) -> IntArray:
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    right, up = corner + columns, corner + 1
+    return np.concatenate([np.column_stack([corner, right, up]), np.column_stack([right, right + 1, up])])
+
+
+def plane(cloud: Cloud) -> Fitted:
+    """z = c0 + c1 x + c2 y."""
+    return _sheet(lambda x, y: np.column_stack([np.ones_like(x), x, y]), "plane", cloud)
+
+
+def quadric(cloud: Cloud) -> Fitted:
+    """z = a quadratic polynomial of x and y."""
+    return _sheet(lambda x, y: np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y]), "quadric", cloud)
+
+
+def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
+    """A bicubic spline sheet; its pieces are no shorter than so many tip radii."""
+    from scipy.interpolate import BSpline
+
+    low, high = cloud.extent
+    pieces = [int(min(8, (high[i] - low[i]) / (shortest * cloud.tip_radius))) for i in range(2)]
+    if min(pieces) < 1 or len(cloud.points) < 4 * (pieces[0] + 3) * (pieces[1] + 3):
+        return None
+    knots = [
+        np.concatenate([[low[i]] * 3, np.linspace(low[i], high[i], pieces[i] + 1), [high[i]] * 3]) for i in range(2)
+    ]
+
+    def design(x: FloatArray, y: FloatArray) -> FloatArray:
+        bx, by = (
+            BSpline.design_matrix(np.clip(c, k[0], k[-1]), k, 3).toarray() for c, k in ((x, knots[0]), (y, knots[1]))
+        )
+        return np.asarray((bx[:, :, None] * by[:, None, :]).reshape(len(x), -1))
+
+    count = [pieces[i] + 3 for i in range(2)]
+    # the sheet bends no more than the ball: second differences of the coefficients, in squared pieces over its radius
+    along, across = (
+        np.diff(np.eye(count[i]), 2, axis=0) * cloud.tip_radius * (pieces[i] / (high[i] - low[i])) ** 2
+        for i in range(2)
+    )
+    bends = np.vstack([np.kron(along, np.eye(count[1])), np.kron(np.eye(count[0]), across)])
+    return _sheet(design, "sheet", cloud, bends)
+
+
+def sphere(cloud: Cloud) -> Fitted | None:
+    """Centre and radius, from the algebraic fit refined by robust distances."""
+    from scipy.optimize import least_squares
+
+    p = cloud.points
+    start = np.linalg.lstsq(np.column_stack([2 * p, np.ones(len(p))]), (p**2).sum(axis=1), rcond=None)[0]
+    radius = float(np.sqrt(max(start[3] + start[:3] @ start[:3], 0.0)))
+
+    def residual(q: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.norm(p - q[:3], axis=1) - q[3])
+
+    q = least_squares(residual, [*start[:3], radius], loss="soft_l1", f_scale=max(cloud.scale, 1e-9 * radius)).x
+    centre = q[:3]
+    hollow = cloud.hollow((p - centre) / np.linalg.norm(p - centre, axis=1, keepdims=True))
+    body = float(q[3]) + (cloud.tip_radius if hollow else -cloud.tip_radius)
+    if not 0.0 < body < 20.0 * float(np.ptp(p, axis=0).max()):
+        return None
+    parameters = {"centre": cloud.world(centre[None])[0].tolist(), "radius": body} | (
+        {"hollow": True} if hollow else {}
+    )
+    return Fitted(
+        "sphere", parameters, residual(q), 4, lambda cloud, spacing: _sphere_mesh(centre, body, hollow, cloud)
+    )
+
+
+def _sphere_mesh(centre: FloatArray, radius: float, hollow: bool, cloud: Cloud) -> Surface:
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=6, radius=radius)
+    return Surface(cloud.world(np.asarray(ball.vertices) + centre), outside(np.asarray(ball.faces), hollow))
+
+
+def outside(faces: IntArray, hollow: bool) -> IntArray:
+    """Faces of a closed body, turned over if it is hollow."""
+    return np.asarray(faces[:, ::-1] if hollow else faces, dtype=np.int64)
+
+
+@lru_cache(maxsize=1)
+def cylinder(cloud: Cloud) -> Fitted | None:
+    """Axis and radius by robust distances, started along each principal axis of the cloud; every tube asks for it."""
+    from scipy.optimize import least_squares
+
+    p = cloud.points
+    best = None
+    for axis in range(3):
+        across = [i for i in range(3) if i != axis]
+        flat = p[:, across]
+        start = np.linalg.lstsq(np.column_stack([2 * flat, np.ones(len(p))]), (flat**2).sum(axis=1), rcond=None)[0]
+        radius = float(np.sqrt(max(start[2] + start[:2] @ start[:2], 0.0)))
+
+        def residual(q: FloatArray, axis: int = axis, across: list[int] = across) -> FloatArray:
+            return np.asarray(np.linalg.norm(_across(p, q, axis, across), axis=1) - q[4])
+
+        scale = max(cloud.scale, 1e-9 * radius)
+        found = least_squares(residual, [start[0], start[1], 0.0, 0.0, radius], loss="soft_l1", f_scale=scale)
+        misses = residual(found.x)
+        cost = float(np.minimum((misses / cloud.floor) ** 2, OUTLIER**2).sum())
+        if best is None or cost < best[0]:
+            best, missed = (cost, found.x, axis, across), misses
+    assert best is not None
+    _, q, axis, across = best
+    away = _across(p, q, axis, across)
+    hollow = cloud.hollow(away / np.linalg.norm(away, axis=1, keepdims=True))
+    body = float(q[4]) + (cloud.tip_radius if hollow else -cloud.tip_radius)
+    if not 0.0 < body < 20.0 * float(np.ptp(p, axis=0).max()):
+        return None
+    direction, point = np.zeros(3), np.zeros(3)
+    direction[axis], direction[across[0]], direction[across[1]] = 1.0, q[2], q[3]
+    direction /= np.linalg.norm(direction)
+    point[across[0]], point[across[1]] = q[0], q[1]
+    parameters = {
+        "point": cloud.world(point[None])[0].tolist(),
+        "axis": (direction @ cloud.axes).tolist(),
+        "radius": body,
+    } | ({"hollow": True} if hollow else {})
+    return Fitted(
+        "cylinder",
+        parameters,
+        missed,
+        5,
+        lambda cloud, spacing: _cylinder_mesh(point, direction, body, hollow, cloud, spacing),
+    )
+
+
+def _across(p: FloatArray, q: FloatArray, axis: int, across: list[int]) -> FloatArray:
+    """Vectors from the axis (point q0, q1; direction 1, q2, q3) to the points, perpendicular to it."""
+    direction, point = np.zeros(3), np.zeros(3)
+    direction[axis], direction[across[0]], direction[across[1]] = 1.0, q[2], q[3]
+    direction /= np.linalg.norm(direction)
+    point[across[0]], point[across[1]] = q[0], q[1]
+    offset = p - point
+    return np.asarray(offset - np.outer(offset @ direction, direction))
+
+
+def _cylinder_mesh(
+    point: FloatArray, direction: FloatArray, radius: float, hollow: bool, cloud: Cloud, spacing: float | None
+) -> Surface:
+    """A tube over the cloud's length; its facets stay within a millionth of the radius (20 with a spacing)."""
+    height = (cloud.points - point) @ direction
+    margin = 2.0 * cloud.tip_radius
+    helper = np.eye(3)[np.abs(direction).argmin()]
+    u = np.cross(direction, helper)
+    u /= np.linalg.norm(u)
+    v = np.cross(direction, u)
+    low, high = float(height.min()) - margin, float(height.max()) + margin
+    around, along = 2048 if spacing is None else 512, pieces_of(high - low, spacing)
+    angle = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
+    ring = radius * (np.outer(np.cos(angle), u) + np.outer(np.sin(angle), v))
+    levels = point + np.linspace(low, high, along + 1)[:, None] * direction
+    vertices = (levels[:, None, :] + ring[None, :, :]).reshape(-1, 3)
+    return Surface(cloud.world(vertices), outside(ring_faces(around, along), hollow))
+
+
+def ring_faces(around: int, along: int) -> IntArray:
+    """Triangles of a tube whose vertices are rings of `around` corners, one after the other."""
+    level, k = (grid.ravel() for grid in np.meshgrid(np.arange(along), np.arange(around), indexing="ij"))
+    a, b = level * around + k, level * around + (k + 1) % around
+    return np.concatenate([np.column_stack([a, b, b + around]), np.column_stack([a, b + around, a + around])])
+
+
+Family = Callable[[Cloud], Fitted | None]
+FAMILIES: tuple[Family, ...] = (plane, sphere, cylinder, quadric, sheet)

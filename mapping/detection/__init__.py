@@ -1,0 +1,30 @@
+"""Detection: the crossings of one sweep, at a stated rate of false alarms."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.detection.coverage import (
+        Coverage as Coverage,
+        coverage as coverage,
+        face_samples as face_samples,
+        found_heights as found_heights,
+    )
+    from mapping.detection.crossing import Crossing as Crossing
+    from mapping.detection.detect import Detections as Detections, detect as detect
+    from mapping.detection.height_profile import arclength as arclength, height_profiles as height_profiles
+    from mapping.detection.paper_algorithms import (
+        along_chord as along_chord,
+        curvature_features as curvature_features,
+        curvature_profile as curvature_profile,
+    )
+
+_PUBLIC = {
+    "coverage": ("Coverage", "coverage", "face_samples", "found_heights"),
+    "crossing": ("Crossing",),
+    "detect": ("Detections", "detect"),
+    "height_profile": ("arclength", "height_profiles"),
+    "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
+}
+doorway(__name__, _PUBLIC)

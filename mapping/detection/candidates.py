@@ -1,0 +1,248 @@
+"""Stretches: where along a profile the heights leave the base, found by a bank of matched filters."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from mapping import BoolArray, FloatArray
+from mapping.detection.cap_fit import Disturbance, fit_cap
+from mapping.detection.height_profile import HeightProfile
+from mapping.detection.matched_filter import Bank
+from mapping.instrument import Noise
+
+# A stretch reaches as far as the smoothed height exceeds this share of the crest, or 2.5 standard deviations.
+SKIRT = 0.03
+SKIRT_SDS = 2.5
+# A crest beside a higher one counts if the valley between them is deeper than this share of the lower, or 5 sds.
+PROMINENCE = 0.2
+PROMINENCE_SDS = 5.0
+# What is left beside a disturbance and lower than this share of it belongs to it: no feature is exactly a cap.
+SIDE_LOBE = 0.12
+# Share of the threshold that the fitted height must reach too: at the ends of a sweep the fit knows less.
+MEASURED = 0.5
+# The tip draws no cap higher than w^2 / (2 r); twice as much is no contact but a disturbance of the measurement.
+PHYSICAL = 2.0
+LARGEST_SHARE = 0.6
+# A disturbance weaker than this many thresholds hides no other: what it leaves behind are its own side lobes.
+HIDING = 1.5
+ROUNDS = 50
+# Samples are scarce where the noise's variance is raised by more than this share: less is the binning's own.
+SCARCE = 0.1
+
+
+def find_disturbances(
+    profile: HeightProfile, bank: Bank, noise: Noise, threshold: float, tip_radius: float
+) -> tuple[Disturbance, ...]:
+    """Every disturbance above the threshold, the strongest first.
+
+    Args:
+        profile: heights along one sweep.
+        bank: matched filters for its noise and bins.
+        noise: of single samples.
+        threshold: smallest signal-to-noise ratio.
+        tip_radius: m.
+    """
+    found: list[Disturbance] = []
+    for height, begin, end, crest, snr in _stretches(profile, bank, noise, threshold, tip_radius):
+        for low, high in _crests(height, begin, end, crest, profile, noise, tip_radius):
+            beside = (low > begin, high < end)
+            sign = float(np.sign(crest))
+            new = fit_cap(height, (low, high), sign, profile, noise, bank.drift, tip_radius, beside)
+            if not any(beside) and new.snr < snr:
+                new = replace(new, snr=snr)
+            certain = abs(new.height) >= MEASURED * threshold * new.height_sd
+            if certain and new.snr >= threshold and not _side_lobe(new, found, bank.drift > 0):
+                found.append(new)
+    return tuple(found)
+
+
+def quiet_bins(profile: HeightProfile, bank: Bank, noise: Noise, threshold: float, tip_radius: float) -> BoolArray:
+    """(n,) True where a profile shows nothing above the threshold; nowhere if it is too short for any filter."""
+    short = bank.filters[0].half_width > LARGEST_SHARE * profile.length
+    quiet = np.full(len(profile.height), not short)
+    for _, begin, end, _, _ in _stretches(profile, bank, noise, threshold, tip_radius):
+        quiet[begin:end] = False
+    return quiet
+
+
+def _stretches(
+    profile: HeightProfile, bank: Bank, noise: Noise, threshold: float, tip_radius: float
+) -> Iterator[tuple[FloatArray, int, int, float, float]]:
+    """(heights, first bin, past-last bin, crest, signal-to-noise) of each stretch.
+
+    Each round takes the candidates that nothing stronger overlaps, removes those stretches from the profile that
+    are strong enough to hide others, and looks again, until nothing new exceeds the threshold.
+    """
+    height = profile.height.copy()
+    certainty = _certainties(profile, bank)
+    weak: list[tuple[int, float]] = []
+    changed = True
+    for _ in range(ROUNDS):
+        if changed:
+            candidates = _candidates(height, bank, threshold, tip_radius, certainty)
+        accepted, changed = _dominant(candidates, weak), False
+        if not accepted:
+            return
+        for place, half_width, crest, snr in accepted:
+            begin, end = _extent(height, place, half_width, crest, profile, noise, tip_radius)
+            yield height.copy(), begin, end, crest, snr
+            if snr < HIDING * threshold:
+                weak.append((place, half_width))
+                continue
+            shoulders = _shoulders(height, begin, end, bank.drift > 0)
+            changed = True
+            height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
+
+
+def _scarcity(profile: HeightProfile, bank: Bank) -> FloatArray:
+    """(n,) share by which the noise's variance in a bin exceeds the average for want of samples; 0 if none does."""
+    counts = np.maximum(np.diff(profile.first), 1)
+    white = bank.noise.white**2 / bank.samples
+    share = white / max(white + bank.noise.correlated**2, np.finfo(float).tiny)
+    return np.asarray(share * (bank.samples / counts - 1.0))
+
+
+def _certainties(profile: HeightProfile, bank: Bank) -> Callable[[int], FloatArray | None]:
+    """Of the k-th filter, when asked: expected over actual sd of what it sees in each bin (n,), at most 1.
+
+    None where it is 1 throughout.
+    """
+    scarcity = _scarcity(profile, bank)
+    if scarcity.max(initial=0.0) <= SCARCE:
+        return lambda _: None
+    return cache(lambda k: _certainty(scarcity, int(bank.filters[k].half_width / bank.spacing)))
+
+
+def _certainty(scarcity: FloatArray, bins: int) -> FloatArray | None:
+    raised = _running_mean(scarcity, max(1, bins))
+    if raised.max() <= SCARCE:
+        return None
+    return np.asarray(1 / np.sqrt(1 + np.where(raised > SCARCE, raised, 0.0)))
+
+
+def _candidates(
+    height: FloatArray, bank: Bank, threshold: float, tip_radius: float, certainty: Callable[[int], FloatArray | None]
+) -> list[tuple[float, int, float, float]]:
+    """(signal-to-noise, bin, half-width in bins, height) of local maxima over place for every width."""
+    result = []
+    for k, f in enumerate(bank.filters):
+        if f.half_width > LARGEST_SHARE * len(height) * bank.spacing or len(height) < 2 * f.coarse:
+            continue
+        crest, sd = f.heights(height)
+        snr = np.abs(crest) / sd
+        if snr.max() <= threshold:
+            continue
+        if (share := certainty(k)) is not None:
+            snr *= share[: len(crest) * f.coarse : f.coarse]
+        snr[np.abs(crest) > PHYSICAL * f.half_width**2 / (2 * tip_radius)] = 0.0
+        around = np.concatenate([[-1.0], snr, [-1.0]])
+        peaks = np.flatnonzero((snr > threshold) & (snr >= around[:-2]) & (snr > around[2:]))
+        width = f.half_width / bank.spacing
+        result += [(float(snr[p]), int((p + 0.5) * f.coarse), width, float(crest[p])) for p in peaks]
+    return result
+
+
+def _dominant(
+    candidates: list[tuple[float, int, float, float]], taken: list[tuple[int, float]]
+) -> list[tuple[int, float, float, float]]:
+    """Place, half-width, height and signal-to-noise of the candidates, the strongest first.
+
+    Candidates that overlap a stronger one or one of those taken already (place, half-width) are left out.
+    """
+    kept: list[tuple[int, float, float, float]] = []
+    blocked = list(taken)
+    for snr, place, half_width, crest in sorted(candidates, reverse=True):
+        if all(abs(place - other) >= half_width + width for other, width in blocked):
+            kept.append((place, half_width, crest, snr))
+        blocked.append((place, half_width))
+    return kept
+
+
+def _extent(
+    height: FloatArray,
+    place: int,
+    half_width: float,
+    crest: float,
+    profile: HeightProfile,
+    noise: Noise,
+    tip_radius: float,
+) -> tuple[int, int]:
+    """First and past-last bin around a place within which the profile stays off the base on one side."""
+    size, sd = _smoothing(crest, half_width, profile, noise, tip_radius)
+    low, high = max(0, int(place - half_width)), min(len(height), int(place + half_width) + 2)
+    smooth = np.sign(crest) * _running_mean(height, size)
+    off = smooth > max(SKIRT * abs(crest), SKIRT_SDS * sd)
+    below, above = np.flatnonzero(~off[:low]), np.flatnonzero(~off[high:])
+    begin = int(below[-1]) + 1 if len(below) else 0
+    end = high + int(above[0]) if len(above) else len(height)
+    return begin, end
+
+
+def _smoothing(
+    crest: float, half_width: float, profile: HeightProfile, noise: Noise, tip_radius: float
+) -> tuple[int, float]:
+    """Half-size in bins of a running mean that keeps every physical structure, and the sd of its output."""
+    sharpest = float(np.sqrt(2 * tip_radius * abs(crest)))
+    size = int(0.2 * min(sharpest, half_width * profile.spacing) / profile.spacing)
+    count = 2 * size + 1
+    covariance = noise.block_covariances(1, count * profile.spacing, count * profile.samples)
+    return size, float(np.sqrt(covariance[0]))
+
+
+def _running_mean(height: FloatArray, size: int) -> FloatArray:
+    """Mean over 2 size + 1 bins, shorter at the ends."""
+    sums = np.concatenate([[0.0], np.cumsum(height)])
+    index = np.arange(len(height))
+    low, high = np.maximum(index - size, 0), np.minimum(index + size + 1, len(height))
+    return np.asarray((sums[high] - sums[low]) / (high - low))
+
+
+def _shoulders(height: FloatArray, begin: int, end: int, drift: bool) -> tuple[float, float]:
+    """Levels to join when a stretch is removed: the base itself, or what stands beside it."""
+    if not drift:
+        return 0.0, 0.0
+    size = max(2, (end - begin) // 3)
+    sides = [height[max(0, begin - size) : begin], height[end : end + size]]
+    levels = [float(np.median(side)) for side in sides if len(side)] or [0.0]
+    return levels[0], levels[-1]
+
+
+def _crests(
+    height: FloatArray,
+    begin: int,
+    end: int,
+    crest: float,
+    profile: HeightProfile,
+    noise: Noise,
+    tip_radius: float,
+) -> list[tuple[int, int]]:
+    """Bounds of the crests of a stretch: split at valleys deep against the noise and the lower crest beside."""
+    size, sd = _smoothing(crest, (end - begin) / 2, profile, noise, tip_radius)
+    smooth = np.sign(crest) * _running_mean(height, size)[begin:end]
+    valleys = []
+    top = lowest = 0
+    for i in range(1, len(smooth)):
+        if smooth[i] < smooth[lowest]:
+            lowest = i
+        needed = max(PROMINENCE * min(smooth[top], smooth[i]), PROMINENCE_SDS * sd)
+        deep = lowest > top and smooth[i] - smooth[lowest] > needed and smooth[top] - smooth[lowest] > needed
+        if deep:
+            valleys.append(lowest)
+        if deep or smooth[i] > smooth[top]:
+            top = lowest = i
+    bounds = [begin, *(begin + v for v in valleys), end]
+    return list(itertools.pairwise(bounds))
+
+
+def _side_lobe(new: Disturbance, found: list[Disturbance], drift: bool) -> bool:
+    """True for what is left of a stronger disturbance whose shape is not quite a cap."""
+    for old in found:
+        reach = (old.stop - old.start) * (1.0 if drift else 0.6) + new.half_width
+        if abs(new.place - old.place) < reach and abs(new.height) < SIDE_LOBE * abs(old.height):
+            return True
+    return False

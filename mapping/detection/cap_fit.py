@@ -1,0 +1,193 @@
+"""Cap fit: the cap, or the flat-topped plateau, that explains a stretch of a profile best.
+
+Disturbance: one crest, dip or plateau of a height profile, measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.detection.height_profile import HeightProfile
+from mapping.instrument import Noise
+
+# Improvement in twice the log-likelihood that a plateau must bring over a cap.
+PLATEAU_GAIN = 12.0
+# Averaging a stretch to this many bins costs its fit less than 1 % of its information.
+BINS = 120
+ZOOM_ROUNDS = 5
+# Shares of a plateau's half-width that its flanks may take, and how often the best share is refined.
+FLANKS = (0.4, 0.02)
+FLANK_ROUNDS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class _Whitened:
+    """A window of a profile seen through the inverse square root of its noise.
+
+    Args:
+        x: (n,) arclengths of the bins' middles, m, from the profile's first bin.
+        step: width of the bins, m.
+        root: (n, n) whitening matrix, with the drift projected out.
+        values: (n,) whitened heights.
+    """
+
+    x: FloatArray
+    step: float
+    root: FloatArray
+    values: FloatArray
+
+    def gains(
+        self, place: FloatArray, half_width: FloatArray, flat: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Gain in twice the log-likelihood, height and its information for caps (C,), by least squares."""
+        from mapping.detection.cap_kernels import caps
+
+        seen = caps(self.x[0], self.step, len(self.x), place, half_width, flat * half_width) @ self.root.T
+        information = np.maximum(np.einsum("ij,ij->i", seen, seen), np.finfo(float).tiny)
+        height = seen @ self.values / information
+        return height * np.abs(height) * information, height, information
+
+
+def fit_cap(
+    height: FloatArray,
+    bounds: tuple[int, int],
+    sign: float,
+    profile: HeightProfile,
+    noise: Noise,
+    drift: int,
+    tip_radius: float,
+    neighbours: tuple[bool, bool] = (False, False),
+) -> Disturbance:
+    """Generalised least squares over place, half-width and flatness.
+
+    Args:
+        height: (n,) heights of the profile, m, with other disturbances removed.
+        bounds: first and past-last bin of the stretch.
+        sign: +1 for a crest, -1 for a dip.
+        profile: where the heights come from.
+        noise: of single samples.
+        drift: number of polynomial terms of the base that the fit must ignore.
+        tip_radius: m; nothing on a trace is sharper.
+        neighbours: whether another crest begins right before and right behind: it must not pull at the fit.
+    """
+    low, high = bounds
+    window = _whitened(height, low, high, profile, noise, drift, neighbours)
+    spacing = profile.spacing
+    half = max(0.5 * (high - low) * spacing, 1.5 * spacing)
+    sharpest = float(np.sqrt(2 * tip_radius * np.abs(height[low:high]).max()))
+    crest = _zoom(window, sign, low * spacing, (high - 1) * spacing, half, 0.0)
+    if half > 1.5 * sharpest and not any(neighbours):
+        plateau = _plateau(window, sign, low * spacing, (high - 1) * spacing, half)
+        if plateau[0] > crest[0] + PLATEAU_GAIN:
+            crest = plateau
+    gain, place, half_width, flat = crest
+    shift = 0.05 * half_width
+    around, heights, information = window.gains(
+        np.array([place - shift, place, place + shift]), np.full(3, half_width), np.full(3, flat)
+    )
+    bend = float(sign * (2 * around[1] - around[0] - around[2])) / shift**2
+    return Disturbance(
+        place=place + profile.start,
+        start=low * spacing + profile.start,
+        stop=(high - 1) * spacing + profile.start,
+        height=float(heights[1]),
+        height_sd=float(1 / np.sqrt(information[1])),
+        place_sd=min(float(np.sqrt(2 / bend)) if bend > 0 else half_width, half_width),
+        half_width=half_width,
+        flat=flat * half_width,
+        curvature=2 * float(heights[1]) / (half_width * (1 - flat)) ** 2,
+        snr=float(np.sqrt(max(gain, 0.0))),
+    )
+
+
+def _whitened(
+    height: FloatArray,
+    low: int,
+    high: int,
+    profile: HeightProfile,
+    noise: Noise,
+    drift: int,
+    neighbours: tuple[bool, bool],
+) -> _Whitened:
+    margin = max(4, (high - low) // (2 if drift else 4))
+    begin = low if neighbours[0] else max(0, low - margin)
+    end = high if neighbours[1] else min(len(height), high + margin)
+    if end - begin < 5:
+        begin, end = max(0, begin - 2), min(len(height), end + 2)
+    merge = max(1, (end - begin) // BINS)
+    count = (end - begin) // merge
+    x = (begin + (np.arange(count, dtype=np.float64) + 0.5) * merge - 0.5) * profile.spacing
+    values = height[begin : begin + count * merge].reshape(count, merge).mean(axis=1)
+    step = merge * profile.spacing
+    covariances = noise.block_covariances(count, step, profile.samples * merge)
+    lags = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    cholesky = np.linalg.cholesky(covariances[lags] + 1e-12 * covariances[0] * np.eye(count))
+    root = np.linalg.inv(cholesky)
+    if drift:
+        nuisance = ((x - x.mean()) / max(float(np.ptp(x)), step))[:, None] ** np.arange(drift)
+        basis = np.linalg.qr(root @ nuisance)[0]
+        root = root - basis @ (basis.T @ root)
+    return _Whitened(x, step, root, root @ values)
+
+
+def _plateau(window: _Whitened, sign: float, low: float, high: float, half: float) -> tuple[float, float, float, float]:
+    """(gain, place, half-width, flatness) of the best plateau: its flanks may be a small share of its width."""
+    flats = list(1.0 - np.geomspace(*FLANKS, 6))
+    best = max(_zoom(window, sign, low, high, half, flat) for flat in flats)
+    factor = (FLANKS[1] / FLANKS[0]) ** 0.1
+    for _ in range(FLANK_ROUNDS):
+        near = [1.0 - (1.0 - best[3]) * f for f in (1 / factor, factor)]
+        best = max(best, *(_zoom(window, sign, low, high, half, flat) for flat in near))
+        factor = factor**0.5
+    return best
+
+
+def _zoom(
+    window: _Whitened, sign: float, low: float, high: float, half: float, flat: float
+) -> tuple[float, float, float, float]:
+    """(gain, place, half-width, flatness) of the best cap: a grid, refined around its best point."""
+    places = np.linspace(low, high, 17)
+    narrowest = max(1.2 * window.step, half / 8)
+    widths = np.geomspace(narrowest, max(2.0 * half, 1.1 * narrowest), 13)
+    best = (-np.inf, 0.5 * (low + high), half, flat)
+    for _ in range(ZOOM_ROUNDS):
+        grid_place, grid_width = (g.ravel() for g in np.meshgrid(places, widths))
+        gains = sign * window.gains(grid_place, grid_width, np.full(len(grid_place), flat))[0]
+        k = int(gains.argmax())
+        if gains[k] > best[0]:
+            best = (float(gains[k]), float(grid_place[k]), float(grid_width[k]), flat)
+        reach = places[1] - places[0]
+        factor = widths[1] / widths[0]
+        places = np.clip(np.linspace(best[1] - reach, best[1] + reach, 9), low, high)
+        widths = np.maximum(best[2] * np.geomspace(1 / factor, factor, 9), narrowest)
+    return best
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """What one stretch of a profile holds.
+
+    Args:
+        place: arclength of the crest, or of the plateau's middle, m.
+        start, stop: arclengths between which the profile is disturbed, m.
+        height: signed height of the crest, m.
+        height_sd, place_sd: standard deviations, m.
+        half_width: of the fitted cap, m.
+        flat: half-length of the flat top, m; 0 for a crest.
+        curvature: of the trace at the crest (of the flanks for a plateau), 1/m.
+        snr: signal-to-noise ratio.
+    """
+
+    place: float
+    start: float
+    stop: float
+    height: float
+    height_sd: float
+    place_sd: float
+    half_width: float
+    flat: float
+    curvature: float
+    snr: float

@@ -1,0 +1,140 @@
+"""Coverage: which share of each face sweeps inspected, and how small a feature on it they would have found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import BoolArray, FloatArray, IntArray, Surface
+
+# Samples of faces looked at, at most
+MOST_SAMPLES = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """How much of a mesh was inspected.
+
+    Args:
+        share: (F,) inspected share of each face, 0 to 1.
+        fraction: inspected share of the area of all faces (of the region).
+        reach: distance from a sweep up to which a feature is seen, m.
+    """
+
+    share: FloatArray
+    fraction: float
+    reach: float
+
+
+def coverage(surface: Surface, touched: FloatArray, reach: float, region: BoolArray | None = None) -> Coverage:
+    """Coverage of a mesh by the points (N, 3) that sweeps touched.
+
+    Every face is sampled three times as finely as `reach`; a sample is inspected if a touched point lies within
+    `reach` of it in space.
+
+    Args:
+        region: (F,) faces that were to be inspected; all if None.
+    """
+    from scipy.spatial import cKDTree
+
+    points, owner = face_samples(surface, reach / 3.0)
+    near = np.zeros(len(points), dtype=bool)
+    if len(touched):
+        distance, _ = cKDTree(touched).query(points, distance_upper_bound=reach)
+        near = np.isfinite(distance)
+    count = len(surface.faces)
+    share = np.bincount(owner, weights=near, minlength=count) / np.bincount(owner, minlength=count)
+    areas = surface.face_areas if region is None else surface.face_areas * region
+    total = float(areas.sum())
+    return Coverage(share, float((share * areas).sum() / total) if total > 0 else 0.0, reach)
+
+
+def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limit: float) -> FloatArray:
+    """(F,) m: a crest at least this high anywhere on the face would have been found; infinity where it might not.
+
+    A ball that passes a sharp crest of height D at the distance y still rises to D - (r - sqrt(r^2 - y^2)); it is
+    found, with the probability that `limit` is stated for, if that is at least the detection limit. Taken is the
+    nearest sweep alone, so the true probability is higher where two sweeps pass near.
+
+    Args:
+        touched: (N, 3) places of the base that sweeps touched, closer together than the answer is wanted, m.
+        tip_radius: r, m.
+        limit: height of the smallest crest found where a sweep crosses it, m.
+
+    Reference: theory sections 4 and 6.
+    """
+    from scipy.spatial import cKDTree
+
+    if not len(touched):
+        return np.full(len(surface.faces), np.inf)
+    step = 0.06 * tip_radius
+    while _sample_count(surface, step) > MOST_SAMPLES:
+        step *= 1.5  # a coarser answer is a more cautious one
+    points, owner = face_samples(surface, step)
+    distance, _ = cKDTree(touched).query(points, distance_upper_bound=0.9 * tip_radius, workers=-1)
+    # as far as a place of the face may lie from the nearest sample
+    distance = np.asarray(distance) + 0.55 * (_longest_sides(surface) / _parts(surface, step))[owner]
+    passed = distance < tip_radius
+    lost = np.full(len(points), np.inf)
+    lost[passed] = distance[passed] ** 2 / (tip_radius + np.sqrt(tip_radius**2 - distance[passed] ** 2))
+    worst = np.zeros(len(surface.faces))
+    np.maximum.at(worst, owner, lost)
+    return limit + worst
+
+
+def found_probability(
+    distance: FloatArray, height: float, tip_radius: float, limit: float, threshold: float, at_limit: float = 0.95
+) -> FloatArray:
+    """(N,) probability that a sweep which passes a sharp crest at the distances (N,) m finds it.
+
+    The signal-to-noise ratio grows as the 5/4th power of the height that the sweep sees (white noise: height times
+    the square root of the width), and is such that a crest of the detection limit is found with `at_limit`.
+
+    Args:
+        height: of the crest, m.
+        limit, threshold: of the detection: m, and in standard deviations.
+
+    Reference: theory section 6: P = Phi(d' - u).
+    """
+    from scipy.special import ndtr, ndtri
+
+    y = np.minimum(np.abs(distance), tip_radius)
+    seen = np.clip(height - y**2 / (tip_radius + np.sqrt(tip_radius**2 - y**2)), 0.0, None)
+    signal = (threshold + ndtri(at_limit)) * (seen / limit) ** 1.25
+    return np.where(seen > 0, ndtr(signal - threshold), 0.0)
+
+
+def _parts(surface: Surface, spacing: float) -> IntArray:
+    """(F,) subdivisions of each face's sides."""
+    longest = _longest_sides(surface)
+    # a face of 200 subdivisions already has 40 000 samples
+    return np.asarray(np.clip(np.ceil(longest / spacing), 1, 200).astype(np.int64))
+
+
+def _longest_sides(surface: Surface) -> FloatArray:
+    """(F,) m."""
+    corners = surface.vertices[surface.faces]
+    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1))
+
+
+def _sample_count(surface: Surface, spacing: float) -> int:
+    parts = _parts(surface, spacing)
+    # a spacing that leaves each face one sample cannot be made coarser
+    return int((parts**2).sum()) if parts.max(initial=1) > 1 else 0
+
+
+def face_samples(surface: Surface, spacing: float) -> tuple[FloatArray, IntArray]:
+    """Points (N, 3) spread evenly over every face, at most about `spacing` apart, and the face of each."""
+    corners, parts = surface.vertices[surface.faces], _parts(surface, spacing)
+    points, owner = [], []
+    for n in np.unique(parts):
+        faces = np.flatnonzero(parts == n)
+        i, j = np.divmod(np.arange(n * n), n)
+        flip = i + j >= n
+        u = np.where(flip, n - i - 1 / 3, i + 1 / 3) / n
+        v = np.where(flip, n - j - 1 / 3, j + 1 / 3) / n
+        weights = np.column_stack([1 - u - v, u, v])
+        points.append(np.einsum("sk,fkx->fsx", weights, corners[faces]).reshape(-1, 3))
+        owner.append(np.repeat(faces, n * n))
+    return np.concatenate(points), np.concatenate(owner)

@@ -1,0 +1,279 @@
+"""Detection: where sweeps passed over something that the base does not explain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapping import DetectionError, FloatArray, IntArray, Trace
+from mapping.base import Base, fit_base
+from mapping.detection.candidates import find_disturbances
+from mapping.detection.cap_fit import Disturbance
+from mapping.detection.crossing import Crossing
+from mapping.detection.false_alarms import threshold_for
+from mapping.detection.height_profile import HeightProfile, arclength, height_profiles
+from mapping.detection.matched_filter import BINS_PER_HALF_WIDTH, smallest_half_width
+from mapping.detection.paper_algorithms import along_chord, curvature_features
+from mapping.detection.quiet_noise import CERTAIN, background, first_noise, floored, raw_stretches
+from mapping.instrument import Noise, StatedNoise
+
+# Number, samples and arclengths (N,) m of a sweep
+Sweep = tuple[int, Trace, FloatArray]
+
+# Half-width of the widest disturbance that counts as fine, in tip radii.
+LARGEST = 4.0
+# Height, in standard deviations of a profile, of the gentlest detail that is no roughness of an unknown base.
+ROUGHNESS = 5.0
+PROBABILITY = 0.95
+# Height, in steps of positions that are rounded, up to which a detail may be the rounding's: half a step to either
+# side, and a step and a half of motion between two reports.
+UNRESOLVED = 2.5
+# Distances between samples that differ by no more than this factor are as good as equal.
+ALIKE = 1.15
+
+
+@dataclass(frozen=True, eq=False)
+class Detections:
+    """What a trace holds beyond its base.
+
+    Args:
+        crossings: one for every place where a sweep passed over something, in the order of the trace.
+        noise: of the trace's samples.
+        algorithm: number of the paper's algorithm (figure 4) that decided `curvature_feature`.
+        detection_limit: smallest height of a sharp crest that a sweep across it detects with `probability`, m.
+        probability: 0.95.
+        threshold: signal-to-noise ratio above which a crossing is reported.
+        inspected_length: length of path inspected, m.
+        left_out: sentences naming what could not be inspected, and why.
+    """
+
+    crossings: tuple[Crossing, ...]
+    noise: Noise
+    algorithm: int
+    detection_limit: float
+    probability: float
+    threshold: float
+    inspected_length: float
+    left_out: tuple[str, ...] = ()
+
+    @classmethod
+    def together(cls, parts: Sequence[Detections]) -> Detections:
+        """What sweeps detected one by one with the same noise and algorithm hold together; one part at least."""
+        usual = max(parts, key=lambda part: part.inspected_length)
+        return replace(
+            usual,
+            crossings=tuple(crossing for part in parts for crossing in part.crossings),
+            inspected_length=sum(part.inspected_length for part in parts),
+            left_out=tuple(reason for part in parts for reason in part.left_out),
+        )
+
+
+def detect(
+    trace: Trace,
+    base: Base | None = None,
+    *,
+    algorithm: int = 3,
+    false_alarms_per_metre: float = 0.01,
+    noise: Noise | None = None,
+    stated: StatedNoise | None = None,
+    largest: float | None = None,
+) -> Detections:
+    """Find every crossing of something that the base does not explain.
+
+    The height of the trace over the base's trace is averaged over bins that the smallest visible crest spans
+    twelve times; a bank of matched filters, whitened by the noise estimated from the same heights, looks for
+    a cap of any size at any place.
+
+    Args:
+        trace: one or many sweeps.
+        base: the known global model; None: fitted to the trace.
+        algorithm: number in figure 4 of the paper.
+        false_alarms_per_metre: expected number of false crossings per metre of path, 1/m.
+        noise: of the samples; None: estimated from the trace.
+        stated: what is known of the noise before, say from a data sheet; it guides the estimate over a given mesh.
+        largest: half-width of the widest disturbance that counts as a fine feature, m; None: four tip radii.
+
+    Raises:
+        DetectionError: an unknown algorithm, no samples, or a rate that is not positive.
+
+    Reference: paper section 3 and figure 4; theory sections 3, 4 and 6.
+    """
+    if algorithm not in (1, 2, 3, 4):
+        raise DetectionError(f"unknown algorithm {algorithm!r}; the paper has 1, 2, 3 and 4")
+    if not (np.isfinite(false_alarms_per_metre) and false_alarms_per_metre > 0):
+        raise DetectionError(f"false alarms per metre must be positive and finite; found {false_alarms_per_metre}")
+    if len(trace) == 0:
+        raise DetectionError("cannot detect in a trace without samples")
+    if base is None:
+        base = fit_base(trace)
+    tip = trace.tip_radius
+    sweeps = [(number, part, arclength(part, base)) for number, part in trace.sweeps()]
+    usable = [sweep for sweep in sweeps if len(sweep[1]) >= 8 and sweep[2][-1] > 0]
+    left_out = tuple(
+        f"sweep {number}: {len(part)} samples over {s[-1] if len(s) else 0:.3g} m are too few to inspect"
+        for number, part, s in sweeps
+        if len(part) < 8 or not s[-1] > 0
+    )
+    if not usable:
+        return Detections((), noise or Noise(0.0), algorithm, np.inf, PROBABILITY, np.inf, 0.0, left_out)
+    raw = float(np.median([_step(sweep) for sweep in usable]))
+    stretches = [] if noise else raw_stretches(usable, base)
+    first = floored(noise, tip) if noise else first_noise(stretches, raw, tip)
+    widest = LARGEST * tip if largest is None else largest
+    profiles = _profiles(usable, base, first, tip)
+    behind = background(profiles, base, noise, stretches, first, tip, widest, stated)
+    level = behind.noise
+    thresholds = {
+        spacing: threshold_for(bank, false_alarms_per_metre, behind.uncertainties[spacing])
+        for spacing, bank in behind.banks.items()
+    }
+    crossings = []
+    for profile in profiles:
+        bank, threshold = behind.banks[profile.spacing], thresholds[profile.spacing]
+        disturbances = find_disturbances(profile, bank, level, threshold, tip)
+        if base.kind == "profile":
+            disturbances = tuple(d for d in disturbances if _stands_out(d, profile, level, tip))
+        for disturbance in sorted(disturbances, key=lambda d: d.place):
+            crossings += _crossings(disturbance, profile, base, tip)
+    crossings, unresolved = _resolved(crossings, trace.resolution)
+    left_out += unresolved
+    if algorithm != 3:
+        crossings = _judged(crossings, usable, algorithm, level)
+    lengths = {spacing: sum(p.length for p in profiles if p.spacing == spacing) for spacing in thresholds}
+    # what is stated of the whole trace holds for the sweeps that make most of it
+    usual = max(lengths, key=lambda spacing: lengths[spacing])
+    threshold, length = thresholds[usual], sum(lengths.values())
+    limit = max(behind.banks[usual].detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
+    return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out)
+
+
+def _resolved(crossings: list[Crossing], resolution: float) -> tuple[list[Crossing], tuple[str, ...]]:
+    """Without those that the rounding of the positions can make, which no model of noise describes."""
+    kept = [c for c in crossings if abs(c.height) > UNRESOLVED * resolution]
+    lost = len(crossings) - len(kept)
+    if not lost:
+        return kept, ()
+    low = UNRESOLVED * resolution
+    return kept, (f"{lost} details of at most {low:.3g} m may be rounding: the positions come in steps",)
+
+
+def _step(sweep: Sweep) -> float:
+    """Mean distance of a sweep's samples, m."""
+    s = sweep[2]
+    return float(s[-1] / (len(s) - 1))
+
+
+def _profiles(usable: list[Sweep], base: Base, noise: Noise, tip: float) -> list[HeightProfile]:
+    """Profiles of every sweep in bins that the smallest visible crest spans BINS_PER_HALF_WIDTH times."""
+    spacings = np.empty(len(usable))
+    for alike in _alike(np.array([_step(sweep) for sweep in usable])):
+        raw = float(np.median([_step(usable[i]) for i in alike]))
+        smallest = smallest_half_width(noise, raw, 1.0, tip, CERTAIN)
+        spacings[alike] = raw * max(1, int(smallest / (BINS_PER_HALF_WIDTH * raw)))
+    each = zip(usable, spacings.tolist(), strict=True)
+    return [p for (number, part, s), spacing in each for p in height_profiles(number, part, s, base, spacing)]
+
+
+def _alike(steps: FloatArray) -> list[IntArray]:
+    """Indices of the sweeps that were sampled about as densely as each other: filters know one density."""
+    order = np.argsort(steps, kind="stable")
+    groups, least = [], steps[order[0]]
+    begin = 0
+    for i, step in enumerate(steps[order]):
+        if step > ALIKE * least:
+            groups.append(order[begin:i])
+            begin, least = i, step
+    return [*groups, order[begin:]]
+
+
+def _stands_out(found: Disturbance, profile: HeightProfile, noise: Noise, tip: float) -> bool:
+    """True unless a detail gentler than the tip hides among the samples of a profile whose base was fitted.
+
+    One profile cannot tell roughness from the base's own shape, and its shape is unknown: such a detail must
+    be higher than ROUGHNESS standard deviations of the profile at the resolution that the detail needs.
+    """
+    if abs(found.curvature) > 1 / (2 * tip):
+        return True
+    block = max(profile.spacing, found.half_width / BINS_PER_HALF_WIDTH)
+    variance = noise.block_covariances(1, block, profile.samples * block / profile.spacing)[0]
+    return bool(abs(found.height) > ROUGHNESS * np.sqrt(variance))
+
+
+def _judged(crossings: list[Crossing], usable: list[Sweep], algorithm: int, noise: Noise) -> list[Crossing]:
+    """Crossings whose `curvature_feature` says whether the paper's algorithm reports a feature of their sign there."""
+    judged = []
+    for number, part, _ in usable:
+        features = curvature_features(part, algorithm, noise)
+        for c in (c for c in crossings if c.sweep == number and part.t[0] <= c.t <= part.t[-1]):
+            low, high = sorted(along_chord(part, part.centers[[c.start, min(c.stop, len(part)) - 1]]))
+            sign = 1 if c.height > 0 else -1
+            reported = any(f.sign == sign and f.start <= high and f.stop >= low for f in features)
+            judged.append(replace(c, curvature_feature=reported))
+    return judged
+
+
+def _crossings(found: Disturbance, profile: HeightProfile, base: Base, tip: float) -> list[Crossing]:
+    """A crest as one crossing; a plateau as the step up and the step down at its ends."""
+    if found.flat == 0.0:
+        kind = "convex" if found.height > 0 else "concave"
+        return [_crossing(found, kind, found.place, found.start, found.stop, profile, base, tip)]
+    kinds = ("step up", "step down") if found.height > 0 else ("step down", "step up")
+    edges = (found.place - found.flat, found.place + found.flat)
+    low, high = profile.start + profile.spacing, profile.start + profile.length - 2 * profile.spacing
+    bounds = ((found.start, found.place), (found.place, found.stop))
+    return [
+        _crossing(found, kind, edge, *bound, profile, base, tip)
+        for kind, edge, bound, outside in zip(
+            kinds, edges, bounds, (found.start <= low, found.stop >= high), strict=True
+        )
+        if not outside and low <= edge <= high
+    ]
+
+
+def _crossing(
+    found: Disturbance,
+    kind: str,
+    place: float,
+    start: float,
+    stop: float,
+    profile: HeightProfile,
+    base: Base,
+    tip: float,
+) -> Crossing:
+    s = profile.s
+    near = max(found.half_width - found.flat, 2 * profile.spacing)
+    low, high = np.clip(np.searchsorted(s, [place - near, place + near]), 0, len(s) - 1)
+    if high - low < 2:
+        low, high = max(0, low - 1), min(len(s) - 1, low + 2)
+    # a line through the path near the crest: the noise of single bins would throw the crest off the sweep
+    design = np.column_stack([np.ones(high - low + 1), s[low : high + 1] - place])
+    line = np.linalg.lstsq(design, profile.centers[low : high + 1], rcond=None)[0]
+    foot = base.foot(line[:1], tip)
+    normal = foot.normals[0]
+    tangent = line[1] - (line[1] @ normal) * normal
+    norm = np.linalg.norm(tangent)
+    index = np.clip(np.searchsorted(s, [start, stop]), 0, len(s) - 1)
+    # definition 1 on the trace (theory section 3): k > 1/r on the body is k_t > 1/(2 r); a dip between two rims
+    # is a kink, sharper than any curvature
+    sharp = found.curvature > 1 / (2 * tip) if found.height > 0 else found.curvature < -1 / (2 * tip)
+    if kind.startswith("step"):
+        sharp = bool(abs(found.curvature) > 1 / (2 * tip))
+    return Crossing(
+        sweep=profile.sweep,
+        t=float(np.interp(place, s, profile.t)),
+        point=foot.points[0],
+        normal=normal,
+        tangent=tangent / norm if norm > 0 else tangent,
+        kind=kind,
+        height=found.height,
+        height_sd=found.height_sd,
+        position_sd=found.place_sd,
+        half_width=found.half_width if found.flat == 0 else near,
+        trace_curvature=found.curvature,
+        snr=found.snr,
+        curvature_feature=bool(sharp),
+        start=int(profile.first[index[0]]),
+        stop=int(profile.first[min(index[1] + 1, len(s))]),
+    )

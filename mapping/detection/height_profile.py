@@ -1,0 +1,154 @@
+"""Height profile: one sweep's height over the base, averaged over equal bins of its path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import FloatArray, IntArray, Trace
+from mapping.base import Base
+
+# Blocks of a sweep are long enough once doubling them shortens its length by less than this: noise zigzags,
+# the path does not.
+LENGTH_TOLERANCE = 0.01
+LARGEST_FIRST_BLOCK_COUNT = 2000
+# Steps in time that exceed the mean by this factor hold samples that were left out.
+UNEVEN = 1.5
+# A gap of more than this many bins, and of more than this share of the tip radius, cuts a profile: nothing was
+# touched there. A shorter one is a tip that was thrown off for a moment; the ball saw no detail that narrow.
+LONGEST_GAP, NARROW = 2, 0.03
+# Bins of fewer samples average heights: the mean of two centres on a curved path lies beside it, which shows without
+# noise. Bins of more average centres first: the distance of a noisy centre from a kink is biased.
+FEW = 4
+
+
+@dataclass(frozen=True, eq=False)
+class HeightProfile:
+    """Heights at equal steps of arclength along one sweep.
+
+    Args:
+        sweep: number of the sweep.
+        start: arclength of the first bin's middle, m.
+        spacing: width of the bins, m.
+        height: (n,) mean height over the base in each bin, m.
+        samples: samples per bin on average.
+        first: (n + 1,) index within the sweep of the first sample of each bin.
+        t: (n,) mean times, s.
+        centers: (n, 3) mean ball centres, m.
+    """
+
+    sweep: int
+    start: float
+    spacing: float
+    height: FloatArray
+    samples: float
+    first: IntArray
+    t: FloatArray
+    centers: FloatArray
+
+    @property
+    def s(self) -> FloatArray:
+        """(n,) arclength of the bins' middles, m."""
+        return self.start + self.spacing * np.arange(len(self.height), dtype=np.float64)
+
+    @property
+    def length(self) -> float:
+        """Length of path that the profile covers, m."""
+        return self.spacing * len(self.height)
+
+
+def arclength(trace: Trace, base: Base) -> FloatArray:
+    """(N,) arclength along the base's trace under one sweep, m, free of the zigzag that noise adds.
+
+    The length of the polyline through block means, with blocks so long that longer ones change it little, each
+    lowered onto the base's own trace: foot points would stand still at an edge of the base and jump over a hollow.
+    """
+    count = len(trace)
+    if count < 2:
+        return np.zeros(count)
+    size = max(1, count // LARGEST_FIRST_BLOCK_COUNT)
+    means = _block_means(trace.centers, size)
+    while count // (2 * size) >= 4:
+        longer = _block_means(means, 2)
+        if _length(means) <= (1 + LENGTH_TOLERANCE) * _length(longer):
+            break
+        means, size = longer, 2 * size
+    if len(means) < 2:
+        means, size = trace.centers[[0, -1]], count - 1
+    feet = base.foot(means, trace.tip_radius)
+    lowered = feet.points + trace.tip_radius * feet.normals
+    knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(lowered, axis=0), axis=1))])
+    place, middles = _progress(trace, size, len(knots))
+    inner = np.interp(place, middles, knots)
+    before, after = np.diff(knots[[0, 1, -2, -1]])[::2] / np.diff(middles[[0, 1, -2, -1]])[::2]
+    inner += np.minimum(place - middles[0], 0.0) * before + np.maximum(place - middles[-1], 0.0) * after
+    return np.asarray(inner - inner[0])
+
+
+def _progress(trace: Trace, size: int, blocks: int) -> tuple[FloatArray, FloatArray]:
+    """(N,) how far each sample is along its sweep, and the means of that over so many blocks.
+
+    The samples' count, as they come evenly; their times where many were left out between some of them.
+    """
+    steps = np.diff(trace.t)
+    even = steps.min() <= 0 or steps.max() <= UNEVEN * steps.mean()
+    place = np.arange(len(trace), dtype=np.float64) if even else trace.t - trace.t[0]
+    if blocks * size > len(trace):  # two blocks of a sample each: its ends
+        return place, place[[0, -1]]
+    return place, place[: blocks * size].reshape(blocks, size).mean(axis=1)
+
+
+def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing: float) -> tuple[HeightProfile, ...]:
+    """The sweep's heights in bins of the given width; more than one profile where contact was lost in between.
+
+    Args:
+        trace: the samples of one sweep.
+        s: (N,) their arclengths, m (see `arclength`), not decreasing.
+        spacing: width of the bins, m.
+    """
+    # half a step off: evenly spaced samples would sit on the bins' borders, where rounding decides
+    step = (s[-1] - s[0]) / max(len(s) - 1, 1)
+    bins = np.floor((s - s[0] + 0.5 * step) / spacing).astype(np.int64)
+    first = np.flatnonzero(np.diff(bins, prepend=-1) > 0)
+    occupied = bins[first]
+    counts = np.diff(np.append(first, len(s)))
+    centers = np.add.reduceat(trace.centers, first, axis=0) / counts[:, None]
+    times = np.add.reduceat(trace.t, first) / counts
+    if counts.mean() < FEW:
+        height = np.add.reduceat(base.foot(trace.centers, trace.tip_radius).height, first) / counts
+    else:
+        height = base.foot(centers, trace.tip_radius).height
+    longest = max(LONGEST_GAP, int(NARROW * trace.tip_radius / spacing))
+    cuts = np.flatnonzero(np.diff(occupied) > longest + 1) + 1
+    profiles = []
+    for begin, end in zip([0, *cuts], [*cuts, len(occupied)], strict=True):
+        # a bin that the sweep only begins or ends in is as noisy as its few samples
+        enough = 0.5 * np.median(counts[begin:end])
+        if end - begin > 2:
+            begin, end = begin + (counts[begin] < enough), end - (counts[end - 1] < enough)
+        wanted = np.arange(occupied[begin], occupied[end - 1] + 1)
+        have = occupied[begin:end]
+        edges = np.append(first, len(s))[np.searchsorted(occupied, np.append(wanted, wanted[-1] + 1))]
+        profiles.append(
+            HeightProfile(
+                sweep,
+                float(s[0] + (wanted[0] + 0.5) * spacing - 0.5 * step),
+                spacing,
+                np.interp(wanted, have, height[begin:end]),
+                float(counts[begin:end].mean()),
+                edges,
+                np.interp(wanted, have, times[begin:end]),
+                np.column_stack([np.interp(wanted, have, centers[begin:end, k]) for k in range(3)]),
+            )
+        )
+    return tuple(profiles)
+
+
+def _block_means(points: FloatArray, size: int) -> FloatArray:
+    whole = len(points) // size * size
+    return np.asarray(np.add.reduceat(points[:whole], np.arange(0, whole, size), axis=0) / size)
+
+
+def _length(points: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -1,0 +1,230 @@
+"""Quiet noise: the noise of the stretches that hold no feature, and the matched filters that tell which these are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapping import BoolArray, FloatArray, Trace
+from mapping.base import Base
+from mapping.detection.candidates import quiet_bins
+from mapping.detection.height_profile import HeightProfile
+from mapping.detection.matched_filter import Bank, build_bank, filter_sd, smallest_half_width
+from mapping.instrument import Blocks, Noise, NoiseFit, StatedNoise, estimate_noise, fit_noise, perturbed, relative_sd
+
+# Rounding of contact geometry, in tip radii: the noise is never taken to be smaller.
+ROUNDING = 1e-8
+# Signal-to-noise ratio of the smallest crest looked for, and of what is kept out of the noise's estimate.
+CERTAIN = 5.0
+SUSPECT = 3.5
+# Standard deviations off a known base that no bin of noise reaches, even where its level is a guess.
+UNLIKELY = 10.0
+# Samples that the noise is first estimated from, and blocks that it is fitted to.
+RAW_SAMPLES = 40_000
+BLOCKS = 8000
+ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Heights of some samples of one sweep.
+
+    Args:
+        sweep: number of the sweep.
+        height: (N,) over the base, m.
+        s: (N,) arclengths along the sweep, m.
+    """
+
+    sweep: int
+    height: FloatArray
+    s: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Background:
+    """What stands behind every feature.
+
+    Args:
+        noise: of single samples.
+        banks: filters for it, by the width of the bins (m) of the profiles that they look at.
+        uncertainties: relative standard deviation of each bank's noise.
+    """
+
+    noise: Noise
+    banks: dict[float, Bank]
+    uncertainties: dict[float, float]
+
+
+def raw_stretches(usable: Sequence[tuple[int, Trace, FloatArray]], base: Base) -> list[Stretch]:
+    """The middles of the sweeps (number, samples, arclengths), together no more than about RAW_SAMPLES."""
+    share = max(64, RAW_SAMPLES // len(usable))
+    stretches = []
+    for number, part, s in usable:
+        begin = max(0, (len(part) - share) // 2)
+        cut = slice(begin, begin + share)
+        stretches.append(Stretch(number, base.foot(part.centers[cut], part.tip_radius).height, s[cut]))
+    return stretches
+
+
+def first_noise(stretches: Sequence[Stretch], spacing: float, tip_radius: float) -> Noise:
+    """Noise of the stretches, features included, by robust statistics; spacing in m between samples."""
+    height = np.concatenate([stretch.height for stretch in stretches])
+    if len(height) < 16:
+        return floored(Noise(float(np.std(height))), tip_radius)
+    places, offset = [], 0.0
+    for stretch in stretches:
+        places.append(stretch.s - stretch.s[0] + offset)
+        offset = places[-1][-1] + 1000 * spacing
+    return floored(estimate_noise(height, np.concatenate(places)), tip_radius)
+
+
+def floored(noise: Noise, tip_radius: float) -> Noise:
+    """The noise, but never less than rounding."""
+    return replace(noise, white=max(noise.white, ROUNDING * tip_radius))
+
+
+def background(
+    profiles: Sequence[HeightProfile],
+    base: Base,
+    given: Noise | None,
+    stretches: Sequence[Stretch],
+    first: Noise,
+    tip_radius: float,
+    largest: float,
+    stated: StatedNoise | None = None,
+) -> Background:
+    """The noise of what is no feature, and filters for it; each improves the other unless the noise is given.
+
+    Args:
+        profiles: of all sweeps.
+        base: the global model.
+        given: noise of single samples, or None.
+        stretches: samples to fit the noise to (none needed if it is given).
+        first: a first estimate.
+        tip_radius: m.
+        largest: half-width of the widest feature, m.
+        stated: what was known of the noise before, if it is not given.
+    """
+    drift = 0 if base.known else 2
+    if given is not None:
+        banks = _banks(profiles, floored(given, tip_radius), tip_radius, largest, drift)
+        return Background(floored(given, tip_radius), banks, dict.fromkeys(banks, 0.0))
+    level, fit, banks = first, NoiseFit(first), _banks(profiles, first, tip_radius, largest, drift)
+    before: list[BoolArray] = []
+    for _ in range(ROUNDS):
+        quiet = [
+            quiet_bins(p, banks[p.spacing], level, SUSPECT, tip_radius) & _likely(p, level, drift) for p in profiles
+        ]
+        if before and all(np.array_equal(a, b) for a, b in zip(quiet, before, strict=True)):
+            break
+        fit = _fit(profiles, quiet, stretches, level, first, base, stated)
+        level = floored(fit.noise, tip_radius)
+        banks, before = _banks(profiles, level, tip_radius, largest, drift), quiet
+    return Background(level, banks, {spacing: _uncertainty(fit, bank) for spacing, bank in banks.items()})
+
+
+def _likely(profile: HeightProfile, noise: Noise, drift: int) -> BoolArray:
+    """(n,) False where a bin is too far off a known base for noise: pieces too short for any filter hide much."""
+    if drift:
+        return np.ones(len(profile.height), dtype=bool)
+    sd = np.sqrt(noise.block_covariances(1, profile.spacing, profile.samples)[0])
+    return np.asarray(np.abs(profile.height) <= UNLIKELY * sd)
+
+
+def _banks(
+    profiles: Sequence[HeightProfile], noise: Noise, tip_radius: float, largest: float, drift: int
+) -> dict[float, Bank]:
+    """Filters for the profiles of each width of bins."""
+    banks = {}
+    for spacing in dict.fromkeys(p.spacing for p in profiles):
+        samples = float(np.mean([p.samples for p in profiles if p.spacing == spacing]))
+        smallest = smallest_half_width(noise, spacing, samples, tip_radius, CERTAIN)
+        banks[spacing] = build_bank(noise, spacing, samples, smallest, max(largest, smallest), drift)
+    return banks
+
+
+def _fit(
+    profiles: Sequence[HeightProfile],
+    quiet: Sequence[BoolArray],
+    stretches: Sequence[Stretch],
+    start: Noise,
+    first: Noise,
+    base: Base,
+    stated: StatedNoise | None,
+) -> NoiseFit:
+    """Noise of what is quiet: by likelihood over a known base, else by what an unknown base disturbs less."""
+    if not base.known:
+        return NoiseFit(_robust(profiles, quiet, first))
+    size = max(1, -(-sum(len(stretch.s) for stretch in stretches) // BLOCKS))
+    blocks = [_raw_blocks(stretches, profiles, quiet, size)]
+    if sum(p.samples * len(p.height) for p in profiles) > 1.1 * sum(len(stretch.s) for stretch in stretches):
+        blocks += [_profile_blocks(p, keep) for p, keep in zip(profiles, quiet, strict=True)]
+    return fit_noise(blocks, start, stated)
+
+
+def _raw_blocks(
+    stretches: Sequence[Stretch], profiles: Sequence[HeightProfile], quiet: Sequence[BoolArray], size: int
+) -> Blocks:
+    """Means over `size` samples; NaN where a profile is not quiet."""
+    values, steps = [], []
+    for stretch in stretches:
+        whole = len(stretch.s) // size * size
+        if whole < 2 * size:
+            continue
+        value, s = (column[:whole].reshape(-1, size).mean(axis=1) for column in (stretch.height, stretch.s))
+        step = np.diff(s, prepend=s[0])
+        typical = float(np.median(step[1:]))
+        # what arclength adds in rounding would only cost the likelihood its shortcuts; a gap begins another run
+        step = np.where(np.abs(step - typical) < 0.2 * typical, typical, np.maximum(step, 0.01 * typical))
+        step = np.where(step > 3 * typical, -typical, step)
+        step[0] = -typical
+        steps.append(step)
+        values.append(np.where(_is_quiet(s, stretch.sweep, profiles, quiet), value, np.nan))
+    if not values:
+        return Blocks(np.zeros(0), np.zeros(0), 1.0)
+    return Blocks(np.concatenate(values), np.concatenate(steps), float(size))
+
+
+def _is_quiet(s: FloatArray, sweep: int, profiles: Sequence[HeightProfile], quiet: Sequence[BoolArray]) -> BoolArray:
+    """True where a profile of the sweep covers the arclengths s (N,) and shows nothing there."""
+    result = np.zeros(len(s), dtype=bool)
+    for profile, keep in zip(profiles, quiet, strict=True):
+        if profile.sweep == sweep:
+            index = np.floor((s - profile.start) / profile.spacing + 0.5).astype(np.int64)
+            inside = (index >= 0) & (index < len(keep))
+            result[inside] = keep[index[inside]]
+    return result
+
+
+def _profile_blocks(profile: HeightProfile, keep: BoolArray) -> Blocks:
+    steps = np.full(len(keep), profile.spacing)
+    steps[0] = -profile.spacing
+    return Blocks(np.where(keep, profile.height, np.nan), steps, profile.samples)
+
+
+def _uncertainty(fit: NoiseFit, bank: Bank) -> float:
+    """Relative standard deviation of the narrowest filter's noise; every threshold rests on it."""
+    width, spacing, samples = bank.filters[0].half_width, bank.spacing, bank.samples
+    own = filter_sd(width, fit.noise, spacing, samples, bank.drift)
+    others = [filter_sd(width, perturbed(fit.noise, k, 0.1), spacing, samples, bank.drift) for k in range(3)]
+    return relative_sd(fit, np.log(np.array(others) / own) / 0.1)
+
+
+def _robust(profiles: Sequence[HeightProfile], quiet: Sequence[BoolArray], first: Noise) -> Noise:
+    """Noise of the profiles' quiet bins by robust statistics; the white level of single samples."""
+    heights, places, offset = [], [], 0.0
+    for profile, keep in zip(profiles, quiet, strict=True):
+        heights.append(profile.height[keep])
+        places.append(profile.s[keep] - profile.s[0] + offset)
+        offset += profile.length + 1000 * profile.spacing
+    height = np.concatenate(heights)
+    if len(height) < 16:
+        return first
+    estimated = estimate_noise(height, np.concatenate(places))
+    white = estimated.white * np.sqrt(float(np.mean([p.samples for p in profiles])))
+    # the raw samples are many more than the bins: their level stands unless the bins contradict it
+    if first.white > 0 and abs(np.log(max(white, 1e-300) / first.white)) < 4 * np.sqrt(1.4 / len(height)):
+        white = first.white
+    return replace(estimated, white=white)

@@ -1,0 +1,1 @@
+"""Estimates from sweeps: rows, tangents, normals, kinks, and the envelope of the balls."""

@@ -1,0 +1,17 @@
+"""The estimated surface: the envelope of the balls, and what it may claim."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.estimate.envelope.envelope import estimate_surface as estimate_surface
+    from mapping.estimate.envelope.estimate import Estimate as Estimate
+    from mapping.estimate.envelope.profile_envelope import envelope_heights as envelope_heights
+
+_PUBLIC = {
+    "envelope": ("estimate_surface",),
+    "estimate": ("Estimate",),
+    "profile_envelope": ("envelope_heights",),
+}
+doorway(__name__, _PUBLIC)

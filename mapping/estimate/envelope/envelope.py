@@ -1,0 +1,188 @@
+"""Estimated surface: what the body must have been, from the path of the ball's centre."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mapping import BoolArray, EnvelopeError, FloatArray, Surface, Trace
+from mapping.base import Base
+from mapping.estimate.envelope.alpha_shape import alpha_estimate
+from mapping.estimate.envelope.bridging import bridged_faces, resting_points, split
+from mapping.estimate.envelope.estimate import Estimate
+from mapping.estimate.envelope.profile_envelope import penetration
+from mapping.estimate.envelope.sweep_mesh import sweep_faces
+from mapping.estimate.sweeps import (
+    BRIDGED,
+    EXTRAPOLATED,
+    LABELS,
+    TOUCHED,
+    ContactRow,
+    Smoothed,
+    at_kinks,
+    contact_row,
+    in_plane,
+    pitch,
+    smooth,
+    surface_normals,
+    thinned,
+)
+from mapping.instrument import Noise
+
+__all__ = ["BRIDGED", "EXTRAPOLATED", "LABELS", "TOUCHED", "EnvelopeError", "Estimate", "estimate_surface"]
+
+
+METHODS = ("envelope", "contact", "normals", "alpha")
+# Balls may overlap a contact by this share of their radius before it counts as impossible.
+TOLERANCE = 1e-9
+# The doubt of a slope is an estimate, no bound: it must be this much smaller than what would be harmless.
+CAUTION = 2.0
+# More points of a mesh than this cost memory and minutes of curvature, on bodies that no picture shows so finely.
+MOST_POINTS = 300_000
+
+
+def estimate_surface(
+    trace: Trace,
+    method: str = "envelope",
+    *,
+    base: Base | None = None,
+    outward: ArrayLike | None = None,
+    noise: Noise | None = None,
+    spacing: float | None = None,
+) -> Estimate:
+    """The surface of the body under a trace, every point labelled with how certain it is.
+
+    Args:
+        method: "envelope": the envelope of the balls, from positions alone; "contact": centre - r normal by
+            recorded contact normals; "normals": equation 12, with the normals of the traced surface itself
+            and no regard to its kinks; "alpha": the envelope of unorganised balls, whose corners bound the body
+            but are nowhere called touched.
+        base, outward: which side the finger is on: the base, or (3,) or (N, 3) directions away from the body.
+            Without both, recorded normals, else +z.
+        noise: if given, the trace is smoothed at the scale that this noise demands (paper, section 3.3);
+            without it the trace is taken as exact, and ball operators on noise are biased.
+        spacing: distance to which points are thinned along the sweeps, m; None takes all points of a single
+            sweep and a quarter of the distance between several, or more where that were more than MOST_POINTS.
+
+    Returns:
+        The estimate; contacts that lie inside another ball are impossible and left out.
+
+    Raises:
+        EnvelopeError: an unknown method, no samples, "contact" without recorded normals, or no possible contact.
+
+    Reference: the paper, sections 2.2 and 3.3, equation 12; theory sections 1 and 4.
+    """
+    if method not in METHODS:
+        raise EnvelopeError(f"unknown method {method!r}; possible: {', '.join(METHODS)}")
+    if len(trace) == 0:
+        raise EnvelopeError("cannot estimate a surface from a trace of no samples")
+    if method == "contact" and trace.normals is None:
+        raise EnvelopeError("method 'contact' needs recorded contact normals; this trace has positions alone")
+    away, slack = _outward(trace, base, outward), TOLERANCE * trace.tip_radius
+    smoothed = None
+    if noise is not None and noise.sd > 0:
+        smoothed = smooth(trace, noise, outward=away)
+        trace, away = smoothed.trace, away[smoothed.sample]
+        slack = max(slack, 4 * smoothed.sd)
+    if method == "alpha":
+        estimate = alpha_estimate(trace.centers, away, trace.tip_radius, trace.sweep)
+        return estimate if smoothed is None else replace(estimate, sd=smoothed.sd)
+    points = _contacts(trace, method, away, slack)
+    if smoothed is not None:
+        points = _unsmoothed(points, smoothed)
+    possible = penetration(points.points, trace.centers, trace.tip_radius) <= slack
+    if not possible.any():
+        raise EnvelopeError("every contact lies inside another ball: the trace is no ball's path; give its noise")
+    points = points.select(np.flatnonzero(possible))
+    step = _step(points, pitch(trace.centers, trace.sweep)) if spacing is None else spacing
+    # Thinned by their own distances, and by their balls': over a sharp edge many balls share one contact.
+    points = points.select(thinned(points.points, points.sweep, step, _bounding(points)))
+    estimate = _meshed(points, trace, slack)
+    return estimate if smoothed is None else replace(estimate, sd=smoothed.sd)
+
+
+def _step(points: Estimate, apart: float) -> float:
+    """Distance between points along sweeps that lie so far apart, m; 0 takes all."""
+    length = float(np.linalg.norm(np.diff(points.points, axis=0), axis=1).sum())
+    return max(apart / 4, length / MOST_POINTS) if apart > 0 else 0.0
+
+
+def _outward(trace: Trace, base: Base | None, outward: ArrayLike | None) -> FloatArray:
+    """(N, 3) directions away from the body."""
+    if outward is not None:
+        return np.array(np.broadcast_to(np.asarray(outward, dtype=np.float64), trace.centers.shape))
+    if base is not None:
+        return base.foot(trace.centers, trace.tip_radius).normals
+    if trace.normals is not None:
+        return trace.normals
+    return np.array(np.broadcast_to([0.0, 0.0, 1.0], trace.centers.shape))
+
+
+def _contacts(trace: Trace, method: str, outward: FloatArray, slack: float) -> Estimate:
+    """Contacts of every sweep, and points of the resting ball at its interference points; no mesh yet."""
+    moving = np.r_[True, (np.diff(trace.centers, axis=0) != 0).any(axis=1) | (np.diff(trace.sweep) != 0)]
+    still = np.flatnonzero(moving)  # a finger that stands still says everything once
+    trace, outward = trace.select(still), outward[still]
+    rows, sweeps, start = [], [], 0
+    for number, part in trace.sweeps():
+        own = slice(start, start + len(part))
+        row = contact_row(part.centers, outward[own], trace.tip_radius, open_kinks=method != "normals")
+        rows.append(replace(row, sample=np.where(row.sample < 0, -1, row.sample + start), nearest=row.nearest + start))
+        sweeps.append(np.full(len(row.centers), number))
+        start += len(part)
+    row = ContactRow.joined(rows)
+    normals, across, doubt = surface_normals(trace, row, outward)
+    if method == "contact" and trace.normals is not None:
+        normals, doubt = _recorded(trace, row), np.zeros(len(doubt))
+    # A ball turned by an angle about its contact leaves the body by half of r angle^2.
+    uncertain = (row.labels == TOUCHED) & (0.5 * trace.tip_radius * (CAUTION * doubt) ** 2 > slack)
+    labels = np.where(uncertain, EXTRAPOLATED, row.labels).astype(np.int8)
+    sample = np.where(row.sample < 0, -1, still[row.sample])
+    points = row.centers - trace.tip_radius * normals
+    return Estimate(None, points, normals, row.centers, labels, sample, np.concatenate(sweeps), across)
+
+
+def _bounding(points: Estimate) -> BoolArray:
+    """(N,) which points are the contacts at interference points: they bound a bridged strip, however sure they are."""
+    bridged = np.pad(points.labels == BRIDGED, 1)
+    return np.asarray((points.sample < 0) & ~bridged[1:-1] & (bridged[:-2] | bridged[2:]))
+
+
+def _recorded(trace: Trace, row: ContactRow) -> FloatArray:
+    """Recorded normals at the samples; at interference points they are continued, and made to fit the tangents."""
+    recorded = np.zeros_like(trace.centers) if trace.normals is None else trace.normals
+    normals = np.where((row.sample >= 0)[:, None], recorded[row.nearest], row.normals)
+    ends, continued = at_kinks(trace, row, recorded)
+    normals[ends] = in_plane(row.tangents[ends], continued)
+    return normals
+
+
+def _unsmoothed(points: Estimate, smoothed: Smoothed) -> Estimate:
+    """Points of a smoothed trace with the samples of the original; what may be a kink is bridged."""
+    own = points.sample >= 0
+    dented = own & smoothed.dented[points.sample]
+    labels = np.where(dented, BRIDGED, points.labels).astype(np.int8)
+    return replace(points, labels=labels, sample=np.where(own, smoothed.sample[points.sample], -1))
+
+
+def _meshed(points: Estimate, trace: Trace, slack: float) -> Estimate:
+    """The points joined as their centres lie (those never coincide), with resting points in bridged faces."""
+    if len(np.unique(points.sweep)) < 2:
+        return points
+    faces = sweep_faces(points.centers, points.sweep, points.normals, points.points)
+    if len(faces) == 0:
+        return points
+    r = trace.tip_radius
+    flagged = bridged_faces(points.centers, points.normals, faces, r, points.across)
+    # Faces at an opened interference point hold their bridged points already.
+    chosen = np.flatnonzero(flagged & (points.sample[faces] >= 0).all(axis=1))
+    resting = resting_points(points.centers, points.normals, faces[chosen], r)
+    corners = points.centers[faces[chosen]]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
+    # Samples between the three corners lower the balls' common boundary by up to this sagitta.
+    possible = penetration(resting, trace.centers, r) <= slack + longest**2 / (2 * r)
+    chosen, resting = chosen[possible], resting[possible]
+    joined = points.with_resting(resting, faces[chosen])
+    return replace(joined, surface=Surface(joined.points, split(faces, chosen, len(points.points))))

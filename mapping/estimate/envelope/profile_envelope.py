@@ -1,0 +1,120 @@
+"""Envelope of balls under a profile: the exact morphological erosion of its trace, in O(n).
+
+Penetration: how deep points lie inside balls where no body can be.
+
+Height map under balls: the highest body that scattered ball centres allow, on a grid of nodes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mapping import EnvelopeError, FloatArray, IntArray
+
+
+def envelope_heights(
+    x: ArrayLike, z: ArrayLike, tip_radius: float, at: ArrayLike | None = None
+) -> tuple[FloatArray, IntArray]:
+    """Highest body that balls centred at (x, z) allow.
+
+    e(x') = min over i of z_i - sqrt(r^2 - (x' - x_i)^2), each ball where it reaches.
+
+    Args:
+        x, z: (N,) ball centres, m, in any order.
+        tip_radius: r, m.
+        at: (M,) abscissae x', m; None takes x.
+
+    Returns:
+        (M,) heights, +inf where no ball reaches, and (M,) indices of the balls that bound them, -1 for none.
+
+    Raises:
+        EnvelopeError: arrays of different lengths, values that are not finite, a radius that is not positive.
+
+    Reference: ISO 16610-41 (erosion by a disc); theory section 1.
+    """
+    centers = np.array([np.asarray(x, dtype=np.float64), np.asarray(z, dtype=np.float64)])
+    query = centers[0] if at is None else np.asarray(at, dtype=np.float64)
+    if centers.ndim != 2 or not np.isfinite(centers).all() or not np.isfinite(query).all():
+        raise EnvelopeError(f"a profile's envelope needs finite x and z of shape (N,); found {centers.shape[1:]}")
+    if not (np.isfinite(tip_radius) and tip_radius > 0):
+        raise EnvelopeError(f"tip radius must be a positive length in metres; found {tip_radius!r}")
+    if centers.shape[1] == 0:
+        return np.full(len(query), np.inf), np.full(len(query), -1, dtype=np.int64)
+    from mapping.estimate.envelope.envelope_kernels import envelope_at, lower_envelope
+
+    order, sorted_x, sorted_z = _sorted(centers[0], centers[1])
+    owners, starts = lower_envelope(sorted_x, sorted_z, float(tip_radius))
+    query_order, sorted_query, _ = _sorted(query, query)
+    heights, indices = np.empty(len(query)), np.empty(len(query), dtype=np.int64)
+    found, owner = envelope_at(sorted_x, sorted_z, float(tip_radius), owners, starts, sorted_query)
+    heights[query_order] = found
+    indices[query_order] = np.where(owner < 0, -1, order[owner])
+    return heights, indices
+
+
+def _sorted(x: FloatArray, z: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+    if (np.diff(x) >= 0).all():
+        return np.arange(len(x)), np.ascontiguousarray(x), np.ascontiguousarray(z)
+    order = np.argsort(x, kind="stable")
+    return order, x[order], z[order]
+
+
+def penetration(points: FloatArray, centers: FloatArray, tip_radius: float) -> FloatArray:
+    """(N,) depth of points (N, 3) below the surface of the deepest of the balls at `centers` (M, 3), m.
+
+    Positive inside a ball, where no body can be; negative outside all of them. Points of a profile (all y of
+    one value) are judged by the profile's envelope in O(n), others by a k-d tree.
+    """
+    if len(points) == 0:
+        return np.zeros(0)
+    if np.ptp(centers[:, 1]) == 0 and (points[:, 1] == centers[0, 1]).all() and (np.diff(centers[:, 0]) > 0).all():
+        return _below_profile(points, centers, tip_radius)
+    from scipy.spatial import cKDTree
+
+    return np.asarray(tip_radius - cKDTree(centers).query(points)[0])
+
+
+def _below_profile(points: FloatArray, centers: FloatArray, tip_radius: float) -> FloatArray:
+    order = np.argsort(points[:, 0], kind="stable")
+    owner = np.empty(len(points), dtype=np.int64)
+    owner[order] = envelope_heights(centers[:, 0], centers[:, 2], tip_radius, points[order, 0])[1]
+    distance = np.linalg.norm(points - centers[owner], axis=1)
+    return np.where(owner < 0, -np.inf, tip_radius - distance)
+
+
+def envelope_map(
+    centers: ArrayLike, tip_radius: float, corner: tuple[float, float], step: float, shape: tuple[int, int]
+) -> tuple[FloatArray, IntArray]:
+    """Envelope of balls at scattered centres, looked at along z: the erosion of the trace at every node.
+
+    With centres on the nodes of a height map this is the erosion that surface metrology applies to stylus and AFM
+    maps; centres may as well lie anywhere, as sweeps and clouds do.
+
+    Args:
+        centers: (N, 3) ball centres, m, z outward.
+        tip_radius: r, m.
+        corner: x and y of node (0, 0), m.
+        step: distance between nodes, m.
+        shape: numbers of nodes along y (rows) and x (columns).
+
+    Returns:
+        (rows, columns) heights, m, +inf where no ball reaches, and the indices of the bounding balls, -1 for none.
+
+    Raises:
+        EnvelopeError: centres that are not finite (N, 3), or a radius, step or shape that is not positive.
+
+    Reference: Villarrubia 1997 (tip erosion); ISO 16610-85; theory section 1.
+    """
+    points = np.ascontiguousarray(centers, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+        raise EnvelopeError(f"ball centres must be finite and of shape (N, 3); found shape {points.shape}")
+    positive = {"tip radius": tip_radius, "step": step, "rows": shape[0], "columns": shape[1]}
+    for name, value in positive.items():
+        if not (np.isfinite(value) and value > 0):
+            raise EnvelopeError(f"a height map needs a positive {name}; found {value!r}")
+    from mapping.estimate.envelope.envelope_kernels import splat_balls
+
+    x, y, z = np.ascontiguousarray(points.T)
+    heights, owner = splat_balls(x, y, z, float(tip_radius), corner[0], corner[1], float(step), *shape)
+    return heights, owner

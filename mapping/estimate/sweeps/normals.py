@@ -1,0 +1,221 @@
+"""Normals of the traced surface at the points of its sweeps, from positions alone.
+
+Slope of the traced surface across its sweeps, from the neighbouring rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import BoolArray, FloatArray, IntArray, Trace
+from mapping.estimate.sweeps.contact_row import ContactRow
+from mapping.estimate.sweeps.curve import SweepCurve
+from mapping.estimate.sweeps.labels import TOUCHED
+from mapping.estimate.sweeps.rows import parallel_rows, pitch, thinned
+from mapping.estimate.sweeps.tangents import lagrange, unit
+
+# Samples whose neighbourhoods are fitted together: a bound on the memory that they take
+AT_ONCE = 16_384
+
+
+def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Outward unit normals (M, 3) at the points of `row`, curvature across (M,), 1/m, and doubt of the slope (M,), rad.
+
+    A single sweep knows its slope along itself only: its normals stay in the plane of tangent and outward
+    direction, as of a profile. Parallel sweeps add the slope across; other arrangements take it from local fits.
+    """
+    if len(np.unique(trace.sweep)) < 2:
+        return row.normals, np.full(len(row.normals), np.nan), np.zeros(len(row.normals))
+    along = np.zeros_like(trace.centers)
+    own = row.sample >= 0
+    along[row.sample[own]] = row.tangents[own]
+    rows = parallel_rows(trace.centers, trace.sweep)
+    unknown = np.full(len(trace), np.nan)
+    slope = (
+        CrossSlope(along.copy(), unknown, unknown.copy())
+        if rows is None
+        else cross_slope(trace.centers, along, outward, rows, _curves(trace, row, rows))
+    )
+    lost = np.flatnonzero(np.isnan(slope.doubt))
+    slope.tangents[lost], slope.doubt[lost] = _fitted(trace, lost, along[lost], outward[lost])
+    across = slope.tangents[row.nearest]
+    ends, continued = at_kinks(trace, row, slope.tangents)
+    across[ends] = continued
+    normals = unit(np.cross(row.tangents, across))
+    side = np.sign(np.einsum("ij,ij->i", normals, outward[row.nearest]))
+    normals = np.where((side == 0)[:, None], row.normals, normals * side[:, None])
+    return normals, slope.curvature[row.nearest], slope.doubt[row.nearest]
+
+
+def at_kinks(trace: Trace, row: ContactRow, directions: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Unit directions (N, 3) of the samples continued to both sides of each interference point, from its own side.
+
+    Returns:
+        (K,) indices of the contacts at interference points, and (K, 3) directions there.
+    """
+    ends = np.flatnonzero((row.sample < 0) & (row.labels == TOUCHED))
+    way = np.where(row.sample[ends - 1] >= 0, -1, 1)  # the first contact of a fan follows a sample
+    samples = row.nearest[ends][:, None] + way[:, None] * np.arange(4)
+    held = (samples >= 0) & (samples < len(trace))
+    samples = np.asarray(np.clip(samples, 0, len(trace) - 1), dtype=np.int64)
+    held &= trace.sweep[samples] == trace.sweep[samples[:, :1]]
+    points = trace.centers[samples]
+    s = np.cumsum(np.linalg.norm(np.diff(points, axis=1, prepend=points[:, :1]), axis=2), axis=1)
+    before = -np.linalg.norm(row.centers[ends] - points[:, 0], axis=1)
+    # A kink beside the kink leaves too few samples: then the nearest must do.
+    straight = held.all(axis=1) & (np.abs(before) < 2 * s[:, 1]) & (np.diff(s, axis=1) > 0).all(axis=1)
+    safe = np.where(straight[:, None], s, np.arange(4.0))
+    weights = np.where(straight[:, None], lagrange(safe, before)[0], np.eye(4)[0])
+    return np.asarray(ends, dtype=np.int64), unit(np.einsum("km,kmc->kc", weights, directions[samples]))
+
+
+def _curves(trace: Trace, row: ContactRow, rows: list[IntArray]) -> list[SweepCurve]:
+    """The curve of each of `rows`."""
+    sweep = trace.sweep[row.nearest]
+    return [SweepCurve.of(row.select(np.flatnonzero(sweep == trace.sweep[own[0]]))) for own in rows]
+
+
+def _fitted(
+    trace: Trace, samples: IntArray, along: FloatArray, outward: FloatArray, neighbours: int = 24
+) -> tuple[FloatArray, FloatArray]:
+    """Tangents across the sweeps, and their doubt, from quadratic fits to the nearest samples of the thinned trace.
+
+    The doubt is three times the residual over the width; it is a right angle where the neighbours lie on one line.
+    """
+    from scipy.spatial import cKDTree
+
+    cloud = trace.centers[thinned(trace.centers, trace.sweep, pitch(trace.centers, trace.sweep))]
+    tree, count = cKDTree(cloud), min(neighbours, len(cloud))
+    tangents, doubt = np.empty((len(samples), 3)), np.empty(len(samples))
+    for start in range(0, len(samples), AT_ONCE):
+        part = slice(start, start + AT_ONCE)
+        distance, index = (
+            np.asarray(found) for found in tree.query(trace.centers[samples[part]], [*range(1, count + 1)])
+        )
+        arm = cloud[index] - trace.centers[samples[part], None]
+        tangents[part], doubt[part] = _across(arm, distance, along[part], outward[part])
+    return tangents, doubt
+
+
+def _across(
+    arm: FloatArray, distance: FloatArray, along: FloatArray, outward: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Tangents across and their doubt from the ways (N, K, 3) to the neighbours of each sample, and their lengths."""
+    across = unit(np.cross(outward, along))
+    up = unit(np.cross(along, across))
+    up *= np.where(np.einsum("ij,ij->i", up, outward) < 0, -1.0, 1.0)[:, None]
+    scale = np.maximum(distance[:, -1:], 1e-300)
+    arm = arm / scale[..., None]
+    u, v, w = (np.einsum("nkc,nc->nk", arm, axis) for axis in (along, across, up))
+    columns = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=-1)
+    weight = np.exp(-2.0 * (distance / scale) ** 2)[..., None]
+    fit = np.linalg.pinv(columns * weight, rcond=1e-9) @ (w[..., None] * weight)
+    residual = np.sqrt((weight * (w[..., None] - columns @ fit) ** 2).mean(axis=(1, 2)))
+    width = np.sqrt((weight[..., 0] * v**2).mean(axis=1))
+    doubt = np.where(width > 1e-3, 3 * residual / np.maximum(width, 1e-3), np.pi / 2)
+    return unit(across + fit[:, 2] * up), doubt
+
+
+# Rows to either side that are looked at.
+REACH = 4
+# A one-sided polynomial must be smoother than the others by this factor.
+CENTRAL = 1.25
+# A higher term must be smaller than the curvature by this factor, or it speaks of a kink.
+FALLING = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class CrossSlope:
+    """The traced surface across its sweeps.
+
+    Args:
+        tangents: (N, 3) unit tangents across the sweeps; meaningless where `doubt` is NaN.
+        curvature: (N,) curvature across, 1/m, positive where it bulges out; NaN where unknown.
+        doubt: (N,) how far the slope may be off, rad; NaN where the neighbours do not tell.
+    """
+
+    tangents: FloatArray
+    curvature: FloatArray
+    doubt: FloatArray
+
+
+def cross_slope(
+    points: FloatArray, along: FloatArray, outward: FloatArray, rows: list[IntArray], curves: list[SweepCurve]
+) -> CrossSlope:
+    """Slope across the parallel sweeps `rows` at their samples (N, 3) with unit tangents `along` (N, 3).
+
+    The surface is cut at each sample by the plane perpendicular to the sweep, which the neighbouring rows cross
+    in a few points; their interpolant gives the slope, its last term the doubt.
+    """
+    across = unit(np.cross(outward, along))
+    up = np.cross(along, across)
+    up *= np.sign(np.einsum("ij,ij->i", up, outward))[:, None]
+    slope, bend, doubt = np.full((3, len(points)), np.nan)
+    for j, row in enumerate(rows):
+        v, w = np.full((2, len(row), 2 * REACH + 1), np.nan)
+        v[:, REACH] = w[:, REACH] = 0.0
+        for shift in range(-REACH, REACH + 1):
+            if shift and 0 <= j + shift < len(rows):
+                arm = curves[j + shift].crossings(points[row], along[row]) - points[row]
+                v[:, REACH + shift] = np.einsum("ij,ij->i", arm, across[row])
+                w[:, REACH + shift] = np.einsum("ij,ij->i", arm, up[row])
+        slope[row], bend[row], doubt[row] = smooth_slope(v, w)
+        # Beside an outermost sweep nothing shows whether the surface goes on as it came.
+        alone = np.isnan(v[:, REACH - 1]) | np.isnan(v[:, REACH + 1])
+        doubt[row] = shared(np.where(alone & ~np.isnan(doubt[row]), np.pi / 2, doubt[row]))
+    return CrossSlope(unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5, doubt)
+
+
+def shared(doubt: FloatArray, reach: int = 2) -> FloatArray:
+    """Largest doubt (N,) of a few neighbours along a sweep: among the doubtful, one may agree with itself by chance."""
+    padded = np.pad(doubt, reach, constant_values=np.nan)
+    largest = np.fmax.reduce(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1)
+    return np.asarray(np.where(np.isnan(doubt), doubt, largest))
+
+
+def smooth_slope(v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Slope, second derivative and doubt of the slope at the middle column of w(v), (N, 2 k + 1), NaN where missing.
+
+    Essentially non-oscillatory (Harten et al. 1987): of all quartics, cubics and parabolas through the middle and
+    its neighbours, the one of highest degree whose last term is small beside its curvature. A kink that runs along
+    the sweeps therefore stays outside, even where it mimics a curvature in three rows.
+    """
+    middle = v.shape[1] // 2
+    with np.errstate(invalid="ignore", divide="ignore"):  # missing rows are NaN and lose every comparison
+        table = [w]
+        for order in range(1, 5):
+            table.append(np.diff(table[-1], axis=1) / (v[:, order:] - v[:, :-order]))
+        slope, bend, doubt, _ = _polynomial(v, w, table, 2, middle)
+        for order in (3, 4):
+            candidate, curved, last, falling = _polynomial(v, w, table, order, middle)
+            # A cubic that is refused still tells how little the parabola knew.
+            doubt = np.where(falling, last, np.fmax(doubt, last) if order == 3 else doubt)
+            slope, bend = np.where(falling, candidate, slope), np.where(falling, curved, bend)
+    return slope, bend, doubt
+
+
+def _polynomial(
+    v: FloatArray, w: FloatArray, table: list[FloatArray], order: int, middle: int
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Slope and curvature of the smoothest polynomial of an order, doubt of the slope, if its last term is small."""
+    index = np.arange(len(v))
+    size = np.abs(table[order][:, middle - order : middle + 1])
+    size = np.where(np.isnan(size), np.inf, size) * np.r_[CENTRAL, np.ones(order - 1), CENTRAL]
+    best, second = np.argsort(size, axis=1, kind="stable")[:, :2].T
+    first = middle - order + best
+    slope, other = _slope(v, w, first, order), _slope(v, w, middle - order + second, order)
+    inner = np.clip(middle - 1, first, first + order - 2)
+    bend = 2 * table[2][index, inner]
+    spacing = np.abs(v[index, first + order] - v[index, first]) / order
+    last = np.abs(table[order][index, first]) * spacing ** (order - 1)
+    # Where the second smoothest window sees another slope, a kink or a jump of curvature lies beside the sample.
+    return slope, bend, np.fmax(last, np.abs(slope - other)), last <= FALLING * np.abs(bend) * spacing
+
+
+def _slope(v: FloatArray, w: FloatArray, first: IntArray, order: int) -> FloatArray:
+    """Slope at v = 0 of the polynomials through columns first to first + order."""
+    nodes = first[:, None] + np.arange(order + 1)
+    at, heights = np.take_along_axis(v, nodes, 1), np.take_along_axis(w, nodes, 1)
+    return np.asarray(np.einsum("km,km->k", lagrange(at, np.zeros(len(v)))[1], heights))

@@ -1,0 +1,1 @@
+"""Geometry: meshes, the contact of a ball, curvature, and closed-form traces."""

@@ -1,0 +1,221 @@
+"""The first contact of a moving ball with many triangles (numba).
+
+Lengths are in the body's own frame: centred, and scaled so that the larger of body and ball is about 1.
+A Row i of `rows` (F, 12) holds a triangle's corners and its unit normal. A `ball` is (radius, reach, graze): it
+touches what is within its reach, and passes what it would sink into by less than `graze`.
+"""
+
+from __future__ import annotations
+
+from math import inf, nan, sqrt
+
+import numpy as np
+from numba import njit
+
+from mapping.geometry.mesh import (
+    BLOCK,
+    STACK,
+    WIDTH,
+    closest,
+    closest_on_triangle,
+    corners,
+    cross,
+    dot,
+    enter_triangle,
+    leave_triangle,
+    moved,
+    push_lanes,
+    scaled,
+    sub,
+    vector,
+)
+
+PASSES, TOUCHES, OVERLAPS = 0, 1, 2
+TOUCH = 1e-9  # relative to the radius: what lies this close to the resting ball touches it
+APART = 9e-5  # relative to the radius, sqrt(8 TOUCH): dents narrower than this are shallower than TOUCH
+GLANCING = 1e-3  # cosine below which a step along the way says little about the gap
+MOST = 16  # distinct contacts that are told apart
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def stays_above(rows, i, end, d, reach):  # type: ignore[no-untyped-def]
+    """True if a ball on its way along d to `end` stays further than `reach` from a triangle's plane."""
+    n = (rows[i, 9], rows[i, 10], rows[i, 11])
+    height = n[0] * (rows[i, 0] - end[0]) + n[1] * (rows[i, 1] - end[1]) + n[2] * (rows[i, 2] - end[2])
+    return abs(height) > reach and height * dot(d, n) >= 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def meet(rows, i, o, d, ball):  # type: ignore[no-untyped-def]
+    """When a ball free at o meets the triangle: t >= 0, inf if never, -1 if it overlaps it at the start."""
+    radius, _, graze = ball
+    a, b, c, n = corners(rows, i, o)
+    enter = enter_triangle(a, b, c, n, d, radius, graze)
+    if enter >= 0.0:
+        return enter
+    if leave_triangle(a, b, c, n, d, radius, graze) < 0.0:
+        return inf
+    p = closest_on_triangle(a, b, c, n)
+    if sqrt(dot(p, p)) < radius * (1.0 - TOUCH) - graze:
+        return -1.0
+    return 0.0 if dot(p, d) > 0.0 else inf  # resting on it: pressed in, or moving away
+
+
+@njit(cache=True, error_model="numpy")
+def first_touch(rows, leaves, boxes, links, ball, o, d, far, guess, near, stack, apart, late):  # type: ignore[no-untyped-def]
+    """Search for the earliest contact before `far`, triangle `guess` first.
+
+    Returns (t, triangle or -1, kept): near[:kept] are all triangles that may touch at t.
+    t = -1: the ball overlaps the triangle at the start.
+    """
+    radius, reach, graze = ball
+    best, hit, kept = far, -1, 0
+    if guess >= 0:
+        t = meet(rows, guess, o, d, ball)
+        if t < best:
+            best, hit = t, guess
+    end = moved(o, best, d)
+    stack[0] = len(links) - 1
+    waiting = 1
+    while waiting > 0 and best >= 0.0:
+        i = -1 - stack[waiting - 1]
+        if i < 0:
+            waiting = push_lanes(leaves, boxes, links, stack, waiting, o, end, d, best, reach, apart, late)
+            continue
+        waiting -= 1
+        if stays_above(rows, i, end, d, reach):
+            continue
+        p = closest(rows, i, end)
+        gap = sqrt(dot(p, p))
+        ahead = dot(p, d) >= 0.0
+        if ahead and gap > reach:
+            continue
+        if not (ahead and gap >= radius - graze):  # else it is only just touched, or less
+            t = meet(rows, i, o, d, ball)
+            if t < best:
+                best, hit = t, i
+                end = moved(o, best, d)
+        near[kept] = i
+        kept += 1
+    return best, hit, kept
+
+
+@njit(cache=True, error_model="numpy")
+def further(p, d, radius):  # type: ignore[no-untyped-def]
+    """How much further along d a ball rests on the point p that it all but touches; inf if it slides along it."""
+    gap = sqrt(dot(p, p))
+    cosine = dot(p, d) / gap
+    return (gap - radius) / cosine if cosine > GLANCING else inf
+
+
+@njit(cache=True, error_model="numpy")
+def settle(rows, order, near, kept, hit, o, d, ball):  # type: ignore[no-untyped-def]
+    """(triangle, step, kept): which of the near triangles stops the ball first, and how much further along d than o.
+
+    Of those that differ by rounding it is the face of the lowest number: no order of search can change that.
+    near[:kept] shrinks to the triangles within reach.
+    """
+    radius, reach, graze = ball
+    least = further(closest(rows, hit, o), d, radius)
+    if least == inf:
+        a, b, c, n = corners(rows, hit, o)
+        again = enter_triangle(a, b, c, n, d, radius, 0.0)
+        least = again if abs(again) <= 1e-6 * radius else 0.0
+    stay = 0
+    for i in range(kept):
+        p = closest(rows, near[i], o)
+        if dot(p, p) <= reach * reach:
+            near[stay] = near[i]
+            stay += 1
+            least = min(least, further(p, d, radius))
+    first = -1
+    for i in range(stay):
+        lower = first < 0 or order[near[i]] < order[first]
+        if lower and further(closest(rows, near[i], o), d, radius) <= least + 0.25 * graze:
+            first = near[i]
+    return first if first >= 0 else hit, least, stay
+
+
+@njit(cache=True, error_model="numpy")
+def count_contacts(rows, near, kept, first, o, ball, points):  # type: ignore[no-untyped-def]
+    """Number of distinct places of the near triangles that a ball at o touches, `first` (relative to o) among them."""
+    apart = APART * ball[0]
+    found = 1
+    points[0, 0], points[0, 1], points[0, 2] = first
+    for i in range(kept):
+        p = closest(rows, near[i], o)
+        new = found < MOST and dot(p, p) <= ball[1] * ball[1]
+        for j in range(found):
+            w = sub(p, vector(points, j))
+            new = new and dot(w, w) > apart * apart
+        if new:
+            points[found, 0], points[found, 1], points[found, 2] = p
+            found += 1
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def feature_of(rows, i, o, p, rounding):  # type: ignore[no-untyped-def]
+    """1 face, 2 edge, 3 vertex: the smallest part of the triangle that holds the point p relative to o."""
+    a, b, c, _ = corners(rows, i, o)
+    square, feature = rounding * rounding, 1
+    for u, v in ((a, b), (b, c), (c, a)):
+        w, e = sub(p, u), sub(v, u)
+        if dot(w, w) <= square:
+            return 3
+        across = cross(e, w)
+        if dot(across, across) <= square * dot(e, e):
+            feature = 2
+    return feature
+
+
+@njit(cache=True, error_model="numpy")
+def way_to_body(o, d, around):  # type: ignore[no-untyped-def]
+    """(start, length) of the part of a ray within a sphere around the body; length < 0 if it misses it."""
+    middle = -dot(o, d)
+    lateral = moved(o, middle, d)
+    miss = sqrt(dot(lateral, lateral))
+    around += 1e-12 * abs(middle)
+    half = sqrt(max((around - miss) * (around + miss), 0.0))
+    if miss > around or middle + half < 0.0:
+        return 0.0, -1.0
+    start = max(0.0, middle - half)
+    return start, middle + half - start
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def first_contacts(  # type: ignore[no-untyped-def]
+    rows, order, leaves, boxes, links, ball, size, origins, directions, where, feature, count, distance, state
+):  # fmt: skip
+    """Fill the outputs for every query: `where` (N, 3, 3) with centre, point and normal.
+
+    `size` is the radius of a sphere around the body.
+    """
+    stack, near, places = np.empty(STACK, np.int32), np.empty(len(rows), np.int32), np.empty((MOST, 3))
+    apart, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
+    guess = -1
+    for q in range(len(origins)):
+        if q % BLOCK == 0:
+            guess = -1
+        o, d = vector(origins, q), vector(directions, q if len(directions) > 1 else 0)
+        for k in range(3):
+            where[q, 0, k] = where[q, 1, k] = where[q, 2, k] = nan
+        feature[q], count[q], distance[q], state[q] = 0, 0, inf, PASSES
+        start, length = way_to_body(o, d, 1.001 * (size + ball[1]))
+        if length < 0.0:
+            continue
+        o = moved(o, start, d)  # a far origin costs no digits from here on
+        t, hit, kept = first_touch(rows, leaves, boxes, links, ball, o, d, length, guess, near, stack, apart, late)
+        if t < 0.0:
+            state[q], distance[q] = OVERLAPS, 0.0
+        elif hit >= 0:
+            o, guess, state[q] = moved(o, t, d), hit, TOUCHES
+            i, more, kept = settle(rows, order, near, kept, hit, o, d, ball)
+            o = moved(o, more, d)
+            p = closest(rows, i, o)
+            n, at = scaled(-1.0 / sqrt(dot(p, p)), p), moved(o, 1.0, p)
+            for k in range(3):
+                where[q, 0, k], where[q, 1, k], where[q, 2, k] = o[k], at[k], n[k]
+            feature[q] = feature_of(rows, i, o, p, ball[2])
+            count[q] = count_contacts(rows, near, kept, p, o, ball, places)
+            distance[q] = max(start + t + more, 0.0)

@@ -1,0 +1,288 @@
+"""Curvature by local jets that weigh every degree and neighbourhood by the error that the noise lets it expect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mapping import BoolArray, CurvatureError, FloatArray, IntArray, Surface
+from mapping.geometry.curvature.curvature import Curvature, from_operators
+from mapping.geometry.mesh import cores
+
+# Neighbourhoods from which points choose. Regular grids are symmetric in 25, 37, 49, 69 and 97 neighbours, which
+# cancels odd errors; 33 are the fewest that a jet of degree 6 needs with some to spare.
+SIZES = (25, 33, 37, 49, 69, 97, 137, 193, 274, 387, 547)
+DEGREE = 6
+# Sizes whose residuals tell the noise.
+SMALL = (37, 49)
+# Every so many of the nearest points speak for a point's surroundings, up to so many.
+POOL_STEP, POOL = 4, 60
+CERTAINTY = 3.5
+# Weights fall with this power of the squared error: 1 averages most, large powers choose.
+SHARPNESS = 0.75
+SAMPLE = 3000
+# Share of the weight that may be lost at either end.
+SHARE = 0.1
+# Meshes above this size try only the neighbourhoods that a sample of their points chooses.
+LARGE = 20_000
+# Neighbour indices held at once by one thread: keeps a million points under a gigabyte.
+CHUNK_VALUES = 4_000_000
+SMOOTHING = 24
+# Share of the residual that counts as noise even where all of it seems to be the polynomial's misfit.
+NOISE_FLOOR = 1e-3
+# Least share of the next size's residual that a jet with hardly more points than terms is credited with.
+LUCK = 1.0
+
+
+def jet_curvature(
+    body: Surface | FloatArray,
+    normals: FloatArray | None,
+    noise: float | None = None,
+    neighbours: int | None = None,
+    degree: int = DEGREE,
+) -> Curvature:
+    """Curvature from polynomials of degree 2, 4 and 6 over neighbourhoods of 25 to 547 points.
+
+    Each candidate's variance follows from the noise, its bias from how much it disagrees around the point with
+    narrower and higher ones; the weights of the mean fall with a power of their sum. Ordinates are bent by the larger
+    curvature, found on a sample beforehand, so that wide neighbourhoods of tubes and balls are as good as flat ones.
+
+    Args:
+        body: mesh or points (N, 3), m.
+        normals: (N, 3) outward normals, or None.
+        noise: standard deviation of the points along the normal, m, or None: estimated.
+        neighbours: use this neighbourhood and `degree` alone instead of choosing.
+        degree: 2, 4 or 6; the highest to choose from.
+
+    Raises:
+        CurvatureError: an odd degree, one beyond 6, or fewer neighbours than the degree needs.
+    """
+    _check(neighbours, degree)
+    points, rough, used = _oriented(body, normals)
+    index = np.flatnonzero(used)
+    if len(index) < 8:
+        return _nothing(len(points))
+    place = points[index] - points[index].mean(axis=0)
+    size = float(np.abs(place).max()) or 1.0
+    jets = _Jets(place / size, rough[index], degree)
+    sizes = np.array([s for s in SIZES if s <= max(len(index), SIZES[0])] if neighbours is None else [neighbours])
+    level = jets.noise() if noise is None else noise / size
+    if neighbours is None:
+        jets.bend(sizes, level)
+    if len(index) > LARGE:
+        sizes = jets.worthwhile(sizes, level)
+    operators, slopes, sd = jets.weighed(sizes, level, fixed=neighbours is not None)
+    return _spread(len(points), index, operators / size, jets.bases(slopes), sd / size)
+
+
+def _check(neighbours: int | None, degree: int) -> None:
+    if degree not in (2, 4, 6):
+        raise CurvatureError(f"jets have degree 2, 4 or 6; found {degree}")
+    least = (degree + 1) * (degree + 2) // 2 + (2 if degree == 2 else 4)
+    if neighbours is not None and neighbours < least:
+        raise CurvatureError(f"a jet of degree {degree} needs at least {least} neighbours; found {neighbours}")
+
+
+def _nothing(count: int) -> Curvature:
+    return _spread(count, np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 2, 3)), np.zeros(0))
+
+
+def _spread(count: int, index: IntArray, operators: FloatArray, bases: FloatArray, sd: FloatArray) -> Curvature:
+    """Curvature at all points from that of the indexed ones."""
+    every, frames, spread = np.full((count, 3), np.nan), np.full((count, 2, 3), np.nan), np.full(count, np.nan)
+    every[index], frames[index], spread[index] = operators, bases, sd
+    return from_operators(every, frames, spread, np.isfinite(every).all(axis=1))
+
+
+@dataclass(eq=False)
+class _Candidates:
+    """Fits of `fit_jets` for M points, S sizes and D degrees."""
+
+    operators: FloatArray
+    factors: FloatArray
+    rests: FloatArray
+    slopes: FloatArray
+
+    def deviations(self, noise: float) -> FloatArray:
+        """(M, S, D) standard deviations; the highest degree is trusted no better than what it leaves over."""
+        level = np.full(self.factors.shape, noise)
+        highest = self.rests[..., -1]
+        # with few points to spare a small residual may be luck: that of the next size tells
+        bound = LUCK * np.concatenate([highest[:, 1:], highest[:, -1:]], axis=1)
+        level[..., -1] = np.fmax(noise, np.fmax(highest, bound))
+        return self._times(level)
+
+    def part(self, chosen: IntArray) -> _Candidates:
+        """The candidates of some points."""
+        return _Candidates(self.operators[chosen], self.factors[chosen], self.rests[chosen], self.slopes[chosen])
+
+    def misfits(self, noise: float) -> FloatArray:
+        """(M, S, D) standard deviations if all that a fit leaves over were noise."""
+        return self._times(np.fmax(noise, self.rests))
+
+    def _times(self, level: FloatArray) -> FloatArray:
+        known = np.isfinite(self.factors) & np.isfinite(level)
+        return np.asarray(np.multiply(level, self.factors, where=known, out=np.full(level.shape, np.inf)))
+
+
+class _Jets:
+    """Points (N, 3) of about unit size with their neighbourhoods and mean normals."""
+
+    def __init__(self, place: FloatArray, rough: FloatArray, degree: int):
+        from scipy.spatial import cKDTree
+
+        self.place, self.degree = place, degree
+        self.tree = cKDTree(place)
+        self.normals = _smoothed_normals(place, rough, self.tree)
+        self.bends = np.zeros(len(place))
+
+    def fit(self, chosen: IntArray, sizes: IntArray) -> _Candidates:
+        """Every candidate at the chosen points."""
+        from mapping.geometry.curvature.jet_kernels import fit_jets
+
+        near = self.near(chosen, int(sizes[-1]))
+        return _Candidates(*fit_jets(self.place, self.normals, near, chosen, self.bends[chosen], sizes, self.degree))
+
+    def near(self, chosen: IntArray, count: int) -> IntArray:
+        """(M, count) nearest points, nearest first; N where there are no more."""
+        return np.asarray(self.tree.query(self.place[chosen], k=count)[1], dtype=np.int64).reshape(len(chosen), count)
+
+    def sample(self) -> IntArray:
+        """Indices of points that speak for all."""
+        return np.linspace(0, len(self.place) - 1, min(SAMPLE, len(self.place))).astype(np.int64)
+
+    def noise(self) -> float:
+        """Noise level from residuals of the highest fits over two small neighbourhoods.
+
+        Noise leaves the same residual in both; what the polynomial cannot follow grows with the power of the radius
+        that is one above its degree. The median ignores the few points where the surface is not smooth.
+        """
+        rests = self.fit(self.sample(), np.array(SMALL)).rests[..., -1]
+        rests = rests[np.isfinite(rests).all(axis=1)]
+        if len(rests) == 0:
+            return 0.0
+        free = np.array(SMALL) - (self.degree + 1) * (self.degree + 2) // 2
+        # median of chi-square over its degrees of freedom (Wilson and Hilferty)
+        first, second = np.median(rests, axis=0) ** 2 / (1 - 2 / (9 * free)) ** 3
+        growth = (SMALL[1] / SMALL[0]) ** (self.degree + 1)
+        return float(np.sqrt(max((growth * first - second) / (growth - 1), NOISE_FLOOR**2 * first)))
+
+    def bend(self, sizes: IntArray, noise: float) -> None:
+        """Bend all ordinates by the larger curvature at the nearest point of a sample, found without bending."""
+        from scipy.spatial import cKDTree
+
+        sample = self.sample()
+        found, tree = self.fit(sample, sizes), cKDTree(self.place[sample])
+        pools = tree.query(self.place[sample], k=min(POOL // POOL_STEP, len(sample)))[1].reshape(len(sample), -1)
+        weights = self._weights(found, found.deviations(noise), np.arange(len(sample)), pools, sizes, noise)[0]
+        a, b, c = np.einsum("msd,msdk->km", weights, np.nan_to_num(found.operators))
+        mean, half = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
+        larger = np.nan_to_num(np.where(mean < 0, mean - half, mean + half))
+        self.bends = larger[tree.query(self.place, workers=-1)[1]]
+
+    def worthwhile(self, sizes: IntArray, noise: float) -> IntArray:
+        """The sizes that points of a sample give most weight to, with those that judge them."""
+        sample = self.sample()
+        found = self.fit(sample, sizes)
+        own, all_of_it = found.deviations(noise), np.arange(len(sample))
+        weights = self._weights(found, own, all_of_it, all_of_it[:, None], sizes, noise)[0].sum(axis=2)
+        reach = np.cumsum(weights[np.isfinite(weights).all(axis=1)].mean(axis=0))
+        last = min(int(np.searchsorted(reach, 1 - SHARE)), len(sizes) - 1)
+        first = min(max(int(np.searchsorted(reach, SHARE)) - 2, 0), last)
+        return sizes[first : last + 1]
+
+    def weighed(self, sizes: IntArray, noise: float, fixed: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(N, 3) operators, (N, 2) slopes and (N,) standard deviations of the weighed mean at every point."""
+        count = len(self.place)
+        shape = (count, len(sizes), self.degree // 2)
+        every = _Candidates(np.empty((*shape, 3)), np.empty(shape), np.empty(shape), np.empty((*shape, 2)))
+        pools = np.empty((count, POOL // POOL_STEP), dtype=np.int64)
+        parts = np.array_split(np.arange(count), max(4, count * int(sizes[-1]) // CHUNK_VALUES))
+
+        def fill(part: IntArray) -> None:
+            found = self.fit(part, sizes)
+            every.operators[part], every.factors[part] = found.operators, found.factors
+            every.rests[part], every.slopes[part] = found.rests, found.slopes
+            pools[part] = np.minimum(self.near(part, POOL)[:, ::POOL_STEP], count - 1)
+
+        def mean(part: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            weights, error = self._weights(every, own, part, pools[part], sizes, noise)
+            return (
+                np.einsum("msd,msdk->mk", weights, np.nan_to_num(every.operators[part])),
+                np.einsum("msd,msdk->mk", weights, every.slopes[part]),
+                error / np.sqrt(2),
+            )
+
+        _in_threads(fill, parts)
+        if fixed:
+            return every.operators[:, 0, -1], every.slopes[:, 0, -1], every.misfits(noise)[:, 0, -1] / np.sqrt(2)
+        own = every.deviations(noise)
+        results = _in_threads(mean, parts)
+        operators, slopes, sd = (np.concatenate(values) for values in zip(*results, strict=True))
+        return operators, slopes, sd
+
+    def _weights(
+        self, every: _Candidates, own: FloatArray, part: IntArray, pools: IntArray, sizes: IntArray, noise: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """(M, S, D) weights, NaN where no candidate has a value, and (M,) errors of the weighed means."""
+        from mapping.geometry.curvature.jet_kernels import pooled_bias
+
+        bias = np.empty((len(part), *own.shape[1:]))
+        pooled_bias(every.operators, own, pools, sizes, CERTAINTY, bias)
+        # where all agree to rounding, none is better than another
+        trust = np.maximum(own[part] ** 2 + bias, np.finfo(float).tiny ** 0.25) ** -SHARPNESS
+        total = trust.sum(axis=(1, 2))
+        weights = trust / np.where(total > 0, total, np.nan)[:, None, None]
+        # errors of nested fits go together: that of the mean is not below the mean of theirs by much
+        error = np.sqrt(every.part(part).misfits(noise) ** 2 + bias)
+        known = np.multiply(weights, error, where=weights > 0, out=np.zeros_like(error)).sum(axis=(1, 2))
+        return weights, np.where(np.isfinite(known) & (total > 0), known, np.nan)
+
+    def bases(self, slopes: FloatArray) -> FloatArray:
+        """(N, 2, 3) orthonormal bases of the tangent planes with the given slopes in the normals' frames."""
+        n = self.normals
+        axis = np.eye(3)[np.abs(n).argmin(axis=1)]
+        e1 = axis - (axis * n).sum(axis=1, keepdims=True) * n
+        e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
+        e2 = np.cross(n, e1)
+        t1, t2 = e1 + slopes[:, :1] * n, e2 + slopes[:, 1:] * n
+        t1 /= np.linalg.norm(t1, axis=1, keepdims=True)
+        t2 -= (t2 * t1).sum(axis=1, keepdims=True) * t1
+        return np.stack([t1, t2 / np.linalg.norm(t2, axis=1, keepdims=True)], axis=1)
+
+
+def _in_threads(work: Callable[[IntArray], Any], parts: list[IntArray]) -> list[Any]:
+    with ThreadPoolExecutor(cores()) as threads:
+        return list(threads.map(work, parts))
+
+
+def _oriented(body: Surface | FloatArray, normals: FloatArray | None) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Points, outward normals, and which points belong to a body at all."""
+    if isinstance(body, Surface):
+        points = body.vertices
+        area = body.face_normals * body.face_areas[:, None]
+        total = np.zeros_like(points)
+        for corner in range(3):
+            np.add.at(total, body.faces[:, corner], area)
+        rough = total if normals is None else normals
+    else:
+        points = body
+        rough = points - points.mean(axis=0) if normals is None else normals
+    length = np.linalg.norm(rough, axis=1)
+    used = length > 0
+    return points, np.divide(rough, length[:, None], out=np.zeros_like(rough), where=used[:, None]), used
+
+
+def _smoothed_normals(place: FloatArray, rough: FloatArray, tree: Any) -> FloatArray:
+    """Mean normals over the nearest points: noise tilts single triangles."""
+    smooth = np.empty_like(rough)
+    for part in np.array_split(np.arange(len(place)), max(1, len(place) * SMOOTHING // CHUNK_VALUES)):
+        near = tree.query(place[part], k=min(SMOOTHING, len(place)), workers=-1)[1]
+        same = np.einsum("ijk,ik->ij", rough[near], rough[part]) > 0
+        smooth[part] = np.einsum("ijk,ij->ik", rough[near], same.astype(np.float64))
+    length = np.linalg.norm(smooth, axis=1, keepdims=True)
+    return np.where(length > 0, smooth / np.where(length > 0, length, 1.0), rough)

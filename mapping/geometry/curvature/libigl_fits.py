@@ -1,0 +1,119 @@
+"""Curvature by libigl's quadratic fits, with every input that it cannot survive kept away from it.
+
+libigl 2.6.3 ends the process on some meshes (vertices with fewer than six neighbours, small components, vertices
+of no face) and returns zeros or nonsense for others (degenerate faces, inconsistent winding): theory section 9.
+The mesh is cleaned first, and the call runs in a process of its own, so that whatever remains cannot do harm.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from mapping import CurvatureError, FloatArray, IntArray, Surface
+from mapping.geometry.curvature.curvature import Curvature
+
+# A component needs this many vertices for six neighbours everywhere and a fit that is more than interpolation.
+SMALLEST_COMPONENT = 20
+# Area over squared longest edge below which a face has no normal that libigl can use.
+FLATTEST_FACE = 1e-10
+SECONDS = 600
+_CALL = """
+import sys
+import igl
+import numpy as np
+data = np.load(sys.argv[1])
+d1, d2, k1, k2, bad = igl.principal_curvature(data["v"], data["f"], int(data["radius"]), bool(data["rings"]))
+np.savez(sys.argv[2], d1=d1, d2=d2, k1=k1, k2=k2, bad=np.asarray(bad, dtype=np.int64))
+"""
+
+
+def libigl_curvature(surface: Surface, radius: int = 5, rings: bool = True) -> Curvature:
+    """`igl.principal_curvature` where it can be trusted, and NaN elsewhere.
+
+    Args:
+        surface: any mesh.
+        radius: rings of neighbours, or average edge lengths if `rings` is False; at least 2.
+        rings: count rings rather than distance.
+
+    Raises:
+        CurvatureError: a radius under 2 (libigl would silently take 2).
+    """
+    if radius < 2:
+        raise CurvatureError(f"libigl fits over at least 2 rings of neighbours; found radius {radius}")
+    faces = _sound_faces(surface)
+    used, faces = np.unique(faces, return_inverse=True)
+    faces = faces.reshape(-1, 3).astype(np.int64)
+    count = len(surface.vertices)
+    k1, k2 = np.full(count, np.nan), np.full(count, np.nan)
+    d1, d2 = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
+    if len(faces):
+        vertices = surface.vertices[used]
+        result = _in_own_process(vertices, faces, radius, rings)
+        if result is not None:
+            trusted = np.isfinite(result["k1"]) & np.isfinite(result["k2"])
+            trusted[result["bad"]] = False
+            trusted &= (np.abs(result["d1"]).sum(axis=1) > 0) & (np.abs(result["d2"]).sum(axis=1) > 0)
+            keep = used[trusted]
+            k1[keep], k2[keep] = result["k1"][trusted], result["k2"][trusted]
+            d1[keep], d2[keep] = result["d1"][trusted], result["d2"][trusted]
+    valid = np.isfinite(k1)
+    return Curvature(k1, k2, d1, d2, np.full(count, np.nan), valid)
+
+
+def _sound_faces(surface: Surface) -> IntArray:
+    """Faces of large enough, consistently wound components, without degenerate and repeated ones."""
+    faces = surface.faces
+    corners = surface.vertices[faces]
+    edges = np.roll(corners, -1, axis=1) - corners
+    longest = (edges**2).sum(axis=2).max(axis=1)
+    scale = np.maximum(longest, np.finfo(float).tiny)
+    sound = (surface.face_areas / scale > FLATTEST_FACE) & (longest > 0)
+    faces = faces[sound]
+    if len(faces) == 0:
+        return np.asarray(faces)
+    faces = faces[np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])]
+    component, sizes = _components(faces, len(surface.vertices))
+    wanted = sizes >= SMALLEST_COMPONENT
+    wanted[component[_turned(faces)]] = False
+    return np.asarray(faces[wanted[component[faces[:, 0]]]])
+
+
+def _components(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
+    """Component of every vertex, and the number of vertices in each component."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    total, component = connected_components(graph, directed=False)
+    return component.astype(np.int64), np.bincount(component, minlength=total)
+
+
+def _turned(faces: IntArray) -> IntArray:
+    """Vertices of edges that two faces run through in the same direction (inconsistent winding)."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    unique, times = np.unique(edges, axis=0, return_counts=True)
+    return np.asarray(np.unique(unique[times > 1]))
+
+
+def _in_own_process(vertices: FloatArray, faces: IntArray, radius: int, rings: bool) -> dict[str, FloatArray] | None:
+    """What libigl says, or None if it did not survive."""
+    with tempfile.TemporaryDirectory() as folder:
+        question, answer = Path(folder) / "question.npz", Path(folder) / "answer.npz"
+        np.savez(question, v=vertices, f=faces, radius=radius, rings=rings)
+        subprocess.run(
+            [sys.executable, "-c", _CALL, str(question), str(answer)],
+            check=False,
+            timeout=SECONDS,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        if not answer.exists():
+            return None
+        with np.load(answer) as found:
+            return {name: found[name] for name in found.files}

@@ -1,0 +1,49 @@
+"""Meshes and polylines: trees of triangles, nearest points, threads, files."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.geometry.mesh.atomic_write import write_whole as write_whole
+    from mapping.geometry.mesh.bvh_kernels import STACK as STACK, WIDTH as WIDTH, push_lanes as push_lanes
+    from mapping.geometry.mesh.nearest import MovedNearestPoint as MovedNearestPoint, NearestPoint as NearestPoint
+    from mapping.geometry.mesh.open3d_import import open3d as open3d
+    from mapping.geometry.mesh.polyline import (
+        arclengths as arclengths,
+        directions as directions,
+        distances as distances,
+        middle as middle,
+        nearest_on as nearest_on,
+        resample as resample,
+    )
+    from mapping.geometry.mesh.threads import by_shares as by_shares, cores as cores
+    from mapping.geometry.mesh.tree import TriangleTree as TriangleTree
+    from mapping.geometry.mesh.triangle_kernels import (
+        closest_on_triangle as closest_on_triangle,
+        enter_triangle as enter_triangle,
+        leave_triangle as leave_triangle,
+    )
+    from mapping.geometry.mesh.triangle_row_kernels import BLOCK as BLOCK, closest as closest, corners as corners
+    from mapping.geometry.mesh.vector_kernels import (
+        cross as cross,
+        dot as dot,
+        moved as moved,
+        scaled as scaled,
+        sub as sub,
+        vector as vector,
+    )
+
+_PUBLIC = {
+    "atomic_write": ("write_whole",),
+    "bvh_kernels": ("STACK", "WIDTH", "push_lanes"),
+    "nearest": ("MovedNearestPoint", "NearestPoint"),
+    "open3d_import": ("open3d",),
+    "polyline": ("arclengths", "directions", "distances", "middle", "nearest_on", "resample"),
+    "threads": ("by_shares", "cores"),
+    "tree": ("TriangleTree",),
+    "triangle_kernels": ("closest_on_triangle", "enter_triangle", "leave_triangle"),
+    "triangle_row_kernels": ("BLOCK", "closest", "corners"),
+    "vector_kernels": ("cross", "dot", "moved", "scaled", "sub", "vector"),
+}
+doorway(__name__, _PUBLIC)

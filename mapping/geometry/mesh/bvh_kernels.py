@@ -1,0 +1,278 @@
+"""A tree of bounding boxes over triangles, sixteen to a node (numba).
+
+Triangles are ordered so that any sixteen neighbours, any sixteen groups of sixteen, and so on, lie close
+together. The tree then needs no links but counting, and the boxes of a node's sixteen lanes are
+tested by one vectorised loop. Boxes are float32: they only ever leave out what is surely missed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mapping.geometry.mesh.vector_kernels import dot, moved, sub
+
+WIDTH = 16
+STACK = 512  # 32 bit numbers of triangles make at most 8 levels, each leaving at most 15 lanes waiting
+ROUNDING = 6e-6  # what float32 boxes and paths may be off by, in lengths of the scaled body
+NOWHERE = 1e18  # a box that no path comes near
+
+F4 = np.float32
+
+
+@njit(cache=True, error_model="numpy")
+def bounds(vertices, faces):  # type: ignore[no-untyped-def]
+    """(2, 3) smallest and largest coordinates of the vertices that faces use."""
+    box = np.empty((2, 3))
+    for k in range(3):
+        box[0, k] = box[1, k] = vertices[faces[0, 0], k]
+    for i in range(len(faces)):
+        for j in range(3):
+            for k in range(3):
+                x = vertices[faces[i, j], k]
+                box[0, k], box[1, k] = min(box[0, k], x), max(box[1, k], x)
+    return box
+
+
+@njit(cache=True, error_model="numpy")
+def leaf_order(vertices, faces):  # type: ignore[no-untyped-def]
+    """(F,) int32: the faces in the order of the leaves, by halving at whole groups along the longest extent."""
+    count = len(faces)
+    keys, order = np.empty((count, 3), np.float32), np.empty(count, np.int32)
+    for i in range(count):
+        order[i] = i
+        for k in range(3):
+            keys[i, k] = vertices[faces[i, 0], k] + vertices[faces[i, 1], k] + vertices[faces[i, 2], k]
+    todo = np.empty((128, 2), np.int64)
+    todo[0, 0], todo[0, 1] = 0, count
+    waiting = 1
+    while waiting > 0:
+        waiting -= 1
+        first, end = todo[waiting, 0], todo[waiting, 1]
+        if end - first <= WIDTH:
+            continue
+        group = WIDTH
+        while group * WIDTH < end - first:
+            group *= WIDTH
+        cut = first + group * (((end - first + group - 1) // group + 1) // 2)
+        part(keys, order, first, end, cut, longest_axis(keys, first, end))
+        for low, high in ((first, cut), (cut, end)):
+            todo[waiting, 0], todo[waiting, 1] = low, high
+            waiting += 1
+    return order
+
+
+@njit(cache=True, error_model="numpy")
+def longest_axis(keys, first, end):  # type: ignore[no-untyped-def]
+    """Axis along which the keys spread most."""
+    best, longest = 0, F4(-1.0)
+    for axis in range(3):
+        low = high = keys[first, axis]
+        for i in range(first, end):
+            low, high = min(low, keys[i, axis]), max(high, keys[i, axis])
+        if high - low > longest:
+            best, longest = axis, high - low
+    return best
+
+
+@njit(cache=True, error_model="numpy")
+def part(keys, order, first, end, cut, axis):  # type: ignore[no-untyped-def]
+    """Permute keys and order so that none before `cut` exceeds one after it (Hoare's quickselect)."""
+    low, high, chance = first, end - 1, 12345
+    while low < high:
+        chance = (chance * 1103515245 + 12345) % 2147483648  # a pivot that no mesh can foresee
+        pivot = keys[low + chance % (high - low + 1), axis]
+        i, j = low, high
+        while i <= j:
+            while keys[i, axis] < pivot:
+                i += 1
+            while keys[j, axis] > pivot:
+                j -= 1
+            if i <= j:
+                for k in range(3):
+                    keys[i, k], keys[j, k] = keys[j, k], keys[i, k]
+                order[i], order[j] = order[j], order[i]
+                i, j = i + 1, j - 1
+        if cut <= j:
+            high = j
+        elif cut >= i:
+            low = i
+        else:
+            return
+
+
+@njit(cache=True, error_model="numpy")
+def build_tree(rows):  # type: ignore[no-untyped-def]
+    """The tree over triangles (F, >= 9) in leaf order. Nodes count from the leaves; the last one is the root.
+
+    Returns:
+        leaves: (L, 10, WIDTH) float32, of each lane's triangle the nine coordinates of its corners and a third of
+            its longest side squared.
+        boxes: (M, 6, WIDTH) float32, of each lane of the other nodes the smallest and largest coordinates.
+        links: (L + M, 2) int32: node in lane 0 (the others follow) or, of a leaf, -1 - triangle in lane 0; number
+            of lanes in use.
+    """
+    count = (len(rows) + WIDTH - 1) // WIDTH
+    others, level = 0, count
+    while level > 1:
+        level = (level + WIDTH - 1) // WIDTH
+        others += level
+    leaves = np.full((count, 10, WIDTH), F4(NOWHERE))
+    boxes = np.full((others, 6, WIDTH), F4(NOWHERE))
+    links = np.empty((count + others, 2), np.int32)
+    for i in range(len(rows)):
+        for k in range(9):
+            leaves[i // WIDTH, k, i % WIDTH] = rows[i, k]
+        leaves[i // WIDTH, 9, i % WIDTH] = longest_square(rows, i) / 3.0
+    for i in range(count):
+        links[i, 0], links[i, 1] = -1 - WIDTH * i, min(WIDTH, len(rows) - WIDTH * i)
+    below, first = 0, count
+    while count > 1:
+        parents = (count + WIDTH - 1) // WIDTH
+        for i in range(count):
+            enclose(leaves, boxes, links, below + i, first + i // WIDTH - len(leaves), i % WIDTH)
+        for i in range(parents):
+            links[first + i, 0], links[first + i, 1] = below + WIDTH * i, min(WIDTH, count - WIDTH * i)
+        below, first, count = first, first + parents, parents
+    return leaves, boxes, links
+
+
+@njit(cache=True, error_model="numpy")
+def longest_square(rows, i):  # type: ignore[no-untyped-def]
+    """Longest side of a triangle, squared."""
+    a, b = (rows[i, 0], rows[i, 1], rows[i, 2]), (rows[i, 3], rows[i, 4], rows[i, 5])
+    c = (rows[i, 6], rows[i, 7], rows[i, 8])
+    u, v, w = sub(b, a), sub(c, b), sub(a, c)
+    return max(dot(u, u), dot(v, v), dot(w, w))
+
+
+@njit(cache=True, error_model="numpy")
+def lane_box(leaves, boxes, node, lane):  # type: ignore[no-untyped-def]
+    """(low, high): corners of the box of a lane."""
+    i = node - len(leaves)
+    if i >= 0:
+        low, high = (boxes[i, 0, lane], boxes[i, 1, lane], boxes[i, 2, lane]), (
+            boxes[i, 3, lane], boxes[i, 4, lane], boxes[i, 5, lane],
+        )  # fmt: skip
+        return low, high
+    a = (leaves[node, 0, lane], leaves[node, 1, lane], leaves[node, 2, lane])
+    b = (leaves[node, 3, lane], leaves[node, 4, lane], leaves[node, 5, lane])
+    c = (leaves[node, 6, lane], leaves[node, 7, lane], leaves[node, 8, lane])
+    low = (min(a[0], b[0], c[0]), min(a[1], b[1], c[1]), min(a[2], b[2], c[2]))
+    return low, (max(a[0], b[0], c[0]), max(a[1], b[1], c[1]), max(a[2], b[2], c[2]))
+
+
+@njit(cache=True, error_model="numpy")
+def enclose(leaves, boxes, links, node, parent, lane):  # type: ignore[no-untyped-def]
+    """Write the box around all lanes of a node into a lane of its parent (its number among `boxes`)."""
+    for i in range(links[node, 1]):
+        low, high = lane_box(leaves, boxes, node, i)
+        for k in range(3):
+            if i == 0 or low[k] < boxes[parent, k, lane]:
+                boxes[parent, k, lane] = low[k]
+            if i == 0 or high[k] > boxes[parent, 3 + k, lane]:
+                boxes[parent, 3 + k, lane] = high[k]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def leaf_tests(leaves, node, end, d, reach, apart):  # type: ignore[no-untyped-def]
+    """`box_tests` for the triangles of a leaf.
+
+    On fine meshes sharper than their boxes: for a point p = sum w_i v_i of a triangle, |p|^2 is
+    sum w_i |v_i|^2 - sum w_i w_j |v_i - v_j|^2, and the last sum is at most a third of the longest side squared.
+    """
+    ex, ey, ez, dx, dy, dz = F4(end[0]), F4(end[1]), F4(end[2]), F4(d[0]), F4(d[1]), F4(d[2])
+    zero, behind, square = F4(0.0), F4(-1.0), F4(reach * reach)
+    for i in range(leaves.shape[2]):
+        ax, ay, az = leaves[node, 0, i] - ex, leaves[node, 1, i] - ey, leaves[node, 2, i] - ez
+        bx, by, bz = leaves[node, 3, i] - ex, leaves[node, 4, i] - ey, leaves[node, 5, i] - ez
+        cx, cy, cz = leaves[node, 6, i] - ex, leaves[node, 7, i] - ey, leaves[node, 8, i] - ez
+        nx = max(min(min(ax, bx), cx), zero) + min(max(max(ax, bx), cx), zero)
+        ny = max(min(min(ay, by), cy), zero) + min(max(max(ay, by), cy), zero)
+        nz = max(min(min(az, bz), cz), zero) + min(max(max(az, bz), cz), zero)
+        box = nx * nx + ny * ny + nz * nz if nx * dx + ny * dy + nz * dz >= zero else behind
+        ahead = min(min(ax * dx + ay * dy + az * dz, bx * dx + by * dy + bz * dz), cx * dx + cy * dy + cz * dz)
+        near = min(min(ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz), cx * cx + cy * cy + cz * cz)
+        third = leaves[node, 9, i]
+        near = near - third if ahead >= zero else behind
+        near = near if third <= square else behind  # else the difference has too few digits
+        apart[i] = max(box, near)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def box_tests(boxes, node, end, d, reach, apart, late):  # type: ignore[no-untyped-def]
+    """Look from the end of a ball's way, along the unit vector d, at the boxes of a node's lanes.
+
+    apart: (WIDTH,) out, squared distance from `end` of a box that lies ahead, so that the rest of the way
+        is further from it still; -1 if it lies behind, and the way may have been closer to it.
+    late: (WIDTH,) out, larger where the ball would meet the middle of the box later (to the second order).
+    """
+    ex, ey, ez, dx, dy, dz = F4(end[0]), F4(end[1]), F4(end[2]), F4(d[0]), F4(d[1]), F4(d[2])
+    zero, half, twice = F4(0.0), F4(0.5), F4(2.0 * reach)
+    for i in range(boxes.shape[2]):  # a count unknown to the compiler: constant ones are unrolled, not vectorised
+        ax, ay, az = boxes[node, 0, i], boxes[node, 1, i], boxes[node, 2, i]
+        bx, by, bz = boxes[node, 3, i], boxes[node, 4, i], boxes[node, 5, i]
+        nx = max(ax - ex, zero) - max(ex - bx, zero)
+        ny = max(ay - ey, zero) - max(ey - by, zero)
+        nz = max(az - ez, zero) - max(ez - bz, zero)
+        apart[i] = nx * nx + ny * ny + nz * nz if nx * dx + ny * dy + nz * dz >= zero else F4(-1.0)
+        lx, ly, lz = half * (ax + bx) - ex, half * (ay + by) - ey, half * (az + bz) - ez
+        along = lx * dx + ly * dy + lz * dz
+        late[i] = lx * lx + ly * ly + lz * lz + (twice - along) * along
+
+
+@njit(cache=True, error_model="numpy")
+def passes(leaves, boxes, node, lane, start, end, d, length, reach):  # type: ignore[no-untyped-def]
+    """True if a ball on its way from `start` to `end` surely stays further than `reach` from a lane's box.
+
+    Two more separating planes are tried: across the box's point closest to the start, and along the way.
+    """
+    low, high = lane_box(leaves, boxes, node, lane)
+    n = (
+        max(low[0] - start[0], 0.0) - max(start[0] - high[0], 0.0),
+        max(low[1] - start[1], 0.0) - max(start[1] - high[1], 0.0),
+        max(low[2] - start[2], 0.0) - max(start[2] - high[2], 0.0),
+    )
+    if dot(n, d) <= 0.0 and dot(n, n) > reach * reach:
+        return True
+    middle = (0.5 * (low[0] + high[0]) - end[0], 0.5 * (low[1] + high[1]) - end[1], 0.5 * (low[2] + high[2]) - end[2])
+    aside = moved(middle, -dot(middle, d), d)
+    half = 0.5 * (
+        abs(aside[0]) * (high[0] - low[0]) + abs(aside[1]) * (high[1] - low[1]) + abs(aside[2]) * (high[2] - low[2])
+    )
+    square = dot(aside, aside)
+    gap = square - half - length * abs(dot(aside, d))  # the last: aside is across d to rounding only
+    return gap > 0.0 and gap * gap > reach * reach * square
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def push_lanes(leaves, boxes, links, stack, waiting, start, end, d, length, reach, apart, late):  # type: ignore[no-untyped-def]
+    """Replace the node on top of the stack by the lanes that a ball on its way may touch, the earliest on top.
+
+    Returns the new height of the stack. Numbers from 0 up are nodes; -1 - i is triangle i.
+    """
+    node = stack[waiting - 1]
+    child, lanes = links[node, 0], links[node, 1]
+    step = 1 if child >= 0 else -1
+    reach += ROUNDING
+    if child >= 0:
+        box_tests(boxes, node - len(leaves), end, d, reach, apart, late)
+    else:
+        leaf_tests(leaves, node, end, d, reach, apart)
+    bottom, square = waiting - 1, F4(reach * reach)
+    end_of_lanes = bottom
+    for lane in range(lanes):  # without a branch, which nobody could predict
+        stack[end_of_lanes] = lane
+        end_of_lanes += apart[lane] <= square
+    waiting = bottom
+    for i in range(bottom, end_of_lanes):
+        lane = stack[i]
+        if apart[lane] < F4(0.0) and passes(leaves, boxes, node, lane, start, end, d, length, reach):
+            continue
+        place = waiting
+        while step > 0 and place > bottom and late[stack[place - 1] - child] < late[lane]:
+            stack[place] = stack[place - 1]
+            place -= 1
+        stack[place] = child + step * lane
+        waiting += 1
+    return waiting

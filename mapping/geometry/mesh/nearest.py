@@ -1,0 +1,158 @@
+"""Nearest point of a mesh to given points, with the side they lie on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mapping import FloatArray, IntArray, MappingError, Surface
+from mapping.geometry.mesh.tree import TriangleTree
+
+# A barycentric coordinate below this counts as zero: the point lies on an edge or a vertex.
+ON_BORDER = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """Closest points of a surface.
+
+    Args:
+        points: (N, 3) closest points on the mesh, m.
+        distance: (N,) unsigned distances, m.
+        side: (N,) +1 outside (on the side of the outward normals), -1 inside.
+        normals: (N, 3) unit pseudonormals of the mesh at the closest points (angle-weighted at edges
+            and vertices; Baerentzen & Aanaes 2005).
+        face: (N,) face that the point lies in.
+        barycentric: (N, 3) its coordinates in that face.
+    """
+
+    points: FloatArray
+    distance: FloatArray
+    side: FloatArray
+    normals: FloatArray
+    face: IntArray
+    barycentric: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class NearestPoint:
+    """Answers nearest-point queries on one surface."""
+
+    surface: Surface
+
+    def query(self, points: ArrayLike) -> Nearest:
+        """The nearest point of the mesh to each of (N, 3) points, m.
+
+        Raises:
+            MappingError: points of the wrong shape or not finite.
+        """
+        query = np.asarray(points, dtype=np.float64)
+        if query.ndim != 2 or query.shape[1] != 3 or not np.isfinite(query).all():
+            raise MappingError(
+                f"nearest-point queries must be finite points of shape (N, 3); found shape {query.shape}"
+            )
+        if len(query) == 0:
+            empty = np.zeros((0, 3))
+            return Nearest(empty, np.zeros(0), np.zeros(0), empty, np.zeros(0, dtype=np.int64), empty)
+        return self._answered(query)
+
+    def _answered(self, query: FloatArray) -> Nearest:
+        face, closest = self._closest(query)
+        barycentric = self._barycentric(closest, face)
+        normals = self._pseudonormals(face, barycentric)
+        offset = query - closest
+        side = np.where(np.einsum("ij,ij->i", offset, normals) >= 0.0, 1.0, -1.0)
+        return Nearest(closest, np.linalg.norm(offset, axis=1), side, normals, face, barycentric)
+
+    def _closest(self, query: FloatArray) -> tuple[IntArray, FloatArray]:
+        from mapping.geometry.mesh.nearest_kernels import nearest_points
+
+        index, tree = self._tree
+        points, face = np.empty(query.shape), np.empty(len(query), dtype=np.int64)
+        nearest_points(tree.rows, tree.order, tree.leaves, tree.boxes, tree.links, tree.into(query), points, face)
+        return index[face], tree.out(points)
+
+    @cached_property
+    def _tree(self) -> tuple[IntArray, TriangleTree]:
+        """Indices of the faces that have an area, all faces if none has, and their tree."""
+        proper = np.flatnonzero((self.surface.face_normals != 0).any(axis=1))
+        index = proper if len(proper) else np.arange(len(self.surface.faces))
+        return index, TriangleTree(Surface(self.surface.vertices, self.surface.faces[index]))
+
+    def _barycentric(self, points: FloatArray, face: IntArray) -> FloatArray:
+        a, b, c = (self.surface.vertices[self.surface.faces[face, i]] for i in range(3))
+        u, v, w = b - a, c - a, points - a
+        uu, uv, vv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v)))
+        wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
+        det = uu * vv - uv * uv
+        safe = np.where(det > 0, det, 1.0)
+        second = np.where(det > 0, (vv * wu - uv * wv) / safe, 0.0)
+        third = np.where(det > 0, (uu * wv - uv * wu) / safe, 0.0)
+        weights = np.clip(np.column_stack([1.0 - second - third, second, third]), 0.0, 1.0)
+        return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+    def _pseudonormals(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
+        zero = barycentric < ON_BORDER
+        normals = self.surface.face_normals[face].copy()
+        on_edge = np.flatnonzero(zero.sum(axis=1) == 1)
+        normals[on_edge] = self.edge_normals[face[on_edge], zero[on_edge].argmax(axis=1)]
+        on_vertex = np.flatnonzero(zero.sum(axis=1) == 2)
+        corner = barycentric[on_vertex].argmax(axis=1)
+        normals[on_vertex] = self._vertex_normals[self.surface.faces[face[on_vertex], corner]]
+        return normals
+
+    @cached_property
+    def edge_normals(self) -> FloatArray:
+        """(F, 3, 3): of the edge opposite to each corner, the mean normal of the faces that share it."""
+        faces = self.surface.faces
+        edges = np.sort(np.stack([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]], axis=1), axis=2)
+        _, name = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+        sums = np.zeros((int(name.max()) + 1, 3))
+        np.add.at(sums, name.ravel(), np.repeat(self.surface.face_normals, 3, axis=0))
+        return _unit(sums)[name.ravel()].reshape(-1, 3, 3)
+
+    @cached_property
+    def _vertex_normals(self) -> FloatArray:
+        """(V, 3) normals weighted by the faces' angles at the vertex."""
+        vertices, faces = self.surface.vertices, self.surface.faces
+        sums = np.zeros_like(vertices)
+        for corner in range(3):
+            here = vertices[faces[:, corner]]
+            u = _unit(vertices[faces[:, (corner + 1) % 3]] - here)
+            v = _unit(vertices[faces[:, (corner + 2) % 3]] - here)
+            angle = np.arccos(np.clip(np.einsum("ij,ij->i", u, v), -1.0, 1.0))
+            np.add.at(sums, faces[:, corner], angle[:, None] * self.surface.face_normals)
+        return _unit(sums)
+
+
+@dataclass(frozen=True, eq=False)
+class MovedNearestPoint(NearestPoint):
+    """Answers queries on a rigidly moved surface by those on the surface as it was: no tree is built again.
+
+    Args:
+        surface: the moved one.
+        still: answers queries on the surface before the motion.
+        rotation, translation: of the motion, x to rotation @ x + translation; (3, 3) and (3,) m.
+    """
+
+    still: NearestPoint
+    rotation: FloatArray
+    translation: FloatArray
+
+    def _answered(self, query: FloatArray) -> Nearest:
+        near = self.still.query((query - self.translation) @ self.rotation)
+        points, normals = near.points @ self.rotation.T + self.translation, near.normals @ self.rotation.T
+        return Nearest(points, near.distance, near.side, normals, near.face, near.barycentric)
+
+    @cached_property
+    def edge_normals(self) -> FloatArray:
+        return np.asarray(self.still.edge_normals @ self.rotation.T)
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    """Rows scaled to length one; rows of no length stay zero."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0))

@@ -1,0 +1,49 @@
+"""TriangleTree: the faces of a body in a frame of their own, under a tree of boxes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mapping import FloatArray, Surface
+
+
+class TriangleTree:
+    """Triangles centred, scaled by a power of two to a size of about 1, and ordered under a tree.
+
+    The centre has few digits: subtracting it is exact to the coordinates' own rounding, and a body around
+    the origin keeps its coordinates. Lengths scale exactly.
+
+    Args:
+        surface: the body.
+        length: another length that must not exceed about 1 in the frame, m, for example a ball's radius.
+    """
+
+    def __init__(self, surface: Surface, length: float = 0.0) -> None:
+        from mapping.geometry.mesh import bvh_kernels, triangle_row_kernels
+
+        low, high = bvh_kernels.bounds(surface.vertices, surface.faces)
+        self.extent = float((0.5 * high - 0.5 * low).max()) * 2.0
+        self._exponent = int(np.frexp(max(self.extent, length))[1])
+        self._center = np.ldexp(np.round(np.ldexp(0.5 * low + 0.5 * high, -self._exponent)), self._exponent)
+        vertices = self.into(surface.vertices)
+        self.order: NDArray[np.int32] = bvh_kernels.leaf_order(vertices, surface.faces)
+        self.rows: FloatArray = triangle_row_kernels.lay_out(vertices, surface.faces, self.order)
+        self.leaves, self.boxes, self.links = bvh_kernels.build_tree(self.rows)
+        self.size = float(np.linalg.norm(np.abs(self.into(np.stack([low, high]))).max(axis=0)))
+
+    def into(self, points: FloatArray) -> FloatArray:
+        """Points (N, 3), m, in the tree's frame."""
+        return np.asarray(np.ldexp(points - self._center, -self._exponent))
+
+    def out(self, points: FloatArray) -> FloatArray:
+        """Points (N, 3) of the tree's frame, m."""
+        return np.asarray(np.ldexp(points, self._exponent) + self._center)
+
+    def scale_in(self, lengths: ArrayLike) -> FloatArray:
+        """Lengths, m, in the tree's frame."""
+        return np.asarray(np.ldexp(lengths, -self._exponent))
+
+    def scale_out(self, lengths: ArrayLike) -> FloatArray:
+        """Lengths of the tree's frame, m."""
+        return np.asarray(np.ldexp(lengths, self._exponent))

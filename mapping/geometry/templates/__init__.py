@@ -1,0 +1,50 @@
+"""Templates: the closed-form traces of caps, chains, hollows and bells."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.geometry.templates.bell_kernels import bell_heights as bell_heights
+    from mapping.geometry.templates.bump_of_revolution import BumpOfRevolution as BumpOfRevolution
+    from mapping.geometry.templates.cap_section import radius_of_cap as radius_of_cap, width_of_cap as width_of_cap
+    from mapping.geometry.templates.chain_kernels import chain_heights as chain_heights
+    from mapping.geometry.templates.hollow_kernels import (
+        groove_heights as groove_heights,
+        pit_heights as pit_heights,
+        step_heights as step_heights,
+    )
+    from mapping.geometry.templates.shapes import (
+        cap_height as cap_height,
+        chain_height as chain_height,
+        contact_half_width as contact_half_width,
+        groove_height as groove_height,
+        kink_angle as kink_angle,
+        rim_height as rim_height,
+        step_height as step_height,
+    )
+    from mapping.geometry.templates.small_heights import (
+        OUTLIER as OUTLIER,
+        SHAPE_ERROR as SHAPE_ERROR,
+        crest_trace as crest_trace,
+        misfit as misfit,
+    )
+
+_PUBLIC = {
+    "bell_kernels": ("bell_heights",),
+    "bump_of_revolution": ("BumpOfRevolution",),
+    "cap_section": ("radius_of_cap", "width_of_cap"),
+    "chain_kernels": ("chain_heights",),
+    "hollow_kernels": ("groove_heights", "pit_heights", "step_heights"),
+    "shapes": (
+        "cap_height",
+        "chain_height",
+        "contact_half_width",
+        "groove_height",
+        "kink_angle",
+        "rim_height",
+        "step_height",
+    ),
+    "small_heights": ("OUTLIER", "SHAPE_ERROR", "crest_trace", "misfit"),
+}
+doorway(__name__, _PUBLIC)

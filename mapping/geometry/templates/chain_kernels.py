@@ -1,0 +1,158 @@
+"""Compiled heights of a ball over many capsule chains at once (the exact envelope of shapes.chain_height)."""
+
+# mypy: disable-error-code="untyped-decorator"
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mapping import FloatArray, IntArray
+
+NONE = -1e300
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _last_exit(square, along, gap):  # type: ignore[no-untyped-def]
+    """Largest root of square t^2 + 2 along t + gap = 0, or NONE; for along > 0 in the form that does not cancel."""
+    discriminant = along * along - square * gap
+    if discriminant < 0.0 or square < 1e-300:
+        return NONE
+    root = np.sqrt(discriminant)
+    if along > 0.0:
+        return -gap / (along + root)
+    return (root - along) / square
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def chain_heights(
+    feet: FloatArray,
+    normals: FloatArray,
+    tangents: FloatArray,
+    half_bin: FloatArray,
+    first: IntArray,
+    last: IntArray,
+    chains: FloatArray,
+    radii: FloatArray,
+    rounding: FloatArray,
+    tip_radius: float,
+    out: FloatArray,
+) -> None:
+    """Heights (W, n) of W chains (W, K, 3) over n bins, averaged over each bin; written to `out`.
+
+    Bin i looks at the vertices first[i] to last[i] alone (a single one is a sphere). A capsule is convex: where the
+    ray leaves its infinite cylinder beyond a joint, it leaves the capsule through that joint's sphere. Both ends of
+    the chain are rounded over by e = rounding * a: 1 is a capsule's hemisphere, 0 is cut square. At x beyond an end
+    the dilated body then has the radius a - e + sqrt((r + e)^2 - x^2).
+
+    The floor at 0 is averaged over the bin: a straight flank that changes by 2 d over it gives (s + d)^2 / (4 d)
+    where it crosses 0.
+    """
+    walkers, bins = out.shape
+    legs = chains.shape[1] - 1
+    unit, length = np.zeros((max(legs, 1), 3)), np.zeros(max(legs, 1))
+    for w in range(walkers):
+        chain = chains[w]
+        total = radii[w] + tip_radius
+        edge = rounding[w] * radii[w]
+        inner, reach = radii[w] - edge, tip_radius + edge
+        first_leg, last_leg = legs, -1
+        for k in range(legs):
+            for c in range(3):
+                unit[k, c] = chain[k + 1, c] - chain[k, c]
+            length[k] = np.sqrt(unit[k, 0] ** 2 + unit[k, 1] ** 2 + unit[k, 2] ** 2)
+            if length[k] > 0.0:
+                first_leg, last_leg = min(first_leg, k), k
+                for c in range(3):
+                    unit[k, c] /= length[k]
+        for i in range(bins):
+            nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
+            qx = feet[i, 0] + tip_radius * nx
+            qy = feet[i, 1] + tip_radius * ny
+            qz = feet[i, 2] + tip_radius * nz
+            # Further out than this the trace is below the base's over the whole bin.
+            far = total * (total + 2.0 * half_bin[i])
+            best, mx, my, mz = NONE, 0.0, 0.0, 0.0
+            if last_leg < 0:
+                start, stop = first[i], first[i] + 1
+            else:
+                start = min(max(first[i], first_leg), last_leg)
+                stop = max(min(last[i] - 1, last_leg), start) + 1
+            for k in range(start, stop):
+                beside = -1
+                ox, oy, oz = qx - chain[k, 0], qy - chain[k, 1], qz - chain[k, 2]
+                if last_leg >= 0:
+                    if length[k] == 0.0:
+                        continue
+                    ux, uy, uz = unit[k, 0], unit[k, 1], unit[k, 2]
+                    o_along = ox * ux + oy * uy + oz * uz
+                    n_along = nx * ux + ny * uy + nz * uz
+                    along = ox * nx + oy * ny + oz * nz - o_along * n_along
+                    # most bins are far from most legs: they are told by the cheapest form, which cancels a little
+                    if along > 0.0 and ox * ox + oy * oy + oz * oz - o_along * o_along > far:
+                        continue
+                    ax, ay, az = ox - o_along * ux, oy - o_along * uy, oz - o_along * uz
+                    bx, by, bz = nx - n_along * ux, ny - n_along * uy, nz - n_along * uz
+                    along = ax * bx + ay * by + az * bz
+                    square = bx * bx + by * by + bz * bz
+                    distance = ax * ax + ay * ay + az * az
+                    distance = np.sqrt(distance)
+                    t = _last_exit(square, along, (distance - total) * (distance + total))
+                    place = o_along + max(t, -total) * n_along
+                    if place >= 0.0 and place <= length[k]:
+                        if t > best:
+                            best, mx, my, mz = t, ax + t * bx, ay + t * by, az + t * bz
+                        continue
+                    if rounding[w] < 1.0 and (
+                        (place < 0.0 and k == first_leg) or (place > length[k] and k == last_leg)
+                    ):
+                        x = 0.0
+                        # A ray that leans along the axis changes x on its way: a few rounds settle it.
+                        for _ in range(4):
+                            x = -place if place < 0.0 else place - length[k]
+                            if x >= reach:
+                                t = NONE
+                                break
+                            size = inner + np.sqrt((reach - x) * (reach + x))
+                            t = _last_exit(square, along, (distance - size) * (distance + size))
+                            if t == NONE or abs(n_along) < 1e-12:
+                                break
+                            place = o_along + t * n_along
+                        if t > best:
+                            cx, cy, cz = ax + t * bx, ay + t * by, az + t * bz
+                            share = 1.0 - inner / max(np.sqrt(cx * cx + cy * cy + cz * cz), inner)
+                            x = -x if place < 0.0 else x
+                            best, mx, my, mz = t, share * cx + x * ux, share * cy + x * uy, share * cz + x * uz
+                        continue
+                    beyond = place > length[k]
+                    if beyond:
+                        ox, oy, oz = qx - chain[k + 1, 0], qy - chain[k + 1, 1], qz - chain[k + 1, 2]
+                    beside = k + 1 if beyond else k - 1
+                along = ox * nx + oy * ny + oz * nz
+                distance = ox * ox + oy * oy + oz * oz
+                if distance > far and along > 0.0:
+                    continue
+                distance = np.sqrt(distance)
+                t = _last_exit(1.0, along, (distance - total) * (distance + total))
+                if t <= best:
+                    continue
+                sx, sy, sz = ox + t * nx, oy + t * ny, oz + t * nz
+                if last_leg >= 0 and rounding[w] < 1.0 and first_leg <= beside and beside <= last_leg:
+                    # half of a joint's sphere is in the leg beside it, unless that ends there, cut square
+                    into = sx * unit[beside, 0] + sy * unit[beside, 1] + sz * unit[beside, 2]
+                    if (into if beside > k else -into) > 0.0:
+                        continue
+                best, mx, my, mz = t, sx, sy, sz
+            if best <= -half_bin[i]:
+                out[w, i] = 0.0
+                continue
+            rise = mx * nx + my * ny + mz * nz
+            run = abs(mx * tangents[i, 0] + my * tangents[i, 1] + mz * tangents[i, 2])
+            # Near the horizon of the chain the flank is vertical; the slope of 45 degrees is steep enough there.
+            d = half_bin[i] * (run / rise if run < rise else 1.0)
+            if best >= d:
+                out[w, i] = best
+            elif best <= -d:
+                out[w, i] = 0.0
+            else:
+                out[w, i] = (best + d) * (best + d) / (4.0 * d)

@@ -1,0 +1,102 @@
+"""Compiled traces of grooves, pits and steps, averaged over the nodes of each bin (the forms of shapes.py)."""
+
+# mypy: disable-error-code="untyped-decorator"
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mapping import FloatArray
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _rim(distance, tip, depth, bend):  # type: ignore[no-untyped-def]
+    """Height (negative) of a ball at a distance inside the rim of a hollow, as in shapes.rim_height."""
+    if distance <= 0.0:
+        return 0.0
+    if distance > tip:
+        return -depth
+    square = distance * distance
+    dip = square / (tip + np.sqrt((tip - distance) * (tip + distance))) + 0.5 * bend * square
+    return -min(dip, depth)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def groove_heights(
+    s: FloatArray,
+    lateral: FloatArray,
+    basis: FloatArray,
+    bend: FloatArray,
+    courses: FloatArray,
+    ends: FloatArray,
+    widths: FloatArray,
+    depths: FloatArray,
+    tip: float,
+    out: FloatArray,
+) -> None:
+    """Heights (W, n) of W grooves over bins with q nodes; `basis` (m, n, q) of the lateral modes, `ends` (W, 2)."""
+    walkers, bins = out.shape
+    modes, nodes = basis.shape[0], s.shape[1]
+    for w in range(walkers):
+        half, first, last = 0.5 * widths[w], ends[w, 0], ends[w, 1]
+        for i in range(bins):
+            total = 0.0
+            for q in range(nodes):
+                along = min(s[i, q] - first, last - s[i, q])
+                if along <= 0.0:
+                    continue
+                aside = lateral[i, q]
+                for m in range(modes):
+                    aside -= courses[w, m] * basis[m, i, q]
+                total += _rim(min(half - abs(aside), along), tip, depths[w], bend[i, q])
+            out[w, i] = total / nodes
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def pit_heights(
+    x: FloatArray,
+    y: FloatArray,
+    bend: float,
+    places: FloatArray,
+    widths: FloatArray,
+    depths: FloatArray,
+    tip: float,
+    out: FloatArray,
+) -> None:
+    """Heights (W, n) of W round pits over bins with nodes at tangent coordinates x, y (n, q); `places` (W, 2)."""
+    walkers, bins = out.shape
+    nodes = x.shape[1]
+    for w in range(walkers):
+        for i in range(bins):
+            total = 0.0
+            for q in range(nodes):
+                away = np.sqrt((x[i, q] - places[w, 0]) ** 2 + (y[i, q] - places[w, 1]) ** 2)
+                total += _rim(0.5 * widths[w] - away, tip, depths[w], bend)
+            out[w, i] = total / nodes
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def step_heights(
+    lateral: FloatArray,
+    basis: FloatArray,
+    courses: FloatArray,
+    heights: FloatArray,
+    high_side: float,
+    tip: float,
+    out: FloatArray,
+) -> None:
+    """Heights (W, n) of W steps over bins with nodes at lateral distances (n, q) from the chart."""
+    walkers, bins = out.shape
+    modes, nodes = basis.shape[0], lateral.shape[1]
+    for w in range(walkers):
+        for i in range(bins):
+            total = 0.0
+            for q in range(nodes):
+                aside = lateral[i, q]
+                for m in range(modes):
+                    aside -= courses[w, m] * basis[m, i, q]
+                inside = min(max(-high_side * aside, 0.0), tip)
+                drop = inside * inside / (tip + np.sqrt((tip - inside) * (tip + inside)))
+                total += max(heights[w] - drop, 0.0)
+            out[w, i] = total / nodes

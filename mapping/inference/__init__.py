@@ -1,0 +1,28 @@
+"""Inference: the posterior of one feature, and of all together."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.inference.evidence import (
+        log_evidence as log_evidence,
+        log_evidence_of_nothing as log_evidence_of_nothing,
+    )
+    from mapping.inference.feature_posterior import (
+        Solution as Solution,
+        pose_problem as pose_problem,
+        refine as refine,
+        sample_posterior as sample_posterior,
+        solve_problem as solve_problem,
+    )
+    from mapping.inference.joint import refine_all as refine_all
+    from mapping.inference.kind_odds import as_broken as as_broken, as_bump as as_bump
+
+_PUBLIC = {
+    "evidence": ("log_evidence", "log_evidence_of_nothing"),
+    "feature_posterior": ("Solution", "pose_problem", "refine", "sample_posterior", "solve_problem"),
+    "joint": ("refine_all",),
+    "kind_odds": ("as_broken", "as_bump"),
+}
+doorway(__name__, _PUBLIC)

@@ -1,0 +1,178 @@
+"""Chart: a curve on the base with the frames along it, in which ridges and grooves are described."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import EmptyWindowError, FloatArray, IntArray
+from mapping.base import Base, onto_base
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """A reference curve on the base.
+
+    Args:
+        s: (K,) distance along the curve, m.
+        points: (K, 3) points of the base, m.
+        tangents, laterals, normals: (K, 3) right-handed unit frames: lateral = normal x tangent.
+        bend: (K,) normal curvature of the base across the curve, 1/m, positive where it bulges outward.
+        closed: True if the curve returns to its beginning (last point equals the first).
+    """
+
+    s: FloatArray
+    points: FloatArray
+    tangents: FloatArray
+    laterals: FloatArray
+    normals: FloatArray
+    bend: FloatArray
+    closed: bool
+
+    @property
+    def length(self) -> float:
+        """Length of the curve, m."""
+        return float(self.s[-1] - self.s[0])
+
+    def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Points, laterals, normals (..., 3) and bends (...) at distances s, interpolated linearly."""
+        leg = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
+        share = ((s - self.s[leg]) / (self.s[leg + 1] - self.s[leg]))[..., None]
+
+        def mix(values: FloatArray) -> FloatArray:
+            return np.asarray((1.0 - share) * values[leg] + share * values[leg + 1])
+
+        return mix(self.points), mix(self.laterals), mix(self.normals), mix(self.bend[:, None])[..., 0]
+
+    def coordinates(self, points: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Distance along the curve, signed lateral distance (n,) and nearest leg of points (n, 3) on the base, m."""
+        start, leg = self.points[:-1], np.diff(self.points, axis=0)
+        square = np.maximum(np.einsum("ij,ij->i", leg, leg), np.finfo(float).tiny)
+        share = (points @ leg.T - np.einsum("ij,ij->i", start, leg)) / square
+        share = np.clip(share, 0.0, 1.0)
+        # |p - (start + share leg)|^2 without an (n, K, 3) array
+        cross = points @ start.T
+        gap = (
+            np.einsum("ij,ij->i", points, points)[:, None]
+            - 2.0 * (cross + share * (points @ leg.T))
+            + np.einsum("ij,ij->i", start, start)
+            + 2.0 * share * np.einsum("ij,ij->i", start, leg)
+            + share**2 * square
+        )
+        nearest = np.argmin(gap, axis=1)
+        s, lateral = self._on_leg(points, nearest)
+        return s, lateral, nearest
+
+    def _on_leg(self, points: FloatArray, leg: IntArray) -> tuple[FloatArray, FloatArray]:
+        offset = points - self.points[leg]
+        along = self.points[leg + 1] - self.points[leg]
+        length = np.linalg.norm(along, axis=1)
+        forward = np.einsum("ij,ij->i", offset, along) / np.maximum(length, np.finfo(float).tiny)
+        lateral = np.einsum("ij,ij->i", offset, self.laterals[leg])
+        s = self.s[leg] + forward * (self.s[leg + 1] - self.s[leg]) / np.maximum(length, np.finfo(float).tiny)
+        return s, lateral
+
+
+def chart_along(
+    axis: FloatArray, normals: FloatArray, base: Base, tip_radius: float, spacing: float, extension: float, reach: float
+) -> Chart:
+    """The chart along a polyline, its vertices put on the base, straight on by `extension` beyond both ends.
+
+    Args:
+        axis: (K, 3) polyline near the base, K >= 2, m; first equals last for a closed curve.
+        normals: (K, 3) outward normals at its points.
+        base: the global model.
+        tip_radius: radius of the fingertip, m: feet are sought from this high above.
+        spacing: wanted distance of the chart's points, m.
+        extension: length added at both ends of an open curve, m; less where the base ends.
+        reach: lateral distance over which the bend of the base is measured, m.
+
+    Raises:
+        EmptyWindowError: the line does not lie over the base.
+    """
+    closed = len(axis) > 3 and bool(np.array_equal(axis[0], axis[-1]))
+    line, lift = _resampled(axis, normals, spacing)
+    if not closed and extension > 0.0:
+        line, lift = _extended(line, lift, spacing, extension)
+    points, up = onto_base(line, lift, base, tip_radius, smooth=int(0.5 * reach / spacing))
+    if not closed:
+        keep = _on_base(points - line, up, 0.1 * reach)
+        points, up = _apart(points[keep], up[keep])
+    if closed:
+        points[-1], up[-1] = points[0], up[0]
+    tangents = _tangents(points, closed)
+    laterals = np.cross(up, tangents)
+    laterals /= np.linalg.norm(laterals, axis=1, keepdims=True)
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return Chart(s, points, tangents, laterals, up, _bend(points, laterals, up, base, tip_radius, reach), closed)
+
+
+def _resampled(axis: FloatArray, normals: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1))])
+    keep = np.concatenate([[True], np.diff(s) > 0.0])
+    s, axis, normals = s[keep], axis[keep], normals[keep]
+    even = np.linspace(0.0, s[-1], max(2, int(np.ceil(s[-1] / spacing)) + 1))
+    both = [np.column_stack([np.interp(even, s, values[:, i]) for i in range(3)]) for values in (axis, normals)]
+    return both[0], both[1] / np.linalg.norm(both[1], axis=1, keepdims=True)
+
+
+def _extended(line: FloatArray, lift: FloatArray, spacing: float, extension: float) -> tuple[FloatArray, FloatArray]:
+    """The line and its normals with straight legs before and behind."""
+    count = max(1, int(np.ceil(extension / spacing)))
+    far = np.linspace(extension / count, extension, count)[:, None]
+    # The direction of an end is taken over a stretch, not over the last leg, which holds the noise of two crossings.
+    stretch = max(1, min(len(line) - 1, len(line) // 3))
+    back, ahead = line[0] - line[stretch], line[-1] - line[-1 - stretch]
+    before = line[0] + far[::-1] * back / np.linalg.norm(back)
+    behind = line[-1] + far * ahead / np.linalg.norm(ahead)
+    lifts = [np.repeat(lift[:1], count, axis=0), lift, np.repeat(lift[-1:], count, axis=0)]
+    return np.concatenate([before, line, behind]), np.concatenate(lifts)
+
+
+def _on_base(moved: FloatArray, up: FloatArray, tolerance: float) -> slice:
+    """The longest stretch about the middle that lies over the base, and one point more at each border.
+
+    A foot moves along its own normal where the base goes on, and sideways, back to the border, where it does not.
+    """
+    sideways = moved - np.einsum("ij,ij->i", moved, up)[:, None] * up
+    out = np.flatnonzero(np.linalg.norm(sideways, axis=1) > tolerance)
+    middle = len(moved) // 2
+    low, high = int(out[out < middle].max(initial=-1)), int(out[out >= middle].min(initial=len(moved)))
+    return slice(max(low, 0), min(high + 1, len(moved)))
+
+
+def _apart(points: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The points without those that stand where the one before them does: on the base's border feet gather."""
+    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    apart = np.concatenate([[True], step > 1e-9 * step.max(initial=0.0)])
+    if apart.sum() < 2:
+        raise EmptyWindowError("its axis does not lie over the base")
+    return points[apart], up[apart]
+
+
+def _tangents(points: FloatArray, closed: bool) -> FloatArray:
+    if closed:
+        ring = points[:-1]
+        along = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
+        along = np.concatenate([along, along[:1]])
+    else:
+        along = np.gradient(points, axis=0)
+    return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
+
+
+def _bend(
+    points: FloatArray, laterals: FloatArray, up: FloatArray, base: Base, tip_radius: float, reach: float
+) -> FloatArray:
+    """(K,) curvature across the curve from the base's sag at `reach` on both sides; 0 where the base ends."""
+    sag = np.zeros((2, len(points)))
+    for side, sign in enumerate((-1.0, 1.0)):
+        aside = base.foot(points + sign * reach * laterals + tip_radius * up, tip_radius).points - points
+        across = np.einsum("ij,ij->i", aside, laterals)
+        drop = -np.einsum("ij,ij->i", aside, up)
+        sound = np.abs(across) > 0.5 * reach
+        sag[side] = np.where(sound, 2.0 * drop / np.where(sound, across, 1.0) ** 2, np.nan)
+    with np.errstate(invalid="ignore"):
+        known = np.isfinite(sag)
+        mean = np.where(known, sag, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    return np.asarray(mean)

@@ -1,0 +1,81 @@
+"""Smooth axis: the simplest curve through the crossings of a ridge that their uncertainty allows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapping import FloatArray
+
+HIGHEST_DEGREE = 8
+# A fit whose typical square residual exceeds this many variances follows the axis at no degree: the axis is kept.
+POOR = 9.0
+# Degrees of freedom of the residuals' tails, and the median of chi-square with two.
+TAIL, MEDIAN = 4.0, 1.386
+ROUNDS = 8
+
+
+def smooth_axis(axis: FloatArray, sd: float, most: int = HIGHEST_DEGREE, least: int = 1) -> tuple[FloatArray, int]:
+    """A polyline (K', D) along polynomials (closed axis: Fourier series) of the degree with the best evidence.
+
+    Args:
+        axis: (K, D) crossings in order, in space or in the plane, m; first equals last if closed.
+        sd: standard deviation of a crossing, m.
+        most, least: degrees to try; a single one is taken whether it fits or not.
+
+    Returns:
+        The smoothed polyline and its degree; the axis itself and the highest degree if none fits.
+    """
+    closed = len(axis) > 3 and bool(np.array_equal(axis[0], axis[-1]))
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1))])
+    points = len(axis) - 1 if closed else len(axis)
+    most = min((points - 2) // 2 if closed else points - 2, most)
+    lowest = min(least, most)
+    if most < 1:
+        return axis, 1
+    x = s / s[-1] * 2.0 - 1.0
+    dense = np.linspace(-1.0, 1.0, max(2, 4 * len(axis), 65 if closed else 2))
+    best, best_cost, best_misfit = lowest, np.inf, np.inf
+    for degree in range(lowest, most + 1):
+        coefficients, square = _fit(axis[:points], x[:points], degree, closed, sd)
+        # All coordinates but one are across the axis; that one is the order of the crossings, not a datum.
+        freedom = (axis.shape[1] - 1.0) * len(coefficients)
+        cost = float(((TAIL + 2.0) * np.log1p(square / TAIL)).sum()) + freedom * float(np.log(points))
+        if cost < best_cost:
+            best, best_cost, best_misfit = degree, cost, float(np.median(square)) / MEDIAN
+            curve = _design(dense, degree, closed) @ coefficients
+    if best_misfit > POOR and most > lowest:
+        return axis, most
+    if closed:
+        curve[-1] = curve[0]
+    return curve, best
+
+
+def _fit(axis: FloatArray, places: FloatArray, degree: int, closed: bool, sd: float) -> tuple[FloatArray, FloatArray]:
+    """Coefficients of the curve through crossings, and their squared distances across it in variances.
+
+    A sweep that grazes the axis places its crossing up to a half width along it: residuals have Student's tails, and
+    those along the curve are taken out by moving the crossing along it.
+    """
+    weight, gap = np.ones(len(axis)), 2.0 / len(axis)
+    for _ in range(ROUNDS if len(axis) > 3 else 1):
+        design = _design(places, degree, closed)
+        root = np.sqrt(weight)[:, None]
+        coefficients = np.linalg.lstsq(root * design, root * axis, rcond=None)[0]
+        velocity = (_design(places + 1e-5, degree, closed) - _design(places - 1e-5, degree, closed)) @ coefficients
+        speed = np.maximum(np.linalg.norm(velocity, axis=1) / 2e-5, np.finfo(float).tiny)
+        tangent = velocity / (2e-5 * speed[:, None])
+        residual = axis - design @ coefficients
+        along = np.einsum("ij,ij->i", residual, tangent)
+        square = ((residual - along[:, None] * tangent) ** 2).sum(axis=1) / sd**2
+        weight = (TAIL + 2.0) / (TAIL + square)
+        places = places + np.clip(along / speed, -0.5 * gap, 0.5 * gap)
+        if not closed:
+            places = np.clip(places, -1.0, 1.0)
+    return np.asarray(coefficients), np.asarray(square)
+
+
+def _design(x: FloatArray, degree: int, closed: bool) -> FloatArray:
+    if not closed:
+        return np.asarray(np.polynomial.legendre.legvander(x, degree))
+    waves = [f(np.pi * k * x) for k in range(1, degree + 1) for f in (np.cos, np.sin)]
+    return np.column_stack([np.ones_like(x), *waves])

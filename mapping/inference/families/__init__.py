@@ -1,0 +1,40 @@
+"""Families of shapes: what a feature's trace looks like, with the parameters to be found."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.inference.families.bell import BellShape as BellShape, width_at_half_height as width_at_half_height
+    from mapping.inference.families.broken_ridge import BrokenRidgeShape as BrokenRidgeShape
+    from mapping.inference.families.bump import BumpShape as BumpShape, spot_at as spot_at
+    from mapping.inference.families.curves import curve_problem as curve_problem
+    from mapping.inference.families.feature_trace import feature_trace as feature_trace
+    from mapping.inference.families.free_tip import with_free_tip as with_free_tip, with_nominal_tip as with_nominal_tip
+    from mapping.inference.families.hollow import GrooveShape as GrooveShape, PitShape as PitShape
+    from mapping.inference.families.problem import (
+        MODEL_FLOOR as MODEL_FLOOR,
+        NEAR as NEAR,
+        Problem as Problem,
+        Surroundings as Surroundings,
+        sizes_of as sizes_of,
+        touches as touches,
+    )
+    from mapping.inference.families.ridge import RidgeShape as RidgeShape, rounding_of as rounding_of
+    from mapping.inference.families.spots import bump_shape as bump_shape, spot_problem as spot_problem
+    from mapping.inference.families.step import StepShape as StepShape
+
+_PUBLIC = {
+    "bell": ("BellShape", "width_at_half_height"),
+    "broken_ridge": ("BrokenRidgeShape",),
+    "bump": ("BumpShape", "spot_at"),
+    "curves": ("curve_problem",),
+    "feature_trace": ("feature_trace",),
+    "free_tip": ("with_free_tip", "with_nominal_tip"),
+    "hollow": ("GrooveShape", "PitShape"),
+    "problem": ("MODEL_FLOOR", "NEAR", "Problem", "Surroundings", "sizes_of", "touches"),
+    "ridge": ("RidgeShape", "rounding_of"),
+    "spots": ("bump_shape", "spot_problem"),
+    "step": ("StepShape",),
+}
+doorway(__name__, _PUBLIC)

@@ -1,0 +1,217 @@
+"""The posteriors of features along a curve: ridges, grooves and steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapping import Feature, FloatArray
+from mapping.inference.curves import HIGHEST_DEGREE, Chart, CurveModes, chart_along, normals_along, smooth_on_base
+from mapping.inference.families.hollow import GrooveShape
+from mapping.inference.families.problem import NEAR, Problem, Sizes, Surroundings, pose, sizes_of, touches, window_for
+from mapping.inference.families.ridge import RidgeShape
+from mapping.inference.families.spots import height_prior, hollow_priors, radius_prior
+from mapping.inference.families.step import StepShape
+from mapping.inference.likelihood import Normal, Prior, Shape, Uniform, Window
+from mapping.inference.sampler import find_optima
+
+# Chords of the chart may sag by this share of the feature's height.
+SAG = 0.005
+MOST_LEGS = 300
+HIGHEST_MODE = 8
+# After so many degrees in a row that are no better than a lower one, no higher one is tried.
+PATIENCE = 2
+
+
+def curve_problem(feature: Feature, around: Surroundings) -> Problem:
+    """Pose the posterior of a ridge, groove or step.
+
+    The trace decides how freely the axis bends over the base (BIC): few crossings cannot tell a gentle bend from
+    their own scatter, and one that a neighbour pulled aside asks for bends that are not there.
+    """
+    sizes = sizes_of(feature, around.trace.tip_radius)
+    axis, normals, crossings = _axis_of(feature, sizes, around)
+    course = _chart(axis, normals, feature, sizes, crossings, HIGHEST_DEGREE, around)
+    window = window_for(_crest(course, around.trace.tip_radius, sizes), sizes, around)
+
+    def posed(most: int, least: int = 1) -> tuple[Problem, int]:
+        line, degree = smooth_on_base(
+            axis, normals, sizes.position_sd, most, least, around.base, around.trace.tip_radius, sizes.half_width
+        )
+        chart = _chart(line, normals_along(line, axis, normals), feature, sizes, crossings, degree, around)
+        ends = chart.coordinates(axis[[0, -1]])[0]
+        modes = _modes(chart, ends, degree, crossings, sizes)
+        limits = _end_limits(axis, chart, ends, feature, sizes, around)
+        shape = _shape(feature.kind, window, chart, modes, ends, limits, crossings, sizes, around)
+        return pose(feature, sizes, shape, window, around, _beginnings(shape, chart, sizes, feature.kind)), degree
+
+    best, asked = first = posed(HIGHEST_DEGREE)
+    if len(axis) < 3:
+        return best
+    least, costs = _cost(best), list[float]()
+    for degree in range(1, HIGHEST_DEGREE + 1):
+        other, reached = first if degree == asked else posed(degree, degree)
+        if reached < degree:
+            break
+        costs.append(least if other is best else _cost(other))
+        best, least = (other, costs[-1]) if costs[-1] < least else (best, least)
+        if len(costs) > PATIENCE and min(costs[-PATIENCE:]) >= min(costs[:-PATIENCE]):
+            break
+    return best
+
+
+def _cost(problem: Problem) -> float:
+    """Bayesian information criterion at the optimum nearest to the detection (Schwarz 1978), halved."""
+    best = find_optima(problem.target, problem.beginnings[:1])[0]
+    fit = float(problem.target.likelihood.log_density(problem.target.templates(best[None]))[0])
+    return 0.5 * len(best) * float(np.log(len(problem.window))) - fit
+
+
+def _axis_of(feature: Feature, sizes: Sizes, around: Surroundings) -> tuple[FloatArray, FloatArray, int]:
+    """Axis, normals and number of crossings; a single crossing gets a short axis across its sweep."""
+    axis, normals = np.asarray(feature.axis), np.asarray(feature.normals)
+    if len(axis) > 1 and np.ptp(axis, axis=0).max() > 0.0:
+        return axis, normals, max(feature.evidence.crossings, 2 if len(axis) == 2 else len(axis))
+    window = window_for(axis[:1] + around.trace.tip_radius * normals[:1], sizes, around)
+    nearest = int(np.argmin(np.linalg.norm(window.feet - axis[0], axis=1)))
+    across = np.cross(normals[0], window.tangents[nearest])
+    half = 0.5 * sizes.half_width * across / max(float(np.linalg.norm(across)), np.finfo(float).tiny)
+    return np.stack([axis[0] - half, axis[0] + half]), np.repeat(normals[:1], 2, axis=0), 1
+
+
+def _chart(
+    line: FloatArray,
+    lift: FloatArray,
+    feature: Feature,
+    sizes: Sizes,
+    crossings: int,
+    degree: int,
+    around: Surroundings,
+) -> Chart:
+    """The chart along the line, extended to where the ends may be, with legs as long as its curvature allows."""
+    length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    extension = 0.0 if feature.kind == "step" else max(6.0 * sizes.half_width, 1.5 * length / max(crossings - 1, 1))
+    tip = around.trace.tip_radius
+
+    def build(spacing: float) -> Chart:
+        return chart_along(line, lift, around.base, tip, spacing, extension, sizes.half_width)
+
+    trial = build((length + 2.0 * extension) / 64.0)
+    turn = np.linalg.norm(np.diff(trial.tangents, axis=0), axis=1).max(initial=0.0)
+    curvature = turn / (trial.length / max(len(trial.s) - 1, 1))
+    if curvature * trial.length < 1e-6 and degree == 1:
+        return build(length + extension)
+    spacing = float(np.sqrt(8.0 * SAG * sizes.height / max(curvature, 1e-12)))
+    return build(min(max(spacing, trial.length / MOST_LEGS), trial.length / 16.0))
+
+
+def _modes(chart: Chart, ends: FloatArray, degree: int, crossings: int, sizes: Sizes) -> CurveModes:
+    if chart.closed:
+        # Offsets of a ring whose coordinates have a degree have harmonics one higher: an ellipse differs from a
+        # circle by the second.
+        highest = max(0, min(degree + 1, (crossings - 1) // 2, HIGHEST_MODE))
+        return CurveModes(highest, 0.5 * chart.length, 0.5 * chart.length, True)
+    reach = max(0.5 * abs(float(ends[1] - ends[0])), 0.5 * sizes.half_width)
+    highest = min(max(degree, 1), max(crossings - 1, 1), HIGHEST_MODE)
+    return CurveModes(highest, float(ends.mean()), reach, False)
+
+
+def _crest(chart: Chart, tip_radius: float, sizes: Sizes) -> FloatArray:
+    """Points along the chart one tip radius above the base, close enough together to measure distances from."""
+    count = max(2, int(np.ceil(chart.length / (0.25 * sizes.half_width))) + 1)
+    points, _, normals, _ = chart.at(np.linspace(chart.s[0], chart.s[-1], count))
+    return np.asarray(points + tip_radius * normals)
+
+
+def _shape(
+    kind: str,
+    window: Window,
+    chart: Chart,
+    modes: CurveModes,
+    ends: FloatArray,
+    limits: list[tuple[float, float]],
+    crossings: int,
+    sizes: Sizes,
+    around: Surroundings,
+) -> Shape:
+    tip = around.trace.tip_radius
+    priors = _lateral_priors(modes, crossings, sizes)
+    start, step = [0.0] * modes.count, list(0.02 * sizes.half_width * modes.scale)
+    if kind == "step":
+        priors.append(height_prior(sizes))
+        start, step = [*start, sizes.height], [*step, 0.02 * sizes.height]
+        sides = [
+            StepShape(window, chart, modes, tip, side, tuple(priors), np.array(start), np.array(step))
+            for side in (-1.0, 1.0)
+        ]
+        return max(sides, key=lambda shape: _rough_fit(shape, around))
+    if not chart.closed:
+        if kind == "ridge":
+            priors.append(Uniform(0.0, 1.0))
+            start, step = [*start, 0.5], [*step, 0.2]
+        priors += [Uniform(*limit) for limit in limits]
+        start, step = [*start, float(ends.min()), float(ends.max())], [*step, *[0.1 * sizes.half_width] * 2]
+    if kind == "ridge":
+        priors += [height_prior(sizes), radius_prior(sizes, tip)]
+        start, step = [*start, sizes.height, np.log(sizes.radius)], [*step, 0.02 * sizes.height, 0.1]
+        return RidgeShape(window, chart, modes, tip, tuple(priors), np.array(start), np.array(step))
+    priors += hollow_priors(sizes, tip)
+    start, step = [*start, np.log(2.0 * sizes.radius), np.log(2.0 * sizes.height)], [*step, 0.02, 0.05]
+    return GrooveShape(window, chart, modes, tip, tuple(priors), np.array(start), np.array(step))
+
+
+def _end_limits(
+    axis: FloatArray, chart: Chart, ends: FloatArray, feature: Feature, sizes: Sizes, around: Surroundings
+) -> list[tuple[float, float]]:
+    """Places between which the beginning and the end of an open line lie, m along the chart."""
+    low, high = float(chart.s[0]), float(chart.s[-1])
+    middle = min(max(float(ends.mean()), low + 1e-3 * (high - low)), high - 1e-3 * (high - low))
+    limits = []
+    for k, (least, most) in zip(np.argsort(ends), ((low, middle), (middle, high)), strict=True):
+        tip = axis[[0, -1][k]]
+        if any(touches(tip, other, sizes.half_width) for other in around.others if other is not feature):
+            reach = NEAR * sizes.half_width
+            at = float(np.clip(ends[k], least + 0.1 * reach, most - 0.1 * reach))
+            least, most = max(least, at - reach), min(most, at + reach)
+        limits.append((least, most))
+    return limits
+
+
+def _rough_fit(shape: StepShape, around: Surroundings) -> float:
+    """Correlation of a step's template with the data, each run's mean taken out."""
+    template, height = shape.templates(shape.start[None])[0], shape.window.height
+    total = 0.0
+    for start, stop in zip(shape.window.starts[:-1], shape.window.starts[1:], strict=True):
+        total += float((template[start:stop] - template[start:stop].mean()) @ height[start:stop])
+    return total
+
+
+def _lateral_priors(modes: CurveModes, crossings: int, sizes: Sizes) -> list[Prior]:
+    """Within 1.5 half widths of where it was detected; the heading of a single crossing may be anything to 60 deg."""
+    bound = 1.5 * sizes.half_width
+    priors: list[Prior] = []
+    for name in modes.names:
+        if name == "offset":
+            priors.append(Uniform(-bound, bound))
+        elif name == "heading":
+            limit = 1.7 if crossings < 2 else max(2.0 * bound / modes.reach, 0.1)
+            priors.append(Uniform(-limit, limit))
+        else:
+            priors.append(Normal(0.0, 0.5 * sizes.half_width))
+    return priors
+
+
+def _beginnings(shape: Shape, chart: Chart, sizes: Sizes, kind: str) -> FloatArray:
+    """Starts that differ in the section, and in the ends."""
+    start = shape.start
+    starts = [start]
+    if kind != "step":
+        for size in (4.0 * sizes.radius, 0.5 * sizes.height) if kind == "ridge" else (sizes.height,):
+            section = start.copy()
+            section[-1] = np.log(size)
+            starts.append(section)
+        if not chart.closed:
+            for out in (-0.5, 0.5, 1.0):
+                moved = start.copy()
+                moved[-4:-2] += out * sizes.half_width * np.array([-1.0, 1.0])
+                starts.append(moved)
+    return np.array(starts)

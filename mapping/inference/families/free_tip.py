@@ -1,0 +1,81 @@
+"""FreeTipShape: any shape felt by a tip whose radius is known only up to a prior."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.inference.families.problem import Problem
+from mapping.inference.likelihood import Normal, Prior, Shape
+
+# A tip is at least this share of its nominal radius.
+SMALLEST = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class FreeTipShape:
+    """A shape with the radius of the fingertip as its last parameter.
+
+    The feet and heights of a trace hold for the nominal radius r. A ball of radius r' stands r' - r higher over the
+    bare base, and feels the feature with its own radius. What is not known of the tip mostly widens the radius of a
+    crest (only a + r' counts under a ball) and the width of a groove.
+
+    Args:
+        felt: the shape as the nominal tip feels it.
+        tip: prior of the radius, m.
+    """
+
+    felt: Any
+    tip: Normal
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.felt.names, "tip radius")
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return (*self.felt.units, "m")
+
+    @property
+    def priors(self) -> tuple[Prior, ...]:
+        return (*self.felt.priors, self.tip)
+
+    @property
+    def start(self) -> FloatArray:
+        return np.append(self.felt.start, self.tip.mean)
+
+    @property
+    def step(self) -> FloatArray:
+        return np.append(self.felt.step, 0.1 * self.tip.sd)
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights over the trace of a tip of nominal radius on the bare base, m."""
+        return np.concatenate([self._with_tip(float(row[-1])).templates(row[None, :-1]) + row[-1] - self.tip.mean
+                               for row in theta])  # fmt: skip
+
+    def _with_tip(self, radius: float) -> Shape:
+        # A copy keeps what the shape has cached of its window, which does not depend on the tip.
+        other: Shape = copy.copy(self.felt)
+        object.__setattr__(other, "tip_radius", radius)
+        return other
+
+
+def with_free_tip(problem: Problem, sd: float) -> Problem:
+    """The problem with the tip's radius as a parameter: Gaussian about the nominal one, sd in m."""
+    felt: Any = problem.target.shape
+    prior = Normal(felt.tip_radius, sd, SMALLEST * felt.tip_radius)
+    nominal = np.full((len(problem.beginnings), 1), felt.tip_radius)
+    target = replace(problem.target, shape=FreeTipShape(felt, prior))
+    return replace(problem, target=target, beginnings=np.hstack([problem.beginnings, nominal]))
+
+
+def with_nominal_tip(problem: Problem) -> Problem:
+    """The problem as the nominal tip feels it; the same if the tip was not free."""
+    shape = problem.target.shape
+    if not isinstance(shape, FreeTipShape):
+        return problem
+    return replace(problem, target=replace(problem.target, shape=shape.felt), beginnings=problem.beginnings[:, :-1])

@@ -1,0 +1,111 @@
+"""HollowShape: grooves and pits, in which the ball rests on the nearer rim or on the bottom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.inference.curves import Chart, CurveModes
+from mapping.inference.families.bump import Spot
+from mapping.inference.likelihood import Prior, Window
+
+# Two Gauss points average a template over its bin: exact for cubics between kinks.
+NODES = np.array([-1.0, 1.0]) / np.sqrt(3.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PitShape:
+    """Round pits with an upright wall and a flat bottom: position, log width of the mouth, log depth.
+
+    `free` is 1 for a lone profile: the pit is then taken to lie under it.
+    """
+
+    window: Window
+    spot: Spot
+    tip_radius: float
+    free: int
+    priors: tuple[Prior, ...]
+    start: FloatArray
+    step: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*("along", "across")[: self.free], "log width", "log depth")
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return (*("m", "m")[: self.free], "ln m", "ln m")
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights (negative) over the base's trace, m."""
+        from mapping.geometry.templates import pit_heights
+
+        place = np.zeros((len(theta), 2))
+        place[:, : self.free] = theta[:, : self.free]
+        out = np.empty((len(theta), len(self.window)))
+        width, depth = np.exp(theta[:, -2]), np.exp(theta[:, -1])
+        pit_heights(*self._places, float(self.spot.bends.mean()), place, width, depth, self.tip_radius, out)
+        return out
+
+    @cached_property
+    def _places(self) -> tuple[FloatArray, FloatArray]:
+        """(n, nodes) tangent coordinates of the nodes of each bin, m."""
+        nodes = bin_nodes(self.window) - self.spot.point
+        return nodes @ self.spot.axes[0], nodes @ self.spot.axes[1]
+
+
+@dataclass(frozen=True, eq=False)
+class GrooveShape:
+    """Grooves with upright walls and a flat bottom: lateral modes, ends, log width, log depth."""
+
+    window: Window
+    chart: Chart
+    modes: CurveModes
+    tip_radius: float
+    priors: tuple[Prior, ...]
+    start: FloatArray
+    step: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        ends = () if self.chart.closed else ("start", "end")
+        return (*self.modes.names, *ends, "log width", "log depth")
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        ends = () if self.chart.closed else ("m", "m")
+        return (*self.modes.units, *ends, "ln m", "ln m")
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights (negative) over the base's trace, m."""
+        from mapping.geometry.templates import groove_heights
+
+        ends = (
+            np.ascontiguousarray(theta[:, -4:-2])
+            if not self.chart.closed
+            else np.tile([-1e300, 1e300], (len(theta), 1))
+        )
+        courses = np.ascontiguousarray(theta[:, : self.modes.count])
+        out = np.empty((len(theta), len(self.window)))
+        width, depth = np.exp(theta[:, -2]), np.exp(theta[:, -1])
+        groove_heights(*self._places, courses, ends, width, depth, self.tip_radius, out)
+        return out
+
+    @cached_property
+    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """(n, nodes) distances along the chart, lateral distances, (m, n, nodes) modes, and bends of the base."""
+        nodes = bin_nodes(self.window)
+        s, lateral, leg = self.chart.coordinates(nodes.reshape(-1, 3))
+        shape = nodes.shape[:2]
+        basis = self.modes.basis(s).reshape(-1, *shape)
+        return s.reshape(shape), lateral.reshape(shape), basis, self.chart.bend[leg].reshape(shape)
+
+
+def bin_nodes(window: Window) -> FloatArray:
+    """(n, nodes, 3) places within each bin, m."""
+    return np.ascontiguousarray(
+        window.feet[:, None] + (window.half[:, None] * NODES)[..., None] * window.tangents[:, None]
+    )

@@ -1,0 +1,173 @@
+"""Problem: one feature's posterior, posed: what is known beforehand, which samples matter, and the density."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapping import Feature, FloatArray, Trace
+from mapping.base import Base
+from mapping.geometry.mesh import distances
+from mapping.geometry.templates import contact_half_width, radius_of_cap
+from mapping.inference.families.feature_trace import feature_trace
+from mapping.inference.likelihood import (
+    Likelihood,
+    Nuisance,
+    Shape,
+    Target,
+    Window,
+    bin_samples,
+    build_likelihood,
+    gather,
+)
+from mapping.instrument import Noise
+
+# Bins of x_c/30 lose 0.7 % of the information (theory section 8); windows reach 3 x_c to either side of the crest.
+BINS_PER_HALF_WIDTH = 30.0
+REACH = 3.0
+# More bins than this are made coarser: a long ridge has information to spare.
+MOST_BINS = 4000
+# Noise below this share of the height no longer hides what a smoothed path and wide bins do to flanks and kinks (2 um
+# of a wire of 0.65 mm felt by a stage that moves by steps): the path stays as it is, and twice as many bins are taken.
+PRECISE = 0.01
+# What shape and base leave out, as a share of the feature's height: a noise-free log is not believed further.
+MODEL_FLOOR = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Sizes:
+    """Preliminary sizes of a feature, from its detection.
+
+    Args:
+        height: height or depth of its disturbance on the trace, m, positive.
+        height_sd: standard deviation of that, m.
+        radius: radius of a protruding section; half the width of a hollow one, m.
+        half_width: half of the disturbance on the trace, m.
+        position_sd: of the crest, m.
+    """
+
+    height: float
+    height_sd: float
+    radius: float
+    half_width: float
+    position_sd: float
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """All that a feature's posterior is conditioned on beside the feature itself.
+
+    Args:
+        trace: the whole trace.
+        base: the global model.
+        noise: of a sample.
+        others: features near by.
+        tip_sd: standard deviation of the tip's radius about the trace's, m; above 0 it becomes a parameter.
+    """
+
+    trace: Trace
+    base: Base
+    noise: Noise
+    others: Sequence[Feature] = ()
+    tip_sd: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A posed posterior.
+
+    Args:
+        feature: what was detected.
+        sizes: its preliminary sizes.
+        target: the density of the shape's parameters.
+        noise: the noise in its likelihood.
+        nuisance: prior of the base under each run.
+        beginnings: (M, P) places to start the search for the optimum from.
+    """
+
+    feature: Feature
+    sizes: Sizes
+    target: Target
+    noise: Noise
+    nuisance: Nuisance
+    beginnings: FloatArray
+
+    @property
+    def window(self) -> Window:
+        return self.target.likelihood.window
+
+    def under(self, noise: Noise, inflation: FloatArray | None = None) -> Problem:
+        """The same problem under another noise, or with some bins trusted less."""
+        likelihood = _likelihood(self.window, noise, self.nuisance, self.sizes.height, inflation)
+        return replace(self, noise=noise, target=self.target.with_likelihood(likelihood))
+
+
+def sizes_of(feature: Feature, tip_radius: float) -> Sizes:
+    """Preliminary sizes from a feature's intervals, kept to what a ball of the tip's radius can feel."""
+    height = max(abs(feature.height.median), 1e-9 * tip_radius)
+    sd = max(abs(feature.height.high - feature.height.low) / 3.29, 1e-3 * height)
+    width = feature.width.median if feature.width.median > 0.0 else height
+    if feature.kind in ("groove", "pit"):
+        seen = np.sqrt(height * max(2.0 * tip_radius - height, 0.0))
+        half = max(0.5 * width, float(seen))
+        return Sizes(height, sd, half, half, _position_sd(feature, half))
+    if feature.kind == "step":
+        half = float(contact_half_width(min(height, tip_radius), 0.0, tip_radius))
+        return Sizes(height, sd, 0.0, half, _position_sd(feature, half))
+    radius = max(radius_of_cap(height, width), 0.5 * height)
+    half = float(contact_half_width(height, radius, tip_radius))
+    return Sizes(height, sd, radius, half, _position_sd(feature, half))
+
+
+def _position_sd(feature: Feature, half_width: float) -> float:
+    sd = feature.position_sd
+    return float(sd) if np.isfinite(sd) and sd > 0.0 else 0.1 * half_width
+
+
+def window_for(crest: FloatArray, sizes: Sizes, around: Surroundings) -> Window:
+    """The bins near a crest polyline (K, 3) on the base, lifted by the caller to the ball's centre, m."""
+    width = sizes.half_width / BINS_PER_HALF_WIDTH
+    reach = REACH * sizes.half_width + 2.0 * sizes.position_sd
+    samples = gather(around.trace, around.base, crest, reach)
+    precise = around.noise.sd <= PRECISE * sizes.height
+    most, smooth_over = (2 * MOST_BINS, 0.0) if precise else (MOST_BINS, sizes.half_width)
+    window = bin_samples(samples, width, around.noise.sd, smooth_over)
+    if len(window) > most:
+        coarser = min(width * len(window) / most, sizes.half_width / 8.0)
+        window = bin_samples(samples, coarser, around.noise.sd, smooth_over)
+    return window
+
+
+def pose(
+    feature: Feature, sizes: Sizes, shape: Shape, window: Window, around: Surroundings, beginnings: FloatArray
+) -> Problem:
+    """Join a shape, its window and the noise to a posterior density."""
+    vague = 3.0 * max(sizes.height, around.noise.sd)
+    bend = 0.0 if around.base.kind == "mesh" else 0.3 * sizes.height
+    nuisance = Nuisance(vague, vague, bend)
+    likelihood = _likelihood(window, around.noise, nuisance, sizes.height, None)
+    beside = None
+    near = [other for other in around.others if other is not feature]
+    if near:
+        traces = [feature_trace(other, window.feet, window.normals, around.trace.tip_radius) for other in near]
+        highest, lowest = np.max(traces, axis=0), np.min(traces, axis=0)
+        beside = np.where(highest > 0.0, highest, lowest)
+    return Problem(feature, sizes, Target(shape, likelihood, beside), around.noise, nuisance, beginnings)
+
+
+def _likelihood(
+    window: Window, noise: Noise, nuisance: Nuisance, height: float, inflation: FloatArray | None
+) -> Likelihood:
+    return build_likelihood(window, noise, nuisance, MODEL_FLOOR * height, inflation)
+
+
+# An end at which a line meets another lies that near to where it was detected, in half-widths: what the other one
+# covers does not tell it
+NEAR = 0.5
+
+
+def touches(end: FloatArray, other: Feature, half_width: float) -> bool:
+    """True if a line whose end (3,) this is meets another feature there."""
+    return len(other.axis) > 1 and bool(distances(end[None], other.axis)[0] < NEAR * half_width)

@@ -1,0 +1,110 @@
+"""RidgeShape: a ridge of round section along a curve on the base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mapping import FloatArray, IntArray
+from mapping.inference.curves import Chart, CurveModes
+from mapping.inference.likelihood import Prior, Window
+
+# A bin looks at the legs of the chart within this share of a tip radius of the one nearest to it: an axis that is
+# turned a little against the chart is nearest at a place a little further along.
+LOOK_AROUND = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class RidgeShape:
+    """Capsule chains: lateral modes of the axis, rounding and places of its two ends, height and log radius.
+
+    An end is where the crest ends; beyond it the body is cut square (rounding 0) or goes on as a hemisphere (1): the
+    two differ by 0.05 mm in the place of the end of the paper's wire, so what is not known of it is marginalised.
+    The ends are distances along one curve, each with its own range, so they cannot swap. A closed ridge has none.
+
+    Args:
+        window: the bins.
+        chart: the reference curve on the base, longer than the ridge.
+        modes: lateral course of the axis over the chart.
+        tip_radius: radius of the fingertip, m.
+        priors, start, step: as in `Shape`.
+    """
+
+    window: Window
+    chart: Chart
+    modes: CurveModes
+    tip_radius: float
+    priors: tuple[Prior, ...]
+    start: FloatArray
+    step: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        ends = () if self.chart.closed else ("end rounding", "start", "end")
+        return (*self.modes.names, *ends, "height", "log radius")
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        ends = () if self.chart.closed else ("", "m", "m")
+        return (*self.modes.units, *ends, "m", "ln m")
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights over the base's trace, m."""
+        from mapping.geometry.templates import chain_heights
+
+        window = self.window
+        radius = np.exp(theta[:, -1])
+        out = np.empty((len(theta), len(window)))
+        first, last = self._candidates
+        chain_heights(
+            window.feet,
+            window.normals,
+            window.tangents,
+            window.half,
+            first,
+            last,
+            self.chains(theta, theta[:, -2] - radius),
+            radius,
+            np.ones(len(theta)) if self.chart.closed else rounding_of(theta[:, -5]),
+            self.tip_radius,
+            out,
+        )
+        return out
+
+    def chains(self, theta: FloatArray, lift: FloatArray) -> FloatArray:
+        """(W, K, 3) axes at `lift` (W,) over the base, m; vertices beyond an end stand at the end."""
+        from mapping.inference.curves import axes_about
+
+        chart, modes = self.chart, self.modes
+        return np.asarray(
+            axes_about(
+                chart.s,
+                chart.points,
+                chart.laterals,
+                chart.normals,
+                chart.bend,
+                self._basis,
+                modes.middle,
+                modes.reach,
+                np.ascontiguousarray(theta[:, : modes.count]),
+                np.ascontiguousarray(lift),
+                np.zeros((0, 2)) if chart.closed else np.ascontiguousarray(theta[:, -4:-2]),
+            )
+        )
+
+    @cached_property
+    def _basis(self) -> FloatArray:
+        return np.ascontiguousarray(self.modes.basis(self.chart.s))
+
+    @cached_property
+    def _candidates(self) -> tuple[IntArray, IntArray]:
+        leg = self.chart.coordinates(self.window.feet)[2]
+        neighbours = 1 + int(LOOK_AROUND * self.tip_radius / float(np.diff(self.chart.s).mean()))
+        return np.maximum(leg - neighbours, 0), np.minimum(leg + 1 + neighbours, len(self.chart.s) - 1)
+
+
+def rounding_of(turn: FloatArray) -> FloatArray:
+    """Rounding 0 to 1 of an end from a parameter that is uniform on 0 to 1: mostly either square or round."""
+    return np.asarray(0.5 - 0.5 * np.cos(np.pi * turn))

@@ -1,0 +1,227 @@
+"""Refine: from a detected feature and the trace to its posterior, and to the feature that the draws describe."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapping import EmptyWindowError, Feature, FloatArray, MappingError, Posterior, Trace
+from mapping.base import Base, fit_base
+from mapping.inference.evidence import better_profile, log_evidence_of_nothing
+from mapping.inference.families import Problem, Surroundings, curve_problem, spot_problem, with_free_tip
+from mapping.inference.model_error import account_for_misfit
+from mapping.inference.sampler import (
+    TRUSTED_K_HAT,
+    Chain,
+    Importance,
+    find_optima,
+    importance_sample,
+    laplace,
+    resample,
+    sample_ensemble,
+    walkers_for,
+)
+from mapping.inference.summary import describe
+from mapping.inference.trace_noise import noise_of_trace
+from mapping.instrument import Noise
+
+# Kinds that have a closed-form trace here; the others are reported as detected.
+SAMPLED_KINDS = ("bump", "ridge", "pit", "groove", "step")
+KEPT_DRAWS = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A posed problem, solved.
+
+    Args:
+        problem: as it was finally posed (noise adapted to the misfit, if any).
+        posterior: draws and their trustworthiness.
+        importance: the fast answer, with its evidence.
+        chain: what emcee did, or None if it did not run.
+    """
+
+    problem: Problem
+    posterior: Posterior
+    importance: Importance
+    chain: Chain | None
+
+
+def sample_posterior(
+    feature: Feature,
+    trace: Trace,
+    rng: np.random.Generator,
+    *,
+    base: Base | None = None,
+    noise: Noise | None = None,
+    others: Sequence[Feature] = (),
+    tip_sd: float = 0.0,
+    confirm: bool = True,
+) -> Posterior:
+    """Draws of a feature's parameters given the trace.
+
+    The optimum, a Laplace approximation and adapted importance sampling give the answer in milliseconds and say by
+    k-hat whether it can be trusted; emcee confirms it (theory section 8).
+
+    Args:
+        feature: as detected: kind, axis, preliminary height and width.
+        trace: the whole trace; only the samples near the feature are used.
+        rng: all randomness comes from here: the same state gives the same draws.
+        base: the global model; fitted to the trace if None.
+        noise: level and correlation of a sample; estimated from the trace if None.
+        others: features near by, which the trace also shows (the feature itself may be among them).
+        tip_sd: standard deviation of the tip's radius, m; above 0 the radius is a parameter with a Gaussian prior.
+        confirm: False to stop at importance sampling where its k-hat is below 0.5.
+
+    Raises:
+        MappingError: a kind that has no closed form, or no sample near the feature.
+    """
+    return solve(feature, trace, rng, base=base, noise=noise, others=others, tip_sd=tip_sd, confirm=confirm).posterior
+
+
+def refine(
+    feature: Feature,
+    trace: Trace,
+    rng: np.random.Generator,
+    *,
+    base: Base | None = None,
+    noise: Noise | None = None,
+    others: Sequence[Feature] = (),
+    tip_sd: float = 0.0,
+    confirm: bool = True,
+) -> Feature:
+    """The feature with posterior, intervals and axis from the draws; arguments as for `sample_posterior`.
+
+    Kinds without a closed form ("convex edge", "concave corner") come back as they are, with a note; so does, with no
+    evidence, a feature without any sample near it.
+    """
+    if feature.kind not in SAMPLED_KINDS:
+        note = f"no posterior: a {feature.kind} has no closed-form trace"
+        return replace(feature, notes=(*feature.notes, note))
+    base = base or _fitted(trace)
+    noise = noise or noise_of_trace(trace, base)
+    try:
+        solution = solve(feature, trace, rng, base=base, noise=noise, others=others, tip_sd=tip_sd, confirm=confirm)
+    except EmptyWindowError as error:  # one feature that nothing speaks for must not cost all others
+        nothing = replace(feature.evidence, log_odds=0.0)
+        return replace(feature, evidence=nothing, notes=(*feature.notes, f"no posterior: {error}"))
+    found = describe(solution.problem, solution.posterior, base)
+    if solution.problem.noise != noise.rounded(trace.resolution):  # intervals hold within the family only
+        note = f"no ideal {found.kind} fits the trace within its noise: the sizes are those of the closest one"
+        found = replace(found, notes=(*found.notes, note))
+    odds = odds_against_nothing(solution)
+    return replace(found, evidence=replace(found.evidence, log_odds=odds if np.isfinite(odds) else None))
+
+
+def solve(
+    feature: Feature,
+    trace: Trace,
+    rng: np.random.Generator,
+    *,
+    base: Base | None = None,
+    noise: Noise | None = None,
+    others: Sequence[Feature] = (),
+    tip_sd: float = 0.0,
+    confirm: bool = True,
+) -> Solution:
+    """Pose and solve a feature's posterior; arguments as for `sample_posterior`."""
+    base = base or _fitted(trace)
+    noise = (noise or noise_of_trace(trace, base)).rounded(trace.resolution)
+    around = Surroundings(trace, base, noise, others, tip_sd)
+    solution = solve_problem(pose_problem(feature, around), rng, confirm=confirm)
+    if feature.kind != "bump" or solution.problem.noise == noise:
+        return solution
+
+    bell = better_profile(solution.problem, around, rng)
+    return solution if bell is None else solve_problem(bell, rng, confirm=confirm)
+
+
+def settle(feature: Feature, around: Surroundings) -> Feature:
+    """The feature at the optimum of its posterior: laid out beside its neighbours, without intervals.
+
+    Kinds without a closed form, and features that no sample speaks for, come back as they are.
+    """
+    if feature.kind not in SAMPLED_KINDS:
+        return feature
+    around = replace(around, noise=around.noise.rounded(around.trace.resolution))
+    try:
+        problem = pose_problem(feature, around)
+    except EmptyWindowError:
+        return feature
+    best = find_optima(problem.target, problem.beginnings[:1])[0]
+    shape, nan = problem.target.shape, float("nan")
+    optimum = Posterior(shape.names, shape.units, best[None], nan, nan, "not needed", "only the optimum was asked for")
+    return describe(problem, optimum, around.base)
+
+
+def odds_against_nothing(solution: Solution) -> float:
+    """Log Bayes factor of a solved feature against the bare base (with the neighbours that it was posed with)."""
+    return solution.importance.log_evidence - log_evidence_of_nothing(solution.problem.target)
+
+
+def pose_problem(feature: Feature, around: Surroundings) -> Problem:
+    """The posterior density of a feature of any kind that has a closed form."""
+    if feature.kind in ("bump", "pit"):
+        problem = spot_problem(feature, around)
+    elif feature.kind in ("ridge", "groove", "step"):
+        problem = curve_problem(feature, around)
+    else:
+        possible = ", ".join(SAMPLED_KINDS)
+        raise MappingError(f"no posterior for a {feature.kind!r}: closed-form traces exist for {possible}")
+    return with_free_tip(problem, around.tip_sd) if around.tip_sd > 0.0 else problem
+
+
+def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool = True, adapt: bool = True) -> Solution:
+    """Optimum, misfit (unless `adapt` is False: the noise is known), importance sampling, and emcee where needed."""
+    optima = find_optima(problem.target, problem.beginnings)
+    if adapt:
+        problem, optima = account_for_misfit(problem, optima)
+    fast = importance_sample(problem.target, [laplace(problem.target, optimum) for optimum in optima], rng)
+    if not confirm and fast.k_hat < TRUSTED_K_HAT:
+        return Solution(problem, _from_importance(problem, fast, rng), fast, None)
+    walkers = walkers_for(len(problem.window), fast.draws.shape[1])
+    starts = _starts(problem, fast, rng, walkers)
+    chain = sample_ensemble(problem.target, starts, rng, proposal=fast.proposal)
+    return Solution(problem, _from_chain(problem, fast, chain, rng), fast, chain)
+
+
+def _starts(problem: Problem, fast: Importance, rng: np.random.Generator, walkers: int) -> FloatArray:
+    """Walkers at weighted draws, pulled apart a little so that no two coincide."""
+    target = problem.target
+    starts = fast.draws[resample(rng, fast.weights, walkers)]
+    jitter = 0.1 * (fast.draws[rng.permutation(len(fast.draws))[:walkers]] - fast.weights @ fast.draws)
+    moved = np.clip(starts + jitter, target.low, target.high)
+    sound = np.isfinite(target.log_density(moved))
+    return np.where(sound[:, None], moved, starts)
+
+
+def _from_importance(problem: Problem, fast: Importance, rng: np.random.Generator) -> Posterior:
+    shape = problem.target.shape
+    samples = fast.draws[resample(rng, fast.weights, KEPT_DRAWS)]
+    reason = f"importance sampling of the Laplace approximation has k-hat {fast.k_hat:.2f} < {TRUSTED_K_HAT}"
+    nan = float("nan")
+    return Posterior(shape.names, shape.units, samples, nan, nan, "not needed", reason, fast.k_hat, fast.ess)
+
+
+def _from_chain(problem: Problem, fast: Importance, chain: Chain, rng: np.random.Generator) -> Posterior:
+    shape = problem.target.shape
+    samples = chain.samples
+    if len(samples) > 4 * KEPT_DRAWS:
+        samples = samples[np.sort(rng.permutation(len(samples))[: 4 * KEPT_DRAWS])]
+    return Posterior(
+        shape.names,
+        shape.units,
+        samples,
+        chain.tau,
+        chain.acceptance,
+        chain.status,
+        chain.reason,
+        fast.k_hat,
+        chain.ess,
+    )
+
+
+def _fitted(trace: Trace) -> Base:
+    return fit_base(trace)

@@ -1,0 +1,99 @@
+"""Refine all: the posteriors of features that disturb one another's traces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mapping import Feature, Trace
+from mapping.base import Base
+from mapping.geometry.mesh import distances
+from mapping.inference.families import Surroundings, sizes_of
+from mapping.inference.feature_posterior import refine, settle
+from mapping.inference.junctions import Meeting, brought_together, meetings
+from mapping.inference.trace_noise import noise_of_trace
+from mapping.instrument import Noise
+
+# What fewer crossings show may be false, and would take its part of a true neighbour's trace and live on that
+CERTAIN = 3
+
+
+def refine_all(
+    features: Sequence[Feature],
+    trace: Trace,
+    seed: int,
+    *,
+    base: Base,
+    noise: Noise | None = None,
+    tip_sd: float = 0.0,
+    confirm: bool = True,
+    progress: Callable[[float], None] = lambda share: None,
+) -> tuple[Feature, ...]:
+    """The features with their posteriors, each beside the others as well as they are known by then.
+
+    Where the disturbances of two that several sweeps saw overlap, both are laid out first by the optima of their
+    posteriors: what is a neighbour's and what its own depends on both. What fewer sweeps saw is judged beside them, and
+    counts as their neighbour only if it is likely then. Lines that meet end in one place, which the courses of all of
+    them tell.
+
+    Args:
+        features: as detected.
+        trace: the whole trace.
+        seed: each feature draws from a stream of its own: what one draws does not change the next.
+        base: the global model.
+        noise: of the samples; None: estimated from the trace.
+        tip_sd: standard deviation of the tip's radius, m; above 0 it is a parameter.
+        confirm: False to stop at importance sampling where it can be trusted.
+        progress: told the share that is done, after each feature.
+    """
+    tip = trace.tip_radius
+    noise = noise or noise_of_trace(trace, base)
+    half_widths = [sizes_of(feature, tip).half_width for feature in features]
+    met = meetings(features, half_widths)
+    beside = _beside(features, half_widths)
+    certain = [k for k, feature in enumerate(features) if feature.evidence.crossings >= CERTAIN]
+    doubtful = [k for k in range(len(features)) if k not in certain]
+    known = list(features)
+    for k in certain:
+        if beside[k].intersection(certain):
+            around = Surroundings(trace, base, noise, [known[m] for m in certain if m != k], tip_sd)
+            known[k] = settle(features[k], around)
+    known = brought_together(known, met, half_widths, base, tip)
+    detected = _begun_at(features, known, met)
+
+    def refined(k: int, others: Sequence[int]) -> Feature:
+        near, rng = [known[m] for m in others if m != k], np.random.default_rng([seed, k])
+        return refine(detected[k], trace, rng, base=base, noise=noise, others=near, tip_sd=tip_sd, confirm=confirm)
+
+    for done, k in enumerate([*certain, *doubtful]):
+        known[k] = refined(k, certain if k in certain else range(len(features)))
+        progress((done + 1) / len(features))
+    true = [k for k in range(len(features)) if known[k].evidence.likely]
+    for k in certain:
+        if beside[k].intersection(true, doubtful):
+            known[k] = refined(k, true)
+    return tuple(brought_together(known, met, half_widths, base, tip))
+
+
+def _beside(features: Sequence[Feature], half_widths: Sequence[float]) -> list[set[int]]:
+    """For each feature the numbers of those whose disturbances touch its own."""
+    return [
+        {
+            m
+            for m, other in enumerate(features)
+            if m != k and distances(feature.axis, other.axis).min() < half_widths[k] + half_widths[m]
+        }
+        for k, feature in enumerate(features)
+    ]
+
+
+def _begun_at(detected: Sequence[Feature], known: Sequence[Feature], met: Sequence[Meeting]) -> list[Feature]:
+    """The detected features with their ends where they meet as that is known by now."""
+    result = list(detected)
+    for number, end in (end for meeting in met for end in meeting.ends):
+        axis = result[number].axis.copy()
+        axis[end] = known[number].axis[end]
+        result[number] = replace(result[number], axis=axis)
+    return result

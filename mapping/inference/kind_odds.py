@@ -1,0 +1,111 @@
+"""Kind odds: log Bayes factors between what a detection may be, on the same samples.
+
+Each is the ratio of two evidences under the same noise, window and nuisance. With equal odds beforehand the
+probability of the first is 1 / (1 + exp(-log odds)); `explore3d bench odds` checks that such probabilities come true.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mapping import Feature, MappingError, Trace
+from mapping.base import Base
+from mapping.inference.evidence import log_evidence, log_evidence_of_nothing
+from mapping.inference.families import BrokenRidgeShape, Problem, RidgeShape, Surroundings, bump_shape, spot_at
+from mapping.inference.feature_posterior import pose_problem
+from mapping.inference.likelihood import Target
+from mapping.inference.sampler import find_optima
+from mapping.instrument import Noise
+
+
+def something_or_nothing(
+    feature: Feature,
+    trace: Trace,
+    rng: np.random.Generator,
+    *,
+    base: Base,
+    noise: Noise,
+    others: Sequence[Feature] = (),
+) -> float:
+    """Log Bayes factor of a feature against the bare base; arguments as for `refine`."""
+    problem = pose_problem(feature, Surroundings(trace, base, noise, others))
+    return log_evidence(problem, rng) - log_evidence_of_nothing(problem.target)
+
+
+def bump_or_ridge(
+    feature: Feature,
+    trace: Trace,
+    rng: np.random.Generator,
+    *,
+    base: Base,
+    noise: Noise,
+    others: Sequence[Feature] = (),
+) -> float:
+    """Log Bayes factor of a ridge against a round bump; positive where the ridge is the likelier.
+
+    Both are asked about the samples near the ridge, with the same priors of height and section.
+
+    Args:
+        feature: a bump or ridge as detected; the other arguments as for `refine`.
+    """
+    around = Surroundings(trace, base, noise, [other for other in others if other is not feature])
+    ridge = pose_problem(replace(feature, kind="ridge"), around)
+    return log_evidence(ridge, rng) - log_evidence(as_bump(ridge, feature, around), rng)
+
+
+def as_bump(ridge: Problem, feature: Feature, around: Surroundings) -> Problem:
+    """The problem of a bump on the samples of a ridge's problem."""
+    middle = len(feature.axis) // 2
+    point, normal = feature.axis[middle], feature.normals[middle]
+    tip = around.trace.tip_radius
+    nearest = int(np.argmin(np.linalg.norm(ridge.window.feet - point, axis=1)))
+    spot = spot_at(point, normal, ridge.window.tangents[nearest], around.base, tip, ridge.sizes.half_width)
+    shape = bump_shape(ridge.window, spot, ridge.sizes, tip, 2)
+    shifts = np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]) * ridge.sizes.half_width
+    beginnings = np.tile(shape.start, (len(shifts), 1))
+    beginnings[:, :2] += shifts
+    return replace(ridge, target=Target(shape, ridge.target.likelihood, ridge.target.beside), beginnings=beginnings)
+
+
+def two_ridges_or_one(
+    feature: Feature,
+    trace: Trace,
+    rng: np.random.Generator,
+    *,
+    base: Base,
+    noise: Noise,
+    others: Sequence[Feature] = (),
+) -> float:
+    """Log Bayes factor of two ridges in line, with a gap between them, against one.
+
+    Args:
+        feature: an open ridge that spans both; the other arguments as for `refine`.
+
+    Raises:
+        MappingError: a feature that is not an open ridge.
+    """
+    around = Surroundings(trace, base, noise, [other for other in others if other is not feature])
+    whole = pose_problem(feature, around)
+    return log_evidence(as_broken(whole), rng) - log_evidence(whole, rng)
+
+
+def as_broken(ridge: Problem) -> Problem:
+    """The problem of two ridges in line on the samples of one ridge's problem."""
+    whole = ridge.target.shape
+    if not isinstance(whole, RidgeShape) or whole.chart.closed:
+        raise MappingError("only an open ridge can be two ridges in line")
+    shape = BrokenRidgeShape(whole, ridge.sizes.half_width)
+    target = Target(shape, ridge.target.likelihood, ridge.target.beside)
+    unbroken = find_optima(ridge.target, ridge.beginnings)[0]
+    low, high = unbroken[-4], unbroken[-3]
+    # Gaps all along the ridge, and beyond its ends, where they leave it whole.
+    beyond = 0.5 * (target.low[0] + low), 0.5 * (high + target.high[0])
+    middles = [*(low + share * (high - low) for share in np.linspace(0.05, 0.95, 13)), *beyond]
+    gaps = np.array([(middle, np.log(width * ridge.sizes.half_width)) for middle in middles for width in (0.4, 2.0)])
+    beginnings = np.column_stack([gaps, np.tile(unbroken, (len(gaps), 1))])
+    beginnings = np.clip(beginnings, target.low, target.high)
+    inside = beginnings[:-4][np.argsort(-target.log_density(beginnings[:-4]))[:4]]
+    return replace(ridge, target=target, beginnings=np.concatenate([inside, beginnings[-4::2]]))

@@ -1,0 +1,36 @@
+"""The likelihood of the samples near a feature: windows, whitening, priors, density."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.inference.likelihood.bin_filter import bin_filter as bin_filter
+    from mapping.inference.likelihood.gaussian import (
+        Likelihood as Likelihood,
+        Nuisance as Nuisance,
+        build_likelihood as build_likelihood,
+    )
+    from mapping.inference.likelihood.priors import (
+        Normal as Normal,
+        Prior as Prior,
+        StudentT as StudentT,
+        Uniform as Uniform,
+    )
+    from mapping.inference.likelihood.target import Shape as Shape, Target as Target
+    from mapping.inference.likelihood.window import (
+        Window as Window,
+        bin_samples as bin_samples,
+        distance_along as distance_along,
+        gather as gather,
+        samples_near as samples_near,
+    )
+
+_PUBLIC = {
+    "bin_filter": ("bin_filter",),
+    "gaussian": ("Likelihood", "Nuisance", "build_likelihood"),
+    "priors": ("Normal", "Prior", "StudentT", "Uniform"),
+    "target": ("Shape", "Target"),
+    "window": ("Window", "bin_samples", "distance_along", "gather", "samples_near"),
+}
+doorway(__name__, _PUBLIC)

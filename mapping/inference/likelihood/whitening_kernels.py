@@ -1,0 +1,85 @@
+"""Compiled whitening of binned traces: one pass of a scalar Kalman filter, O(n) per template."""
+
+# mypy: disable-error-code="untyped-decorator"
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mapping import FloatArray, IntArray
+
+
+@njit(cache=True, nogil=True)
+def whiten(
+    values: FloatArray, starts: IntArray, carry: FloatArray, observe: FloatArray, gain: FloatArray, scale: FloatArray
+) -> FloatArray:
+    """Innovations over their standard deviation of W series (W, n); the filter begins anew at each of `starts`.
+
+    m' = carry m + gain v, v = y - observe m: the gains do not depend on the data.
+    """
+    walkers, n = values.shape
+    out = np.empty((walkers, n))
+    for w in range(walkers):
+        for run in range(len(starts) - 1):
+            state = 0.0
+            for i in range(starts[run], starts[run + 1]):
+                innovation = values[w, i] - observe[i] * state
+                state = carry[i] * state + gain[i] * innovation
+                out[w, i] = innovation * scale[i]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def chi_square(
+    height: FloatArray,
+    templates: FloatArray,
+    starts: IntArray,
+    carry: FloatArray,
+    observe: FloatArray,
+    gain: FloatArray,
+    scale: FloatArray,
+    basis: FloatArray,
+    shrink: FloatArray,
+) -> FloatArray:
+    """(W,) squared lengths of heights (n,) less templates (W, n), whitened, each run's nuisance marginalised.
+
+    |e|^2 - sum_j g_j^2 (u_j . e)^2 with the orthonormal columns u_j of `basis` (n, Q) within each run and
+    `shrink` (runs, Q) holding g_j^2. `whiten` and this in one pass, which keeps no whitened series.
+    """
+    walkers = templates.shape[0]
+    count = basis.shape[1]
+    total = np.zeros(walkers)
+    dots = np.empty(count)
+    for w in range(walkers):
+        square = 0.0
+        for run in range(len(starts) - 1):
+            dots[:] = 0.0
+            state = 0.0
+            for i in range(starts[run], starts[run + 1]):
+                innovation = height[i] - templates[w, i] - observe[i] * state
+                state = carry[i] * state + gain[i] * innovation
+                white = innovation * scale[i]
+                square += white * white
+                for j in range(count):
+                    dots[j] += white * basis[i, j]
+            for j in range(count):
+                square -= shrink[run, j] * dots[j] * dots[j]
+        total[w] = square
+    return total
+
+
+@njit(cache=True, nogil=True)
+def project(white: FloatArray, starts: IntArray, basis: FloatArray, shrink: FloatArray) -> None:
+    """Take the marginalised nuisance out of whitened series (W, n) in place, so that |e|^2 is `chi_square`."""
+    walkers = white.shape[0]
+    count = basis.shape[1]
+    for w in range(walkers):
+        for run in range(len(starts) - 1):
+            for j in range(count):
+                dot = 0.0
+                for i in range(starts[run], starts[run + 1]):
+                    dot += white[w, i] * basis[i, j]
+                dot *= 1.0 - np.sqrt(max(0.0, 1.0 - shrink[run, j]))
+                for i in range(starts[run], starts[run + 1]):
+                    white[w, i] -= dot * basis[i, j]

@@ -1,0 +1,276 @@
+"""Window: the binned samples of a trace near one feature, all that its posterior depends on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapping import EmptyWindowError, FloatArray, IntArray, Trace
+from mapping.base import Base, Feet
+
+# Samples are looked at in blocks of this many: the cost of the rest of a long log is that of its boxes.
+BLOCK = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Bins along each run of consecutive samples near a feature.
+
+    Args:
+        feet: (n, 3) mean foot points of the bins on the base, m, smoothed along the run.
+        normals: (n, 3) unit normals of the base there.
+        tangents: (n, 3) unit directions of the sweep.
+        height: (n,) mean height of the trace over the base's trace, m.
+        count: (n,) samples in the bin.
+        place: (n,) distance along the run of the bin's middle, m.
+        last: (n,) distance along the run of the bin's last sample, m.
+        half: (n,) half of the bin's extent, m.
+        starts: (runs + 1,) first bin of each run, and n.
+        samples: number of raw samples behind the bins.
+    """
+
+    feet: FloatArray
+    normals: FloatArray
+    tangents: FloatArray
+    height: FloatArray
+    count: IntArray
+    place: FloatArray
+    last: FloatArray
+    half: FloatArray
+    starts: IntArray
+    samples: int
+
+    def __len__(self) -> int:
+        return len(self.height)
+
+    @property
+    def run(self) -> IntArray:
+        """(n,) number of the run that each bin belongs to."""
+        return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
+
+
+def samples_near(trace: Trace, points: FloatArray, reach: float) -> IntArray:
+    """Indices of the samples whose centres lie within `reach` of any of the points (K, 3), in order."""
+    from scipy.spatial import cKDTree
+
+    if len(trace) == 0:
+        return np.zeros(0, dtype=np.int64)
+    cuts = np.arange(0, len(trace), BLOCK)
+    low, high = np.minimum.reduceat(trace.centers, cuts), np.maximum.reduceat(trace.centers, cuts)
+    box_low, box_high = points.min(axis=0) - reach, points.max(axis=0) + reach
+    near = np.flatnonzero(((low <= box_high) & (high >= box_low)).all(axis=1))
+    tree = cKDTree(points)
+    middle, radius = 0.5 * (low[near] + high[near]), 0.5 * np.linalg.norm(high[near] - low[near], axis=1)
+    near = near[tree.query(middle)[0] <= reach + radius]
+    index = (near[:, None] * BLOCK + np.arange(BLOCK)).ravel()
+    index = index[index < len(trace)]
+    distance = tree.query(trace.centers[index], distance_upper_bound=reach)[0]
+    return np.asarray(index[np.isfinite(distance)])
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """The raw samples near a feature: feet on the base, and the first sample of each run after the first."""
+
+    feet: Feet
+    breaks: IntArray
+
+
+def gather(trace: Trace, base: Base, points: FloatArray, reach: float) -> Samples:
+    """The samples near a feature; the cost of the rest of the trace is one look at the boxes of its blocks.
+
+    Args:
+        trace: the whole trace.
+        base: the global model.
+        points: (K, 3) crest of the feature lifted to the ball's centre, densely spaced, m.
+        reach: distance from it that still counts, m.
+
+    Raises:
+        EmptyWindowError: no sample is near.
+    """
+    index = samples_near(trace, points, reach)
+    if len(index) == 0:
+        raise EmptyWindowError(
+            f"no sample of the trace ({len(trace)} in all) lies within {reach:.3g} m of the feature at "
+            f"{np.array2string(points.mean(axis=0), precision=6)} m"
+        )
+    index, breaks = _whole_runs(index, trace.sweep)
+    return Samples(base.foot(trace.centers[index], trace.tip_radius), breaks)
+
+
+def bin_samples(samples: Samples, width: float, noise_level: float, scale: float) -> Window:
+    """Bin samples along their runs.
+
+    Args:
+        samples: what `gather` found.
+        width: wanted length of a bin along the sweep, m.
+        noise_level: standard deviation of a sample, m: how far the path can be trusted.
+        scale: half width of the feature's disturbance, m: the path is smooth over a small part of it; 0: it is not,
+            and each bin lies where it was felt (a stage moves by steps, now along and now up).
+    """
+    feet, count = samples.feet, len(samples.feet.height)
+    runs = []
+    for start, stop in zip([0, *samples.breaks], [*samples.breaks, count], strict=True):
+        own = slice(int(start), int(stop))
+        path = distance_along(feet.points[own], noise_level)
+        runs.append(_bin(feet.points[own], feet.normals[own], feet.height[own], path, width, noise_level, scale))
+    return _join(runs)
+
+
+def _whole_runs(index: IntArray, sweep: IntArray) -> tuple[IntArray, IntArray]:
+    """Indices with short gaps closed (noise scatters samples about the rim of a window), and where runs begin."""
+    gaps = np.flatnonzero((np.diff(index) > BLOCK) | (np.diff(sweep[index]) != 0))
+    firsts, lasts = index[np.append(0, gaps + 1)], index[np.append(gaps, len(index) - 1)]
+    sizes = lasts - firsts + 1
+    begins = np.cumsum(sizes) - sizes
+    whole = np.arange(int(sizes.sum())) + np.repeat(firsts - begins, sizes)
+    return whole, begins[1:]
+
+
+def _join(runs: list[Window]) -> Window:
+    def every(name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(run, name) for run in runs])
+
+    starts = np.cumsum([0, *(len(run) for run in runs)])
+    return Window(
+        every("feet"),
+        every("normals"),
+        every("tangents"),
+        every("height"),
+        every("count"),
+        every("place"),
+        every("last"),
+        every("half"),
+        starts.astype(np.int64),
+        sum(run.samples for run in runs),
+    )
+
+
+def distance_along(points: FloatArray, noise_level: float) -> FloatArray:
+    """(N,) distance travelled along one run, from means of blocks so long that noise cannot lengthen it."""
+    count = len(points)
+    chord = float(np.linalg.norm(np.ptp(points, axis=0)))
+    blocks = count
+    if noise_level > 0.0:
+        blocks = int((chord * np.sqrt(count) / (5.0 * noise_level)) ** (2.0 / 3.0))
+    blocks = min(max(blocks, 2), count)
+    if blocks < 2 or chord == 0.0:
+        return np.zeros(count)
+    edges = np.linspace(0, count, blocks + 1).astype(np.int64)
+    sizes = np.diff(edges)
+    means = np.add.reduceat(points, edges[:-1]) / sizes[:, None]
+    centre = edges[:-1] + 0.5 * (sizes - 1)
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(means, axis=0), axis=1))])
+    index = np.arange(count)
+    along = np.interp(index, centre, travelled)
+    first, final = np.diff(travelled[:2])[0], np.diff(travelled[-2:])[0]
+    along += np.minimum(index - centre[0], 0.0) * first / (centre[1] - centre[0])
+    along += np.maximum(index - centre[-1], 0.0) * final / (centre[-1] - centre[-2])
+    return np.asarray(along - along[0])
+
+
+def _bin(
+    points: FloatArray,
+    normals: FloatArray,
+    height: FloatArray,
+    path: FloatArray,
+    width: float,
+    noise_level: float,
+    scale: float,
+) -> Window:
+    """The window of one run."""
+    cell = np.floor(path / width).astype(np.int64)
+    edges = np.flatnonzero(np.diff(cell, prepend=-1))
+    count = np.diff(np.append(edges, len(path)))
+    share = _shares(path, edges, count)
+    feet = np.add.reduceat(share[:, None] * points, edges)
+    mean_normals = np.add.reduceat(share[:, None] * normals, edges)
+    place = np.add.reduceat(share * path, edges)
+    last = path[edges + count - 1]
+    spacing = float(path[-1]) / max(len(path) - 1, 1)
+    # a single sample was felt at a point, however far the next one is (a machine that pecks)
+    extent = np.where(count > 1, last - path[edges] + spacing, 0.0)
+    if noise_level > 0.0:
+        feet, mean_normals = _smooth(feet, place, width, scale), _smooth(mean_normals, place, width, scale)
+    mean_normals = mean_normals / np.linalg.norm(mean_normals, axis=1, keepdims=True)
+    if noise_level > 0.0:
+        share, count = _without_spikes(height, edges, count, share, noise_level)
+    mean_height = np.add.reduceat(share * height, edges)
+    # as many samples of equal share as would be known as well: where the finger stood, they are worth fewer
+    worth = np.maximum(np.rint(1.0 / np.add.reduceat(share**2, edges)), 1.0).astype(np.int64)
+    whole = np.array([0, len(count)], dtype=np.int64)
+    return Window(
+        feet, mean_normals, _tangents(feet), mean_height, worth, place, last, 0.5 * extent, whole, int(count.sum())
+    )
+
+
+def _shares(path: FloatArray, edges: IntArray, count: IntArray) -> FloatArray:
+    """(N,) weight of each sample in the mean over its bin: of the way it stands for, not of the time spent there.
+
+    A template is averaged over the way; a finger that slows down at a flank leaves most samples of a bin there.
+    """
+    way = (
+        np.maximum(np.gradient(path), 1e-3 * path[-1] / len(path))
+        if len(path) > 1 and path[-1] > 0
+        else 0.0 * path + 1.0
+    )
+    return np.asarray(way / np.repeat(np.add.reduceat(way, edges), count))
+
+
+def _without_spikes(
+    height: FloatArray, edges: IntArray, count: IntArray, share: FloatArray, noise_level: float
+) -> tuple[FloatArray, IntArray]:
+    """Shares and counts without single samples far outside their bin (a knock, a lost bit).
+
+    On a flank the samples of a bin differ by more than the noise: what lies between the medians of the bins beside it
+    is no spike.
+    """
+    bins = np.repeat(np.arange(len(edges)), count)
+    order = np.lexsort((height, bins))
+    middle = height[order][edges + count // 2]
+    beside = np.stack([middle, np.append(middle[:1], middle[:-1]), np.append(middle[1:], middle[-1:])])
+    low, high = beside.min(axis=0) - 6.0 * noise_level, beside.max(axis=0) + 6.0 * noise_level
+    spike = ((height < low[bins]) | (height > high[bins])) & (count[bins] >= 5)
+    if not spike.any():
+        return share, count
+    kept = np.where(spike, 0.0, share)
+    left = count - np.add.reduceat(spike.astype(np.int64), edges)
+    return kept / np.repeat(np.maximum(np.add.reduceat(kept, edges), 1e-300), count), np.maximum(left, 1)
+
+
+def _smooth(values: FloatArray, place: FloatArray, width: float, scale: float) -> FloatArray:
+    """Local parabolas over a quarter of the feature's half width: the path's own noise goes, its course stays.
+
+    A bin's few samples do not lie evenly in it: what the filter makes of their `place` (n,) says for where it holds,
+    and each value is brought back to its own place.
+    """
+    smooth = _filtered(np.column_stack([values, place]), width, scale)
+    smooth, at = smooth[:, :-1], smooth[:, -1]
+    if len(at) < 2 or not (np.diff(at) > 0.0).all():
+        return smooth
+    return np.asarray(smooth + np.gradient(smooth, at, axis=0) * (place - at)[:, None])
+
+
+def _filtered(values: FloatArray, width: float, scale: float) -> FloatArray:
+    """The filter of Savitzky & Golay (1964); at both ends the parabola of the outermost stretch is read off."""
+    half = min(int(0.25 * scale / width), (len(values) - 1) // 2)
+    if half < 2:
+        return values
+    powers = np.arange(-half, half + 1)[:, None] ** np.arange(3.0)
+    fit = np.linalg.pinv(powers)
+    count = 2 * half + 1
+    middle = np.column_stack([np.convolve(column, fit[0][::-1], mode="valid") for column in values.T])
+    first = powers[:half] @ (fit @ values[:count])
+    final = powers[half + 1 :] @ (fit @ values[-count:])
+    return np.concatenate([first, middle, final])
+
+
+def _tangents(feet: FloatArray) -> FloatArray:
+    if len(feet) < 2:
+        return np.zeros_like(feet)
+    along = np.gradient(feet, axis=0)
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    return np.asarray(np.divide(along, length, out=np.zeros_like(along), where=length > 0))

@@ -1,0 +1,74 @@
+"""Misfit: what the best shape leaves over is put into the noise before anything is claimed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.inference.families import MODEL_FLOOR, Problem
+from mapping.inference.likelihood import bin_filter
+from mapping.inference.sampler import find_optima
+from mapping.instrument import Noise
+
+# A whitened bin further out than this is an outlier, as long as few are.
+OUTLIER = 4.5
+FEW = 0.03
+# Standard deviations of chi-square by which the residual must exceed the noise to count as a misfit.
+EXCESS = 5.0
+
+
+def account_for_misfit(problem: Problem, optima: list[FloatArray]) -> tuple[Problem, list[FloatArray]]:
+    """The problem with outliers trusted less and, if the residual is still too large, with noise to match.
+
+    Lone wild bins get the variance that makes them ordinary (a Gaussian scale mixture, one step of its EM). A
+    residual too large all over means that the feature is not of the family, or the noise is not what was said:
+    white and correlated levels that explain it are then found by maximum likelihood, so that the intervals tell of
+    it (model discrepancy; Kennedy & O'Hagan 2001).
+    """
+    residual = _residual(problem, optima)
+    wild = np.abs(residual) > OUTLIER
+    if wild.any() and wild.mean() < FEW:
+        inflation = np.where(wild, residual**2, 1.0)
+        problem = problem.under(problem.noise, inflation)
+        optima = find_optima(problem.target, np.array(optima))
+        residual = _residual(problem, optima)
+    count = len(residual)
+    if float(residual @ residual) <= count + EXCESS * np.sqrt(2.0 * count):
+        return problem, optima
+    noise = _noise_of_residual(problem, optima[0])
+    problem = problem.under(noise)
+    return problem, find_optima(problem.target, np.array([*optima, *problem.beginnings]))
+
+
+def _residual(problem: Problem, optima: list[FloatArray]) -> FloatArray:
+    """(n,) whitened residual at the best optimum."""
+    return problem.target.residuals(optima[0][None])[0, : len(problem.window)]
+
+
+def _noise_of_residual(problem: Problem, optimum: FloatArray) -> Noise:
+    """The most likely noise, not below the given one, for the heights that the optimum leaves over."""
+    window = problem.window
+    over = window.height - problem.target.templates(optimum[None])[0]
+    for start, stop in zip(window.starts[:-1], window.starts[1:], strict=True):
+        over[start:stop] -= over[start:stop].mean()
+    given = problem.noise
+    level = max(float(np.std(over)), MODEL_FLOOR * problem.sizes.height)
+    whites = [given.white, *(level * np.sqrt(window.count.mean()) * np.array([0.1, 0.3, 1.0]))]
+    best, best_value = given, -np.inf
+    for white in whites:
+        for correlated in (given.correlated, 0.5 * level, level, 1.5 * level):
+            for length in problem.sizes.half_width * np.array([0.1, 0.3, 1.0]):
+                noise = replace(
+                    given,
+                    white=max(given.white, float(white)),
+                    correlated=max(given.correlated, float(correlated)),
+                    length=given.length if correlated <= given.correlated else float(length),
+                )
+                whitener = bin_filter(window, noise, MODEL_FLOOR * problem.sizes.height)
+                innovations = whitener.whiten(over[None])[0]
+                value = float(np.log(whitener.scale).sum() - 0.5 * innovations @ innovations)
+                if value > best_value:
+                    best, best_value = noise, value
+    return best

@@ -1,0 +1,27 @@
+"""Samplers of a posterior: Laplace, importance sampling, emcee's ensemble."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.inference.sampler.ensemble import (
+        Chain as Chain,
+        sample_ensemble as sample_ensemble,
+        walkers_for as walkers_for,
+    )
+    from mapping.inference.sampler.importance import (
+        TRUSTED_K_HAT as TRUSTED_K_HAT,
+        Importance as Importance,
+        importance_sample as importance_sample,
+    )
+    from mapping.inference.sampler.laplace import find_optima as find_optima, laplace as laplace
+    from mapping.inference.sampler.psis import resample as resample
+
+_PUBLIC = {
+    "ensemble": ("Chain", "sample_ensemble", "walkers_for"),
+    "importance": ("Importance", "TRUSTED_K_HAT", "importance_sample"),
+    "laplace": ("find_optima", "laplace"),
+    "psis": ("resample",),
+}
+doorway(__name__, _PUBLIC)

@@ -1,0 +1,154 @@
+"""Sampling: emcee with differential evolution, run until its autocorrelation time is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mapping import FloatArray, SamplerError
+from mapping.inference.likelihood import Target
+from mapping.inference.sampler.proposal import DEGREES, Proposal
+
+# Walkers at least and at most; so many bins a step cost no more than what emcee does beside them, whoever sees them.
+WALKERS, MOST_WALKERS = 20, 48
+FREE_BINS = 12_000
+# Share of the steps that propose from an adapted proposal: where its tails are too light walkers stick, and the others
+# set them free.
+INDEPENDENT = 0.5
+# A chain counts as long when it holds this many autocorrelation times, and their estimate has settled.
+TIMES = 100
+SETTLED = 0.01
+FIRST_LOOK = 200
+GROWTH = 1.06
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """What an ensemble run gave.
+
+    Args:
+        samples: (S, P) draws after burn-in, thinned to about an autocorrelation time.
+        tau: largest integrated autocorrelation time, steps.
+        acceptance: mean acceptance fraction.
+        status: "converged", "chain too short" or "stuck".
+        reason: one sentence.
+        ess: effective number of draws (walkers times steps over tau).
+        steps: steps taken.
+    """
+
+    samples: FloatArray
+    tau: float
+    acceptance: float
+    status: str
+    reason: str
+    ess: float
+    steps: int
+
+
+def walkers_for(bins: int, parameters: int) -> int:
+    """How many walkers sample a density over so many bins and parameters at the least cost a draw."""
+    return max(min(max(FREE_BINS // bins, WALKERS), MOST_WALKERS), 2 * parameters + 4)
+
+
+def sample_ensemble(
+    target: Target,
+    starts: FloatArray,
+    rng: np.random.Generator,
+    *,
+    proposal: Proposal | None = None,
+    max_steps: int = 6000,
+) -> Chain:
+    """Draw from a target by an ensemble of walkers.
+
+    Differential evolution with an occasional jump of full length between modes (gamma0 = 1); half of the steps
+    propose from `proposal` instead, independently of the walker (Metropolis-Hastings), which costs
+    nothing where the proposal is good and is refused where it is not. The snooker move of emcee 3.1.6 is wrong and
+    not used.
+
+    Args:
+        target: the posterior density.
+        starts: (W, P) places of the walkers, W even and at least 2 P, inside the support.
+        rng: all randomness comes from here.
+        proposal: the adapted importance proposal, or None.
+        max_steps: steps after which the run ends unconverged.
+
+    Reference: Foreman-Mackey et al. (2013); ter Braak (2006); theory section 8.
+    """
+    import emcee
+
+    moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
+    if proposal is not None:
+        moves = [(move, (1.0 - INDEPENDENT) * weight) for move, weight in moves]
+        moves.append((emcee.moves.MHMove(_independent(proposal)), INDEPENDENT))
+    sampler = emcee.EnsembleSampler(*starts.shape, target.log_density, moves=moves, vectorize=True)
+    _seed(sampler, rng)
+    state, tau, look = starts, np.inf, FIRST_LOOK
+    while True:
+        state = sampler.run_mcmc(state, look - sampler.iteration, skip_initial_state_check=True)
+        previous, tau = tau, _autocorrelation(sampler.get_chain())
+        settled = abs(tau - previous) < SETTLED * tau
+        if (settled and look > TIMES * tau) or look >= max_steps or not np.isfinite(tau):
+            break
+        # The last stretch is short, so that the estimate is compared with one from nearly the same chain.
+        look = min(max(int(GROWTH * look), min(int(1.02 * TIMES * tau), 4 * look)), max_steps)
+    return _chain(sampler, tau, settled)
+
+
+def _chain(sampler: Any, tau: float, settled: bool) -> Chain:
+    chain: FloatArray = sampler.get_chain()
+    steps, walkers, _ = chain.shape
+    acceptance = float(np.mean(sampler.acceptance_fraction))
+    if not np.isfinite(tau) or acceptance < 0.01:
+        status, reason = (
+            "stuck",
+            f"after {steps} steps of {walkers} walkers {acceptance:.1%} of the moves were accepted",
+        )
+    elif steps > TIMES * tau and settled:
+        status = "converged"
+        reason = f"{steps} steps of {walkers} walkers are {steps / tau:.0f} autocorrelation times of {tau:.1f} steps"
+    else:
+        status = "chain too short"
+        reason = (
+            f"{steps} steps of {walkers} walkers are only {steps / tau:.0f} autocorrelation times ({tau:.1f} steps)"
+        )
+    burn = min(int(5 * tau), steps // 4) if np.isfinite(tau) else steps // 2
+    thin = max(1, int(tau)) if np.isfinite(tau) else 1
+    samples = chain[burn::thin].reshape(-1, chain.shape[2])
+    ess = walkers * (steps - burn) / tau if np.isfinite(tau) else 0.0
+    return Chain(samples, tau, acceptance, status, reason, float(ess), steps)
+
+
+def _independent(
+    proposal: Proposal,
+) -> Callable[[FloatArray, np.random.RandomState], tuple[FloatArray, FloatArray]]:
+    """emcee's form of a proposal that does not look at where the walker stands."""
+
+    def propose(coords: FloatArray, random: np.random.RandomState) -> tuple[FloatArray, FloatArray]:
+        count = len(coords)
+        variates = random.random_sample(count), random.standard_normal(coords.shape), random.chisquare(DEGREES, count)
+        new = proposal.draw(*variates)
+        return new, proposal.log_density(coords) - proposal.log_density(new)
+
+    return propose
+
+
+def _seed(sampler: Any, rng: np.random.Generator) -> None:
+    """Hand the randomness over; emcee hides a state that it could not set, so it is read back."""
+    wanted: Any = np.random.RandomState(int(rng.integers(2**32 - 1))).get_state(legacy=True)
+    sampler.random_state = wanted
+    if not np.array_equal(sampler.random_state[1], wanted[1]):
+        raise SamplerError("emcee did not take the random state that it was given; the run would not be repeatable")
+
+
+def _autocorrelation(chain: FloatArray) -> float:
+    """Largest integrated autocorrelation time of (steps, walkers, P), steps, never below 1; NaN if nothing moves."""
+    import emcee
+
+    spread = chain.reshape(-1, chain.shape[2]).std(axis=0)
+    if not (spread > 0.0).all():
+        return float("nan")
+    tau = emcee.autocorr.integrated_time(chain, tol=0, quiet=True)
+    return float(max(1.0, np.max(tau)))

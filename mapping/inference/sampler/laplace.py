@@ -1,0 +1,140 @@
+"""Laplace: the optimum of a posterior and the Gaussian that touches it there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.inference.likelihood import Target
+
+ITERATIONS = 60
+# Gain in chi-square of a step after which the optimum is known: a thirtieth of a standard deviation.
+SETTLED = 1e-3
+# Log density below the best optimum at which another one does not matter, and how many are kept.
+NEGLIGIBLE = 12.0
+MODES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Laplace:
+    """Optimum and curvature.
+
+    Args:
+        mean: (P,) parameters of the highest density.
+        covariance: (P, P) inverse of the Gauss-Newton Hessian, with flat directions replaced by the spread of the
+            density along them.
+        log_density: at the optimum.
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+    log_density: float
+
+
+def find_optima(target: Target, starts: FloatArray) -> list[FloatArray]:
+    """Distinct optima (P,) reached by Levenberg-Marquardt from the starts (M, P), best first.
+
+    Optima that hold a negligible share of the probability, or lie within a fraction of a step of a better one, are
+    left out; at most MODES are kept.
+    """
+    found = np.array([_descend(target, start) for start in starts])
+    values = target.log_density(found)
+    kept: list[FloatArray] = []
+    for i in np.argsort(-values, kind="stable"):
+        apart = [np.abs((found[i] - other) / target.shape.step).max() > 0.5 for other in kept]
+        if values[i] > values.max() - NEGLIGIBLE and all(apart) and len(kept) < MODES:
+            kept.append(found[i])
+    return kept or [starts[0]]
+
+
+def laplace(target: Target, optimum: FloatArray) -> Laplace:
+    """The Gaussian at an optimum; differences are taken over a good part of a standard deviation.
+
+    A posterior with kinks (an end between two sweeps) has no useful curvature at a point: along each parameter whose
+    density over +-3 standard deviations disagrees with the Gaussian's, the spread of a scan along it counts.
+    """
+    step = target.shape.step.copy()
+    for _ in range(3):
+        jacobian = _jacobian(target, optimum, step)[1]
+        covariance = _inverse(jacobian.T @ jacobian, target)
+        step = np.clip(0.3 * np.sqrt(np.diag(covariance)), 1e-3 * target.shape.step, 10 * target.shape.step)
+    covariance = _scanned(target, optimum, covariance)
+    return Laplace(optimum, covariance, float(target.log_density(optimum[None])[0]))
+
+
+def _descend(target: Target, start: FloatArray) -> FloatArray:
+    low, high, scale = target.low, target.high, target.shape.step
+    theta = np.clip(start, low, high)
+    damping, (residual, jacobian) = 1e-3, _jacobian(target, theta, 0.1 * scale)
+    cost = float(residual @ residual)
+    for _ in range(ITERATIONS):
+        scaled = jacobian * scale
+        gradient, hessian = scaled.T @ residual, scaled.T @ scaled
+        # Several dampings are tried at once: a batch of templates costs little more than one.
+        dampings = damping * np.array([1e-2, 1.0, 1e2, 1e4])
+        ridge = np.maximum(np.diag(hessian), 1e-6 * max(float(np.diag(hessian).max()), 1e-300))
+        moves = np.stack([np.linalg.solve(hessian + d * np.diag(ridge), -gradient) for d in dampings])
+        candidates = np.clip(theta + moves * scale, low, high)
+        costs = (target.residuals(candidates) ** 2).sum(axis=1)
+        pick = int(np.argmin(costs))
+        if not costs[pick] < cost - 1e-9 * max(1.0, abs(cost)) * 1e-3:
+            if damping > 1e6:
+                break
+            damping *= 1e3
+            continue
+        gain = cost - float(costs[pick])
+        theta, damping = candidates[pick], max(float(dampings[pick]), 1e-12)
+        residual, jacobian = _jacobian(target, theta, 0.1 * scale)
+        cost = float(residual @ residual)
+        if gain < SETTLED:
+            break
+    return np.asarray(theta)
+
+
+def _jacobian(target: Target, theta: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Residuals (m,) and their central differences (m, P), one-sided at a bound; a single batch of templates."""
+    count = len(theta)
+    up = np.minimum(theta + step, target.high)
+    down = np.maximum(theta - step, target.low)
+    batch = np.tile(theta, (2 * count + 1, 1))
+    batch[np.arange(count), np.arange(count)] = up
+    batch[np.arange(count) + count, np.arange(count)] = down
+    residuals = target.residuals(batch)
+    span = np.maximum(up - down, np.finfo(float).tiny)
+    return residuals[-1], ((residuals[:count] - residuals[count : 2 * count]) / span[:, None]).T
+
+
+def _widths(target: Target) -> FloatArray:
+    """(P,) standard deviations of the priors where bounded, else generous multiples of the step."""
+    with np.errstate(invalid="ignore"):
+        width = (target.high - target.low) / np.sqrt(12.0)
+    return np.asarray(np.where(np.isfinite(width), width, 1e3 * target.shape.step))
+
+
+def _inverse(hessian: FloatArray, target: Target) -> FloatArray:
+    """Inverse with the priors' widths as the least curvature, scaled so that units do not matter."""
+    width = _widths(target)
+    scaled = hessian * np.outer(width, width) + np.eye(len(width))
+    return np.asarray(np.linalg.inv(scaled) * np.outer(width, width))
+
+
+def _scanned(target: Target, optimum: FloatArray, covariance: FloatArray) -> FloatArray:
+    """The covariance with rows rescaled where a scan along a parameter finds another conditional spread."""
+    precision = np.linalg.inv(covariance)
+    conditional = 1.0 / np.sqrt(np.diag(precision))
+    factors = np.ones(len(optimum))
+    grid = np.linspace(-1.0, 1.0, 61)
+    for i in range(len(optimum)):
+        reach = max(4.0 * conditional[i], 8.0 * target.shape.step[i])
+        low, high = max(optimum[i] - reach, target.low[i]), min(optimum[i] + reach, target.high[i])
+        batch = np.tile(optimum, (len(grid), 1))
+        batch[:, i] = 0.5 * (low + high) + 0.5 * (high - low) * grid
+        log_density = target.log_density(batch)
+        weight = np.exp(log_density - log_density.max())
+        mean = np.average(batch[:, i], weights=weight)
+        spread = np.sqrt(np.average((batch[:, i] - mean) ** 2, weights=weight))
+        if spread > 1.5 * conditional[i]:
+            factors[i] = spread / conditional[i]
+    return np.asarray(covariance * np.outer(factors, factors))

@@ -1,0 +1,191 @@
+"""Summary: the feature that posterior draws describe.
+
+Extent: whether the ends of an axis were seen, or only that it goes at least so far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mapping import Feature, FloatArray, Interval, Posterior
+from mapping.base import Base, onto_base
+from mapping.geometry.templates import rim_height, width_of_cap
+from mapping.inference.families import (
+    BellShape,
+    BumpShape,
+    GrooveShape,
+    PitShape,
+    Problem,
+    RidgeShape,
+    StepShape,
+    width_at_half_height,
+    with_nominal_tip,
+)
+
+# Draws that lengths of curves are measured on, and points of the reported axis.
+FEW_DRAWS = 400
+AXIS_POINTS = 64
+
+
+def describe(problem: Problem, posterior: Posterior, base: Base) -> Feature:
+    """The detected feature with axis, intervals and standard deviation from the draws of its posterior."""
+    full, problem = posterior, with_nominal_tip(problem)
+    shape = problem.target.shape
+    # What is described is the feature: the draws of a free tip's radius, in the last column, are left out.
+    posterior = replace(full, samples=full.samples[:, : len(shape.names)])
+    if isinstance(shape, BumpShape | BellShape | PitShape):
+        feature = _describe_spot(problem, shape, posterior, base)
+    elif isinstance(shape, RidgeShape | GrooveShape | StepShape):
+        feature = _describe_curve(problem, shape, posterior, base)
+    else:
+        raise TypeError(f"no description for the shape {type(shape).__name__}")
+    notes = tuple(note for note in (*feature.notes, *_warnings(posterior)) if note)
+    return replace(feature, posterior=full, notes=tuple(dict.fromkeys(notes)))
+
+
+def _warnings(posterior: Posterior) -> tuple[str, ...]:
+    if posterior.status in ("converged", "not needed"):
+        return ()
+    return (f"posterior: {posterior.status}: {posterior.reason}",)
+
+
+def _describe_spot(
+    problem: Problem, shape: BumpShape | BellShape | PitShape, posterior: Posterior, base: Base
+) -> Feature:
+    draws = posterior.samples
+    place = np.zeros((1, 2))
+    place[0, : shape.free] = np.median(draws[:, : shape.free], axis=0)
+    point = shape.spot.lifted(place, np.zeros(1))
+    axis, normals = onto_base(point, shape.spot.normal[None], base, shape.tip_radius)
+    sd = float(np.sqrt((draws[:, : shape.free].std(axis=0) ** 2).mean()))
+    height, width, radius, note = _section(problem, shape, draws)
+    notes = [note] if note else []
+    if shape.free == 1:
+        notes.append("seen by a single sweep: the position across it is not known")
+    return replace(
+        problem.feature,
+        axis=axis,
+        normals=normals,
+        height=height,
+        width=width,
+        length=Interval(0.0, 0.0, 0.0),
+        position_sd=sd,
+        notes=(*problem.feature.notes, *notes),
+        extra={**problem.feature.extra, **radius},
+    )
+
+
+def _describe_curve(
+    problem: Problem, shape: RidgeShape | GrooveShape | StepShape, posterior: Posterior, base: Base
+) -> Feature:
+    draws, chart, modes = posterior.samples, shape.chart, shape.modes
+    has_ends = not chart.closed and not isinstance(shape, StepShape)
+    low, high = float(chart.s[0]), float(chart.s[-1])
+    if has_ends:
+        low, high = float(np.median(draws[:, -4])), float(np.median(draws[:, -3]))
+    count = AXIS_POINTS if (chart.closed or len(chart.s) > 8 or modes.degree > 1) else 2
+    s = np.linspace(low, high, count)
+    points, laterals, normals, bend = chart.at(s)
+    courses = modes.lateral(draws[:, : modes.count], s)
+    aside = np.median(courses, axis=0)
+    points = points + aside[:, None] * laterals - (0.5 * bend * aside**2)[:, None] * normals
+    axis, normals = onto_base(points, normals, base, shape.tip_radius)
+    if chart.closed:
+        axis[-1], normals[-1] = axis[0], normals[0]
+    height, width, radius, note = _section(problem, shape, draws)
+    length, notes = _length(problem, shape, draws, has_ends)
+    # Along the axis: how well it is known across itself, and its two ends along itself (first, last).
+    known: dict[str, object] = {"axis_sd": courses.std(axis=0).tolist()}
+    if has_ends:
+        spans = np.quantile(draws[:, -4:-2], [0.05, 0.95], axis=0) - [low, high]
+        known |= {"end_intervals": spans.T.tolist(), "ends_seen": list(explored(problem, draws))}
+    return replace(
+        problem.feature,
+        axis=axis,
+        normals=normals,
+        height=height,
+        width=width,
+        length=length,
+        position_sd=float(np.sqrt(courses.var(axis=0).mean())),
+        notes=(*problem.feature.notes, *notes, *([note] if note else [])),
+        extra={**problem.feature.extra, **radius, **known},
+    )
+
+
+def _section(problem: Problem, shape: object, draws: FloatArray) -> tuple[Interval, Interval, dict[str, float], str]:
+    """Height, width, extra values and a remark."""
+    if isinstance(shape, StepShape):
+        sign = 1.0 if problem.feature.height.median >= 0.0 else -1.0
+        return Interval.from_draws(sign * draws[:, -1]), Interval(0.0, 0.0, 0.0), {}, ""
+    if isinstance(shape, BumpShape | RidgeShape):
+        radii = np.exp(draws[:, -1])
+        cap = Interval.from_draws(width_of_cap(draws[:, -2], radii))
+        return Interval.from_draws(draws[:, -2]), cap, {"radius": float(np.median(radii))}, ""
+    if isinstance(shape, BellShape):
+        scale, exponent = np.exp(draws[:, -2]), np.exp(draws[:, -1])
+        full = Interval.from_draws(width_at_half_height(scale, exponent))
+        extra = {"scale": float(np.median(scale)), "exponent": float(np.median(exponent))}
+        return Interval.from_draws(draws[:, -3]), full, extra, "its flank runs out in a skirt: width at half height"
+    width, depth = np.exp(draws[:, -2]), np.exp(draws[:, -1])
+    tip = shape.tip_radius  # type: ignore[attr-defined]
+    unhindered = -rim_height(0.5 * width, tip)
+    dips = np.minimum(unhindered, depth)
+    # Where the ball hangs between the rims the bottom is out of reach: the dip bounds the depth from below.
+    censored = bool(np.mean(depth > unhindered) > 0.05)
+    values = -dips if censored else -depth
+    low, median, high = np.quantile(values, [0.05, 0.5, 0.95])
+    note = "the ball does not reach the bottom: at least this deep" if censored else ""
+    return Interval(float(median), float(low), float(high), censored), Interval.from_draws(width), {}, note
+
+
+def _length(
+    problem: Problem, shape: RidgeShape | GrooveShape | StepShape, draws: FloatArray, has_ends: bool
+) -> tuple[Interval, list[str]]:
+    chart, modes = shape.chart, shape.modes
+    some = draws[:: max(1, len(draws) // FEW_DRAWS)]
+    lengths = np.empty(len(some))
+    for i, theta in enumerate(some):
+        ends = (theta[-4], theta[-3]) if has_ends else (chart.s[0], chart.s[-1])
+        s = np.linspace(*ends, AXIS_POINTS if len(chart.s) > 8 or modes.degree > 1 else 2)
+        points, laterals, _, _ = chart.at(s)
+        course = points + modes.lateral(theta[None, : modes.count], s)[0][:, None] * laterals
+        lengths[i] = np.linalg.norm(np.diff(course, axis=0), axis=1).sum()
+    interval = Interval.from_draws(lengths)
+    if chart.closed:
+        return interval, []
+    if not has_ends:
+        return replace(interval, censored=True), ["the length of a step is what was explored of it: at least this"]
+    seen = explored(problem, draws)
+    return (interval, []) if all(seen) else (replace(interval, censored=True), [*with_open_ends((), seen)])
+
+
+# An end that may as well lie at the limit of what was looked at was not seen: no more log density against it.
+UNSEEN = 3.0
+GOES_ON = "the axis goes on beyond what was explored"
+
+
+def explored(problem: Problem, draws: FloatArray) -> tuple[bool, bool]:
+    """For the first and the last end: True if the data say that the axis does not go on.
+
+    The best of the draws is moved out to the limit of the end's prior; if the density hardly drops, nothing was
+    measured that could have shown the end, and the length is only bounded from below (a censored value).
+    """
+    target = problem.target
+    best = draws[int(np.argmax(target.log_density(draws)))]
+    at_limit = np.tile(best, (3, 1))
+    columns = len(best) - 4, len(best) - 3
+    at_limit[1, columns[0]] = target.low[columns[0]]
+    at_limit[2, columns[1]] = target.high[columns[1]]
+    value = target.log_density(at_limit)
+    return bool(value[0] - value[1] > UNSEEN), bool(value[0] - value[2] > UNSEEN)
+
+
+def with_open_ends(notes: Sequence[str], seen: Sequence[bool]) -> tuple[str, ...]:
+    """The notes of a line with the one that says which of its ends (first, last) were not seen, if any."""
+    open_ends = [name for name, known in zip(("first", "last"), seen, strict=True) if not known]
+    note = f"{GOES_ON} at its {' and its '.join(open_ends)} point: at least this long"
+    rest = tuple(each for each in notes if not each.startswith(GOES_ON))
+    return (*rest, note) if open_ends else rest

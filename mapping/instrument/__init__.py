@@ -1,0 +1,25 @@
+"""The instrument: the noise of a sweep, its fit, its statement, and the tip's calibration."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.instrument.fit import (
+        Blocks as Blocks,
+        NoiseFit as NoiseFit,
+        fit_noise as fit_noise,
+        perturbed as perturbed,
+        relative_sd as relative_sd,
+    )
+    from mapping.instrument.noise import Noise as Noise, estimate_noise as estimate_noise, robust_sd as robust_sd
+    from mapping.instrument.stated import StatedNoise as StatedNoise
+    from mapping.instrument.tip_calibration import TipCalibration as TipCalibration, calibrate_tip as calibrate_tip
+
+_PUBLIC = {
+    "fit": ("Blocks", "NoiseFit", "fit_noise", "perturbed", "relative_sd"),
+    "noise": ("Noise", "estimate_noise", "robust_sd"),
+    "stated": ("StatedNoise",),
+    "tip_calibration": ("TipCalibration", "calibrate_tip"),
+}
+doorway(__name__, _PUBLIC)

@@ -1,0 +1,83 @@
+"""The annotated model as GLB (glTF 2.0): the base, and one named node per feature with its record in `extras`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mapping import Feature, FloatArray, Surface
+from mapping.model.feature_mesh import feature_mesh
+from mapping.model.json_record import SCHEMA, feature_record
+
+BASE_COLOUR = (0.78, 0.80, 0.83, 1.0)
+COLOURS = {
+    "bump": (0.85, 0.37, 0.01, 1.0),
+    "ridge": (0.80, 0.16, 0.22, 1.0),
+    "pit": (0.20, 0.53, 0.74, 1.0),
+    "groove": (0.13, 0.37, 0.66, 1.0),
+    "step": (0.48, 0.31, 0.64, 1.0),
+}
+OTHER_COLOUR = (0.25, 0.25, 0.25, 1.0)
+# glTF allows no NaN in a vertex attribute: this stands for "not known".
+UNKNOWN = -1.0
+
+
+def glb_bytes(
+    base: Surface,
+    features: Sequence[Feature],
+    reach: FloatArray | None = None,
+    sigma: FloatArray | None = None,
+) -> bytes:
+    """The scene as one GLB file.
+
+    Nodes: "base" and one per feature, named by its id, with the feature's record (docs/model.md) in
+    `extras`. Float32 vertex attributes: `_SIGMA`, standard deviation of the surface there, m; `_REACH`,
+    0 touched, 1 bridged, 2 extrapolated; both -1 where not known. Vertices are stored relative to the
+    middle of the base, which the nodes' matrices add back: float32 would lose it far from the origin.
+    """
+    import trimesh
+
+    scene = trimesh.Scene()
+    origin = base.bounds.mean(axis=0)
+    _add(scene, "base", base, origin, BASE_COLOUR, sigma, reach)
+    for feature in features:
+        mesh = feature_mesh(feature)
+        # The central 90 % of a Gaussian is 2 * 1.645 standard deviations wide.
+        spread = np.full(len(mesh.vertices), (feature.height.high - feature.height.low) / 3.29)
+        touched = np.zeros(len(mesh.vertices))
+        _add(scene, feature.id, mesh, origin, COLOURS.get(feature.kind, OTHER_COLOUR), spread, touched)
+    extras: dict[str, Any] = {feature.id: feature_record(feature) for feature in features}
+    extras["base"] = {"schema": SCHEMA, "units": "m"}
+
+    def annotate(tree: dict[str, Any]) -> None:
+        for node in tree["nodes"]:
+            if node["name"] in extras:
+                node["extras"] = extras[node["name"]]
+
+    return bytes(trimesh.exchange.gltf.export_glb(scene, tree_postprocessor=annotate))
+
+
+def _add(
+    scene: Any,
+    name: str,
+    surface: Surface,
+    origin: FloatArray,
+    colour: tuple[float, float, float, float],
+    sigma: FloatArray | None,
+    reach: FloatArray | None,
+) -> None:
+    import trimesh
+
+    material = trimesh.visual.material.PBRMaterial(
+        name=name, baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=0.7, doubleSided=True
+    )
+    mesh = trimesh.Trimesh(surface.vertices - origin, surface.faces, process=False)
+    mesh.visual = trimesh.visual.TextureVisuals(material=material)
+    for key, values in (("_SIGMA", sigma), ("_REACH", reach)):
+        known = np.full(len(surface.vertices), UNKNOWN) if values is None else np.nan_to_num(values, nan=UNKNOWN)
+        mesh.vertex_attributes[key] = known.astype(np.float32)
+    transform = np.eye(4)
+    transform[:3, 3] = origin
+    scene.add_geometry(mesh, node_name=name, geom_name=name, transform=transform)

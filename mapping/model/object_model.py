@@ -1,0 +1,175 @@
+"""ObjectModel: the global model with its fine features attached, and its folder on disk."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Self
+from zipfile import BadZipFile
+
+import numpy as np
+
+from mapping import Feature, FloatArray, LeftOut, ModelError, Surface
+from mapping.base import Base, anchor
+from mapping.geometry.mesh import write_whole
+from mapping.model.glb import glb_bytes
+from mapping.model.json_record import SCHEMA, Record, feature_record, left_out_record, plain, read_feature
+
+__all__ = ["LeftOut", "ObjectModel"]
+
+
+# Fields over the base's vertices or faces that are kept beside it
+FIELDS = ("reach", "sigma", "inspected")
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectModel:
+    """A body: its base, and what the finger found on it.
+
+    Args:
+        base: the global model.
+        features: the features, each with an id and an anchor (see `attach`).
+        left_out: stages that were not needed or could not be done.
+        timings: seconds spent per stage.
+        provenance: where it came from (scene, tip radius, log hash, software version); JSON values.
+        reach: (V,) label of each base vertex (0 touched, 1 bridged, 2 extrapolated), or None.
+        sigma: (V,) standard deviation of the base at each vertex, m, or None.
+        inspected: (F,) height above which each base face is free of features that were not found, m, or None.
+    """
+
+    base: Base
+    features: tuple[Feature, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
+    timings: dict[str, float] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
+    reach: FloatArray | None = None
+    sigma: FloatArray | None = None
+    inspected: FloatArray | None = None
+
+    @classmethod
+    def attach(cls, base: Base, features: Sequence[Feature], **about: Any) -> Self:
+        """The model of a base with features hung on it: each gets an anchor and an id ("ridge-1", ...).
+
+        Args:
+            base: the global model.
+            features: features whose axes run on the base, in the order of their numbers.
+            about: the other fields of the model.
+        """
+        number: Counter[str] = Counter()
+        attached = []
+        for feature in features:
+            number[feature.kind] += 1
+            name = f"{feature.kind.replace(' ', '-')}-{number[feature.kind]}"
+            attached.append(replace(feature, id=name, anchor=anchor(feature.axis, base.surface)))
+        return cls(base, tuple(attached), **about)
+
+    def save(self, folder: Path | str) -> Path:
+        """Write model.npz (arrays), model.glb (for viewers) and, last, model.json; returns its path.
+
+        Raises:
+            ModelError: a feature without an id or with one used twice, or values that JSON cannot hold.
+            OSError: the folder cannot be made or written.
+        """
+        self._check_ids()
+        document = json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        glb = glb_bytes(self.base.surface, self.features, self.reach, self.sigma)
+        place = Path(folder)
+        place.mkdir(parents=True, exist_ok=True)
+        write_whole(place / "model.npz", self._arrays())
+        write_whole(place / "model.glb", glb)
+        return write_whole(place / "model.json", document)
+
+    @classmethod
+    def load(cls, path: Path | str) -> Self:
+        """The model saved in a folder (or at its model.json).
+
+        Raises:
+            ModelError: no model there, another schema, or a field missing or malformed.
+        """
+        file = Path(path) / "model.json" if Path(path).is_dir() else Path(path)
+        record, arrays = _read(file)
+        try:
+            base = Base(
+                Surface(arrays["base_vertices"], arrays["base_faces"]),
+                record["base"]["kind"],
+                record["base"]["parameters"],
+            )
+            return cls(
+                base,
+                tuple(read_feature(each, arrays.get(f"draws/{each.get('id')}")) for each in record["features"]),
+                tuple(LeftOut(**each) for each in record["left_out"]),
+                {name: float(seconds) for name, seconds in record["timings"].items()},
+                record["provenance"],
+                arrays.get("reach"),
+                arrays.get("sigma"),
+                arrays.get("inspected"),
+            )
+        except KeyError as error:
+            raise ModelError(f"{file}: field {error.args[0]!r} is missing") from error
+        except (TypeError, AttributeError) as error:
+            raise ModelError(f"{file}: {error}") from error
+
+    def document(self) -> Record:
+        """The content of model.json: plain JSON values, SI units (docs/model.md)."""
+        surface = self.base.surface
+        return {
+            "schema": SCHEMA,
+            "units": "m",
+            "base": {
+                "kind": self.base.kind,
+                "parameters": plain(self.base.parameters, "base.parameters"),
+                "mesh": {"file": "model.glb", "node": "base"},
+                "arrays": "model.npz",
+                "vertices": len(surface.vertices),
+                "faces": len(surface.faces),
+                "bounds": plain(surface.bounds),
+            },
+            "features": [feature_record(feature) for feature in self.features],
+            "left_out": [left_out_record(each) for each in self.left_out],
+            "timings": {name: round(float(seconds), 6) for name, seconds in self.timings.items()},
+            "provenance": plain(self.provenance, "provenance"),
+        }
+
+    def _check_ids(self) -> None:
+        ids = Counter(feature.id for feature in self.features)
+        twice = [name for name, count in ids.items() if count > 1]
+        if "" in ids or twice:
+            found = f"{twice[0]!r} used {ids[twice[0]]} times" if twice and twice[0] else "a feature without one"
+            raise ModelError(f"a model's features need ids of their own (use ObjectModel.attach); found {found}")
+
+    def _arrays(self) -> bytes:
+        arrays: dict[str, Any] = {
+            "base_vertices": self.base.surface.vertices,
+            "base_faces": self.base.surface.faces,
+        }
+        arrays |= {f"draws/{each.id}": each.posterior.samples for each in self.features if each.posterior is not None}
+        arrays |= {name: getattr(self, name) for name in FIELDS if getattr(self, name) is not None}
+        stream = io.BytesIO()
+        np.savez_compressed(stream, **arrays)
+        return stream.getvalue()
+
+
+def _read(file: Path) -> tuple[Record, dict[str, FloatArray]]:
+    """The JSON document and the arrays of a saved model."""
+    try:
+        record = json.loads(file.read_text("utf-8"))
+    except (OSError, ValueError) as error:
+        raise ModelError(f"{file} is not a readable model: {_why(error)}") from error
+    if not isinstance(record, dict) or record.get("schema") != SCHEMA:
+        found = record.get("schema") if isinstance(record, dict) else type(record).__name__
+        raise ModelError(f"{file}: expected schema {SCHEMA!r}, found {found!r}")
+    arrays = file.parent / "model.npz"
+    try:
+        with np.load(arrays, allow_pickle=False) as bundle:
+            return record, dict(bundle)
+    except (OSError, ValueError, BadZipFile) as error:
+        raise ModelError(f"{arrays}, which holds the arrays of {file.name}, cannot be read: {_why(error)}") from error
+
+
+def _why(error: Exception) -> str:
+    """The error in words, without its number and the file that the message names already."""
+    return str(getattr(error, "strerror", None) or error)

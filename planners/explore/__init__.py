@@ -1,0 +1,17 @@
+"""Exploring: survey, look, follow, until nothing is left or the budget is spent."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from planners.explore.discover import SIDES as SIDES, Discover as Discover
+    from planners.explore.explore import Explore as Explore
+    from planners.explore.locate import Locate as Locate
+
+_PUBLIC = {
+    "discover": ("Discover", "SIDES"),
+    "explore": ("Explore",),
+    "locate": ("Locate",),
+}
+doorway(__name__, _PUBLIC)

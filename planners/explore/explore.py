@@ -1,0 +1,289 @@
+"""Explore: surveys the base, then does what sharpens the features most per second, and stops when it is enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.base import Base
+from mapping.detection import Crossing
+from mapping.instrument import Noise
+from planners import Outcome, Plan, PlannerError, Spent, within
+from planners.explore.faint_search import CloserLook, FaintLead, FaintSearch
+from planners.explore.found import Found
+from planners.explore.surveyor import CANDIDATES, Surveyor
+from planners.explore.warm_up import get_ready
+from planners.follow import (
+    AxisTrack,
+    BumpSize,
+    BumpSizer,
+    Circuit,
+    Crest,
+    EndFinder,
+    RidgeFollower,
+    Sense,
+    headings,
+    is_step,
+    slender,
+)
+from planners.paths import Strokes
+from planners.survey import Survey
+
+# Slides off one end, at most, and in one go
+MOST_SLIDES, AT_ONCE = 150, 8
+# A faint line is straight, and every crossing of it costs many passes: the step, in its length so far
+LEAD_STEP = 0.25
+
+
+@dataclass(frozen=True)
+class Action:
+    """One thing that could be done next: what for, what it is expected to gain (m) and take (s), how to do it."""
+
+    name: str
+    gain: float
+    seconds: float
+    start: Callable[[], Plan]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Explore:
+    """Survey, circle, follow, bisect, slide, stop.
+
+    After the survey the next action is always the one with the largest expected reduction of the features'
+    uncertainty per second of finger time: looking into a detection (its extent is unknown by about a survey
+    pitch) or one more slide off an end that is not precise enough. It stops when nothing is left to gain.
+
+    Args:
+        base: the global model.
+        tip_radius: m.
+        smallest: height of the smallest feature to be found, m.
+        precision: wanted half-width of the 90 % interval of a feature's end or centre, m.
+        speed, force: of the sweeps, m/s and N.
+        shortest_ridge: distance between the ends of the shortest ridge to be found, m; None: bumps as well.
+        region: (low, high) corners (3,) of the part to be inspected, m; None: all of the base.
+        time_budget: finger time, s.
+        path_budget: finger path, m.
+        travel_speed: between sweeps, m/s; None: 25 tip radii per second.
+        false_alarms_per_metre: accepted rate of false crossings, 1/m.
+        noise: of the samples; None: learnt from the first sweeps.
+    """
+
+    base: Base
+    tip_radius: float
+    smallest: float
+    precision: float = 1e-4
+    speed: float = 0.03
+    force: float = 1.0
+    shortest_ridge: float | None = None
+    region: tuple[FloatArray, FloatArray] | None = None
+    time_budget: float = np.inf
+    path_budget: float = np.inf
+    travel_speed: float | None = None
+    false_alarms_per_metre: float = 0.01
+    noise: Noise | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("tip_radius", "smallest", "precision", "speed", "time_budget"):
+            if not getattr(self, name) > 0:
+                raise PlannerError(f"explore: {name} must be positive; found {getattr(self, name)}")
+
+    @property
+    def wanted_sd(self) -> float:
+        """Standard deviation whose 90 % interval is the wanted precision, m."""
+        return self.precision / 1.645
+
+    @cached_property
+    def survey(self) -> Survey:
+        """The survey that it begins with."""
+        return Survey(
+            base=self.base,
+            tip_radius=self.tip_radius,
+            smallest=self.smallest,
+            speed=self.speed,
+            force=self.force,
+            shortest_ridge=self.shortest_ridge,
+            region=self.region,
+        )
+
+    @property
+    def strokes(self) -> Strokes:
+        """Sweeps with this fingertip on this base."""
+        return Strokes(self.base, self.tip_radius, self.speed, self.force)
+
+    def plan(self, rng: np.random.Generator | None = None) -> Plan:
+        """The whole exploration; the outcome's value is a Found. Nothing in it is random: `rng` is not used."""
+        get_ready(self.tip_radius)
+        found = Found(self.tip_radius, noise=self.noise)
+        spent = Spent(25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed)
+        surveyor = Surveyor(self.survey, found, self.false_alarms_per_metre)
+        everything = self._everything(surveyor, found)
+        outcome = yield from within(everything, spent, self.time_budget, self.path_budget)
+        if found.surveyed:
+            self._account(surveyor, found)
+        if outcome.reason == "budget":
+            found.left_out.append(f"{_counted(len(found.unexplained()), 'detection')} not looked into: budget spent")
+        why = f"{self._why(outcome.reason, found)}, after {spent.seconds:.0f} s and {spent.metres:.3g} m of finger path"
+        return Outcome(outcome.reason, "; not inspected for ".join([why, *found.unseen]), found)
+
+    @staticmethod
+    def _why(reason: str, found: Found) -> str:
+        """Why it ended, in words."""
+        if reason == "budget":
+            return f"the budget was spent, with {_counted(len(found.unexplained()), 'detection')} not looked into"
+        if reason == "nothing found":
+            return "the survey found nothing to look into"
+        return "every detection was looked into and nothing was left to sharpen"
+
+    def _account(self, surveyor: Surveyor, found: Found) -> None:
+        """What the survey covered, told when the finger has nothing to wait for any more."""
+        found.survey = surveyor.covered()
+        if surveyor.survey.crossed(surveyor.visible) is not None:
+            found.unseen.append(
+                f"features smaller than a ridge that spans {1e3 * (self.shortest_ridge or 0.0):g} mm: "
+                f"{100 * found.survey.fraction:.0f} % of the surface lies near enough to a sweep to see them"
+            )
+
+    def _everything(self, surveyor: Surveyor, found: Found) -> Plan:
+        yield from surveyor.plan()
+        found.surveyed = True
+        yield from self._faint(surveyor, found)
+        if not found.crossings and not found.leads:
+            found.left_out.append("circuits, ridge following and sizing: the survey found nothing")
+            return Outcome("nothing found")
+        sense = Sense(self.base, found.noise, self.false_alarms_per_metre)
+        while actions := self._actions(found, sense):
+            best = max(actions, key=lambda action: action.gain / action.seconds)
+            outcome = yield from best.start()
+            found.actions.append(f"{best.name}: {outcome.reason}" + (f" ({outcome.detail})" if outcome.detail else ""))
+        return Outcome("done")
+
+    def _faint(self, surveyor: Surveyor, found: Found) -> Plan:
+        """Where no single sweep shows the smallest ridge asked for, look for lines that many show."""
+        rate = CANDIDATES * self.false_alarms_per_metre
+        noise, learns = found.noise or Noise(0.0), self.noise is None
+        search = FaintSearch(self.survey, surveyor.limit, noise, rate, learns)
+        if self.survey.crossed(self.survey.visible) is None or search.crossings == 1:
+            return Outcome("not needed")
+        searched = yield from search.plan()
+        look: CloserLook = searched.value
+        found.crossings.extend(look.crossings)
+        found.noise = look.noise or found.noise
+        found.actions.append(f"closer survey: {searched.detail}")
+        found.leads.extend(look.leads)
+        return searched
+
+    def _follow_lead(self, lead: FaintLead, found: Found, sense: Sense) -> Plan:
+        """Follow a faint line, unless what was followed since explains it."""
+        found.leads.remove(lead)
+        if any(track.distance(lead.seed.point) < 1.5 * track.half_width for track in found.tracks):
+            return Outcome("known", "it lies on an axis that was followed before")
+        step = max(LEAD_STEP * lead.length, self.tip_radius)
+        follower = replace(self._follower(found, sense), passes=lead.passes, first_step=step, longest_step=step)
+        followed = yield from follower.follow(lead.seed, [lead.way, -lead.way])
+        found.tracks.extend([] if followed.value is None else [followed.value])
+        return Outcome(f"by {lead.passes} passes", followed.detail)
+
+    def _actions(self, found: Found, sense: Sense) -> list[Action]:
+        actions = []
+        for seed in found.unexplained()[:1]:
+            pitch = self.survey.pitch
+            seconds = 2.0 * np.pi * self._circuit_radius(seed) / self.speed
+            actions.append(Action("look into", pitch, seconds, partial(self._look_into, seed, found, sense)))
+        for lead in [] if actions else found.leads[:1]:
+            # what single sweeps show comes first: it may be what the faint line is a part of
+            seconds = lead.passes * lead.length / self.speed
+            start = partial(self._follow_lead, lead, found, sense)
+            actions.append(Action("follow a faint line", self.survey.pitch, seconds, start))
+        for index, track in enumerate(found.tracks):
+            for which, end in enumerate(track.ends):
+                done = found.slides.get((index, which), 0)
+                if end.reason == "end" and end.sd > self._enough(track) and done < MOST_SLIDES and track.kind != "step":
+                    seconds = 1.65 * track.half_width / self.speed
+                    # n slides leave 1 / sqrt(n) of the uncertainty of one
+                    left = float(np.sqrt((done + 1.0) / (done + 2.0)))
+                    gain = end.sd * (1.0 - left) if np.isfinite(end.sd) else self.survey.pitch
+                    start = partial(self._slide, index, which, found)
+                    actions.append(Action("slide off an end", gain, seconds, start))
+        return actions
+
+    def _enough(self, track: AxisTrack) -> float:
+        """Standard deviation down to which slides are worth it, m: what they cannot tell is left beside it."""
+        unknown = Crest.of(track).rounding_sd(self.tip_radius)
+        return float(np.sqrt(max(self.wanted_sd**2 - unknown**2, unknown**2)))
+
+    def _circuit_radius(self, seed: Crossing) -> float:
+        """Wide enough to go round a bump whose top lies up to half a survey pitch beside the sweep."""
+        half_width = seed.half_width * min(1.0, 1.3 * slender(seed, self.tip_radius))
+        return 1.4 * half_width + 0.5 * self.survey.pitch
+
+    def _look_into(self, seed: Crossing, found: Found, sense: Sense) -> Plan:
+        """Circle a detection, then follow the ridge or size the bump that it belongs to."""
+        found.tried.append(seed)
+        edge = found.step_heading(seed, 3.0 * self.survey.pitch)
+        if edge is not None:
+            followed = yield from self._follower(found, sense).follow(seed, [edge, -edge])
+            found.tracks.extend([] if followed.value is None else [followed.value])
+            return Outcome("step", followed.detail)
+        circled = yield from Circuit(self.strokes, sense, self._circuit_radius(seed)).around(seed)
+        branches: tuple[Crossing, ...] = circled.value
+        if branches:
+            seed, ways = _typed(seed, branches), headings(seed, branches, self.tip_radius)
+        else:
+            sized = yield from BumpSizer(self.strokes, sense, self.wanted_sd).size(seed)
+            bump: BumpSize | None = sized.value
+            if bump is None or bump.long_way is None:
+                found.bumps.extend([] if bump is None else [bump])
+                return Outcome(circled.reason, sized.detail)
+            ways = [bump.long_way, -bump.long_way]
+            seed = replace(seed, point=bump.point)
+        followed = yield from self._follower(found, sense).follow(seed, ways)
+        found.crossings.extend(branches)
+        track: AxisTrack | None = followed.value
+        if track is not None and any(track.repeats(other) for other in found.tracks):
+            return Outcome("known", "it lies on an axis that was followed before")
+        if track is not None:
+            found.tracks.append(track)
+        return Outcome(circled.reason, followed.detail)
+
+    def _follower(self, found: Found, sense: Sense) -> RidgeFollower:
+        tracks = tuple(found.tracks)
+
+        def known(point: FloatArray) -> bool:
+            return any(track.distance(point) < 0.5 * track.half_width for track in tracks)
+
+        noise = found.noise or Noise(0.0)
+        return RidgeFollower(self.strokes, sense, noise, self.wanted_sd, known=known)
+
+    def _slide(self, index: int, which: int, found: Found) -> Plan:
+        """More sweeps to and fro off an end that is not known well enough; the way to it is paid once for all."""
+        track = found.tracks[index]
+        finder = EndFinder(self.strokes, self.base, found.noise or Noise(0.0))
+        crest = Crest.of(track)
+        end = track.ends[which]
+        for _ in range(AT_ONCE):
+            end = yield from finder.slide(end, crest)
+            found.slides[index, which] = found.slides.get((index, which), 0) + 1
+            if end.reason != "end" or end.sd <= self._enough(track):
+                break
+        found.tracks[index] = track.with_end(which, end)
+        return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
+def _typed(seed: Crossing, branches: tuple[Crossing, ...]) -> Crossing:
+    """The seed with the kind, height and width of the circuit's branches.
+
+    A ridge swept lengthwise looks like a plateau between two steps; only a circuit crosses it squarely.
+    """
+    crests = [branch for branch in branches if not is_step(branch)]
+    like = max(crests or branches, key=lambda c: abs(c.height))
+    if is_step(seed) == is_step(like):
+        return seed
+    return replace(seed, kind=like.kind, height=like.height, half_width=like.half_width)

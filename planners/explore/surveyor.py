@@ -1,0 +1,97 @@
+"""Surveyor: carries the survey out, as closely as its first sweep asks for, and looks at what every sweep felt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mapping import FloatArray, Trace
+from mapping.detection import Coverage, detect
+from planners import Outcome, Plan
+from planners.explore.found import Found
+from planners.survey import Survey
+
+# Path of the first survey sweeps, in tip radii, that tell the noise if it is not given; later ones are detected singly
+LEARNING = 50.0
+# False alarms of the survey against those accepted in the end: a look at each of them costs seconds, and what the
+# analysis of all sweeps may report at its own estimate of the noise must have been looked at
+CANDIDATES = 4.0
+# Height that must stay visible between two sweeps, in detection limits; and its least share of the smallest feature's
+MARGIN, LEAST = 1.25, 0.1
+# Samples that a sweep must have to be looked at
+FEWEST = 16
+
+
+@dataclass
+class Surveyor:
+    """One survey under way.
+
+    Args:
+        survey: what to sweep.
+        found: where crossings and noise are noted.
+        false_alarms_per_metre: accepted rate of false crossings in the end, 1/m.
+        visible: share of the smallest feature's height that stays visible between two sweeps.
+        paths: touched by the sweeps so far, each (K, 3), m.
+        limit: least height that the sweeps detect one by one, m.
+    """
+
+    survey: Survey
+    found: Found
+    false_alarms_per_metre: float
+    visible: float = field(init=False)
+    paths: list[FloatArray] = field(init=False, default_factory=list)
+    limit: float = field(init=False, default=0.0)
+
+    def __post_init__(self) -> None:
+        self.visible = self.survey.visible
+
+    def plan(self) -> Plan:
+        """Every sweep of the survey; the first ones are detected together, for they tell the noise."""
+        strips = self.survey.crossed(self.survey.visible) is None
+        if strips and (first := next(self.survey.sweeps(), None)) is not None:
+            trace = yield first
+            self._widen(trace)
+        waiting, felt = list[Trace](), 0.0
+        for move in self.survey.sweeps(self.visible):
+            trace = yield move
+            self.paths.append(move.path + self.survey.tip_radius * move.approach)
+            if len(trace) == 0:
+                self.found.left_out.append("a survey sweep felt no contact")
+                continue
+            waiting.append(trace)
+            felt += move.length
+            if self.found.noise is not None or felt >= LEARNING * self.survey.tip_radius:
+                self._detect(waiting)
+        if waiting:
+            self._detect(waiting)
+        return Outcome("done")
+
+    def covered(self) -> Coverage:
+        """How much of the surface lies near enough to a sweep to see the smallest feature."""
+        return self.survey.covered(self.paths, self.survey.strip(self.visible))
+
+    def _widen(self, first: Trace) -> None:
+        """Strips as wide as the noise of a first sweep allows the smallest feature to be seen."""
+        if len(first) < FEWEST:
+            return
+        smallest = self.survey.smallest
+        limit = detect(first, self.survey.base, noise=self.found.noise).detection_limit
+        if limit > smallest:
+            self.found.unseen.append(
+                f"features lower than {1e3 * limit:.2g} mm: a single sweep does not show them through the noise, "
+                f"though {1e3 * smallest:.2g} mm were asked for"
+            )
+        self.visible = float(np.clip(MARGIN * limit / smallest, LEAST, self.survey.visible))
+
+    def _detect(self, waiting: list[Trace]) -> None:
+        felt = detect(
+            Trace.concatenate(waiting),
+            self.survey.base,
+            noise=self.found.noise,
+            false_alarms_per_metre=CANDIDATES * self.false_alarms_per_metre,
+        )
+        self.found.noise = felt.noise
+        self.limit = felt.detection_limit
+        self.found.crossings.extend(felt.crossings)
+        waiting.clear()

@@ -1,0 +1,106 @@
+"""Checks of a move before it moves anything: workspace, speed, force, approach angle, collision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hw import Move, Workspace
+from mapping.base import Base
+from planners.paths.travel import DEEP, gap, sunk
+
+# The sensor's field about its axis (paper, section 4)
+FIELD = float(np.radians(75.0))
+# How far the commanded path of a sweep may sink into the base, in tip radii: further in it crosses a wall
+PRESSED = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """What a move must keep to.
+
+    Args:
+        workspace: of the finger.
+        base: the global model; None while it is unknown: then only the workspace, speed and force are checked.
+        tip_radius: m.
+        field: largest angle between the finger's axis and the base's normal in a sweep, rad.
+        stem_radius: of the straight stem behind the ball, m.
+        stem_length: of the stem that is checked, m.
+    """
+
+    workspace: Workspace
+    base: Base | None
+    tip_radius: float
+    field: float = FIELD
+    stem_radius: float = 0.0
+    stem_length: float = 0.0
+
+    @classmethod
+    def of(cls, workspace: Workspace, base: Base | None, tip_radius: float) -> Limits:
+        """Limits with a stem half as thick as the ball and three balls long."""
+        return cls(workspace, base, tip_radius, stem_radius=0.5 * tip_radius, stem_length=6.0 * tip_radius)
+
+    def violation(self, move: Move, before: Move | None = None) -> str | None:
+        """What is wrong with the move, and the way to it from the one before it, as a sentence; None if nothing is."""
+        for complaint in (self._workspace(move), self._speed(move)):
+            if complaint:
+                return complaint
+        if self.base is None:
+            return None
+        checks = (self._field(move, self.base), self._collision(move, self.base), self._stem(move, self.base))
+        way = None if before is None else self._way(before, move, self.base)
+        return next((complaint for complaint in (*checks, way) if complaint), None)
+
+    def _workspace(self, move: Move) -> str | None:
+        outside = ((move.path < self.workspace.low) | (move.path > self.workspace.high)).any(axis=1)
+        if not outside.any():
+            return None
+        where = np.round(move.path[outside.argmax()], 6).tolist()
+        low, high = (np.round(bound, 6).tolist() for bound in (self.workspace.low, self.workspace.high))
+        return f"the path leaves the workspace at {where} m; possible are {low} to {high} m"
+
+    def _speed(self, move: Move) -> str | None:
+        if move.speed > self.workspace.max_speed:
+            return f"the speed is {move.speed:g} m/s; at most {self.workspace.max_speed:g} m/s is possible"
+        if move.force > self.workspace.max_force:
+            return f"the force is {move.force:g} N; at most {self.workspace.max_force:g} N is possible"
+        return None
+
+    def _field(self, move: Move, base: Base) -> str | None:
+        if move.purpose != "sweep":
+            return None
+        feet = base.foot(move.path, self.tip_radius)
+        outward = feet.normals * np.where(feet.height > -self.tip_radius, 1.0, -1.0)[:, None]
+        angle = np.arccos(np.clip(-(outward * move.approach).sum(axis=1), -1.0, 1.0))
+        if angle.max() <= self.field:
+            return None
+        return (
+            f"the finger's axis is {np.degrees(angle.max()):.0f} degrees off the surface's normal; "
+            f"the sensor's field is {np.degrees(self.field):.0f} degrees"
+        )
+
+    def _collision(self, move: Move, base: Base) -> str | None:
+        """The ball: a sweep presses a little, any other move stays free."""
+        allowed = PRESSED if move.purpose == "sweep" else DEEP
+        deepest = sunk(move.path, base, self.tip_radius)
+        if deepest <= allowed * self.tip_radius:
+            return None
+        if move.purpose == "sweep":
+            return f"the sweep's path sinks {1e3 * deepest:.3f} mm into another part of the body"
+        return f"the way through free space sinks {1e3 * deepest:.3f} mm into the body"
+
+    def _stem(self, move: Move, base: Base) -> str | None:
+        if self.stem_length <= 0:
+            return None
+        back = np.linspace(1.5 * self.tip_radius, self.stem_length, 6)
+        stem = (move.path[:, None, :] - back[None, :, None] * move.approach[:, None, :]).reshape(-1, 3)
+        clearance = float(base.foot(stem, self.stem_radius).height.min())
+        return f"the stem behind the ball sinks {-1e3 * clearance:.3f} mm into the body" if clearance < 0 else None
+
+    def _way(self, before: Move, move: Move, base: Base) -> str | None:
+        """The ball on its way from the end of one move to the beginning of the next."""
+        deepest = sunk(gap(before, move, self.tip_radius), base, self.tip_radius)
+        if deepest <= DEEP * self.tip_radius:
+            return None
+        return f"the way from the move before sinks {1e3 * deepest:.3f} mm into the body"

@@ -1,0 +1,54 @@
+"""Pace: how fast sweeps may be that still show the smallest feature asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapping.instrument import Noise
+
+# Standard deviations that a crest must stand out by: a usual threshold of detection, and 1.645 to be found in 95 of 100
+CERTAIN = 6.5
+# Height asked for, in heights that are just found
+MARGIN = 1.25
+SPEEDS = 24
+
+
+def fastest_speed(
+    noise: Noise, rate: float, tip_radius: float, smallest: float, slowest: float, fastest: float
+) -> float:
+    """The fastest speed (m/s) at which a sweep across the smallest feature finds it.
+
+    Samples of a faster sweep lie further apart, so white noise averages less; correlated noise is the same. Where no
+    single sweep finds it, many must: fast ones tell more per second, for correlated noise averages over sweeps only.
+
+    Args:
+        noise: of a sample.
+        rate: samples per second.
+        tip_radius: m.
+        smallest: height of a sharp crest, m.
+        slowest, fastest: between which to choose, m/s.
+    """
+    speeds = np.geomspace(fastest, slowest, SPEEDS)
+    found = (v for v in speeds if MARGIN * least_height(noise, v / rate, tip_radius, CERTAIN) <= smallest)
+    return float(next(found, fastest))
+
+
+def least_height(noise: Noise, spacing: float, tip_radius: float, ratio: float) -> float:
+    """Height of the smallest sharp crest whose matched filter has a signal-to-noise ratio, m.
+
+    A crest of height h disturbs w = sqrt(2 r h) to either side, as the cap T = h (1 - (x / w)^2). White noise leaves
+    the information 16 w / (15 sigma^2 Delta) on its height, a process of correlation length L the integral of
+    (T'^2 L + T^2 / L) / (2 sigma^2 h^2).
+
+    Args:
+        spacing: of the samples, Delta, m.
+
+    Reference: theory section 6.
+    """
+    heights = np.geomspace(1e-7, 1.0, 800) * tip_radius
+    width = np.sqrt(2.0 * tip_radius * heights)
+    length = max(noise.length, np.finfo(float).tiny)
+    white = noise.white * np.sqrt(15.0 * spacing / (16.0 * width))
+    correlated = noise.correlated * np.sqrt(2.0 / (8.0 * length / (3.0 * width) + 16.0 * width / (15.0 * length)))
+    seen = heights >= ratio * np.hypot(white, correlated)
+    return float(heights[seen.argmax()] if seen.any() else heights[-1])

@@ -1,0 +1,215 @@
+"""Survey: sweeps over the whole global model, close enough that no feature asked for is missed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hw import Move
+from mapping import BoolArray, FloatArray, IntArray
+from mapping.base import Base
+from mapping.detection import Coverage, coverage
+from planners import Outcome, Plan, PlannerError
+from planners.paths import Isoline, isolines, pressed_sweep, thinned, touched_points
+from planners.survey.charts import crease_charts
+from planners.survey.level_field import LevelField, level_field
+from planners.survey.slices import Slices, slice_axes, slices_for
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Survey:
+    """Parallel sweeps that meet every bump of a height, or crossed ones that meet every ridge of a span.
+
+    A feature of height D disturbs the trace within sqrt(2 r D) of its crest (theory section 4); a sweep
+    that passes it at the distance x still sees the height D - x^2 / (2 r). Bumps need strips: sweeps along the
+    level sets of an evenly spaced field, so close that everywhere at least `visible` of the height D stays. Where
+    only ridges of a span must not be missed, crossed families of plane sections do with far less path
+    (planners.survey.slices).
+
+    Args:
+        base: the global model.
+        tip_radius: r, m.
+        smallest: height D of the smallest feature to be found, m.
+        speed, force: of the sweeps, m/s and N.
+        shortest_ridge: distance between the ends of the shortest ridge to be found, m; None: bumps as well.
+        region: (low, high) corners in m of the part to be inspected; everything if None.
+        visible: share of the smallest feature's height that every sweep pair must leave visible.
+        crossings: how often a straight ridge of the shortest span must be crossed.
+    """
+
+    base: Base
+    tip_radius: float
+    smallest: float
+    speed: float = 0.03
+    force: float = 1.0
+    shortest_ridge: float | None = None
+    region: tuple[FloatArray, FloatArray] | None = None
+    visible: float = 0.35
+    crossings: int = 1
+
+    def __post_init__(self) -> None:
+        if not 0 < self.smallest < np.inf:
+            raise PlannerError(f"the smallest feature must have a positive height in metres; found {self.smallest}")
+        if self.shortest_ridge is not None and not 0 < self.shortest_ridge < np.inf:
+            raise PlannerError(f"the shortest ridge must have a positive span in metres; found {self.shortest_ridge}")
+        if not 0 < self.visible < 1:
+            raise PlannerError(f"the visible share must lie between 0 and 1; found {self.visible}")
+
+    @property
+    def pitch(self) -> float:
+        """Width of the strip in which a sweep sees the smallest feature, m; never more than a tip radius."""
+        return self.strip(self.visible)
+
+    def strip(self, visible: float) -> float:
+        """Width of the strip in which a sweep sees a share of the smallest feature, m."""
+        return float(min(2.0 * np.sqrt(2.0 * self.smallest * (1.0 - visible) * self.tip_radius), self.tip_radius))
+
+    def plan(self) -> Plan:
+        """Yield every sweep; the outcome's value is the planned Coverage."""
+        touched = []
+        for move in self.sweeps():
+            touched.append(move.path + (1.0 * self.tip_radius) * move.approach)
+            yield move
+        done = self.covered(touched)
+        detail = f"{100 * done.fraction:.1f} % of the surface lies within {1e3 * done.reach:.2f} mm of a sweep"
+        return Outcome("done" if done.fraction > 0.99 else "not all reached", detail, done)
+
+    def covered(self, paths: list[FloatArray], pitch: float | None = None) -> Coverage:
+        """Coverage of the region by touched paths (each (K, 3), m) that see strips as wide as the pitch."""
+        pitch = pitch or self.pitch
+        dense = [_dense(path, 0.2 * pitch) for path in paths]
+        points = np.concatenate(dense) if dense else np.zeros((0, 3))
+        return coverage(self.base.surface, points, 0.55 * pitch, self._inside())
+
+    def crossed(self, visible: float) -> Slices | None:
+        """The crossed plane sections that see a visible share, or None where strips are asked for or are shorter."""
+        if self.shortest_ridge is None or not self._charts:
+            return None
+        if self.crossings > 1:
+            return Slices(self._axes, self.shortest_ridge / self.crossings)
+        strip = self.strip(visible)
+        slices = slices_for(self._axes, self.shortest_ridge, 0.5 * strip)
+        return slices if len(slices.axes) * strip < slices.pitch else None
+
+    @cached_property
+    def _axes(self) -> FloatArray:
+        return slice_axes(self.base.surface, np.concatenate(self._charts))
+
+    @cached_property
+    def _charts(self) -> list[IntArray]:
+        return crease_charts(self.base.surface, self._inside())
+
+    def sweeps(self, visible: float | None = None) -> Iterator[Move]:
+        """All sweeps, each begun near the end of the one before it; another visible share may be given."""
+        visible = visible or self.visible
+        slices = self.crossed(visible)
+        lines = self._strips(self.strip(visible)) if slices is None else self._sections(slices)
+        for line in lines:
+            yield from self._pressed(line)
+
+    def _sections(self, slices: Slices) -> Iterator[Isoline]:
+        """Lines along one family of plane sections after the other."""
+        surface = self.base.surface
+        used = surface.vertices[np.unique(surface.faces[np.concatenate(self._charts)])]
+        here: FloatArray | None = None
+        for axis in slices.axes:
+            values = surface.vertices @ axis
+            for level in slices.levels(axis, used):
+                lines = [
+                    line
+                    for chart in self._charts
+                    for line in isolines(surface.vertices, surface.faces, chart, values, float(level))
+                ]
+                for line in _in_turn(lines, here, self.pitch):
+                    here = line.points[-1]
+                    yield line
+
+    @cached_property
+    def _fields(self) -> dict[int, LevelField]:
+        """The fields solved so far, by the number of the chart."""
+        return {}
+
+    def _strips(self, pitch: float) -> Iterator[Isoline]:
+        """Lines along the level sets of one chart after the other, a pitch apart."""
+        surface = self.base.surface
+        here: FloatArray | None = None
+        done = np.zeros(len(surface.faces), dtype=bool)
+        for number, chart in enumerate(self._charts):
+            if done[chart].all():
+                continue
+            touched = []
+            if number not in self._fields:
+                self._fields[number] = level_field(surface, surface.vertices, chart)
+            levels = self._fields[number]
+            for level in levels.levels(pitch):
+                lines = isolines(surface.vertices, surface.faces, chart, levels.values, float(level))
+                for line in _in_turn(lines, here, pitch):
+                    here = line.points[-1]
+                    touched.append(line.points)
+                    yield line
+            if len(chart) < len(surface.faces):
+                done |= self.covered(touched, pitch).share > 0.999
+
+    def _pressed(self, line: Isoline) -> Iterator[Move]:
+        points, normals = touched_points(line, self.base.surface)
+        points, normals = thinned(points, normals, min(0.1 * self.tip_radius, 0.5 * self.pitch))
+        reachable = self._reachable(points, normals)
+        for run in _runs(reachable):
+            if len(run) > 1:
+                yield pressed_sweep(points[run], normals[run], self.tip_radius, self.speed, self.force)
+
+    def _reachable(self, points: FloatArray, normals: FloatArray) -> BoolArray:
+        """(K,) False where the ball that touches here would be deep in another part of the body."""
+        return self.base.foot(points + self.tip_radius * normals, self.tip_radius).height > -0.3 * self.tip_radius
+
+    def _inside(self) -> BoolArray | None:
+        if self.region is None:
+            return None
+        middle = self.base.surface.vertices[self.base.surface.faces].mean(axis=1)
+        low, high = self.region
+        return np.asarray(((middle >= low) & (middle <= high)).all(axis=1))
+
+
+def _in_turn(lines: list[Isoline], here: FloatArray | None, pitch: float) -> Iterator[Isoline]:
+    """The lines, each begun near the end of the one before, without those shorter than a tenth of the pitch."""
+    while lines:
+        nearest = 0 if here is None else int(np.argmin([_gap(line, here) for line in lines]))
+        line = _begun_near(lines.pop(nearest), here, pitch)
+        if line.length >= 0.1 * pitch:
+            here = line.points[-1]
+            yield line
+
+
+def _gap(line: Isoline, here: FloatArray) -> float:
+    candidates = line.points if line.closed else line.points[[0, -1]]
+    return float(np.linalg.norm(candidates - here, axis=1).min())
+
+
+def _begun_near(line: Isoline, here: FloatArray | None, overlap: float) -> Isoline:
+    """The line begun at the end (or, if closed, the point) nearest to `here`; a closed one overlaps itself."""
+    points, faces = line.points, line.faces
+    if line.closed:
+        start = 0 if here is None else int(np.linalg.norm(points[:-1] - here, axis=1).argmin())
+        points, faces = np.roll(points[:-1], -start, axis=0), np.roll(faces, -start)
+        along = np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))
+        more = 2 + int(np.searchsorted(along, overlap))
+        again = np.arange(len(points) + more) % len(points)
+        return Isoline(points[again], faces[again[:-1]])
+    if here is not None and np.linalg.norm(points[-1] - here) < np.linalg.norm(points[0] - here):
+        return Isoline(points[::-1], faces[::-1])
+    return line
+
+
+def _runs(mask: BoolArray) -> list[IntArray]:
+    index = np.flatnonzero(mask)
+    return np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(index) else []
+
+
+def _dense(path: FloatArray, spacing: float) -> FloatArray:
+    """The polyline (K, 3) resampled at most `spacing` apart."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    s = np.linspace(0.0, along[-1], 1 + int(np.ceil(along[-1] / spacing)))
+    return np.column_stack([np.interp(s, along, path[:, k]) for k in range(3)])

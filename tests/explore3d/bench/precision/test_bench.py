@@ -1,0 +1,63 @@
+"""The bench: its references hold, what fails is said, and its page is whole."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from explore3d.bench.precision import bench, summary, write
+from explore3d.bench.precision.surfaces import PLACES, dilated, paralleled
+from explore3d.bench.precision.work_precision import Omission, Point, Stage, timed
+
+PICTURES = {"a_stage.png", "a_stage.svg"}
+
+
+def _falls(quick: bool, peers: bool) -> list[Point | Omission]:
+    points = [Point("a stage", "halving <&>", f"step {k}", 10.0**-k, 2.0 ** (k - 9), 3) for k in range(4)]
+    return [*points, Omission("a stage", "another", "not installed")]
+
+
+def _fails(quick: bool, peers: bool) -> list[Point | Omission]:
+    raise ValueError("no such thing")
+
+
+def test_the_references_of_the_traced_surface_agree():
+    assert np.abs(dilated(PLACES[::20]) - paralleled(PLACES[::20])).max() < 1e-12
+
+
+def test_timing_takes_the_median_of_calls_after_the_first():
+    calls: list[int] = []
+    seconds, repeats, value = timed(lambda: calls.append(1) or len(calls))
+    assert (repeats, value, len(calls)) == (3, 4, 4)
+    assert seconds < 0.1
+
+
+def test_page_tables_and_pictures_are_written_and_a_failing_stage_is_said(tmp_path: Path, monkeypatch):
+    stages = (Stage("a stage", "error (m)", "truth", "look", _falls), Stage("broken", "error", "truth", "look", _fails))
+    monkeypatch.setattr(sys.modules[bench.__module__], "stages", lambda: stages)
+    measured = bench(quick=True, peers=False)
+    page = write(measured, tmp_path, quick=True).read_text()
+    assert "halving &lt;&amp;&gt;" in page
+    assert "failed: ValueError: no such thing" in page
+    assert 'src="http' not in page
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "bench.html",
+        "bench.csv",
+        "bench.json",
+        "a_stage.png",
+        "a_stage.svg",
+    }
+    record = json.loads((tmp_path / "bench.json").read_text())
+    assert record["stages"][0]["points"][1]["seconds"] == 0.1
+    assert summary(measured).startswith("bench: 2 stages, 4 points, 2 omissions listed")
+    assert "nothing measured for broken" in summary(measured)
+
+
+@pytest.mark.slow
+def test_every_stage_measures_something_quickly():
+    measured = bench(quick=True, peers=False)
+    assert all(each.points for each in measured), summary(measured)

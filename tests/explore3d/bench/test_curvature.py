@@ -1,0 +1,54 @@
+"""The curvature bench: bodies with true curvatures, a line for each case, and files."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from explore3d.bench import curvature as bench
+
+
+@pytest.mark.parametrize("body", bench.BODIES)
+def test_a_body_measures_two_and_its_curvatures_are_those_of_a_fine_fit(body):
+    known = bench.BODIES[body](10_000)
+    assert np.ptp(known.surface.vertices, axis=0).max() == pytest.approx(bench.SIZE, rel=1e-3)
+    line = bench.measure("plain jet, degree 4, 48 points", body, 10_000, 0.0)
+    assert line.median < 2e-3
+    assert line.valid == 1.0
+
+
+def test_lines_become_a_table_csv_json_and_a_picture(tmp_path):
+    lines = [
+        bench.measure(method, body, 400, 0.0) for body in bench.BODIES for method in ("explore3d", "libigl, 2 rings")
+    ]
+    assert len(list(bench.curvature_table(lines))) == 5
+    files = bench.write_bench(lines, tmp_path / "new")
+    rows = list(csv.DictReader(files[0].open()))
+    assert [row["method"] for row in rows] == [line.method for line in lines]
+    assert json.loads(files[1].read_text())[0]["median"] == lines[0].median
+    assert files[2].read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_peer_that_is_not_installed_is_named_with_the_way_to_get_it(monkeypatch):
+    monkeypatch.setitem(bench.PEERS, "pymeshlab, quadric", "no_such_module")
+    methods, missing = bench.available()
+    assert "pymeshlab, quadric" not in methods
+    assert "explore3d[peers]" in missing[0]
+
+
+@pytest.mark.parametrize(
+    ("noise", "median"),
+    [
+        pytest.param(0.0, 6e-4, marks=pytest.mark.slow),
+        (1e-4, 3.7e-3),
+        pytest.param(1e-3, 3e-2, marks=pytest.mark.slow),
+        pytest.param(1e-2, 0.13, marks=pytest.mark.slow),
+    ],
+)
+def test_a_torus_is_as_exact_at_every_noise(noise, median):
+    found = bench.measure("explore3d", "torus", 10_000, noise)
+    assert found.median <= median
+    assert found.valid > 0.999

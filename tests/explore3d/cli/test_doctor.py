@@ -1,0 +1,99 @@
+"""The doctor names what is missing, what it is needed for, and what to do."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import pytest
+
+from explore3d.cli import doctor
+from explore3d.cli.doctor import STATES, examine
+
+
+def by_subject(monkeypatch: pytest.MonkeyPatch, subject: str) -> doctor.Check:
+    return next(check for check in examine() if check.subject == subject)
+
+
+def test_every_check_says_what_it_is_needed_for() -> None:
+    checks = examine()
+    assert {"Python", "open3d", "emcee", "kernel cache"} <= {check.subject for check in checks}
+    assert all(check.state in STATES and check.found and check.needed_for for check in checks)
+    assert all(check.remedy for check in checks if check.state == "missing")
+
+
+def test_a_missing_package_is_named_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(doctor.REQUIRED, "no-such-package", ("no_such_package", "the test"))
+    check = by_subject(monkeypatch, "no-such-package")
+    assert (check.state, check.found, check.remedy) == ("missing", "not installed", "make setup")
+
+
+def test_a_package_that_does_not_load_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(doctor.REQUIRED, "emcee", ("emcee.no_such_module", "the test"))
+    check = by_subject(monkeypatch, "emcee")
+    assert check.state == "missing"
+    assert "does not load: ModuleNotFoundError" in check.found
+
+
+def test_a_missing_system_library_of_open3d_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    from mapping.geometry.mesh import open3d_import
+
+    def fails() -> None:
+        raise ImportError("libGL.so.1: cannot open shared object file")
+
+    monkeypatch.setattr(open3d_import, "open3d", fails)
+    check = by_subject(monkeypatch, "open3d")
+    assert check.state == "missing"
+    assert "libGL.so.1" in check.found
+    assert "make setup" in check.remedy
+
+
+def test_serial_ports_are_listed_with_their_permission(
+    monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    from serial.tools import list_ports
+
+    mine = tmp_path_factory.mktemp("dev") / "ttyACM0"
+    mine.write_text("")
+    monkeypatch.setattr(list_ports, "comports", lambda: [_Port(str(mine), "a finger"), _Port("/no/tty", "")])
+    assert by_subject(monkeypatch, str(mine)).state == "ok"
+    refused = by_subject(monkeypatch, "/no/tty")
+    assert refused.state == "note"
+    assert "no permission" in refused.found
+    assert "dialout" in refused.remedy
+
+
+class _Port(str):
+    """A port as pyserial lists it: sortable, with device and description."""
+
+    description: str
+
+    def __new__(cls, device: str, description: str) -> _Port:
+        port = super().__new__(cls, device)
+        port.description = description
+        return port
+
+    @property
+    def device(self) -> str:
+        return str(self)
+
+
+def test_no_serial_port_is_no_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    from serial.tools import list_ports
+
+    monkeypatch.setattr(list_ports, "comports", list)
+    assert by_subject(monkeypatch, "serial ports").state == "note"
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_only_what_is_missing_fails_the_command(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], state: str
+) -> None:
+    from explore3d.cli.main import main
+
+    monkeypatch.setattr(doctor, "examine", lambda: [doctor.Check("a", state, "b", "c", "d")])
+    monkeypatch.setattr(sys, "argv", ["explore3d", "doctor", "--json"])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == (1 if state == "missing" else 0)
+    assert json.loads(capsys.readouterr().out)[0]["needed_for"] == "c"

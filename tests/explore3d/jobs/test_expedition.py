@@ -1,0 +1,117 @@
+"""Expeditions: a body that is not known, or stands off its model, is found and explored like any other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from explore3d.analysis.result import Analysis
+from explore3d.errors import UserError
+from explore3d.jobs.analyze import analyze
+from explore3d.jobs.run import run
+from explore3d.log.reader import read_log
+from explore3d.log.record import read_base
+from explore3d.scene.mesh_files import load_mesh
+from mapping.base.pose import Pose
+
+ASSETS = Path(__file__).resolve().parents[3] / "assets"
+AXIS = np.array([[-0.007468129, -0.01003007, 0.0], [0.015468129, 0.00603007, 0.0]])
+
+SCENE = """
+schema = "explore3d/scene/1"
+tip.radius = "5 mm"
+seed = 3
+[model]
+{model}
+[finger]
+object = "{object}"
+rate = "1 kHz"
+[finger.noise]
+white = "0.05 mm"
+correlated = "0.005 mm"
+[survey]
+smallest_feature = "0.4 mm"
+[[truth]]
+kind = "ridge"
+axis = {axis}
+height = 0.00065
+width = 0.00065
+length = 0.028
+"""
+
+
+def write_scene(folder: Path, model: str, object: Path, axis: np.ndarray = AXIS) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(SCENE.format(model=model, object=object, axis=axis.tolist()))
+    return path
+
+
+def moved_tile(folder: Path) -> tuple[Path, Pose]:
+    """The tile with its wire, shifted by 3 mm and turned by 2 degrees."""
+    x, y, z = np.array([1.0, 2.0, 0.5]) / np.linalg.norm([1.0, 2.0, 0.5])
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = np.radians(2.0)
+    rotation = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    shift = np.array([0.5e-3, 0.5e-3, 2.9e-3])
+    pose = Pose(rotation, shift, np.zeros(3), np.zeros((6, 6)))
+    mesh = load_mesh(ASSETS / "meshes" / "wire_on_tile.ply", "m")
+    lines = [f"v {a!r} {b!r} {c!r}" for a, b, c in pose.onto(mesh.vertices).tolist()]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces.tolist()]
+    (folder / "moved.obj").write_text("\n".join(lines) + "\n")
+    return folder / "moved.obj", pose
+
+
+def the_wire_is_found(analysis: Analysis) -> None:
+    found = [row for row in analysis.errors if row.status == "found"]
+    assert len(found) == 1 and found[0].found is not None and found[0].found.kind == "ridge"
+    assert found[0].axis_rms < 1e-4 and found[0].end_error < 5e-4
+    assert abs(found[0].height_error) < 2e-5
+
+
+@pytest.mark.slow
+def test_a_wire_on_an_unknown_plate_is_found(tmp_path: Path) -> None:
+    region = 'region = { low = ["-28 mm", "-18 mm", "-8 mm"], high = ["28 mm", "18 mm", "8 mm"] }'
+    scene = write_scene(tmp_path, region, ASSETS / "meshes" / "wire_on_tile.ply")
+    analysis = run(scene, tmp_path / "out")
+    assert analysis.base.kind == "plane" and "plane" in analysis.ended
+    assert np.abs(analysis.base.surface.vertices[:, 2]).max() < 1e-5
+    the_wire_is_found(analysis)
+    again = analyze(tmp_path / "out", tmp_path / "again")
+    assert again.ended == analysis.ended and again.base.kind == "plane"
+
+
+@pytest.mark.slow
+def test_an_object_three_millimetres_off_its_mesh_is_explored_where_it_stands(tmp_path: Path) -> None:
+    object, true = moved_tile(tmp_path)
+    model = f'mesh = "{ASSETS}/meshes/tile.ply"\npose = "estimate"'
+    analysis = run(write_scene(tmp_path, model, object, true.onto(AXIS)), tmp_path / "out")
+    the_wire_is_found(analysis)
+    pose = Pose.read(analysis.base.parameters["pose"])
+    tile = load_mesh(ASSETS / "meshes" / "tile.ply", "m").vertices
+    off = (pose.onto(tile) - true.onto(tile)) @ true.rotation[:, 2]
+    assert np.abs(off).max() < 2e-5
+    ridge = analysis.model.features[0]
+    assert np.abs(pose.onto(ridge.extra["axis_in_model_frame"]) - ridge.axis).max() < 1e-12
+    logged = read_base(read_log(tmp_path / "out" / "log.mcap").events)
+    assert logged is not None and "pose" in logged.parameters
+    again = analyze(tmp_path / "out", tmp_path / "again")
+    assert [f.axis.tolist() for f in again.model.features] == [f.axis.tolist() for f in analysis.model.features]
+
+
+def test_an_object_that_is_not_there_ends_the_run_in_one_sentence(tmp_path: Path) -> None:
+    region = 'region = { low = ["-28 mm", "-18 mm", "12 mm"], high = ["28 mm", "18 mm", "20 mm"] }'
+    scene = write_scene(tmp_path, region, ASSETS / "meshes" / "tile.ply")
+    with pytest.raises(UserError, match="nothing was felt: no body was touched"):
+        run(scene, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_an_object_that_stands_too_far_off_is_not_explored(tmp_path: Path) -> None:
+    object, _ = moved_tile(tmp_path)
+    model = f'mesh = "{ASSETS}/meshes/tile.ply"\npose = "estimate"\nshift = "1 mm"'
+    analysis = run(write_scene(tmp_path, model, object), tmp_path / "out")
+    assert "the scene allows 1 mm" in analysis.ended
+    assert any(left.stage == "pose" for left in analysis.left_out)

@@ -1,0 +1,77 @@
+"""Touching one place of an earlier session again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from explore3d.errors import UserError
+from explore3d.jobs.reprobe import reprobe
+from explore3d.jobs.run import scene_finger
+from explore3d.log.reader import read_log
+from explore3d.log.writer import LogWriter
+from explore3d.scene.scene import load_scene
+from hw.move import Move
+
+MESHES = Path(__file__).parents[3] / "assets" / "meshes"
+R = 0.01
+SCENE = f"""
+schema = "explore3d/scene/1"
+seed = 1
+[tip]
+radius = {R}
+[model]
+mesh = "{MESHES}/tile.ply"
+units = "m"
+[finger]
+kind = "simulated"
+object = "{MESHES}/tile.ply"
+units = "m"
+rate = 1000.0
+[survey]
+smallest_feature = 3e-4
+speed = 0.03
+force = 1.0
+"""
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Path:
+    """One sweep along x, felt where sample 200 is 0.1 mm too high."""
+    (tmp_path / "scene.toml").write_text(SCENE)
+    scene = load_scene(tmp_path / "scene.toml")
+    move = Move([[-0.01, 0.002, R], [0.01, 0.002, R]], [0.0, 0.0, -1.0], speed=0.03)
+    with scene_finger(scene) as finger, LogWriter(tmp_path / "log.mcap", tip_radius=R) as log:
+        trace = finger.execute(move)
+        centers = trace.centers.copy()
+        centers[200, 2] += 1e-4
+        object.__setattr__(trace, "centers", centers)
+        log.write(move, trace)
+    return tmp_path
+
+
+def test_a_mishap_is_told_from_what_is_there(session: Path) -> None:
+    x = -0.01 + 200 * 3e-5
+    found = reprobe(session, (x, 0.002, 0.0))
+    assert found.sample == 200
+    assert found.offsets == pytest.approx(-1e-4 / found.neighbours, abs=1e-12)
+    assert np.array_equal(found.approach, [0.0, 0.0, -1.0])
+    untouched = reprobe(session, (x + 1e-3, 0.002, 0.0), touches=2)
+    assert untouched.offsets == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_the_touches_are_a_log_of_their_own(session: Path) -> None:
+    one, two = reprobe(session, (0.0, 0.002, 0.0)), reprobe(session, (0.0, 0.002, 0.0))
+    assert [one.log.name, two.log.name] == ["reprobe-1.mcap", "reprobe-2.mcap"]
+    assert np.allclose(read_log(one.log).trace.centers, one.felt)
+    assert len(read_log(session / "log.mcap").trace) == 667
+
+
+def test_a_place_that_was_never_touched_is_refused(session: Path, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"nothing was recorded near \[0.0, 0.0, 90.0\] mm.* mm away"):
+        reprobe(session, (0.0, 0.0, 0.09))
+    with pytest.raises(UserError, match="give the folder of a session"):
+        reprobe(tmp_path / "nowhere", (0.0, 0.0, 0.0))
+    assert not list(session.glob("reprobe-*"))

@@ -1,0 +1,130 @@
+"""Resuming: what was felt is not felt again, what was cut short is, and nothing is lost on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from explore3d.errors import UserError
+from explore3d.jobs.resume import EARLIER, Replay, earlier_log
+from explore3d.log.reader import read_log
+from explore3d.log.writer import LogWriter
+from hw.move import Move
+from hw.simulated.finger import SimulatedFinger
+from mapping.surface import Surface
+from mapping.trace import Trace
+from planners.drive import drive
+from planners.plan import Outcome, Plan
+
+R = 0.01
+
+
+def finger() -> SimulatedFinger:
+    corners = 0.1 * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    return SimulatedFinger(object=Surface(corners, [[0, 1, 2], [0, 2, 3]]), tip_radius=R, rate=200.0)
+
+
+def plan(count: int = 8) -> Plan:
+    """Each sweep lies where the one before it ended: the plan depends on what it is sent."""
+    y = 0.02
+    for _ in range(count):
+        path = np.array([[0.02, y, R], [0.05, y, R]])
+        trace = yield Move(path, np.array([0.0, 0.0, -1.0]))
+        y += 0.1 * float(trace.centers[-1, 0])
+    return Outcome("done")
+
+
+def logged(execute: Callable[[Move], Trace], log: LogWriter) -> Callable[[Move], Trace]:
+    def both(move: Move) -> Trace:
+        trace = execute(move)
+        log.write(move, trace)
+        return trace
+
+    return both
+
+
+def broken_off(path: Path, after: int, outcome: str = "") -> None:
+    """A log of a session that ended after so many moves."""
+    with LogWriter(path, tip_radius=R) as log:
+        drive(plan(after), logged(finger().execute, log))
+        if outcome:
+            log.event("outcome", {"reason": outcome, "detail": ""})
+
+
+def test_the_resumed_session_feels_what_the_whole_one_would_have_felt(tmp_path: Path) -> None:
+    broken_off(tmp_path / "log.mcap", 5)
+    log, content = earlier_log(tmp_path)
+    assert content == (tmp_path / "log.mcap").read_bytes()
+    replay, live = Replay(log), finger()
+    made = []
+
+    def execute(move: Move) -> Trace:
+        made.append(move)
+        return live.execute(move)
+
+    record, outcome = drive(plan(), replay.before(execute))
+    whole, _ = drive(plan(), finger().execute)
+    assert outcome.reason == "done"
+    assert replay.replayed == 4 and len(made) == 4  # the fifth may have been cut short: it is made again
+    for (_, one), (_, other) in zip(record, whole, strict=True):
+        assert np.allclose(one.centers, other.centers, atol=1e-12)
+    trace = Trace.concatenate([trace for _, trace in record])
+    assert (np.diff(trace.t) > 0).all()
+    assert np.unique(trace.sweep).tolist() == list(range(1, 9))
+
+
+@pytest.mark.parametrize("after", [2, 5, 7])
+def test_a_resumed_simulation_has_the_noise_and_the_time_of_the_whole_one(tmp_path: Path, after: int) -> None:
+    noisy = replace(finger(), white=1e-4, correlated=1e-5)
+    whole, _ = drive(plan(), noisy.execute)
+    with LogWriter(tmp_path / "log.mcap", tip_radius=R) as log:
+        drive(plan(after), logged(replace(finger(), white=1e-4, correlated=1e-5).execute, log))
+    again = replace(finger(), white=1e-4, correlated=1e-5)
+    record, _ = drive(plan(), Replay(read_log(tmp_path / "log.mcap")).before(again.execute, again.skip))
+    assert len(record) == len(whole) == 8
+    for (_, one), (_, other) in zip(record, whole, strict=True):
+        assert np.allclose(one.centers, other.centers, atol=1e-9) and np.allclose(one.t, other.t, atol=1e-9)
+        assert (one.sweep == other.sweep).all()
+
+
+def test_a_finished_session_is_replayed_whole_and_moves_nothing(tmp_path: Path) -> None:
+    broken_off(tmp_path / "log.mcap", 8, "done")
+
+    def refuse(move: Move) -> Trace:
+        raise AssertionError("moved")
+
+    replay = Replay(read_log(tmp_path / "log.mcap"))
+    drive(plan(), replay.before(refuse))
+    assert replay.replayed == 8
+
+
+def test_from_the_first_difference_on_the_finger_moves(tmp_path: Path) -> None:
+    broken_off(tmp_path / "log.mcap", 5)
+    replay, made = Replay(read_log(tmp_path / "log.mcap")), []
+
+    def other() -> Plan:
+        yield Move(np.array([[0.02, 0.02, R], [0.05, 0.02, R]]), np.array([0.0, 0.0, -1.0]))
+        for _ in range(3):
+            yield Move(np.array([[0.02, 0.09, R], [0.05, 0.09, R]]), np.array([0.0, 0.0, -1.0]))
+        return Outcome("done")
+
+    live = finger()
+    drive(other(), replay.before(lambda move: made.append(move) or live.execute(move)))  # type: ignore[func-returns-value]
+    assert replay.replayed == 1 and len(made) == 3
+
+
+def test_the_fuller_of_two_logs_is_gone_on_from(tmp_path: Path) -> None:
+    """A resumed session that was killed while it replayed has a short log beside the whole earlier one."""
+    broken_off(tmp_path / EARLIER, 5)
+    broken_off(tmp_path / "log.mcap", 2)
+    log, _ = earlier_log(tmp_path)
+    assert len({int(s) for s in log.trace.sweep}) == 5
+
+
+def test_a_folder_without_a_log_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="nothing to resume"):
+        earlier_log(tmp_path)

@@ -1,0 +1,317 @@
+"""Tables of positions: whatever the instrument wrote is understood, or refused in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from explore3d.errors import UserError
+from explore3d.log.load import load_logs
+from explore3d.log.record import Log
+from explore3d.log.table import read_table
+
+STYLUS = Path(__file__).parents[4] / "shared" / "data" / "stylus_profile_mm.csv"
+
+
+def table(folder: Path, content: str | bytes, name: str = "scan.csv") -> Path:
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+def read(folder: Path, content: str | bytes, **options: object) -> Log:
+    return read_table(table(folder, content), **({"units": "mm", "tip_radius": "1 mm"} | options))  # type: ignore[arg-type]
+
+
+def refused(folder: Path, content: str | bytes, *said: str, **options: object) -> None:
+    with pytest.raises(UserError) as error:
+        read(folder, content, **options)
+    message = str(error.value)
+    assert "scan.csv" in message and "\n" not in message
+    for part in said:
+        assert part in message, message
+
+
+@pytest.mark.skipif(not STYLUS.exists(), reason=f"needs {STYLUS}")
+def test_the_stylus_scan_is_read_as_one_profile_in_metres() -> None:
+    log = read_table(STYLUS, units="mm", tip_radius="2 um")
+    assert len(log.trace) == 9600 and log.trace.tip_radius == pytest.approx(2e-6)
+    assert log.trace.centers[0].tolist() == [8.672200 * 1e-3, 0.0, 106.606853 * 1e-3]
+    assert np.diff(log.trace.centers[:, 0]) == pytest.approx(0.5e-6, rel=1e-6)
+    assert np.unique(log.trace.sweep).tolist() == [0]
+    assert log.metadata["columns"] == {"x": "X", "z": "Y", "valid": "valid"}
+    assert log.complete and log.recovered == "" and len(log.sha256) == 64
+
+
+SAME = [
+    "x,y,z\n1,2,3\n4,5,6\n",
+    "x;y;z\n1;2;3\n4;5;6\n",
+    "1 2 3\n4 5 6\n",
+    "  1\t2   3 \r\n\r\n 4 5 6\r\n",
+    "1\t2\t3\n4\t5\t6",
+    "# scan of a plate\n# x y z\n1 2 3\n# a break\n4 5 6\n",
+    "% comment, with commas\n1,2,3\n4,5,6\n",
+    "z;x;y\n3;1;2\n6;4;5\n",
+    "X [mm];Y [mm];Z [mm]\n1,0;2,0;3,0\n4,0;5,0;6,0\n",
+    "x (mm) y (mm) z (mm)\n1 2 3\n4 5 6\n",
+    "x;y;z\nmm;mm;mm\n1;2;3;\n4;5;6;\n",
+    '"x","y","z"\n"1","2","3"\n"4","5","6"\n',
+    "Instrument: X9\nDate 2020-01-01, 12:00\n\nx,y,z\n1,2,3\n4,5,6\n",
+    "\ufeffx,y,z\n1e0,+2.,3.0E0\n4,5,6\n",
+    "index,x,y,z,remark\n0,1,2,3,7\n1,4,5,6,8\n",
+]
+
+
+@pytest.mark.parametrize("content", SAME)
+def test_however_it_is_written_it_is_the_same_table(tmp_path: Path, content: str) -> None:
+    trace = read(tmp_path, content).trace
+    assert trace.centers.tolist() == [[1e-3, 2e-3, 3e-3], [4e-3, 5e-3, 6e-3]]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "latin-1", "utf-8"])
+def test_encodings_of_instruments_are_understood(tmp_path: Path, encoding: str) -> None:
+    trace = read(tmp_path, "x [µm]\tz [µm]\n1\t2\n3\t4\n".encode(encoding), units=None).trace
+    assert trace.centers == pytest.approx(np.array([[1e-6, 0, 2e-6], [3e-6, 0, 4e-6]]))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    rows=st.lists(st.tuples(*[st.floats(-1e12, 1e12)] * 3), min_size=1, max_size=8),
+    delimiter=st.sampled_from([",", ";", "\t", " ", ";comma"]),
+)
+def test_numbers_written_in_full_come_back_bit_for_bit(
+    tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[float, float, float]], delimiter: str
+) -> None:
+    lines = [delimiter[0].join(repr(value) for value in row) for row in rows]
+    text = "\n".join(lines).replace(".", ",") if delimiter == ";comma" else "\n".join(lines)
+    path = table(tmp_path_factory.mktemp("table"), text)
+    trace = read_table(path, units="m", tip_radius=1.0, jump=1e30).trace
+    assert trace.centers.tolist() == [list(row) for row in rows]
+
+
+def test_units_come_from_the_header_even_if_they_differ(tmp_path: Path) -> None:
+    trace = read(tmp_path, "x [mm];z [um];t [ms]\n1;2;3\n4;5;6\n", units=None).trace
+    assert trace.centers == pytest.approx(np.array([[1e-3, 0, 2e-6], [4e-3, 0, 5e-6]]))
+    assert trace.t == pytest.approx([3e-3, 6e-3])
+    trace = read(tmp_path, "1;2\n4;5\n", units={"x": "mm", "z": "um"}).trace
+    assert trace.centers == pytest.approx(np.array([[1e-3, 0, 2e-6], [4e-3, 0, 5e-6]]))
+
+
+def test_units_that_nobody_or_two_state_are_refused(tmp_path: Path) -> None:
+    refused(tmp_path, "1;2\n3;4\n", "field units", "--units mm", units=None)
+    refused(tmp_path, "x [um];z [um]\n1;2\n3;4\n", "field units", "'mm'", "'um'")
+    refused(tmp_path, "1;2\n3;4\n", "units", "unknown unit", units="mmm")
+    refused(tmp_path, "1;2\n3;4\n", "units", "'deg' is a unit of angle", units="deg")
+
+
+def test_a_missing_tip_radius_says_how_to_give_it(tmp_path: Path) -> None:
+    refused(tmp_path, "1;2\n3;4\n", "field tip_radius", "--tip-radius", "scan.csv.toml", tip_radius=None)
+
+
+@pytest.mark.parametrize(("radius", "said"), [("-2 um", "greater than 0"), ("2", "unit missing"), ("2 kg", "unknown")])
+def test_a_wrong_tip_radius_is_refused(tmp_path: Path, radius: str, said: str) -> None:
+    refused(tmp_path, "1;2\n3;4\n", "tip_radius", said, tip_radius=radius)
+
+
+def test_rows_that_are_invalid_or_lack_a_number_are_left_out_counted_and_said(tmp_path: Path) -> None:
+    content = "x;z;valid\n1;1;1\n2;;1\n3;nan;1\n4;4;0\n5;5;1\n6;inf;1\n7;7;0\n8;8;\n"
+    log = read(tmp_path, content)
+    assert log.trace.centers[:, 0].tolist() == [1e-3, 5e-3]
+    assert "3 of 8 rows are marked invalid" in log.recovered and "3 of 8 rows lack a number" in log.recovered
+    assert log.metadata["rows"] == 8 and log.metadata["rows_left_out"] == 6
+    assert np.unique(log.trace.sweep).tolist() == [0]
+
+
+def test_a_table_with_no_sample_left_is_refused(tmp_path: Path) -> None:
+    refused(tmp_path, "x;z;valid\n1;1;0\n2;2;0\n", "samples", "2 of 2 rows are marked invalid")
+    refused(tmp_path, "x;y;z\n1;1;nan\n2;2;\n", "samples", "2 of 2 rows lack a number")
+    refused(tmp_path, "x;y;z\n", "no line of two or more numbers")
+
+
+def test_an_incomplete_last_line_is_left_out_and_said(tmp_path: Path) -> None:
+    log = read(tmp_path, "1;2;3\n4;5;6\n7;8")
+    assert len(log.trace) == 2 and not log.complete and "last line was incomplete" in log.recovered
+
+
+def test_a_cell_that_is_no_number_is_named_by_line_and_column(tmp_path: Path) -> None:
+    refused(tmp_path, "x;z\n1;2\n3;4\n5;six\n7;8\n", "line 4, column 2", "'six'")
+    refused(tmp_path, "1 2 3\n4 5\n6 7 8\n", "line 2", "expected 3 columns; found 2")
+    refused(tmp_path, "1;2;3\n4;5;6\nmean;0\n", "line 3", "expected 3 columns; found 2")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "is empty"),
+        (b" \n\n", "is empty"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "PNG image"),
+        (b"PK\x03\x04 spreadsheet", "export it as CSV"),
+        (b"1;2\n\0\0;3", "binary"),
+        (b"once upon a time\nthere was", "once upon a time"),
+        (b"1\n2\n3\n", "two or more numbers"),
+    ],
+)
+def test_files_that_are_no_tables_are_refused(tmp_path: Path, content: bytes, said: str) -> None:
+    refused(tmp_path, content, said)
+
+
+def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"none\.csv: cannot read it"):
+        read_table(tmp_path / "none.csv", units="mm", tip_radius=1.0)
+    with pytest.raises(UserError, match="cannot read it"):
+        read_table(tmp_path, units="mm", tip_radius=1.0)
+
+
+# --- columns --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("columns", ["x=pos,z=Total", {"x": 2, "z": 4}, "x=2, z=4", {"x": "POS", "z": "total"}])
+def test_columns_can_be_said(tmp_path: Path, columns: object) -> None:
+    log = read(tmp_path, "n;pos;rough;Total\n0;1;9;2\n1;3;9;4\n", columns=columns)
+    assert log.trace.centers.tolist() == [[1e-3, 0, 2e-3], [3e-3, 0, 4e-3]]
+
+
+def test_columns_that_cannot_be_told_apart_or_do_not_exist_are_refused(tmp_path: Path) -> None:
+    content = "n;pos;rough;Total\n0;1;9;2\n1;3;9;4\n"
+    refused(tmp_path, content, "field columns", "'pos'", "--columns")
+    refused(tmp_path, content, "columns.z", "did you mean 'Total'?", columns="x=pos,z=Totl")
+    refused(tmp_path, content, "columns.x", "no column 5", "1 to 4", columns="x=5,z=1")
+    refused(tmp_path, content, "columns", "expected", columns="pos")
+    refused(tmp_path, content, "columns", "'w'", columns="w=pos,z=Total")
+    refused(tmp_path, content, "x and z", columns="x=pos")
+
+
+def test_contact_data_is_read_if_all_three_parts_are_there(tmp_path: Path) -> None:
+    head = "t,x,y,z,nx,ny,nz,fx,fy,fz,cx,cy,cz\n"
+    trace = read(tmp_path, head + "0,1,2,3,0,0,1,0,0,2,1,2,2\n1,2,2,3,0,0,1,0,0,2,2,2,2\n").trace
+    assert trace.normals is not None and trace.normals.tolist() == [[0, 0, 1]] * 2
+    assert trace.force is not None and trace.force.tolist() == [[0, 0, 2]] * 2
+    assert trace.contacts is not None and trace.contacts.tolist() == [[1e-3, 2e-3, 2e-3], [2e-3] * 3]
+    refused(tmp_path, "x,y,z,nx,ny\n1,2,3,0,0\n", "normals need nx, ny, nz")
+
+
+def test_a_profile_that_does_not_advance_is_refused(tmp_path: Path) -> None:
+    refused(tmp_path, "x;z\n1;1\n1;2\n1;3\n", "field x", "advances")
+
+
+# --- sweeps ---------------------------------------------------------------------------------------------
+
+
+def raster(noise: float = 0.0, back_and_forth: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Five lines of 200 points 0.1 apart, 3 from line to line; (points, number of the line)."""
+    rng = np.random.default_rng(5)
+    along, lines = np.arange(200) * 0.1, np.arange(5)
+    x = np.concatenate([along[::-1] if back_and_forth and line % 2 else along for line in lines])
+    points = np.column_stack([x, np.repeat(lines * 3.0, 200), np.zeros(1000)])
+    return points + noise * rng.normal(size=points.shape), np.repeat(lines, 200)
+
+
+def rows(points: np.ndarray) -> str:
+    return "\n".join(" ".join(map(repr, row)) for row in points.tolist())
+
+
+@pytest.mark.parametrize("back_and_forth", [False, True])
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_sweeps_are_cut_where_the_finger_jumped(tmp_path: Path, back_and_forth: bool, noise: float) -> None:
+    points, line = raster(noise, back_and_forth)
+    assert np.array_equal(read(tmp_path, rows(points)).trace.sweep, line)
+
+
+def test_noise_much_larger_than_the_spacing_does_not_cut_sweeps(tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    points = np.column_stack([np.arange(20_000) * 6e-3, *rng.normal(0, 0.2, (2, 20_000))])
+    assert np.unique(read(tmp_path, rows(points)).trace.sweep).tolist() == [0]
+
+
+def test_a_length_of_jump_can_be_said(tmp_path: Path) -> None:
+    points, _ = raster()
+    assert np.unique(read(tmp_path, rows(points), jump="25 mm").trace.sweep).tolist() == [0]
+    assert len(np.unique(read(tmp_path, rows(points), jump="0.05 mm").trace.sweep)) == 1000
+
+
+def test_a_sweep_column_wins(tmp_path: Path) -> None:
+    log = read(tmp_path, "x,y,z,Line\n1,2,3,7\n1,2,4,7\n1,2,5,9\n")
+    assert log.trace.sweep.tolist() == [7, 7, 9]
+    refused(tmp_path, "x,y,z,sweep\n1,2,3,7.5\n", "field sweep", "7.5")
+
+
+# --- sidecar and frame ----------------------------------------------------------------------------------
+
+SIDECAR = """
+units = "um"
+tip_radius = "5 um"
+columns = { x = "a", z = "b" }
+reference = "bottom"
+
+[frame]
+origin = ["1 mm", 0, 0]
+rotation = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+"""
+
+
+@pytest.mark.parametrize("name", ["scan.toml", "scan.csv.toml"])
+def test_a_sidecar_says_what_the_file_does_not(tmp_path: Path, name: str) -> None:
+    table(tmp_path, SIDECAR, name)
+    log = read_table(table(tmp_path, "a b\n1 2\n3 4\n"))
+    assert log.trace.tip_radius == pytest.approx(5e-6)
+    assert log.trace.centers == pytest.approx(np.array([[1e-3, 1e-6, 7e-6], [1e-3, 3e-6, 9e-6]]))
+    assert log.metadata["sidecar"] == str(tmp_path / name)
+
+
+def test_options_win_over_the_sidecar(tmp_path: Path) -> None:
+    table(tmp_path, SIDECAR, "scan.csv.toml")
+    assert load_logs([table(tmp_path, "a b\n1 2\n3 4\n")], tip_radius="1 mm").trace.tip_radius == 1e-3
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("tip_radus = '1 mm'", "did you mean 'tip_radius'?"),
+        ("tip_radius = 'x'", "tip_radius"),
+        ("tip_radius =", "not TOML"),
+        ("[frame]\nrotation = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]", "frame.rotation"),
+        ("[frame]\norign = [0, 0, 0]", "did you mean 'origin'?"),
+        ("reference = 'top'", "reference"),
+    ],
+)
+def test_a_wrong_sidecar_is_named_with_the_field(tmp_path: Path, text: str, said: str) -> None:
+    sidecar = table(tmp_path, text, "scan.toml")
+    with pytest.raises(UserError) as error:
+        read(tmp_path, "1 2\n3 4\n")
+    assert str(sidecar) in str(error.value) and said in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_scene_beside_the_table_is_no_sidecar(tmp_path: Path) -> None:
+    table(tmp_path, 'schema = "explore3d/scene/1"\n[tip]\nradius = "1 mm"', "scan.toml")
+    assert read(tmp_path, "1 2\n3 4\n").metadata["sidecar"] is None
+
+
+def test_a_frame_turns_directions_but_does_not_move_them(tmp_path: Path) -> None:
+    frame = {"origin": (1.0, 2.0, 3.0), "rotation": [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
+    trace = read(tmp_path, "x y z nx ny nz cx cy cz\n1 2 3 1 0 0 4 5 6\n", units="m", frame=frame).trace
+    assert trace.centers.tolist() == [[4.0, 3.0, 5.0]]
+    assert trace.normals is not None and trace.normals.tolist() == [[0.0, 1.0, 0.0]]
+    assert trace.contacts is not None and trace.contacts.tolist() == [[7.0, 6.0, 8.0]]
+
+
+# --- several, and many ----------------------------------------------------------------------------------
+
+
+def test_several_tables_merge_into_sweeps(tmp_path: Path) -> None:
+    paths = [table(tmp_path, "1 2\n3 4\n", f"{name}.txt") for name in "ab"]
+    log = load_logs(paths, tip_radius="1 mm", units="mm")
+    assert log.trace.sweep.tolist() == [0, 0, 1, 1] and log.sources == tuple(map(str, paths))
+
+
+@pytest.mark.slow
+def test_a_million_rows_are_read_in_seconds(tmp_path: Path) -> None:
+    import time
+
+    points = np.random.default_rng(0).normal(size=(1_000_000, 3))
+    np.savetxt(tmp_path / "scan.csv", points, fmt="%.9f", delimiter=";")
+    start = time.process_time()
+    assert len(read_table(tmp_path / "scan.csv", units="mm", tip_radius=1.0).trace) == 1_000_000
+    assert time.process_time() - start < 5

@@ -1,0 +1,60 @@
+"""What the terminal says of a model: how many features, how large, how sure."""
+
+from __future__ import annotations
+
+from math import inf
+from types import SimpleNamespace
+from typing import Any
+
+from explore3d.report.findings import summary
+from mapping.feature import Interval
+
+
+def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
+    height = Interval(0.651e-3, 0.648e-3, 0.654e-3)
+    return SimpleNamespace(
+        id=name, curvature_feature=finer, height=height, width=Interval(1e-3, 1e-3, 1e-3), length=length
+    )
+
+
+def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.12e-3) -> Any:
+    model, trace = SimpleNamespace(features=features), SimpleNamespace(tip_radius=0.01)
+    detections = SimpleNamespace(detection_limit=limit, probability=0.95)
+    return SimpleNamespace(model=model, trace=trace, recovered=recovered, detections=detections)
+
+
+def test_nothing_found_is_said_so() -> None:
+    assert summary(analysis())[0] == "no features found"
+
+
+def test_what_would_have_been_seen_is_said_with_every_result() -> None:
+    seen = "A sharp crest 0.12 mm high or higher is seen with 95 % probability where a sweep crosses it."
+    assert summary(analysis())[-1] == seen
+    found = analysis(feature("bump-1", True, Interval(0.0, 0.0, 0.0)))
+    assert summary(found)[-1] == seen
+    assert summary(analysis(limit=inf))[-1] == "The trace is too short to say what would have been seen."
+
+
+def test_each_feature_has_a_line_with_its_intervals() -> None:
+    found = analysis(
+        feature("ridge-1", True, Interval(80e-3, 79.9e-3, 80.1e-3)),
+        feature("bump-1", False, Interval(0.0, 0.0, 0.0)),
+        feature("ridge-2", False, Interval(50e-3, 40e-3, 60e-3, censored=True)),
+    )
+    first, ridge, bump, cut, _ = summary(found)
+    assert first == "3 features found, 1 of them finer than the tip of 10 mm"
+    assert ridge.strip().startswith(
+        "ridge-1: height 0.6510 mm (0.6480 to 0.6540), width 1 mm, length 80.00 mm (79.90 to 80.10)"
+    )
+    assert "length" not in bump
+    assert cut.endswith("length at least 40 mm")
+
+
+def test_a_recovered_log_is_mentioned() -> None:
+    assert "12 samples lost" in summary(analysis(recovered="12 samples lost"))
+
+
+def test_a_long_list_is_cut_and_says_so() -> None:
+    lines = summary(analysis(*(feature(f"bump-{k}", False, Interval(0.0, 0.0, 0.0)) for k in range(23))))
+    assert len(lines) == 23
+    assert lines[-2] == "  and 3 more, see the report"

@@ -1,0 +1,134 @@
+"""The report is one page that fetches nothing, says what was found, and keeps markup out of its texts."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reported_wire import AXIS, BASE, HEIGHT, TIP, UP, crossing, ridge, sweeps
+
+from explore3d.analysis.result import Analysis, TipCount
+from explore3d.analysis.truth import TrueFeature, compare
+from explore3d.report.pictures import Pictures
+from explore3d.report.report import report_page, write_report
+from mapping.base.base import Base
+from mapping.detection.detect import Detections
+from mapping.feature import Evidence, Feature, Interval, LeftOut
+from mapping.geometry.templates.shapes import chain_height
+from mapping.instrument.noise import Noise
+from mapping.model.object_model import ObjectModel
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+
+def analysis(features: tuple[Feature, ...] = (ridge(),), title: str = "A wire") -> Analysis:
+    trace = sweeps()
+    model = ObjectModel.attach(BASE, features, provenance={"tip_radius": TIP})
+    crossings = tuple(crossing(i, x) for i, x in enumerate(np.linspace(-0.03, 0.03, 11)) if abs(x) < 0.02)
+    truth = (TrueFeature("ridge", AXIS, HEIGHT),) if features else ()
+    return Analysis(
+        title,
+        trace,
+        BASE,
+        Detections(crossings if features else (), Noise(1e-5), 3, 4e-5, 0.95, 5.0, 0.55),
+        model,
+        truth=truth,
+        errors=compare(model, truth, TIP),
+        timings={"detection": 1.5, "posterior": 3.0},
+        left_out=(LeftOut("base fit", "the global model was given"),),
+        time_curve=((10.0, 1e-3), (20.0, 2e-4)),
+        tip_counts=(TipCount(TIP, 1, 0), TipCount(2 * TIP, 0, 1)),
+    )
+
+
+def words(page: str) -> str:
+    """The page's text without scripts, styles and tags."""
+    bare = re.sub(r"<(script|style)[^>]*>.*?</\1>", " ", page, flags=re.S)
+    return " ".join(re.sub(r"<[^>]+>", " ", bare).split())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("report")
+    write_report(analysis(), place)
+    return place
+
+
+def test_the_page_loads_nothing_from_elsewhere(folder: Path) -> None:
+    page = (folder / "report.html").read_text()
+    assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=\"(?!data:)", page)
+    assert "default-src 'none'" in page
+
+
+def test_the_page_says_what_was_found_and_what_was_left_out(folder: Path) -> None:
+    text = words((folder / "report.html").read_text())
+    for sentence in (
+        "1 ridge was found.",
+        "0.650 mm (0.634 to 0.666) high",
+        "1 finer than the tip",
+        "1 of 1 features found, 0 missed, 0 invented",
+        "the global model was given",
+        "A sharp crest 40 µm high or higher is seen with 95 % probability",
+        "4.5 s",
+    ):
+        assert sentence in text, sentence
+
+
+def test_every_figure_lies_beside_the_page_as_a_png(folder: Path) -> None:
+    names = {each.stem for each in (folder / "pictures").iterdir()}
+    assert names == {"object", "sections", "sizes", "time"}
+    for each in (folder / "pictures").iterdir():
+        assert each.read_bytes().startswith(b"\x89PNG") and each.stat().st_size > 5000
+
+
+def test_the_same_analysis_gives_the_same_pictures(folder: Path, tmp_path: Path) -> None:
+    write_report(analysis(), tmp_path)
+    for each in (folder / "pictures").iterdir():
+        assert (tmp_path / "pictures" / each.name).read_bytes() == each.read_bytes(), each.name
+
+
+def test_an_empty_result_says_what_would_have_been_seen() -> None:
+    text = words(report_page(analysis(()), Pictures({}), []))
+    assert "Nothing was found that the base does not explain." in text
+    assert "A sharp crest 40 µm high or higher is seen with 95 % probability" in text
+
+
+def test_texts_from_outside_cannot_become_markup() -> None:
+    hostile = "<script>alert(1)</script>"
+    noted = replace(ridge(), notes=(hostile,))
+    page = report_page(analysis((noted,), title=hostile), Pictures({}), [])
+    assert hostile not in page and "&lt;script&gt;alert(1)" in page
+
+
+def test_a_profile_is_drawn_as_a_profile(tmp_path: Path) -> None:
+    x = np.arange(0.0, 1e-3, 5e-7)
+    bump = Feature(
+        "bump",
+        np.array([[5e-4, 0.0, 0.0]]),
+        UP[None],
+        Interval.normal(1e-6, 1e-8),
+        Interval.normal(4e-6, 1e-7),
+        Interval(0, 0, 0),
+        Evidence(50.0, 1, (3,)),
+        False,
+        1e-8,
+    )
+    strip = Base(
+        Surface([[0, -1e-4, 0], [1e-3, -1e-4, 0], [1e-3, 1e-4, 0], [0, 1e-4, 0]], [[0, 1, 2], [0, 2, 3]]), "profile"
+    )
+    feet = np.column_stack([x, 0 * x, 0 * x])
+    radius = 2.5e-6
+    z = 2e-6 + chain_height(feet, np.tile(UP, (len(x), 1)), bump.axis + (1e-6 - radius) * UP, radius, 2e-6)
+    whole = replace(
+        analysis(),
+        trace=Trace.from_profile(x, z, 2e-6),
+        base=strip,
+        model=ObjectModel.attach(strip, (bump,)),
+        truth=(),
+        errors=(),
+        time_curve=(),
+    )
+    text = words(write_report(whole, tmp_path).read_text())
+    assert {each.stem for each in (tmp_path / "pictures").iterdir()} == {"profile", "sections"}
+    assert "1 bump was found. It is 1.000 µm" in text and "Against the truth" not in text

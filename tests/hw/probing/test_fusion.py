@@ -1,0 +1,106 @@
+"""Clocks, delays and the joining of stage and sensor, against known clocks and delays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hw.emulated.force import OptoForceEmulator
+from hw.emulated.grbl import GrblEmulator
+from hw.emulated.pty_server import PtyServer
+from hw.emulated.touched_body import TouchedBody
+from hw.grbl.controller import GrblController, Report
+from hw.grbl.frame import Frame
+from hw.grbl.guarded_stage import GuardedStage
+from hw.grbl.protocol import parse_status
+from hw.probing.fusion import estimate_delay, known_at, positions_at, prompt, rigid_centers
+from hw.probing.lag import measured_delay
+from hw.sensors.clock import SensorClock, missing, unwrapped
+from hw.sensors.optoforce import OptoForce
+from mapping.surface import Surface
+
+
+def test_the_sensors_clock_is_found_through_jitter_that_only_delays() -> None:
+    rng = np.random.default_rng(4)
+    ticks = np.arange(20_000.0)
+    arrivals = 5.0 + 1.0003e-3 * ticks + rng.exponential(2e-3, len(ticks))
+    clock = SensorClock.estimate(ticks, arrivals, 1e-3)
+    assert clock.period == pytest.approx(1.0003e-3, rel=2e-6)
+    assert np.abs(clock.times(ticks) - 5.0 - 1.0003e-3 * ticks).max() < 5e-5
+
+
+def test_a_counter_that_starts_anew_runs_on_and_its_gaps_are_counted() -> None:
+    counter = (65500 + np.delete(np.arange(200), [50, 51, 120])) % 65536
+    ticks = unwrapped(counter, 16)
+    assert ticks[-1] - ticks[0] == 199
+    assert missing(ticks) == 3
+
+
+def test_the_delay_is_found_from_one_touch_whatever_the_height_of_contact() -> None:
+    delay, stiffness, speed = 0.013, 1e4, 2e-3
+    t = np.arange(0.0, 2.0, 0.001)
+    height = np.abs(t - 1.0) * speed - 0.5e-3  # down to -0.5 mm and up again
+    force = stiffness * np.maximum(-0.37e-3 - height, 0.0)
+    reports = np.arange(0.0, 2.0, 0.02)
+    found = estimate_delay(reports, np.interp(reports, t, height), t + delay, force, 0.2)
+    assert found == pytest.approx(delay, abs=2e-4)
+
+
+def test_positions_between_reports_are_interpolated_and_outside_unknown() -> None:
+    stamps, places = np.array([0.0, 1.0]), np.array([[0.0, 0, 0], [1.0, 2.0, 3.0]])
+    found = positions_at(np.array([-0.1, 0.25, 1.1]), stamps, places)
+    assert found[1].tolist() == [0.25, 0.5, 0.75]
+    assert np.isnan(found[[0, 2]]).all()
+    assert rigid_centers(found[1:2], np.array([[0.0, 0.0, 2.0]]), 1e4)[0, 2] == pytest.approx(0.75 + 2e-4)
+
+
+def test_a_long_silence_hides_the_way_on_a_flank_and_nothing_on_the_flat() -> None:
+    stamps, up = np.array([0.0, 0.01, 0.5, 0.51, 1.0]), np.tile([0.0, 0.0, 1.0], (5, 1))
+    places = np.array([[0.0, 0, 0], [1e-4, 0, 0], [5e-3, 0, 0], [5e-3, 0, 0], [8e-3, 0, 1e-3]])
+    times = np.array([0.005, 0.2, 0.5, 0.505, 0.7])
+    assert known_at(times, stamps, places, up, 0.02, 1e-5).tolist() == [True, True, True, True, False]
+
+
+def test_reports_that_came_late_to_a_busy_host_are_not_trusted() -> None:
+    status = parse_status("<Idle|MPos:0.000,0.000,0.000|FS:0,0>")
+    assert status is not None
+    reports = [Report(0.1 * k, status, 2e-4 if k != 3 else 5e-3) for k in range(6)]
+    assert [report.at for report in prompt(reports)] == [0.1 * k for k in (0, 1, 2, 4, 5)]
+
+
+def test_in_a_corner_the_spring_pulls_from_where_the_rigid_ball_rests() -> None:
+    # a wedge opening upwards, 90 degrees: the ball rests on both sides, its centre sqrt(2) r above the edge
+    r, stiffness = 5e-3, 1e4
+    corners = [[0, -1, 0], [0, 1, 0], [1, -1, 1], [1, 1, 1], [-1, -1, 1], [-1, 1, 1]]
+    body = TouchedBody(
+        Surface(0.05 * np.array(corners, dtype=float), [[0, 2, 1], [1, 2, 3], [0, 1, 4], [1, 5, 4]]), r, None, stiffness
+    )
+    rest = np.array([0.0, 0.0, np.sqrt(2.0) * r])
+    for off in ([0.0, 0.0, -1e-4], [2e-5, 0.0, -1e-4], [-3e-5, 1e-3, -5e-5]):
+        place = rest + off
+        resting = rigid_centers(place[None], body.force(place)[None], stiffness)[0]
+        assert resting == pytest.approx(np.array([0.0, off[1], rest[2]]), abs=1e-9)
+
+
+def test_on_one_side_the_spring_pulls_along_its_normal() -> None:
+    corners = 0.02 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    body = TouchedBody(Surface(corners, [[0, 1, 2], [0, 2, 3]]), 0.005, None, 1e4)
+    assert body.force(np.array([1e-3, 2e-3, 0.0049])) == pytest.approx([0.0, 0.0, 1.0])
+    assert not body.force(np.array([1e-3, 2e-3, 0.0051])).any()
+
+
+@pytest.mark.slow
+def test_a_latency_put_into_the_emulated_sensor_is_measured_through_the_ports() -> None:
+    frame, found = Frame.of((-0.15, -0.15, -0.05)), []
+    corners = 0.02 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    body = TouchedBody(Surface(corners, [[0, 1, 2], [0, 2, 3]]), 0.005, frame, 1e4)
+    for latency in (0.0, 0.06):
+        stage = GrblEmulator(body, np.array([-0.15, -0.15, -0.042]))
+        with PtyServer([stage, OptoForceEmulator(stage, noise=0.003, latency=latency)]) as server:
+            controller = GrblController(server.ports[0]).open()
+            with OptoForce(server.ports[1], 400.0) as sensor:
+                guarded = GuardedStage(controller, frame, controller.settings.bounds, 0.03, 2e-4, sensor)
+                found.append(measured_delay(guarded, sensor, np.array([0.0, 0.0, -1.0]), 1e4)[0])
+            controller.close()
+    # the scheduling of a busy host is in both; the difference is the latency
+    assert found[1] - found[0] == pytest.approx(0.06, abs=0.02)

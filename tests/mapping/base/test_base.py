@@ -1,0 +1,97 @@
+"""The base: heights over a mesh, and the family that the evidence chooses without one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from mapping.arrays import FloatArray
+from mapping.base.base import Base
+from mapping.base.fit import fit_base
+from mapping.errors import TraceError
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+TIP, BODY, NOISE = 2e-3, 40e-3, 2e-5
+
+CENTERS: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
+    "plane": lambda u, v: np.column_stack([u, v, TIP + 0 * u]),
+    "cylinder": lambda u, v: np.column_stack([v, (BODY + TIP) * np.sin(u / BODY), (BODY + TIP) * np.cos(u / BODY)]),
+    "sphere": lambda u, v: (
+        (BODY + TIP)
+        * np.column_stack(
+            [np.sin(v / 0.05) * np.cos(u / 0.05), np.sin(u / 0.05), np.cos(v / 0.05) * np.cos(u / 0.05)],
+        )
+    ),
+    "quadric": lambda u, v: np.column_stack([u, v, TIP + 2 * u**2 - 3 * v**2]),
+    "sheet": lambda u, v: np.column_stack([u, v, TIP + 2e-3 * np.sin(u / 0.015) * np.cos(v / 0.02)]),
+}
+
+
+def _sweeps(centers: Callable[[FloatArray, FloatArray], FloatArray], bump: float = 0.0) -> Trace:
+    rng = np.random.default_rng(0)
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    turn = turn if turn[2, 2] > 0 else turn @ np.diag([1, 1, -1])
+    u = np.linspace(-0.05, 0.05, 1000)
+    points = np.concatenate([centers(u, np.full_like(u, v)) for v in np.linspace(-0.05, 0.05, 20)])
+    points[:, 2] += bump * np.tile(np.abs(u - 0.01) < 2e-3, 20)
+    points = points @ turn.T + NOISE * rng.normal(size=points.shape)
+    sweep = np.repeat(np.arange(20), 1000)
+    return Trace(np.arange(20000.0), points, sweep, TIP, normals=np.tile(turn[:, 2], (20000, 1)))
+
+
+@pytest.mark.parametrize("kind", CENTERS)
+def test_each_family_is_recognised_and_fits_to_the_noise(kind: str) -> None:
+    trace = _sweeps(CENTERS[kind])
+    base = fit_base(trace)
+    height = base.foot(trace.centers, TIP).height
+    assert base.kind == kind
+    assert abs(height.mean()) < 0.1 * NOISE
+    assert height.std() < 1.1 * NOISE
+
+
+def test_radii_of_fitted_bodies_are_the_truth_less_the_tip() -> None:
+    for kind in ("sphere", "cylinder"):
+        assert fit_base(_sweeps(CENTERS[kind])).parameters["radius"] == pytest.approx(BODY, abs=2e-5)
+
+
+def test_a_feature_does_not_bend_the_fitted_plane() -> None:
+    trace = _sweeps(CENTERS["plane"], bump=3e-4)
+    height = fit_base(trace).foot(trace.centers, TIP).height
+    assert abs(np.median(height)) < 0.2 * NOISE
+    assert height.max() == pytest.approx(3e-4, abs=5 * NOISE)
+
+
+def test_a_wire_does_not_bend_the_base_of_a_short_profile() -> None:
+    x = np.arange(-15e-3, 15e-3, 6e-6)
+    wire = np.clip(0.65e-3 - x**2 / (2 * 10.325e-3), 0, None)
+    trace = Trace.from_profile(x, 0.01 + wire + 2e-4 * np.random.default_rng(0).normal(size=len(x)), 0.01)
+    base = fit_base(trace)
+    assert base.kind == "profile"
+    error = base.foot(trace.centers, 0.01).height - (trace.centers[:, 2] - 0.01)
+    assert np.abs(error).max() < 6e-5
+
+
+def test_the_height_over_a_convex_edge_is_zero_on_the_trace_of_the_edge() -> None:
+    roof = Surface([[-1, -1, -1], [-1, 1, -1], [0, -1, 0], [0, 1, 0], [1, -1, -1], [1, 1, -1]], [
+        [0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5],
+    ])  # fmt: skip
+    angle = np.linspace(np.pi / 4, 3 * np.pi / 4, 50)
+    centers = 0.1 * np.column_stack([np.cos(angle), np.zeros(50), np.sin(angle)])
+    feet = Base(roof).foot(centers, 0.1)
+    assert np.abs(feet.height).max() < 1e-15
+    assert np.allclose(feet.points, 0, atol=1e-15)
+
+
+def test_below_the_surface_the_height_is_less_than_minus_the_tip_radius() -> None:
+    plate = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    feet = Base(plate).foot([[0.5, 0.5, -0.2], [0.5, 0.5, 0.0]], 0.01)
+    assert feet.height == pytest.approx([-0.21, -0.01])
+    assert np.allclose(feet.normals, [[0, 0, 1], [0, 0, 1]])
+
+
+def test_a_trace_in_one_place_has_no_base() -> None:
+    with pytest.raises(TraceError, match="different places"):
+        fit_base(Trace.from_profile(np.zeros(5), np.zeros(5), 1e-3))

@@ -1,0 +1,74 @@
+"""Coverage: how small a feature would have been found where, and how surely."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from explore3d.analysis.inspected import Inspected
+from hw.simulated.finger import SimulatedFinger
+from mapping.base.base import Base
+from mapping.detection.coverage import found_heights, found_probability
+from mapping.detection.detect import detect
+from mapping.geometry.templates.shapes import cap_height
+from mapping.instrument.noise import Noise
+from mapping.surface import Surface
+from mapping.trace import Trace
+from planners.survey.survey import Survey
+
+R = 0.01
+
+
+def plate(cells: int = 24) -> Surface:
+    x, y = (g.ravel() for g in np.meshgrid(*[np.linspace(0.0, 0.06, cells + 1)] * 2, indexing="ij"))
+    corner = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    faces = [np.column_stack([corner, corner + cells + 1, corner + 1])]
+    faces.append(np.column_stack([corner + cells + 1, corner + cells + 2, corner + 1]))
+    return Surface(np.column_stack([x, y, 0 * x]), np.concatenate(faces))
+
+
+def test_a_face_beside_a_sweep_hides_what_the_ball_passes_over() -> None:
+    surface = plate()
+    touched = np.column_stack([np.linspace(0, 0.06, 601), np.full(601, 0.03), np.zeros(601)])
+    height = found_heights(surface, touched, R, 1e-4)
+    middle = surface.vertices[surface.faces].mean(axis=1)
+    away = np.abs(surface.vertices[surface.faces][:, :, 1] - 0.03).max(axis=1)
+    near = away < 0.8 * R
+    exact, beyond = (1e-4 + R - np.sqrt(R**2 - (away[near] + more) ** 2) for more in (0.0, 0.1 * R))
+    assert (height[near] >= exact).all() and (height[near] <= beyond).all()
+    assert np.isinf(height[np.abs(middle[:, 1] - 0.03) > 1.1 * R]).all()
+    assert np.isinf(found_heights(surface, touched[:0], R, 1e-4)).all()
+
+
+def test_the_probability_of_finding_is_what_detection_does() -> None:
+    """Bumps beside a sweep in white noise: the predicted share is found."""
+    noise, spacing = Noise(1e-4), 4e-5
+    x = np.arange(-0.03, 0.03, spacing)
+    flat = Surface([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]], [[0, 1, 2], [0, 2, 3]])
+    base, rng = Base(flat), np.random.default_rng(1)
+    quiet = detect(Trace.from_profile(x, R + 1e-4 * rng.normal(size=len(x)), R), base, noise=noise)
+    limit, threshold = quiet.detection_limit, quiet.threshold
+    for height, aside in ((limit, 0.0), (2.0 * limit, 0.5e-3), (2.0 * limit, np.sqrt(2 * R * 1.15 * limit))):
+        predicted = float(found_probability(np.array([aside]), height, R, limit, threshold)[0])
+        found = 0
+        for _ in range(60):
+            cap = cap_height(np.sqrt(x**2 + aside**2), height, 1e-7, R)
+            trace = Trace.from_profile(x, R + cap + 1e-4 * rng.normal(size=len(x)), R)
+            crossings = detect(trace, base, noise=noise).crossings
+            found += any(abs(c.point[0]) < 2e-3 for c in crossings)
+        assert found / 60 == pytest.approx(predicted, abs=0.17), (height, aside)
+
+
+def test_a_survey_inspects_what_it_was_asked_for() -> None:
+    base = Base(plate())
+    finger = SimulatedFinger(object=base.surface, tip_radius=R, rate=2000.0, white=1e-4, seed=1)
+    trace = Trace.concatenate(
+        [finger.execute(move) for move in Survey(base=base, tip_radius=R, smallest=4e-4).sweeps()]
+    )
+    inspected = Inspected.of(trace, base, detect(trace, base), 4e-4)
+    assert inspected.share(4e-4) > 0.9 and inspected.untouched == 0.0
+    assert inspected.share(0.5 * inspected.limit) == 0.0
+    half = trace.select(trace.centers[:, 1] < 0.02)
+    part = Inspected.of(half, base, detect(half, base), 4e-4)
+    assert 0.2 < part.share(4e-4) < 0.5 and part.untouched > 0.4
+    assert "No sweep came near" in part.sentence()

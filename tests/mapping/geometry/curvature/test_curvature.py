@@ -1,0 +1,259 @@
+"""Curvature against closed forms, by both methods, and on meshes that libigl does not survive."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mapping.errors import CurvatureError, SurfaceError
+from mapping.geometry.curvature.principal_curvatures import principal_curvatures
+from mapping.geometry.templates.bump_of_revolution import BumpOfRevolution
+from mapping.surface import Surface
+
+
+def grid(function, count: int, half: float = 1.0) -> Surface:
+    x, y = (g.ravel() for g in np.meshgrid(*[np.linspace(-half, half, count)] * 2, indexing="ij"))
+    index = np.arange(count * count).reshape(count, count)
+    a, b, c, d = (i.ravel() for i in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    return Surface(np.column_stack([x, y, function(x, y)]), faces)
+
+
+def torus(big: float, small: float, around: int, across: int) -> tuple[Surface, np.ndarray]:
+    u, v = (
+        g.ravel()
+        for g in np.meshgrid(
+            np.arange(around) * 2 * np.pi / around, np.arange(across) * 2 * np.pi / across, indexing="ij"
+        )
+    )
+    points = np.column_stack(
+        [(big + small * np.cos(v)) * np.cos(u), (big + small * np.cos(v)) * np.sin(u), small * np.sin(v)]
+    )
+    a = np.arange(around * across).reshape(around, across)
+    b, d = np.roll(a, -1, 0), np.roll(a, -1, 1)
+    c = np.roll(b, -1, 1)
+    quads = [q.ravel() for q in (a, b, c, d)]
+    faces = np.concatenate([np.column_stack([quads[0], quads[1], quads[2]]), np.column_stack([quads[0], *quads[2:]])])
+    return Surface(points, faces), np.cos(v) / (big + small * np.cos(v))
+
+
+def test_a_jet_knows_the_curvatures_of_a_torus_with_the_outward_sign():
+    surface, k2 = torus(1.0, 0.4, 200, 80)
+    curvature = principal_curvatures(surface)
+    assert curvature.valid.all()
+    np.testing.assert_allclose(curvature.k1, 2.5, rtol=1e-3)
+    np.testing.assert_allclose(curvature.k2, k2, atol=3e-3)
+
+
+def crest_errors(counts, **settings) -> np.ndarray:
+    errors = []
+    for count in counts:
+        surface = grid(lambda x, y: 0.4 * np.exp(-3 * (x**2 + y**2)), count)
+        middle = np.argmin(np.linalg.norm(surface.vertices[:, :2], axis=1))
+        errors.append(abs(principal_curvatures(surface, noise=0.0, **settings).k1[middle] - 2.4))
+    return np.array(errors)
+
+
+@pytest.mark.parametrize(("degree", "neighbours"), [(2, 25), (4, 49), (6, 69)])
+def test_a_jet_on_a_symmetric_stencil_converges_with_the_order_of_its_degree(degree, neighbours):
+    errors = crest_errors((41, 81), degree=degree, neighbours=neighbours)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(degree, abs=0.35)
+
+
+def test_the_mean_of_jets_converges_no_slower_than_a_quartic():
+    errors = crest_errors((31, 61))
+    assert errors[1] < errors[0] / 2**4
+
+
+def bump(count: int, noise: float = 0.0) -> tuple[Surface, np.ndarray, np.ndarray, np.ndarray]:
+    """The paper's bump over a square of side 2, its curvatures, and which vertices are away from the border."""
+    surface = grid(lambda x, y: 1 / (1 + 15 * (x**2 + y**2)), count)
+    k = BumpOfRevolution(15.0).curvatures(np.linalg.norm(surface.vertices[:, :2], axis=1))
+    inside = (np.abs(surface.vertices[:, :2]) < 0.85).all(axis=1)
+    shaken = surface.vertices + 2 * noise * np.random.default_rng(0).standard_normal(surface.vertices.shape)
+    return Surface(shaken, surface.faces), np.maximum(*k), np.minimum(*k), inside
+
+
+@pytest.mark.parametrize(
+    ("noise", "median", "p95", "wrong"),
+    [(0.0, 3e-6, 3e-4, 0.0), (1e-4, 7e-4, 2e-3, 2e-3), (1e-3, 3e-3, 1.7e-2, 4e-3), (1e-2, 2e-2, 0.11, 0.02)],
+)
+def test_one_method_is_as_exact_at_every_noise_as_the_best_of_many(noise, median, p95, wrong):
+    surface, k1, k2, inside = bump(100, noise)
+    found = principal_curvatures(surface)
+    error = np.maximum(np.abs(found.k1 - k1), np.abs(found.k2 - k2))[inside] / 30
+    assert np.median(error) <= median
+    assert np.quantile(error, 0.95) <= p95
+    finer = np.abs(found.largest) > 10
+    assert (finer != (np.maximum(np.abs(k1), np.abs(k2)) > 10))[inside].mean() <= wrong
+
+
+def test_a_jet_that_cannot_be_is_refused_by_name():
+    surface = grid(lambda x, y: x * y, 12)
+    with pytest.raises(CurvatureError, match="2, 4 or 6"):
+        principal_curvatures(surface, degree=3)
+    with pytest.raises(CurvatureError, match="at least 19"):
+        principal_curvatures(surface, degree=4, neighbours=18)
+
+
+def test_curvature_is_the_same_surface_scaled_from_nanometres_to_kilometres():
+    surface = grid(lambda x, y: 0.3 * x**2 - 0.2 * y**2 + 0.1 * x**3, 25)
+    plain = principal_curvatures(surface)
+    for power in (-30, 10):
+        scaled = principal_curvatures(Surface(surface.vertices * 2.0**power, surface.faces))
+        np.testing.assert_array_equal(scaled.k1, plain.k1 / 2.0**power)
+
+
+def test_a_million_metres_from_the_origin_cost_only_their_rounding():
+    surface = grid(lambda x, y: 0.5 * x**2, 25)
+    far = principal_curvatures(Surface(surface.vertices + np.array([1e6, -1e6, 1e6]), surface.faces))
+    inside = (np.abs(surface.vertices[:, :2]) < 0.7).all(axis=1)
+    near = principal_curvatures(surface)
+    # 1.2e-10 m of rounding over the square of a neighbourhood of 0.25 m, times the condition of a quartic fit
+    np.testing.assert_allclose(far.k2[inside], near.k2[inside], atol=1e-6)
+
+
+def test_noise_widens_the_neighbourhood_and_the_standard_deviation_is_honest():
+    rng = np.random.default_rng(3)
+    surface = grid(lambda x, y: -0.5 * (x**2 + y**2) / 2, 50)
+    noisy = Surface(surface.vertices + np.array([0, 0, 1e-3]) * rng.standard_normal((2500, 1)), surface.faces)
+    curvature = principal_curvatures(noisy)
+    inside = (np.abs(surface.vertices[:, :2]) < 0.6).all(axis=1)
+    radius2 = (surface.vertices[:, :2] ** 2).sum(axis=1)
+    truth = 0.5 * (0.5 / (1 + 0.25 * radius2) ** 1.5 + 0.5 / np.sqrt(1 + 0.25 * radius2))
+    error = (0.5 * (curvature.k1 + curvature.k2) - truth)[inside]
+    assert np.abs(error).max() < 0.1
+    assert 0.3 < np.sqrt(np.mean((error / curvature.sd[inside]) ** 2)) < 1.5
+
+
+def test_a_sphere_has_curvature_but_no_principal_directions():
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=2.0)
+    rng = np.random.default_rng(0)
+    vertices = ball.vertices * (1 + 1e-4 * rng.standard_normal((len(ball.vertices), 1)))
+    curvature = principal_curvatures(Surface(vertices, ball.faces))
+    np.testing.assert_allclose(np.median(curvature.k1), 0.5, rtol=0.02)
+    assert np.isnan(curvature.d1).all(axis=1).mean() > 0.5
+
+
+def test_libigl_behind_the_guard_says_exactly_what_it_says_alone():
+    import igl
+
+    surface, _ = torus(1.0, 0.4, 40, 24)
+    guarded = principal_curvatures(surface, "libigl")
+    alone = igl.principal_curvature(surface.vertices, surface.faces)
+    np.testing.assert_array_equal(guarded.k1, alone[2])
+    np.testing.assert_array_equal(guarded.k2, alone[3])
+    assert guarded.valid.all()
+
+
+def tetrahedron(offset: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]) + offset
+    return vertices, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+
+
+def quarter_cylinder() -> Surface:
+    angle, z = (g.ravel() for g in np.meshgrid(np.linspace(0, np.pi / 2, 4), [0.0, 1.0], indexing="ij"))
+    index = np.arange(8).reshape(4, 2)
+    a, b, c, d = (i.ravel() for i in (index[:-1, 0], index[1:, 0], index[1:, 1], index[:-1, 1]))
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    return Surface(np.column_stack([np.cos(angle), np.sin(angle), z]), faces)
+
+
+@pytest.mark.parametrize("method", ["jet", "libigl"])
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        Surface(*tetrahedron()),
+        Surface(np.eye(3), [[0, 1, 2]]),
+        Surface(np.zeros((3, 3)), [[0, 1, 2]]),
+        quarter_cylinder(),
+        Surface(np.column_stack([np.arange(30.0), np.zeros(30), np.zeros(30)]), [[i, i + 1, i + 2] for i in range(28)]),
+    ],
+    ids=["tetrahedron", "one triangle", "one point", "quarter cylinder", "collinear strip"],
+)
+def test_too_little_to_fit_gives_no_value_and_no_crash(mesh, method):
+    curvature = principal_curvatures(mesh, method)
+    assert not curvature.valid.any()
+    assert np.isnan(curvature.k1).all()
+
+
+@pytest.mark.parametrize("method", ["jet", "libigl"])
+def test_vertices_of_no_face_and_tiny_components_say_so_while_the_rest_is_trusted(method):
+    surface, _ = torus(1.0, 0.4, 30, 20)
+    extra, faces = tetrahedron(5.0)
+    count = len(surface.vertices)
+    vertices = np.concatenate([surface.vertices, extra, [[9.0, 9.0, 9.0]]])
+    together = Surface(vertices, np.concatenate([surface.faces, faces + count]))
+    curvature = principal_curvatures(together, method)
+    assert not curvature.valid[-1]
+    assert curvature.valid[:count].all()
+    if method == "libigl":
+        assert not curvature.valid[count:].any()
+
+
+def test_inconsistent_winding_is_not_trusted_to_libigl():
+    surface, _ = torus(1.0, 0.4, 30, 20)
+    faces = surface.faces.copy()
+    faces[::7] = faces[::7, ::-1]
+    assert not principal_curvatures(Surface(surface.vertices, faces), "libigl").valid.any()
+
+
+def test_degenerate_faces_do_not_spoil_their_neighbours():
+    surface, _ = torus(1.0, 0.4, 30, 20)
+    faces = np.concatenate([surface.faces, [[0, 0, 1], [2, 3, 3]]])
+    curvature = principal_curvatures(Surface(surface.vertices, faces), "libigl")
+    np.testing.assert_array_equal(curvature.k1, principal_curvatures(surface, "libigl").k1)
+
+
+def test_inconsistent_winding_does_not_turn_a_jets_sign():
+    surface, _ = torus(1.0, 0.4, 100, 40)
+    faces = surface.faces.copy()
+    faces[::7] = faces[::7, ::-1]
+    found = principal_curvatures(Surface(surface.vertices, faces))
+    np.testing.assert_allclose(found.k1[found.valid], 2.5, rtol=0.05)
+
+
+@pytest.mark.parametrize("method", ["jet", "libigl"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_no_number_that_is_not_finite_reaches_a_fit(method, bad):
+    vertices = torus(1.0, 0.4, 30, 20)[0].vertices.copy()
+    vertices[5, 1] = bad
+    with pytest.raises(SurfaceError):
+        principal_curvatures(Surface(vertices, torus(1.0, 0.4, 30, 20)[0].faces), method)
+    with pytest.raises(CurvatureError):
+        principal_curvatures(vertices, method)
+
+
+def test_a_last_vertex_of_no_face_does_not_end_the_process_when_libigl_counts_distance():
+    surface, _ = torus(1.0, 0.4, 30, 20)
+    lonely = Surface(np.vstack([surface.vertices, [9.0, 9.0, 9.0]]), surface.faces)
+    found = principal_curvatures(lonely, "libigl", rings=False, radius=3)
+    assert found.valid[:-1].all()
+    assert not found.valid[-1]
+
+
+def test_skinny_triangles_do_not_turn_a_jets_sign():
+    angle, z = (g.ravel() for g in np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(0, 1, 400), indexing="ij"))
+    a = np.arange(24 * 400).reshape(24, 400)
+    b, c, d = np.roll(a, -1, 0)[:, :-1], np.roll(a, -1, 0)[:, 1:], a[:, 1:]
+    quads = [q.ravel() for q in (a[:, :-1], b, c, d)]
+    faces = np.concatenate([np.column_stack(quads[:3]), np.column_stack([quads[0], *quads[2:]])])
+    found = principal_curvatures(Surface(np.column_stack([np.cos(angle), np.sin(angle), z]), faces))
+    sure = found.valid & (found.sd < 0.1)
+    assert (found.k1[sure] > 0.5).all()
+
+
+def test_bad_input_is_refused_by_name():
+    surface, _ = torus(1.0, 0.4, 30, 20)
+    with pytest.raises(CurvatureError, match="at least 2"):
+        principal_curvatures(surface, "libigl", radius=1)
+    with pytest.raises(CurvatureError, match="jet, libigl"):
+        principal_curvatures(surface, "best")
+    with pytest.raises(CurvatureError, match="finite"):
+        principal_curvatures(np.array([[np.nan, 0, 0]]))
+    with pytest.raises(SurfaceError):
+        principal_curvatures(Surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=int)))
+    with pytest.raises(SurfaceError):
+        principal_curvatures(Surface(np.eye(3), [[0, 1, 9]]))

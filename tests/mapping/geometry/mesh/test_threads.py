@@ -1,0 +1,45 @@
+"""Row shares: the same rows, bit for bit, however the work on them is divided."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from mapping.geometry.mesh import threads as row_shares
+from mapping.geometry.mesh.threads import by_shares
+
+
+def squares(rows: np.ndarray) -> np.ndarray:
+    return np.asarray((rows**2).sum(axis=1))
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 100])
+def test_divided_work_is_the_work_at_once(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(row_shares, "cores", lambda: 3)
+    rows = np.random.default_rng(1).normal(size=(count, 4))
+    assert np.array_equal(by_shares(squares, rows, 10**6), squares(rows))
+
+
+def test_little_work_starts_no_thread_and_much_work_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(row_shares, "cores", lambda: 2)
+    seen: list[str] = []
+
+    def work(rows: np.ndarray) -> np.ndarray:
+        seen.append(threading.current_thread().name)
+        return squares(rows)
+
+    rows = np.ones((10, 2))
+    by_shares(work, rows, 10)
+    assert seen == [threading.main_thread().name]
+    by_shares(work, rows, 10**6)
+    assert len(seen) == 3 and threading.main_thread().name not in seen[1:]
+
+
+def test_an_error_in_a_share_comes_out() -> None:
+    def fails(rows: np.ndarray) -> np.ndarray:
+        raise ValueError("bad row")
+
+    with pytest.raises(ValueError, match="bad row"):
+        by_shares(fails, np.ones((10, 2)), 10**6)

@@ -1,0 +1,42 @@
+"""The chart of a line on the base: its points lie apart, also where the base ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mapping.base.base import Base
+from mapping.errors import EmptyWindowError
+from mapping.inference.curves.chart import chart_along
+from mapping.surface import Surface
+
+TIP = 0.01
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def plate() -> Base:
+    corners = 0.03 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    return Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
+
+
+def along(start: float, stop: float, y: float = 0.0):
+    axis = np.linspace([start, y, 0.0], [stop, y, 0.0], 5)
+    return chart_along(axis, np.tile(UP, (5, 1)), plate(), TIP, 1e-3, 0.01, 3.6e-3)
+
+
+def test_a_chart_goes_on_straight_beyond_both_ends() -> None:
+    chart = along(-0.01, 0.01)
+    assert chart.points[:, 0].min() == pytest.approx(-0.02) and chart.points[:, 0].max() == pytest.approx(0.02)
+    assert (np.diff(chart.s) > 0).all()
+
+
+def test_a_chart_ends_where_the_base_does_and_its_points_stay_apart() -> None:
+    chart = along(0.0, 0.029)
+    assert chart.points[:, 0].max() <= 0.03 + 1e-12
+    assert (np.diff(chart.s) > 0).all() and np.isfinite(chart.tangents).all()
+
+
+def test_a_line_that_does_not_lie_over_the_base_has_none() -> None:
+    axis = np.linspace([0.05, 0.05, 0.0], [0.06, 0.06, 0.0], 5)
+    with pytest.raises(EmptyWindowError, match="does not lie over the base"):
+        chart_along(axis, np.tile(UP, (5, 1)), plate(), TIP, 1e-3, 0.01, 3.6e-3)
