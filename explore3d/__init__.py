@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     )
     from explore3d.units import (
         UNITS as UNITS,
-        UNKNOWN as UNKNOWN,
+        UNKNOWN_TEXT as UNKNOWN_TEXT,
         count_text as count_text,
         interval_text as interval_text,
         length_text as length_text,
@@ -36,7 +36,7 @@ _PUBLIC = {
     "errors": ("FolderError", "MeshFileError", "PointCloudError", "SceneError", "UnitError", "UserError"),
     "units": (
         "UNITS",
-        "UNKNOWN",
+        "UNKNOWN_TEXT",
         "count_text",
         "interval_text",
         "length_text",

@@ -134,7 +134,7 @@ def _example(dimension: str) -> str:
 
 
 LENGTH_UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
-UNKNOWN = "–"
+UNKNOWN_TEXT = "–"
 
 
 def length_unit(size: float) -> tuple[float, str]:
@@ -148,7 +148,7 @@ def length_unit(size: float) -> tuple[float, str]:
 def length_text(value: float, digits: int = 3) -> str:
     """A length such as "0.65 mm", to so many significant digits."""
     if not math.isfinite(value):
-        return UNKNOWN
+        return UNKNOWN_TEXT
     factor, name = length_unit(value)
     return f"{_rounded(value / factor, digits)} {name}"
 
@@ -156,7 +156,7 @@ def length_text(value: float, digits: int = 3) -> str:
 def interval_text(interval: Interval) -> tuple[str, str]:
     """The median with its unit, and the 90 % range ("0.64 to 0.66"); censored ones read "at least"."""
     if not math.isfinite(interval.median):
-        return UNKNOWN, ""
+        return UNKNOWN_TEXT, ""
     factor, name = length_unit(interval.median)
     if interval.censored:
         return f"at least {_rounded(interval.low / factor, 3)} {name}", ""
@@ -172,7 +172,7 @@ def interval_text(interval: Interval) -> tuple[str, str]:
 def seconds_text(seconds: float) -> str:
     """A duration: "12 ms", "3.4 s", "2 min 05 s"."""
     if not math.isfinite(seconds):
-        return UNKNOWN
+        return UNKNOWN_TEXT
     if seconds < 0.0995:
         return f"{1e3 * seconds:.2g} ms" if seconds >= 1e-4 else "under 0.1 ms"
     if seconds < 99.5:

@@ -8,7 +8,7 @@ import numpy as np
 
 from mapping.arrays import FloatArray
 
-STATUSES = ("converged", "chain too short", "stuck", "not needed")
+POSTERIOR_STATUSES = ("converged", "chain too short", "stuck", "not needed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class Posterior:
         samples: (S, P) draws, thinned to nearly independent ones.
         tau: largest integrated autocorrelation time of the chain, steps; NaN if no chain ran.
         acceptance: acceptance fraction of the chain; NaN if no chain ran.
-        status: one of STATUSES; "not needed" means that Laplace with importance sampling sufficed.
+        status: one of POSTERIOR_STATUSES; "not needed" means that Laplace with importance sampling sufficed.
         reason: one sentence saying why the status is what it is.
         k_hat: Pareto shape of the importance weights of the Laplace approximation, NaN if not computed.
         ess: effective number of independent draws behind `samples`.

@@ -10,7 +10,7 @@ from mapping import Trace, TraceError
 from planners.plan import Outcome, Plan
 
 # After so many refusals in a row the finger is taken for lost, and the plan for one that cannot be carried out
-PATIENCE, FORBIDDEN = 5, 100
+MOST_REFUSALS, FORBIDDEN = 5, 100
 
 Check = Callable[[Move, Move | None], str | None]
 
@@ -54,7 +54,7 @@ def drive(
             if trace is None:
                 if note:
                     note(f"{move.purpose} not executed: {reason}" if forbidden else f"{move.purpose} failed: {reason}")
-                if refused >= PATIENCE or forbidden >= FORBIDDEN or (not record and empty is None):
+                if refused >= MOST_REFUSALS or forbidden >= FORBIDDEN or (not record and empty is None):
                     plan.close()
                     return record, Outcome("finger refuses", f"{_moves(max(refused, forbidden))} refused: {reason}")
                 trace = empty if empty is not None else record[-1][1].select(slice(0, 0))

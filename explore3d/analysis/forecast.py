@@ -13,10 +13,10 @@ from explore3d.analysis.truth import Comparison
 from mapping import Feature
 
 # Width of a central 90 % interval of a Gaussian, in standard deviations
-NINETY = 3.2897
+SDS_PER_90_INTERVAL = 3.2897
 # Points of the run's own curve that a slope needs, and the slopes that are believed
-FEWEST = 4
-STEEPEST = 2.0
+FEWEST_SLOPE_POINTS = 4
+STEEPEST_ERROR_SLOPE = 2.0
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ def forecast(analysis: Analysis) -> Forecast | None:
     if not analysis.model.features or seconds <= 0:
         return None
     curve = [(t, e) for t, e in analysis.time_curve if t > 0 and e > 0]
-    if len(curve) >= FEWEST:
+    if len(curve) >= FEWEST_SLOPE_POINTS:
         t, e = np.log(np.array(curve)).T
-        exponent = float(np.clip(-np.polyfit(t, e, 1)[0], 0.0, STEEPEST))
+        exponent = float(np.clip(-np.polyfit(t, e, 1)[0], 0.0, STEEPEST_ERROR_SLOPE))
         how = f"by the slope of this run's own error over time, {len(curve)} moments of it"
         return _spread(seconds, curve[-1][1], exponent, how)
     sd = _largest_sd(analysis.model.features)
@@ -87,6 +87,6 @@ def _spread(seconds: float, error: float, exponent: float, how: str) -> Forecast
 
 def _largest_sd(features: Sequence[Feature]) -> float:
     """The largest standard deviation (m) of a place or a height."""
-    sizes = [(each.height.high - each.height.low) / NINETY for each in features]
+    sizes = [(each.height.high - each.height.low) / SDS_PER_90_INTERVAL for each in features]
     places = [each.position_sd for each in features]
     return float(max(value for value in (*sizes, *places) if np.isfinite(value)))

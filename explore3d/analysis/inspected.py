@@ -17,7 +17,7 @@ from mapping.detection import Detections, found_heights
 from mapping.estimate.envelope import Estimate
 from mapping.estimate.sweeps import EXTRAPOLATED, pitch
 
-CELLS = 20_000
+MOST_INSPECTED_CELLS = 20_000
 # Heights that the record states the inspected share for, in detection limits
 STATED = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
 
@@ -48,7 +48,7 @@ class Inspected:
         if base.kind == "profile":  # a strip as wide as one likes: all of it lies under the one sweep
             height = np.full(len(base.surface.faces), limit)
             return cls(height, base.surface.face_areas, limit, detections.probability, asked)
-        places = base.foot(Cells.of(trace, CELLS).centers, trace.tip_radius).points
+        places = base.foot(Cells.of(trace, MOST_INSPECTED_CELLS).centers, trace.tip_radius).points
         if not np.isfinite(limit):
             places = places[:0]
         height = found_heights(base.surface, places, trace.tip_radius, limit)
@@ -89,7 +89,7 @@ class Inspected:
 
 
 # A vertex takes the label of the nearest estimated point within this many distances between points or sweeps.
-NEAR = 3.0
+TOUCHED_REACH = 3.0
 
 
 def base_reach(surface: Surface, estimate: Estimate) -> FloatArray:
@@ -98,6 +98,6 @@ def base_reach(surface: Surface, estimate: Estimate) -> FloatArray:
 
     tree = cKDTree(estimate.points)
     apart = np.asarray(tree.query(estimate.points, k=[2])[0])
-    reach = NEAR * max(float(np.median(apart)), pitch(estimate.points, estimate.sweep))
+    reach = TOUCHED_REACH * max(float(np.median(apart)), pitch(estimate.points, estimate.sweep))
     distance, nearest = tree.query(surface.vertices)
     return np.where(distance <= reach, estimate.labels[nearest].astype(np.float64), float(EXTRAPOLATED))

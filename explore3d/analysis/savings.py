@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from explore3d.scene import Scene
 
 # Cost of a stage over that of detection
-RATIOS = {
+STAGE_COST_RATIOS = {
     "base fit": 0.3,
     "algorithms 1 and 2": 0.6,
     "grammar": 0.4,
@@ -41,8 +41,10 @@ def with_savings(left_out: Sequence[LeftOut], timings: Mapping[str, float]) -> t
 def _estimate(stage: str, timings: Mapping[str, float]) -> str:
     if stage == "long chain":
         return _about(CHAIN * timings.get("posterior", 0.0), "4 times the fast path")
-    if stage in RATIOS and "detection" in timings:
-        return _about(RATIOS[stage] * timings["detection"], f"{RATIOS[stage]:g} times the detection")
+    if stage in STAGE_COST_RATIOS and "detection" in timings:
+        return _about(
+            STAGE_COST_RATIOS[stage] * timings["detection"], f"{STAGE_COST_RATIOS[stage]:g} times the detection"
+        )
     return ""
 
 

@@ -11,7 +11,7 @@ from explore3d import UserError
 from mapping import LeftOut
 
 # Stages that a job may leave out, and that can be forced back in
-OPTIONAL = (
+OPTIONAL_STAGES = (
     "dynamics",
     "base fit",
     "pose",
@@ -39,7 +39,7 @@ class Stages:
 
     Args:
         progress: told what is under way.
-        forced: names of stages, of OPTIONAL, to run even where the scene does not need them.
+        forced: names of stages, of OPTIONAL_STAGES, to run even where the scene does not need them.
 
     Raises:
         UserError: a stage to be forced that there is not.
@@ -52,8 +52,8 @@ class Stages:
 
     def __post_init__(self) -> None:
         for name in self.forced:
-            if name not in OPTIONAL:
-                raise UserError(f"no stage {name!r} to force; possible: {', '.join(OPTIONAL)}")
+            if name not in OPTIONAL_STAGES:
+                raise UserError(f"no stage {name!r} to force; possible: {', '.join(OPTIONAL_STAGES)}")
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Callable[[float], None]]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from explore3d.analysis.truth import SAMPLES, Comparison, TrueFeature, compare
+from explore3d.analysis.truth import AXIS_SAMPLES, Comparison, TrueFeature, compare
 from mapping import Trace
 from mapping.assembly import assemble
 from mapping.detection import Detections
@@ -68,5 +68,5 @@ def _distance(row: Comparison) -> float:
     axes = row.true.axis, row.found.axis
     return max(
         float(np.linalg.norm(points - nearest_on(points, other)[0], axis=1).max())
-        for points, other in ((resample(axes[0], SAMPLES), axes[1]), (resample(axes[1], SAMPLES), axes[0]))
+        for points, other in ((resample(axes[0], AXIS_SAMPLES), axes[1]), (resample(axes[1], AXIS_SAMPLES), axes[0]))
     )

@@ -14,10 +14,10 @@ from mapping import Feature, FloatArray, Interval
 from mapping.geometry.mesh import arclengths, directions, nearest_on, resample
 from mapping.model import ObjectModel
 
-STATUSES = ("found", "missed", "invented")
+MATCH_STATUSES = ("found", "missed", "invented")
 
 # Points at which two axes are compared.
-SAMPLES = 201
+AXIS_SAMPLES = 201
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class Comparison:
     """One true feature beside the found one, or either alone.
 
     Args:
-        status: one of STATUSES; "invented" was found but is not there.
+        status: one of MATCH_STATUSES; "invented" was found but is not there.
         true, found: the two features, None where there is none.
         axis_rms, axis_max: distance of the found axis from the true one across it, m; for point features the
             distance between the points.
@@ -127,7 +127,7 @@ def _cost(found: Feature, true: TrueFeature, tip_radius: float, far: float) -> f
 
 
 def _dense(axis: FloatArray) -> FloatArray:
-    return resample(axis, SAMPLES) if len(axis) > 1 else axis
+    return resample(axis, AXIS_SAMPLES) if len(axis) > 1 else axis
 
 
 def _mean_distance(points: FloatArray, axis: FloatArray) -> float:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     )
     from explore3d.bench.explore_curves import write_curves as write_curves
     from explore3d.bench.exploring import (
-        NOISES as NOISES,
+        FINGER_NOISES as FINGER_NOISES,
         STRATEGIES as STRATEGIES,
         bench_exploring as bench_exploring,
         one_run as one_run,
@@ -40,7 +40,7 @@ _PUBLIC = {
     "curvature": ("CurvatureError", "available", "bench_curvature", "curvature_table", "write_bench"),
     "dynamics": ("dynamics_curve", "dynamics_table", "wire_trace"),
     "explore_curves": ("write_curves",),
-    "exploring": ("NOISES", "STRATEGIES", "bench_exploring", "one_run", "records"),
+    "exploring": ("FINGER_NOISES", "STRATEGIES", "bench_exploring", "one_run", "records"),
     "figures": ("write_figures",),
     "scaling": ("AXES", "bench_scaling", "scaling_lines"),
     "trace": ("bench_trace", "bump_mesh", "by_opencamlib", "trace_table"),

@@ -23,14 +23,14 @@ from mapping import FloatArray, Surface, Trace
 from mapping.detection import along_chord, curvature_profile
 from mapping.geometry.mesh import write_whole
 
-TIP, RATE, SPEED, FORCE = 10e-3, 5000.0, 0.03, 1.0
+TIP_RADIUS, SAMPLE_RATE, SPEED, FORCE = 10e-3, 5000.0, 0.03, 1.0
 CENTRE, CONTACT, ANGLE = 0.2e-3, 0.5e-3, np.radians(1.0)
 TILT = np.radians(45.0)
 WIRES = (0.5e-3, 0.65e-3, 1.0e-3, 1.5e-3)
 WIRE = 0.65e-3
 # A slide is as long as one likes; a roll ends where the contact leaves the tip's field of +-75 degrees.
-LENGTHS = {"rolling": 2 * np.radians(75.0) * TIP, "sliding": 60e-3}
-NAMES = {
+MOTION_LENGTHS = {"rolling": 2 * np.radians(75.0) * TIP_RADIUS, "sliding": 60e-3}
+ALGORITHM_NAMES = {
     1: "1: surface from contacts",
     2: "2: derivative of the normal",
     3: "3: traced surface",
@@ -38,10 +38,10 @@ NAMES = {
 }
 # Algorithm 2 with the threshold that the paper gives for all surfaces, which no convex trace can pass.
 PAPERS = 20
-COLUMNS = {**NAMES, PAPERS: "2 with the threshold 1/r"}
+ALGORITHM_COLUMNS = {**ALGORITHM_NAMES, PAPERS: "2 with the threshold 1/r"}
 HALF_PLATE = 50e-3
 # Facets so narrow that even the finest fit spans several.
-SIDES = 720
+WIRE_FACETS = 720
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,9 @@ def tilted_plate(wire: float) -> Surface:
     """A plate through the origin, tilted about y, with a wire of that diameter along y, m."""
     corners = HALF_PLATE * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
     axis = np.array([[0.0, -0.8 * HALF_PLATE, wire / 2], [0.0, 0.8 * HALF_PLATE, wire / 2]])
-    flat = joined((corners, np.array([[0, 1, 2], [0, 2, 3]])), tube(axis, np.array([0.0, 0.0, 1.0]), wire / 2, SIDES))
+    flat = joined(
+        (corners, np.array([[0, 1, 2], [0, 2, 3]])), tube(axis, np.array([0.0, 0.0, 1.0]), wire / 2, WIRE_FACETS)
+    )
     return Surface(flat.vertices @ _tilt().T, flat.faces)
 
 
@@ -82,22 +84,23 @@ def crossing(motion: str, wire: float, seed: int | None = 0) -> Trace:
     The tip comes from straight above, as the paper's did, so that the plate touches it 45 degrees off its pole.
     """
     noise = {} if seed is None else {"white": CENTRE, "contact": CONTACT, "angle": float(ANGLE), "seed": seed}
-    with SimulatedFinger(object=tilted_plate(wire), tip_radius=TIP, rate=RATE, contact_data=True, **noise) as finger:  # type: ignore[arg-type]
-        half = LENGTHS[motion] / 2
-        path = np.array([[-half, 0.0, TIP], [half, 0.0, TIP]]) @ _tilt().T
+    settings: dict[str, Any] = noise | {"rate": SAMPLE_RATE, "contact_data": True}
+    with SimulatedFinger(object=tilted_plate(wire), tip_radius=TIP_RADIUS, **settings) as finger:
+        half = MOTION_LENGTHS[motion] / 2
+        path = np.array([[-half, 0.0, TIP_RADIUS], [half, 0.0, TIP_RADIUS]]) @ _tilt().T
         return finger.execute(Move(path, np.array([0.0, 0.0, -1.0]), SPEED, FORCE))
 
 
 def findings(wires: Sequence[float] = WIRES, seeds: int = 20) -> list[Finding]:
     """Every algorithm on every wire and motion, without errors and with the apparatus' errors over some seeds."""
     found = []
-    for motion in LENGTHS:
+    for motion in MOTION_LENGTHS:
         for wire in wires:
             for noise in (False, True):
                 traces = [crossing(motion, wire, seed) for seed in range(seeds)] if noise else [_exact(motion, wire)]
-                for algorithm in COLUMNS:
+                for algorithm in ALGORITHM_COLUMNS:
                     counts = np.mean([_counted(trace, wire, algorithm) for trace in traces], axis=0)
-                    false = float(counts[2]) / LENGTHS[motion]
+                    false = float(counts[2]) / MOTION_LENGTHS[motion]
                     found.append(Finding(motion, wire, algorithm, noise, float(counts[0]), float(counts[1]), false))
     return found
 
@@ -110,10 +113,10 @@ def _counted(trace: Trace, wire: float, algorithm: int) -> tuple[float, float, i
     """Crest found (0 or 1), share of the two interference points found, and features elsewhere."""
     profile = curvature_profile(trace, 2 if algorithm == PAPERS else algorithm)
     if algorithm == PAPERS:
-        profile = replace(profile, convex=1 / TIP)
+        profile = replace(profile, convex=1 / TIP_RADIUS)
     middle = float(along_chord(trace, np.array([[0.0, 0.0, 0.0]]))[0])
     # the kinks of the trace stand where the ball touches plate and wire at once (theory section 4)
-    reach = np.sqrt(2 * TIP * wire)
+    reach = np.sqrt(2 * TIP_RADIUS * wire)
     blur = 2 * profile.half_width + 3 * (CONTACT if algorithm == 1 else CENTRE)
     convex, sides, elsewhere = False, set(), 0
     for feature in profile.features:
@@ -130,11 +133,11 @@ def _counted(trace: Trace, wire: float, algorithm: int) -> tuple[float, float, i
 
 def findings_table(found: Sequence[Finding]) -> str:
     """The findings as a table in markdown: one line a motion and wire, one column an algorithm."""
-    head = "| motion | wire | errors | " + " | ".join(COLUMNS.values()) + " |"
-    lines = [head, "|" + "---|" * (3 + len(COLUMNS))]
+    head = "| motion | wire | errors | " + " | ".join(ALGORITHM_COLUMNS.values()) + " |"
+    lines = [head, "|" + "---|" * (3 + len(ALGORITHM_COLUMNS))]
     for motion, wire, noise in dict.fromkeys((f.motion, f.wire, f.noise) for f in found):
         cells = []
-        for algorithm in COLUMNS:
+        for algorithm in ALGORITHM_COLUMNS:
             f = next(f for f in found if (f.motion, f.wire, f.noise, f.algorithm) == (motion, wire, noise, algorithm))
             cells.append(f"+ {100 * f.convex:.0f} %, - {100 * f.concave:.0f} %, {f.false:.1f} false/m")
         errors = "apparatus" if noise else "none"
@@ -160,8 +163,8 @@ def write_apparatus(out: Path, seeds: int = 20) -> tuple[list[Path], str]:
 def recorded() -> Any:
     """Figure 7: centres, contact points and contact angles of one crossing, rolled and slid."""
     figure = new_figure(9.0, 6.2)
-    panels = figure.subplots(2, 2, width_ratios=[LENGTHS["rolling"], LENGTHS["sliding"]], sharex="col")
-    for column, motion in enumerate(LENGTHS):
+    panels = figure.subplots(2, 2, width_ratios=[MOTION_LENGTHS["rolling"], MOTION_LENGTHS["sliding"]], sharex="col")
+    for column, motion in enumerate(MOTION_LENGTHS):
         noisy, exact = crossing(motion, WIRE), _exact(motion, WIRE)
         over, under = panels[:, column]
         for trace, centre, contact, size in ((noisy, TRACED, BAND, 1.0), (exact, INK, ESTIMATED, 0.0)):
@@ -190,23 +193,25 @@ def recorded() -> Any:
 def compared() -> Any:
     """Figure 8: the curvature that each algorithm tests, its thresholds, and the features that it reports."""
     figure = new_figure(9.0, 8.6)
-    panels = figure.subplots(len(NAMES), 2, sharex="col", width_ratios=[LENGTHS["rolling"], LENGTHS["sliding"]])
-    for column, motion in enumerate(LENGTHS):
+    panels = figure.subplots(
+        len(ALGORITHM_NAMES), 2, sharex="col", width_ratios=[MOTION_LENGTHS["rolling"], MOTION_LENGTHS["sliding"]]
+    )
+    for column, motion in enumerate(MOTION_LENGTHS):
         noisy = crossing(motion, WIRE)
         middle = float(along_chord(noisy, np.array([[0.0, 0.0, 0.0]]))[0])
-        for row, algorithm in enumerate(NAMES):
+        for row, algorithm in enumerate(ALGORITHM_NAMES):
             axes, profile = panels[row, column], curvature_profile(noisy, algorithm)
-            axes.axhspan(profile.concave * TIP, profile.convex * TIP, color=FAINT, lw=0)
-            axes.plot(1e3 * (profile.s - middle), profile.curvature * TIP, color=INK, lw=1.1)
+            axes.axhspan(profile.concave * TIP_RADIUS, profile.convex * TIP_RADIUS, color=FAINT, lw=0)
+            axes.plot(1e3 * (profile.s - middle), profile.curvature * TIP_RADIUS, color=INK, lw=1.1)
             for feature in profile.features:
                 colour = ESTIMATED if feature.sign > 0 else TRACED
                 axes.axvspan(
                     1e3 * (feature.start - middle), 1e3 * (feature.stop - middle), color=colour, alpha=0.35, lw=0
                 )
             for side in (-1, 1):
-                axes.axvline(1e3 * side * np.sqrt(2 * TIP * WIRE), color=TRUTH, lw=0.8, ls=(0, (3, 2)))
-            axes.set_ylim(*(np.array([-1.15, 1.15]) * max(1.6, float(np.abs(profile.curvature * TIP).max()))))
-            axes.set_title(f"{motion}, {NAMES[algorithm]}")
+                axes.axvline(1e3 * side * np.sqrt(2 * TIP_RADIUS * WIRE), color=TRUTH, lw=0.8, ls=(0, (3, 2)))
+            axes.set_ylim(*(np.array([-1.15, 1.15]) * max(1.6, float(np.abs(profile.curvature * TIP_RADIUS).max()))))
+            axes.set_title(f"{motion}, {ALGORITHM_NAMES[algorithm]}")
         panels[-1, column].set_xlabel("along the plate, from the wire [mm]")
     for axes in panels[:, 0]:
         axes.set_ylabel("curvature × r")

@@ -24,14 +24,14 @@ from mapping.geometry.mesh import write_whole
 from mapping.geometry.templates import BumpOfRevolution
 
 # Both bodies measure 2 across; noise is isotropic and given as a share of that.
-SIZE = 2.0
-SHARPNESS = 15.0
+BODY_SIZE = 2.0
+STEEPNESS = 15.0
 TORUS = (5 / 7, 2 / 7)
-NOISES = (0.0, 1e-4, 1e-3, 1e-2)
+RELATIVE_NOISES = (0.0, 1e-4, 1e-3, 1e-2)
 # The bump is judged where |x| and |y| are below this: its border has neighbours on one side only.
 INTERIOR = 0.85
-TIP = 0.1
-LARGE = 20_000
+CURVATURE_TIP_RADIUS = 0.1
+LARGE_POINT_COUNT = 20_000
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def bump(vertices: int) -> Known:
     """The paper's bump over a square of side 2; its interior is where |x| and |y| are below 0.85."""
     surface = bump_mesh(2 * (round(np.sqrt(vertices)) - 1) ** 2)
     x, y, _ = surface.vertices.T
-    meridian, around = BumpOfRevolution(SHARPNESS).curvatures(np.hypot(x, y))
+    meridian, around = BumpOfRevolution(STEEPNESS).curvatures(np.hypot(x, y))
     inside = (np.abs(x) < INTERIOR) & (np.abs(y) < INTERIOR)
     return Known(surface, np.maximum(meridian, around), np.minimum(meridian, around), inside)
 
@@ -116,8 +116,8 @@ def _ours(surface: Surface, method: str = "jet", **settings: Any) -> tuple[Float
 
 
 Method = Callable[[Surface], tuple[FloatArray, FloatArray]]
-BODIES: dict[str, Callable[[int], Known]] = {"bump": bump, "torus": torus}
-METHODS: dict[str, Method] = {
+BODIES_OF_KNOWN_CURVATURE: dict[str, Callable[[int], Known]] = {"bump": bump, "torus": torus}
+COMPARED_METHODS: dict[str, Method] = {
     "explore3d": _ours,
     "plain jet, degree 4, 48 points": partial(_ours, neighbours=48, degree=4),
     "libigl, 2 rings": partial(_ours, method="libigl", radius=2),
@@ -132,14 +132,14 @@ def available() -> tuple[list[str], list[str]]:
     """Methods that can be measured here, and a sentence for each that cannot."""
     missing = {name for name, module in PEERS.items() if not importlib.util.find_spec(module)}
     sentences = [f"{name}: {PEERS[name]} is not installed; pip install 'explore3d[peers]'" for name in sorted(missing)]
-    return [name for name in METHODS if name not in missing], sentences
+    return [name for name in COMPARED_METHODS if name not in missing], sentences
 
 
 def bench_curvature(vertices: Iterable[int], methods: Iterable[str], seed: int = 0) -> Iterator[CurvatureError]:
     """Measure every case, each in a process of its own; noise only up to 20 000 vertices, where it has been studied."""
     for count in vertices:
-        for body in BODIES if count <= LARGE else ("bump",):
-            for noise in NOISES if count <= LARGE else (0.0,):
+        for body in BODIES_OF_KNOWN_CURVATURE if count <= LARGE_POINT_COUNT else ("bump",):
+            for noise in RELATIVE_NOISES if count <= LARGE_POINT_COUNT else (0.0,):
                 for method in methods:
                     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
                         yield pool.submit(measure, method, body, count, noise, seed).result()
@@ -147,15 +147,19 @@ def bench_curvature(vertices: Iterable[int], methods: Iterable[str], seed: int =
 
 def measure(method: str, body: str, vertices: int, noise: float, seed: int = 0) -> CurvatureError:
     """Error and cost of one method on one body."""
-    known, compute = BODIES[body](vertices), METHODS[method]
-    compute(BODIES[body](400).surface)  # loads the kernels
-    shaken = known.surface.vertices + noise * SIZE * np.random.default_rng(seed).standard_normal((len(known.k1), 3))
+    known, compute = BODIES_OF_KNOWN_CURVATURE[body](vertices), COMPARED_METHODS[method]
+    compute(BODIES_OF_KNOWN_CURVATURE[body](400).surface)  # loads the kernels
+    shaken = known.surface.vertices + noise * BODY_SIZE * np.random.default_rng(seed).standard_normal(
+        (len(known.k1), 3)
+    )
     begin = perf_counter()
     k1, k2 = compute(Surface(shaken, known.surface.faces))
     seconds = perf_counter() - begin
     inside, largest = known.interior, max(np.abs(known.k1).max(), np.abs(known.k2).max())
     error = np.maximum(np.abs(k1 - known.k1), np.abs(k2 - known.k2))[inside] / largest
-    finer, truly = (np.maximum(np.abs(a), np.abs(b)) > 1 / TIP for a, b in ((k1, k2), (known.k1, known.k2)))
+    finer, truly = (
+        np.maximum(np.abs(a), np.abs(b)) > 1 / CURVATURE_TIP_RADIUS for a, b in ((k1, k2), (known.k1, known.k2))
+    )
     return CurvatureError(
         method,
         body,

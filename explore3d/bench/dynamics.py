@@ -10,7 +10,7 @@ import numpy as np
 from hw.simulated import Dynamics
 from mapping import FloatArray
 
-SPEED, TIP, WIRE = 0.03, 0.01, 0.65e-3
+SPEED, TIP_RADIUS, WIRE = 0.03, 0.01, 0.65e-3
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class DynamicsCost:
 
 def wire_trace(times: FloatArray) -> FloatArray:
     """Height (N,) of the ball over the paper's wire crossed at 30 mm/s (theory section 4), m; again every 0.5 s."""
-    arm = TIP + WIRE / 2
+    arm = TIP_RADIUS + WIRE / 2
     x = np.clip(SPEED * (np.asarray(times) % 0.5) - 0.0075, -arm, arm)
     return np.maximum(WIRE - x**2 / (arm + np.sqrt((arm - x) * (arm + x))), 0.0)
 

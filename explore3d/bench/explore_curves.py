@@ -17,7 +17,7 @@ from explore3d.pictures import ESTIMATED, MUTED, TRACED, TRUTH, new_figure, png,
 from mapping.geometry.mesh import write_whole
 
 Record = dict[str, Any]
-FAMILIES = {"explore": ESTIMATED, "raster": TRACED, "random": MUTED, "ergodic": TRUTH}
+STRATEGY_COLOURS = {"explore": ESTIMATED, "raster": TRACED, "random": MUTED, "ergodic": TRUTH}
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ def picture(rows: Sequence[Summary]) -> bytes:
     with styled():
         figure = new_figure(8.0, 3.2)
         axes = figure.subplots(1, 2, sharey=True)
-        for family, colour in FAMILIES.items():
+        for family, colour in STRATEGY_COLOURS.items():
             some = sorted((r for r in rows if r.strategy.startswith(family)), key=lambda r: r.finger_seconds)
             some = [row for row in some if np.isfinite(row.error)]
             for axis, name in zip(axes, ("finger_seconds", "compute_seconds"), strict=True):

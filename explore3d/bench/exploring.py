@@ -34,13 +34,13 @@ from planners.survey import Ergodic, RandomSweeps, Raster, fastest_speed
 TIP_RADIUS = 0.01
 # Wanted half-width of the 90 % interval of an end, m: as good as it gets while nobody knows whether an end is round or
 # square (0.03 mm for the wire); and others, for the curve of error against time
-PRECISION, PRECISIONS = 0.05e-3, (0.02e-3, 0.1e-3, 0.2e-3)
+PRECISION, CURVE_PRECISIONS = 0.05e-3, (0.02e-3, 0.1e-3, 0.2e-3)
 # Speeds between which everyone may sweep, m/s: the paper's, and one at which a tip of 0.1 kg on a contact of 1e5 N/m
 # still keeps contact over the wire and lags by at most 0.012 mm behind the rigid trace (hw.simulated.dynamics)
 SLOW, FAST = 0.03, 0.1
 # The apparatus of the paper (theory section 6), and one whose noise is correlated over as much as a wire disturbs
 APPARATUS: dict[str, Any] = {"rate": 5000.0, "white": 0.2e-3, "correlated": 0.02e-3, "correlation_length": 1e-3}
-NOISES = {"apparatus": APPARATUS, "correlated": APPARATUS | {"correlated": 0.06e-3, "correlation_length": 2e-3}}
+FINGER_NOISES = {"apparatus": APPARATUS, "correlated": APPARATUS | {"correlated": 0.06e-3, "correlation_length": 2e-3}}
 
 Strategy = Callable[[BenchScene, np.random.Generator], Plan]
 
@@ -104,7 +104,7 @@ def _ergodic(seconds: float, speed: float) -> Strategy:
 def _strategies() -> dict[str, Strategy]:
     """Exploring to several precisions, and every baseline at both speeds."""
     known = {"explore": _explore(PRECISION)}
-    known |= {f"explore to {1e3 * precision:g} mm": _explore(precision) for precision in PRECISIONS}
+    known |= {f"explore to {1e3 * precision:g} mm": _explore(precision) for precision in CURVE_PRECISIONS}
     for speed, ending in ((SLOW, ""), (FAST, f" at {1e3 * FAST:g} mm/s")):
         known |= {f"raster {1e3 * p:g} mm{ending}": _raster(p, speed) for p in (8e-3, 4e-3, 2e-3, 1e-3, 0.5e-3)}
         known |= {f"random {s:g} s{ending}": _random(s, speed) for s in (90.0, 180.0, 360.0)}
@@ -143,7 +143,7 @@ def records(store: Path) -> list[dict[str, Any]]:
 
 def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus") -> dict[str, Any]:
     """Sweep the body by one strategy, build its model, and compare it with the truth."""
-    finger = SimulatedFinger(object=body.object, tip_radius=TIP_RADIUS, seed=seed, **NOISES[noise])
+    finger = SimulatedFinger(object=body.object, tip_radius=TIP_RADIUS, seed=seed, **FINGER_NOISES[noise])
     clock = _Clock(finger)
     record, outcome = drive(STRATEGIES[strategy](body, np.random.default_rng(seed)), clock.execute)
     after = clock.idle

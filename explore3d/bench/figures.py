@@ -19,9 +19,9 @@ from mapping.geometry.templates import BumpOfRevolution
 from mapping.instrument import Noise
 
 # The paper's bump and tip (figure 3), in units of the bump's height; variance 0.01 is that of its section 4.1.
-BUMP, TIP = BumpOfRevolution(15.0), 1.0
+BUMP, FIGURE_TIP_RADIUS = BumpOfRevolution(15.0), 1.0
 SIGMA = 0.1
-SAMPLES = 6000
+SECTION_SAMPLES = 6000
 EXTENT = 2.6
 
 
@@ -49,13 +49,13 @@ def write_figures(out: Path) -> list[Path]:
 
 
 @cache
-def section_trace(samples: int = SAMPLES) -> Trace:
+def section_trace(samples: int = SECTION_SAMPLES) -> Trace:
     """The ball's path over a section through the bump's axis, by exact contact with its mesh."""
-    mesh = BUMP.mesh(EXTENT + 2 * TIP, rings=1200, sectors=16)
+    mesh = BUMP.mesh(EXTENT + 2 * FIGURE_TIP_RADIUS, rings=1200, sectors=16)
     x = np.linspace(-EXTENT, EXTENT, samples)
-    above = np.column_stack([x, np.zeros(samples), np.full(samples, 4 * TIP)])
-    centers = BallContact(mesh, TIP).first_contact(above, np.array([0.0, 0.0, -1.0])).centers
-    return Trace.from_profile(centers[:, 0], centers[:, 2], TIP)
+    above = np.column_stack([x, np.zeros(samples), np.full(samples, 4 * FIGURE_TIP_RADIUS)])
+    centers = BallContact(mesh, FIGURE_TIP_RADIUS).first_contact(above, np.array([0.0, 0.0, -1.0])).centers
+    return Trace.from_profile(centers[:, 0], centers[:, 2], FIGURE_TIP_RADIUS)
 
 
 def traced_and_estimated() -> Any:
@@ -82,7 +82,7 @@ def parallel_surface() -> Any:
     """Figure 2: the parallel surface folds at caustic points; at the interference point the ball touches twice."""
     u = np.linspace(-EXTENT, EXTENT, 4001)
     x, z = _parallel(u)
-    caustics = np.column_stack(BUMP.parallel(BUMP.caustics(TIP), TIP))
+    caustics = np.column_stack(BUMP.parallel(BUMP.caustics(FIGURE_TIP_RADIUS), FIGURE_TIP_RADIUS))
     meeting = _meeting()
     trace = section_trace().centers
     figure = new_figure(7.2, 3.5)
@@ -115,7 +115,7 @@ def curvature_features() -> Any:
     from matplotlib.ticker import NullLocator
 
     u = np.linspace(-1.5, 1.5, 3001)
-    k = BUMP.curvatures(np.abs(u))[0] * TIP
+    k = BUMP.curvatures(np.abs(u))[0] * FIGURE_TIP_RADIUS
     figure = new_figure(7.2, 5.0)
     over, under = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.2))
     over.fill_between(u, BUMP.height(u), -0.1, color=FAINT, lw=0)
@@ -143,14 +143,14 @@ def noisy_trace() -> Any:
     exact, noise = section_trace(), Noise(SIGMA)
     x = exact.centers[:, 0]
     shaken = exact.centers[:, 2] + SIGMA * np.random.default_rng(1999).standard_normal(len(x))
-    noisy = Trace.from_profile(x, shaken, TIP)
+    noisy = Trace.from_profile(x, shaken, FIGURE_TIP_RADIUS)
     smoothed, estimate = smooth(noisy, noise), estimate_surface(noisy, noise=noise)
     figure = new_figure(7.2, 6.8)
     over, under = figure.subplots(2, 1, sharex=True, height_ratios=(1.5, 1.0))
     _body(over)
     over.plot(x[::4], shaken[::4], ".", color=TRACED, ms=1.2, alpha=0.5, label="trace with noise, variance 0.01")
     over.plot(*smoothed.trace.centers[:, [0, 2]].T, color=INK, label="smoothed trace")
-    raw = envelope_heights(x, shaken, TIP)[0]
+    raw = envelope_heights(x, shaken, FIGURE_TIP_RADIUS)[0]
     over.plot(x, raw, color=MUTED, lw=1.0, ls=(0, (3, 1.5)), label="ball envelope of the raw trace")
     bridged = (estimate.labels == BRIDGED)[:, None]
     for mask, color, name in ((bridged, TRUTH, "touched"), (~bridged, ESTIMATED, "bridged")):
@@ -162,8 +162,8 @@ def noisy_trace() -> Any:
     over.set_xlabel("")
     place = smoothed.trace.centers[:, 0]
     under.axhspan(0.5, 1.0, color=BAND, lw=0, label="convex: 1/(2r) < k_t < 1/r")
-    under.plot(place, smoothed.curvature * TIP, color=INK, label="k_t of the smoothed trace")
-    for k, crossing in enumerate(detect(noisy, noise=noise, largest=1.5 * TIP).crossings):
+    under.plot(place, smoothed.curvature * FIGURE_TIP_RADIUS, color=INK, label="k_t of the smoothed trace")
+    for k, crossing in enumerate(detect(noisy, noise=noise, largest=1.5 * FIGURE_TIP_RADIUS).crossings):
         name = f"bump found: {crossing.height:.2f} high"
         under.axvline(crossing.point[0], color=ESTIMATED, lw=1.4, label=name if k == 0 else "")
     under.set_xlabel("x, in heights of the bump")
@@ -175,25 +175,25 @@ def noisy_trace() -> Any:
 
 def _parallel(u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The parallel surface's section through the axis, on both sides of it."""
-    radial, height = BUMP.parallel(np.abs(u), TIP)
+    radial, height = BUMP.parallel(np.abs(u), FIGURE_TIP_RADIUS)
     return np.sign(u) * radial, height
 
 
 def _meeting() -> FloatArray:
     """Centre (x, z) of the ball at the interference point to the right of the bump."""
-    flank, _ = BUMP.interference(TIP) or (0.0, 0.0)
-    return np.array(BUMP.parallel(flank, TIP))
+    flank, _ = BUMP.interference(FIGURE_TIP_RADIUS) or (0.0, 0.0)
+    return np.array(BUMP.parallel(flank, FIGURE_TIP_RADIUS))
 
 
 def _body(axes: Any) -> None:
-    u = np.linspace(-EXTENT - TIP, EXTENT + TIP, 4001)
+    u = np.linspace(-EXTENT - FIGURE_TIP_RADIUS, EXTENT + FIGURE_TIP_RADIUS, 4001)
     axes.fill_between(u, BUMP.height(u), -1.0, color=FAINT, lw=0)
     axes.plot(u, BUMP.height(u), color=INK, lw=1.0, label="body")
 
 
 def _ball(axes: Any, center: FloatArray, color: str, label: str = "") -> None:
     angle = np.linspace(0, 2 * np.pi, 241)
-    x, z = center[0] + TIP * np.cos(angle), center[1] + TIP * np.sin(angle)
+    x, z = center[0] + FIGURE_TIP_RADIUS * np.cos(angle), center[1] + FIGURE_TIP_RADIUS * np.sin(angle)
     axes.plot(x, z, color=color, lw=1.2, zorder=1.5, label=label)
     axes.plot(*center, "+", color=color, ms=7, zorder=1.6)
 

@@ -25,12 +25,12 @@ from mapping import FloatArray
 from mapping.geometry.contact import BallContact
 
 AXES = ("samples", "triangles", "features")
-SAMPLES = (10_000, 100_000, 1_000_000, 3_000_000, 10_000_000)
-TRIANGLES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
+SAMPLE_COUNTS = (10_000, 100_000, 1_000_000, 3_000_000, 10_000_000)
+TRIANGLE_COUNTS = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 FEATURES = (0, 10, 50, 200)
 HUGE = (100_000_000,)
 # Sizes from which on what the program costs to start does not count
-LARGE = {"samples": 1_000_000}
+LARGE_SIZES = {"samples": 1_000_000}
 QUERIES = 20_000
 LOG_OF_FEATURES = 3_000_000  # samples of the log in which features are counted
 
@@ -50,7 +50,7 @@ class Cost:
 def bench_scaling(store: Path, axes: Sequence[str] = AXES, huge: bool = False, quick: bool = False) -> Iterator[Cost]:
     """Run every size that `store` does not hold yet; yields all, old and new, axis by axis."""
     known = {(cost.axis, cost.size): cost for cost in _read(store)}
-    sizes = {"samples": SAMPLES + (HUGE if huge else ()), "triangles": TRIANGLES, "features": FEATURES}
+    sizes = {"samples": SAMPLE_COUNTS + (HUGE if huge else ()), "triangles": TRIANGLE_COUNTS, "features": FEATURES}
     for axis in axes:
         for size in sizes[axis][:3] if quick else sizes[axis]:
             cost = known.get((axis, size))
@@ -125,7 +125,7 @@ def exponents(costs: Sequence[Cost]) -> dict[str, tuple[float, float]]:
 
 def _larger(axis: str, costs: list[Cost]) -> list[Cost]:
     """Those costs, in the order of size, that growth and not the start of the program decides."""
-    if len(large := [cost for cost in costs if cost.size >= LARGE.get(axis, np.inf)]) >= 2:
+    if len(large := [cost for cost in costs if cost.size >= LARGE_SIZES.get(axis, np.inf)]) >= 2:
         return large
     return costs[-max(2, min(3, len(costs))) :]
 

@@ -25,9 +25,9 @@ from mapping import FloatArray, IntArray, Surface
 from mapping.geometry.contact import BallContact
 
 STEEPNESS = 15.0  # a of the paper's bump, figure 3
-SIZE = 2.0  # side of the square under it
-TRIANGLES = (20_000, 200_000, 2_000_000)
-RATIOS = (0.05, 0.5)
+GROUND_SIDE = 2.0  # side of the square under it
+TRACED_MESH_SIZES = (20_000, 200_000, 2_000_000)
+BALL_SIZE_RATIOS = (0.05, 0.5)
 LAYOUTS = ("grid", "scattered")
 PEER_SECONDS = 10.0  # a slow method answers only as many of the queries as fit in here
 
@@ -77,8 +77,8 @@ class TraceTiming:
 
 
 def bench_trace(
-    triangles: Sequence[int] = TRIANGLES,
-    ratios: Sequence[float] = RATIOS,
+    triangles: Sequence[int] = TRACED_MESH_SIZES,
+    ratios: Sequence[float] = BALL_SIZE_RATIOS,
     layouts: Sequence[str] = LAYOUTS,
     side: int = 256,
     peers: bool = True,
@@ -88,9 +88,9 @@ def bench_trace(
     Raises:
         UserError: a peer is not installed.
     """
-    methods = [name for name, module in METHODS.items() if peers or not module]
+    methods = [name for name, module in METHOD_PACKAGES.items() if peers or not module]
     for name in methods:
-        if METHODS[name] and importlib.util.find_spec(METHODS[name]) is None:
+        if METHOD_PACKAGES[name] and importlib.util.find_spec(METHOD_PACKAGES[name]) is None:
             raise UserError(f"{name} is not installed: pip install explore3d[peers], or leave out --peers")
     return (
         _in_own_process(m, n, ratio, layout, side)
@@ -106,7 +106,7 @@ def _in_own_process(*case: Any) -> TraceTiming:
 def bump_mesh(triangles: int) -> Surface:
     """The paper's bump over a square, as a height field of about so many triangles."""
     cells = max(round(np.sqrt(triangles / 2)), 1)
-    x = np.linspace(-SIZE / 2, SIZE / 2, cells + 1)
+    x = np.linspace(-GROUND_SIDE / 2, GROUND_SIDE / 2, cells + 1)
     u, v = np.meshgrid(x, x, indexing="ij")
     points = np.column_stack([u.ravel(), v.ravel(), (1.0 / (1.0 + STEEPNESS * (u * u + v * v))).ravel()])
     n = np.arange(len(points), dtype=np.int64).reshape(u.shape)
@@ -117,17 +117,17 @@ def bump_mesh(triangles: int) -> Surface:
 def query_points(side: int, layout: str) -> FloatArray:
     """(side^2, 3) starting centres above the bump."""
     if layout == "scattered":
-        xy = np.random.default_rng(0).uniform(-0.49 * SIZE, 0.49 * SIZE, (side * side, 2))
+        xy = np.random.default_rng(0).uniform(-0.49 * GROUND_SIDE, 0.49 * GROUND_SIDE, (side * side, 2))
     else:
-        x = np.linspace(-0.49 * SIZE, 0.49 * SIZE, side)
+        x = np.linspace(-0.49 * GROUND_SIDE, 0.49 * GROUND_SIDE, side)
         xy = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1).reshape(-1, 2)
-    return np.column_stack([xy, np.full(len(xy), 2.0 * SIZE)])
+    return np.column_stack([xy, np.full(len(xy), 2.0 * GROUND_SIDE)])
 
 
 def _timed(method: str, triangles: int, ratio: float, layout: str, side: int) -> TraceTiming:
-    radius, mesh, start = ratio * SIZE, bump_mesh(triangles), query_points(side, layout)
+    radius, mesh, start = ratio * GROUND_SIDE, bump_mesh(triangles), query_points(side, layout)
     _by_explore3d(bump_mesh(8), radius, start[:2])  # loads the kernels
-    tracer: Tracer = _by_explore3d if not METHODS[method] else by_opencamlib
+    tracer: Tracer = _by_explore3d if not METHOD_PACKAGES[method] else by_opencamlib
     answers = tracer(mesh, radius, start)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     own = _by_explore3d(mesh, radius, start[answers.which])
@@ -152,7 +152,7 @@ def by_opencamlib(mesh: Surface, radius: float, start: FloatArray) -> Answers:
     body = ocl.STLSurf()
     for corners in mesh.vertices[mesh.faces].tolist():
         body.addTriangle(ocl.Triangle(*[ocl.Point(*corner) for corner in corners]))
-    floor = -10.0 * (SIZE + radius)
+    floor = -10.0 * (GROUND_SIDE + radius)
     cutter = ocl.BallCutter(2.0 * radius, -2.0 * floor)  # OpenCAMLib keeps no reference to it
 
     def drop(which: IntArray) -> tuple[FloatArray, float]:
@@ -182,7 +182,7 @@ def _spread(count: int, few: int) -> IntArray:
 
 
 # What must be installed for a method
-METHODS = {"explore3d": "", "OpenCAMLib BallCutter": "opencamlib"}
+METHOD_PACKAGES = {"explore3d": "", "OpenCAMLib BallCutter": "opencamlib"}
 
 
 def trace_table(timings: Iterable[TraceTiming]) -> Iterator[str]:
@@ -193,7 +193,7 @@ def trace_table(timings: Iterable[TraceTiming]) -> Iterator[str]:
     )
     own: TraceTiming | None = None
     for t in timings:
-        if not METHODS[t.method]:
+        if not METHOD_PACKAGES[t.method]:
             own, lead = t, ""
         else:
             lead = f"{t.seconds / own.seconds:8.0f}x" if own is not None else ""

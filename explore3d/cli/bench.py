@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 bench = typer.Typer(invoke_without_command=True)
 
-METHODS = ("importance", "emcee")
+SAMPLING_METHODS = ("importance", "emcee")
 
 Store = Annotated[Path, typer.Option("--store", help="JSONL file of finished runs; what it holds is not run again.")]
 
@@ -120,12 +120,23 @@ def calibration(
 
     Example: explore3d bench calibration --store calibration.jsonl --seeds 100
     """
-    from explore3d.bench.posterior import KINDS, by_kind, calibrate, campaign, draw_ranks, verdicts, write_record
+    from explore3d.bench.posterior import (
+        CALIBRATED_KINDS,
+        by_kind,
+        calibrate,
+        campaign,
+        draw_ranks,
+        verdicts,
+        write_record,
+    )
 
-    for option, found, possible in (("--method", method, METHODS), ("--believed", believed, ("true", "white"))):
+    for option, found, possible in (
+        ("--method", method, SAMPLING_METHODS),
+        ("--believed", believed, ("true", "white")),
+    ):
         if found not in possible:
             raise UserError(f"{option}: expected {' or '.join(possible)}; found {found!r}")
-    chosen = _names(shapes, "--shapes", list(KINDS))
+    chosen = _names(shapes, "--shapes", list(CALIBRATED_KINDS))
     rows = calibrate(campaign(chosen, seeds, method, believed), store, seconds)
     for kind, group in by_kind(rows).items():
         for name, verdict in verdicts(group).items():
@@ -171,11 +182,11 @@ def explore(
     """
     import json
 
-    from explore3d.bench import NOISES, STRATEGIES, bench_exploring, records, write_curves
+    from explore3d.bench import FINGER_NOISES, STRATEGIES, bench_exploring, records, write_curves
     from explore3d.bench.scenes import SCENES
 
     chosen = _names(scenes, "--scenes", list(SCENES)), _names(strategies, "--strategies", list(STRATEGIES))
-    _names(noise, "--noise", list(NOISES))
+    _names(noise, "--noise", list(FINGER_NOISES))
     _print(json.dumps(record) for record in bench_exploring(*chosen, seeds, store, noise, seconds))
     if out is not None:
         _print(str(path) for path in write_curves([r for r in records(store) if r["noise"] == noise], out))
@@ -223,11 +234,11 @@ def classify(
 
     Example: explore3d bench classify --store classify.jsonl --bodies bump,ridge --seeds 100
     """
-    from explore3d.bench.detection import NOISES, SWEEPS, bench_classify, classify_table
-    from explore3d.bench.scenes import BODIES
+    from explore3d.bench.detection import NOISE_SOURCES, SWEEP_PATTERNS, bench_classify, classify_table
+    from explore3d.bench.scenes import BODIES_BY_KIND
 
-    chosen = _names(bodies, "--bodies", list(BODIES)), _names(noises, "--noises", list(NOISES))
-    patterns = _names(sweeps, "--sweeps", list(SWEEPS))
+    chosen = _names(bodies, "--bodies", list(BODIES_BY_KIND)), _names(noises, "--noises", list(NOISE_SOURCES))
+    patterns = _names(sweeps, "--sweeps", list(SWEEP_PATTERNS))
     print(classify_table(list(bench_classify(*chosen, patterns, seeds, store))), end="")
 
 

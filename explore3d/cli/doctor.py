@@ -41,7 +41,7 @@ class Check:
 
 
 # package: module that must load, what it serves
-REQUIRED = {
+REQUIRED_PACKAGES = {
     "numpy": ("numpy", "everything"),
     "scipy": ("scipy.optimize", "fits and statistics"),
     "numba": ("numba", "contact of the simulated finger, envelopes"),
@@ -55,7 +55,7 @@ REQUIRED = {
     "pydantic": ("pydantic", "scenes"),
     "pyserial": ("serial", "fingers on a serial port"),
 }
-OPTIONAL = {
+OPTIONAL_PACKAGES = {
     "opencamlib": ("opencamlib", "comparison with its drop cutter: pip install explore3d[peers]"),
     "pymeshlab": ("pymeshlab", "comparison with its curvatures: pip install explore3d[peers]"),
     "arviz": ("arviz", "further diagnostics of the posteriors: pip install explore3d[arviz]"),
@@ -65,9 +65,9 @@ OPTIONAL = {
 def examine() -> list[Check]:
     """Every check, in the order in which one would mend things."""
     checks = [_python()]
-    checks += [_package(name, *what, absent="missing") for name, what in REQUIRED.items()]
+    checks += [_package(name, *what, absent="missing") for name, what in REQUIRED_PACKAGES.items()]
     checks += [_open3d(), _cache()]
-    checks += [_package(name, *what, absent="note") for name, what in OPTIONAL.items()]
+    checks += [_package(name, *what, absent="note") for name, what in OPTIONAL_PACKAGES.items()]
     return checks + _serial_ports()
 
 

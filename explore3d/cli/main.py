@@ -21,7 +21,7 @@ from hw import FingerError, MoveError
 from mapping import MappingError
 from planners import PlannerError
 
-ABOUT = "Find, follow and measure surface features that are finer than the fingertip that touches them."
+PROGRAM_HELP = "Find, follow and measure surface features that are finer than the fingertip that touches them."
 
 app = typer.Typer(
     name="explore3d",
@@ -42,7 +42,7 @@ def _show_version(asked: bool) -> None:
         raise typer.Exit
 
 
-@app.callback(help=ABOUT)
+@app.callback(help=PROGRAM_HELP)
 def _common(
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and leave.")

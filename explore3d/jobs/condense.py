@@ -26,8 +26,8 @@ from mapping.inference.likelihood import samples_near
 from mapping.instrument import Noise
 
 CHUNK = 2_000_000  # samples searched at once
-KEPT = 1_500_000  # samples kept away from crossings, about
-NEAR = 1.5  # tip radii around a crossing within which every sample is kept
+KEPT_BACKGROUND_SAMPLES = 1_500_000  # samples kept away from crossings, about
+CROSSING_REACH = 1.5  # tip radii around a crossing within which every sample is kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ def condense(
         settings: of mapping.detection.detect.detect.
     """
     total = count_samples(stream.path)
-    every = max(1, round(total / KEPT))
+    every = max(1, round(total / KEPT_BACKGROUND_SAMPLES))
     key = _key(stream.path, every, chunk, settings)
     result = None if folder is None else folder / "whole.npz"
     if result is not None and (earlier := _load(result, key)) is not None:
@@ -131,7 +131,7 @@ def _kept(trace: Trace, crossings: tuple[Crossing, ...], every: int) -> BoolArra
     keep[np.concatenate([[0], ends, ends - 1, [len(trace) - 1]])] = True
     if crossings:
         points = np.array([crossing.point + trace.tip_radius * crossing.normal for crossing in crossings])
-        reach = NEAR * trace.tip_radius + max(crossing.half_width for crossing in crossings)
+        reach = CROSSING_REACH * trace.tip_radius + max(crossing.half_width for crossing in crossings)
         keep[samples_near(trace, points, reach)] = True
     return keep
 

@@ -52,11 +52,11 @@ def merge(model: Path | str, logs: Sequence[Path | str], out: Path | str, pose_s
 
 
 # Two surfaces, or a trace and the base under it, may lie so far apart in tip radii, and in sds of the pose
-APART, POSE_SDS = 0.1, 3.0
+MOST_SURFACE_GAP, POSE_SDS = 0.1, 3.0
 # Samples, or faces, that are looked at
-MOST = 5000
+MOST_COMPARED_PLACES = 5000
 # Share of the faces whose middles must lie on the other mesh: a border may be cut elsewhere
-SHARE = 0.9
+MATCHING_FACE_SHARE = 0.9
 
 
 def unlike(log: Log, base: Base, pose_sd: float = 0.0) -> str:
@@ -69,7 +69,7 @@ def unlike(log: Log, base: Base, pose_sd: float = 0.0) -> str:
         base: of the model that it shall join.
         pose_sd: standard deviation of the pose between the two, m.
     """
-    limit = APART * log.trace.tip_radius + POSE_SDS * pose_sd
+    limit = MOST_SURFACE_GAP * log.trace.tip_radius + POSE_SDS * pose_sd
     own = read_base(log.events)
     if own is not None and own.kind == base.kind == "mesh":
         gap = max(_gap(own, base), _gap(base, own))
@@ -77,7 +77,7 @@ def unlike(log: Log, base: Base, pose_sd: float = 0.0) -> str:
             return (
                 f"the mesh that it was recorded for lies {_mm(gap)} off the model's; at most {_mm(limit)} is possible"
             )
-    some = np.linspace(0, len(log.trace) - 1, min(MOST, len(log.trace))).astype(np.int64)
+    some = np.linspace(0, len(log.trace) - 1, min(MOST_COMPARED_PLACES, len(log.trace))).astype(np.int64)
     height = base.foot(log.trace.centers[some], log.trace.tip_radius).height
     off = float(np.median(np.abs(height)))
     if off > limit:
@@ -86,10 +86,10 @@ def unlike(log: Log, base: Base, pose_sd: float = 0.0) -> str:
 
 
 def _gap(one: Base, other: Base) -> float:
-    """Distance of a mesh from another that SHARE of its faces keep within, m."""
+    """Distance of a mesh from another that MATCHING_FACE_SHARE of its faces keep within, m."""
     middles = one.surface.vertices[one.surface.faces].mean(axis=1)
-    some = middles[np.linspace(0, len(middles) - 1, min(MOST, len(middles))).astype(np.int64)]
-    return float(np.quantile(other.nearest.query(some).distance, SHARE))
+    some = middles[np.linspace(0, len(middles) - 1, min(MOST_COMPARED_PLACES, len(middles))).astype(np.int64)]
+    return float(np.quantile(other.nearest.query(some).distance, MATCHING_FACE_SHARE))
 
 
 def _mm(length: float) -> str:

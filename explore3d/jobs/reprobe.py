@@ -15,7 +15,7 @@ from hw import Move
 from mapping import BoolArray, FloatArray, Trace
 
 # Samples this close to the place, in tip radii, were taken of it
-NEAR = 5e-3
+SAME_PLACE_REACH = 5e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class Reprobed:
 
     Args:
         sample: number of the recorded sample whose line of approach passes nearest to the place asked for.
-        neighbours: how many samples of that sweep lie within NEAR of it, itself included.
+        neighbours: how many samples of that sweep lie within SAME_PLACE_REACH of it, itself included.
         recorded: (3,) mean of the ball's centres there then.
         approach: (3,) unit direction in which it was pressed.
         felt: (N, 3) centres now, one for each touch.
@@ -123,9 +123,11 @@ def _nearest(log: Log, at: FloatArray) -> int:
 
 
 def _neighbours(trace: Trace, sample: int, approach: FloatArray) -> BoolArray:
-    """(N,) True for the samples of that sweep within NEAR tip radii of its line of approach."""
+    """(N,) True for the samples of that sweep within SAME_PLACE_REACH tip radii of its line of approach."""
     away = trace.centers - trace.centers[sample]
-    close = (_beside(away, approach) <= NEAR * trace.tip_radius) & (np.abs(away @ approach) <= trace.tip_radius)
+    close = (_beside(away, approach) <= SAME_PLACE_REACH * trace.tip_radius) & (
+        np.abs(away @ approach) <= trace.tip_radius
+    )
     return np.asarray(close & (trace.sweep == trace.sweep[sample]))
 
 

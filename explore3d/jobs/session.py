@@ -17,7 +17,7 @@ from explore3d import FolderError, UserError, __version__
 from explore3d.log import LOG, Recorder
 
 MARKER = "session.json"
-SCHEMA = "explore3d/session/1"
+SESSION_SCHEMA = "explore3d/session/1"
 _PART = ".part-"
 
 
@@ -150,7 +150,7 @@ class Session:
             return []
         try:
             record = json.loads((self.folder / MARKER).read_text("utf-8"))
-            if record["schema"] != SCHEMA:
+            if record["schema"] != SESSION_SCHEMA:
                 raise ValueError(record["schema"])
             return [str(name) for name in record["files"]]
         except (OSError, ValueError, KeyError, TypeError):
@@ -202,7 +202,7 @@ class Session:
     def _mark(self, state: str) -> None:
         now = datetime.now(UTC)
         record = {
-            "schema": SCHEMA,
+            "schema": SESSION_SCHEMA,
             "state": state,
             "version": __version__,
             "started": self._started.isoformat(timespec="seconds"),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from explore3d.analysis import Analysis, Progress, Stages, build_model, silent
 from explore3d.jobs.conclude import conclude
-from explore3d.jobs.condense import CHUNK, KEPT, Condensed, condense
+from explore3d.jobs.condense import CHUNK, KEPT_BACKGROUND_SAMPLES, Condensed, condense
 from explore3d.jobs.session import Session
 from explore3d.log import Log, LogStream, count_samples, digest, head, read_base
 from explore3d.scene import Settings, parse_scene
@@ -67,7 +67,7 @@ def _log(path: Path, scene_text: str, condensed: Condensed) -> Log:
 
 def _fitted(path: Path, tip_radius: float | None, stages: Stages) -> Base:
     """The base of a log that has none, from a first pass over every k-th sample."""
-    every, total, done = max(1, round(count_samples(path) / KEPT)), max(count_samples(path), 1), 0
+    every, total, done = max(1, round(count_samples(path) / KEPT_BACKGROUND_SAMPLES)), max(count_samples(path), 1), 0
     parts = []
     with stages.stage("base fit") as share:
         for trace in LogStream(path, tip_radius).sweeps(CHUNK):

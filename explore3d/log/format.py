@@ -13,8 +13,8 @@ FRAME = "object"
 TRACE_TOPIC, PATH_TOPIC, FELT_TOPIC = "/trace", "/path", "/felt"
 
 # fields of a sample: t, centre and sweep always, the others if the finger felt them
-REQUIRED = (("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("t", "<f8"), ("sweep", "<i4"))
-OPTIONAL = {"normals": ("nx", "ny", "nz"), "contacts": ("cx", "cy", "cz"), "force": ("fx", "fy", "fz")}
+REQUIRED_FIELDS = (("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("t", "<f8"), ("sweep", "<i4"))
+OPTIONAL_FIELDS = {"normals": ("nx", "ny", "nz"), "contacts": ("cx", "cy", "cz"), "force": ("fx", "fy", "fz")}
 
 SAMPLES_PER_MESSAGE = 500
 # a record that says it is larger is damage; the writer makes none (chunks stay near 1 MiB, but an event may be long)
@@ -23,8 +23,8 @@ LARGEST_RECORD = 1 << 30
 
 def sample_dtype(optional: tuple[str, ...] = ()) -> np.dtype[np.void]:
     """One packed sample with the named optional fields of a trace."""
-    extra = [(name, "<f8") for group in optional for name in OPTIONAL[group]]
-    return np.dtype([*REQUIRED, *extra])
+    extra = [(name, "<f8") for group in optional for name in OPTIONAL_FIELDS[group]]
+    return np.dtype([*REQUIRED_FIELDS, *extra])
 
 
 def _vector(text: str) -> dict[str, object]:

@@ -222,7 +222,7 @@ def _trace(batches: list[NDArray[np.void]], reading: Reading) -> Trace:
 
     optional = {
         group: column(names)
-        for group, names in log_format.OPTIONAL.items()
+        for group, names in log_format.OPTIONAL_FIELDS.items()
         if all(names[0] in (batch.dtype.names or ()) for batch in batches)
     }
     assert reading.tip_radius is not None

@@ -17,7 +17,7 @@ from mapping import Trace
 # Bytes of a sample in a log with positions alone: only where the log was never closed, and cannot say how many it holds
 BYTES = 16
 # More samples than this are not loaded at once: the analysis of so many takes about 4 GB
-MOST = 12_000_000
+MOST_LOADED_SAMPLES = 12_000_000
 
 
 class LogStream:
@@ -107,6 +107,6 @@ def count_samples(path: Path | str) -> int:
 def large_log(path: Path | str) -> Path | None:
     """The log itself, or that in the folder of a session, if it is better streamed than loaded; else None."""
     file = Path(path) / LOG if Path(path).is_dir() else Path(path)
-    if not file.is_file() or file.stat().st_size < MOST * BYTES // 4:  # the cheap test first
+    if not file.is_file() or file.stat().st_size < MOST_LOADED_SAMPLES * BYTES // 4:  # the cheap test first
         return None
-    return file if is_log(file) and count_samples(file) > MOST else None
+    return file if is_log(file) and count_samples(file) > MOST_LOADED_SAMPLES else None

@@ -10,7 +10,7 @@ import numpy as np
 
 from explore3d import UserError
 from explore3d.log.record import Log
-from explore3d.log.table_columns import LENGTHS, VECTORS, find_columns, length_factors, time_factor
+from explore3d.log.table_columns import LENGTH_ROLES, VECTORS, find_columns, length_factors, time_factor
 from explore3d.log.table_settings import TableSettings, load_settings
 from explore3d.log.table_text import TableText, read_text
 from mapping import BoolArray, FloatArray, IntArray, Trace, TraceError
@@ -120,7 +120,7 @@ def _trace(values: Columns, settings: TableSettings, text: TableText) -> Trace:
     for field, names in VECTORS.items():
         if names[0] in values:
             vector = np.column_stack([values[name] for name in names])
-            vectors[field] = vector @ rotation.T + (origin if names[0] in LENGTHS else 0.0) if moved else vector
+            vectors[field] = vector @ rotation.T + (origin if names[0] in LENGTH_ROLES else 0.0) if moved else vector
     t = values["t"] if "t" in values else np.arange(len(x), dtype=np.float64)
     centers = table @ rotation.T + origin if moved else table
     try:

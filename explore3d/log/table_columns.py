@@ -12,7 +12,7 @@ from explore3d.log.table_text import TableText
 Role = Literal["x", "y", "z", "t", "sweep", "valid", "nx", "ny", "nz", "cx", "cy", "cz", "fx", "fy", "fz"]
 POSITION: tuple[Role, ...] = ("x", "y", "z")
 VECTORS = {"normals": ("nx", "ny", "nz"), "contacts": ("cx", "cy", "cz"), "force": ("fx", "fy", "fz")}
-LENGTHS: tuple[Role, ...] = (*POSITION, "cx", "cy", "cz")
+LENGTH_ROLES: tuple[Role, ...] = (*POSITION, "cx", "cy", "cz")
 
 _SYNONYMS = {
     "t": ("t", "time"),
@@ -55,7 +55,7 @@ def length_factors(
         UserError: a unit that nobody states, or that the file and the user state differently.
     """
     factors: dict[str, float] = {}
-    for role in (role for role in LENGTHS if role in roles):
+    for role in (role for role in LENGTH_ROLES if role in roles):
         stated = table.units[roles[role]]
         stated = stated if stated in UNITS["length"] else ""
         asked = units if isinstance(units, str) else (units or {}).get(role, "")

@@ -154,7 +154,7 @@ class LogWriter:
         self.close("closed" if error is None else f"{type(error).__name__}: {error}")
 
     def _samples(self, channel: str, trace: Trace) -> None:
-        optional = tuple(name for name in log_format.OPTIONAL if getattr(trace, name) is not None)
+        optional = tuple(name for name in log_format.OPTIONAL_FIELDS if getattr(trace, name) is not None)
         dtype, prefix = self._layout(optional)
         samples = _pack(trace, dtype, optional, self.path)
         for start in range(0, len(samples), log_format.SAMPLES_PER_MESSAGE):
@@ -203,7 +203,7 @@ def _pack(trace: Trace, dtype: np.dtype[np.void], optional: tuple[str, ...], pat
         raise UserError(f"{path}: field sweep must fit 32 bits; found {trace.sweep.min()} to {trace.sweep.max()}")
     samples = np.empty(len(trace), dtype)
     samples["t"], samples["sweep"] = trace.t, trace.sweep
-    groups = {"centers": ("x", "y", "z")} | {name: log_format.OPTIONAL[name] for name in optional}
+    groups = {"centers": ("x", "y", "z")} | {name: log_format.OPTIONAL_FIELDS[name] for name in optional}
     for group, names in groups.items():
         for axis, name in enumerate(names):
             samples[name] = getattr(trace, group)[:, axis]

@@ -10,7 +10,7 @@ from explore3d import length_unit
 from explore3d.pictures.figure import BAND, ESTIMATED, INK, new_figure, png, styled
 from mapping import Feature, FloatArray, Posterior
 
-BINS = 24
+HISTOGRAM_BINS = 24
 # Shares of the draws inside the drawn contours.
 LEVELS = (0.5, 0.9)
 
@@ -67,14 +67,14 @@ def _scaled(posterior: Posterior, index: int) -> tuple[FloatArray, str]:
 def _alone(axes: Any, draws: FloatArray) -> None:
     low, high = np.quantile(draws, [0.05, 0.95])
     axes.axvspan(low, high, color=BAND, linewidth=0)
-    axes.hist(draws, BINS, color=INK, histtype="step", linewidth=1.0)
+    axes.hist(draws, HISTOGRAM_BINS, color=INK, histtype="step", linewidth=1.0)
     axes.axvline(float(np.median(draws)), color=ESTIMATED, linewidth=1.0)
     axes.set_yticks([])
 
 
 def _pair(axes: Any, x: FloatArray, y: FloatArray) -> None:
     axes.plot(x, y, ".", color=INK, markersize=1.2, alpha=0.25, markeredgewidth=0, rasterized=True)
-    counts, xs, ys = np.histogram2d(x, y, BINS)
+    counts, xs, ys = np.histogram2d(x, y, HISTOGRAM_BINS)
     smooth = _blurred(counts)
     order = np.sort(smooth.ravel())[::-1]
     held = np.cumsum(order) / order.sum()

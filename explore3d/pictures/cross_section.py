@@ -17,8 +17,8 @@ from mapping.geometry.templates import step_height
 from mapping.inference.families import feature_trace
 
 # The section reaches so many half-widths of the disturbance to either side.
-REACH = 2.4
-BINS = 60
+SECTION_REACH = 2.4
+SECTION_BINS = 60
 GRID = 241
 
 
@@ -78,7 +78,7 @@ def cross_section(
     feet = base.foot(trace.centers[window], trace.tip_radius)
     x, beside = _place(feature, feet.points, feet.normals)
     half = max(half_width(feature, trace.tip_radius), 0.0 if crossing is None else crossing.half_width)
-    near = (np.abs(x) < REACH * half) & (beside < half)
+    near = (np.abs(x) < SECTION_REACH * half) & (beside < half)
     index = np.flatnonzero(near)[np.argsort(x[near], kind="stable")]
     if len(index) < 3:
         return None
@@ -204,8 +204,8 @@ def _aligned(curves: list[FloatArray], height: FloatArray) -> list[FloatArray]:
 
 
 def _binned(x: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Means over at most BINS equal bins of x: places, heights, standard errors (0 for single samples)."""
-    count = min(BINS, max(1, len(x) // 3))
+    """Means over at most SECTION_BINS equal bins of x: places, heights, standard errors (0 for single samples)."""
+    count = min(SECTION_BINS, max(1, len(x) // 3))
     bins = np.clip(((x - x[0]) / max(np.ptp(x), np.finfo(float).tiny) * count).astype(np.int64), 0, count - 1)
     number = np.bincount(bins, minlength=count)
     # The outermost bins may hold a single stray sample.
@@ -224,9 +224,9 @@ def _body(
         return np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool)
     own = np.flatnonzero(estimate.sweep == sweep)
     near = np.linalg.norm(estimate.points[own] - nearest_on(estimate.points[own], feature.axis)[0], axis=1)
-    own = own[near < 2.0 * REACH * half]
+    own = own[near < 2.0 * SECTION_REACH * half]
     foot = base.foot(estimate.points[own], tip_radius)
     x, beside = _place(feature, foot.points, foot.normals)
-    keep = np.flatnonzero((np.abs(x) < REACH * half) & (beside < half))
+    keep = np.flatnonzero((np.abs(x) < SECTION_REACH * half) & (beside < half))
     order = keep[np.argsort(x[keep], kind="stable")]
     return x[order], foot.height[order] + tip_radius, estimate.labels[own][order] == BRIDGED

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 # Values within so many standard deviations of zero are drawn flat: their colour would be noise.
 SIGNIFICANT = 3.0
-FLAT = np.array([0.93, 0.93, 0.93])
+FLAT_COLOUR = np.array([0.93, 0.93, 0.93])
 NOT_VALID = np.array([0.75, 0.75, 0.75])
-COLOURS = "RdBu_r"
+CURVATURE_COLOURMAP = "RdBu_r"
 
 
 def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float) -> bytes:
@@ -42,13 +42,13 @@ def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float)
     with styled():
         figure, panels = panels_for(cameras, room=0.6)
         for (axes, camera), values, name in zip(panels, scaled, ("larger, k₁", "smaller, k₂"), strict=True):
-            colours = colormaps[COLOURS](norm(values))[:, :3]
-            colours[np.abs(values) < SIGNIFICANT * curvature.sd * tip_radius] = FLAT
+            colours = colormaps[CURVATURE_COLOURMAP](norm(values))[:, :3]
+            colours[np.abs(values) < SIGNIFICANT * curvature.sd * tip_radius] = FLAT_COLOUR
             colours[~curvature.valid] = NOT_VALID
             axes.imshow(render([Body(surface, colours)], camera).reduced(SUPERSAMPLING), interpolation="none")
             axes.set_title(f"Principal curvature, {name}", fontweight="bold")
         bar = figure.colorbar(
-            ScalarMappable(norm, COLOURS), ax=[axes for axes, _ in panels], shrink=0.75, aspect=28, pad=0.01
+            ScalarMappable(norm, CURVATURE_COLOURMAP), ax=[axes for axes, _ in panels], shrink=0.75, aspect=28, pad=0.01
         )
         bar.set_label("curvature × tip radius")
         bar.outline.set_visible(False)

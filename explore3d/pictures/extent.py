@@ -12,8 +12,8 @@ from explore3d.pictures.figure import BAND, ESTIMATED, INK, TRUTH, new_figure, p
 from mapping import Feature, FloatArray
 from mapping.geometry.mesh import arclengths
 
-COLUMNS = 2
-QUANTILE = 1.6448536
+EXTENTS_PER_ROW = 2
+NORMAL_QUANTILE_95 = 1.6448536
 
 
 def extent_picture(features: Sequence[Feature], truths: Sequence[FloatArray | None]) -> bytes | None:
@@ -26,7 +26,7 @@ def extent_picture(features: Sequence[Feature], truths: Sequence[FloatArray | No
     pairs = [(f, t) for f, t in zip(features, truths, strict=True) if len(f.axis) > 1 and "axis_sd" in f.extra]
     if not pairs:
         return None
-    columns = min(COLUMNS, len(pairs))
+    columns = min(EXTENTS_PER_ROW, len(pairs))
     rows = -(-len(pairs) // columns)
     with styled():
         figure = new_figure(5.5 * columns, 2.6 * rows)
@@ -47,7 +47,7 @@ def _panel(axes: Any, feature: Feature, true: FloatArray | None) -> None:
         sd = np.full(len(x), feature.position_sd)
     tangent = np.gradient(np.column_stack([x, y]), axis=0)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), np.finfo(float).tiny)
-    side = QUANTILE * sd[:, None] * tangent[:, ::-1] * [-1.0, 1.0]
+    side = NORMAL_QUANTILE_95 * sd[:, None] * tangent[:, ::-1] * [-1.0, 1.0]
     x_factor, x_name = length_unit(float(np.abs(x).max()))
     spread = [y, y + side[:, 1], y - side[:, 1]]
     if true is not None:
@@ -96,4 +96,4 @@ def _plane(feature: Feature) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _worst(feature: Feature, sd: FloatArray) -> str:
     length = length_text(float(arclengths(feature.axis)[-1]))
-    return f"{length} long, known across to ±{length_text(QUANTILE * float(sd.max()), 2)}"
+    return f"{length} long, known across to ±{length_text(NORMAL_QUANTILE_95 * float(sd.max()), 2)}"

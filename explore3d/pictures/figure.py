@@ -14,7 +14,7 @@ TRUTH = "#1b7f4d"
 BAND = "#f4c7c3"
 DPI = 160
 
-STYLE = {
+FIGURE_STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
     "axes.edgecolor": MUTED,
@@ -49,7 +49,7 @@ def styled() -> Any:
     """The style as a context: `with styled(): ...` around drawing and saving."""
     from matplotlib import rc_context
 
-    return rc_context(STYLE)
+    return rc_context(FIGURE_STYLE)
 
 
 def png(figure: Any) -> bytes:

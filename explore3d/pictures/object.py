@@ -13,17 +13,17 @@ from explore3d.pictures.figure import DPI, INK, new_figure, png, styled
 from explore3d.pictures.raycast import Body, Picture, render
 from explore3d.pictures.sweep_paths import SweepPath, densified
 from mapping import Feature, FloatArray, Surface
-from mapping.model import COLOURS, OTHER_COLOUR, drawn_at_least, feature_mesh
+from mapping.model import KIND_COLOURS, OTHER_COLOUR, drawn_at_least, feature_mesh
 
 # Width of a picture of one panel, and of each of two, pixels; and the most that a panel is high for its width.
 WIDTHS = {1: 1080, 2: 760}
 TALLEST = 0.8
 SUPERSAMPLING = 2
-BASE_COLOUR = np.array([0.86, 0.88, 0.91])
+PICTURE_BASE_COLOUR = np.array([0.86, 0.88, 0.91])
 QUIET = np.array([0.42, 0.52, 0.62])
 LOUD = np.array([0.93, 0.55, 0.13])
 # Features are drawn at least so many pixels wide, or nobody would see them.
-VISIBLE = 5.0
+LEAST_FEATURE_PIXELS = 5.0
 # A body whose outward directions cancel more than this is round: it needs two views.
 ROUND = 0.45
 
@@ -90,10 +90,10 @@ def _close_up(base: Surface, feet: FloatArray) -> FloatArray:
 
 def _scene(base: Surface, features: Sequence[Feature], camera: Camera, sweeps: Sequence[SweepPath]) -> Picture:
     pixel = pixel_size(camera)
-    bodies = [Body(base, BASE_COLOUR)]
+    bodies = [Body(base, PICTURE_BASE_COLOUR)]
     for feature in features:
-        colour = np.array(COLOURS.get(feature.kind, OTHER_COLOUR)[:3])
-        bodies.append(Body(feature_mesh(drawn_at_least(feature, VISIBLE * SUPERSAMPLING * pixel)), colour))
+        colour = np.array(KIND_COLOURS.get(feature.kind, OTHER_COLOUR)[:3])
+        bodies.append(Body(feature_mesh(drawn_at_least(feature, LEAST_FEATURE_PIXELS * SUPERSAMPLING * pixel)), colour))
     picture = render(bodies, camera)
     for path in sweeps:
         line = densified(path.points + 2.0 * pixel * path.normals, 0.5 * pixel)

@@ -10,7 +10,7 @@ import numpy as np
 from explore3d import count_text, length_text, seconds_text
 from explore3d.pictures.figure import ESTIMATED, INK, MUTED, png, styled
 from explore3d.pictures.object import (
-    BASE_COLOUR,
+    PICTURE_BASE_COLOUR,
     SUPERSAMPLING,
     cameras_for,
     draw_scale_bar,
@@ -26,7 +26,7 @@ from mapping.base import Base
 
 AIR = np.array([0.72, 0.76, 0.80])
 WRONG = np.array([0.78, 0.16, 0.16])
-COLOURS = "viridis"
+TIME_COLOURMAP = "viridis"
 
 
 def plan_picture(base: Base, moves: Sequence[Move], tip_radius: float, violations: Collection[int] = ()) -> bytes:
@@ -48,7 +48,7 @@ def plan_picture(base: Base, moves: Sequence[Move], tip_radius: float, violation
     with styled():
         figure, panels = panels_for(cameras_for(corners, views), room=0.5)
         for axes, camera in panels:
-            picture = render([Body(base.surface, BASE_COLOUR)], camera)
+            picture = render([Body(base.surface, PICTURE_BASE_COLOUR)], camera)
             for number, move in enumerate(moves):
                 share = times[number : number + 2] / (times[-1] or 1.0)
                 _draw(picture, move, base, tip_radius, number in violations, share)
@@ -66,7 +66,7 @@ def _draw(picture: Picture, move: Move, base: Base, tip_radius: float, wrong: bo
     if move.purpose == "sweep":
         feet = base.foot(path, tip_radius)
         path = feet.points + 2.0 * pixel * feet.normals
-    colours = colormaps[COLOURS](np.linspace(share[0], share[1], len(path)))[:, :3]
+    colours = colormaps[TIME_COLOURMAP](np.linspace(share[0], share[1], len(path)))[:, :3]
     if move.purpose != "sweep":
         colours = np.broadcast_to(AIR, path.shape)
     picture.splat(path, np.broadcast_to(WRONG, path.shape) if wrong else colours, 2.6 if wrong else 2.0, 3.0 * pixel)
@@ -84,7 +84,7 @@ def _legend(figure: Any, panels: Any, moves: Sequence[Move], seconds: float, wro
         f"{count_text(len(sweeps), 'sweep')}, {length} long, {seconds_text(seconds)} of moves; {verdict}",
         x=0.02, ha="left", fontsize=10, color=ESTIMATED if wrong else INK,
     )  # fmt: skip
-    scale = ScalarMappable(Normalize(0.0, seconds or 1.0), COLOURS)
+    scale = ScalarMappable(Normalize(0.0, seconds or 1.0), TIME_COLOURMAP)
     bar = figure.colorbar(scale, ax=panels, shrink=0.5, aspect=30, pad=0.01)
     bar.set_label("time of the sweep (s)", color=MUTED)
     bar.outline.set_visible(False)

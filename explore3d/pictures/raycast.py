@@ -14,7 +14,7 @@ from mapping.geometry.mesh import open3d
 
 BACKGROUND = np.ones(3)
 # Creases sharper than this keep their edge; flatter ones are shaded round.
-CREASE = np.cos(np.radians(35.0))
+CREASE_COSINE = np.cos(np.radians(35.0))
 AMBIENT = 0.55
 OUTLINE = 0.55
 
@@ -90,7 +90,7 @@ def _shade(body: Body, face: NDArray[np.uint32], uv: FloatArray, ray: FloatArray
     weights = np.column_stack([1.0 - uv.sum(axis=1), uv])
     flat = surface.face_normals[face]
     bent = _vertex_normals(surface)
-    rounded = (np.einsum("fj,fkj->fk", surface.face_normals, bent[surface.faces]) > CREASE).all(axis=1)[face]
+    rounded = (np.einsum("fj,fkj->fk", surface.face_normals, bent[surface.faces]) > CREASE_COSINE).all(axis=1)[face]
     normal = flat.copy()
     normal[rounded] = _mixed(bent, surface.faces[face[rounded]], weights[rounded])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)

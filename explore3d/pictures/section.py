@@ -12,7 +12,7 @@ from explore3d.pictures.cross_section import CrossSection
 from explore3d.pictures.figure import BAND, ESTIMATED, INK, MUTED, TRACED, TRUTH, new_figure, png, styled
 from mapping import FloatArray
 
-COLUMNS = 3
+SECTIONS_PER_ROW = 3
 # Dots beyond so many hide each other.
 DOTS = 1500
 # Points of the body further apart than this share of the panel are not joined.
@@ -26,7 +26,7 @@ def section_picture(sections: Sequence[CrossSection], truths: Sequence[float | N
         sections: at least one.
         truths: true height of each feature, m, or None.
     """
-    columns = min(COLUMNS, len(sections))
+    columns = min(SECTIONS_PER_ROW, len(sections))
     rows = -(-len(sections) // columns)
     with styled():
         figure = new_figure({1: 7.5, 2: 9.5, 3: 11.0}[columns], 3.1 * rows + 0.5)

@@ -14,11 +14,11 @@ from mapping.detection import Crossing
 from mapping.geometry.mesh import arclengths
 
 # Samples are averaged over this share of the explored size: about three pixels of a picture.
-FINEST = 0.0025
+DRAWN_SPACING_SHARE = 0.0025
 # Samples that tell the explored size.
-ENOUGH = 50_000
+SIZE_SAMPLES = 50_000
 # Blocks from which the true length of a noisy path is taken.
-COARSE = 64
+LENGTH_BLOCKS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,9 @@ def sweep_paths(trace: Trace, base: Base, crossings: Sequence[Crossing] = ()) ->
     """
     if len(trace) == 0:
         return []
-    spacing = FINEST * float(np.linalg.norm(np.ptp(trace.centers[:: 1 + len(trace) // ENOUGH], axis=0)))
+    spacing = DRAWN_SPACING_SHARE * float(
+        np.linalg.norm(np.ptp(trace.centers[:: 1 + len(trace) // SIZE_SAMPLES], axis=0))
+    )
     marked = _noticed(trace, crossings)
     means, middles = [], []
     for start, stop in _runs(trace):
@@ -57,7 +59,7 @@ def sweep_paths(trace: Trace, base: Base, crossings: Sequence[Crossing] = ()) ->
 
 def _block(points: FloatArray, spacing: float) -> int:
     """Samples per stretch: the path's length without its jitter decides."""
-    size = max(1, len(points) // COARSE)
+    size = max(1, len(points) // LENGTH_BLOCKS)
     whole = len(points) // size * size
     length = arclengths(points[:whole].reshape(-1, size, 3).mean(axis=1))[-1]
     return max(1, int(spacing * len(points) / length)) if length > 0 else len(points)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from explore3d import UNKNOWN, length_text
+from explore3d import UNKNOWN_TEXT, length_text
 from explore3d.analysis import Analysis, Comparison
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.report.pictures import Pictures, shown_features
@@ -109,7 +109,7 @@ def _row(row: Comparison) -> Row:
 
 def _error(value: float, inside: bool | None) -> Html:
     if not isfinite(value):
-        return Html(UNKNOWN)
+        return Html(UNKNOWN_TEXT)
     sign = "+" if value > 0 else ""
     remark = "" if inside is None else "truth inside 90 %" if inside else "truth outside 90 %"
     return Html(element("span", sign + length_text(value, 2)) + element("small", remark))

@@ -9,7 +9,7 @@ from explore3d import count_text, interval_text, length_text
 from explore3d.analysis import Analysis
 from mapping import Feature, Interval
 
-MOST = 20  # features that are listed one by one; the report has them all
+MOST_LISTED_FEATURES = 20  # features that are listed one by one; the report has them all
 
 
 def show(analysis: Analysis, out: Path, as_json: bool) -> None:
@@ -31,8 +31,17 @@ def summary(analysis: Analysis) -> list[str]:
         lines[0] += f", {finer} of them finer than the tip of {length_text(analysis.trace.tip_radius)}"
     if analysis.recovered:
         lines.append(analysis.recovered)
-    more = [f"  and {len(features) - MOST} more, see the report"] if len(features) > MOST else []
-    return [*lines, *(feature_line(feature) for feature in features[:MOST]), *more, limit_sentence(analysis)]
+    more = (
+        [f"  and {len(features) - MOST_LISTED_FEATURES} more, see the report"]
+        if len(features) > MOST_LISTED_FEATURES
+        else []
+    )
+    return [
+        *lines,
+        *(feature_line(feature) for feature in features[:MOST_LISTED_FEATURES]),
+        *more,
+        limit_sentence(analysis),
+    ]
 
 
 def limit_sentence(analysis: Analysis) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from explore3d import UNKNOWN, count_text, interval_text, length_text
+from explore3d import UNKNOWN_TEXT, count_text, interval_text, length_text
 from explore3d.analysis import Analysis
 from explore3d.report.findings import limit_sentence
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
@@ -137,7 +137,7 @@ def _posterior(feature: Feature) -> Html:
 
 def _with_range(interval: Interval) -> Html:
     if not interval.high and not interval.low:
-        return Html(UNKNOWN)  # the kind has no such size: a step has no width
+        return Html(UNKNOWN_TEXT)  # the kind has no such size: a step has no width
     median, span = interval_text(interval)
     return Html(element("span", median) + (element("small", span) if span else ""))
 

@@ -12,7 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from explore3d import __version__
 from explore3d.report.markup import Html, element, section, table
 
-POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+PAGE_SECURITY_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 PACKAGES = ("numpy", "scipy", "numba", "libigl", "open3d-cpu", "open3d", "emcee", "opencamlib", "pymeshlab")
 MORE_STYLE = (
     ".table { max-height: none; } td { min-width: 5rem; } td b, td small, td span { white-space: normal; }"
@@ -27,9 +27,9 @@ def page(kind: str, title: str, lead: str, *sections: str) -> str:
     )
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        f'<meta http-equiv="Content-Security-Policy" content="{PAGE_SECURITY_POLICY}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"{element('title', title + ' · explore3d')}<style>{STYLE}{MORE_STYLE}</style></head>"
+        f"{element('title', title + ' · explore3d')}<style>{REPORT_CSS}{MORE_STYLE}</style></head>"
         f"<body>{element('main', header, *sections)}</body></html>\n"
     )
 
@@ -68,7 +68,7 @@ def _processor() -> str:
     return names[0] if names else platform.processor() or platform.machine()
 
 
-STYLE = """
+REPORT_CSS = """
 :root { --ink: #1f2933; --soft: #52606d; --faint: #e4e7eb; --paper: #ffffff; --accent: #c62828; }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--paper); color: var(--ink);

@@ -11,7 +11,7 @@ from explore3d.report.account import account_of_time, provenance, what_was_left_
 from explore3d.report.evidence import compared_with_truth, cross_sections, curvature_maps, posteriors
 from explore3d.report.findings_section import facts, headline, what_was_found
 from explore3d.report.markup import Html, element, text
-from explore3d.report.page import STYLE
+from explore3d.report.page import REPORT_CSS
 from explore3d.report.pictures import Pictures, draw_pictures, is_profile
 from explore3d.report.view3d import object_view, plotly_script, profile_view
 from mapping.geometry.mesh import write_whole
@@ -20,7 +20,7 @@ REPORT = "report.html"
 PICTURES = "pictures"
 
 # Nothing may be fetched: everything that the page shows is inside it.
-POLICY = (
+REPORT_SECURITY_POLICY = (
     "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; "
     "script-src 'unsafe-inline' 'unsafe-eval'; font-src data:; worker-src blob:; connect-src data: blob:"
 )
@@ -68,9 +68,9 @@ def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPa
     )
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        f'<meta http-equiv="Content-Security-Policy" content="{REPORT_SECURITY_POLICY}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>explore3d: drawing</title><style>{STYLE}</style>{plotly_script()}</head>"
+        f"<title>explore3d: drawing</title><style>{REPORT_CSS}</style>{plotly_script()}</head>"
         f"<body>{content}{_ready(analysis.title)}</body></html>\n"
     )
 

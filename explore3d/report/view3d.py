@@ -13,15 +13,15 @@ from explore3d.report.markup import Html, element
 from mapping import Feature, FloatArray, Surface, Trace
 from mapping.base import Base
 from mapping.geometry.mesh import open3d
-from mapping.model import COLOURS, OTHER_COLOUR, drawn_at_least, feature_mesh
+from mapping.model import KIND_COLOURS, OTHER_COLOUR, drawn_at_least, feature_mesh
 
 # More than this makes pages slow without showing more.
 MOST_FACES = 60_000
 # Features are drawn at least this share of the base's size wide.
-VISIBLE = 0.004
+LEAST_FEATURE_SHARE = 0.004
 VIEW = "view"
 # Diagonal of what is drawn, in units of the scene; the camera stands 1.7 of them off.
-SEEN = 1.4
+SCENE_DIAGONAL = 1.4
 
 
 def plotly_script() -> Html:
@@ -50,13 +50,13 @@ def object_view(base: Surface, features: Sequence[Feature], sweeps: Sequence[Swe
         )
     )
     for feature in features:
-        colour = "rgb" + str(tuple(round(255 * each) for each in COLOURS.get(feature.kind, OTHER_COLOUR)[:3]))
-        shape = feature_mesh(drawn_at_least(feature, VISIBLE * base.size))
+        colour = "rgb" + str(tuple(round(255 * each) for each in KIND_COLOURS.get(feature.kind, OTHER_COLOUR)[:3]))
+        shape = feature_mesh(drawn_at_least(feature, LEAST_FEATURE_SHARE * base.size))
         parts.append(_mesh(shape, factor, feature.id, colour, hover_text(feature), opacity=1.0))
     axes = {"showbackground": False, "gridcolor": "#e4e7eb", "zeroline": False}
     drawing = plot.Figure(parts)
     low, high = _box(parts)
-    ratio = SEEN * (high - low) / np.linalg.norm(high - low)
+    ratio = SCENE_DIAGONAL * (high - low) / np.linalg.norm(high - low)
     scene: dict[str, Any] = {"aspectmode": "manual", "aspectratio": dict(zip("xyz", map(float, ratio), strict=True))}
     for axis, *ends in zip("xyz", map(float, low), map(float, high), strict=True):
         scene[f"{axis}axis"] = axes | {"title": f"{axis} ({unit})", "range": ends}

@@ -16,7 +16,7 @@ from explore3d.scene.to_toml import scene_text
 from explore3d.scene.values import Angle, Extent, Force, Length, LengthUnit, Point, Rate, Signed, Speed, Table, Time
 from mapping import KINDS, Surface
 
-SCHEMA = "explore3d/scene/1"
+SCENE_SCHEMA = "explore3d/scene/1"
 
 
 class Tip(Table):

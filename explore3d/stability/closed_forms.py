@@ -19,9 +19,9 @@ from mapping.instrument import Noise
 
 Float = Callable[..., float]
 TIPS = (1e-9, 1e-2, 1e3)
-SHARPNESS = tuple(10.0**k for k in range(-3, 10))
+STEEPNESS_RANGE = tuple(10.0**k for k in range(-3, 10))
 # Distances from the bump's axis in its own width 1/sqrt(a); 1/sqrt(3) is the inflection
-PLACES = (1e-8, 1e-3, 0.3, 0.577350269189, 0.6, 1.0, 3.0, 1e3)
+AXIS_DISTANCES = (1e-8, 1e-3, 0.3, 0.577350269189, 0.6, 1.0, 3.0, 1e3)
 
 
 def form(
@@ -88,7 +88,7 @@ def _opening(u: Decimal, a: Decimal, r: Decimal) -> Decimal:
 
 
 def _bump_places() -> Iterable[tuple[float, float]]:
-    return ((place / sqrt(a), a) for a in SHARPNESS for place in PLACES)
+    return ((place / sqrt(a), a) for a in STEEPNESS_RANGE for place in AXIS_DISTANCES)
 
 
 def _bump_places_and_tips() -> Iterable[tuple[float, float, float]]:
@@ -138,7 +138,7 @@ def _mean_of_walk(x: Decimal) -> Decimal:
 def interference_of_bump() -> Answer:
     """The two contacts of the ball at the bump's kink: their centres must be one point."""
     worst, count, where = 0.0, 0, ""
-    for a, r in itertools.product(SHARPNESS, (1e-3, 1e-1, 1.0, 1e3)):
+    for a, r in itertools.product(STEEPNESS_RANGE, (1e-3, 1e-1, 1.0, 1e3)):
         pair = BumpOfRevolution(a).interference(r)
         if pair is None:
             continue
@@ -163,7 +163,7 @@ def _bump(method: str, index: int) -> Float:
     return value
 
 
-CASES = [
+CLOSED_FORM_CASES = [
     form("bump's curvature, radial", "2a(1-3au²)/(c³d³), a from 1e-3 to 1e9", _radial, _bump("curvatures", 0),
          list(_bump_places())),
     form("bump's curvature, around", "2a/(cd²), a from 1e-3 to 1e9", _around, _bump("curvatures", 1),

@@ -17,7 +17,7 @@ from mapping.geometry.contact import BallContact
 from mapping.geometry.mesh import NearestPoint
 from mapping.geometry.templates import BumpOfRevolution
 
-RADIUS = 0.3
+CONTACT_BALL_RADIUS = 0.3
 SCALES = tuple(10.0**k for k in (-9, -6, -3, 3, 6))
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -54,23 +54,25 @@ def _largest(centers: FloatArray, reference: FloatArray, size: float = 2.0) -> f
 
 def scaled() -> Answer:
     """Any unit of length gives the same answer, scaled."""
-    reference = touched(body(), RADIUS, starts(), DOWN)
+    reference = touched(body(), CONTACT_BALL_RADIUS, starts(), DOWN)
     errors = {}
     for scale in SCALES:
         mesh = Surface(scale * body().vertices, body().faces)
-        errors[scale] = _largest(touched(mesh, scale * RADIUS, scale * starts(), DOWN) / scale, reference)
+        errors[scale] = _largest(touched(mesh, scale * CONTACT_BALL_RADIUS, scale * starts(), DOWN) / scale, reference)
     worst = max(errors, key=lambda scale: errors[scale])
     return Answer(f"400 contacts at {len(SCALES)} scales, worst at {worst:g} m", errors[worst], 2.0, reason="rounding")
 
 
 def powers_of_two() -> Answer:
     """A power of two rescales without any rounding: not a bit may differ."""
-    reference = touched(body(), RADIUS, starts(), DOWN)
+    reference = touched(body(), CONTACT_BALL_RADIUS, starts(), DOWN)
     different = 0
     for power in (-40, -13, 17, 40):
         scale = 2.0**power
         mesh = Surface(scale * body().vertices, body().faces)
-        different += int((touched(mesh, scale * RADIUS, scale * starts(), DOWN) != scale * reference).sum())
+        different += int(
+            (touched(mesh, scale * CONTACT_BALL_RADIUS, scale * starts(), DOWN) != scale * reference).sum()
+        )
     return Answer(f"{different} of 4800 coordinates differ", reason="bit for bit", holds=different == 0)
 
 
@@ -83,8 +85,8 @@ def far_origin(distance: float) -> Callable[[], Answer]:
         grid = 2.0 ** np.ceil(np.log2(distance * 4 * EPS))
         mesh = Surface(np.round(body().vertices / grid) * grid, body().faces)
         start = np.round(starts() / grid) * grid
-        reference = touched(mesh, RADIUS, start, DOWN)
-        moved = touched(Surface(mesh.vertices + shift, mesh.faces), RADIUS, start + shift, DOWN) - shift
+        reference = touched(mesh, CONTACT_BALL_RADIUS, start, DOWN)
+        moved = touched(Surface(mesh.vertices + shift, mesh.faces), CONTACT_BALL_RADIUS, start + shift, DOWN) - shift
         return Answer(
             "400 contacts", _largest(moved, reference), distance / 2, reason="coordinates are eps times the distance"
         )
@@ -95,9 +97,9 @@ def far_origin(distance: float) -> Callable[[], Answer]:
 def rotated() -> Answer:
     """No direction is special."""
     rotation = turned()
-    reference = touched(body(), RADIUS, starts(), DOWN)
+    reference = touched(body(), CONTACT_BALL_RADIUS, starts(), DOWN)
     mesh = Surface(body().vertices @ rotation.T, body().faces)
-    back = touched(mesh, RADIUS, starts() @ rotation.T, rotation @ DOWN) @ rotation
+    back = touched(mesh, CONTACT_BALL_RADIUS, starts() @ rotation.T, rotation @ DOWN) @ rotation
     # rounding the turned mesh moves the contact by more on the steep flank of the bump
     return Answer("400 contacts", _largest(back, reference), 10.0, reason="the flank is steep: rounding of the turn")
 
@@ -108,8 +110,10 @@ def reordered() -> Answer:
     order = rng.permutation(len(mesh.vertices))
     place = np.argsort(order)
     faces = place[mesh.faces][rng.permutation(len(mesh.faces))]
-    other = touched(Surface(mesh.vertices[order], np.roll(faces, 1, axis=1)), RADIUS, starts(), DOWN)
-    return Answer("400 contacts", _largest(other, touched(mesh, RADIUS, starts(), DOWN)), 1.0, reason="rounding")
+    other = touched(Surface(mesh.vertices[order], np.roll(faces, 1, axis=1)), CONTACT_BALL_RADIUS, starts(), DOWN)
+    return Answer(
+        "400 contacts", _largest(other, touched(mesh, CONTACT_BALL_RADIUS, starts(), DOWN)), 1.0, reason="rounding"
+    )
 
 
 def doubled() -> Answer:
@@ -117,8 +121,10 @@ def doubled() -> Answer:
     mesh = body()
     corners = mesh.vertices[np.concatenate([mesh.faces, mesh.faces[:, ::-1]])].reshape(-1, 3)
     soup = Surface(corners, np.arange(len(corners)).reshape(-1, 3))
-    other = touched(soup, RADIUS, starts(), DOWN)
-    return Answer("400 contacts", _largest(other, touched(mesh, RADIUS, starts(), DOWN)), 1.0, reason="rounding")
+    other = touched(soup, CONTACT_BALL_RADIUS, starts(), DOWN)
+    return Answer(
+        "400 contacts", _largest(other, touched(mesh, CONTACT_BALL_RADIUS, starts(), DOWN)), 1.0, reason="rounding"
+    )
 
 
 def _needle() -> Surface:
@@ -201,7 +207,7 @@ def nearest_far() -> Answer:
 def brute_force() -> Answer:
     """Against every triangle, edge and vertex by closed forms in longer floats, without a tree."""
     mesh, start = bump_mesh(200), starts(60)
-    found = touched(mesh, RADIUS, start, DOWN)
+    found = touched(mesh, CONTACT_BALL_RADIUS, start, DOWN)
     best = np.array([_drop(mesh, np.asarray(xy, dtype=np.longdouble)) for xy in start[:, :2]])
     error = float(np.abs(found[:, 2] - best).max() / 2.0)
     return Answer("60 contacts", error, 2.0, reason="rounding")
@@ -210,7 +216,7 @@ def brute_force() -> Answer:
 def _drop(mesh: Surface, xy: NDArray[np.longdouble]) -> float:
     """Height at which the ball that comes down over xy rests: the highest of vertices, edges and faces."""
     corners = mesh.vertices[mesh.faces].astype(np.longdouble)
-    radius = np.longdouble(RADIUS)
+    radius = np.longdouble(CONTACT_BALL_RADIUS)
     heights = []
     for tip in mesh.vertices.astype(np.longdouble):
         aside = np.hypot(*(tip[:2] - xy))
@@ -239,7 +245,7 @@ def _drop(mesh: Surface, xy: NDArray[np.longdouble]) -> float:
     return float(max(heights))
 
 
-CASES = [
+CONTACT_CASES = [
     Case("contact", "scale", "the same contacts from 1e-9 to 1e6 m", scaled),
     Case("contact", "powers of two", "not a bit lost by scales 2^-40 to 2^40", powers_of_two),
     Case("contact", "origin 1e3 sizes away", "the same contacts", far_origin(1e3)),

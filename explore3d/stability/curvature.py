@@ -102,7 +102,7 @@ def skinny(method: str) -> Callable[[], Answer]:
     return run
 
 
-CASES = [
+CURVATURE_CASES = [
     Case("curvature", "umbilics everywhere", "a sphere of 3000 points", umbilics),
     Case("curvature", "cylinder", "9240 points", cylinder),
     Case("curvature", "scale", "the same from 1e-9 to 1e6 m", scaled),

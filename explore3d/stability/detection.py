@@ -6,7 +6,18 @@ from collections.abc import Callable
 
 import numpy as np
 
-from explore3d.bench.scenes import DIAMETER, HALF, SPACING, TIP, Heights, features, plate, scaled, sweeps, wire
+from explore3d.bench.scenes import (
+    DIAMETER,
+    HALF,
+    SAMPLE_SPACING,
+    TIP_RADIUS,
+    Heights,
+    features,
+    plate,
+    scaled,
+    sweeps,
+    wire,
+)
 from explore3d.stability.table import Answer, Case
 from mapping import (
     Feature,
@@ -18,7 +29,7 @@ from mapping.base import Base
 from mapping.detection import Detections, detect
 from mapping.geometry.templates import groove_height, step_height
 
-WHITE = 0.2e-3
+WHITE_NOISE = 0.2e-3
 
 
 def told(detections: Detections, found: tuple[Feature, ...]) -> str:
@@ -88,7 +99,7 @@ def _near(*places: float) -> Callable[[Detections, tuple[Feature, ...]], bool]:
 def _faint(detections: Detections, found: tuple[Feature, ...]) -> bool:
     """No sweep sees the wire, and says so; what many sweeps agree on is the wire's height, within its interval."""
     right = [f.kind == "ridge" and f.height.low <= DIAMETER <= f.height.high for f in found]
-    near = [np.abs(f.axis[:, 1]).max() < 0.3 * np.sqrt(2 * TIP * DIAMETER) for f in found]
+    near = [np.abs(f.axis[:, 1]).max() < 0.3 * np.sqrt(2 * TIP_RADIUS * DIAMETER) for f in found]
     return detections.detection_limit > DIAMETER and len(found) <= 1 and all(right) and all(near)
 
 
@@ -105,24 +116,29 @@ def _both(*parts: Heights) -> Heights:
 
 
 def _groove(width: float) -> Heights:
-    return lambda feet: groove_height(feet[:, 1], width, TIP)
+    return lambda feet: groove_height(feet[:, 1], width, TIP_RADIUS)
 
 
 def _step(height: float) -> Heights:
-    return lambda feet: step_height(feet[:, 1], height, TIP)
+    return lambda feet: step_height(feet[:, 1], height, TIP_RADIUS)
 
 
 def _standing() -> Trace:
     """A finger that does not move."""
     count = 500
-    return Trace(2e-4 * np.arange(float(count)), np.tile([0.0, 0.0, TIP], (count, 1)), np.zeros(count, dtype=int), TIP)
+    return Trace(
+        2e-4 * np.arange(float(count)),
+        np.tile([0.0, 0.0, TIP_RADIUS], (count, 1)),
+        np.zeros(count, dtype=int),
+        TIP_RADIUS,
+    )
 
 
 def _not_a_number() -> Trace:
     good = sweeps(wire())
     centers = good.centers.copy()
     centers[77, 2] = np.nan
-    return Trace(good.t, centers, good.sweep, TIP)
+    return Trace(good.t, centers, good.sweep, TIP_RADIUS)
 
 
 def _few() -> Trace:
@@ -140,7 +156,7 @@ def invariant(scale: float, distance: float = 0.0) -> Callable[[], Answer]:
     """The same crossings in another unit of length, or far from the coordinates' origin."""
 
     def run() -> Answer:
-        trace = sweeps(wire(angle=0.1), white=WHITE)
+        trace = sweeps(wire(angle=0.1), white=WHITE_NOISE)
         origin = distance * np.array([1.0, -1.0, 1.0])
         moved = scaled(trace, scale, origin)
         if distance:  # what the far coordinates can hold is the input of both
@@ -156,29 +172,30 @@ def invariant(scale: float, distance: float = 0.0) -> Callable[[], Answer]:
     return run
 
 
-PARALLEL = (-3e-3, -1.5e-3, 0.0, 1.5e-3, 3e-3)
-CASES = [
+PARALLEL_SWEEP_PLACES = (-3e-3, -1.5e-3, 0.0, 1.5e-3, 3e-3)
+DETECTION_CASES = [
     Case("detection", "thinner than the spacing", "a wire of 2 um, samples every 6 um, no noise",
          outcome(lambda: sweeps(wire(2e-6)), _ridges(1, 2e-6, 2e-8), "the ball magnifies it: a trace 0.4 mm wide")),
     Case("detection", "D = 2 r", "a wire as thick as the ball",
-         outcome(lambda: sweeps(wire(2 * TIP), half=40e-3), _anything, "wider than four tip radii is no fine feature")),
+         outcome(lambda: sweeps(wire(2 * TIP_RADIUS), half=40e-3), _anything,
+                 "wider than four tip radii is no fine feature")),
     Case("detection", "two wires closer than 2 x_c", "5 mm apart, traces 7.2 mm wide",
-         outcome(lambda: sweeps(_both(wire(y=-2.5e-3), wire(y=2.5e-3)), white=WHITE), _near(-2.5e-3, 2.5e-3),
+         outcome(lambda: sweeps(_both(wire(y=-2.5e-3), wire(y=2.5e-3)), white=WHITE_NOISE), _near(-2.5e-3, 2.5e-3),
                  "their traces meet in a kink between them")),
     Case("detection", "two wires just apart", "8 mm apart, traces 7.2 mm wide",
-         outcome(lambda: sweeps(_both(wire(y=-4e-3), wire(y=4e-3)), white=WHITE), _near(-4e-3, 4e-3),
+         outcome(lambda: sweeps(_both(wire(y=-4e-3), wire(y=4e-3)), white=WHITE_NOISE), _near(-4e-3, 4e-3),
                  "the plate between them is seen")),
     Case("detection", "two wires that touch", "0.65 mm apart: one ridge to this ball",
-         outcome(lambda: sweeps(_both(wire(y=-0.325e-3), wire(y=0.325e-3)), white=WHITE), _ridges(1, DIAMETER, 6e-5),
-                 "the ball rests on both: the kink is 5 um deep")),
+         outcome(lambda: sweeps(_both(wire(y=-0.325e-3), wire(y=0.325e-3)), white=WHITE_NOISE),
+                 _ridges(1, DIAMETER, 6e-5), "the ball rests on both: the kink is 5 um deep")),
     Case("detection", "wire parallel to the sweeps", "five sweeps along it, the middle one on its crest",
-         outcome(lambda: sweeps(wire(half=4e-3), places=PARALLEL, along_x=True, white=WHITE),
+         outcome(lambda: sweeps(wire(half=4e-3), places=PARALLEL_SWEEP_PLACES, along_x=True, white=WHITE_NOISE),
                  lambda _, f: len(f) >= 1, "its ends are crossed by every sweep")),
     Case("detection", "groove 0.1 mm wide, no noise", "a dip of 0.125 um",
          outcome(lambda: sweeps(_groove(0.1e-3)), lambda _, f: any(each.height.median < 0 for each in f),
                  "the noise floor is the rounding of contact geometry, 1e-8 r")),
     Case("detection", "groove 0.1 mm wide, 0.2 mm of noise", "a dip of 0.125 um",
-         outcome(lambda: sweeps(_groove(0.1e-3), white=WHITE), _nothing, "a 1600th of the noise: out of reach")),
+         outcome(lambda: sweeps(_groove(0.1e-3), white=WHITE_NOISE), _nothing, "a 1600th of the noise: out of reach")),
     Case("detection", "no noise at all", "sigma = 0",
          outcome(lambda: sweeps(wire()), _ridges(1, DIAMETER, 0.01 * DIAMETER), "the best filter, before any fit")),
     Case("detection", "noise of 10 D", "sigma = 6.5 mm, D = 0.65 mm",
@@ -186,19 +203,20 @@ CASES = [
     Case("detection", "plain plate, no noise", "constant height",
          outcome(lambda: sweeps(_flat), _nothing, "nothing there, nothing found")),
     Case("detection", "plain plate, noise", "0.2 mm",
-         outcome(lambda: sweeps(_flat, white=WHITE), _nothing, "0.01 false alarms a metre")),
+         outcome(lambda: sweeps(_flat, white=WHITE_NOISE), _nothing, "0.01 false alarms a metre")),
     Case("detection", "constant trace", "the finger stands still",
          outcome(_standing, _nothing, "no length to inspect; said in left_out")),
     Case("detection", "NaN samples", "one sample of 20 000", refused(_not_a_number, "a trace must be finite")),
     Case("detection", "six samples a sweep", "every 4 mm",
          outcome(_few, _silent, "too few to inspect; said in left_out")),
     Case("detection", "step of 0.95 r", "contact 87 degrees round the ball",
-         outcome(lambda: sweeps(_step(0.95 * TIP), half=40e-3), lambda d, _: len(d.crossings) > 0,
+         outcome(lambda: sweeps(_step(0.95 * TIP_RADIUS), half=40e-3), lambda d, _: len(d.crossings) > 0,
                  "a vertical wall at the step's edge")),
     Case("detection", "at the border", "a wire 0.3 mm from where the sweeps end",
-         outcome(lambda: sweeps(wire(y=HALF - 0.3e-3), white=WHITE), lambda _, f: len(f) == 1, "half of it is seen")),
+         outcome(lambda: sweeps(wire(y=HALF - 0.3e-3), white=WHITE_NOISE), lambda _, f: len(f) == 1,
+                 "half of it is seen")),
     Case("detection", "1 sample in 6 um, 1 in 0.6 mm", "samples a hundred times sparser",
-         outcome(lambda: sweeps(wire(), spacing=100 * SPACING, white=0.02e-3), _ridges(1, DIAMETER, 6e-5),
+         outcome(lambda: sweeps(wire(), spacing=100 * SAMPLE_SPACING, white=0.02e-3), _ridges(1, DIAMETER, 6e-5),
                  "12 samples over the wire's trace")),
     *[Case("detection", f"unit of {scale:g} m", "the same crossings", invariant(scale))
       for scale in (1e-9, 1e-6, 1e-3, 1e3, 1e6)],

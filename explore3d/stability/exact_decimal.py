@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from decimal import Decimal, getcontext, localcontext
 
 DIGITS = 60
-STEP = Decimal(10) ** -20  # relative, for differences: leaves 20 digits of a derivative
+DIFFERENCE_STEP = Decimal(10) ** -20  # relative, for differences: leaves 20 digits of a derivative
 
 Formula = Callable[..., Decimal]
 
@@ -26,8 +26,8 @@ def condition(formula: Formula, arguments: Sequence[float]) -> float:
         value = formula(*given)
         total = Decimal(0)
         for k, each in enumerate(given):
-            moved = [*given[:k], each * (1 + STEP), *given[k + 1 :]]
-            total += abs((formula(*moved) - value) / STEP)
+            moved = [*given[:k], each * (1 + DIFFERENCE_STEP), *given[k + 1 :]]
+            total += abs((formula(*moved) - value) / DIFFERENCE_STEP)
         return 1.0 if value == 0 else max(1.0, float(total / abs(value)))
 
 

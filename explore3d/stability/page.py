@@ -10,7 +10,7 @@ from explore3d.report import Html, badge, element, machine_section, page, paragr
 from explore3d.stability.table import Row, cells, digits, summary
 
 HEAD = ("case", "asked", "found", "digits kept", "explained by", "time", "")
-ABOUT = {
+GROUP_EXPLANATIONS = {
     "closed forms": "Formulas against 60 decimal digits. “Printed form” is how the paper or a textbook writes it: with "
     "large balls or small features its differences cancel, and digits are lost that the question does not cost.",
     "contact": "Where a ball first touches a triangle mesh, asked in ways that geometry does not know: another unit, "
@@ -34,7 +34,12 @@ def stability_page(rows: Sequence[Row]) -> str:
     )
     verdict = badge("no case fails", "good") if all(row.passed for row in rows) else badge("cases fail", "bad")
     sections = [
-        section(name[0].upper() + name[1:], name.replace(" ", "-"), paragraph(ABOUT.get(name, "")), _table(list(group)))
+        section(
+            name[0].upper() + name[1:],
+            name.replace(" ", "-"),
+            paragraph(GROUP_EXPLANATIONS.get(name, "")),
+            _table(list(group)),
+        )
         for name, group in groupby(rows, key=lambda row: row.group)
     ]
     return page("Stability", "Digits kept at the extremes", lead, paragraph(verdict, " ", summary(rows)), *sections,

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from explore3d.bench.posterior import DIAMETER, NOISE, crossings
-from explore3d.bench.scenes import TIP, features, plate, scaled, simulate_noise, sweeps, wire
+from explore3d.bench.posterior import APPARATUS_NOISE, DIAMETER, crossings
+from explore3d.bench.scenes import TIP_RADIUS, features, plate, scaled, simulate_noise, sweeps, wire
 from explore3d.stability.table import Answer, Case
 from mapping import Feature, Interval, MappingError, Posterior, Surface, Trace
 from mapping.base import Base
@@ -57,9 +57,9 @@ def sweeps_of(trace: Trace, noise: Noise) -> Trace:
     feet = np.concatenate(paths)
     up = np.tile([0.0, 0.0, 1.0], (len(feet), 1))
     axis = np.array([[-5e-3 * len(paths), 0.0, 0.5 * DIAMETER], [5e-3 * len(paths), 0.0, 0.5 * DIAMETER]])
-    heights = chain_height(feet, up, axis, 0.5 * DIAMETER, TIP)
+    heights = chain_height(feet, up, axis, 0.5 * DIAMETER, TIP_RADIUS)
     heights = heights + simulate_noise(noise, paths, np.random.default_rng(SEED))
-    return replace(trace, centers=feet + (TIP + heights)[:, None] * up)
+    return replace(trace, centers=feet + (TIP_RADIUS + heights)[:, None] * up)
 
 
 def in_unit(scale: float) -> Callable[[], Answer]:
@@ -71,14 +71,19 @@ def in_unit(scale: float) -> Callable[[], Answer]:
 
     def run() -> Answer:
         short, base = wire(half=6e-3), plate()
-        across, along = sweeps(short, white=NOISE.white), sweeps(short, white=NOISE.white, places=(0.0,), along_x=True)
+        across, along = (
+            sweeps(short, white=APPARATUS_NOISE.white),
+            sweeps(short, white=APPARATUS_NOISE.white, places=(0.0,), along_x=True),
+        )
         trace = Trace.concatenate([across, replace(along, sweep=along.sweep + across.sweep.max() + 1)])
         feature = features(trace)[1][0]
-        home = sample_posterior(feature, trace, np.random.default_rng(SEED), base=base, noise=NOISE, confirm=False)
+        home = sample_posterior(
+            feature, trace, np.random.default_rng(SEED), base=base, noise=APPARATUS_NOISE, confirm=False
+        )
         there = sample_posterior(
             _scaled_feature(feature, scale), scaled(trace, scale), np.random.default_rng(SEED),
             base=Base(Surface(scale * base.surface.vertices, base.surface.faces)),
-            noise=Noise(scale * NOISE.white), confirm=False,
+            noise=Noise(scale * APPARATUS_NOISE.white), confirm=False,
         )  # fmt: skip
         factors = np.array([{"m": scale, "1/m": 1 / scale}.get(unit, 1.0) for unit in home.units])
         shifts = np.array([np.log(scale) if unit == "ln m" else 0.0 for unit in home.units])
@@ -105,7 +110,7 @@ def never_crossed() -> Answer:
     trace, base, feature = crossings(3)
     away = replace(feature, axis=feature.axis + np.array([0.0, 0.045, 0.0]))
     try:
-        posterior = sample_posterior(away, trace, np.random.default_rng(SEED), base=base, noise=NOISE)
+        posterior = sample_posterior(away, trace, np.random.default_rng(SEED), base=base, noise=APPARATUS_NOISE)
     except MappingError as error:
         return Answer(f"refused: {error}", reason="no sample near the feature")
     return Answer(_told(posterior), holds=False)
@@ -114,10 +119,10 @@ def never_crossed() -> Answer:
 def nothing_there() -> Answer:
     """A ridge claimed where the plate is bare: the height must not exclude zero."""
     trace, base, feature = crossings(3)
-    noise = NOISE.white * np.random.default_rng(SEED).standard_normal(len(trace))
-    centers = np.column_stack([trace.centers[:, :2], TIP + noise])
+    noise = APPARATUS_NOISE.white * np.random.default_rng(SEED).standard_normal(len(trace))
+    centers = np.column_stack([trace.centers[:, :2], TIP_RADIUS + noise])
     noisy = replace(trace, centers=centers)
-    posterior = sample_posterior(feature, noisy, np.random.default_rng(SEED), base=base, noise=NOISE)
+    posterior = sample_posterior(feature, noisy, np.random.default_rng(SEED), base=base, noise=APPARATUS_NOISE)
     height = float(np.median(posterior.samples[:, 0]))
     return Answer(
         _told(posterior), reason="a feature that the data deny", holds=_sound(posterior) and np.isfinite(height)
@@ -136,18 +141,19 @@ def ends_unseen() -> Answer:
     )  # fmt: skip
 
 
-CORRELATED = Noise(0.02e-3, 0.2e-3, 3e-3)
-CASES = [
-    Case("posterior", "one crossing", "direction and length of a ridge are not in the data", wires(1, NOISE)),
-    Case("posterior", "one crossing, emcee", "the chain must say what it is worth", wires(1, NOISE, confirm=True)),
+LONG_CORRELATED_NOISE = Noise(0.02e-3, 0.2e-3, 3e-3)
+POSTERIOR_CASES = [
+    Case("posterior", "one crossing", "direction and length of a ridge are not in the data", wires(1, APPARATUS_NOISE)),
+    Case("posterior", "one crossing, emcee", "the chain must say what it is worth",
+         wires(1, APPARATUS_NOISE, confirm=True)),
     Case("posterior", "noise of 1e-9 m", "a posterior a 1e6th as wide as its prior", wires(4, Noise(1e-9))),
     Case("posterior", "noise of 1e-12 m", "narrower than the rounding of a template", wires(4, Noise(1e-12))),
     Case("posterior", "noise of 10 D", "wider than its prior", wires(3, Noise(10 * DIAMETER))),
-    Case("posterior", "correlated over 3 mm", "noise that looks like the feature", wires(4, CORRELATED)),
+    Case("posterior", "correlated over 3 mm", "noise that looks like the feature", wires(4, LONG_CORRELATED_NOISE)),
     Case("posterior", "correlated over 1 m", "noise longer than the sweep: an offset",
          wires(4, Noise(0.02e-3, 0.2e-3, 1.0))),
     Case("posterior", "noise believed 100 times too small", "the misfit must widen it",
-         wires(3, NOISE, assumed=Noise(2e-6))),
+         wires(3, APPARATUS_NOISE, assumed=Noise(2e-6))),
     Case("posterior", "unit of 1e-9 m", "the same posterior", in_unit(1e-9)),
     Case("posterior", "unit of 1e6 m", "the same posterior", in_unit(1e6)),
     Case("posterior", "never crossed", "no sample near the feature", never_crossed),

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-KINDS = ("lose", "garble", "stall", "reset", "disconnect", "alarm")
+FAULT_KINDS = ("lose", "garble", "stall", "reset", "disconnect", "alarm")
 
 
 @dataclass
@@ -35,8 +35,8 @@ class Fault:
     _left: int = field(init=False)
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise ValueError(f"unknown fault {self.kind!r}; possible: {', '.join(KINDS)}")
+        if self.kind not in FAULT_KINDS:
+            raise ValueError(f"unknown fault {self.kind!r}; possible: {', '.join(FAULT_KINDS)}")
         self._left = self.count
 
     @classmethod

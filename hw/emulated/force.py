@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 
 from hw.emulated.grbl import GrblEmulator
-from hw.sensors import CONFIGURE, SPEEDS, checksum, encode_frame, encode_line
+from hw.sensors import CONFIGURE, RATE_CODES, checksum, encode_frame, encode_line
 from mapping import FloatArray
 
 
@@ -89,7 +89,7 @@ class OptoForceEmulator(ForceEmulator):
         self._heard += data
         while (at := self._heard.find(CONFIGURE)) >= 0 and len(self._heard) >= at + 9:
             frame, self._heard = self._heard[at : at + 9], self._heard[at + 9 :]
-            speeds = {code: speed for speed, code in SPEEDS.items()}
+            speeds = {code: speed for speed, code in RATE_CODES.items()}
             if frame[7] << 8 | frame[8] == checksum(frame[:7]) and frame[4] in speeds:
                 self.rate = float(speeds[frame[4]])
                 self._next = int(np.ceil(now * self.rate * self._clock))

@@ -9,7 +9,7 @@ from hw import GcodeError
 
 _WORD = re.compile(r"([A-Z])([-+]?(?:\d+\.?\d*|\.\d+))")
 MOTIONS = {"G0": "G0", "G1": "G1", "G38.2": "G38.2", "G38.3": "G38.3", "G38.4": "G38.4", "G38.5": "G38.5"}
-MODES = {
+MODAL_GROUPS = {
     "G17": "plane", "G20": "unit", "G21": "unit", "G90": "distance", "G91": "distance", "G94": "feed",
     "G54": "system", "G55": "system", "G56": "system", "G57": "system", "G58": "system", "G59": "system",
     "G40": "cutter", "G49": "length", "G80": "cancel", "G61": "path",
@@ -63,10 +63,10 @@ def _take(block: Block, letter: str, number: float) -> None:
         if block.motion is not None:
             raise GcodeError(21)
         block.motion = word
-    elif word in MODES:
-        if MODES[word] in block.modes:
+    elif word in MODAL_GROUPS:
+        if MODAL_GROUPS[word] in block.modes:
             raise GcodeError(21)
-        block.modes[MODES[word]] = word
+        block.modes[MODAL_GROUPS[word]] = word
     elif word in ONCE or word in PROGRAM:
         block.once.add(word)
     elif letter in "GM":

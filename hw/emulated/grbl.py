@@ -18,7 +18,7 @@ from hw.emulated.touched_body import TouchedBody
 from hw.grbl import RECEIVE_BUFFER
 from mapping import FloatArray
 
-BLOCKS = 15  # of the planner
+PLANNER_BLOCKS = 15  # of the planner
 SETTINGS = {
     0: 10, 1: 25, 2: 0, 3: 0, 4: 0, 5: 0, 6: 0, 10: 1, 11: 0.010, 12: 0.002, 13: 0, 20: 1, 21: 0, 22: 1, 23: 0,
     24: 25, 25: 500, 26: 250, 27: 1, 30: 1000, 31: 0, 32: 0, 100: 250, 101: 250, 102: 250,
@@ -144,7 +144,7 @@ class GrblEmulator:
         place = f"MPos:{self._units(position)}" if mask & 1 else f"WPos:{self._units(position - self.offset)}"
         fields = [self.state, place]
         if mask & 2:
-            fields.append(f"Bf:{BLOCKS - len(self.motion.queue)},{RECEIVE_BUFFER - len(self._buffer)}")
+            fields.append(f"Bf:{PLANNER_BLOCKS - len(self.motion.queue)},{RECEIVE_BUFFER - len(self._buffer)}")
         speed = self.motion.queue[0].speed * 60e3 if self.motion.queue and not self.motion.held else 0.0
         fields.append(f"FS:{speed:.0f},0")
         if np.any(self.body.force(position)):
@@ -215,7 +215,7 @@ class GrblEmulator:
 
     def _read_lines(self) -> None:
         """Take lines out of the buffer for as long as the parser is free."""
-        while not self._probing and self._dwell is None and len(self.motion.queue) < BLOCKS:
+        while not self._probing and self._dwell is None and len(self.motion.queue) < PLANNER_BLOCKS:
             match = re.search(rb"[\r\n]", self._buffer)
             if match is None:
                 return

@@ -13,7 +13,7 @@ from mapping import FloatArray, Surface
 from mapping.geometry.contact import BallContact
 
 # What may be left of an overlap, in tip radii, and how many sides are looked for to push it out
-CLOSE, SIDES = 1e-6, 6
+LEFT_OVERLAP, MOST_LEFT_SIDES = 1e-6, 6
 # Cosine of the angle between normals above which two contacts are one, on a curved side
 SAME_SIDE = 0.995
 
@@ -65,9 +65,9 @@ class TouchedBody:
         """(3,) shortest way off all sides in reach; the nearest is overlapped by `overlap` and left along `away`."""
         normals, depths = [away], [overlap]
         way = overlap * away
-        for _ in range(SIDES):
+        for _ in range(MOST_LEFT_SIDES):
             left, away = self._overlap(place + way)
-            if left <= CLOSE * self.tip_radius:
+            if left <= LEFT_OVERLAP * self.tip_radius:
                 break
             depth = left + float(away @ way)  # as seen from where it began
             alike = [i for i, normal in enumerate(normals) if normal @ away > SAME_SIDE]

@@ -20,10 +20,10 @@ from mapping import FloatArray
 # A status is asked for this often while something is waited for (10 to 50 Hz), s
 POLL = 0.05
 # With no sign of life for so long the controller is taken for lost, s
-STALE = 1.5
+LONGEST_CONTROLLER_SILENCE = 1.5
 
 # Reports that are kept: ten seconds of asking as fast as a port can answer
-KEPT = 50_000
+KEPT_REPORTS = 50_000
 
 
 class Report(NamedTuple):
@@ -64,7 +64,7 @@ class GrblController:
         self.offset = np.zeros(3)
         self.alarm: str | None = None
         self.stop_reason: str | None = None
-        self.reports: deque[Report] = deque(maxlen=KEPT)
+        self.reports: deque[Report] = deque(maxlen=KEPT_REPORTS)
         self._asked: float | None = None
         self._news = threading.Condition()
         self._answers: deque[str] = deque()
@@ -356,7 +356,13 @@ class GrblController:
             raise LinkError(self.link.error or f"{self.link.port} is not open")
 
     def _wait(
-        self, done: Callable[[], bool], within: float, what: str, restarts: int, alarm: str | None, stale: float = STALE
+        self,
+        done: Callable[[], bool],
+        within: float,
+        what: str,
+        restarts: int,
+        alarm: str | None,
+        stale: float = LONGEST_CONTROLLER_SILENCE,
     ) -> None:
         """Wait for news, asking for a status meanwhile, so that silence is noticed soon."""
         until = time.monotonic() + within

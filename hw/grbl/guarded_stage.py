@@ -15,10 +15,10 @@ from mapping import FloatArray
 
 # Shorter ways are not worth a command: the controller refuses to probe towards where it stands
 STANDING = 5e-6
-# A force sample older than FRESH is not steered by; a sensor that stays silent for STALE is taken for lost, s
-FRESH, STALE = 0.05, 1.0
+# A force sample older than FRESH is not steered by; a sensor silent for LONGEST_SENSOR_SILENCE is taken for lost, s
+FRESH, LONGEST_SENSOR_SILENCE = 0.05, 1.0
 # How long the machine may stand still in the midst of a motion, s
-PATIENCE = 5.0
+LONGEST_STANDSTILL = 5.0
 
 
 @dataclass(eq=False)
@@ -92,7 +92,7 @@ class GuardedStage:
             if hit:
                 break
         if not hit:
-            self.controller.wait_idle(PATIENCE)
+            self.controller.wait_idle(LONGEST_STANDSTILL)
             hit = self._touches(sensor)
         self.controller.cancel_jog()
         return self.position(), hit
@@ -103,7 +103,7 @@ class GuardedStage:
         The force is looked at once at least, however fast the stage was there: on a busy host it always is, and
         would be sent into the body step by step.
         """
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + LONGEST_STANDSTILL
         while True:
             self.listen(sensor, made)
             if self._touches(sensor):
@@ -126,7 +126,7 @@ class GuardedStage:
         def fresh() -> bool:
             return sensor.age <= FRESH and sensor.heard > since
 
-        if not fresh() and not sensor.wait(fresh, STALE):
+        if not fresh() and not sensor.wait(fresh, LONGEST_SENSOR_SILENCE):
             self.controller.halt(
                 f"no force sample for {sensor.age:.2f} s; check the sensor's cable and power, run again"
             )

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hw import FingerError
-from hw.grbl import PATIENCE, GuardedStage
+from hw.grbl import LONGEST_STANDSTILL, GuardedStage
 from hw.probing.fusion import estimate_delay
 from hw.sensors import ForceSensor
 from mapping import FloatArray
@@ -24,7 +24,7 @@ from mapping import FloatArray
 # The lag is expected to be of this size, s: a stretch without chatter leaves it as it is
 EXPECTED = 5e-4
 # Second differences over this time, s: the surface is straight over it but for a bend that no chatter follows
-SPAN = 0.01
+SECOND_DIFFERENCE_SPAN = 0.01
 # Residuals of more standard deviations are kinks of the surface
 KINK = 4.0
 
@@ -59,7 +59,7 @@ class Lag:
         if len(times) < 3:
             return
         spacing = float(np.median(np.diff(times)))
-        span = max(1, round(SPAN / spacing))
+        span = max(1, round(SECOND_DIFFERENCE_SPAN / spacing))
         if len(times) < 3 * span:
             return
         speeds = np.gradient(positions, times, axis=0)
@@ -88,7 +88,7 @@ def _bend(values: FloatArray, span: int) -> FloatArray:
 
 # Longer than any delay that there could be, s
 LULL = 0.2
-ENOUGH, TRIES = 5, 12
+ENOUGH_TOUCHES, TRIES = 5, 12
 
 
 def measured_delay(
@@ -126,9 +126,9 @@ def measured_delay(
         stamps = np.array([report.at for report in reports])
         with suppress(ValueError):  # a touch during which a busy host missed the reports says nothing
             found.append(estimate_delay(stamps, np.array(heights), times, pressing, 0.3 * press))
-        if len(found) == ENOUGH:
+        if len(found) == ENOUGH_TOUCHES:
             break
-    if len(found) < ENOUGH:
+    if len(found) < ENOUGH_TOUCHES:
         raise FingerError(f"only {len(found)} of {TRIES} touches could be used; is the host too busy?")
     return float(np.median(found)), float(np.std(found) / np.sqrt(len(found)))
 
@@ -136,4 +136,4 @@ def measured_delay(
 def _follow(stage: GuardedStage, target: FloatArray, speed: float) -> None:
     """Jog to the target and ask for the position all the way."""
     stage.controller.jog(stage.frame.to_machine(target), speed)
-    stage.controller.wait_idle(PATIENCE)
+    stage.controller.wait_idle(LONGEST_STANDSTILL)

@@ -32,7 +32,7 @@ class Touched:
 
 
 # Sweeps get at least so many pecks: detection needs a curve, not a few points
-FEWEST = 24
+FEWEST_PECKS = 24
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Peck:
 
     def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
         """The latched tip centre of each contact along the sweep, as it is made."""
-        path, approach = spaced(move, min(self.step, move.length / FEWEST))
+        path, approach = spaced(move, min(self.step, move.length / FEWEST_PECKS))
         depth = -self.stroke  # of the last contact behind the commanded path, along the approach
         for point, inwards in zip(path, approach, strict=True):
             hover = point + (max(depth, -self.stroke) - self.clearance) * inwards

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hw import LinkError, Move, StoppedError
-from hw.grbl import PATIENCE, GuardedStage
+from hw.grbl import LONGEST_STANDSTILL, GuardedStage
 from hw.probing.fusion import known_at, positions_at, prompt, rigid_centers
 from hw.probing.lag import Lag
 from hw.probing.peck import Touched, spaced
@@ -28,10 +28,10 @@ BATCH = 0.5
 # Share of the wanted force that may be missing, or too much, at full tangential speed; and the slowest pace
 EASE, SLOWEST = 0.25, 0.1
 # A sweep begins when the force is this near to the wanted one, in its share, or after so many control periods
-SETTLED, SETTLING = 0.2, 50
+SETTLED_FORCE_SHARE, SETTLING = 0.2, 50
 # Reports further apart than this, in control periods, hide a turn or a stand; than this many usual gaps, if it is more;
 # unless they differ by no more than so many steps of the stage along the normal
-BLIND, UNUSUAL, STEPS = 0.5, 2.0, 2.0
+BLIND, UNUSUAL, HARMLESS_STAGE_STEPS = 0.5, 2.0, 2.0
 # Reports from so long before the samples are looked at: the last one may be that old, s
 BEFORE = 0.1
 # A path of one point is touched for so many control periods
@@ -108,7 +108,7 @@ class Slide:
             inwards = _between(approach, at)
             inwards /= np.linalg.norm(inwards)
             missing = move.force - self._pressing(stage, inwards, here, sum(queued), made)
-            settling = 0 if abs(missing) <= SETTLED * move.force else max(0, settling - 1)
+            settling = 0 if abs(missing) <= SETTLED_FORCE_SHARE * move.force else max(0, settling - 1)
             pace = 0.0 if settling else _pace(missing / move.force)
             at = min(end, at + pace)
             wanted = self.gain * missing / self.stiffness
@@ -138,7 +138,7 @@ class Slide:
         The machine paces the loop: a host that is late makes it stand, never run ahead. No force counts twice: a
         loop that goes on with what it felt before its last jog (`made`, s) would press deeper without feeling it.
         """
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + LONGEST_STANDSTILL
         left = max(queued, 1.5 * stage.controller.settings.resolution)
         while np.linalg.norm(stage.position() - here) > left:
             if time.monotonic() > until:
@@ -165,7 +165,7 @@ class Slide:
         pressing = np.linalg.norm(forces, axis=1)
         normals = forces / np.maximum(pressing, self.contact)[:, None]
         longest = max(BLIND * self.period, UNUSUAL * float(np.median(np.diff(stamps))))
-        step = STEPS * stage.controller.settings.resolution
+        step = HARMLESS_STAGE_STEPS * stage.controller.settings.resolution
 
         def touching(delay: float) -> tuple[BoolArray, FloatArray]:
             centers = positions_at(times - delay, stamps, places)

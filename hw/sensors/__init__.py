@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from hw.sensors.line_sensor import LineSensor as LineSensor, encode_line as encode_line
     from hw.sensors.optoforce import (
         CONFIGURE as CONFIGURE,
-        SPEEDS as SPEEDS,
+        RATE_CODES as RATE_CODES,
         OptoForce as OptoForce,
         checksum as checksum,
         encode_frame as encode_frame,
@@ -18,6 +18,6 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "force_sensor": ("ForceSensor",),
     "line_sensor": ("LineSensor", "encode_line"),
-    "optoforce": ("CONFIGURE", "OptoForce", "SPEEDS", "checksum", "encode_frame"),
+    "optoforce": ("CONFIGURE", "OptoForce", "RATE_CODES", "checksum", "encode_frame"),
 }
 doorway(__name__, _PUBLIC)

@@ -17,7 +17,7 @@ from hw.sensors.clock import SensorClock, missing, unwrapped
 from mapping import FloatArray, IntArray
 
 # Samples that are kept: a minute at 5 kHz
-KEPT = 300_000
+KEPT_SAMPLES = 300_000
 # Before the samples asked for, the clock is known by those of so many seconds
 HISTORY = 10.0
 
@@ -45,7 +45,7 @@ class ForceSensor:
         self.rate, self.bits = rate, bits
         self.tick = 1.0 / rate if tick is None else tick
         self.zero = np.zeros(3)
-        self._samples: deque[tuple[float, int, float, float, float]] = deque(maxlen=KEPT)
+        self._samples: deque[tuple[float, int, float, float, float]] = deque(maxlen=KEPT_SAMPLES)
         self._limit = np.inf
         self._halt: Callable[[str], None] = _nothing
         self._news = threading.Condition()

@@ -17,9 +17,9 @@ from hw import FingerError, Frames
 from hw.sensors.force_sensor import ForceSensor
 
 HEADER = bytes((170, 7, 8, 10))
-LENGTH = 16
+FRAME_BYTES = 16
 CONFIGURE = bytes((170, 0, 50, 3))
-SPEEDS = {0: 0, 1000: 1, 333: 3, 100: 10, 30: 33, 10: 100}
+RATE_CODES = {0: 0, 1000: 1, 333: 3, 100: 10, 30: 33, 10: 100}
 FILTERS = {0.0: 0, 500.0: 1, 150.0: 2, 50.0: 3, 15.0: 4, 5.0: 5, 1.5: 6}
 BAUDRATE = 1_000_000
 DISTRUST = 0xFC00  # any error of unit or sensor
@@ -49,9 +49,9 @@ def configuration(speed: int, low_pass: float, zero: bool) -> bytes:
     Raises:
         FingerError: a rate or cut-off that the device does not have.
     """
-    if speed not in SPEEDS or low_pass not in FILTERS:
-        raise FingerError(f"optoforce: possible rates {sorted(SPEEDS)} Hz, filters {sorted(FILTERS)} Hz")
-    body = CONFIGURE + bytes((SPEEDS[speed], FILTERS[low_pass], 255 if zero else 0))
+    if speed not in RATE_CODES or low_pass not in FILTERS:
+        raise FingerError(f"optoforce: possible rates {sorted(RATE_CODES)} Hz, filters {sorted(FILTERS)} Hz")
+    body = CONFIGURE + bytes((RATE_CODES[speed], FILTERS[low_pass], 255 if zero else 0))
     return body + struct.pack(">H", checksum(body))
 
 
@@ -71,7 +71,7 @@ class OptoForce(ForceSensor):
         self._setting = configuration(rate, float(low_pass), False)
         x, y, z = np.broadcast_to(np.asarray(counts_per_newton, dtype=np.float64), 3)
         self._scale = (1.0 / float(x), 1.0 / float(y), 1.0 / float(z))
-        super().__init__(port, Frames(HEADER, LENGTH, is_whole), rate=rate, bits=16, baudrate=BAUDRATE)
+        super().__init__(port, Frames(HEADER, FRAME_BYTES, is_whole), rate=rate, bits=16, baudrate=BAUDRATE)
 
     def start(self) -> None:
         """Set rate and filter; the zero is taken by `tare`, so that the device's own is left as it is."""

@@ -20,8 +20,8 @@ from mapping import FloatArray
 # Halvings of the interval between two control instants, at most: 2^-30 of 6 um is below an atom
 DEEPEST = 30
 # Share of the tolerance that the rigid trace may take: an error of its slope grows while the tip flies, by how much
-# only a second ride can tell, over a trace FINER times as fine; below LEAST of it rounding is all that is left
-SHARE, FINER, LEAST = 0.004, 8.0, 1e-7
+# only a second ride can tell, over a trace FINER times as fine; below LEAST_ERROR_SHARE of it only rounding is left
+RIGID_ERROR_SHARE, FINER, LEAST_ERROR_SHARE = 0.004, 8.0, 1e-7
 
 
 @dataclass(frozen=True)
@@ -86,9 +86,9 @@ class Dynamics:
             times: (N,) control instants, s, increasing.
             force: to hold, N.
         """
-        share = SHARE
+        share = RIGID_ERROR_SHARE
         ride = self._once(height, times, force, share)
-        while ride.error > self.tolerance and share > LEAST:
+        while ride.error > self.tolerance and share > LEAST_ERROR_SHARE:
             share /= FINER
             finer = self._once(height, times, force, share)
             ride = replace(finer, error=float(np.abs(finer.gap - ride.gap).max(initial=0.0)))

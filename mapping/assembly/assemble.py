@@ -20,13 +20,13 @@ from mapping.base import Base
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances
 
-NAMES = {1: ("bump", "ridge"), -1: ("pit", "groove")}
+KINDS_BY_SIGN = {1: ("bump", "ridge"), -1: ("pit", "groove")}
 # A group of crossings that spreads over more than this many half-widths cannot be one round bump: sweeps further
 # than one half-width from its crest miss it.
 WIDEST_SPOT = 2.6
 # A crossing lower than this share of its group's is a stray if it lies so many half-widths off the others, and so many
 # from any other low one; where others are so many that they are a line, not a spot with low rims.
-STRAY, BESIDE, MATES, LINE = 0.6, 1.3, 3.0, 5
+STRAY, STRAY_DISTANCE, MATES, LINE = 0.6, 1.3, 3.0, 5
 
 
 def assemble(
@@ -121,7 +121,7 @@ def _without_strays(group: list[Crossing], scale: float) -> list[list[Crossing]]
     if len(crest) < LINE:
         return [group]
     # what lies on the flanks of the crest is no mate of what lies off it
-    off = [c for c in low if _nearest(c.point, crest) > BESIDE * scale]
+    off = [c for c in low if _nearest(c.point, crest) > STRAY_DISTANCE * scale]
     strays = []
     for c in off:
         alike = [other.point for other in off if other.sweep != c.sweep]
@@ -138,7 +138,7 @@ def _nearest(point: FloatArray, others: list[FloatArray]) -> float:
 
 def _name(crossing: Crossing) -> str:
     """What a crossing of a single profile is called."""
-    return "step" if crossing.kind.startswith("step") else NAMES[1 if crossing.height > 0 else -1][0]
+    return "step" if crossing.kind.startswith("step") else KINDS_BY_SIGN[1 if crossing.height > 0 else -1][0]
 
 
 def _strongest_first(features: Sequence[Feature]) -> tuple[Feature, ...]:
@@ -156,7 +156,7 @@ def _details(members: list[Crossing], around: Around) -> list[Feature]:
     if not members:
         return []
     highest = max(members, key=lambda c: abs(c.height))
-    spot_name, line_name = NAMES[1 if highest.height > 0 else -1]
+    spot_name, line_name = KINDS_BY_SIGN[1 if highest.height > 0 else -1]
     half_width = float(np.sqrt(2 * around.tip_radius * abs(highest.height)))
     half_width = max(half_width, min(c.half_width for c in members if abs(c.height) > 0.7 * abs(highest.height)))
     points = np.array([c.point for c in members])

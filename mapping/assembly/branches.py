@@ -22,7 +22,7 @@ TWIG, SAME_HUB, WITHIN_HUB, DIRECTION = 1.3, 2.0, 1.1, 3.5
 STRAIGHT_ON = -0.85
 # Cosine of the angle between both ways from a point at which a line has a corner; longest gap between arms that go
 # straight on into each other, in half-widths.
-CORNER, LONGEST_GAP = -0.64, 7.0
+CORNER, LONGEST_ARM_GAP = -0.64, 7.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +214,7 @@ def _meetings(
     home = {(a, e): arms[a].hubs[e] for a, e in ends}
     seen = {(a, e): arms[a].outward(e, centers[home[a, e]], DIRECTION * half_width) for a, e in ends}
     partner: dict[ArmEnd, ArmEnd] = {}
-    for _, one, other in sorted(_straight_pairs(arms, seen, LONGEST_GAP * half_width)):
+    for _, one, other in sorted(_straight_pairs(arms, seen, LONGEST_ARM_GAP * half_width)):
         if one not in partner and other not in partner:
             partner[one], partner[other] = other, one
     meeting, crowded = [], set()
@@ -330,7 +330,7 @@ def _straightest(
         for other in ends:
             start, stop = (lines[k].axis[-e] for k, e in (one, other))
             length = float(np.linalg.norm(stop - start))
-            if one[0] >= other[0] or not 0.0 < length < LONGEST_GAP * half_width:
+            if one[0] >= other[0] or not 0.0 < length < LONGEST_ARM_GAP * half_width:
                 continue
             gap = (stop - start) / length
             turns = [float(sign * way[end] @ gap) for end, sign in ((one, 1), (other, -1)) if end in way]

@@ -20,10 +20,10 @@ from mapping.geometry.mesh import arclengths, nearest_on
 
 # A stretch is straight if it bends by less than this share of its rise, once its first part is left out, where the
 # ball rolls over the edge.
-STRAIGHT, ROLLING = 0.08, 0.35
-CLEAR, LEAST_PLACES = 4.0, 8
+STRAIGHT_BEND_SHARE, ROLLING = 0.08, 0.35
+EDGE_HEIGHT_SDS, LEAST_PLACES = 4.0, 8
 # Places that a parabola needs, and one more that tells whether it fits
-BENT = 4
+FEWEST_PARABOLA_PLACES = 4
 # Hinges further from each other than so many tip radii belong to different edges.
 SAME_EDGE = 2.0
 
@@ -60,18 +60,18 @@ def _hinge(crossing: Crossing, inspection: Inspection) -> Hinge | None:
     sd = float(np.median(inspection.sd[own]))
     for order in (slice(None), slice(None, None, -1)):
         place, height = points[order], heights[order]
-        off = height > max(CLEAR * sd, 0.03 * height.max())
+        off = height > max(EDGE_HEIGHT_SDS * sd, 0.03 * height.max())
         count = int(off.argmin())
         if count < LEAST_PLACES:
             continue
         s = np.linalg.norm(place[:count] - place[0], axis=1)
         keep = s < (1 - ROLLING) * s[-1]
-        if keep.sum() < BENT:  # a sweep that comes back to where it began
+        if keep.sum() < FEWEST_PARABOLA_PLACES:  # a sweep that comes back to where it began
             continue
         bend, slope, start = np.polyfit(s[keep], height[:count][keep], 2)
         rise = abs(np.ptp(np.polyval([bend, slope, start], s[keep])))
         line = np.polyfit(s[keep], height[:count][keep], 1)
-        straight = abs(bend) * np.ptp(s[keep]) ** 2 / 4 < STRAIGHT * rise
+        straight = abs(bend) * np.ptp(s[keep]) ** 2 / 4 < STRAIGHT_BEND_SHARE * rise
         if straight and line[0] < 0 and rise > max(0.4 * line[1], 10 * sd):
             way = (place[0] - place[count - 1]) / np.linalg.norm(place[0] - place[count - 1])
             at = place[0] + way * line[1] / line[0]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapping import Evidence, Feature, Interval, Trace
-from mapping.assembly.faint_lines import SECTIONS, SWEEPS, FaintLine, faint_lines
+from mapping.assembly.faint_lines import FEWEST_AGREEING_SWEEPS, SECTIONS, FaintLine, faint_lines
 from mapping.assembly.inspection import Inspection, inspect
 from mapping.assembly.line_ends import line_end
 from mapping.assembly.points import body_width
@@ -16,12 +16,12 @@ from mapping.detection import Detections
 from mapping.geometry.mesh import arclengths, distances
 
 # Places to a half-width of the narrowest section looked for.
-PLACES = 2.5
+PLACES_PER_HALF_WIDTH = 2.5
 # A feature of no more crossings, and no clearer than so many thresholds, may be a part of a faint line; so may a spot,
 # or a line of some crossings, that is lower than a single sweep detects with certainty.
-FEW, CLEAR, SOME = 2, 2.0, 6
+FEW_CROSSINGS, CLEAR_THRESHOLDS, SOME = 2, 2.0, 6
 # Standard deviations above which a single place stands out.
-PLAIN = 5.0
+PLAIN_PLACE_SDS = 5.0
 # Samples to a place, below which there is no noise to be averaged away; and places that are looked through in seconds.
 LEAST_SAMPLES, MOST_PLACES = 4.0, 150_000
 
@@ -41,7 +41,7 @@ def with_faint_lines(
     normals = base.foot(inspection.points, trace.tip_radius).normals
     weak = [f for f in features if _is_weak(f, detections)]
     # what one place alone shows is not faint
-    masked = np.abs(inspection.height) > PLAIN * inspection.sd
+    masked = np.abs(inspection.height) > PLAIN_PLACE_SDS * inspection.sd
     for feature in features:
         if feature not in weak:
             reach = 1.3 * np.sqrt(2 * trace.tip_radius * abs(feature.height.median)) + 0.5 * feature.width.high
@@ -61,8 +61,8 @@ def why_none_sought(detections: Detections, trace: Trace, base: Base) -> str:
     """Why no lines fainter than single sweeps show can be sought, "" if they can."""
     if base.kind != "mesh":
         return "over a base that was fitted its own errors run along lines too"
-    if len(np.unique(trace.sweep)) < SWEEPS:
-        return f"there are fewer than {SWEEPS} sweeps"
+    if len(np.unique(trace.sweep)) < FEWEST_AGREEING_SWEEPS:
+        return f"there are fewer than {FEWEST_AGREEING_SWEEPS} sweeps"
     if not np.isfinite(detections.detection_limit):
         return "the sweeps are too short"
     places = detections.inspected_length / _scales(detections, trace.tip_radius)[1]
@@ -74,11 +74,11 @@ def why_none_sought(detections: Detections, trace: Trace, base: Base) -> str:
 def _scales(detections: Detections, tip_radius: float) -> tuple[float, float]:
     """Half-width of the smallest crest that a single sweep detects, and distance between places to look at, m."""
     half_width = float(np.sqrt(2 * tip_radius * detections.detection_limit))
-    return half_width, min(SECTIONS) * half_width / PLACES
+    return half_width, min(SECTIONS) * half_width / PLACES_PER_HALF_WIDTH
 
 
 def _is_weak(feature: Feature, detections: Detections) -> bool:
-    few = feature.evidence.crossings <= FEW and feature.evidence.snr < CLEAR * detections.threshold
+    few = feature.evidence.crossings <= FEW_CROSSINGS and feature.evidence.snr < CLEAR_THRESHOLDS * detections.threshold
     # sweeps that leave a groove by its end feel a dip there, each for itself
     alone = len(feature.axis) == 1 or feature.evidence.crossings <= SOME
     return few or (alone and abs(feature.height.median) < detections.detection_limit)

@@ -23,19 +23,19 @@ from mapping.geometry.templates import crest_trace
 SECTIONS = (1.0, 0.65)
 # Lines are sought within circles of so many half-widths, whose places face the same way within 30 degrees.
 TILE = 30.0
-FACING = 0.87
+LIKE_NORMAL_COSINE = 0.87
 # Bins across and along the line, in half-widths; lengths of lines, in bins along.
-ACROSS, ALONG = 1.0 / 3.0, 2.0
-LENGTHS = (4, 7, 12, 20)
+BIN_WIDTH_ACROSS, BIN_LENGTH_ALONG = 1.0 / 3.0, 2.0
+LINE_LENGTHS = (4, 7, 12, 20)
 # Places at the crest of a line, at least: fewer say nothing of its height.
 LEAST_POWER = 2.0
 # Places that can show a line
-FEWEST = 16
+FEWEST_LINE_PLACES = 16
 # Half-widths by which the ends of the longest line may lie beside the nearest direction that is tried.
-ASIDE = 0.5
+DIRECTION_END_OFFSET = 0.5
 # Sweeps that must agree; without the one that says most this share of what the others should say must remain, and
 # so many standard deviations.
-SWEEPS, WITHOUT_BEST, OTHERS = 4, 0.75, 3.0
+FEWEST_AGREEING_SWEEPS, WITHOUT_BEST, OTHERS = 4, 0.75, 3.0
 # The number of straight lines that noise can choose from is larger than that of lines without common places: the
 # field of lines is continuous in place, direction, beginning and end. Set by simulation.
 CONTINUUM = 30.0
@@ -117,7 +117,7 @@ def threshold(path: float, pitch: float, half_width: float, alarms: float) -> fl
     from scipy.special import ndtri
 
     area = path * max(min(pitch, 10 * half_width), half_width)
-    lines = 0.5 * np.pi * area / half_width**2 * len(LENGTHS) * len(SECTIONS)
+    lines = 0.5 * np.pi * area / half_width**2 * len(LINE_LENGTHS) * len(SECTIONS)
     return float(-ndtri(min(alarms / (2 * CONTINUUM * max(lines, 1.0)), 0.1)))
 
 
@@ -128,7 +128,7 @@ def _tiles(inspection: Inspection, normals: FloatArray, free: BoolArray, half_wi
         if not left[centre]:
             continue
         near = inspection.near(inspection.points[centre][None], TILE * half_width)
-        near = near[normals[near] @ normals[centre] > FACING]
+        near = near[normals[near] @ normals[centre] > LIKE_NORMAL_COSINE]
         gap = np.linalg.norm(inspection.points[near] - inspection.points[centre], axis=1)
         left[near[gap < 0.8 * TILE * half_width]] = False
         left[centre] = False
@@ -165,7 +165,10 @@ def _agreed_in(
 ) -> FaintLine | None:
     """The clearest line of one section among the places of one tile that enough sweeps agree on."""
     for _ in range(1 + WITHOUT):
-        if len(tile) < FEWEST or (found := _clearest_in(inspection, tile, normal, half_width, inflation)) is None:
+        if (
+            len(tile) < FEWEST_LINE_PLACES
+            or (found := _clearest_in(inspection, tile, normal, half_width, inflation)) is None
+        ):
             return None
         line, support = found
         if support.agreed(inspection.level * inflation):
@@ -187,10 +190,10 @@ def _clearest_in(
     flat = (inspection.points[tile] - origin) @ frame.T
     height = inspection.height[tile]
     size = 2 * float(np.linalg.norm(flat, axis=1).max())
-    angles = np.arange(0.0, np.pi, 4 * ASIDE / (LENGTHS[-1] * ALONG))
-    cell_u, cell_v = ALONG * half_width, ACROSS * half_width
+    angles = np.arange(0.0, np.pi, 4 * DIRECTION_END_OFFSET / (LINE_LENGTHS[-1] * BIN_LENGTH_ALONG))
+    cell_u, cell_v = BIN_LENGTH_ALONG * half_width, BIN_WIDTH_ACROSS * half_width
     section = crest_trace(np.arange(-2.0, 3.0) * cell_v, 1.0, half_width)
-    sd, lengths = inspection.sd[tile], np.array(LENGTHS)
+    sd, lengths = inspection.sd[tile], np.array(LINE_LENGTHS)
     best = best_segment(
         flat, height / sd, inspection.level / sd, angles, size, cell_u, cell_v, section, lengths, LEAST_POWER
     )
@@ -219,23 +222,26 @@ def _polished(line: FaintLine, inspection: Inspection, free: BoolArray, inflatio
     """The line turned and moved aside by less than what was tried, and as long as all free places along it say."""
     middle, length = line.axis.mean(axis=0), float(np.linalg.norm(line.axis[1] - line.axis[0]))
     frame = _frame(line.normal, np.cross(line.normal, line.axis[1] - line.axis[0]))
-    reach = max(length, LENGTHS[-1] * ALONG * line.half_width)
+    reach = max(length, LINE_LENGTHS[-1] * BIN_LENGTH_ALONG * line.half_width)
     near = inspection.near(middle + reach / length * (line.axis - line.axis[::-1]), 3.0 * line.half_width)
     near = near[free[near]]
     flat, worth = (inspection.points[near] - middle) @ frame.T, (inspection.level / inspection.sd[near]) ** 2
     edges = np.arange(-reach, reach + line.half_width, line.half_width)
-    widest, step = 2.0 * ASIDE * line.half_width / length, 2.0 * ASIDE * line.half_width / reach
+    widest, step = (
+        2.0 * DIRECTION_END_OFFSET * line.half_width / length,
+        2.0 * DIRECTION_END_OFFSET * line.half_width / reach,
+    )
     best = (0.0, 0.0, 0.0, *(frame @ (line.axis - middle).T)[0], 0.0)
     for angle in np.arange(-widest, widest + step, step):
         along = flat @ [np.cos(angle), np.sin(angle)]
         across = flat @ [-np.sin(angle), np.cos(angle)]
-        for row in np.linspace(-1.0, 1.0, 7) * ACROSS * line.half_width:
+        for row in np.linspace(-1.0, 1.0, 7) * BIN_WIDTH_ACROSS * line.half_width:
             shape = crest_trace(across - row, np.sign(line.height), line.half_width)
             terms = (worth * shape * inspection.height[near], worth * shape**2)
             sums = [np.histogram(along, edges, weights=term)[0] for term in terms]
             signal, square = (np.append(0.0, np.cumsum(values)) for values in sums)
             power = np.maximum(square[None] - square[:, None], LEAST_POWER)
-            match = np.triu(signal[None] - signal[:, None], LENGTHS[0]) / np.sqrt(power)
+            match = np.triu(signal[None] - signal[:, None], LINE_LENGTHS[0]) / np.sqrt(power)
             first, last = np.unravel_index(match.argmax(), match.shape)
             touched = np.flatnonzero(sums[1][first:last] > 0)
             first, last = first + touched[0], first + touched[-1] + 1
@@ -278,7 +284,7 @@ class _Support:
 
         A sweep that runs at a slant over the line says more of it than the others, and may.
         """
-        if len(self.signal) < SWEEPS:
+        if len(self.signal) < FEWEST_AGREEING_SWEEPS:
             return False
         sign, rest = float(np.sign(self.signal.sum())), self.numbers != self.loudest
         height = sign * float(self.signal.sum() / self.square.sum())

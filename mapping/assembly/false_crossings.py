@@ -19,7 +19,7 @@ from mapping.geometry.mesh import distances
 from mapping.geometry.templates import crest_trace
 
 # Only what is claimed to be so clear is held to account, and to this share of its claim.
-CLAIM, SHARE = 20.0, 0.3
+CLAIM, SEEN_CLAIM_SHARE = 20.0, 0.3
 
 
 def is_unseen(crossing: Crossing, inspection: Inspection) -> bool:
@@ -39,13 +39,13 @@ def is_unseen(crossing: Crossing, inspection: Inspection) -> bool:
     level = float(np.median(heights[beside])) if beside.any() else 0.0
     sd = float(np.median(inspection.sd[own][inside]) / np.sqrt(max(shape @ shape, 1e-3)))
     seen = [np.sign(crossing.height) * (shape @ (heights[inside] - base)) / (shape @ shape) for base in (0.0, level)]
-    return bool(max(seen) < SHARE * crossing.snr * sd)
+    return bool(max(seen) < SEEN_CLAIM_SHARE * crossing.snr * sd)
 
 
 # A hollow is felt below the base by this share of its depth ...
-FELT = 0.2
+FELT_HOLLOW_SHARE = 0.2
 # ... and a plateau stands above it by this share, within so many half-widths of the crossing.
-PLATEAU, NEAR = 0.5, 2.0
+PLATEAU, PLATEAU_REACH = 0.5, 2.0
 
 
 def is_plateau_end(crossing: Crossing, inspection: Inspection) -> bool:
@@ -58,8 +58,11 @@ def is_plateau_end(crossing: Crossing, inspection: Inspection) -> bool:
     if not middle.any():
         return False
     tall = abs(crossing.height)
-    beside = heights[gap < NEAR * crossing.half_width]
-    felt = bool(heights[middle].mean() + 3 * inspection.sd[own][middle].mean() / np.sqrt(middle.sum()) > FELT * tall)
+    beside = heights[gap < PLATEAU_REACH * crossing.half_width]
+    felt = bool(
+        heights[middle].mean() + 3 * inspection.sd[own][middle].mean() / np.sqrt(middle.sum())
+        > FELT_HOLLOW_SHARE * tall
+    )
     return not felt and bool(np.sort(-beside)[-2:].min() > PLATEAU * tall)
 
 

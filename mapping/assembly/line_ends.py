@@ -16,10 +16,10 @@ from mapping.geometry.templates import crest_trace, misfit
 
 # Rise of the misfit (twice the log-likelihood) at the ends of a central 90 % interval, and where a line may be said
 # not to go on.
-INTERVAL, SEEN = 2.7, 9.0
+INTERVAL_MISFIT_RISE, END_MISFIT_RISE = 2.7, 9.0
 # In half-widths: how far back from the last crossing the end may lie, and places so far aside that tell of it.
-BACK, ASIDE = 1.2, 1.3
-STEPS = 120
+END_REACH_BACK, END_REACH_ASIDE = 1.2, 1.3
+END_SEARCH_STEPS = 120
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,23 +50,23 @@ def line_end(axis: FloatArray, height: float, half_width: float, inspection: Ins
         inspection: heights of the inspected places.
         longest: distance beyond the last point up to which the line may go unseen, m.
     """
-    anchor, way, length = _last_leg(axis, BACK * half_width)
+    anchor, way, length = _last_leg(axis, END_REACH_BACK * half_width)
     farthest = anchor + (length + longest + half_width) * way
-    places = inspection.near(np.stack([anchor, farthest]), ASIDE * half_width)
+    places = inspection.near(np.stack([anchor, farthest]), END_REACH_ASIDE * half_width)
     offset = inspection.points[places] - anchor
     along = offset @ way
     across = np.linalg.norm(offset - np.outer(along, way), axis=1)
-    step = (length + longest) / STEPS
-    near = (along > 0) & (along < length + longest + half_width) & (across < ASIDE * half_width)
-    reach = step * np.arange(1, STEPS + 1)
+    step = (length + longest) / END_SEARCH_STEPS
+    near = (along > 0) & (along < length + longest + half_width) & (across < END_REACH_ASIDE * half_width)
+    reach = step * np.arange(1, END_SEARCH_STEPS + 1)
     beyond = np.maximum(along[near][:, None] - reach, 0.0)
     model = crest_trace(np.hypot(beyond, across[near][:, None]), height, half_width)
     rise = misfit(inspection.height[places[near]][:, None] - model, inspection.sd[places[near], None], height).sum(
         axis=0
     )
     rise -= rise.min()
-    likely = reach[rise <= INTERVAL]
-    seen = bool(rise[-1] > SEEN)
+    likely = reach[rise <= INTERVAL_MISFIT_RISE]
+    seen = bool(rise[-1] > END_MISFIT_RISE)
     best = float(0.5 * (likely[0] + likely[-1]) if seen else likely[0])
     # the ball leaves a hollow's floor line half a width before the rim at its end
     rim = half_width if height < 0 else 0.0
@@ -88,7 +88,7 @@ def _index_of(axis: FloatArray, point: FloatArray) -> int:
 
 
 # A gap longer than this share of the line, or than so many half-widths of its disturbance, does not close.
-LONGEST_SHARE, LONGEST_GAP = 0.5, 6.0
+LONGEST_SHARE, LONGEST_CLOSING_GAP = 0.5, 6.0
 # How much longer than the gap the arc over it is, for one that turns by a right angle.
 ARC = 1.3
 
@@ -96,7 +96,7 @@ ARC = 1.3
 def closes(axis: FloatArray, height: float, half_width: float, inspection: Inspection) -> bool:
     """True if a smooth arc from the last point of an axis (K, 3) back to the first is not denied by what was felt."""
     gap = float(np.linalg.norm(axis[-1] - axis[0]))
-    if len(axis) < 4 or gap > min(LONGEST_SHARE * arclengths(axis)[-1], LONGEST_GAP * half_width):
+    if len(axis) < 4 or gap > min(LONGEST_SHARE * arclengths(axis)[-1], LONGEST_CLOSING_GAP * half_width):
         return False
     out, back = axis[-1] - axis[-2], axis[1] - axis[0]
     out, back = ARC * gap * out / np.linalg.norm(out), ARC * gap * back / np.linalg.norm(back)

@@ -11,7 +11,7 @@ from mapping import JUNCTION, Feature, FloatArray, Interval
 from mapping.assembly.branches import Branch, branches, rejoined
 from mapping.assembly.inspection import Inspection
 from mapping.assembly.line_ends import LineEnd, closes, line_end
-from mapping.assembly.linking import FELT, LONGEST_LINK, between
+from mapping.assembly.linking import FELT_REACH, LONGEST_LINK, between
 from mapping.assembly.points import body_width, evidence
 from mapping.assembly.runs import RunPoint
 from mapping.base import Base
@@ -26,7 +26,7 @@ END_HEIGHT = 0.95
 # Crossings nearer to each other than this share of the half-width are one point of the axis.
 ONE_POINT = 0.5
 # A disturbance wider than so many of the narrow ones was crossed at a slant.
-SLANT = 2.0
+SLANTED_WIDTH_RATIO = 2.0
 # A link over a place that felt no crest is as good as one so many times as long.
 DENIED = 3.0
 
@@ -66,7 +66,7 @@ def line_features(members: list[Crossing], kind: str, around: Around) -> list[Fe
 def _denied(sign: float, half_width: float, around: Around, start: FloatArray, stop: FloatArray) -> bool:
     """True if a place between two points of crests was found too low."""
     low = np.sign(sign) * half_width**2 / (2 * around.tip_radius)
-    return around.inspection.denies(between(start, stop, half_width), low, FELT * half_width)
+    return around.inspection.denies(between(start, stop, half_width), low, FELT_REACH * half_width)
 
 
 def _links(points: FloatArray, sign: float, half_width: float, around: Around) -> FloatArray:
@@ -103,7 +103,7 @@ def _squarely_first(full: list[Crossing], half_width: float, inspection: Inspect
     A sweep that ran along a line, or crossed it at a slant, was disturbed over a longer stretch.
     """
     narrow = np.quantile([c.half_width for c in full], 0.25)
-    square = [c for c in full if not isinstance(c, RunPoint) and c.half_width < SLANT * narrow]
+    square = [c for c in full if not isinstance(c, RunPoint) and c.half_width < SLANTED_WIDTH_RATIO * narrow]
     if not square:
         return full
     places = np.array([c.point for c in square])

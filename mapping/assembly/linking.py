@@ -15,7 +15,7 @@ LONGEST_LINK = 6.0
 # Linked crossings differ in height by less than this factor: sweeps beside an end see less of it.
 HEIGHT_RATIO = 0.2
 # A place so near to a supposed line, in half-widths, must have felt it.
-FELT = 0.4
+FELT_REACH = 0.4
 
 
 def groups(crossings: Sequence[Crossing], inspection: Inspection, scale: float) -> list[list[int]]:
@@ -59,7 +59,7 @@ def linked(a: Crossing, b: Crossing, inspection: Inspection, scale: float) -> bo
         return False
     if a.kind.startswith("step"):
         return True
-    return not inspection.denies(between(a.point, b.point, scale), np.sign(a.height) * low, FELT * scale)
+    return not inspection.denies(between(a.point, b.point, scale), np.sign(a.height) * low, FELT_REACH * scale)
 
 
 def uphill(crossing: Crossing) -> FloatArray:

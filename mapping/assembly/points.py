@@ -14,7 +14,7 @@ from mapping import Evidence, Feature, FloatArray, Interval
 from mapping.assembly.inspection import Inspection
 from mapping.assembly.runs import RunPoint
 from mapping.detection import Crossing, Detections
-from mapping.geometry.templates import OUTLIER, SHAPE_ERROR, crest_trace
+from mapping.geometry.templates import CREST_OUTLIER_SDS, SHAPE_ERROR, crest_trace
 
 # A trace of curvature 1 / (a + r) tells the body's radius a only if that is this share of the sum.
 CLEAR_RADIUS = 0.3
@@ -65,11 +65,11 @@ def body_width(height: float, half_width: float, tip_radius: float) -> Interval:
 
 
 # A line explains the heights better than a spot by more than this (twice the log-likelihood) ...
-BETTER = 16.0
+LINE_OVER_SPOT_GAIN = 16.0
 # ... and is longer than this share of the half-width of its disturbance.
-LONGER = 0.5
+SHORTEST_LINE_SHARE = 0.5
 # Places within so many half-widths of the crossings' middle, beyond their own spread, take part.
-AROUND = 1.6
+OUTLINE_REACH = 1.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,14 +103,14 @@ def outline(members: list[Crossing], inspection: Inspection, half_width: float) 
     highest = max(members, key=lambda c: abs(c.height))
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     frame = _tangent_frame(points - middle, highest.normal)
-    reach = float(np.linalg.norm(points - middle, axis=1).max()) + AROUND * half_width
+    reach = float(np.linalg.norm(points - middle, axis=1).max()) + OUTLINE_REACH * half_width
     near = inspection.near(middle[None], reach)
     near = near[np.linalg.norm(inspection.points[near] - middle, axis=1) < reach]
     places, height, sd = (inspection.points[near] - middle) @ frame.T, inspection.height[near], inspection.sd[near]
     flat = (points - middle) @ frame.T
     spot = _fit(places, height, sd, flat, highest.height, half_width, elongated=False)
     line = _fit(places, height, sd, flat, highest.height, half_width, elongated=True)
-    is_line = spot[-1] - line[-1] > BETTER and 2 * line[3] > LONGER * line[5]
+    is_line = spot[-1] - line[-1] > LINE_OVER_SPOT_GAIN and 2 * line[3] > SHORTEST_LINE_SHARE * line[5]
     x, y, angle, half, crest, wide, chi_square = line if is_line else spot
     heading = np.cos(angle) * frame[0] + np.sin(angle) * frame[1]
     length = 2 * half if is_line else 0.0
@@ -160,7 +160,7 @@ def _fit(
         return np.asarray((height - crest_trace(distance, x[4] * crest, x[5] * half_width)) / level)
 
     begin = np.clip(start[free], low + 1e-3, high - 1e-3)
-    found = least_squares(residual, begin, bounds=(low, high), loss="soft_l1", f_scale=OUTLIER, x_scale=0.3)
+    found = least_squares(residual, begin, bounds=(low, high), loss="soft_l1", f_scale=CREST_OUTLIER_SDS, x_scale=0.3)
     x = start.copy()
     x[free] = found.x
     scaled = x * [half_width, half_width, 1.0, half_width, crest, half_width]

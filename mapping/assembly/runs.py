@@ -93,17 +93,17 @@ def split_runs(crossings: Sequence[Crossing]) -> tuple[list[Run], list[Crossing]
 
 # Half-widths to either side, within which the crest may lie and places tell it; and along the sweep, within which the
 # line is straight.
-ASIDE, ALONG = 1.2, 0.5
-STEPS = 49
+CREST_SEARCH_REACH, STRAIGHT_REACH = 1.2, 0.5
+CREST_SEARCH_STEPS = 49
 # A crest is told if places so near felt it on both sides, in half-widths, and its place is known to this share of one;
 # it is as high as what was felt, up to this factor.
-BESIDE, TOLD, HIGH = 0.9, 0.25, 1.35
+BRACKET_REACH, MOST_PLACE_SD, HIGH = 0.9, 0.25, 1.35
 # Signal-to-noise ratio from which the other sweeps show the crest there by themselves.
-PLAIN = 6.0
+PLAIN_CREST_SNR = 6.0
 # Square of the usual residual, in standard deviations, up to which it is a crest: a step's edge is not.
 FITS = 3.0
 # A crossing wider than so many thin wires of its height was made at a slant: the sweep ran along for a while.
-SLANT = 2.0
+SLANTED_WIRE_RATIO = 2.0
 
 
 def told_crests(places: Sequence[Crossing], inspection: Inspection, tip_radius: float) -> list[Crossing]:
@@ -121,7 +121,7 @@ def told_crests(places: Sequence[Crossing], inspection: Inspection, tip_radius: 
 def along(crossing: Crossing, spacing: float, base: Base, tip_radius: float) -> list[RunPoint]:
     """Places that a sweep passed while it crossed a line at a slant; none if it crossed squarely."""
     width = float(np.sqrt(2.0 * tip_radius * abs(crossing.height)))
-    if crossing.half_width < SLANT * width:
+    if crossing.half_width < SLANTED_WIRE_RATIO * width:
         return []
     reach = crossing.half_width - width
     count = 2 * int(np.ceil(reach / spacing)) + 1
@@ -138,9 +138,9 @@ def _told(place: Crossing, inspection: Inspection, tip_radius: float) -> Crossin
     """The crossing of a crest that the places about one of a sweep tell together, or None."""
     width = float(np.sqrt(2.0 * tip_radius * abs(place.height)))
     aside = np.cross(place.normal, place.tangent)
-    near = inspection.near(place.point[None], 2.0 * ASIDE * width)
+    near = inspection.near(place.point[None], 2.0 * CREST_SEARCH_REACH * width)
     offset = inspection.points[near] - place.point
-    near_by = (np.abs(offset @ place.tangent) < ALONG * width) & (np.abs(offset @ place.normal) < width)
+    near_by = (np.abs(offset @ place.tangent) < STRAIGHT_REACH * width) & (np.abs(offset @ place.normal) < width)
     near, across = near[near_by], (offset @ aside)[near_by]
     other = inspection.sweep[near] != place.sweep
     if not other.any():
@@ -163,7 +163,7 @@ def _fitted(
         other: (M,) True for those of other sweeps than the one that ran along.
         height: felt by that sweep, m.
     """
-    offsets = np.linspace(-ASIDE, ASIDE, STEPS) * width
+    offsets = np.linspace(-CREST_SEARCH_REACH, CREST_SEARCH_REACH, CREST_SEARCH_STEPS) * width
     sign = float(np.sign(height))
     shapes = sign * crest_trace(across[None] - offsets[:, None], sign, width)
     square = np.maximum((shapes**2 / sds**2).sum(axis=1), np.finfo(float).tiny)
@@ -173,10 +173,16 @@ def _fitted(
     sd = 0.5 * max(float(np.ptp(offsets[costs < costs[best] + 1.0])), float(offsets[1] - offsets[0]))
     said = (shapes[best] / sds)[other]
     seen = float(said @ (heights / sds)[other]) / max(float(np.linalg.norm(said)), np.finfo(float).tiny)
-    beside = (across - offsets[best])[np.abs(across - offsets[best]) < BESIDE * width]
+    beside = (across - offsets[best])[np.abs(across - offsets[best]) < BRACKET_REACH * width]
     bracketed = len(beside) > 0 and beside.min() < 0.0 < beside.max()
     alike = 1.0 / HIGH < crests[best] / height < HIGH
-    if not (alike and bracketed and seen > PLAIN and sd < TOLD * width and costs[best] < FITS * len(across)):
+    if not (
+        alike
+        and bracketed
+        and seen > PLAIN_CREST_SNR
+        and sd < MOST_PLACE_SD * width
+        and costs[best] < FITS * len(across)
+    ):
         return None
     height_sd = 1.0 / float(np.sqrt(square[best]))
     return {"aside": float(offsets[best]), "height": float(crests[best]), "height_sd": height_sd, "position_sd": sd}

@@ -12,11 +12,11 @@ from mapping import FloatArray
 Tree = dict[int, set[int]]
 
 # A tie is longer than so many half-widths: what really joins two lines over such a way would have been crossed
-LONG = 1.5
+SHORTEST_TIE = 1.5
 # Cosine of the angle between the two ways on of a line that goes straight past a tie, at most
 STRAIGHT_PAST = -0.85
 # Cosine of the angle between a line that ends and a tie that turns back from its end, at least
-BACK = 0.3
+TURN_BACK_COSINE = 0.3
 
 
 def untied(tree: Tree, points: FloatArray, half_width: float) -> list[Tree]:
@@ -32,7 +32,7 @@ def untied(tree: Tree, points: FloatArray, half_width: float) -> list[Tree]:
     """
     tree = {i: set(near) for i, near in tree.items()}
     for i, j in [(one, other) for one in tree for other in tree[one] if one < other]:
-        is_long = np.linalg.norm(points[i] - points[j]) > LONG * half_width
+        is_long = np.linalg.norm(points[i] - points[j]) > SHORTEST_TIE * half_width
         ends = [_passes(*way, tree, points, half_width) for way in ((i, j), (j, i))] if is_long else [False]
         if all(ends) or (any(ends) and any(_turns_back(*way, tree, points, half_width) for way in ((i, j), (j, i)))):
             tree[i].discard(j)
@@ -80,7 +80,7 @@ def _goes_beside(i: int, first: int, last: int, tree: Tree, points: FloatArray, 
 def _turns_back(i: int, tied: int, tree: Tree, points: FloatArray, half_width: float) -> bool:
     """True if the one line that ends in a point comes to it from the side to which its link to another one leads."""
     ways = [way_from(i, near, tree, points, half_width) for near in sorted(tree[i]) if near != tied]
-    return len(ways) == 1 and float(ways[0] @ way_from(i, tied, tree, points, half_width)) > BACK
+    return len(ways) == 1 and float(ways[0] @ way_from(i, tied, tree, points, half_width)) > TURN_BACK_COSINE
 
 
 def _parts(tree: Tree) -> list[Tree]:

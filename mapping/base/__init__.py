@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from mapping.base.base import Base as Base, Feet as Feet
     from mapping.base.cells import Cells as Cells
     from mapping.base.extent import (
-        SPACING as SPACING,
+        BASE_TRIANGLE_SIZE as BASE_TRIANGLE_SIZE,
         over_base as over_base,
         refined as refined,
         rolled_off as rolled_off,
@@ -24,7 +24,7 @@ _PUBLIC = {
     "anchor": ("anchor", "tangent_frame"),
     "base": ("Base", "Feet"),
     "cells": ("Cells",),
-    "extent": ("SPACING", "over_base", "refined", "rolled_off", "touched_part"),
+    "extent": ("BASE_TRIANGLE_SIZE", "over_base", "refined", "rolled_off", "touched_part"),
     "fit": ("fit_base",),
     "pose": ("Pose", "estimate_pose"),
     "projection": ("onto_base",),

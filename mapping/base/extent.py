@@ -12,21 +12,21 @@ from mapping.base.cells import Cells
 from mapping.base.fit import fit_base
 from mapping.base.robust import robust_scale
 
-CELLS = 4000
+MOST_EXTENT_CELLS = 4000
 # So far from a place where the finger felt nothing, or rolled off, the body is taken to go on, in tip radii
-EDGE = 0.5
+EDGE_REACH = 0.5
 # Cosine of the angle to the side from which a face is felt, at most
-FACING = 0.5
+FELT_SIDE_COSINE = 0.5
 # A sweep that ends this deep (tip radii) below the base rolled off the body's edge
 ROLLED_OFF = 0.05
 # A ball that overlaps the base by so much (tip radii) would have felt it: half of what sweeps are pressed by
-OVERLAP = 0.01
+FELT_OVERLAP = 0.01
 # A centre this far off the base's normal (rad) stands beside the base, not over it
-BESIDE = float(np.radians(5.0))
+BESIDE_BASE_ANGLE = float(np.radians(5.0))
 # Barycentric coordinate below which a foot stands on a side
 ON_SIDE = 1e-6
 # Triangles that sweeps are planned on, and how far a better fit may lie from the first, in tip radii
-SPACING, AWAY = 0.5, 0.5
+BASE_TRIANGLE_SIZE, AWAY = 0.5, 0.5
 
 
 def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray, sides: FloatArray) -> Base:
@@ -47,7 +47,7 @@ def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray, s
     """
     from scipy.spatial import cKDTree
 
-    cells = Cells.of(trace, CELLS)
+    cells = Cells.of(trace, MOST_EXTENT_CELLS)
     feet = base.foot(cells.centers, trace.tip_radius)
     off = rolled_off(feet.height, cells.sweep, trace.tip_radius)
     bare = _bare(base, empty, trace.tip_radius)
@@ -57,8 +57,8 @@ def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray, s
     _, nearest = cKDTree(places).query(middle)
     keep = touched[nearest]
     if not touched.all():
-        keep &= cKDTree(places[~touched]).query(middle)[0] > EDGE * trace.tip_radius
-    keep &= (base.surface.face_normals @ sides.T > FACING).any(axis=1)
+        keep &= cKDTree(places[~touched]).query(middle)[0] > EDGE_REACH * trace.tip_radius
+    keep &= (base.surface.face_normals @ sides.T > FELT_SIDE_COSINE).any(axis=1)
     keep = keep & (middle >= box[0]).all(axis=1) & (middle <= box[1]).all(axis=1)
     if not keep.any():
         raise SurfaceError(
@@ -89,7 +89,7 @@ def over_base(trace: Trace, base: Base) -> BoolArray:
 
 def _beyond(base: Base, feet: Feet) -> BoolArray:
     """(N,) True of what stands aslant over the base's border."""
-    aslant = np.abs((feet.normals * base.surface.face_normals[feet.face]).sum(axis=1)) < np.cos(BESIDE)
+    aslant = np.abs((feet.normals * base.surface.face_normals[feet.face]).sum(axis=1)) < np.cos(BESIDE_BASE_ANGLE)
     at_side = (feet.barycentric < ON_SIDE) & base.surface.open_sides[feet.face]
     return np.asarray(aslant & at_side.any(axis=1))
 
@@ -100,8 +100,8 @@ def refined(base: Base, trace: Trace) -> Base:
     It stays as it was if the new fit comes no nearer to half of the places.
     """
     over = trace.select(over_base(trace, base))
-    again = fit_base(over, spacing=SPACING * trace.tip_radius)
-    centers = Cells.of(over, CELLS).centers
+    again = fit_base(over, spacing=BASE_TRIANGLE_SIZE * trace.tip_radius)
+    centers = Cells.of(over, MOST_EXTENT_CELLS).centers
     missed = [float(np.median(np.abs(each.foot(centers, trace.tip_radius).height))) for each in (base, again)]
     if missed[1] > missed[0]:
         return base
@@ -120,8 +120,8 @@ def _bare(base: Base, empty: FloatArray, tip_radius: float) -> FloatArray:
     if not len(empty):
         return np.zeros((0, 3))
     free = base.foot(empty[:, :3], tip_radius)
-    facing = (base.surface.face_normals[free.face] * empty[:, 3:]).sum(axis=1) > FACING
-    return np.asarray(free.points[facing & (free.height < -OVERLAP * tip_radius)])
+    facing = (base.surface.face_normals[free.face] * empty[:, 3:]).sum(axis=1) > FELT_SIDE_COSINE
+    return np.asarray(free.points[facing & (free.height < -FELT_OVERLAP * tip_radius)])
 
 
 def part_of(base: Base, keep: BoolArray) -> Base:

@@ -13,11 +13,11 @@ from mapping.base.base import Base
 from mapping.base.polyhedron import polyhedron
 from mapping.base.profile import fit_profile, profile_frame
 from mapping.base.quadrics import FAMILIES, Cloud, Family, Fitted, sheet
-from mapping.base.robust import OUTLIER, robust_scale
+from mapping.base.robust import FEATURE_RESIDUAL_SDS, robust_scale
 from mapping.base.star import star
 from mapping.base.tube import tube
 
-MOST_CELLS = 4000
+MOST_BASE_CELLS = 4000
 # Families for what no simple one explains
 FREE: tuple[Family, ...] = (
     *(partial(sheet, shortest=shortest) for shortest in (5.0, 2.5)),
@@ -55,7 +55,7 @@ def fit_base(trace: Trace, spacing: float | None = None) -> Base:
     if frame is not None:
         surface, parameters = fit_profile(trace, frame)
         return Base(surface, "profile", dict(parameters))
-    cloud = Cloud.of(trace, MOST_CELLS)
+    cloud = Cloud.of(trace, MOST_BASE_CELLS)
     fits = _fits(FAMILIES, cloud)
     if all(_missed(fit, cloud) > EXPLAINED for fit in fits):
         fits += _last_resort((polyhedron,), cloud)
@@ -87,6 +87,6 @@ def _noise_of(residual: FloatArray, floor: float) -> tuple[float, float]:
     """
     # the scatter from cell to cell is too large where sweeps are short and bend over features
     scale = max(0.5 * floor, robust_scale(residual))
-    kept = np.clip(residual / scale, -OUTLIER, OUTLIER)
+    kept = np.clip(residual / scale, -FEATURE_RESIDUAL_SDS, FEATURE_RESIDUAL_SDS)
     correlation = float(np.clip((kept[1:] * kept[:-1]).mean() / max((kept**2).mean(), 1e-12), 0.0, 0.98))
     return scale, (1.0 - correlation) / (1.0 + correlation)

@@ -9,11 +9,11 @@ from mapping.base.base import Base
 from mapping.base.quadrics import Cloud, Fitted
 
 # Trial planes, each through a centre and two of so many that are next to it within so many tip radii
-TRIALS, NEAR, NEIGHBOURS = 300, 4.0, 128
+TRIALS, TRIAL_PLANE_REACH, TRIAL_PLANE_NEIGHBOURS = 300, 4.0, 128
 # Centres so near to a plane belong to it, in tip radii; one of fewer than this share of all is none; the most planes
-THICK, FEWEST, MOST = 0.03, 0.03, 12
+THICK, LEAST_PLANE_SHARE, MOST_PLANES = 0.03, 0.03, 12
 # Rounds in which each plane is fitted again to the centres that touch nothing else
-ROUNDS = 6
+PLANE_FIT_ROUNDS = 6
 # How far the planes' mean normal must point inward for a hollow body
 HOLLOW = -0.3
 
@@ -47,13 +47,13 @@ def _found(cloud: Cloud) -> tuple[FloatArray, FloatArray, FloatArray]:
     rest = cloud.points
     rng = np.random.default_rng(0)
     found: list[tuple[FloatArray, float, float]] = []
-    while len(found) < MOST and len(rest) > FEWEST * len(cloud.points):
+    while len(found) < MOST_PLANES and len(rest) > LEAST_PLANE_SHARE * len(cloud.points):
         normals, offsets = _trials(rest, cloud.tip_radius, rng)
         if not len(normals):
             break
         inside = np.abs(rest @ normals.T - offsets) < THICK * cloud.tip_radius
         best = inside[:, int(inside.sum(axis=0).argmax())]
-        if best.sum() < max(FEWEST * len(cloud.points), 8):
+        if best.sum() < max(LEAST_PLANE_SHARE * len(cloud.points), 8):
             break
         normal, offset = _through(rest[best])
         if np.median(cloud.points @ normal - offset) > 0:
@@ -70,8 +70,8 @@ def _trials(points: FloatArray, tip_radius: float, rng: np.random.Generator) -> 
 
     first = rng.integers(len(points), size=TRIALS)
     tree = cKDTree(points)
-    count = min(NEIGHBOURS, len(points))
-    near = np.asarray(tree.query(points[first], count, distance_upper_bound=NEAR * tip_radius)[1])
+    count = min(TRIAL_PLANE_NEIGHBOURS, len(points))
+    near = np.asarray(tree.query(points[first], count, distance_upper_bound=TRIAL_PLANE_REACH * tip_radius)[1])
     near = near.reshape(TRIALS, count)
     # neighbours that are too far have the number of all points
     known = (near < len(points)).sum(axis=1)
@@ -103,7 +103,7 @@ def _outwardness(normals: FloatArray, share: FloatArray, cloud: Cloud) -> float:
 def _refined(normals: FloatArray, offsets: FloatArray, sign: float, cloud: Cloud) -> tuple[FloatArray, FloatArray]:
     """The planes fitted to the centres that touch one plane alone; the ball on an edge tells nothing of either."""
     normals, offsets = normals.copy(), offsets.copy()
-    for _ in range(ROUNDS):
+    for _ in range(PLANE_FIT_ROUNDS):
         over = cloud.points @ normals.T - offsets
         nearest = over.argmax(axis=1)
         # where the ball touches the plane nearest to it, seen from all others

@@ -14,12 +14,12 @@ from mapping.base.cells import Cells
 from mapping.base.robust import BISQUARE, MAD_TO_SD
 
 # Cells that the pose is fitted to, and of these the share that leads there: a few rounds with all of them then do
-MOST_CELLS, LEADING = 4000, 8
-L1_ROUNDS, BISQUARE_ROUNDS = 40, 40
+MOST_POSE_CELLS, LEADING = 4000, 8
+POSE_L1_ROUNDS, POSE_BISQUARE_ROUNDS = 40, 40
 # Moves smaller than these shares of the heights' scatter end the rounds; the first kind only leads to the second
-L1_NEAR, NEAR = 0.05, 1e-3
+SETTLED_L1_MOVE, SETTLED_MOVE = 0.05, 1e-3
 # A direction is observed if the trace tells it to this share of the bound
-TOLD = 0.2
+OBSERVED_SHARE = 0.2
 # Cells whose height a motion changes by less than this share of itself say nothing: facets of a mesh do that
 LEAST_TILT = 0.03
 FEWEST_CELLS = 12
@@ -110,14 +110,15 @@ def estimate_pose(trace: Trace, base: Base, *, shift: float = 3e-3, turn: float 
     Args:
         trace: some sweeps, best all over the body.
         base: the model as given.
-        shift, turn: the largest that are expected, m and rad; a motion told worse than TOLD of them stays as given.
+        shift, turn: the largest that are expected, m and rad; a motion told worse than OBSERVED_SHARE of them stays
+            as given.
 
     Raises:
         TraceError: too few samples.
 
     Reference: Chen and Medioni 1992 (point to plane); theory sections 1 and 6.
     """
-    cells = Cells.of(trace, MOST_CELLS)
+    cells = Cells.of(trace, MOST_POSE_CELLS)
     if len(cells.centers) < FEWEST_CELLS:
         raise TraceError(f"a pose needs at least {FEWEST_CELLS} samples; found {len(trace)}")
     search = _Search.of(cells, base, trace.tip_radius, shift, turn)
@@ -187,11 +188,11 @@ class _Search:
 
     def settled(self, motion: _Motion) -> _Settled:
         """Gauss-Newton steps along observed motions: least absolute heights first, then the bisquare."""
-        few = replace(self, centers=self.centers[::LEADING]) if len(self.centers) > MOST_CELLS / LEADING else self
-        motion = few.descended(motion, False, L1_ROUNDS, L1_NEAR)
+        few = replace(self, centers=self.centers[::LEADING]) if len(self.centers) > MOST_POSE_CELLS / LEADING else self
+        motion = few.descended(motion, False, POSE_L1_ROUNDS, SETTLED_L1_MOVE)
         if few is not self:
-            motion = few.descended(motion, True, BISQUARE_ROUNDS, L1_NEAR)
-        motion = self.descended(motion, True, BISQUARE_ROUNDS, NEAR)
+            motion = few.descended(motion, True, POSE_BISQUARE_ROUNDS, SETTLED_L1_MOVE)
+        motion = self.descended(motion, True, POSE_BISQUARE_ROUNDS, SETTLED_MOVE)
         return _Settled(motion, self.view(motion, robust=True))
 
     def descended(self, motion: _Motion, robust: bool, rounds: int, near: float) -> _Motion:
@@ -270,7 +271,7 @@ class _View:
         change = np.abs(self.slopes @ vectors)
         strong = (change > tilt) & (self.root > 0)[:, None]
         information = (np.where(strong, change, 0.0) ** 2 * (self.root > 0)[:, None]).sum(axis=0) / self.scatter**2
-        allowed = TOLD * np.sqrt((vectors**2 * bound[:, None] ** 2).sum(axis=0))
+        allowed = OBSERVED_SHARE * np.sqrt((vectors**2 * bound[:, None] ** 2).sum(axis=0))
         seen = (strong.sum(axis=0) >= FEWEST_CELLS) & (information * allowed**2 > 1.0)
         return vectors[:, seen], vectors[:, ~seen]
 

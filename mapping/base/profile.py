@@ -13,7 +13,7 @@ from mapping.base.robust import RobustFit, robust_fit, robust_scale
 SHORTEST_BEND = 8.0
 # Pieces that are tried; the evidence chooses.
 PIECES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
-CELLS = 480
+PROFILE_CELLS = 480
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +88,12 @@ def _design(x: FloatArray, knots: FloatArray, degree: int) -> FloatArray:
 
 
 def _cell_medians(x: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Medians over CELLS cells of equal length, in the order of x: details narrower than a cell vanish."""
-    if len(x) <= 4 * CELLS:
+    """Medians over PROFILE_CELLS cells of equal length, in the order of x: details narrower than a cell vanish."""
+    if len(x) <= 4 * PROFILE_CELLS:
         order = np.argsort(x, kind="stable")
         return x[order], z[order]
-    edges = np.linspace(x.min(), x.max(), CELLS + 1)
-    cell = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, CELLS - 1)
+    edges = np.linspace(x.min(), x.max(), PROFILE_CELLS + 1)
+    cell = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, PROFILE_CELLS - 1)
     order = np.lexsort((z, cell))
     starts = np.flatnonzero(np.diff(cell[order], prepend=-1))
     counts = np.diff(np.append(starts, len(x)))

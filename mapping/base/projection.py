@@ -9,7 +9,7 @@ from mapping.base.base import Base
 
 # Each round leaves of a sideways error the share by which facet and smooth normal differ: 1e-2 for 1 degree, but a
 # third beside a fold of 40 degrees, where rounds go on until a point moves by less than this share of the tip's radius.
-ROUNDS, MOST_ROUNDS, SETTLED = 2, 12, 1e-4
+FEWEST_PROJECTION_ROUNDS, MOST_PROJECTION_ROUNDS, SETTLED_POINT_MOVE = 2, 12, 1e-4
 
 
 def onto_base(
@@ -32,11 +32,14 @@ def onto_base(
     sign = np.where(np.einsum("ij,ij->i", feet.normals, normals) < 0.0, -1.0, 1.0)
     up = averaged(feet.normals * sign[:, None], smooth)
     found = feet.points
-    for done in range(MOST_ROUNDS):
+    for done in range(MOST_PROJECTION_ROUNDS):
         before, gap = found, points - found
         aim = found + gap - np.einsum("ij,ij->i", gap, up)[:, None] * up
         found = base.foot(aim + 1e-3 * tip_radius * up, tip_radius).points
-        if done + 1 >= ROUNDS and np.abs(found - before).max(initial=0.0) < SETTLED * tip_radius:
+        if (
+            done + 1 >= FEWEST_PROJECTION_ROUNDS
+            and np.abs(found - before).max(initial=0.0) < SETTLED_POINT_MOVE * tip_radius
+        ):
             break
     return found.copy(), up
 

@@ -12,12 +12,12 @@ import numpy as np
 from mapping import FloatArray, IntArray, Surface, Trace
 from mapping.base.cells import Cells
 from mapping.base.profile import SHORTEST_BEND
-from mapping.base.robust import MAD_TO_SD, OUTLIER, robust_fit, robust_scale
+from mapping.base.robust import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_fit, robust_scale
 
 # Upward part of the mean direction from a round body's middle of what was felt inside it, without contact normals
 BELOW = -0.6
 # Share of the scatter of second differences below which that of fourth ones shows that the sweeps bend
-BENT = 0.5
+BENT_SCATTER_SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ def _roughness(points: FloatArray) -> float:
     rest, way = np.diff(points, 4, axis=0)[smooth], along[1:-1][smooth] / length[1:-1][smooth, None]
     rest -= (rest * way).sum(axis=1)[:, None] * way
     bent = float(MAD_TO_SD * np.median(np.linalg.norm(rest, axis=1)) / np.sqrt(70.0))
-    return bent if bent < BENT * flat else flat
+    return bent if bent < BENT_SCATTER_SHARE * flat else flat
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ class Fitted:
         Args:
             share: of the cells that count as independent.
         """
-        misfit = float(np.minimum((self.residual / scale) ** 2, OUTLIER**2).sum())
+        misfit = float(np.minimum((self.residual / scale) ** 2, FEATURE_RESIDUAL_SDS**2).sum())
         return share * misfit + self.freedom * (2.0 if self.last_resort else float(np.log(len(self.residual))))
 
     def surface(self, cloud: Cloud, spacing: float | None = None) -> Surface:
@@ -281,7 +281,7 @@ def cylinder(cloud: Cloud) -> Fitted | None:
         scale = max(cloud.scale, 1e-9 * radius)
         found = least_squares(residual, [start[0], start[1], 0.0, 0.0, radius], loss="soft_l1", f_scale=scale)
         misses = residual(found.x)
-        cost = float(np.minimum((misses / cloud.floor) ** 2, OUTLIER**2).sum())
+        cost = float(np.minimum((misses / cloud.floor) ** 2, FEATURE_RESIDUAL_SDS**2).sum())
         if best is None or cost < best[0]:
             best, missed = (cost, found.x, axis, across), misses
     assert best is not None

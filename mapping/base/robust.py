@@ -12,7 +12,7 @@ from mapping import FloatArray
 BISQUARE = 4.685
 MAD_TO_SD = 1.4826
 # A residual beyond so many standard deviations counts as a feature: its size does not matter any more.
-OUTLIER = 3.0
+FEATURE_RESIDUAL_SDS = 3.0
 L1_ROUNDS = 15
 BISQUARE_ROUNDS = 40
 # Designs of more columns are made orthonormal first
@@ -60,7 +60,7 @@ def robust_fit(design: FloatArray, values: FloatArray, scale: float) -> RobustFi
         coefficients, residual = solve(design, values, weights)
     if many:
         coefficients = np.linalg.lstsq(triangle, coefficients, rcond=None)[0]
-    misfit = float(np.minimum((residual / floor) ** 2, OUTLIER**2).sum())
+    misfit = float(np.minimum((residual / floor) ** 2, FEATURE_RESIDUAL_SDS**2).sum())
     return RobustFit(coefficients, residual, misfit + design.shape[1] * float(np.log(len(values))))
 
 

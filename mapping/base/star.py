@@ -20,7 +20,7 @@ ALL_ABOUT = 0.5
 # k (k + 1) times smaller. It matters only where nothing was felt
 DEPARTURE = 0.3
 # Step of the numerical slopes, in rad
-STEP = 1e-4
+SLOPE_STEP_ANGLE = 1e-4
 
 
 def star(cloud: Cloud, degree: int) -> Fitted | None:
@@ -96,7 +96,10 @@ def _ball(middle: FloatArray, reach: Radius, hollow: bool, cloud: Cloud) -> Surf
         length = np.linalg.norm(directions, axis=1)
         return np.asarray(reach(directions)[:, None] * directions / length[:, None])
 
-    along, across = (place(unit + STEP * way) - place(unit - STEP * way) for way in (first, np.cross(unit, first)))
+    along, across = (
+        place(unit + SLOPE_STEP_ANGLE * way) - place(unit - SLOPE_STEP_ANGLE * way)
+        for way in (first, np.cross(unit, first))
+    )
     return touched(
         middle + place(unit), np.cross(along, across), outside(np.asarray(ball.faces), hollow), hollow, cloud
     )

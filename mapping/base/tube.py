@@ -8,10 +8,10 @@ import numpy as np
 
 from mapping import FloatArray, IntArray, Surface
 from mapping.base.quadrics import Cloud, Fitted, cylinder, outside, pieces_of, ring_faces
-from mapping.base.star import STEP, bears, fitted, one_sided, touched
+from mapping.base.star import SLOPE_STEP_ANGLE, bears, fitted, one_sided, touched
 
 # Corners of the mesh around the body, and its rings along it if nobody asks for a spacing
-AROUND, RINGS = 512, 128
+CORNERS_AROUND, RINGS = 512, 128
 
 
 def tube(cloud: Cloud, waves: int, shortest: float) -> Fitted | None:
@@ -43,7 +43,7 @@ def tube(cloud: Cloud, waves: int, shortest: float) -> Fitted | None:
     coefficients, missed = fitted(design, radius, np.repeat(each, pieces + 3), cloud)
 
     def reach(angle: FloatArray, height: FloatArray) -> FloatArray:
-        inside, step = np.clip(height, low, high), STEP * (high - low)
+        inside, step = np.clip(height, low, high), SLOPE_STEP_ANGLE * (high - low)
         near = np.clip(height, low + step, high - step)
         radius, nearer = (_rings(angle, level, each, knots) @ coefficients for level in (inside, near))
         slope = np.divide(radius - nearer, inside - near, out=np.zeros_like(radius), where=inside != near)
@@ -82,15 +82,15 @@ def _pipe(
     margin = 2.0 * cloud.tip_radius
     low, high = ends[0] - margin, ends[1] + margin
     rings = max(RINGS, pieces_of(high - low, spacing))
-    level = np.repeat(np.linspace(low, high, rings + 1), AROUND)
-    angle = np.tile(np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False), rings + 1)
+    level = np.repeat(np.linspace(low, high, rings + 1), CORNERS_AROUND)
+    angle = np.tile(np.linspace(0.0, 2.0 * np.pi, CORNERS_AROUND, endpoint=False), rings + 1)
 
     def place(angle: FloatArray, level: FloatArray) -> FloatArray:
         radius = reach(angle, level)
         return np.asarray(point + np.column_stack([radius * np.cos(angle), radius * np.sin(angle), level]) @ frame)
 
-    rise = STEP * (ends[1] - ends[0])
-    around = place(angle + STEP, level) - place(angle - STEP, level)
+    rise = SLOPE_STEP_ANGLE * (ends[1] - ends[0])
+    around = place(angle + SLOPE_STEP_ANGLE, level) - place(angle - SLOPE_STEP_ANGLE, level)
     along = place(angle, level + rise) - place(angle, level - rise)
-    faces = outside(ring_faces(AROUND, rings), hollow)
+    faces = outside(ring_faces(CORNERS_AROUND, rings), hollow)
     return touched(place(angle, level), np.cross(around, along), faces, hollow, cloud)

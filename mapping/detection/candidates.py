@@ -16,7 +16,7 @@ from mapping.detection.matched_filter import Bank
 from mapping.instrument import Noise
 
 # A stretch reaches as far as the smoothed height exceeds this share of the crest, or 2.5 standard deviations.
-SKIRT = 0.03
+SKIRT_SHARE = 0.03
 SKIRT_SDS = 2.5
 # A crest beside a higher one counts if the valley between them is deeper than this share of the lower, or 5 sds.
 PROMINENCE = 0.2
@@ -30,7 +30,7 @@ PHYSICAL = 2.0
 LARGEST_SHARE = 0.6
 # A disturbance weaker than this many thresholds hides no other: what it leaves behind are its own side lobes.
 HIDING = 1.5
-ROUNDS = 50
+MOST_DISTURBANCE_ROUNDS = 50
 # Samples are scarce where the noise's variance is raised by more than this share: less is the binning's own.
 SCARCE = 0.1
 
@@ -82,7 +82,7 @@ def _stretches(
     certainty = _certainties(profile, bank)
     weak: list[tuple[int, float]] = []
     changed = True
-    for _ in range(ROUNDS):
+    for _ in range(MOST_DISTURBANCE_ROUNDS):
         if changed:
             candidates = _candidates(height, bank, threshold, tip_radius, certainty)
         accepted, changed = _dominant(candidates, weak), False
@@ -176,7 +176,7 @@ def _extent(
     size, sd = _smoothing(crest, half_width, profile, noise, tip_radius)
     low, high = max(0, int(place - half_width)), min(len(height), int(place + half_width) + 2)
     smooth = np.sign(crest) * _running_mean(height, size)
-    off = smooth > max(SKIRT * abs(crest), SKIRT_SDS * sd)
+    off = smooth > max(SKIRT_SHARE * abs(crest), SKIRT_SDS * sd)
     below, above = np.flatnonzero(~off[:low]), np.flatnonzero(~off[high:])
     begin = int(below[-1]) + 1 if len(below) else 0
     end = high + int(above[0]) if len(above) else len(height)

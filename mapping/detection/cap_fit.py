@@ -16,7 +16,7 @@ from mapping.instrument import Noise
 # Improvement in twice the log-likelihood that a plateau must bring over a cap.
 PLATEAU_GAIN = 12.0
 # Averaging a stretch to this many bins costs its fit less than 1 % of its information.
-BINS = 120
+CAP_FIT_BINS = 120
 ZOOM_ROUNDS = 5
 # Shares of a plateau's half-width that its flanks may take, and how often the best share is refined.
 FLANKS = (0.4, 0.02)
@@ -117,7 +117,7 @@ def _whitened(
     end = high if neighbours[1] else min(len(height), high + margin)
     if end - begin < 5:
         begin, end = max(0, begin - 2), min(len(height), end + 2)
-    merge = max(1, (end - begin) // BINS)
+    merge = max(1, (end - begin) // CAP_FIT_BINS)
     count = (end - begin) // merge
     x = (begin + (np.arange(count, dtype=np.float64) + 0.5) * merge - 0.5) * profile.spacing
     values = height[begin : begin + count * merge].reshape(count, merge).mean(axis=1)

@@ -9,7 +9,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray, IntArray, Surface
 
 # Samples of faces looked at, at most
-MOST_SAMPLES = 2_000_000
+MOST_FACE_SAMPLES = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limi
     if not len(touched):
         return np.full(len(surface.faces), np.inf)
     step = 0.06 * tip_radius
-    while _sample_count(surface, step) > MOST_SAMPLES:
+    while _sample_count(surface, step) > MOST_FACE_SAMPLES:
         step *= 1.5  # a coarser answer is a more cautious one
     points, owner = face_samples(surface, step)
     distance, _ = cKDTree(touched).query(points, distance_upper_bound=0.9 * tip_radius, workers=-1)

@@ -14,9 +14,9 @@ from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import Crossing
 from mapping.detection.false_alarms import threshold_for
 from mapping.detection.height_profile import HeightProfile, arclength, height_profiles
-from mapping.detection.matched_filter import BINS_PER_HALF_WIDTH, smallest_half_width
+from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, smallest_half_width
 from mapping.detection.paper_algorithms import along_chord, curvature_features
-from mapping.detection.quiet_noise import CERTAIN, background, first_noise, floored, raw_stretches
+from mapping.detection.quiet_noise import SMALLEST_CREST_SNR, background, first_noise, floored, raw_stretches
 from mapping.instrument import Noise, StatedNoise
 
 # Number, samples and arclengths (N,) m of a sweep
@@ -166,12 +166,12 @@ def _step(sweep: Sweep) -> float:
 
 
 def _profiles(usable: list[Sweep], base: Base, noise: Noise, tip: float) -> list[HeightProfile]:
-    """Profiles of every sweep in bins that the smallest visible crest spans BINS_PER_HALF_WIDTH times."""
+    """Profiles of every sweep in bins that the smallest visible crest spans FILTER_BINS_PER_HALF_WIDTH times."""
     spacings = np.empty(len(usable))
     for alike in _alike(np.array([_step(sweep) for sweep in usable])):
         raw = float(np.median([_step(usable[i]) for i in alike]))
-        smallest = smallest_half_width(noise, raw, 1.0, tip, CERTAIN)
-        spacings[alike] = raw * max(1, int(smallest / (BINS_PER_HALF_WIDTH * raw)))
+        smallest = smallest_half_width(noise, raw, 1.0, tip, SMALLEST_CREST_SNR)
+        spacings[alike] = raw * max(1, int(smallest / (FILTER_BINS_PER_HALF_WIDTH * raw)))
     each = zip(usable, spacings.tolist(), strict=True)
     return [p for (number, part, s), spacing in each for p in height_profiles(number, part, s, base, spacing)]
 
@@ -196,7 +196,7 @@ def _stands_out(found: Disturbance, profile: HeightProfile, noise: Noise, tip: f
     """
     if abs(found.curvature) > 1 / (2 * tip):
         return True
-    block = max(profile.spacing, found.half_width / BINS_PER_HALF_WIDTH)
+    block = max(profile.spacing, found.half_width / FILTER_BINS_PER_HALF_WIDTH)
     variance = noise.block_covariances(1, block, profile.samples * block / profile.spacing)[0]
     return bool(abs(found.height) > ROUGHNESS * np.sqrt(variance))
 

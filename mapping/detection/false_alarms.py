@@ -34,9 +34,9 @@ TYPICAL_THRESHOLD = 5.0
 # Thresholds this near have clumps of the same size, to one or two per cent: a thousandth of the threshold.
 THRESHOLD_STEP = 0.125
 # Steps an octave of the ladder of banks that thresholds are remembered for.
-COARSE = 16
+STEPS_PER_OCTAVE = 16
 # Relative uncertainty of the noise that changes a threshold by less than one part in a thousand.
-NEGLIGIBLE = 5e-3
+NEGLIGIBLE_UNCERTAINTY = 5e-3
 
 
 def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float = 0.0) -> float:
@@ -55,16 +55,16 @@ def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float 
     """
     colour, _ = colour_in_bins(bank.noise, bank.spacing, bank.samples)
     sizes = (
-        min(rung(colour.correlated, COARSE), 1.0),
-        rung(colour.length, COARSE) if colour.correlated else 0.0,
-        rung(bank.filters[0].half_width / bank.spacing, COARSE),
+        min(rung(colour.correlated, STEPS_PER_OCTAVE), 1.0),
+        rung(colour.length, STEPS_PER_OCTAVE) if colour.correlated else 0.0,
+        rung(bank.filters[0].half_width / bank.spacing, STEPS_PER_OCTAVE),
     )
 
     def solved(near: float) -> float:
         return _solve(_intensity(*sizes, len(bank.filters), bank.drift, near), false_alarms_per_metre * bank.spacing)
 
     normal = solved(round(solved(TYPICAL_THRESHOLD) / THRESHOLD_STEP) * THRESHOLD_STEP)
-    if uncertainty < NEGLIGIBLE:
+    if uncertainty < NEGLIGIBLE_UNCERTAINTY:
         return normal
     from scipy.special import ndtr, stdtrit
 
@@ -99,9 +99,9 @@ def _solve(intensity: float, rate: float) -> float:
     return float(max(-ndtri(min(rate / (2 * intensity), 0.5)), 1.5))
 
 
-DRAWS = 128
+NOISE_DRAWS = 128
 # A clump reaches over so many neighbouring widths, and over so many half-widths of path.
-NEIGHBOURS = 8
+NEIGHBOURING_WIDTHS = 8
 CLUMP = 1.5
 # Every so many-th filter is looked at.
 EVERY = 3
@@ -186,7 +186,7 @@ class _Weights:
 def _clumps_of(bank: Bank, number: int, weights: _Weights) -> Clumps:
     own = bank.filters[number]
     step = own.coarse * bank.spacing
-    near = bank.filters[max(0, number - NEIGHBOURS) : number + NEIGHBOURS + 1]
+    near = bank.filters[max(0, number - NEIGHBOURING_WIDTHS) : number + NEIGHBOURING_WIDTHS + 1]
     reach = max(filter_reach(f.half_width, bank.noise, step, bank.drift) for f in near)
     shift = int(np.ceil(CLUMP * own.half_width / step))
     count = 2 * (reach + shift) + 1
@@ -195,7 +195,7 @@ def _clumps_of(bank: Bank, number: int, weights: _Weights) -> Clumps:
     # A fixed seed: these draws are the nodes of a quadrature, and the same bank has one threshold.
     rng = np.random.default_rng(0)
     root = np.linalg.cholesky(covariance + 1e-12 * covariance[0, 0] * np.eye(count))
-    noise = root @ rng.standard_normal((count, DRAWS))
+    noise = root @ rng.standard_normal((count, NOISE_DRAWS))
     rows = np.concatenate([_shifted(weights.of(f, own.coarse, correlation), count, shift) for f in near])
     middle = _shifted(weights.of(own, own.coarse, correlation), count, 0)[0]
     return Clumps(
@@ -203,7 +203,7 @@ def _clumps_of(bank: Bank, number: int, weights: _Weights) -> Clumps:
         rows @ (covariance @ middle),
         middle @ noise,
         np.repeat([own.coarse / f.coarse for f in near], 2 * shift + 1),
-        rng.permutation((np.arange(DRAWS) + 0.5) / DRAWS),
+        rng.permutation((np.arange(NOISE_DRAWS) + 0.5) / NOISE_DRAWS),
     )
 
 

@@ -17,10 +17,10 @@ LARGEST_FIRST_BLOCK_COUNT = 2000
 UNEVEN = 1.5
 # A gap of more than this many bins, and of more than this share of the tip radius, cuts a profile: nothing was
 # touched there. A shorter one is a tip that was thrown off for a moment; the ball saw no detail that narrow.
-LONGEST_GAP, NARROW = 2, 0.03
+LONGEST_BIN_GAP, NARROW = 2, 0.03
 # Bins of fewer samples average heights: the mean of two centres on a curved path lies beside it, which shows without
 # noise. Bins of more average centres first: the distance of a noisy centre from a kink is biased.
-FEW = 4
+FEW_SAMPLES_PER_BIN = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +115,11 @@ def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing
     counts = np.diff(np.append(first, len(s)))
     centers = np.add.reduceat(trace.centers, first, axis=0) / counts[:, None]
     times = np.add.reduceat(trace.t, first) / counts
-    if counts.mean() < FEW:
+    if counts.mean() < FEW_SAMPLES_PER_BIN:
         height = np.add.reduceat(base.foot(trace.centers, trace.tip_radius).height, first) / counts
     else:
         height = base.foot(centers, trace.tip_radius).height
-    longest = max(LONGEST_GAP, int(NARROW * trace.tip_radius / spacing))
+    longest = max(LONGEST_BIN_GAP, int(NARROW * trace.tip_radius / spacing))
     cuts = np.flatnonzero(np.diff(occupied) > longest + 1) + 1
     profiles = []
     for begin, end in zip([0, *cuts], [*cuts, len(occupied)], strict=True):

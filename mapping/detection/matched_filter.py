@@ -13,7 +13,7 @@ from mapping.instrument import Noise
 # Ratio of neighbouring half-widths: a cap between two templates loses less than 0.6 % of its signal-to-noise.
 LADDER = 1.2
 # Bins per half-width: averaging over a bin loses less than 1 %.
-BINS_PER_HALF_WIDTH = 12
+FILTER_BINS_PER_HALF_WIDTH = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +169,7 @@ def filter_reach(half_width: float, noise: Noise, step: float, drift: int) -> in
 
 def filter_sd(half_width: float, noise: Noise, spacing: float, samples: float, drift: int) -> float:
     """Standard deviation of the height that the filter of a half-width estimates, m."""
-    coarse = max(1, int(half_width / (BINS_PER_HALF_WIDTH * spacing)))
+    coarse = max(1, int(half_width / (FILTER_BINS_PER_HALF_WIDTH * spacing)))
     step = coarse * spacing
     reach = filter_reach(half_width, noise, step, drift)
     x = np.arange(-reach, reach + 1, dtype=np.float64) * step
@@ -179,7 +179,7 @@ def filter_sd(half_width: float, noise: Noise, spacing: float, samples: float, d
 
 
 def _build_filter(half_width: float, noise: Noise, spacing: float, samples: float, drift: int) -> MatchedFilter:
-    coarse = max(1, int(half_width / (BINS_PER_HALF_WIDTH * spacing)))
+    coarse = max(1, int(half_width / (FILTER_BINS_PER_HALF_WIDTH * spacing)))
     step = coarse * spacing
     reach = filter_reach(half_width, noise, step, drift)
     x = np.arange(-reach, reach + 1, dtype=np.float64) * step

@@ -13,14 +13,14 @@ from mapping.instrument import Noise
 
 # In half-widths of the widest feature: what must lie behind a crest before it is reported, the path between two
 # looks, and what is remembered.
-BEHIND, HOP, WINDOW = 2.0, 2.0, 8.0
+BEHIND, HOP, REMEMBERED_HALF_WIDTHS = 2.0, 2.0, 8.0
 
 
 class OnlineDetector:
     """Sees one sweep sample by sample and reports each crossing once.
 
-    Every HOP widest half-widths of path the detector looks at the last WINDOW of them exactly as `detect` would, and
-    reports the crests that have BEHIND of them behind.
+    Every HOP widest half-widths of path the detector looks at the last REMEMBERED_HALF_WIDTHS of them exactly as
+    `detect` would, and reports the crests that have BEHIND of them behind.
 
     Args:
         base: the known global model.
@@ -51,7 +51,7 @@ class OnlineDetector:
         self._rate, self._widest, self._sweep = false_alarms_per_metre, widest, sweep
         self._hop = max(16, int(HOP * widest / spacing))
         self._behind = int(BEHIND * widest / spacing)
-        self._keep = self._behind + self._hop + int(WINDOW * widest / spacing)
+        self._keep = self._behind + self._hop + int(REMEMBERED_HALF_WIDTHS * widest / spacing)
         self._t: list[float] = []
         self._centers: list[FloatArray] = []
         self._fresh = 0

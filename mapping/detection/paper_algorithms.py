@@ -24,9 +24,9 @@ from mapping.estimate.sweeps import CurvatureFeature, curvature_along, features_
 from mapping.instrument import Noise, robust_sd
 
 # A curve is put on this many steps per fit: more only cost time.
-STEPS = 40
+STEPS_PER_FIT = 40
 # Narrowest fit to estimated surfaces and normals, in tip radii: narrower ones see grids and facets.
-FINEST = 0.02
+NARROWEST_FIT = 0.02
 # Share by which a concave feature of an estimated surface must exceed the fillets' own curvature.
 FILLET = 0.05
 
@@ -110,7 +110,7 @@ def _normal_derivative(trace: Trace, _: Noise | None) -> CurvatureProfile:
     # slope of a line over 2 w: sd^2 = 3 sigma^2 Delta / (2 w^3)
     threshold = 1 / (2 * trace.tip_radius)
     half_width = max(
-        float((13.5 * level**2 * spacing / threshold**2) ** (1 / 3)), 4 * spacing, FINEST * trace.tip_radius
+        float((13.5 * level**2 * spacing / threshold**2) ** (1 / 3)), 4 * spacing, NARROWEST_FIT * trace.tip_radius
     )
     grid, angle = _even(x, angle, half_width)
     from scipy.signal import savgol_filter
@@ -160,7 +160,7 @@ def _smoothed(
     from scipy.signal import savgol_filter
 
     spacing = float(np.ptp(x)) / (len(x) - 1)
-    half_width = max(half_width_for(noise, spacing, threshold), FINEST * tip)
+    half_width = max(half_width_for(noise, spacing, threshold), NARROWEST_FIT * tip)
     grid, even = _even(x, z, half_width)
     size = min(2 * max(2, round(half_width / (grid[1] - grid[0]))) + 1, len(grid) - (len(grid) + 1) % 2)
     return grid, np.asarray(savgol_filter(even, size, 2, mode="interp")), half_width
@@ -213,9 +213,9 @@ def _planar(trace: Trace, points: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _even(x: FloatArray, z: FloatArray, half_width: float) -> tuple[FloatArray, FloatArray]:
-    """Means of z over equal steps of x, STEPS of them in a half-width (never finer than the samples)."""
+    """Means of z over equal steps of x, STEPS_PER_FIT of them in a half-width (never finer than the samples)."""
     spacing = float(np.ptp(x)) / (len(x) - 1)
-    step = max(half_width / STEPS, spacing)
+    step = max(half_width / STEPS_PER_FIT, spacing)
     if step < 1.5 * spacing and (np.diff(x) > 0).all():
         grid = np.linspace(x[0], x[-1], len(x))
         return grid, np.interp(grid, x, z)

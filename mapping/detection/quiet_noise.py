@@ -15,16 +15,16 @@ from mapping.detection.matched_filter import Bank, build_bank, filter_sd, smalle
 from mapping.instrument import Blocks, Noise, NoiseFit, StatedNoise, estimate_noise, fit_noise, perturbed, relative_sd
 
 # Rounding of contact geometry, in tip radii: the noise is never taken to be smaller.
-ROUNDING = 1e-8
+CONTACT_ROUNDING = 1e-8
 # Signal-to-noise ratio of the smallest crest looked for, and of what is kept out of the noise's estimate.
-CERTAIN = 5.0
+SMALLEST_CREST_SNR = 5.0
 SUSPECT = 3.5
 # Standard deviations off a known base that no bin of noise reaches, even where its level is a guess.
 UNLIKELY = 10.0
 # Samples that the noise is first estimated from, and blocks that it is fitted to.
 RAW_SAMPLES = 40_000
-BLOCKS = 8000
-ROUNDS = 3
+NOISE_FIT_BLOCKS = 8000
+QUIET_NOISE_ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ def first_noise(stretches: Sequence[Stretch], spacing: float, tip_radius: float)
 
 def floored(noise: Noise, tip_radius: float) -> Noise:
     """The noise, but never less than rounding."""
-    return replace(noise, white=max(noise.white, ROUNDING * tip_radius))
+    return replace(noise, white=max(noise.white, CONTACT_ROUNDING * tip_radius))
 
 
 def background(
@@ -113,7 +113,7 @@ def background(
         return Background(floored(given, tip_radius), banks, dict.fromkeys(banks, 0.0))
     level, fit, banks = first, NoiseFit(first), _banks(profiles, first, tip_radius, largest, drift)
     before: list[BoolArray] = []
-    for _ in range(ROUNDS):
+    for _ in range(QUIET_NOISE_ROUNDS):
         quiet = [
             quiet_bins(p, banks[p.spacing], level, SUSPECT, tip_radius) & _likely(p, level, drift) for p in profiles
         ]
@@ -140,7 +140,7 @@ def _banks(
     banks = {}
     for spacing in dict.fromkeys(p.spacing for p in profiles):
         samples = float(np.mean([p.samples for p in profiles if p.spacing == spacing]))
-        smallest = smallest_half_width(noise, spacing, samples, tip_radius, CERTAIN)
+        smallest = smallest_half_width(noise, spacing, samples, tip_radius, SMALLEST_CREST_SNR)
         banks[spacing] = build_bank(noise, spacing, samples, smallest, max(largest, smallest), drift)
     return banks
 
@@ -157,7 +157,7 @@ def _fit(
     """Noise of what is quiet: by likelihood over a known base, else by what an unknown base disturbs less."""
     if not base.known:
         return NoiseFit(_robust(profiles, quiet, first))
-    size = max(1, -(-sum(len(stretch.s) for stretch in stretches) // BLOCKS))
+    size = max(1, -(-sum(len(stretch.s) for stretch in stretches) // NOISE_FIT_BLOCKS))
     blocks = [_raw_blocks(stretches, profiles, quiet, size)]
     if sum(p.samples * len(p.height) for p in profiles) > 1.1 * sum(len(stretch.s) for stretch in stretches):
         blocks += [_profile_blocks(p, keep) for p, keep in zip(profiles, quiet, strict=True)]

@@ -17,7 +17,7 @@ from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise
 
 # What fewer crossings show may be false, and would take its part of a true neighbour's trace and live on that
-CERTAIN = 3
+FEWEST_CERTAIN_CROSSINGS = 3
 
 
 def refine_all(
@@ -53,7 +53,7 @@ def refine_all(
     half_widths = [sizes_of(feature, tip).half_width for feature in features]
     met = meetings(features, half_widths)
     beside = _beside(features, half_widths)
-    certain = [k for k, feature in enumerate(features) if feature.evidence.crossings >= CERTAIN]
+    certain = [k for k, feature in enumerate(features) if feature.evidence.crossings >= FEWEST_CERTAIN_CROSSINGS]
     doubtful = [k for k in range(len(features)) if k not in certain]
     known = list(features)
     for k in certain:

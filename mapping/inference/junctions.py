@@ -11,12 +11,12 @@ import numpy as np
 from mapping import JUNCTION, Feature, FloatArray, Interval
 from mapping.base import Base, onto_base
 from mapping.geometry.mesh import arclengths, nearest_on
-from mapping.inference.families import NEAR, touches
+from mapping.inference.families import MEETING_REACH, touches
 from mapping.inference.summary import with_open_ends
 
 # A course is known no better than this share of the half-width; places that settle the meeting place
-LEAST_SD, ROUNDS = 1e-3, 5
-QUANTILE = 1.6448536
+LEAST_SD, MEETING_ROUNDS = 1e-3, 5
+NORMAL_QUANTILE_95 = 1.6448536
 LINES = ("ridge", "groove")
 
 
@@ -42,7 +42,7 @@ def meetings(features: Sequence[Feature], half_widths: Sequence[float]) -> list[
     for number in lines:
         feature, half_width = features[number], half_widths[number]
         for end in () if feature.closed else (0, -1):
-            place, reach = feature.axis[end], NEAR * half_width
+            place, reach = feature.axis[end], MEETING_REACH * half_width
             met = [k for k in lines if k != number and touches(place, features[k], half_width)]
             if not met:
                 continue
@@ -90,7 +90,7 @@ def _place(
     """The meeting place (3,), m, and its covariance (3, 3): least squares over the courses, by Gauss-Newton steps."""
     before: FloatArray = np.mean([features[number].axis[end] for number, end in meeting.ends], axis=0)
     point, covariance = before, np.eye(3)
-    for _ in range(ROUNDS):
+    for _ in range(MEETING_ROUNDS):
         precision = np.eye(3) / meeting.reach**2
         pull = precision @ before
         for number in meeting.lines:
@@ -143,7 +143,7 @@ def _ended_at(
     points, normals = onto_base(points, nearest, base, tip)
     points[-1] = place
     way = (line[-1] - line[-2]) / np.linalg.norm(line[-1] - line[-2])
-    spread = QUANTILE * float(np.sqrt(way @ covariance @ way))
+    spread = NORMAL_QUANTILE_95 * float(np.sqrt(way @ covariance @ way))
     extra, length = _measured(feature, end, points, spread)
     notes = with_open_ends(feature.notes, extra.get("ends_seen", (True, True)))
     sd = np.asarray(extra.get("axis_sd", ()), dtype=np.float64)[order]

@@ -13,8 +13,8 @@ from mapping.inference.sampler import find_optima
 from mapping.instrument import Noise
 
 # A whitened bin further out than this is an outlier, as long as few are.
-OUTLIER = 4.5
-FEW = 0.03
+WHITENED_OUTLIER_SDS = 4.5
+MOST_OUTLIER_SHARE = 0.03
 # Standard deviations of chi-square by which the residual must exceed the noise to count as a misfit.
 EXCESS = 5.0
 
@@ -28,8 +28,8 @@ def account_for_misfit(problem: Problem, optima: list[FloatArray]) -> tuple[Prob
     it (model discrepancy; Kennedy & O'Hagan 2001).
     """
     residual = _residual(problem, optima)
-    wild = np.abs(residual) > OUTLIER
-    if wild.any() and wild.mean() < FEW:
+    wild = np.abs(residual) > WHITENED_OUTLIER_SDS
+    if wild.any() and wild.mean() < MOST_OUTLIER_SHARE:
         inflation = np.where(wild, residual**2, 1.0)
         problem = problem.under(problem.noise, inflation)
         optima = find_optima(problem.target, np.array(optima))

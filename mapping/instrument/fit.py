@@ -12,7 +12,7 @@ from mapping.instrument.noise import Noise
 from mapping.instrument.stated import StatedNoise
 
 # A correlated part must raise twice the log-likelihood by this much over white noise alone.
-CORRELATED_GAIN = 8.0
+LEAST_LIKELIHOOD_GAIN = 8.0
 # Standard deviation, in natural logarithms, of what is known of a parameter before anything is measured.
 IGNORANCE = 2.0
 # Longest correlation, in lengths of the whole path, that the path can tell from an offset of the base.
@@ -83,7 +83,7 @@ def _unit_fit(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None
     expected = stated.noise if stated is not None and stated.noise.correlated > 0 else None
     guess = start if start.correlated > 0 else expected or Noise(start.white or white, 0.1 * white, 10.0)
     theta, covariance, misfit = _newton(blocks, _logarithms(guess, white), stated)
-    if misfit + (0.0 if expected else CORRELATED_GAIN) > _misfit(blocks, Noise(white)):
+    if misfit + (0.0 if expected else LEAST_LIKELIHOOD_GAIN) > _misfit(blocks, Noise(white)):
         alone = np.zeros((3, 3))
         alone[0, 0] = 2.0 / sum(int(np.isfinite(b.values).sum()) for b in blocks)
         return NoiseFit(Noise(white, 0.0, guess.length), alone)

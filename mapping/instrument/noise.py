@@ -13,13 +13,13 @@ from mapping import FloatArray, NoiseError
 MEDIAN_OF_ABSOLUTE_NORMAL = 0.6744897501960817
 
 # A correlated part must lower chi-square by this much, or the noise counts as white.
-CORRELATED_GAIN = 6.0
+LEAST_CHI_SQUARE_GAIN = 6.0
 
 # Below so many correlation lengths the closed forms cancel; their series in x, with (k + 2)! below, do not.
-SHORT = 0.5
-TERMS = np.arange(20)
-SIGNS = (-1.0) ** TERMS
-FACTORIALS = np.cumprod(np.arange(1.0, 22.0))[TERMS + 1]
+SERIES_LIMIT = 0.5
+SERIES_POWERS = np.arange(20)
+SIGNS = (-1.0) ** SERIES_POWERS
+FACTORIALS = np.cumprod(np.arange(1.0, 22.0))[SERIES_POWERS + 1]
 
 
 @dataclass(frozen=True)
@@ -154,17 +154,17 @@ def robust_sd(values: FloatArray) -> float:
 
 def _mean_variance(x: FloatArray) -> FloatArray:
     """Variance of the mean of a unit OU process over x correlation lengths; series where the form cancels."""
-    safe = np.maximum(x, SHORT)
-    series = np.polynomial.polynomial.polyval(np.minimum(x, SHORT), 2.0 * SIGNS / FACTORIALS)
-    return np.where(x < SHORT, series, 2 * ((safe + np.expm1(-safe)) / safe) / safe)
+    safe = np.maximum(x, SERIES_LIMIT)
+    series = np.polynomial.polynomial.polyval(np.minimum(x, SERIES_LIMIT), 2.0 * SIGNS / FACTORIALS)
+    return np.where(x < SERIES_LIMIT, series, 2 * ((safe + np.expm1(-safe)) / safe) / safe)
 
 
 def _allan_of_ou(x: FloatArray) -> FloatArray:
     """Half the mean square difference of adjoining means of a unit OU process over x correlation lengths."""
-    safe = np.maximum(x, SHORT)
+    safe = np.maximum(x, SERIES_LIMIT)
     full = _mean_variance(safe) - (np.expm1(-safe) / safe) ** 2
-    coefficients = SIGNS * (4.0 - 2.0 ** (TERMS + 2)) / FACTORIALS
-    return np.where(x < SHORT, np.polynomial.polynomial.polyval(np.minimum(x, SHORT), coefficients), full)
+    coefficients = SIGNS * (4.0 - 2.0 ** (SERIES_POWERS + 2)) / FACTORIALS
+    return np.where(x < SERIES_LIMIT, np.polynomial.polynomial.polyval(np.minimum(x, SERIES_LIMIT), coefficients), full)
 
 
 def _allan_variances(residual: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
@@ -212,7 +212,7 @@ def _fit_allan(sizes: FloatArray, variances: FloatArray, counts: FloatArray, spa
     a, b = _two_levels(target, white, correlated, weight)
     misfit = np.where(b > 0, _misfit(target, a[:, None] * white + b[:, None] * correlated, weight), np.inf)
     best = int(misfit.argmin())
-    if misfit[best] > alone - CORRELATED_GAIN:
+    if misfit[best] > alone - LEAST_CHI_SQUARE_GAIN:
         return Noise(float(np.sqrt(level * scale)), 0.0, spacing)
     return Noise(float(np.sqrt(a[best] * scale)), float(np.sqrt(b[best] * scale)), float(lengths[best]))
 

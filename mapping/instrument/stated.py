@@ -10,7 +10,7 @@ from mapping import FloatArray, NoiseError
 from mapping.instrument.noise import Noise
 
 # Degrees of freedom of what is stated (1: Cauchy's): its tails let measurements that contradict it prevail.
-TAIL = 1.0
+STATED_TAIL_FREEDOM = 1.0
 
 
 @dataclass(frozen=True)
@@ -49,4 +49,4 @@ class StatedNoise:
 
 
 def _tail(deviation: float) -> float:
-    return float((TAIL + 1) * np.log1p(deviation**2 / TAIL))
+    return float((STATED_TAIL_FREEDOM + 1) * np.log1p(deviation**2 / STATED_TAIL_FREEDOM))

@@ -13,7 +13,7 @@ from mapping.instrument.noise import Noise, estimate_noise
 
 SHAPES = ("sphere", "ring")
 # 90 % of a normal distribution lie within so many standard deviations
-NINETY = 1.6448536269514722
+SDS_PER_90_HALF_WIDTH = 1.6448536269514722
 SECTORS, BANDS = 12, 3
 
 
@@ -48,7 +48,10 @@ class TipCalibration:
     @property
     def interval(self) -> tuple[float, float]:
         """Lower and upper end of the radius's 90 % interval, m."""
-        return self.radius - NINETY * self.radius_sd, self.radius + NINETY * self.radius_sd
+        return (
+            self.radius - SDS_PER_90_HALF_WIDTH * self.radius_sd,
+            self.radius + SDS_PER_90_HALF_WIDTH * self.radius_sd,
+        )
 
     def record(self) -> dict[str, Any]:
         """JSON values, SI units."""

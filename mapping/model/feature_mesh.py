@@ -14,9 +14,9 @@ from mapping.inference.families import width_at_half_height
 # Corners of half a cross-section, and of a turn round a bump: smooth to the eye, light on disk.
 CORNERS = 17
 # A ribbon stands this part of its width above the base, lest viewers show it in stripes.
-LIFT = 0.02
+RIBBON_LIFT = 0.02
 # A bell is drawn down to this share of its height.
-SKIRT = 0.03
+DRAWN_BELL_SHARE = 0.03
 
 
 def feature_mesh(feature: Feature) -> Surface:
@@ -28,11 +28,11 @@ def feature_mesh(feature: Feature) -> Surface:
     """
     height, width = _size(feature)
     if len(feature.axis) == 1:
-        return _turned(feature, _meridian(feature, max(height, LIFT * width), width))
+        return _turned(feature, _meridian(feature, max(height, RIBBON_LIFT * width), width))
     if feature.kind == "step":
         return _sweep(feature, np.array([[0.0, 0.0], [0.0, height]]), closed=False)
     if height < 0.0:
-        return _sweep(feature, width * np.array([[0.5, LIFT], [-0.5, LIFT]]), closed=False)
+        return _sweep(feature, width * np.array([[0.5, RIBBON_LIFT], [-0.5, RIBBON_LIFT]]), closed=False)
     turn = np.linspace(0.0, np.pi, CORNERS)
     return _sweep(feature, np.column_stack([0.5 * width * np.cos(turn), height * np.sin(turn)]), closed=True)
 
@@ -62,7 +62,7 @@ def _meridian(feature: Feature, height: float, width: float) -> FloatArray:
         p = float(feature.extra["exponent"])
         share = np.linspace(0.0, 1.0, 2 * CORNERS)
         # evenly spaced in the distance up to where the skirt is hardly higher than the base
-        place = share * np.sqrt(p * np.expm1(-np.log(SKIRT) / p))
+        place = share * np.sqrt(p * np.expm1(-np.log(DRAWN_BELL_SHARE) / p))
         fall = (1.0 + place**2 / p) ** -p
         bell = np.column_stack([width / float(width_at_half_height(1.0, p)) * place, height * fall])
         return np.vstack([bell, [bell[-1, 0], 0.0]])

@@ -9,10 +9,10 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Surface
 from mapping.model.feature_mesh import feature_mesh
-from mapping.model.json_record import SCHEMA, feature_record
+from mapping.model.json_record import MODEL_SCHEMA, feature_record
 
-BASE_COLOUR = (0.78, 0.80, 0.83, 1.0)
-COLOURS = {
+GLB_BASE_COLOUR = (0.78, 0.80, 0.83, 1.0)
+KIND_COLOURS = {
     "bump": (0.85, 0.37, 0.01, 1.0),
     "ridge": (0.80, 0.16, 0.22, 1.0),
     "pit": (0.20, 0.53, 0.74, 1.0),
@@ -21,7 +21,7 @@ COLOURS = {
 }
 OTHER_COLOUR = (0.25, 0.25, 0.25, 1.0)
 # glTF allows no NaN in a vertex attribute: this stands for "not known".
-UNKNOWN = -1.0
+UNKNOWN_ATTRIBUTE = -1.0
 
 
 def glb_bytes(
@@ -41,15 +41,15 @@ def glb_bytes(
 
     scene = trimesh.Scene()
     origin = base.bounds.mean(axis=0)
-    _add(scene, "base", base, origin, BASE_COLOUR, sigma, reach)
+    _add(scene, "base", base, origin, GLB_BASE_COLOUR, sigma, reach)
     for feature in features:
         mesh = feature_mesh(feature)
         # The central 90 % of a Gaussian is 2 * 1.645 standard deviations wide.
         spread = np.full(len(mesh.vertices), (feature.height.high - feature.height.low) / 3.29)
         touched = np.zeros(len(mesh.vertices))
-        _add(scene, feature.id, mesh, origin, COLOURS.get(feature.kind, OTHER_COLOUR), spread, touched)
+        _add(scene, feature.id, mesh, origin, KIND_COLOURS.get(feature.kind, OTHER_COLOUR), spread, touched)
     extras: dict[str, Any] = {feature.id: feature_record(feature) for feature in features}
-    extras["base"] = {"schema": SCHEMA, "units": "m"}
+    extras["base"] = {"schema": MODEL_SCHEMA, "units": "m"}
 
     def annotate(tree: dict[str, Any]) -> None:
         for node in tree["nodes"]:
@@ -76,7 +76,11 @@ def _add(
     mesh = trimesh.Trimesh(surface.vertices - origin, surface.faces, process=False)
     mesh.visual = trimesh.visual.TextureVisuals(material=material)
     for key, values in (("_SIGMA", sigma), ("_REACH", reach)):
-        known = np.full(len(surface.vertices), UNKNOWN) if values is None else np.nan_to_num(values, nan=UNKNOWN)
+        known = (
+            np.full(len(surface.vertices), UNKNOWN_ATTRIBUTE)
+            if values is None
+            else np.nan_to_num(values, nan=UNKNOWN_ATTRIBUTE)
+        )
         mesh.vertex_attributes[key] = known.astype(np.float32)
     transform = np.eye(4)
     transform[:3, 3] = origin

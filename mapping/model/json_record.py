@@ -9,7 +9,7 @@ import numpy as np
 
 from mapping import KINDS, Anchor, Evidence, Feature, FloatArray, Interval, LeftOut, ModelError, Posterior
 
-SCHEMA = "explore3d/model/1"
+MODEL_SCHEMA = "explore3d/model/1"
 
 Record = dict[str, Any]
 

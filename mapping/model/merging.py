@@ -14,10 +14,10 @@ from mapping.model.object_model import ObjectModel
 # Two axes further apart than this many standard deviations of their distance belong to two features.
 SAME = 4.0
 # Share of the shorter axis that must lie along the longer one.
-OVERLAP = 0.3
+LEAST_AXIS_OVERLAP = 0.3
 # 1.6449 standard deviations lie between the median and the 95 % quantile of a Gaussian.
-QUANTILE = 1.6448536
-SAMPLES = 33
+NORMAL_QUANTILE_95 = 1.6448536
+AXIS_GAP_POINTS = 33
 
 
 @dataclass(frozen=True)
@@ -69,9 +69,9 @@ def axis_distance(a: Feature, b: Feature, pose_sd: float = 0.0) -> float:
 def axis_gap(a: Feature, b: Feature) -> float:
     """Distance of two axes, m: rms over the stretch that they share; inf if they share none."""
     short, long = sorted((a.axis, b.axis), key=lambda axis: float(arclengths(axis)[-1]))
-    points = resample(short, SAMPLES) if len(short) > 1 else short
+    points = resample(short, AXIS_GAP_POINTS) if len(short) > 1 else short
     gaps, inside = _gaps(points, long)
-    if len(long) > 1 and len(short) > 1 and inside.mean() < OVERLAP:
+    if len(long) > 1 and len(short) > 1 and inside.mean() < LEAST_AXIS_OVERLAP:
         return float("inf")
     counted = gaps[inside] if inside.any() else gaps
     return float(np.sqrt(np.mean(counted**2)))
@@ -158,7 +158,7 @@ def merge_intervals(a: Interval, b: Interval) -> Interval:
         return a if a.low >= b.low else b
     if a.censored or b.censored:
         return b if a.censored else a
-    sds = np.array([(each.high - each.low) / (2.0 * QUANTILE) for each in (a, b)])
+    sds = np.array([(each.high - each.low) / (2.0 * NORMAL_QUANTILE_95) for each in (a, b)])
     if sds.min() <= 0.0:
         return a if sds[0] <= sds[1] else b
     weight = 1.0 / sds**2

@@ -17,7 +17,7 @@ from mapping import Feature, FloatArray, LeftOut, ModelError, Surface
 from mapping.base import Base, anchor
 from mapping.geometry.mesh import write_whole
 from mapping.model.glb import glb_bytes
-from mapping.model.json_record import SCHEMA, Record, feature_record, left_out_record, plain, read_feature
+from mapping.model.json_record import MODEL_SCHEMA, Record, feature_record, left_out_record, plain, read_feature
 
 __all__ = ["LeftOut", "ObjectModel"]
 
@@ -117,7 +117,7 @@ class ObjectModel:
         """The content of model.json: plain JSON values, SI units (docs/model.md)."""
         surface = self.base.surface
         return {
-            "schema": SCHEMA,
+            "schema": MODEL_SCHEMA,
             "units": "m",
             "base": {
                 "kind": self.base.kind,
@@ -159,9 +159,9 @@ def _read(file: Path) -> tuple[Record, dict[str, FloatArray]]:
         record = json.loads(file.read_text("utf-8"))
     except (OSError, ValueError) as error:
         raise ModelError(f"{file} is not a readable model: {_why(error)}") from error
-    if not isinstance(record, dict) or record.get("schema") != SCHEMA:
+    if not isinstance(record, dict) or record.get("schema") != MODEL_SCHEMA:
         found = record.get("schema") if isinstance(record, dict) else type(record).__name__
-        raise ModelError(f"{file}: expected schema {SCHEMA!r}, found {found!r}")
+        raise ModelError(f"{file}: expected schema {MODEL_SCHEMA!r}, found {found!r}")
     arrays = file.parent / "model.npz"
     try:
         with np.load(arrays, allow_pickle=False) as bundle:

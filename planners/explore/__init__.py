@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from planners.explore.discover import SIDES as SIDES, Discover as Discover
+    from planners.explore.discover import APPROACH_SIDES as APPROACH_SIDES, Discover as Discover
     from planners.explore.explore import Explore as Explore
     from planners.explore.locate import Locate as Locate
 
 _PUBLIC = {
-    "discover": ("Discover", "SIDES"),
+    "discover": ("APPROACH_SIDES", "Discover"),
     "explore": ("Explore",),
     "locate": ("Locate",),
 }

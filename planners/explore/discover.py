@@ -9,18 +9,18 @@ import numpy as np
 
 from hw import Move
 from mapping import FloatArray, SurfaceError, Trace, TraceError
-from mapping.base import MAD_TO_SD, SPACING, Base, Cells, fit_base, robust_scale, rolled_off, touched_part
+from mapping.base import BASE_TRIANGLE_SIZE, MAD_TO_SD, Base, Cells, fit_base, robust_scale, rolled_off, touched_part
 from planners import Outcome, Plan, PlannerError
 from planners.explore.feel_line import Felt, FeltLine, empty_at, facing
 from planners.survey import Survey
 
-SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
+APPROACH_SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
 # Lines along and across each side of the box, and sweeps that test a fit
-ALONG, ACROSS, TESTING = 5, 3, 8
-MOST_ROUNDS = 4
+LINES_ALONG, LINES_ACROSS, TESTING = 5, 3, 8
+MOST_DISCOVERY_ROUNDS = 4
 # A base is good if it misses the next sweeps by less than this share of the smallest feature, or by twice the noise
 GOOD = 0.1
-CELLS = 4000
+MOST_DISCOVERY_CELLS = 4000
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -35,7 +35,7 @@ class Discover:
             approached the space must be free.
         tip_radius: m.
         smallest: height of the smallest feature to be found, m: so good the base must be.
-        sides: from which to approach, of SIDES.
+        sides: from which to approach, of APPROACH_SIDES.
         speed, force: of the sweeps, m/s and N.
     """
 
@@ -48,10 +48,10 @@ class Discover:
     force: float = 1.0
 
     def __post_init__(self) -> None:
-        unknown = [side for side in self.sides if side not in SIDES]
+        unknown = [side for side in self.sides if side not in APPROACH_SIDES]
         if unknown or not self.sides:
             found = unknown or "none"
-            raise PlannerError(f"discover: sides must be some of {', '.join(SIDES)}; found {found}")
+            raise PlannerError(f"discover: sides must be some of {', '.join(APPROACH_SIDES)}; found {found}")
         if not (np.asarray(self.low) < np.asarray(self.high)).all():
             raise PlannerError(f"discover: low must lie below high; found {self.low} and {self.high}")
 
@@ -67,10 +67,10 @@ class Discover:
         for side in self.sides:
             for line in self._lines(side):
                 yield from line.feel(felt)
-        if sum(len(trace) for trace in felt.traces) < CELLS // 100:
+        if sum(len(trace) for trace in felt.traces) < MOST_DISCOVERY_CELLS // 100:
             return Outcome("nothing found", "no body was touched inside the region")
         base = self._fit(felt)
-        for number in range(MOST_ROUNDS):
+        for number in range(MOST_DISCOVERY_ROUNDS):
             fresh = []
             for move in self._testing(base, number):
                 trace = yield move
@@ -95,7 +95,7 @@ class Discover:
         low, high = np.asarray(self.low, dtype=np.float64), np.asarray(self.high, dtype=np.float64)
         first, second = sorted((i for i in range(3) if i != axis), key=lambda i: low[i] - high[i])
         top = (high if sign > 0 else low)[axis] + sign * self.tip_radius
-        for along, across, count in ((first, second, ALONG), (second, first, ACROSS)):
+        for along, across, count in ((first, second, LINES_ALONG), (second, first, LINES_ACROSS)):
             for number in range(count):
                 ends = np.zeros((2, 3))
                 ends[:, axis] = top
@@ -107,12 +107,12 @@ class Discover:
 
     def _fit(self, felt: Felt) -> Base:
         trace = Trace.concatenate(felt.traces)
-        cells = Cells.of(trace, CELLS)
+        cells = Cells.of(trace, MOST_DISCOVERY_CELLS)
         first = fit_base(cells.trace(self.tip_radius, np.ones(len(cells.sweep), dtype=bool)))
         height = first.foot(cells.centers, self.tip_radius).height
         # where the ball rolled off the body's edges it does not tell how the body is curved
         kept = cells.trace(self.tip_radius, ~rolled_off(height, cells.sweep, self.tip_radius))
-        base = fit_base(kept, spacing=SPACING * self.tip_radius)
+        base = fit_base(kept, spacing=BASE_TRIANGLE_SIZE * self.tip_radius)
         box = np.stack([self.low, self.high])
         outward = np.array([_outward(side) for side in self.sides])
         return touched_part(base, trace, np.concatenate([np.zeros((0, 6)), *felt.empty]), box, outward)
@@ -128,7 +128,7 @@ class Discover:
 
     def _miss(self, trace: Trace, base: Base) -> tuple[float, float]:
         """Standard deviation of the heights over the base, m, without what stands out; and what is allowed."""
-        height = base.foot(Cells.of(trace, CELLS).centers, self.tip_radius).height
+        height = base.foot(Cells.of(trace, MOST_DISCOVERY_CELLS).centers, self.tip_radius).height
         noise = robust_scale(np.diff(height, 2)) / np.sqrt(6.0)
         return float(MAD_TO_SD * np.median(np.abs(height))), float(max(2.0 * noise, GOOD * self.smallest))
 

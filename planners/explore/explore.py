@@ -34,7 +34,7 @@ from planners.paths import Strokes
 from planners.survey import Survey
 
 # Slides off one end, at most, and in one go
-MOST_SLIDES, AT_ONCE = 150, 8
+MOST_SLIDES, SLIDES_AT_ONCE = 150, 8
 # A faint line is straight, and every crossing of it costs many passes: the step, in its length so far
 LEAD_STEP = 0.25
 
@@ -264,7 +264,7 @@ class Explore:
         finder = EndFinder(self.strokes, self.base, found.noise or Noise(0.0))
         crest = Crest.of(track)
         end = track.ends[which]
-        for _ in range(AT_ONCE):
+        for _ in range(SLIDES_AT_ONCE):
             end = yield from finder.slide(end, crest)
             found.slides[index, which] = found.slides.get((index, which), 0) + 1
             if end.reason != "end" or end.sd <= self._enough(track):

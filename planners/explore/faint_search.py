@@ -15,7 +15,7 @@ from mapping.base import Base
 from mapping.detection import Crossing, Detections, detect
 from mapping.instrument import Noise
 from planners import Outcome, Plan
-from planners.follow import SEEN
+from planners.follow import SEEN_CHI_SQUARE_FALL
 from planners.survey import Survey
 
 # A line may lie anywhere and run in any direction: together its crossings must say so much more (in squares of the
@@ -144,12 +144,12 @@ def lead(line: Feature, seen: Detections, base: Base, tip_radius: float) -> Fain
         start=0,
         stop=0,
     )
-    passes = int(np.clip(np.ceil(SURE * SEEN / one**2), 1, MOST_PASSES))
+    passes = int(np.clip(np.ceil(SURE * SEEN_CHI_SQUARE_FALL / one**2), 1, MOST_PASSES))
     return FaintLead(seed, way, passes, float(np.linalg.norm(line.axis[-1] - line.axis[0])))
 
 
 # Path that tells the noise, in tip radii
-LEARNING = 200.0
+NOISE_LEARNING_PATH = 200.0
 
 
 @dataclass
@@ -183,7 +183,10 @@ class SweepBySweep:
             return
         self.felt.append(trace)
         self.seen.append(self._detected(trace, self.noise))
-        if not self.learnt and sum(part.inspected_length for part in self.seen) > LEARNING * trace.tip_radius:
+        if (
+            not self.learnt
+            and sum(part.inspected_length for part in self.seen) > NOISE_LEARNING_PATH * trace.tip_radius
+        ):
             self.learn()
 
     def learn(self) -> None:

@@ -12,10 +12,10 @@ from mapping import FloatArray, Trace
 from planners.paths import PRESS
 
 # In tip radii: of a guarded approach, of the first and the longest stretch that is followed at once
-TOUCH, SHORT, LONG = 0.2, 1.0, 4.0
+APPROACH_STRETCH, FIRST_STRETCH, LONGEST_STRETCH = 0.2, 1.0, 4.0
 # A contact further from its prediction than this many tip radii makes the next stretch shorter
 SURPRISE = 0.2
-STEEPEST = 2.0
+STEEPEST_SURFACE_SLOPE = 2.0
 
 
 @dataclass
@@ -56,7 +56,7 @@ class FeltLine:
     def feel(self, felt: Felt) -> Generator[Move, Trace, None]:
         """Yield the sweeps; what they feel is added to `felt`."""
         place = 0.0
-        while place < self._length - TOUCH * self.tip_radius:
+        while place < self._length - APPROACH_STRETCH * self.tip_radius:
             contact = yield from self._approach(place, felt)
             if contact is None:
                 felt.empty.append(np.hstack([below := self._below(place), np.tile(-self.inward, (len(below), 1))]))
@@ -84,7 +84,7 @@ class FeltLine:
         """Depth of the first contact below the line at a place, found step by step; None if there is no body."""
         levels = np.arange(0.0, self.depth + self.tip_radius, self.tip_radius)
         for level in np.minimum(levels, self.depth):
-            move = self._sweep(place, place + TOUCH * self.tip_radius, float(level), float(level))
+            move = self._sweep(place, place + APPROACH_STRETCH * self.tip_radius, float(level), float(level))
             trace = yield move
             if len(trace):
                 felt.traces.append(facing(trace, move))
@@ -93,7 +93,7 @@ class FeltLine:
 
     def _follow(self, place: float, depth: float, felt: Felt) -> Generator[Move, Trace, float]:
         """Follow the body from a contact until it is lost or the line ends; the place reached."""
-        slope, stretch = 0.0, SHORT * self.tip_radius
+        slope, stretch = 0.0, FIRST_STRETCH * self.tip_radius
         while place < self._length - 1e-9:
             onward = min(place + stretch, self._length)
             move = self._sweep(place, onward, depth, depth + slope * (onward - place))
@@ -109,7 +109,11 @@ class FeltLine:
             predicted = depth + slope * (onward - place)
             depth, slope = self._end(trace)
             surprised = abs(depth - predicted) > SURPRISE * self.tip_radius
-            stretch = np.clip(stretch * (0.5 if surprised else 1.5), SHORT * self.tip_radius, LONG * self.tip_radius)
+            stretch = np.clip(
+                stretch * (0.5 if surprised else 1.5),
+                FIRST_STRETCH * self.tip_radius,
+                LONGEST_STRETCH * self.tip_radius,
+            )
             place = onward
         return self._length
 
@@ -129,7 +133,7 @@ class FeltLine:
         if last.sum() < 8 or np.ptp(along[last]) < 0.1 * self.tip_radius:
             return float(np.median(depth)), 0.0
         slope, level = np.polyfit(along[last] - along[-1], depth[last], 1)
-        return float(level), float(np.clip(slope, -STEEPEST, STEEPEST))
+        return float(level), float(np.clip(slope, -STEEPEST_SURFACE_SLOPE, STEEPEST_SURFACE_SLOPE))
 
 
 def facing(trace: Trace, move: Move) -> Trace:

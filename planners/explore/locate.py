@@ -13,7 +13,7 @@ from planners.explore.warm_up import get_ready
 from planners.survey import Survey
 
 # Sweeps that locate
-SWEEPS = 8
+LOCATING_SWEEPS = 8
 # A pose beyond what was allowed by this factor is not believed
 BEYOND = 1.25
 
@@ -46,7 +46,7 @@ class Locate:
         )
         moves = list(survey.sweeps())
         felt = []
-        for index in np.unique(np.linspace(0, len(moves) - 1, SWEEPS + 2)[1:-1].round().astype(int)):
+        for index in np.unique(np.linspace(0, len(moves) - 1, LOCATING_SWEEPS + 2)[1:-1].round().astype(int)):
             trace = yield moves[index]
             if len(trace):
                 felt.append(trace)

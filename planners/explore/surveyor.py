@@ -13,14 +13,14 @@ from planners.explore.found import Found
 from planners.survey import Survey
 
 # Path of the first survey sweeps, in tip radii, that tell the noise if it is not given; later ones are detected singly
-LEARNING = 50.0
+FIRST_NOISE_PATH = 50.0
 # False alarms of the survey against those accepted in the end: a look at each of them costs seconds, and what the
 # analysis of all sweeps may report at its own estimate of the noise must have been looked at
 CANDIDATES = 4.0
 # Height that must stay visible between two sweeps, in detection limits; and its least share of the smallest feature's
-MARGIN, LEAST = 1.25, 0.1
+VISIBLE_HEIGHT_MARGIN, LEAST_VISIBLE_SHARE = 1.25, 0.1
 # Samples that a sweep must have to be looked at
-FEWEST = 16
+FEWEST_SWEEP_SAMPLES = 16
 
 
 @dataclass
@@ -61,7 +61,7 @@ class Surveyor:
                 continue
             waiting.append(trace)
             felt += move.length
-            if self.found.noise is not None or felt >= LEARNING * self.survey.tip_radius:
+            if self.found.noise is not None or felt >= FIRST_NOISE_PATH * self.survey.tip_radius:
                 self._detect(waiting)
         if waiting:
             self._detect(waiting)
@@ -73,7 +73,7 @@ class Surveyor:
 
     def _widen(self, first: Trace) -> None:
         """Strips as wide as the noise of a first sweep allows the smallest feature to be seen."""
-        if len(first) < FEWEST:
+        if len(first) < FEWEST_SWEEP_SAMPLES:
             return
         smallest = self.survey.smallest
         limit = detect(first, self.survey.base, noise=self.found.noise).detection_limit
@@ -82,7 +82,9 @@ class Surveyor:
                 f"features lower than {1e3 * limit:.2g} mm: a single sweep does not show them through the noise, "
                 f"though {1e3 * smallest:.2g} mm were asked for"
             )
-        self.visible = float(np.clip(MARGIN * limit / smallest, LEAST, self.survey.visible))
+        self.visible = float(
+            np.clip(VISIBLE_HEIGHT_MARGIN * limit / smallest, LEAST_VISIBLE_SHARE, self.survey.visible)
+        )
 
     def _detect(self, waiting: list[Trace]) -> None:
         felt = detect(

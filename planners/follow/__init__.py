@@ -9,7 +9,11 @@ if TYPE_CHECKING:
     from planners.follow.bump import BumpSize as BumpSize, BumpSizer as BumpSizer
     from planners.follow.circuit import Circuit as Circuit, headings as headings
     from planners.follow.end_finder import Crest as Crest, EndFinder as EndFinder
-    from planners.follow.recross import SEEN as SEEN, is_step as is_step, slender as slender
+    from planners.follow.recross import (
+        SEEN_CHI_SQUARE_FALL as SEEN_CHI_SQUARE_FALL,
+        is_step as is_step,
+        slender as slender,
+    )
     from planners.follow.ridge_follower import RidgeFollower as RidgeFollower
     from planners.follow.sense import Sense as Sense
 
@@ -18,7 +22,7 @@ _PUBLIC = {
     "bump": ("BumpSize", "BumpSizer"),
     "circuit": ("Circuit", "headings"),
     "end_finder": ("Crest", "EndFinder"),
-    "recross": ("SEEN", "is_step", "slender"),
+    "recross": ("SEEN_CHI_SQUARE_FALL", "is_step", "slender"),
     "ridge_follower": ("RidgeFollower",),
     "sense": ("Sense",),
 }

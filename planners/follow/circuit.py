@@ -15,7 +15,7 @@ from planners.paths import Strokes, tangential
 
 # Cosine of the angle between two branches of one line, at most
 OPPOSITE = -0.4
-NAMES = ("bump", "end of a ridge", "ridge", "junction")
+NAMES_BY_BRANCHES = ("bump", "end of a ridge", "ridge", "junction")
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Circuit:
             if all(np.linalg.norm(crossing.point - other.point) > 0.35 * self.radius for other in branches):
                 branches.append(crossing)
         count = len(branches)
-        reason = NAMES[min(count, 3)] if len(trace) else "no contact"
+        reason = NAMES_BY_BRANCHES[min(count, 3)] if len(trace) else "no contact"
         return Outcome(reason, f"the circuit crosses {count} branches", tuple(branches))
 
 

@@ -22,7 +22,7 @@ FIRST = (1.2, 1.8)
 NEXT = (0.4, 1.25)
 # A round end against a square one, in a / (r + a) half-widths: two traces that differ by less than a hundredth of the
 # height; and the standard deviation of a rounding of which nothing is known (mapping.inference.families.ridge)
-ROUNDED, UNKNOWN = 0.4, 0.35
+ROUNDED, UNKNOWN_ROUNDING_SD = 0.4, 0.35
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Crest:
             return 0.0
         section = 0.5 * (self.half_width**2 / self.height + self.height) - tip_radius
         radius = min(0.5 * self.height, max(section, 0.0))
-        return UNKNOWN * ROUNDED * self.half_width * radius / (tip_radius + radius)
+        return UNKNOWN_ROUNDING_SD * ROUNDED * self.half_width * radius / (tip_radius + radius)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from mapping.instrument import Noise
 from planners.follow.template_fit import ShapeFit, crest_shape, dip_shape, edge_shape, fit_shape
 
 # Fall of chi-squared below which a sweep shows nothing: five standard deviations
-SEEN = 25.0
+SEEN_CHI_SQUARE_FALL = 25.0
 
 
 def is_step(crossing: Crossing) -> bool:
@@ -34,7 +34,7 @@ def seen_again(
     way: FloatArray,
     like: Crossing,
     reach: float,
-    least_gain: float = SEEN,
+    least_gain: float = SEEN_CHI_SQUARE_FALL,
 ) -> Crossing | None:
     """The crossing of a known line by a sweep across it, or None if the sweep does not show it.
 

@@ -15,7 +15,7 @@ from planners import Outcome, Plan
 from planners.follow.axis_track import AxisEnd, Course, course
 from planners.follow.end_finder import Crest, EndFinder
 from planners.follow.line import Line, joined, mean_height, returned
-from planners.follow.recross import SEEN, is_step, seen_again
+from planners.follow.recross import SEEN_CHI_SQUARE_FALL, is_step, seen_again
 from planners.follow.sense import Sense
 from planners.paths import Strokes, tangential, to_and_fro
 
@@ -24,7 +24,7 @@ Crossed = Generator[Move, Trace, Crossing | None]
 # A crossing lower than this share of the ridge's last heights lies beyond its end; a faint line's height is too
 # uncertain for more than the middle between all and nothing
 STILL_HIGH, STILL_SEEN = 0.7, 0.5
-FALLING = 0.9
+FALLING_HEIGHT_SHARE = 0.9
 # In tip radii: the first step and the longest unless they are given, and how closely crossings bracket an end before a
 # slide finds it; once more, more closely, where the slide did not
 FIRST_STEP, LONGEST_STEP = 0.4, 2.0
@@ -40,7 +40,7 @@ MOST_TURN = 0.45
 # Crossings that tell a course so well that a slide may look for the end some way ahead
 WELL_KNOWN = 4
 # Cosine of the angle up to which a line is said to go straight on
-STRAIGHT = 0.95
+STRAIGHT_ON_COSINE = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ class RidgeFollower:
             return Line([first], step)
         forth = halves[0][0]
         ahead = course(forth.points[::-1], first.normal, way, self.strokes.tip_radius)
-        if float(ahead.heading @ tangential(way, first.normal)) < STRAIGHT:
+        if float(ahead.heading @ tangential(way, first.normal)) < STRAIGHT_ON_COSINE:
             return Line([first], step)
         return Line(forth.crossings[::-1], forth.step, len(forth.crossings) - 1)
 
@@ -222,7 +222,7 @@ class RidgeFollower:
             felt.extend((yield from to_and_fro(move, int(np.ceil(self.passes / batches)))))
             if not felt:
                 continue
-            found = self._seen(felt, point, way, like, reach, SEEN)
+            found = self._seen(felt, point, way, like, reach, SEEN_CHI_SQUARE_FALL)
             if found is not None:
                 return found if sign * found.height >= lowest else None
             if number >= batches and not self._is_open(felt, point, way, like, reach, sign * lowest):
@@ -271,4 +271,4 @@ class RidgeFollower:
         """True if the last crossing is lower than the line."""
         last = line.crossings[-1]
         doubt = 0.0 if self.passes == 1 else 2.0 * last.height_sd
-        return abs(last.height) + doubt < FALLING * line.height
+        return abs(last.height) + doubt < FALLING_HEIGHT_SHARE * line.height

@@ -15,10 +15,10 @@ from mapping.instrument import Noise
 Shape = Callable[[FloatArray, float], FloatArray]
 
 # Bins that a sweep is averaged over; every shape is wider than many of them
-BINS = 160
+SHAPE_FIT_BINS = 160
 STARTS = 81
 # Relative change of place, height and chi-squared below which a fit has converged: far below its uncertainty
-ENOUGH = 1e-6
+FIT_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,9 @@ def fit_shape(
     bounds = ([within[0], 0.0], [within[1], 3.0 * crest])
     step = max(0.01 * (within[1] - within[0]), np.finfo(float).tiny)
     start = [float(np.clip(first, within[0] + 0.1 * step, within[1] - 0.1 * step)), crest]
-    fit = least_squares(residual, start, bounds=bounds, x_scale=[step, crest], ftol=ENOUGH, xtol=ENOUGH, max_nfev=40)
+    fit = least_squares(
+        residual, start, bounds=bounds, x_scale=[step, crest], ftol=FIT_TOLERANCE, xtol=FIT_TOLERANCE, max_nfev=40
+    )
     jacobian = np.asarray(fit.jac)
     variance = np.diag(np.linalg.pinv(jacobian.T @ jacobian))
     sd, height_sd = (float(np.sqrt(v)) if v > 0 else np.inf for v in variance)
@@ -110,8 +112,8 @@ def edge_shape(tip_radius: float) -> Shape:
 
 
 def _binned(s: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Means of place and height in at most BINS bins of equal length, and the samples in each."""
-    count = int(min(BINS, max(8, len(s) // 4)))
+    """Means of place and height in at most SHAPE_FIT_BINS bins of equal length, and the samples in each."""
+    count = int(min(SHAPE_FIT_BINS, max(8, len(s) // 4)))
     cell = np.clip(((s - s[0]) / (s[-1] - s[0]) * count).astype(int), 0, count - 1)
     samples = np.bincount(cell, minlength=count).astype(float)
     used = samples > 0

@@ -8,7 +8,7 @@ import numpy as np
 
 from hw import Move, Workspace
 from mapping.base import Base
-from planners.paths.travel import DEEP, gap, sunk
+from planners.paths.travel import MOST_SINKING, gap, sunk
 
 # The sensor's field about its axis (paper, section 4)
 FIELD = float(np.radians(75.0))
@@ -82,7 +82,7 @@ class Limits:
 
     def _collision(self, move: Move, base: Base) -> str | None:
         """The ball: a sweep presses a little, any other move stays free."""
-        allowed = PRESSED if move.purpose == "sweep" else DEEP
+        allowed = PRESSED if move.purpose == "sweep" else MOST_SINKING
         deepest = sunk(move.path, base, self.tip_radius)
         if deepest <= allowed * self.tip_radius:
             return None
@@ -101,6 +101,6 @@ class Limits:
     def _way(self, before: Move, move: Move, base: Base) -> str | None:
         """The ball on its way from the end of one move to the beginning of the next."""
         deepest = sunk(gap(before, move, self.tip_radius), base, self.tip_radius)
-        if deepest <= DEEP * self.tip_radius:
+        if deepest <= MOST_SINKING * self.tip_radius:
             return None
         return f"the way from the move before sinks {1e3 * deepest:.3f} mm into the body"

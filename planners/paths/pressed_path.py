@@ -10,7 +10,7 @@ from planners.paths.isolines import Isoline
 
 # Commanded depth below contact, in tip radii: enough to keep contact over a shallow groove
 PRESS = 0.02
-CREASE = float(np.radians(30.0))
+CREASE_ANGLE = float(np.radians(30.0))
 
 
 def pressed_sweep(points: FloatArray, normals: FloatArray, tip_radius: float, speed: float, force: float) -> Move:
@@ -27,7 +27,7 @@ def touched_points(line: Isoline, surface: Surface) -> tuple[FloatArray, FloatAr
     normals = surface.face_normals[line.faces]
     before = np.concatenate([normals[-1:] if line.closed else normals[:1], normals])
     after = np.concatenate([normals, normals[:1] if line.closed else normals[-1:]])
-    sharp = (before * after).sum(axis=1) < np.cos(CREASE)
+    sharp = (before * after).sum(axis=1) < np.cos(CREASE_ANGLE)
     mean = before + after
     length = np.linalg.norm(mean, axis=1, keepdims=True)
     mean = np.divide(mean, length, out=before.copy(), where=length > 0.1)
@@ -46,7 +46,7 @@ def thinned(points: FloatArray, normals: FloatArray, spacing: float) -> tuple[Fl
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     cell = np.floor(along / spacing)
     keep = np.concatenate([[True], cell[1:] != cell[:-1]])
-    turn = (normals[1:] * normals[:-1]).sum(axis=1) < np.cos(CREASE)
+    turn = (normals[1:] * normals[:-1]).sum(axis=1) < np.cos(CREASE_ANGLE)
     keep[1:] |= turn
     keep[:-1] |= turn
     keep[-1] = True

@@ -14,17 +14,17 @@ from mapping.base import Base
 from planners import Outcome, Plan
 
 # How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)
-LIFT = 0.5
+BACK_OFF_DISTANCE = 0.5
 # How far a ball may sink into the base on its way through free space, in tip radii
-DEEP = 0.05
+MOST_SINKING = 0.05
 # Of the grid on which ways round the body are looked for, in tip radii; and its most nodes along an axis
-SPACING, MOST = 0.75, 40
+GRID_SPACING, MOST_GRID_NODES = 0.75, 40
 ROOM = 4.0
 
 
 def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
     """The way between two moves (2, 3), m: backed off where the one ends, straight, and down where the other begins."""
-    lift = LIFT * tip_radius
+    lift = BACK_OFF_DISTANCE * tip_radius
     return np.stack([before.path[-1] - lift * before.approach[-1], after.path[0] - lift * after.approach[0]])
 
 
@@ -77,7 +77,7 @@ class Ways:
 
     def free(self, path: FloatArray) -> bool:
         """True if a ball on the polyline (K, 3) stays out of the body."""
-        return sunk(path, self.base, self.tip_radius) <= DEEP * self.tip_radius
+        return sunk(path, self.base, self.tip_radius) <= MOST_SINKING * self.tip_radius
 
     def round(self, before: Move, after: Move) -> Move | None:
         """The travel between two moves; None where the straight way is free, or where no way was found."""
@@ -100,7 +100,7 @@ class Ways:
         inside = ((steps >= self.low) & (steps <= self.high)).all(axis=1)
         height = self.base.foot(steps, self.tip_radius).height
         roomy = np.flatnonzero((height >= self._room) & inside)
-        if not len(roomy) or height[: roomy[0] + 1].min() < -DEEP * self.tip_radius:
+        if not len(roomy) or height[: roomy[0] + 1].min() < -MOST_SINKING * self.tip_radius:
             return None
         return np.stack([start, steps[roomy[0]]])
 
@@ -115,7 +115,7 @@ class Ways:
         room = ROOM * self.tip_radius
         low = np.maximum(self.base.surface.bounds[0] - room, self.low)
         high = np.minimum(self.base.surface.bounds[1] + room, self.high)
-        spacing = max(SPACING * self.tip_radius, float((high - low).max()) / MOST)
+        spacing = max(GRID_SPACING * self.tip_radius, float((high - low).max()) / MOST_GRID_NODES)
         axes = [np.linspace(a, b, max(2, 1 + int(np.ceil((b - a) / spacing)))) for a, b in zip(low, high, strict=True)]
         return axes, max(float(axis[1] - axis[0]) for axis in axes)
 

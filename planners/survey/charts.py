@@ -6,10 +6,10 @@ import numpy as np
 
 from mapping import BoolArray, IntArray, Surface
 
-CREASE = float(np.radians(30.0))
+CREASE_ANGLE = float(np.radians(30.0))
 
 
-def crease_charts(surface: Surface, inside: BoolArray | None = None, crease: float = CREASE) -> list[IntArray]:
+def crease_charts(surface: Surface, inside: BoolArray | None = None, crease: float = CREASE_ANGLE) -> list[IntArray]:
     """Faces grouped into charts whose neighbours turn by less than `crease` rad, largest area first.
 
     Args:

@@ -14,7 +14,7 @@ from planners import Outcome, Plan
 from planners.paths import Strokes, tangential
 
 # Distance of the places that visits are counted at, in footprints; steps of one sweep
-SPACING, STEPS = 0.7, 24
+VISIT_SPACING, STEPS_PER_SWEEP = 0.7, 24
 # Decay length of the potential, in sizes of the body
 RANGE = 0.5
 
@@ -50,9 +50,9 @@ class Ergodic:
         from scipy.spatial import cKDTree
 
         reach = 0.5 * self.tip_radius if self.footprint is None else self.footprint
-        places = even_places(self.base, SPACING * reach)
+        places = even_places(self.base, VISIT_SPACING * reach)
         tree = cKDTree(places)
-        warm = steady_heat(places, SPACING * reach, RANGE * self.base.surface.size)
+        warm = steady_heat(places, VISIT_SPACING * reach, RANGE * self.base.surface.size)
         visits = np.zeros(len(places))
         strokes = Strokes(self.base, self.tip_radius, self.speed, self.force)
         here, normal = strokes.onto(places[rng.integers(len(places))])
@@ -60,7 +60,7 @@ class Ergodic:
         spent = 0.0
         while spent < self.seconds:
             points, normals = [here], [normal]
-            for _ in range(STEPS):
+            for _ in range(STEPS_PER_SWEEP):
                 _visit(visits, places, tree.query_ball_point(here, 2.0 * reach), here, reach)
                 lag = np.maximum(1.0 / len(places) - visits / max(visits.sum(), np.finfo(float).tiny), 0.0) ** 2
                 near = tree.query_ball_point(here, 2.5 * reach)

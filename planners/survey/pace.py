@@ -7,10 +7,10 @@ import numpy as np
 from mapping.instrument import Noise
 
 # Standard deviations that a crest must stand out by: a usual threshold of detection, and 1.645 to be found in 95 of 100
-CERTAIN = 6.5
+CERTAIN_CREST_SDS = 6.5
 # Height asked for, in heights that are just found
-MARGIN = 1.25
-SPEEDS = 24
+HEIGHT_MARGIN = 1.25
+TRIED_SPEEDS = 24
 
 
 def fastest_speed(
@@ -28,8 +28,10 @@ def fastest_speed(
         smallest: height of a sharp crest, m.
         slowest, fastest: between which to choose, m/s.
     """
-    speeds = np.geomspace(fastest, slowest, SPEEDS)
-    found = (v for v in speeds if MARGIN * least_height(noise, v / rate, tip_radius, CERTAIN) <= smallest)
+    speeds = np.geomspace(fastest, slowest, TRIED_SPEEDS)
+    found = (
+        v for v in speeds if HEIGHT_MARGIN * least_height(noise, v / rate, tip_radius, CERTAIN_CREST_SDS) <= smallest
+    )
     return float(next(found, fastest))
 
 

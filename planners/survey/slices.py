@@ -9,7 +9,7 @@ import numpy as np
 from mapping import FloatArray, IntArray, Surface
 
 # A body whose normals leave its mean plane by less than this share of their variance is flat: two families do
-FLAT = 1e-3
+FLAT_VARIANCE_SHARE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ def slice_axes(surface: Surface, faces: IntArray) -> FloatArray:
     mean = areas @ normals
     spread = np.einsum("f,fi,fj->ij", areas / areas.sum(), normals, normals)
     value, vector = np.linalg.eigh(spread)
-    flat = bool(value[:2].sum() < FLAT) and np.linalg.norm(mean) > 0
+    flat = bool(value[:2].sum() < FLAT_VARIANCE_SHARE) and np.linalg.norm(mean) > 0
     if not flat:
         return np.asarray(vector.T)
     corners = surface.vertices[np.unique(surface.faces[faces])] @ vector[:, :2]

@@ -78,7 +78,7 @@ def test_lines_with_bytes_that_no_answer_has_are_thrown_away_and_counted() -> No
 def test_an_optoforce_frame_survives_its_own_encoding_and_no_flipped_bit() -> None:
     data = optoforce.encode_frame(65535, 0, (-32767, 400, 12))
     assert len(data) == 16 and data[:4] == bytes((170, 7, 8, 10))
-    framing = Frames(optoforce.HEADER, optoforce.LENGTH, optoforce.is_whole)
+    framing = Frames(optoforce.HEADER, optoforce.FRAME_BYTES, optoforce.is_whole)
     assert framing.feed(data) == [data]
     sensor = optoforce.OptoForce("none", [400.0, 400.0, 100.0])
     assert sensor.decode(data) == (65535, -32767 / 400, 1.0, 0.12)

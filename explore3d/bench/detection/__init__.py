@@ -6,8 +6,8 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from explore3d.bench.detection.classify import (
-        NOISES as NOISES,
-        SWEEPS as SWEEPS,
+        NOISE_SOURCES as NOISE_SOURCES,
+        SWEEP_PATTERNS as SWEEP_PATTERNS,
         bench_classify as bench_classify,
         classify_table as classify_table,
     )
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
-    "classify": ("NOISES", "SWEEPS", "bench_classify", "classify_table"),
+    "classify": ("NOISE_SOURCES", "SWEEP_PATTERNS", "bench_classify", "classify_table"),
     "detect": ("all_cases", "bench_detect", "cells"),
     "detect_curves": ("write_curves",),
     "false_alarms": ("bench_false_alarms", "false_alarm_lines"),

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from explore3d.analysis import Comparison, TrueFeature, compare
-from explore3d.bench.scenes import BODIES, MIDDLE, WINDOW
+from explore3d.bench.scenes import BODIES_BY_KIND, INSPECTED_HALF_SIDE, MIDDLE
 from hw import Move
 from hw.simulated import NoiseSource, SimulatedFinger
 from mapping import Feature, FloatArray, Trace
@@ -28,15 +28,15 @@ from mapping.detection import detect
 from mapping.model import ObjectModel
 from planners.paths import Strokes
 
-TIP_RADIUS, RATE, SPEED = 0.01, 5000.0, 0.03
+TIP_RADIUS, SAMPLE_RATE, SPEED = 0.01, 5000.0, 0.03
 PITCH = 4e-3
 # The apparatus of the paper (theory section 6), and none.
-NOISES = {"none": NoiseSource(), "apparatus": NoiseSource(white=0.2e-3)}
+NOISE_SOURCES = {"none": NoiseSource(), "apparatus": NoiseSource(white=0.2e-3)}
 # Different placements of the sweeps over one body; further seeds only change the noise.
 POSES = 10
 # An axis further off than this, or longer or shorter than this, is not the feature's own, m.
-ASIDE, LONGER = 1.5e-3, 2.0 * PITCH
-SWEEPS = ("one way", "two ways", "followed")
+MOST_AXIS_OFFSET, MOST_LENGTH_ERROR = 1.5e-3, 2.0 * PITCH
+SWEEP_PATTERNS = ("one way", "two ways", "followed")
 
 
 def bench_classify(
@@ -61,9 +61,9 @@ def bench_classify(
 
 def trial(body: str, noise: str, pattern: str, seed: int) -> dict[str, Any]:
     """Sweep a body, classify what is on it, and compare with the truth."""
-    scene = BODIES[body]()
+    scene = BODIES_BY_KIND[body]()
     base = Base(scene.base)
-    trace = noisy(touched(body, pattern, seed % POSES), NOISES[noise], seed)
+    trace = noisy(touched(body, pattern, seed % POSES), NOISE_SOURCES[noise], seed)
     start = perf_counter()
     features = classified(trace, base)
     return verdict(features, base, scene.truth) | {"seconds": perf_counter() - start}
@@ -99,9 +99,9 @@ def _rightly_named(pair: Comparison) -> bool:
     if found.kind != true.kind or found.closed != _returns(true.axis):
         return False
     if len(true.axis) == 1:
-        return pair.axis_rms < ASIDE
+        return pair.axis_rms < MOST_AXIS_OFFSET
     endless = true.kind in ("step", "convex edge", "concave corner")
-    return pair.axis_max < ASIDE and (endless or abs(pair.length_error) < LONGER)
+    return pair.axis_max < MOST_AXIS_OFFSET and (endless or abs(pair.length_error) < MOST_LENGTH_ERROR)
 
 
 def _returns(axis: FloatArray) -> bool:
@@ -114,15 +114,15 @@ def noisy(trace: Trace, noise: NoiseSource, seed: int) -> Trace:
     for number in np.unique(trace.sweep):
         own = trace.sweep == number
         rng = np.random.default_rng((seed, int(number)))
-        centers[own] += noise.of_centers(rng, int(own.sum()), SPEED / RATE)
+        centers[own] += noise.of_centers(rng, int(own.sum()), SPEED / SAMPLE_RATE)
     return replace(trace, centers=centers)
 
 
 @lru_cache(maxsize=2 * POSES)
 def touched(body: str, pattern: str, pose: int) -> Trace:
     """What the finger feels of a body without noise."""
-    scene = BODIES[body]()
-    finger = SimulatedFinger(object=scene.object, tip_radius=TIP_RADIUS, rate=RATE)
+    scene = BODIES_BY_KIND[body]()
+    finger = SimulatedFinger(object=scene.object, tip_radius=TIP_RADIUS, rate=SAMPLE_RATE)
     rng = np.random.default_rng(pose)
     strokes = Strokes(Base(scene.base), TIP_RADIUS, SPEED)
     moves = survey(strokes, rng, two_ways=pattern != "one way")
@@ -137,8 +137,8 @@ def survey(strokes: Strokes, rng: np.random.Generator, two_ways: bool) -> list[M
     for turn in (0.0, 0.5 * np.pi)[: 2 if two_ways else 1]:
         along = np.array([np.cos(heading + turn), np.sin(heading + turn), 0.0])
         side = np.array([-along[1], along[0], 0.0])
-        for offset in np.arange(-WINDOW, WINDOW, PITCH) + rng.uniform(0.0, PITCH):
-            moves.append(strokes.line(MIDDLE + offset * side, along, WINDOW, WINDOW))
+        for offset in np.arange(-INSPECTED_HALF_SIDE, INSPECTED_HALF_SIDE, PITCH) + rng.uniform(0.0, PITCH):
+            moves.append(strokes.line(MIDDLE + offset * side, along, INSPECTED_HALF_SIDE, INSPECTED_HALF_SIDE))
     return moves
 
 

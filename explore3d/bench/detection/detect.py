@@ -21,24 +21,24 @@ from typing import Any
 
 import numpy as np
 
-from explore3d.bench.scenes import SPACING, simulate_noise
+from explore3d.bench.scenes import SAMPLE_SPACING, simulate_noise
 from mapping import Surface, Trace
 from mapping.base import Base
 from mapping.detection import curvature_features, detect
 from mapping.geometry.templates import cap_height, groove_height
 from mapping.instrument import Noise, StatedNoise
 
-TIP = 0.01
-LENGTH = 0.1
+TIP_RADIUS = 0.01
+SWEEP_LENGTH = 0.1
 # The paper's 1e-3 false alarms per 100 mm.
-RATE = 0.01
+FALSE_ALARM_RATE = 0.01
 CORRELATION_LENGTH = 1e-3
 # The paper's contact angle is good to 1 degree where its centre is good to 0.2 mm; both scale together here.
 ANGLE_PER_NOISE = np.deg2rad(1.0) / 0.2e-3
 
-SIZES = {"wire": (0.005, 0.01, 0.02, 0.035, 0.065, 0.1, 0.15), "groove": (0.05, 0.1, 0.2, 0.4)}
-NOISES = (0.002, 0.01, 0.02)
-KINDS = ("white", "correlated")
+FEATURE_SIZES = {"wire": (0.005, 0.01, 0.02, 0.035, 0.065, 0.1, 0.15), "groove": (0.05, 0.1, 0.2, 0.4)}
+NOISE_LEVELS = (0.002, 0.01, 0.02)
+NOISE_KINDS = ("white", "correlated")
 HEIGHTS = ("height", "height, noise stated", "height, noise known")
 DETECTORS = (*HEIGHTS, "algorithm 1", "algorithm 2", "algorithm 3", "algorithm 4")
 
@@ -90,9 +90,9 @@ class Cell:
 
 def all_cases(seeds: int, quick: bool) -> Iterator[Case]:
     """The whole campaign, seed by seed; quick: two sizes and one level of noise."""
-    noises = NOISES[-1:] if quick else NOISES
-    for seed, kind, noise in itertools.product(range(seeds), KINDS, noises):
-        for feature, sizes in SIZES.items():
+    noises = NOISE_LEVELS[-1:] if quick else NOISE_LEVELS
+    for seed, kind, noise in itertools.product(range(seeds), NOISE_KINDS, noises):
+        for feature, sizes in FEATURE_SIZES.items():
             for size in sizes[1::3] if quick else sizes:
                 yield Case(feature, size, kind, noise, seed)
 
@@ -121,7 +121,7 @@ def run_case(case: Case) -> dict[str, dict[str, Any]]:
     result = {}
     settings: tuple[dict[str, Any], ...] = ({}, {"stated": StatedNoise(noise)}, {"noise": noise})
     for name, known in zip(HEIGHTS, settings, strict=True):
-        crossings = detect(trace, base, false_alarms_per_metre=RATE, **known).crossings
+        crossings = detect(trace, base, false_alarms_per_metre=FALSE_ALARM_RATE, **known).crossings
         spans = [(c.point[0], c.point[0], np.sign(c.height), c.point[0]) for c in crossings]
         result[name] = _judged(spans, place, extent, sign)
     for number in (1, 2, 3, 4):
@@ -134,24 +134,28 @@ def run_case(case: Case) -> dict[str, dict[str, Any]]:
 
 def simulated_sweep(case: Case) -> tuple[Trace, float, float]:
     """A sweep along x with contact normals, the feature's place and the half-width of what it disturbs, m."""
-    rng = np.random.default_rng([list(SIZES).index(case.feature), KINDS.index(case.kind), case.seed])
-    x = np.arange(-LENGTH / 2, LENGTH / 2, SPACING)
-    place, size = float(rng.uniform(-0.25, 0.25)) * LENGTH, case.size * TIP
+    rng = np.random.default_rng([list(FEATURE_SIZES).index(case.feature), NOISE_KINDS.index(case.kind), case.seed])
+    x = np.arange(-SWEEP_LENGTH / 2, SWEEP_LENGTH / 2, SAMPLE_SPACING)
+    place, size = float(rng.uniform(-0.25, 0.25)) * SWEEP_LENGTH, case.size * TIP_RADIUS
     if case.feature == "wire":
-        height, extent = cap_height(x - place, size, size / 2, TIP), float(np.sqrt(2 * TIP * size))
+        height, extent = cap_height(x - place, size, size / 2, TIP_RADIUS), float(np.sqrt(2 * TIP_RADIUS * size))
     else:
-        height, extent = groove_height(x - place, size, TIP), size / 2
-    level = case.noise * TIP
+        height, extent = groove_height(x - place, size, TIP_RADIUS), size / 2
+    level = case.noise * TIP_RADIUS
     angle = np.arctan(np.gradient(height, x)) + ANGLE_PER_NOISE * level * rng.standard_normal(len(x))
-    z = TIP + height + simulate_noise(noise_of(case), [np.zeros((len(x), 3))], rng)
+    z = TIP_RADIUS + height + simulate_noise(noise_of(case), [np.zeros((len(x), 3))], rng)
     normals = np.column_stack([-np.sin(angle), np.zeros(len(x)), np.cos(angle)])
     centers = np.column_stack([x, np.zeros(len(x)), z])
-    return Trace(x / 0.03 - x[0] / 0.03, centers, np.zeros(len(x), dtype=np.int64), TIP, normals=normals), place, extent
+    return (
+        Trace(x / 0.03 - x[0] / 0.03, centers, np.zeros(len(x), dtype=np.int64), TIP_RADIUS, normals=normals),
+        place,
+        extent,
+    )
 
 
 def noise_of(case: Case) -> Noise:
     """The noise of the centre in metres."""
-    level = case.noise * TIP
+    level = case.noise * TIP_RADIUS
     return Noise(level) if case.kind == "white" else Noise(0.0, level, CORRELATION_LENGTH)
 
 
@@ -172,14 +176,14 @@ def matched_filter_bound(case: Case) -> float:
 
     if case.feature != "wire":
         return float("nan")
-    diameter, level = case.size * TIP, case.noise * TIP
-    reach = np.sqrt(2 * TIP * diameter)
+    diameter, level = case.size * TIP_RADIUS, case.noise * TIP_RADIUS
+    reach = np.sqrt(2 * TIP_RADIUS * diameter)
     if case.kind == "white":
-        visible = diameter / level * np.sqrt(16 * reach / (15 * SPACING))
+        visible = diameter / level * np.sqrt(16 * reach / (15 * SAMPLE_SPACING))
     else:
         ratio = CORRELATION_LENGTH / reach
         visible = diameter / level * np.sqrt(0.5 * (8 * ratio / 3 + 16 / (15 * ratio)))
-    threshold = np.sqrt(2 * np.log(1.581 / (2 * np.pi * reach * RATE)))
+    threshold = np.sqrt(2 * np.log(1.581 / (2 * np.pi * reach * FALSE_ALARM_RATE)))
     return float(ndtr(visible - threshold))
 
 
@@ -211,8 +215,8 @@ def _averaged(case: Case, detector: str, outcomes: list[dict[str, Any]]) -> Cell
 
 def _judged(spans: list[tuple[float, float, float, float]], place: float, extent: float, sign: int) -> dict[str, Any]:
     """Spans (start, stop, sign, place) on the feature and away from it; what a fit's width blurs counts as neither."""
-    beside = extent + 0.5 * TIP
+    beside = extent + 0.5 * TIP_RADIUS
     hits = [float(p) for a, b, s, p in spans if s == sign and a <= place + extent and b >= place - extent]
     false = sum(bool(b < place - beside or a > place + beside) for a, b, _, _ in spans)
     error = min((p - place for p in hits), key=abs, default=None)
-    return {"found": bool(hits), "error": error, "false": false, "path": LENGTH - 2 * beside}
+    return {"found": bool(hits), "error": error, "false": false, "path": SWEEP_LENGTH - 2 * beside}

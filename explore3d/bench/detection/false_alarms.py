@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from explore3d.bench.detection.detect import plate
-from explore3d.bench.scenes import SPACING, simulate_noise
+from explore3d.bench.scenes import SAMPLE_SPACING, simulate_noise
 from explore3d.scene import load_mesh
 from mapping import FloatArray, Surface, Trace
 from mapping.base import Base
@@ -28,11 +28,11 @@ from mapping.detection import detect
 from mapping.geometry.contact import BallContact
 from mapping.instrument import Noise
 
-TIP = 0.01
+TIP_RADIUS = 0.01
 # Enough to be counted: a hundred times the paper's.
-RATE = 1.0
-NOISES = {"none": Noise(0.0), "white": Noise(0.2e-3), "correlated": Noise(0.0, 0.2e-3, 1e-3)}
-SWEEPS = 3
+COUNTABLE_ALARM_RATE = 1.0
+NOISE_MODELS = {"none": Noise(0.0), "white": Noise(0.2e-3), "correlated": Noise(0.0, 0.2e-3, 1e-3)}
+SWEEPS_PER_BODY = 3
 # Steps of the path over steps across the body, up to which a body is swept: slopes of 66 degrees.
 STEEP = 2.5
 
@@ -61,7 +61,7 @@ def torus() -> Surface:
     return Surface(ring.vertices, ring.faces)
 
 
-BODIES: dict[str, Callable[[], Surface]] = {
+FEATURELESS_BODIES: dict[str, Callable[[], Surface]] = {
     "plane": lambda: plate().surface,
     "sphere": sphere,
     "cylinder": cylinder,
@@ -72,33 +72,33 @@ BODIES: dict[str, Callable[[], Surface]] = {
 @cache
 def swept(body: str, mesh: Path | None = None) -> tuple[Base, Trace]:
     """The body as its own base, and noise-free sweeps of the ball over it from above, with contact normals."""
-    surface = _scaled(mesh) if mesh else BODIES[body]()
+    surface = _scaled(mesh) if mesh else FEATURELESS_BODIES[body]()
     low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
     half = 0.4 * (high - low)
     middle = 0.5 * (low + high)
-    x = np.arange(middle[0] - half[0], middle[0] + half[0], SPACING)
+    x = np.arange(middle[0] - half[0], middle[0] + half[0], SAMPLE_SPACING)
     parts = []
-    for number, y in enumerate(middle[1] + half[1] * np.linspace(-0.6, 0.5, SWEEPS)):
-        above = np.column_stack([x, np.full(len(x), y), np.full(len(x), high[2] + 3 * TIP)])
-        centers = BallContact(surface, TIP).first_contact(above, np.array([0.0, 0.0, -1.0])).centers
+    for number, y in enumerate(middle[1] + half[1] * np.linspace(-0.6, 0.5, SWEEPS_PER_BODY)):
+        above = np.column_stack([x, np.full(len(x), y), np.full(len(x), high[2] + 3 * TIP_RADIUS)])
+        centers = BallContact(surface, TIP_RADIUS).first_contact(above, np.array([0.0, 0.0, -1.0])).centers
         centers = centers[np.isfinite(centers).all(axis=1)]
         steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)
         # a ball let down from above jumps over overhangs and skips on steep flanks, where a sliding finger does
         # not: only the longest stretch that is sampled nearly evenly is a sweep
-        cuts = np.concatenate([[0], np.flatnonzero(steps > STEEP * SPACING) + 1, [len(centers)]])
+        cuts = np.concatenate([[0], np.flatnonzero(steps > STEEP * SAMPLE_SPACING) + 1, [len(centers)]])
         longest = int(np.diff(cuts).argmax())
         parts.append(_sweep(centers[cuts[longest] : cuts[longest + 1]], number))
     base, trace = Base(surface), Trace.concatenate(parts)
-    return base, replace(trace, normals=base.foot(trace.centers, TIP).normals)
+    return base, replace(trace, normals=base.foot(trace.centers, TIP_RADIUS).normals)
 
 
 def run_case(body: str, noise: str, seed: int, mesh: Path | None = None) -> dict[str, Any]:
     """Crossings that detection reports on one set of noisy sweeps, and the path inspected, m."""
     base, clean = swept(body, mesh)
-    rng = np.random.default_rng([seed, list(NOISES).index(noise)])
-    height = simulate_noise(NOISES[noise], [clean.centers[clean.sweep == k] for k in np.unique(clean.sweep)], rng)
-    trace = Trace(clean.t, clean.centers + height[:, None] * np.asarray(clean.normals), clean.sweep, TIP)
-    found = detect(trace, base, false_alarms_per_metre=RATE)
+    rng = np.random.default_rng([seed, list(NOISE_MODELS).index(noise)])
+    height = simulate_noise(NOISE_MODELS[noise], [clean.centers[clean.sweep == k] for k in np.unique(clean.sweep)], rng)
+    trace = Trace(clean.t, clean.centers + height[:, None] * np.asarray(clean.normals), clean.sweep, TIP_RADIUS)
+    found = detect(trace, base, false_alarms_per_metre=COUNTABLE_ALARM_RATE)
     return {
         "found": len(found.crossings),
         "metres": found.inspected_length,
@@ -115,13 +115,13 @@ def bench_false_alarms(
     Args:
         mesh: a mesh file of any size to sweep over as well, or None.
     """
-    bodies = [*BODIES, *([mesh.stem] if mesh else [])]
+    bodies = [*FEATURELESS_BODIES, *([mesh.stem] if mesh else [])]
     done = {}
     if out.exists():
         for record in map(json.loads, out.read_text().splitlines()):
             done[record["body"], record["noise"], record["seed"]] = record
     begin, records = monotonic(), []
-    for body, seed, noise in itertools.product(bodies, range(seeds), NOISES):
+    for body, seed, noise in itertools.product(bodies, range(seeds), NOISE_MODELS):
         key = (body, noise, seed)
         if noise == "none" and seed > 0:
             continue
@@ -145,7 +145,7 @@ def false_alarm_lines(records: Iterable[dict[str, Any]]) -> Iterator[str]:
         for k, value in enumerate((1, record["found"], record["metres"])):
             total[k] += value
     for (body, noise), (sets, found, metres) in sums.items():
-        asked = 0.0 if noise == "none" else RATE * metres
+        asked = 0.0 if noise == "none" else COUNTABLE_ALARM_RATE * metres
         most = int(poisson.ppf(0.99, asked)) if asked else 0
         verdict = "within" if found <= most else "ABOVE"
         yield (
@@ -162,5 +162,8 @@ def _scaled(mesh: Path) -> Surface:
 
 def _sweep(centers: FloatArray, number: int) -> Trace:
     return Trace(
-        10.0 * number + np.arange(len(centers)) / 5000.0, centers, np.full(len(centers), number, dtype=np.int64), TIP
+        10.0 * number + np.arange(len(centers)) / 5000.0,
+        centers,
+        np.full(len(centers), number, dtype=np.int64),
+        TIP_RADIUS,
     )

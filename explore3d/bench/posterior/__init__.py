@@ -5,7 +5,11 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from explore3d.bench.posterior.calibration import KINDS as KINDS, calibrate as calibrate, campaign as campaign
+    from explore3d.bench.posterior.calibration import (
+        CALIBRATED_KINDS as CALIBRATED_KINDS,
+        calibrate as calibrate,
+        campaign as campaign,
+    )
     from explore3d.bench.posterior.calibration_verdicts import (
         by_kind as by_kind,
         draw_ranks as draw_ranks,
@@ -14,17 +18,17 @@ if TYPE_CHECKING:
     )
     from explore3d.bench.posterior.odds import bench_odds as bench_odds, odds_table as odds_table
     from explore3d.bench.posterior.sampling import (
+        APPARATUS_NOISE as APPARATUS_NOISE,
         DIAMETER as DIAMETER,
-        NOISE as NOISE,
         Timing as Timing,
         bench_posterior as bench_posterior,
         crossings as crossings,
     )
 
 _PUBLIC = {
-    "calibration": ("KINDS", "calibrate", "campaign"),
+    "calibration": ("CALIBRATED_KINDS", "calibrate", "campaign"),
     "calibration_verdicts": ("by_kind", "draw_ranks", "verdicts", "write_record"),
     "odds": ("bench_odds", "odds_table"),
-    "sampling": ("DIAMETER", "NOISE", "Timing", "bench_posterior", "crossings"),
+    "sampling": ("APPARATUS_NOISE", "DIAMETER", "Timing", "bench_posterior", "crossings"),
 }
 doorway(__name__, _PUBLIC)

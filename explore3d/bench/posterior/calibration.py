@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d.bench.scenes import SPACING, simulate_noise
+from explore3d.bench.scenes import SAMPLE_SPACING, simulate_noise
 from mapping import Evidence, Feature, FloatArray, Interval, Surface, Trace
 from mapping.base import Base
 from mapping.geometry.templates import chain_height, groove_height, rim_height, step_height, width_of_cap
@@ -29,9 +29,9 @@ from mapping.instrument import Noise
 
 TIP_RADIUS = 10e-3
 # Wire of the paper; the other features are of sizes that the same tip feels about as well.
-HEIGHT = 0.65e-3
-NOISES = ("white", "ell 0.3 mm", "ell 1 mm", "ell 3 mm", "low white")
-KINDS = ("ridge", "bump", "groove", "pit", "step")
+WIRE_DIAMETER = 0.65e-3
+CALIBRATED_NOISES = ("white", "ell 0.3 mm", "ell 1 mm", "ell 3 mm", "low white")
+CALIBRATED_KINDS = ("ridge", "bump", "groove", "pit", "step")
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def noise_of(name: str, rng: np.random.Generator) -> Noise:
 
 def run_case(case: Case) -> Row:
     """Simulate, analyse, and find the truth's place in the posterior."""
-    rng = np.random.default_rng([KINDS.index(case.kind), NOISES.index(case.noise), case.seed])
+    rng = np.random.default_rng([CALIBRATED_KINDS.index(case.kind), CALIBRATED_NOISES.index(case.noise), case.seed])
     noise = noise_of(case.noise, rng)
     feature, paths = nominal(case.kind)
     blank = _blank(case.kind)
@@ -93,8 +93,8 @@ def _blank(kind: str) -> Problem:
 
 def nominal(kind: str) -> tuple[Feature, list[FloatArray]]:
     """The feature as a detector would report it, and the sweeps over it: crossings, and slides off both ends."""
-    height = {"ridge": HEIGHT, "bump": HEIGHT, "groove": -0.05e-3, "pit": -0.1e-3, "step": 0.3e-3}[kind]
-    width = {"ridge": HEIGHT, "bump": HEIGHT, "groove": 2e-3, "pit": 3e-3, "step": 0.0}[kind]
+    height = {"ridge": WIRE_DIAMETER, "bump": WIRE_DIAMETER, "groove": -0.05e-3, "pit": -0.1e-3, "step": 0.3e-3}[kind]
+    width = {"ridge": WIRE_DIAMETER, "bump": WIRE_DIAMETER, "groove": 2e-3, "pit": 3e-3, "step": 0.0}[kind]
     point = kind in ("bump", "pit")
     axis = np.zeros((1, 3)) if point else np.array([[-12e-3, 0.0, 0.0], [12e-3, 0.0, 0.0]])
     zero = Interval(0.0, 0.0, 0.0)
@@ -121,7 +121,7 @@ def nominal(kind: str) -> tuple[Feature, list[FloatArray]]:
 
 def straight_path(start: tuple[float, float], stop: tuple[float, float]) -> FloatArray:
     """(N, 3) samples on a line over the plate at the apparatus' spacing, m."""
-    count = int(np.linalg.norm(np.subtract(stop, start)) / SPACING) + 1
+    count = int(np.linalg.norm(np.subtract(stop, start)) / SAMPLE_SPACING) + 1
     return np.column_stack([np.linspace(start, stop, count), np.zeros(count)])
 
 
@@ -226,7 +226,9 @@ def _with_derived(names: tuple[str, ...], draws: FloatArray) -> dict[str, FloatA
 
 def campaign(kinds: Sequence[str], seeds: int, method: str = "importance", assumed: str = "true") -> list[Case]:
     """Every shape under every noise, `seeds` times: interrupted anywhere, all have had about as many."""
-    noises = NOISES if assumed == "true" else [noise for noise in NOISES if noise.startswith("ell")]
+    noises = (
+        CALIBRATED_NOISES if assumed == "true" else [noise for noise in CALIBRATED_NOISES if noise.startswith("ell")]
+    )
     return [Case(kind, noise, seed, method, assumed) for seed in range(seeds) for kind in kinds for noise in noises]
 
 

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from explore3d.bench.posterior.calibration import KINDS, NOISES, Row
+from explore3d.bench.posterior.calibration import CALIBRATED_KINDS, CALIBRATED_NOISES, Row
 from mapping import FloatArray
 from mapping.geometry.mesh import write_whole
 
-BINS = 10
+RANK_BINS = 10
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Verdict:
     p_value: float
 
 
-def verdicts(rows: Sequence[Row], bins: int = BINS) -> dict[str, Verdict]:
+def verdicts(rows: Sequence[Row], bins: int = RANK_BINS) -> dict[str, Verdict]:
     """Coverage and uniformity of the truth's place, for each parameter."""
     return {name: _verdict(np.array([row.below[name] for row in rows]), bins) for name in rows[0].below}
 
@@ -50,8 +50,8 @@ def _verdict(places: FloatArray, bins: int) -> Verdict:
 
 
 def by_kind(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Rows of each shape, in the order of KINDS."""
-    groups = {kind: [row for row in rows if row.case.kind == kind] for kind in KINDS}
+    """Rows of each shape, in the order of CALIBRATED_KINDS."""
+    groups = {kind: [row for row in rows if row.case.kind == kind] for kind in CALIBRATED_KINDS}
     return {kind: group for kind, group in groups.items() if group}
 
 
@@ -67,7 +67,9 @@ def write_record(rows: Sequence[Row], path: Path) -> Path:
 
 
 def _by_noise(rows: Sequence[Row]) -> dict[str, dict[str, dict[str, float]]]:
-    groups = {"all": list(rows)} | {noise: [row for row in rows if row.case.noise == noise] for noise in NOISES}
+    groups = {"all": list(rows)} | {
+        noise: [row for row in rows if row.case.noise == noise] for noise in CALIBRATED_NOISES
+    }
     return {
         noise: {name: {k: round(v, 4) for k, v in asdict(verdict).items()} for name, verdict in verdicts(group).items()}
         for noise, group in groups.items()
@@ -89,13 +91,13 @@ def draw_ranks(rows: Sequence[Row], path: Path) -> Path:
     axes = figure.subplots(len(groups), columns, sharex=True, squeeze=False)
     for line, (kind, group) in zip(axes, groups.items(), strict=True):
         verdict = verdicts(group)
-        low, high = (float(binom.ppf(q, len(group), 1.0 / BINS)) for q in (0.005, 0.995))
+        low, high = (float(binom.ppf(q, len(group), 1.0 / RANK_BINS)) for q in (0.005, 0.995))
         for panel, name in zip(line, verdict, strict=False):
             panel.axhspan(low, high, color="0.9")
-            panel.hist([row.below[name] for row in group], BINS, (0.0, 1.0), color="#33658a")
+            panel.hist([row.below[name] for row in group], RANK_BINS, (0.0, 1.0), color="#33658a")
             panel.set_title(f"{name}: {100 * verdict[name].coverage:.1f} %", fontsize=7)
             panel.tick_params(labelsize=6)
-            panel.set_ylim(0.0, 2.2 * len(group) / BINS)
+            panel.set_ylim(0.0, 2.2 * len(group) / RANK_BINS)
         line[0].set_ylabel(f"{kind}\n{len(group)} runs", fontsize=7)
         for panel in line[len(verdict) :]:
             panel.set_visible(False)

@@ -25,8 +25,8 @@ from mapping.inference.families import BrokenRidgeShape, BumpShape, Problem, Sur
 from mapping.instrument import Noise
 
 # So low that most of what the priors hold is not plain to see.
-HEIGHT = 0.04e-3
-NOISE = Noise(0.2e-3, 0.01e-3, 1e-3)
+LOW_CREST_HEIGHT = 0.04e-3
+ODDS_NOISE = Noise(0.2e-3, 0.01e-3, 1e-3)
 PAIRS = ("bump or nothing", "ridge or bump", "two ridges or one")
 EDGES = np.array([0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0])
 
@@ -45,13 +45,13 @@ class OddsCase:
 def hypotheses(pair: str) -> tuple[Problem, Problem | None]:
     """The two problems on one window; None is nothing but the base."""
     kind = "bump" if pair == "bump or nothing" else "ridge"
-    height = HEIGHT if pair != "two ridges or one" else 4.0 * HEIGHT
+    height = LOW_CREST_HEIGHT if pair != "two ridges or one" else 4.0 * LOW_CREST_HEIGHT
     feature = _feature(kind, height, 6e-3 if pair == "two ridges or one" else 1.5e-3)
     places = (-5e-3, -2.5e-3, 0.0, 2.5e-3, 5e-3) if pair == "two ridges or one" else (-1e-3, -0.3e-3, 0.4e-3, 1.1e-3)
     paths = [straight_path((x, -5e-3), (x, 5e-3)) for x in places]
     paths += [straight_path((-8e-3, 0.1e-3), (8e-3, 0.1e-3))]
     trace = record(paths, np.zeros(sum(len(path) for path in paths)))
-    around = Surroundings(trace, plate(), NOISE)
+    around = Surroundings(trace, plate(), ODDS_NOISE)
     first = pose_problem(feature, around)
     if pair == "bump or nothing":
         return first, None

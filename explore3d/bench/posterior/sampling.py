@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d.bench.scenes import SPACING, simulate_noise
+from explore3d.bench.scenes import SAMPLE_SPACING, simulate_noise
 from mapping import Evidence, Feature, Interval, Surface, Trace
 from mapping.base import Base
 from mapping.geometry.templates import chain_height
@@ -22,7 +22,7 @@ from mapping.instrument import Noise
 
 TIP_RADIUS = 10e-3
 DIAMETER = 0.65e-3
-NOISE = Noise(0.2e-3)
+APPARATUS_NOISE = Noise(0.2e-3)
 # Half of the paper's sweep of 3300 samples at 6 um.
 HALF_SWEEP = 9.9e-3
 
@@ -59,14 +59,14 @@ def crossings(count: int, elsewhere: int = 0) -> tuple[Trace, Base, Feature]:
     corners = np.array([[-half, -half, 0.0], [half, -half, 0.0], [half, half, 0.0], [-half, half, 0.0]])
     base = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
     places = (np.arange(count) - 0.5 * (count - 1)) * 10e-3
-    along = np.arange(-HALF_SWEEP, HALF_SWEEP, SPACING)
+    along = np.arange(-HALF_SWEEP, HALF_SWEEP, SAMPLE_SPACING)
     paths = [np.column_stack([np.full(len(along), x), along, np.zeros(len(along))]) for x in places]
     feet = np.concatenate(paths)
     up = np.tile([0.0, 0.0, 1.0], (len(feet), 1))
     reach = max(5e-3, 0.5 * float(np.ptp(places)) + 4e-3)
     axis = np.array([[-reach, 0.0, 0.5 * DIAMETER], [reach, 0.0, 0.5 * DIAMETER]])
     rng = np.random.default_rng(1)
-    heights = chain_height(feet, up, axis, 0.5 * DIAMETER, TIP_RADIUS) + simulate_noise(NOISE, paths, rng)
+    heights = chain_height(feet, up, axis, 0.5 * DIAMETER, TIP_RADIUS) + simulate_noise(APPARATUS_NOISE, paths, rng)
     centers = feet + (TIP_RADIUS + heights)[:, None] * up
     sweep = np.repeat(np.arange(count), len(along))
     if elsewhere:
@@ -85,7 +85,7 @@ def timed(name: str, trace: Trace, base: Base, feature: Feature, confirm: bool) 
     """Trace to draws by the project's way, the first call (compilation, imports) not counted."""
 
     def once() -> Solution:
-        problem = pose_problem(feature, Surroundings(trace, base, NOISE))
+        problem = pose_problem(feature, Surroundings(trace, base, APPARATUS_NOISE))
         return solve_problem(problem, np.random.default_rng(1), confirm=confirm)
 
     once()
@@ -104,7 +104,7 @@ def default_emcee(trace: Trace, base: Base, feature: Feature, steps: int = 2000)
     """emcee as it comes: stretch moves, 32 walkers about the first guess, one template a call, no proposal learnt."""
     import emcee
 
-    problem: Problem = pose_problem(feature, Surroundings(trace, base, NOISE))
+    problem: Problem = pose_problem(feature, Surroundings(trace, base, APPARATUS_NOISE))
     target, rng = problem.target, np.random.default_rng(1)
     start = target.shape.start + target.shape.step * rng.standard_normal((32, len(target.shape.start)))
     start = np.clip(start, target.low, target.high)

@@ -22,7 +22,7 @@ PAGE = "bench.html"
 
 def stages() -> tuple[Stage, ...]:
     """Every stage, in the order of the method."""
-    return (*bench_surfaces.STAGES, *bench_inference.STAGES, *bench_runs.STAGES)
+    return (*bench_surfaces.SURFACE_STAGES, *bench_inference.INFERENCE_STAGES, *bench_runs.RUN_STAGES)
 
 
 def bench(quick: bool, peers: bool, told: Callable[[Measured], None] = lambda _: None) -> list[Measured]:

@@ -10,12 +10,12 @@ from explore3d import length_text
 from explore3d.bench.precision.work_precision import Point, Stage
 from explore3d.pictures import DPI, ESTIMATED, MUTED, TRUTH, new_figure, styled
 
-COLOURS = (ESTIMATED, "#1d4e89", TRUTH, "#b7791f", "#6b46c1", MUTED, "#0e7490", "#9d174d")
+CURVE_COLOURS = (ESTIMATED, "#1d4e89", TRUTH, "#b7791f", "#6b46c1", MUTED, "#0e7490", "#9d174d")
 MARKERS = "osD^vP*X"
-BETTER = "\u2199 faster and more exact"
+BETTER_CORNER_LABEL = "\u2199 faster and more exact"
 FEW_DECADES = 60.0  # ratio of an axis' ends below which decades alone are too few labels
 DECADE = 10.0  # an axis shows at least so large a ratio: less would make much of little, and crowd its labels
-SMALLEST = 1e-18  # an error of exactly nothing still needs a place on the axis
+SMALLEST_DRAWN_ERROR = 1e-18  # an error of exactly nothing still needs a place on the axis
 
 
 def diagram(stage: Stage, points: Sequence[Point]) -> dict[str, bytes]:
@@ -31,13 +31,13 @@ def diagram(stage: Stage, points: Sequence[Point]) -> dict[str, bytes]:
         for axes, (label, clock) in zip(every, clocks, strict=True):
             for k, method in enumerate(methods):
                 own = [point for point in points if point.method == method]
-                _curve(axes, own, clock, MARKERS[k % len(MARKERS)], COLOURS[k % len(COLOURS)])
+                _curve(axes, own, clock, MARKERS[k % len(MARKERS)], CURVE_COLOURS[k % len(CURVE_COLOURS)])
             axes.set(xscale="log", yscale="log", xlabel=label)
             axes.set_xlim(*_widened(*axes.get_xlim()))
             axes.set_ylim(*_widened(*axes.get_ylim()))
             _ticks(axes.xaxis, lambda value: f"{value:g}")
             _ticks(axes.yaxis, (lambda value: length_text(value, 1)) if metres else lambda value: f"{value:g}")
-            axes.text(0.02, 0.02, BETTER, transform=axes.transAxes, color=MUTED, fontsize=8)
+            axes.text(0.02, 0.02, BETTER_CORNER_LABEL, transform=axes.transAxes, color=MUTED, fontsize=8)
         every[0].set_ylabel(stage.error.split(",")[0].replace(" (m)", ""))
         figure.legend(*every[0].get_legend_handles_labels(), loc="outside right center")
         return {kind: _saved(figure, kind) for kind in ("png", "svg")}
@@ -45,7 +45,10 @@ def diagram(stage: Stage, points: Sequence[Point]) -> dict[str, bytes]:
 
 def _curve(axes: Any, points: Sequence[Point], clock: str, marker: str, colour: str) -> None:
     """One method: its points in the order of its settings, the first and the last of them named."""
-    times, errors = [getattr(point, clock) for point in points], [max(point.error, SMALLEST) for point in points]
+    times, errors = (
+        [getattr(point, clock) for point in points],
+        [max(point.error, SMALLEST_DRAWN_ERROR) for point in points],
+    )
     axes.plot(times, errors, marker=marker, color=colour, markersize=5, label=points[0].method)
     near = {"textcoords": "offset points", "ha": "center", "color": colour, "fontsize": 6}
     axes.annotate(points[0].setting, (times[0], errors[0]), xytext=(0, 6), **near)

@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from explore3d.bench.posterior import DIAMETER, NOISE, crossings
+from explore3d.bench.posterior import APPARATUS_NOISE, DIAMETER, crossings
 from explore3d.bench.precision.work_precision import Omission, Point, Stage, timed
 from explore3d.bench.scenes import plate, sweeps, wire
 from mapping import Feature, FloatArray, Trace
@@ -19,13 +19,13 @@ from mapping.inference.families import Surroundings
 
 Result = list[Point | Omission]
 
-WHITE = 0.2e-3
-PLACES = np.linspace(-40e-3, 40e-3, 21)
+WHITE_NOISE = 0.2e-3
+SWEEP_PLACES = np.linspace(-40e-3, 40e-3, 21)
 
 
 def detection(quick: bool, peers: bool) -> Result:
     """Where a wire is crossed, from ever more of the samples: the matched filters, and the paper's thresholds."""
-    whole = sweeps(wire(half=0.09), places=PLACES.tolist(), white=WHITE)
+    whole = sweeps(wire(half=0.09), places=SWEEP_PLACES.tolist(), white=WHITE_NOISE)
     out: Result = []
     for keep in (64, 16, 4, 1):
         trace = whole.select(slice(None, None, keep))
@@ -52,9 +52,9 @@ def _by_threshold(trace: Trace, algorithm: int) -> list[float]:
 
 def _add(out: Result, method: str, setting: str, seconds: float, repeats: int, places: list[float]) -> None:
     good = [place for place in places if abs(place) < 3.6e-3]
-    missed, false = len(PLACES) - len(good), len(places) - len(good)
+    missed, false = len(SWEEP_PLACES) - len(good), len(places) - len(good)
     if missed > 0 or false > 0:
-        why = f"{setting}: {max(missed, 0)} of {len(PLACES)} crossings missed, {false} invented"
+        why = f"{setting}: {max(missed, 0)} of {len(SWEEP_PLACES)} crossings missed, {false} invented"
         out.append(Omission("detection", method, why))
     if good:
         error = float(np.sqrt(np.mean(np.square(good))))
@@ -67,11 +67,11 @@ def posterior(quick: bool, peers: bool) -> Result:
 
     def fast(seed: int) -> FloatArray:
         rng = np.random.default_rng(seed)
-        return sample_posterior(feature, trace, rng, base=base, noise=NOISE, confirm=False).samples
+        return sample_posterior(feature, trace, rng, base=base, noise=APPARATUS_NOISE, confirm=False).samples
 
     def chain(seed: int) -> FloatArray:
         rng = np.random.default_rng(seed)
-        return sample_posterior(feature, trace, rng, base=base, noise=NOISE, confirm=True).samples
+        return sample_posterior(feature, trace, rng, base=base, noise=APPARATUS_NOISE, confirm=True).samples
 
     runs = [fast(seed) for seed in range(100, 108 if quick else 132)]
     spread = np.concatenate(runs).std(axis=0)
@@ -103,7 +103,7 @@ def _default_emcee(
     import emcee
 
     begin = perf_counter()
-    target = pose_problem(feature, Surroundings(trace, base, NOISE)).target
+    target = pose_problem(feature, Surroundings(trace, base, APPARATUS_NOISE)).target
     posing, rng = perf_counter() - begin, np.random.default_rng(1)
     start = target.shape.start + target.shape.step * rng.standard_normal((32, len(target.shape.start)))
     start = np.clip(start, target.low, target.high)
@@ -120,9 +120,9 @@ def _default_emcee(
     return out
 
 
-STAGES = (
+INFERENCE_STAGES = (
     Stage("detection", "root mean square error of the place of a crossing (m)",
-          f"The wire's own place; {len(PLACES)} crossings of {DIAMETER * 1e3:g} mm under 0.2 mm of white noise.",
+          f"The wire's own place; {len(SWEEP_PLACES)} crossings of {DIAMETER * 1e3:g} mm under 0.2 mm of white noise.",
           "More samples cost time and buy place: white noise averages out as their square root. The paper's thresholds "
           "on curvature see the same crossings with a larger error.", detection),
     Stage("posterior", "error of the medians, in standard deviations of the posterior",

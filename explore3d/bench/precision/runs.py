@@ -16,7 +16,7 @@ Result = list[Point | Omission]
 
 SCENE = Path(__file__).parents[3] / "assets" / "scenes" / "wire_on_plate.toml"
 QUICK_STRATEGIES = 2
-PRECISIONS = ("0.8 mm", "0.4 mm", "0.2 mm", "0.1 mm", "0.05 mm")
+ASKED_PRECISIONS = ("0.8 mm", "0.4 mm", "0.2 mm", "0.1 mm", "0.05 mm")
 QUICK_PRECISION, QUICK_RATE = "0.4 mm", "1 kHz"
 
 
@@ -54,7 +54,7 @@ def whole_runs(quick: bool, peers: bool) -> Result:
     text = SCENE.read_text("utf-8")
     rate = QUICK_RATE if quick else "5 kHz"
     text = text.replace('rate = "5 kHz"', f'rate = "{rate}"')
-    for precision in (QUICK_PRECISION,) if quick else PRECISIONS:
+    for precision in (QUICK_PRECISION,) if quick else ASKED_PRECISIONS:
         scene = parse_scene(text.replace('precision = "0.1 mm"', f'precision = "{precision}"'), SCENE)
         with tempfile.TemporaryDirectory() as folder:
             begin = perf_counter()
@@ -67,12 +67,12 @@ def whole_runs(quick: bool, peers: bool) -> Result:
             continue
         out.append(Point("whole runs", "explore3d run", f"{precision} asked, {rate}", seconds, max(ends), 1, finger))
     if quick:
-        left = ", ".join(each for each in PRECISIONS if each != QUICK_PRECISION)
+        left = ", ".join(each for each in ASKED_PRECISIONS if each != QUICK_PRECISION)
         out.append(Omission("whole runs", f"asked for {left}, at 5 kHz", "left out by --quick"))
     return out
 
 
-STAGES = (
+RUN_STAGES = (
     Stage("exploration", "error of the wire's ends (m)", "The wire as it was laid down.",
           "Time of the finger is what an experiment costs: following what was found beats sweeping everything, at any "
           "error. Computing is a small part of it.", exploration),

@@ -11,7 +11,7 @@ import numpy as np
 
 from explore3d.bench import bump_mesh, by_opencamlib
 from explore3d.bench.precision.work_precision import Omission, Point, Stage, timed
-from explore3d.bench.scenes import DIAMETER, TIP, sweeps, wire
+from explore3d.bench.scenes import DIAMETER, TIP_RADIUS, sweeps, wire
 from mapping import FloatArray, Surface, Trace
 from mapping.estimate.envelope import Estimate, estimate_surface
 from mapping.estimate.sweeps import EXTRAPOLATED
@@ -23,17 +23,17 @@ from mapping.instrument import Noise
 
 Result = list[Point | Omission]
 
-SHARPNESS, RADIUS = 15.0, 0.5
+STEEPNESS, BUMP_BALL_RADIUS = 15.0, 0.5
 DOWN = np.array([0.0, 0.0, -1.0])
-PLACES = np.linspace(0.0, 0.45, 400)
+BUMP_PLACES = np.linspace(0.0, 0.45, 400)
 
 
 def dilated(places: FloatArray) -> FloatArray:
     """Height of the ball's centre over the smooth bump: the largest of h(u) + sqrt(r^2 - (x - u)^2), by refinement."""
-    bump, low, high = BumpOfRevolution(SHARPNESS), places - RADIUS, places + RADIUS
+    bump, low, high = BumpOfRevolution(STEEPNESS), places - BUMP_BALL_RADIUS, places + BUMP_BALL_RADIUS
     for _ in range(14):
         u = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, 201)
-        room = np.clip(RADIUS**2 - (places[:, None] - u) ** 2, 0.0, None)
+        room = np.clip(BUMP_BALL_RADIUS**2 - (places[:, None] - u) ** 2, 0.0, None)
         height = bump.height(u) + np.sqrt(room)
         best = height.argmax(axis=1)
         middle, reach = u[np.arange(len(places)), best], (high - low) / 100
@@ -43,9 +43,9 @@ def dilated(places: FloatArray) -> FloatArray:
 
 def paralleled(places: FloatArray) -> FloatArray:
     """The same from equation 11: the highest point of the parallel curve over each place, by bisection."""
-    bump = BumpOfRevolution(SHARPNESS)
+    bump = BumpOfRevolution(STEEPNESS)
     u = np.linspace(-0.2, 1.2, 28_001)
-    place = np.sign(u) * bump.parallel(np.abs(u), RADIUS)[0]
+    place = np.sign(u) * bump.parallel(np.abs(u), BUMP_BALL_RADIUS)[0]
     best = np.full(len(places), -np.inf)
     for k, x in enumerate(places):
         for i in np.flatnonzero((place[:-1] <= x) != (place[1:] <= x)):
@@ -53,18 +53,18 @@ def paralleled(places: FloatArray) -> FloatArray:
             rising = place[i + 1] > place[i]
             for _ in range(60):
                 middle = 0.5 * (low + high)
-                there = np.sign(middle) * bump.parallel(abs(middle), RADIUS)[0]
+                there = np.sign(middle) * bump.parallel(abs(middle), BUMP_BALL_RADIUS)[0]
                 low, high = (middle, high) if (there <= x) == rising else (low, middle)
-            best[k] = max(best[k], float(bump.parallel(abs(low), RADIUS)[1]))
+            best[k] = max(best[k], float(bump.parallel(abs(low), BUMP_BALL_RADIUS)[1]))
     return best
 
 
 def traced(quick: bool, peers: bool) -> Result:
     """Heights of the ball's centre over ever finer meshes of the paper's bump."""
-    true = dilated(PLACES)
-    doubt = float(np.abs(true - paralleled(PLACES)).max())
+    true = dilated(BUMP_PLACES)
+    doubt = float(np.abs(true - paralleled(BUMP_PLACES)).max())
     out: Result = [Omission("traced surface", "reference", f"its two ways of computing agree to {doubt:.0e}")]
-    start = np.column_stack([PLACES, np.full(len(PLACES), 0.003), np.full(len(PLACES), 4.0)])
+    start = np.column_stack([BUMP_PLACES, np.full(len(BUMP_PLACES), 0.003), np.full(len(BUMP_PLACES), 4.0)])
     for size in (512, 2048, 8192, 32_768) if quick else (512, 2048, 8192, 32_768, 131_072, 524_288):
         mesh = bump_mesh(size)
         for method, trace in TRACERS.items():
@@ -85,19 +85,19 @@ def traced(quick: bool, peers: bool) -> Result:
 
 def _opencamlib(size: int, start: FloatArray, true: FloatArray) -> Point:
     mesh = bump_mesh(size)
-    found = by_opencamlib(mesh, RADIUS, start)
+    found = by_opencamlib(mesh, BUMP_BALL_RADIUS, start)
     error = float(np.sqrt(np.mean((found.heights - true[found.which]) ** 2)))
     return Point("traced surface", "OpenCAMLib BallCutter", f"{len(mesh.faces)} triangles", found.seconds, error)
 
 
 def _by_tree(mesh: Surface, start: FloatArray) -> FloatArray:
-    return np.asarray(BallContact(mesh, RADIUS).first_contact(start, DOWN).centers[:, 2])
+    return np.asarray(BallContact(mesh, BUMP_BALL_RADIUS).first_contact(start, DOWN).centers[:, 2])
 
 
 def _by_vertices(mesh: Surface, start: FloatArray) -> FloatArray:
     heights = np.empty(len(start))
     for k, (x, y, _) in enumerate(start):
-        room = RADIUS**2 - (mesh.vertices[:, 0] - x) ** 2 - (mesh.vertices[:, 1] - y) ** 2
+        room = BUMP_BALL_RADIUS**2 - (mesh.vertices[:, 0] - x) ** 2 - (mesh.vertices[:, 1] - y) ** 2
         near = room > 0
         heights[k] = (mesh.vertices[near, 2] + np.sqrt(room[near])).max()
     return heights
@@ -106,11 +106,11 @@ def _by_vertices(mesh: Surface, start: FloatArray) -> FloatArray:
 def _by_displaced_mesh(mesh: Surface, start: FloatArray) -> FloatArray:
     o3d: Any = open3d()
     u = np.hypot(*mesh.vertices[:, :2].T)
-    radial, axial = BumpOfRevolution(SHARPNESS).normal(u)
+    radial, axial = BumpOfRevolution(STEEPNESS).normal(u)
     out = radial / np.where(u > 0, u, 1.0)
     normals = np.column_stack([mesh.vertices[:, 0] * out, mesh.vertices[:, 1] * out, axial])
     scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-    displaced = (mesh.vertices + RADIUS * normals).astype(np.float32)
+    displaced = (mesh.vertices + BUMP_BALL_RADIUS * normals).astype(np.float32)
     scene.add_triangles(o3d.core.Tensor(displaced), o3d.core.Tensor(mesh.faces.astype(np.uint32)))
     rays = np.hstack([start, np.tile(DOWN, (len(start), 1))]).astype(np.float32)
     return np.asarray(start[:, 2] - scene.cast_rays(o3d.core.Tensor(rays), nthreads=1)["t_hit"].numpy())
@@ -123,7 +123,7 @@ TRACERS: dict[str, Callable[[Surface, FloatArray], FloatArray]] = {
 }
 
 
-WHITE = 20e-6  # noise of the trace whose body is estimated, m
+TRACE_WHITE_NOISE = 20e-6  # noise of the trace whose body is estimated, m
 
 
 def estimated(quick: bool, peers: bool) -> Result:
@@ -131,10 +131,12 @@ def estimated(quick: bool, peers: bool) -> Result:
     out: Result = []
     for spacing in (0.2e-3, 0.1e-3, 0.05e-3) if quick else (0.2e-3, 0.1e-3, 0.05e-3, 0.025e-3, 0.0125e-3, 6e-6):
         places = np.arange(-3e-3, 3.1e-3, 1e-3).tolist()
-        bare = sweeps(wire(), places=places, spacing=spacing, half=8e-3, white=WHITE)
-        trace = Trace(bare.t, bare.centers, bare.sweep, TIP, normals=_normals(bare.centers))
+        bare = sweeps(wire(), places=places, spacing=spacing, half=8e-3, white=TRACE_WHITE_NOISE)
+        trace = Trace(bare.t, bare.centers, bare.sweep, TIP_RADIUS, normals=_normals(bare.centers))
         ways: dict[str, Callable[[], Estimate]] = {
-            "envelope, noise known (ours)": partial(estimate_surface, trace, noise=Noise(WHITE), spacing=0.0),
+            "envelope, noise known (ours)": partial(
+                estimate_surface, trace, noise=Noise(TRACE_WHITE_NOISE), spacing=0.0
+            ),
             "envelope of the raw trace": partial(estimate_surface, trace, spacing=0.0),
             "recorded contact normals": partial(estimate_surface, trace, "contact", spacing=0.0),
             "normals of the raw trace (equation 12)": partial(estimate_surface, trace, "normals", spacing=0.0),
@@ -150,7 +152,7 @@ def estimated(quick: bool, peers: bool) -> Result:
 
 def _normals(centers: FloatArray) -> FloatArray:
     arm = np.column_stack([np.zeros(len(centers)), centers[:, 1], centers[:, 2] - 0.5 * DIAMETER])
-    on_wire = centers[:, 2] > TIP
+    on_wire = centers[:, 2] > TIP_RADIUS
     normals = np.where(on_wire[:, None], arm, [0.0, 0.0, 1.0])
     return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
@@ -186,12 +188,12 @@ def _curvature_error(mesh: Surface, found: Any) -> float:
     """Median error of both curvatures in the interior, over the largest."""
     u = np.hypot(*mesh.vertices[:, :2].T)
     inside = (np.abs(mesh.vertices[:, :2]).max(axis=1) < 0.8) & found.valid
-    radial, around = BumpOfRevolution(SHARPNESS).curvatures(u[inside])
+    radial, around = BumpOfRevolution(STEEPNESS).curvatures(u[inside])
     off = np.abs(found.k1[inside] - np.maximum(radial, around)) + np.abs(found.k2[inside] - np.minimum(radial, around))
-    return float(np.median(off) / (2 * SHARPNESS))
+    return float(np.median(off) / (2 * STEEPNESS))
 
 
-STAGES = (
+SURFACE_STAGES = (
     Stage("traced surface", "root mean square error of the ball's height, in heights of the bump",
           "The smooth bump's own trace, by dilation and, independently, from equation 11.",
           "Every curve falls with the mesh's own error. The tree pays little for more triangles, brute force for "

@@ -7,13 +7,17 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from explore3d.bench.scenes.bodies import joined as joined, tube as tube
     from explore3d.bench.scenes.exploring import SCENES as SCENES, BenchScene as BenchScene
-    from explore3d.bench.scenes.kinds import BODIES as BODIES, MIDDLE as MIDDLE, WINDOW as WINDOW
+    from explore3d.bench.scenes.kinds import (
+        BODIES_BY_KIND as BODIES_BY_KIND,
+        INSPECTED_HALF_SIDE as INSPECTED_HALF_SIDE,
+        MIDDLE as MIDDLE,
+    )
     from explore3d.bench.scenes.long_log import write_long_log as write_long_log
-    from explore3d.bench.scenes.noise import SPACING as SPACING, simulate_noise as simulate_noise
+    from explore3d.bench.scenes.noise import SAMPLE_SPACING as SAMPLE_SPACING, simulate_noise as simulate_noise
     from explore3d.bench.scenes.plate_sweeps import (
         DIAMETER as DIAMETER,
         HALF as HALF,
-        TIP as TIP,
+        TIP_RADIUS as TIP_RADIUS,
         Heights as Heights,
         features as features,
         plate as plate,
@@ -25,9 +29,9 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "bodies": ("joined", "tube"),
     "exploring": ("BenchScene", "SCENES"),
-    "kinds": ("BODIES", "MIDDLE", "WINDOW"),
+    "kinds": ("BODIES_BY_KIND", "INSPECTED_HALF_SIDE", "MIDDLE"),
     "long_log": ("write_long_log",),
-    "noise": ("SPACING", "simulate_noise"),
-    "plate_sweeps": ("DIAMETER", "HALF", "Heights", "TIP", "features", "plate", "scaled", "sweeps", "wire"),
+    "noise": ("SAMPLE_SPACING", "simulate_noise"),
+    "plate_sweeps": ("DIAMETER", "HALF", "Heights", "TIP_RADIUS", "features", "plate", "scaled", "sweeps", "wire"),
 }
 doorway(__name__, _PUBLIC)

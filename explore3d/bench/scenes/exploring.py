@@ -21,15 +21,15 @@ from explore3d.bench.scenes.bodies import (
     tube,
 )
 from mapping import FloatArray, Surface
-from planners.explore import SIDES
+from planners.explore import APPROACH_SIDES
 
 WIRE = 0.65e-3
 UP = np.array([0.0, 0.0, 1.0])
-LONG, SHORT = 0.1, 0.08
+PLATE_LENGTH, PLATE_WIDTH = 0.1, 0.08
 # The span that no ridge on these bodies falls short of, m
-SPAN = 0.025
+SHORTEST_RIDGE_SPAN = 0.025
 # The box that an unknown body is looked for in is so much larger, m
-SPARE = 0.004
+BOX_MARGIN = 0.004
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class BenchScene:
     base: Surface
     object: Surface
     truth: tuple[TrueFeature, ...]
-    shortest_ridge: float | None = SPAN
+    shortest_ridge: float | None = SHORTEST_RIDGE_SPAN
     smallest: float = 0.3e-3
     misplaced: bool = False
     sides: tuple[str, ...] = ()
@@ -58,7 +58,10 @@ class BenchScene:
 
 
 def wires(
-    *axes: FloatArray, size: tuple[float, float] = (LONG, SHORT), bend: float = 0.0, span: float = SPAN
+    *axes: FloatArray,
+    size: tuple[float, float] = (PLATE_LENGTH, PLATE_WIDTH),
+    bend: float = 0.0,
+    span: float = SHORTEST_RIDGE_SPAN,
 ) -> BenchScene:
     """Wires that lie on a plate, which may be folded under them."""
     parts = [tube(axis + 0.5 * WIRE * UP, np.tile(UP, (len(axis), 1)), 0.5 * WIRE) for axis in axes]
@@ -135,8 +138,8 @@ def groove(rng: np.random.Generator) -> BenchScene:
     turn = rng.uniform(0.0, 2.0 * np.pi)
     c, s = np.cos(turn), np.sin(turn)
     rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    vertices, faces = slotted_plate(LONG, SHORT, middle - half, middle + half, depth)
-    base, few = plate(LONG, SHORT)
+    vertices, faces = slotted_plate(PLATE_LENGTH, PLATE_WIDTH, middle - half, middle + half, depth)
+    base, few = plate(PLATE_LENGTH, PLATE_WIDTH)
     dip = -(tip - np.sqrt(tip**2 - 0.25 * width**2))
     truth = TrueFeature("groove", (line(length) + np.append(middle, 0.0)) @ rotation, dip, width)
     scene = Surface(base @ rotation, few), Surface(vertices @ rotation, faces)
@@ -163,7 +166,7 @@ def free_form(rng: np.random.Generator, bumps: bool = True, subdivisions: int = 
         point = blob(way[None])
         parts.append((point + 1e-3 * ball, some))
         truth.append(TrueFeature("bump", point, 1e-3, 2e-3))
-    shortest = None if bumps else SPAN
+    shortest = None if bumps else SHORTEST_RIDGE_SPAN
     return BenchScene(Surface(*parts[0]), joined(*parts), tuple(truth), shortest_ridge=shortest, smallest=0.6e-3)
 
 
@@ -189,7 +192,7 @@ def misplaced(scene: BenchScene, rng: np.random.Generator) -> BenchScene:
 def unknown(scene: BenchScene, sides: tuple[str, ...], inside: float = 0.0) -> BenchScene:
     """The same without a model; the box that it is looked for in stays clear of the edges by so much, m."""
     low, high = scene.object.bounds
-    border = np.array([inside, inside, 0.0]) - SPARE
+    border = np.array([inside, inside, 0.0]) - BOX_MARGIN
     return replace(scene, sides=sides, region=np.stack([low + border, high - border]))
 
 
@@ -206,5 +209,5 @@ SCENES: dict[str, Callable[[np.random.Generator], BenchScene]] = {
     "wrong pose": lambda rng: misplaced(free_form(rng, bumps=False), rng),
     "empty": lambda rng: wires(),
     "unknown fold": lambda rng: unknown(edge(rng), ("+z",), 0.01),
-    "unknown form": lambda rng: unknown(free_form(rng, bumps=False), SIDES),
+    "unknown form": lambda rng: unknown(free_form(rng, bumps=False), APPROACH_SIDES),
 }

@@ -8,20 +8,22 @@ import numpy as np
 
 from explore3d.analysis import TrueFeature
 from explore3d.bench.scenes.bodies import Mesh, folded, joined, plate
-from explore3d.bench.scenes.exploring import LONG, SHORT, UP, WIRE, BenchScene, wires
+from explore3d.bench.scenes.exploring import PLATE_LENGTH, PLATE_WIDTH, UP, WIRE, BenchScene, wires
 from mapping import FloatArray, Surface
 
 MIDDLE = np.zeros(3)
 # Half of the side of the square that the sweeps inspect, m.
-WINDOW = 0.022
-DEEP = 1.5e-3
+INSPECTED_HALF_SIDE = 0.022
+HOLLOW_DEPTH = 1.5e-3
 
 
 def bump() -> BenchScene:
     """A ball of the wire's size on the plate."""
     ball = sphere(MIDDLE + 0.5 * WIRE * UP, 0.5 * WIRE)
     return BenchScene(
-        Surface(*plate(LONG, SHORT)), joined(plate(LONG, SHORT), ball), (TrueFeature("bump", MIDDLE, WIRE, WIRE),)
+        Surface(*plate(PLATE_LENGTH, PLATE_WIDTH)),
+        joined(plate(PLATE_LENGTH, PLATE_WIDTH), ball),
+        (TrueFeature("bump", MIDDLE, WIRE, WIRE),),
     )
 
 
@@ -29,10 +31,17 @@ def pit(width: float = 7e-3, sides: int = 96) -> BenchScene:
     """A round hole with a sharp rim that the tip cannot enter."""
     angle = 2 * np.pi * np.arange(sides) / sides
     circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
-    rings = [0.2 * circle, 0.5 * width * circle, 0.5 * width * circle - [0, 0, DEEP], 1e-6 * circle - [0, 0, DEEP]]
+    rings = [
+        0.2 * circle,
+        0.5 * width * circle,
+        0.5 * width * circle - [0, 0, HOLLOW_DEPTH],
+        1e-6 * circle - [0, 0, HOLLOW_DEPTH],
+    ]
     dip = -((0.5 * width) ** 2) / (0.01 + np.sqrt(0.01**2 - (0.5 * width) ** 2))
     hole = shell(np.stack(rings) + MIDDLE)
-    return BenchScene(Surface(*plate(LONG, SHORT)), joined(hole), (TrueFeature("pit", MIDDLE, dip, width),))
+    return BenchScene(
+        Surface(*plate(PLATE_LENGTH, PLATE_WIDTH)), joined(hole), (TrueFeature("pit", MIDDLE, dip, width),)
+    )
 
 
 def groove(width: float = 4e-3, length: float = 0.026, heading: float = 0.3) -> BenchScene:
@@ -40,13 +49,15 @@ def groove(width: float = 4e-3, length: float = 0.026, heading: float = 0.3) -> 
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     outer = np.column_stack([0.2 * corners, np.zeros(4)])
     rim = np.column_stack([0.5 * corners * [length, width], np.zeros(4)])
-    rings = np.stack([outer, rim, rim - [0, 0, DEEP], 1e-3 * rim - [0, 0, DEEP]])
+    rings = np.stack([outer, rim, rim - [0, 0, HOLLOW_DEPTH], 1e-3 * rim - [0, 0, HOLLOW_DEPTH]])
     along = np.array([np.cos(heading), np.sin(heading), 0.0])
     turn = np.array([along, [-along[1], along[0], 0.0], [0.0, 0.0, 1.0]])
     dip = -((0.5 * width) ** 2) / (0.01 + np.sqrt(0.01**2 - (0.5 * width) ** 2))
     axis = MIDDLE + 0.5 * length * np.array([[-1.0], [1.0]]) * along
     slot = shell(rings @ turn + MIDDLE)
-    return BenchScene(Surface(*plate(LONG, SHORT)), joined(slot), (TrueFeature("groove", axis, dip, width),))
+    return BenchScene(
+        Surface(*plate(PLATE_LENGTH, PLATE_WIDTH)), joined(slot), (TrueFeature("groove", axis, dip, width),)
+    )
 
 
 def step(height: float = 0.5e-3, heading: float = 1.3) -> BenchScene:
@@ -57,18 +68,18 @@ def step(height: float = 0.5e-3, heading: float = 1.3) -> BenchScene:
     high = MIDDLE + corner + [0.0, 0.0, height]
     wall = np.concatenate([high[[1, 0]], high[[0, 1]] - [0.0, 0.0, height]])
     quad = np.array([[0, 2, 1], [0, 3, 2]])
-    axis = MIDDLE + WINDOW * np.array([[-1.0], [1.0]]) * along
-    body = joined(plate(LONG, SHORT), (high, quad[:, ::-1]), (wall, quad))
-    return BenchScene(Surface(*plate(LONG, SHORT)), body, (TrueFeature("step", axis, height),))
+    axis = MIDDLE + INSPECTED_HALF_SIDE * np.array([[-1.0], [1.0]]) * along
+    body = joined(plate(PLATE_LENGTH, PLATE_WIDTH), (high, quad[:, ::-1]), (wall, quad))
+    return BenchScene(Surface(*plate(PLATE_LENGTH, PLATE_WIDTH)), body, (TrueFeature("step", axis, height),))
 
 
 def fold(angle: float) -> BenchScene:
     """A plate bent about a line, where the model knows only its unbent half, continued."""
-    points, faces = plate(LONG, SHORT)
-    axis = MIDDLE + WINDOW * np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
+    points, faces = plate(PLATE_LENGTH, PLATE_WIDTH)
+    axis = MIDDLE + INSPECTED_HALF_SIDE * np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
     kind = "convex edge" if angle > 0 else "concave corner"
     truth = (TrueFeature(kind, axis, -np.sign(angle) * 1e-3),)
-    return BenchScene(Surface(*plate(LONG, SHORT)), Surface(folded(points, angle), faces), truth)
+    return BenchScene(Surface(*plate(PLATE_LENGTH, PLATE_WIDTH)), Surface(folded(points, angle), faces), truth)
 
 
 def star(*angles: float, reach: float = 0.018) -> list[FloatArray]:
@@ -107,7 +118,7 @@ def shell(rings: FloatArray) -> Mesh:
     return rings.reshape(-1, 3), faces
 
 
-BODIES: dict[str, Callable[[], BenchScene]] = {
+BODIES_BY_KIND: dict[str, Callable[[], BenchScene]] = {
     "bump": bump,
     "ridge": lambda: wires(through(0.4, 0.015)),
     "groove": groove,

@@ -18,10 +18,10 @@ from mapping.base import Base
 from mapping.geometry.templates import chain_height
 
 TIP_RADIUS = 10e-3
-RADIUS = 0.325e-3  # of the wires
-RATE, SPEED = 5000.0, 0.03
+WIRE_RADIUS = 0.325e-3  # of the wires
+SAMPLE_RATE, SPEED = 5000.0, 0.03
 PITCH = 4e-3  # between sweeps
-WHITE, CORRELATED, LENGTH = 0.2e-3, 0.02e-3, 1e-3
+WHITE_NOISE, CORRELATED_NOISE, CORRELATION_LENGTH = 0.2e-3, 0.02e-3, 1e-3
 LONGEST_SWEEP, FEWEST_SWEEPS = 15_000, 20
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -32,8 +32,8 @@ def write_long_log(
     """Write a log of about so many samples; returns the wires' axes, each (2, 3), m."""
     length = min(LONGEST_SWEEP, max(samples // FEWEST_SWEEPS, 2))
     count = -(-samples // length)
-    plate = _plate(count * PITCH, length * SPEED / RATE)
-    axes = wire_axes(wires, count * PITCH, length * SPEED / RATE)
+    plate = _plate(count * PITCH, length * SPEED / SAMPLE_RATE)
+    axes = wire_axes(wires, count * PITCH, length * SPEED / SAMPLE_RATE)
     with LogWriter(path, tip_radius=TIP_RADIUS, metadata={"software": "explore3d bench", "seed": seed}) as log:
         log.event(KIND, base_event(plate))
         for number, (move, trace) in enumerate(_sweeps(count, length, axes, np.random.default_rng(seed))):
@@ -53,7 +53,9 @@ def wire_axes(count: int, width: float, height: float) -> tuple[FloatArray, ...]
     slope = min(0.3, (0.5 * cell[1] - 6e-3) / half) if cell[1] > 12e-3 else 0.0
     slots = [((k // rows + 0.5) * cell[0], (k % rows + 0.5) * cell[1]) for k in range(count)]
     along = half * np.array([1.0, slope, 0.0])
-    return tuple(np.array([np.array([x, y, RADIUS]) - along, np.array([x, y, RADIUS]) + along]) for x, y in slots)
+    return tuple(
+        np.array([np.array([x, y, WIRE_RADIUS]) - along, np.array([x, y, WIRE_RADIUS]) + along]) for x, y in slots
+    )
 
 
 def _plate(width: float, height: float) -> Base:
@@ -68,8 +70,8 @@ def _sweeps(
 ) -> Iterator[tuple[Move, Trace]]:
     from scipy.signal import lfilter
 
-    step = SPEED / RATE
-    keep = np.exp(-step / LENGTH)
+    step = SPEED / SAMPLE_RATE
+    keep = np.exp(-step / CORRELATION_LENGTH)
     y = step * np.arange(length)
     for number in range(count):
         x = (number + 0.5) * PITCH
@@ -77,11 +79,11 @@ def _sweeps(
         height = np.zeros(length)
         for axis in axes:
             if axis[:, 0].min() - TIP_RADIUS < x < axis[:, 0].max() + TIP_RADIUS:
-                height = np.maximum(height, chain_height(feet, np.tile(UP, (length, 1)), axis, RADIUS, TIP_RADIUS))
+                height = np.maximum(height, chain_height(feet, np.tile(UP, (length, 1)), axis, WIRE_RADIUS, TIP_RADIUS))
         kicks = np.sqrt(1.0 - keep**2) * rng.standard_normal(length)
         kicks[0] = rng.standard_normal()
-        noise = WHITE * rng.standard_normal(length) + CORRELATED * lfilter([1.0], [1.0, -keep], kicks)
+        noise = WHITE_NOISE * rng.standard_normal(length) + CORRELATED_NOISE * lfilter([1.0], [1.0, -keep], kicks)
         centers = feet + (TIP_RADIUS + height + noise)[:, None] * UP
-        t = (number * length + np.arange(length)) / RATE
+        t = (number * length + np.arange(length)) / SAMPLE_RATE
         move = Move(path=feet[[0, -1]] + TIP_RADIUS * UP, approach=-UP, speed=SPEED)
         yield move, Trace(t, centers, np.full(length, number), TIP_RADIUS)

@@ -7,7 +7,7 @@ import numpy as np
 from mapping import FloatArray
 from mapping.instrument import Noise
 
-SPACING = 6e-6
+SAMPLE_SPACING = 6e-6
 
 
 def simulate_noise(noise: Noise, paths: list[FloatArray], rng: np.random.Generator) -> FloatArray:
@@ -17,7 +17,7 @@ def simulate_noise(noise: Noise, paths: list[FloatArray], rng: np.random.Generat
     parts = []
     for path in paths:
         white = noise.white * rng.standard_normal(len(path))
-        keep = np.exp(-SPACING / noise.length)
+        keep = np.exp(-SAMPLE_SPACING / noise.length)
         kicks = np.sqrt(1.0 - keep**2) * rng.standard_normal(len(path))
         kicks[0] = rng.standard_normal()
         parts.append(white + noise.correlated * lfilter([1.0], [1.0, -keep], kicks))

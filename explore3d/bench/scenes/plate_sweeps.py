@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from explore3d.bench.scenes.noise import SPACING
+from explore3d.bench.scenes.noise import SAMPLE_SPACING
 from mapping import Feature, FloatArray, Surface, Trace
 from mapping.assembly import assemble
 from mapping.base import Base
@@ -15,7 +15,7 @@ from mapping.geometry.templates import chain_height
 
 Heights = Callable[[FloatArray], FloatArray]
 
-TIP = 10e-3
+TIP_RADIUS = 10e-3
 DIAMETER = 0.65e-3
 HALF = 12e-3  # of a sweep
 UP = np.array([0.0, 0.0, 1.0])
@@ -31,7 +31,7 @@ def wire(diameter: float = DIAMETER, y: float = 0.0, half: float = 0.05, angle: 
     """The trace over a wire that lies on the plate along x, turned by an angle about its middle."""
     axis = half * np.array([[-np.cos(angle), -np.sin(angle), 0], [np.cos(angle), np.sin(angle), 0]])
     axis = axis + np.array([0.0, y, 0.5 * diameter])
-    return lambda feet: chain_height(feet, np.tile(UP, (len(feet), 1)), axis, 0.5 * diameter, TIP)
+    return lambda feet: chain_height(feet, np.tile(UP, (len(feet), 1)), axis, 0.5 * diameter, TIP_RADIUS)
 
 
 def sweeps(
@@ -40,7 +40,7 @@ def sweeps(
     places: Sequence[float] = (-9e-3, -5e-3, -1e-3, 3e-3, 7e-3),
     white: float = 0.0,
     along_x: bool = False,
-    spacing: float = SPACING,
+    spacing: float = SAMPLE_SPACING,
     half: float = HALF,
     seed: int = 1,
 ) -> Trace:
@@ -54,9 +54,9 @@ def sweeps(
         paths.append(np.column_stack([*columns, np.zeros(len(run))]))
     feet = np.concatenate(paths)
     height = heights(feet) + white * rng.standard_normal(len(feet))
-    centers = feet + (TIP + height)[:, None] * UP
+    centers = feet + (TIP_RADIUS + height)[:, None] * UP
     number = np.repeat(np.arange(len(places)), len(run))
-    return Trace(2e-4 * np.arange(float(len(feet))), centers, number, TIP)
+    return Trace(2e-4 * np.arange(float(len(feet))), centers, number, TIP_RADIUS)
 
 
 def scaled(trace: Trace, scale: float, at: FloatArray | None = None) -> Trace:

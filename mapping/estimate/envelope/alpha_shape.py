@@ -10,7 +10,7 @@ from mapping.estimate.envelope.estimate import Estimate
 from mapping.estimate.envelope.sweep_mesh import oriented, sweep_faces
 from mapping.estimate.sweeps import EXTRAPOLATED
 
-TOLERANCE = 1e-9  # of the radius, by which balls through three centres may hold a fourth
+EMPTY_BALL_TOLERANCE = 1e-9  # of the radius, by which balls through three centres may hold a fourth
 
 
 def alpha_facets(centers: FloatArray, outward: FloatArray, tip_radius: float) -> tuple[IntArray, FloatArray]:
@@ -45,9 +45,11 @@ def alpha_facets(centers: FloatArray, outward: FloatArray, tip_radius: float) ->
     facets = np.unique(np.sort(facets, axis=1), axis=0).astype(np.int64)
     facets = facets[(facets < len(kept)).all(axis=1)]
     met = resting_points(local, outward[kept], facets, 1.0)
-    near = np.abs(np.linalg.norm(met - local[facets[:, 0]], axis=1) - 1.0) <= TOLERANCE
+    near = np.abs(np.linalg.norm(met - local[facets[:, 0]], axis=1) - 1.0) <= EMPTY_BALL_TOLERANCE
     facets, met = facets[near], met[near]
-    empty = np.asarray(cKDTree(local).query(met)[0]) >= 1.0 - TOLERANCE if len(met) else np.zeros(0, dtype=bool)
+    empty = (
+        np.asarray(cKDTree(local).query(met)[0]) >= 1.0 - EMPTY_BALL_TOLERANCE if len(met) else np.zeros(0, dtype=bool)
+    )
     return oriented(centers, kept[facets[empty]], outward), met[empty] * tip_radius + centers[kept].mean(axis=0)
 
 

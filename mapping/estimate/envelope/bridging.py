@@ -8,9 +8,9 @@ from mapping import BoolArray, FloatArray, IntArray
 from mapping.estimate.sweeps import unit
 
 # A concave turn between neighbours must exceed what their own curvature predicts by this factor.
-OUTSTANDING = 3.0
+CONCAVE_TURN_RATIO = 3.0
 # Where no curvature is known, dents this close to the tip's own curvature are taken for kinks.
-UNKNOWN = 3.0
+UNKNOWN_CURVATURE = 3.0
 
 
 def bridged_faces(
@@ -22,7 +22,7 @@ def bridged_faces(
         centers, normals: (V, 3) ball centres, m, and outward unit normals.
         curvature: (V,) curvature of the traced surface across the sweeps, 1/m; NaN where unknown.
     """
-    dent = np.where(np.isnan(curvature), UNKNOWN / tip_radius, np.maximum(-curvature, 0.0))
+    dent = np.where(np.isnan(curvature), UNKNOWN_CURVATURE / tip_radius, np.maximum(-curvature, 0.0))
     flagged = np.zeros(len(faces), dtype=bool)
     for corner in range(3):
         i, k = faces[:, corner], faces[:, (corner + 1) % 3]
@@ -31,7 +31,7 @@ def bridged_faces(
         turn = np.linalg.norm(normals[k] - normals[i], axis=1)
         concave = np.einsum("ij,ij->i", normals[k] - normals[i], way) < -0.5 * turn * length
         predicted = np.maximum(dent[i], dent[k]) * length
-        flagged |= concave & (turn > OUTSTANDING * predicted) & (tip_radius * turn > 0.5 * length) & (length > 0)
+        flagged |= concave & (turn > CONCAVE_TURN_RATIO * predicted) & (tip_radius * turn > 0.5 * length) & (length > 0)
     return flagged
 
 

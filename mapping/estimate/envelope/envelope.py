@@ -34,9 +34,9 @@ from mapping.instrument import Noise
 __all__ = ["BRIDGED", "EXTRAPOLATED", "LABELS", "TOUCHED", "EnvelopeError", "Estimate", "estimate_surface"]
 
 
-METHODS = ("envelope", "contact", "normals", "alpha")
+ENVELOPE_METHODS = ("envelope", "contact", "normals", "alpha")
 # Balls may overlap a contact by this share of their radius before it counts as impossible.
-TOLERANCE = 1e-9
+OVERLAP_TOLERANCE = 1e-9
 # The doubt of a slope is an estimate, no bound: it must be this much smaller than what would be harmless.
 CAUTION = 2.0
 # More points of a mesh than this cost memory and minutes of curvature, on bodies that no picture shows so finely.
@@ -74,13 +74,13 @@ def estimate_surface(
 
     Reference: the paper, sections 2.2 and 3.3, equation 12; theory sections 1 and 4.
     """
-    if method not in METHODS:
-        raise EnvelopeError(f"unknown method {method!r}; possible: {', '.join(METHODS)}")
+    if method not in ENVELOPE_METHODS:
+        raise EnvelopeError(f"unknown method {method!r}; possible: {', '.join(ENVELOPE_METHODS)}")
     if len(trace) == 0:
         raise EnvelopeError("cannot estimate a surface from a trace of no samples")
     if method == "contact" and trace.normals is None:
         raise EnvelopeError("method 'contact' needs recorded contact normals; this trace has positions alone")
-    away, slack = _outward(trace, base, outward), TOLERANCE * trace.tip_radius
+    away, slack = _outward(trace, base, outward), OVERLAP_TOLERANCE * trace.tip_radius
     smoothed = None
     if noise is not None and noise.sd > 0:
         smoothed = smooth(trace, noise, outward=away)

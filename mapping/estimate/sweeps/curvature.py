@@ -10,9 +10,9 @@ from mapping import FloatArray
 from mapping.instrument import Noise
 
 # Standard deviations of the curvature's noise that a threshold must be apart from zero.
-CERTAINTY = 3.0
+THRESHOLD_SDS = 3.0
 # Bins of a fit for which the effect of correlated noise is summed.
-BINS = 120
+QUADRATIC_FIT_BINS = 120
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,15 @@ def half_width_for(noise: Noise, spacing: float, threshold: float) -> float:
     """
     from scipy.optimize import brentq
 
-    white = float((22.5 * noise.white**2 * spacing * CERTAINTY**2 / threshold**2) ** 0.2)
+    white = float((22.5 * noise.white**2 * spacing * THRESHOLD_SDS**2 / threshold**2) ** 0.2)
     if noise.correlated == 0:
         return max(white, 4 * spacing)
     # over many correlation lengths the process is white noise of this density; over few it is less than that
     density = noise.white**2 * spacing + 2 * noise.correlated**2 * noise.length
-    widest = float((22.5 * density * CERTAINTY**2 / threshold**2) ** 0.2)
+    widest = float((22.5 * density * THRESHOLD_SDS**2 / threshold**2) ** 0.2)
 
     def excess(log_width: float) -> float:
-        return float(np.log(CERTAINTY * curvature_sd(noise, spacing, np.exp(log_width)) / threshold))
+        return float(np.log(THRESHOLD_SDS * curvature_sd(noise, spacing, np.exp(log_width)) / threshold))
 
     low, high = np.log(4 * spacing), np.log(max(1.1 * widest, 8 * spacing))
     if excess(low) <= 0:
@@ -63,12 +63,12 @@ def half_width_for(noise: Noise, spacing: float, threshold: float) -> float:
 
 def curvature_sd(noise: Noise, spacing: float, half_width: float) -> float:
     """Standard deviation of the second derivative of a least-squares quadratic over +-half_width, 1/m."""
-    bin_width = 2 * half_width / BINS
-    x = (np.arange(BINS) + 0.5) * bin_width - half_width
+    bin_width = 2 * half_width / QUADRATIC_FIT_BINS
+    x = (np.arange(QUADRATIC_FIT_BINS) + 0.5) * bin_width - half_width
     weights = 3.75 / half_width**5 * (3 * x**2 - half_width**2) * bin_width
-    covariance = noise.block_covariances(BINS, bin_width, bin_width / spacing)
+    covariance = noise.block_covariances(QUADRATIC_FIT_BINS, bin_width, bin_width / spacing)
     # a symmetric Toeplitz form is the weights' autocorrelation against the covariance
-    products = np.correlate(weights, weights, "full")[BINS - 1 :]
+    products = np.correlate(weights, weights, "full")[QUADRATIC_FIT_BINS - 1 :]
     return float(np.sqrt(covariance[0] * products[0] + 2 * covariance[1:] @ products[1:]))
 
 

@@ -7,7 +7,7 @@ from numba import njit
 
 from mapping.geometry.mesh import dot, sub, vector
 
-ROUNDS = 6
+PLANE_CROSSING_ROUNDS = 6
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -22,7 +22,7 @@ def plane_crossings(nodes, arriving, leaving, nearest, points, normals, out):  #
         i = min(max(nearest[q], 0), last)
         start = dot(sub(vector(nodes, i), p), n)
         stop = dot(sub(vector(nodes, i + 1), p), n)
-        for _ in range(ROUNDS):
+        for _ in range(PLANE_CROSSING_ROUNDS):
             step = -start / (stop - start) if stop != start else 0.0
             i = int(min(max(i + np.floor(min(max(step, -1e6), 1e6)), 0), last))
             start = dot(sub(vector(nodes, i), p), n)
@@ -31,7 +31,7 @@ def plane_crossings(nodes, arriving, leaving, nearest, points, normals, out):  #
             out[q] = np.nan
             continue
         t = start / (start - stop) if start != stop else 0.0
-        for _ in range(ROUNDS):
+        for _ in range(PLANE_CROSSING_ROUNDS):
             height, rise = 0.0, 0.0
             for k in range(3):
                 place, slope = _cubic(nodes, arriving, leaving, i, k, t)

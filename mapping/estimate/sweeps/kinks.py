@@ -10,7 +10,7 @@ from mapping import FloatArray, IntArray
 from mapping.estimate.sweeps.tangents import STENCIL, chord_lengths, lagrange, unit
 
 # The concave turn at a kink must exceed the turns beside it by this factor.
-OUTSTANDING = 3.0
+KINK_TURN_RATIO = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def _outstanding_turns(points: FloatArray, outward: FloatArray) -> IntArray:
     here = turn[1:-2] + turn[2:-1]  # both ends of gap i
     beside = np.abs(turn[:-3]) + np.abs(turn[3:])
     rounding = 16 * np.finfo(float).eps * np.abs(points).max() / np.maximum(length, np.finfo(float).tiny)
-    candidate = np.where(here > OUTSTANDING * beside + rounding, here, 0.0)
+    candidate = np.where(here > KINK_TURN_RATIO * beside + rounding, here, 0.0)
     padded = np.r_[0.0, candidate, 0.0]
     peak = (candidate > 0) & (candidate >= padded[:-2]) & (candidate > padded[2:])
     return np.flatnonzero(peak) + 1

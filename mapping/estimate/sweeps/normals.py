@@ -17,7 +17,7 @@ from mapping.estimate.sweeps.rows import parallel_rows, pitch, thinned
 from mapping.estimate.sweeps.tangents import lagrange, unit
 
 # Samples whose neighbourhoods are fitted together: a bound on the memory that they take
-AT_ONCE = 16_384
+SAMPLES_AT_ONCE = 16_384
 
 
 def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -89,8 +89,8 @@ def _fitted(
     cloud = trace.centers[thinned(trace.centers, trace.sweep, pitch(trace.centers, trace.sweep))]
     tree, count = cKDTree(cloud), min(neighbours, len(cloud))
     tangents, doubt = np.empty((len(samples), 3)), np.empty(len(samples))
-    for start in range(0, len(samples), AT_ONCE):
-        part = slice(start, start + AT_ONCE)
+    for start in range(0, len(samples), SAMPLES_AT_ONCE):
+        part = slice(start, start + SAMPLES_AT_ONCE)
         distance, index = (
             np.asarray(found) for found in tree.query(trace.centers[samples[part]], [*range(1, count + 1)])
         )
@@ -119,11 +119,11 @@ def _across(
 
 
 # Rows to either side that are looked at.
-REACH = 4
+ROWS_EITHER_SIDE = 4
 # A one-sided polynomial must be smoother than the others by this factor.
-CENTRAL = 1.25
+ONE_SIDED_PENALTY = 1.25
 # A higher term must be smaller than the curvature by this factor, or it speaks of a kink.
-FALLING = 0.1
+HIGHER_TERM_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,16 +154,16 @@ def cross_slope(
     up *= np.sign(np.einsum("ij,ij->i", up, outward))[:, None]
     slope, bend, doubt = np.full((3, len(points)), np.nan)
     for j, row in enumerate(rows):
-        v, w = np.full((2, len(row), 2 * REACH + 1), np.nan)
-        v[:, REACH] = w[:, REACH] = 0.0
-        for shift in range(-REACH, REACH + 1):
+        v, w = np.full((2, len(row), 2 * ROWS_EITHER_SIDE + 1), np.nan)
+        v[:, ROWS_EITHER_SIDE] = w[:, ROWS_EITHER_SIDE] = 0.0
+        for shift in range(-ROWS_EITHER_SIDE, ROWS_EITHER_SIDE + 1):
             if shift and 0 <= j + shift < len(rows):
                 arm = curves[j + shift].crossings(points[row], along[row]) - points[row]
-                v[:, REACH + shift] = np.einsum("ij,ij->i", arm, across[row])
-                w[:, REACH + shift] = np.einsum("ij,ij->i", arm, up[row])
+                v[:, ROWS_EITHER_SIDE + shift] = np.einsum("ij,ij->i", arm, across[row])
+                w[:, ROWS_EITHER_SIDE + shift] = np.einsum("ij,ij->i", arm, up[row])
         slope[row], bend[row], doubt[row] = smooth_slope(v, w)
         # Beside an outermost sweep nothing shows whether the surface goes on as it came.
-        alone = np.isnan(v[:, REACH - 1]) | np.isnan(v[:, REACH + 1])
+        alone = np.isnan(v[:, ROWS_EITHER_SIDE - 1]) | np.isnan(v[:, ROWS_EITHER_SIDE + 1])
         doubt[row] = shared(np.where(alone & ~np.isnan(doubt[row]), np.pi / 2, doubt[row]))
     return CrossSlope(unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5, doubt)
 
@@ -202,7 +202,7 @@ def _polynomial(
     """Slope and curvature of the smoothest polynomial of an order, doubt of the slope, if its last term is small."""
     index = np.arange(len(v))
     size = np.abs(table[order][:, middle - order : middle + 1])
-    size = np.where(np.isnan(size), np.inf, size) * np.r_[CENTRAL, np.ones(order - 1), CENTRAL]
+    size = np.where(np.isnan(size), np.inf, size) * np.r_[ONE_SIDED_PENALTY, np.ones(order - 1), ONE_SIDED_PENALTY]
     best, second = np.argsort(size, axis=1, kind="stable")[:, :2].T
     first = middle - order + best
     slope, other = _slope(v, w, first, order), _slope(v, w, middle - order + second, order)
@@ -211,7 +211,7 @@ def _polynomial(
     spacing = np.abs(v[index, first + order] - v[index, first]) / order
     last = np.abs(table[order][index, first]) * spacing ** (order - 1)
     # Where the second smoothest window sees another slope, a kink or a jump of curvature lies beside the sample.
-    return slope, bend, np.fmax(last, np.abs(slope - other)), last <= FALLING * np.abs(bend) * spacing
+    return slope, bend, np.fmax(last, np.abs(slope - other)), last <= HIGHER_TERM_SHARE * np.abs(bend) * spacing
 
 
 def _slope(v: FloatArray, w: FloatArray, first: IntArray, order: int) -> FloatArray:

@@ -13,10 +13,10 @@ from mapping.estimate.sweeps.tangents import chord_lengths, unit
 from mapping.instrument import Noise, estimate_noise
 
 # Samples are averaged over this share of the smoothing length: finer ones carry no more information.
-BLOCK = 1 / 8
-ROUNDS = 10
+BLOCK_SHARE = 1 / 8
+MOST_SMOOTHING_ROUNDS = 10
 # A smoothing spline needs five points.
-FEWEST = 5
+FEWEST_SPLINE_POINTS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Smoothed:
         A kink that is smoothed over the length h is indistinguishable from a dent of a few h.
         """
         deep = np.flatnonzero(self.curvature * self.trace.tip_radius < -1)
-        reach = int(np.ceil(2 / BLOCK)) if self.scale > 0 else 0
+        reach = int(np.ceil(2 / BLOCK_SHARE)) if self.scale > 0 else 0
         near = np.zeros(len(self.trace), dtype=bool)
         for shift in range(-reach, reach + 1):
             beside = np.clip(deep + shift, 0, len(near) - 1)
@@ -124,9 +124,9 @@ class _Sweep:
         outward = unit(self._means(self.outward, blocks))
         kept = np.ones(len(s), dtype=bool)
         positions, curvature = _spline(s, centers, weight, outward, kept, scale, self.spacing)
-        for _ in range(ROUNDS if scale > 0 else 0):
+        for _ in range(MOST_SMOOTHING_ROUNDS if scale > 0 else 0):
             worst = _impossible(np.where(kept, curvature, -np.inf), self.tip_radius)
-            if not worst.any() or (kept & ~worst).sum() < FEWEST:
+            if not worst.any() or (kept & ~worst).sum() < FEWEST_SPLINE_POINTS:
                 break
             kept &= ~worst
             positions, curvature = _spline(s, centers, weight, outward, kept, scale, self.spacing)
@@ -152,7 +152,7 @@ class _Sweep:
 
     def _blocks(self, scale: float) -> IntArray:
         """Borders of equal blocks, a small share of the smoothing length each."""
-        size = max(1, int(BLOCK * scale / self.spacing)) if self.spacing > 0 else 1
+        size = max(1, int(BLOCK_SHARE * scale / self.spacing)) if self.spacing > 0 else 1
         size = max(1, min(size, len(self.trace) // 16))
         borders = np.arange(0, len(self.trace) + 1, size)
         borders[-1] = len(self.trace)
@@ -182,7 +182,7 @@ def _spline(
     spacing: float,
 ) -> tuple[FloatArray, FloatArray]:
     """Smoothing spline through the kept blocks: its values and its curvature towards `outward` at all blocks."""
-    if kept.sum() < FEWEST or s[-1] == s[0]:
+    if kept.sum() < FEWEST_SPLINE_POINTS or s[-1] == s[0]:
         return centers, np.zeros(len(s))
     # In units of a block's length the banded system is well scaled at any size of tip.
     unit_length = (s[-1] - s[0]) / (len(s) - 1)

@@ -8,7 +8,7 @@ from mapping import FloatArray, IntArray
 
 STENCIL = 5
 # A window of points must be smoother than the central one by this factor to displace it.
-CENTRAL = 4.0
+OFF_CENTRE_PENALTY = 4.0
 
 
 def chord_lengths(points: FloatArray) -> FloatArray:
@@ -46,7 +46,7 @@ def tangents(points: FloatArray, cuts: IntArray) -> FloatArray:
     begin = np.repeat(np.r_[0, cuts], np.diff(np.r_[0, cuts, count]))
     end = np.repeat(np.r_[cuts, count], np.diff(np.r_[0, cuts, count]))
     result = np.zeros((count, 3))
-    result = kernel(np.ascontiguousarray(points), s, begin, end, STENCIL, CENTRAL)
+    result = kernel(np.ascontiguousarray(points), s, begin, end, STENCIL, OFF_CENTRE_PENALTY)
     for i in np.flatnonzero(end - begin == 1):
         result[i] = points[np.minimum(i + 1, count - 1)] - points[np.maximum(i - 1, 0)]
     return unit(result)

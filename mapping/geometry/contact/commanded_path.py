@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from mapping import ContactError, FloatArray
 
-MOST_SAMPLES = 100_000_000
+MOST_PATH_SAMPLES = 100_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class CommandedPath:
             raise ContactError(f"spacing along a path must be a positive length in metres; found {spacing!r}")
         lengths = np.linalg.norm(np.diff(self.corners, axis=0), axis=1)
         parts = np.maximum(np.ceil(lengths / spacing), 1.0)
-        if not parts.sum() < MOST_SAMPLES:
+        if not parts.sum() < MOST_PATH_SAMPLES:
             raise ContactError(f"{lengths.sum():g} m at {spacing:g} m make {parts.sum():g} samples; at most 1e8 do")
         counts = parts.astype(np.int64)
         segment = np.repeat(np.arange(len(counts)), counts)

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from mapping.geometry.mesh import (
-    BLOCK,
+    QUERIES_PER_BLOCK,
     STACK,
     WIDTH,
     closest,
@@ -31,10 +31,11 @@ from mapping.geometry.mesh import (
 )
 
 PASSES, TOUCHES, OVERLAPS = 0, 1, 2
-TOUCH = 1e-9  # relative to the radius: what lies this close to the resting ball touches it
-APART = 9e-5  # relative to the radius, sqrt(8 TOUCH): dents narrower than this are shallower than TOUCH
+CONTACT_TOLERANCE = 1e-9  # relative to the radius: what lies this close to the resting ball touches it
+# relative to the radius, sqrt(8 CONTACT_TOLERANCE): dents narrower than this are shallower than CONTACT_TOLERANCE
+DISTINCT_CONTACT_GAP = 9e-5
 GLANCING = 1e-3  # cosine below which a step along the way says little about the gap
-MOST = 16  # distinct contacts that are told apart
+MOST_DISTINCT_CONTACTS = 16  # distinct contacts that are told apart
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -56,7 +57,7 @@ def meet(rows, i, o, d, ball):  # type: ignore[no-untyped-def]
     if leave_triangle(a, b, c, n, d, radius, graze) < 0.0:
         return inf
     p = closest_on_triangle(a, b, c, n)
-    if sqrt(dot(p, p)) < radius * (1.0 - TOUCH) - graze:
+    if sqrt(dot(p, p)) < radius * (1.0 - CONTACT_TOLERANCE) - graze:
         return -1.0
     return 0.0 if dot(p, d) > 0.0 else inf  # resting on it: pressed in, or moving away
 
@@ -139,12 +140,12 @@ def settle(rows, order, near, kept, hit, o, d, ball):  # type: ignore[no-untyped
 @njit(cache=True, error_model="numpy")
 def count_contacts(rows, near, kept, first, o, ball, points):  # type: ignore[no-untyped-def]
     """Number of distinct places of the near triangles that a ball at o touches, `first` (relative to o) among them."""
-    apart = APART * ball[0]
+    apart = DISTINCT_CONTACT_GAP * ball[0]
     found = 1
     points[0, 0], points[0, 1], points[0, 2] = first
     for i in range(kept):
         p = closest(rows, near[i], o)
-        new = found < MOST and dot(p, p) <= ball[1] * ball[1]
+        new = found < MOST_DISTINCT_CONTACTS and dot(p, p) <= ball[1] * ball[1]
         for j in range(found):
             w = sub(p, vector(points, j))
             new = new and dot(w, w) > apart * apart
@@ -191,11 +192,15 @@ def first_contacts(  # type: ignore[no-untyped-def]
 
     `size` is the radius of a sphere around the body.
     """
-    stack, near, places = np.empty(STACK, np.int32), np.empty(len(rows), np.int32), np.empty((MOST, 3))
+    stack, near, places = (
+        np.empty(STACK, np.int32),
+        np.empty(len(rows), np.int32),
+        np.empty((MOST_DISTINCT_CONTACTS, 3)),
+    )
     apart, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
     guess = -1
     for q in range(len(origins)):
-        if q % BLOCK == 0:
+        if q % QUERIES_PER_BLOCK == 0:
             guess = -1
         o, d = vector(origins, q), vector(directions, q if len(directions) > 1 else 0)
         for k in range(3):

@@ -90,7 +90,7 @@ class BallContact:
             )
         radius = float(tree.scale_in(self.tip_radius))
         graze = 8 * float(np.finfo(float).eps) * (tree.size + radius)
-        self._ball = (radius, radius * (1.0 + contact_kernels.TOUCH) + graze, graze)
+        self._ball = (radius, radius * (1.0 + contact_kernels.CONTACT_TOLERANCE) + graze, graze)
 
     def first_contact(self, origins: ArrayLike, directions: ArrayLike, threads: int = 1) -> Contacts:
         """The first contact of balls that start centred at the origins and move straight along the directions.
@@ -107,7 +107,7 @@ class BallContact:
             ContactError: wrong shapes, values that are not finite, a direction of length zero.
         """
         from mapping.geometry.contact import contact_kernels
-        from mapping.geometry.mesh import BLOCK
+        from mapping.geometry.mesh import QUERIES_PER_BLOCK
 
         start = checked_points(origins, "origins")
         way = unit_directions(directions, len(start))
@@ -122,7 +122,7 @@ class BallContact:
                 where[part], feature[part], count[part], distance[part], state[part],
             )  # fmt: skip
 
-        _in_parts(some, len(start), BLOCK, threads)
+        _in_parts(some, len(start), QUERIES_PER_BLOCK, threads)
         return Contacts(
             tree.out(where[:, 0]),
             tree.out(where[:, 1]),

@@ -15,20 +15,20 @@ from mapping.geometry.mesh import cores
 
 # Neighbourhoods from which points choose. Regular grids are symmetric in 25, 37, 49, 69 and 97 neighbours, which
 # cancels odd errors; 33 are the fewest that a jet of degree 6 needs with some to spare.
-SIZES = (25, 33, 37, 49, 69, 97, 137, 193, 274, 387, 547)
+NEIGHBOURHOOD_SIZES = (25, 33, 37, 49, 69, 97, 137, 193, 274, 387, 547)
 DEGREE = 6
 # Sizes whose residuals tell the noise.
 SMALL = (37, 49)
 # Every so many of the nearest points speak for a point's surroundings, up to so many.
 POOL_STEP, POOL = 4, 60
-CERTAINTY = 3.5
+BIAS_ALLOWANCE_SDS = 3.5
 # Weights fall with this power of the squared error: 1 averages most, large powers choose.
-SHARPNESS = 0.75
+WEIGHT_EXPONENT = 0.75
 SAMPLE = 3000
 # Share of the weight that may be lost at either end.
-SHARE = 0.1
+LOST_WEIGHT_SHARE = 0.1
 # Meshes above this size try only the neighbourhoods that a sample of their points chooses.
-LARGE = 20_000
+LARGE_MESH_POINTS = 20_000
 # Neighbour indices held at once by one thread: keeps a million points under a gigabyte.
 CHUNK_VALUES = 4_000_000
 SMOOTHING = 24
@@ -69,11 +69,15 @@ def jet_curvature(
     place = points[index] - points[index].mean(axis=0)
     size = float(np.abs(place).max()) or 1.0
     jets = _Jets(place / size, rough[index], degree)
-    sizes = np.array([s for s in SIZES if s <= max(len(index), SIZES[0])] if neighbours is None else [neighbours])
+    sizes = np.array(
+        [s for s in NEIGHBOURHOOD_SIZES if s <= max(len(index), NEIGHBOURHOOD_SIZES[0])]
+        if neighbours is None
+        else [neighbours]
+    )
     level = jets.noise() if noise is None else noise / size
     if neighbours is None:
         jets.bend(sizes, level)
-    if len(index) > LARGE:
+    if len(index) > LARGE_MESH_POINTS:
         sizes = jets.worthwhile(sizes, level)
     operators, slopes, sd = jets.weighed(sizes, level, fixed=neighbours is not None)
     return _spread(len(points), index, operators / size, jets.bases(slopes), sd / size)
@@ -191,8 +195,8 @@ class _Jets:
         own, all_of_it = found.deviations(noise), np.arange(len(sample))
         weights = self._weights(found, own, all_of_it, all_of_it[:, None], sizes, noise)[0].sum(axis=2)
         reach = np.cumsum(weights[np.isfinite(weights).all(axis=1)].mean(axis=0))
-        last = min(int(np.searchsorted(reach, 1 - SHARE)), len(sizes) - 1)
-        first = min(max(int(np.searchsorted(reach, SHARE)) - 2, 0), last)
+        last = min(int(np.searchsorted(reach, 1 - LOST_WEIGHT_SHARE)), len(sizes) - 1)
+        first = min(max(int(np.searchsorted(reach, LOST_WEIGHT_SHARE)) - 2, 0), last)
         return sizes[first : last + 1]
 
     def weighed(self, sizes: IntArray, noise: float, fixed: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -232,9 +236,9 @@ class _Jets:
         from mapping.geometry.curvature.jet_kernels import pooled_bias
 
         bias = np.empty((len(part), *own.shape[1:]))
-        pooled_bias(every.operators, own, pools, sizes, CERTAINTY, bias)
+        pooled_bias(every.operators, own, pools, sizes, BIAS_ALLOWANCE_SDS, bias)
         # where all agree to rounding, none is better than another
-        trust = np.maximum(own[part] ** 2 + bias, np.finfo(float).tiny ** 0.25) ** -SHARPNESS
+        trust = np.maximum(own[part] ** 2 + bias, np.finfo(float).tiny ** 0.25) ** -WEIGHT_EXPONENT
         total = trust.sum(axis=(1, 2))
         weights = trust / np.where(total > 0, total, np.nan)[:, None, None]
         # errors of nested fits go together: that of the mean is not below the mean of theirs by much

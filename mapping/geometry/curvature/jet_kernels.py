@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-COLUMNS = 28  # monomials of two variables up to degree 6
-TERMS = np.array([6, 15, 28])  # those of degree 2, 4 and 6
-SPARE = np.array([2, 4, 4])  # points that a fit needs beyond its terms
+MONOMIALS = 28  # monomials of two variables up to degree 6
+TERMS_OF_DEGREE = np.array([6, 15, 28])  # those of degree 2, 4 and 6
+SPARE_POINTS = np.array([2, 4, 4])  # points that a fit needs beyond its terms
 CONDITION = 1e5  # ratio of the diagonal of R beyond which the stencil does not determine the jet
 
-ROUNDING = 1e-28  # squared error of a curvature that is never undercut, for bodies of about unit size
+LEAST_SQUARED_ERROR = 1e-28  # squared error of a curvature that is never undercut, for bodies of about unit size
 
 
 @njit(cache=True)
@@ -25,7 +25,7 @@ def _design(u, v, z, first, last, scale, degree, out):  # type: ignore[no-untype
                 out[column + p, row] = x * out[column - d + p, row]
             out[column + d, row] = y * out[column - 1, row]
             column += d + 1
-        out[COLUMNS, row] = z[i] / scale
+        out[MONOMIALS, row] = z[i] / scale
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
@@ -50,8 +50,8 @@ def _absorb(triangle, rows, count, columns):  # type: ignore[no-untyped-def]
             rows[j, i] /= head
         tau = -head / alpha
         triangle[j, j] = alpha
-        for c in range(j + 1, COLUMNS + 1):
-            if columns <= c < COLUMNS:
+        for c in range(j + 1, MONOMIALS + 1):
+            if columns <= c < MONOMIALS:
                 continue
             dot = triangle[c, j]
             for i in range(count):
@@ -62,7 +62,7 @@ def _absorb(triangle, rows, count, columns):  # type: ignore[no-untyped-def]
                 rows[c, i] -= dot * rows[j, i]
     rest = 0.0
     for i in range(count):
-        rest += rows[COLUMNS, i] * rows[COLUMNS, i]
+        rest += rows[MONOMIALS, i] * rows[MONOMIALS, i]
     return rest
 
 
@@ -84,7 +84,7 @@ def _determined(triangle, columns, ratio):  # type: ignore[no-untyped-def]
 def _solve(triangle, columns, coefficients, row):  # type: ignore[no-untyped-def]
     """Coefficients of the nested fit; returns the variance factor of its curvatures (squared Frobenius norm)."""
     for j in range(columns - 1, -1, -1):
-        total = triangle[COLUMNS, j]
+        total = triangle[MONOMIALS, j]
         for c in range(j + 1, columns):
             total -= triangle[c, j] * coefficients[c]
         coefficients[j] = total / triangle[j, j]
@@ -199,11 +199,11 @@ def fit_jets(points, normals, neighbours, chosen, bends, sizes, degree):  # type
     factors = np.full((count, len(sizes), options), np.inf)
     rests = np.full((count, len(sizes), options), np.nan)
     slopes = np.zeros((count, len(sizes), options, 2))
-    widest, columns = neighbours.shape[1], TERMS[options - 1]
+    widest, columns = neighbours.shape[1], TERMS_OF_DEGREE[options - 1]
     place = np.empty((3, widest))
-    rows = np.empty((COLUMNS + 1, widest))
-    triangle = np.empty((COLUMNS + 1, COLUMNS))
-    coefficients, row = np.zeros(COLUMNS), np.zeros(COLUMNS)
+    rows = np.empty((MONOMIALS + 1, widest))
+    triangle = np.empty((MONOMIALS + 1, MONOMIALS))
+    coefficients, row = np.zeros(MONOMIALS), np.zeros(MONOMIALS)
     ends = np.zeros(len(sizes), dtype=np.int64)
     for m in range(count):
         e1, e2 = _frame(normals[chosen[m]])
@@ -222,11 +222,11 @@ def fit_jets(points, normals, neighbours, chosen, bends, sizes, degree):  # type
             rest += _absorb(triangle, rows, last - first, columns)
             first, over, before = last, rest, columns
             for d in range(options - 1, -1, -1):
-                terms = TERMS[d]
+                terms = TERMS_OF_DEGREE[d]
                 for j in range(terms, before):
-                    over += triangle[COLUMNS, j] ** 2
+                    over += triangle[MONOMIALS, j] ** 2
                 before = terms
-                if last < terms + SPARE[d] or reach == 0.0:
+                if last < terms + SPARE_POINTS[d] or reach == 0.0:
                     continue
                 if not _determined(triangle, terms, scale / np.sqrt(reach)):
                     continue
@@ -268,7 +268,7 @@ def pooled_bias(operators, deviations, pools, sizes, certainty, out):  # type: i
                             own, its = deviations[y, s, d], deviations[y, other, higher]
                             if not (np.isfinite(own) and np.isfinite(its)) or (other <= s and its <= own):
                                 continue
-                            expected = max(its * its + (own * own if other > s else -own * own), ROUNDING)
+                            expected = max(its * its + (own * own if other > s else -own * own), LEAST_SQUARED_ERROR)
                             gap = 0.0
                             for k in range(3):
                                 part = operators[y, s, d, k] - operators[y, other, higher, k]

@@ -21,7 +21,7 @@ from mapping.geometry.curvature.curvature import Curvature
 SMALLEST_COMPONENT = 20
 # Area over squared longest edge below which a face has no normal that libigl can use.
 FLATTEST_FACE = 1e-10
-SECONDS = 600
+LIBIGL_TIMEOUT = 600
 _CALL = """
 import sys
 import igl
@@ -109,7 +109,7 @@ def _in_own_process(vertices: FloatArray, faces: IntArray, radius: int, rings: b
         subprocess.run(
             [sys.executable, "-c", _CALL, str(question), str(answer)],
             check=False,
-            timeout=SECONDS,
+            timeout=LIBIGL_TIMEOUT,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )

@@ -30,8 +30,8 @@ def principal_curvatures(
     Raises:
         CurvatureError: an unknown method, points that are not (N, 3) or not finite, a cloud for libigl.
     """
-    if method not in METHODS:
-        raise CurvatureError(f"unknown method {method!r}; possible: {', '.join(sorted(METHODS))}")
+    if method not in CURVATURE_METHODS:
+        raise CurvatureError(f"unknown method {method!r}; possible: {', '.join(sorted(CURVATURE_METHODS))}")
     if not isinstance(body, Surface):
         points = np.asarray(body, dtype=np.float64)
         if points.ndim != 2 or points.shape[1:] != (3,) or not np.isfinite(points).all():
@@ -42,7 +42,7 @@ def principal_curvatures(
     given = None if normals is None else np.asarray(normals, dtype=np.float64)
     if given is not None and given.shape != (len(body.vertices if isinstance(body, Surface) else body), 3):
         raise CurvatureError(f"normals must have one row per point; found shape {given.shape}")
-    return METHODS[method](body, given, **settings)
+    return CURVATURE_METHODS[method](body, given, **settings)
 
 
 def _jet(body: Any, normals: FloatArray | None, **settings: Any) -> Curvature:
@@ -53,4 +53,4 @@ def _libigl(body: Any, normals: FloatArray | None, **settings: Any) -> Curvature
     return libigl_curvature(body, **settings)
 
 
-METHODS: dict[str, Callable[..., Curvature]] = {"jet": _jet, "libigl": _libigl}
+CURVATURE_METHODS: dict[str, Callable[..., Curvature]] = {"jet": _jet, "libigl": _libigl}

@@ -24,7 +24,11 @@ if TYPE_CHECKING:
         enter_triangle as enter_triangle,
         leave_triangle as leave_triangle,
     )
-    from mapping.geometry.mesh.triangle_row_kernels import BLOCK as BLOCK, closest as closest, corners as corners
+    from mapping.geometry.mesh.triangle_row_kernels import (
+        QUERIES_PER_BLOCK as QUERIES_PER_BLOCK,
+        closest as closest,
+        corners as corners,
+    )
     from mapping.geometry.mesh.vector_kernels import (
         cross as cross,
         dot as dot,
@@ -43,7 +47,7 @@ _PUBLIC = {
     "threads": ("by_shares", "cores"),
     "tree": ("TriangleTree",),
     "triangle_kernels": ("closest_on_triangle", "enter_triangle", "leave_triangle"),
-    "triangle_row_kernels": ("BLOCK", "closest", "corners"),
+    "triangle_row_kernels": ("QUERIES_PER_BLOCK", "closest", "corners"),
     "vector_kernels": ("cross", "dot", "moved", "scaled", "sub", "vector"),
 }
 doorway(__name__, _PUBLIC)

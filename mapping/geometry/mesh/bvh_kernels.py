@@ -14,7 +14,7 @@ from mapping.geometry.mesh.vector_kernels import dot, moved, sub
 
 WIDTH = 16
 STACK = 512  # 32 bit numbers of triangles make at most 8 levels, each leaving at most 15 lanes waiting
-ROUNDING = 6e-6  # what float32 boxes and paths may be off by, in lengths of the scaled body
+BOX_ROUNDING = 6e-6  # what float32 boxes and paths may be off by, in lengths of the scaled body
 NOWHERE = 1e18  # a box that no path comes near
 
 F4 = np.float32
@@ -254,7 +254,7 @@ def push_lanes(leaves, boxes, links, stack, waiting, start, end, d, length, reac
     node = stack[waiting - 1]
     child, lanes = links[node, 0], links[node, 1]
     step = 1 if child >= 0 else -1
-    reach += ROUNDING
+    reach += BOX_ROUNDING
     if child >= 0:
         box_tests(boxes, node - len(leaves), end, d, reach, apart, late)
     else:

@@ -7,8 +7,8 @@ from math import sqrt
 import numpy as np
 from numba import njit
 
-from mapping.geometry.mesh.bvh_kernels import ROUNDING, STACK, WIDTH, push_lanes
-from mapping.geometry.mesh.triangle_row_kernels import BLOCK, closest
+from mapping.geometry.mesh.bvh_kernels import BOX_ROUNDING, STACK, WIDTH, push_lanes
+from mapping.geometry.mesh.triangle_row_kernels import QUERIES_PER_BLOCK, closest
 from mapping.geometry.mesh.vector_kernels import dot, moved, vector
 
 
@@ -19,7 +19,7 @@ def nearest_points(rows, order, leaves, boxes, links, queries, points, face):  #
     apart, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
     guess = 0
     for q in range(len(queries)):
-        if q % BLOCK == 0:
+        if q % QUERIES_PER_BLOCK == 0:
             guess = 0
         o = vector(queries, q)
         guess = nearest_triangle(rows, order, leaves, boxes, links, o, guess, stack, apart, late)
@@ -35,7 +35,7 @@ def nearest_triangle(rows, order, leaves, boxes, links, o, guess, stack, apart, 
     best, still = guess, (0.0, 0.0, 0.0)
     p = closest(rows, guess, o)
     least = dot(p, p)
-    slack = ROUNDING * sqrt(dot(o, o))  # float32 has fewer digits for points far from the body
+    slack = BOX_ROUNDING * sqrt(dot(o, o))  # float32 has fewer digits for points far from the body
     stack[0] = len(links) - 1
     waiting = 1
     while waiting > 0:

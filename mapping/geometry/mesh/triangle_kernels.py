@@ -12,7 +12,7 @@ from numba import njit
 
 from mapping.geometry.mesh.vector_kernels import cross, dot, moved, scaled, sub
 
-PARALLEL = 1e-15  # cosine below which a ray runs along a plane: rounding alone tilts it by this much
+PARALLEL_COSINE = 1e-15  # cosine below which a ray runs along a plane: rounding alone tilts it by this much
 SLIVER = 1e-14  # height over longest side below which a triangle is a segment: narrower than rounding
 
 
@@ -109,7 +109,7 @@ def enter_edge(a, b, d, radius, graze):  # type: ignore[no-untyped-def]
 def enter_face(a, b, c, n, d, radius):  # type: ignore[no-untyped-def]
     """When the ball comes to touch the inside of the triangle, from whichever side it comes; inf if never."""
     cosine = dot(d, n)
-    if abs(cosine) <= PARALLEL:
+    if abs(cosine) <= PARALLEL_COSINE:
         return inf
     side = -radius if cosine > 0.0 else radius
     t = (dot(a, n) + side) / cosine

@@ -7,7 +7,7 @@ from numba import njit
 
 from mapping.geometry.mesh.triangle_kernels import closest_on_triangle, unit_normal
 
-BLOCK = 1024  # queries that share their guesses: threads that take whole blocks give the same answers
+QUERIES_PER_BLOCK = 1024  # queries that share their guesses: threads that take whole blocks give the same answers
 
 
 @njit(cache=True, error_model="numpy")

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         step_height as step_height,
     )
     from mapping.geometry.templates.small_heights import (
-        OUTLIER as OUTLIER,
+        CREST_OUTLIER_SDS as CREST_OUTLIER_SDS,
         SHAPE_ERROR as SHAPE_ERROR,
         crest_trace as crest_trace,
         misfit as misfit,
@@ -45,6 +45,6 @@ _PUBLIC = {
         "rim_height",
         "step_height",
     ),
-    "small_heights": ("OUTLIER", "SHAPE_ERROR", "crest_trace", "misfit"),
+    "small_heights": ("CREST_OUTLIER_SDS", "SHAPE_ERROR", "crest_trace", "misfit"),
 }
 doorway(__name__, _PUBLIC)

@@ -10,8 +10,8 @@ from numba import njit
 from mapping import FloatArray
 
 # Steps along the meridian, and places of the table of the trace: its error is 1e-5 of the bump's height or less.
-STEPS = 600
-PLACES = 500
+MERIDIAN_STEPS = 600
+TABLE_PLACES = 500
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -26,8 +26,8 @@ def bell_trace(height: float, scale: float, exponent: float, tip: float, table: 
     last = spacing * (len(table) - 1)
     top = np.arcsinh(last / scale)
     rho0, t0, slope0 = 0.0, height, 0.0
-    for i in range(1, STEPS + 1):
-        u = scale * np.sinh(top * i / STEPS)
+    for i in range(1, MERIDIAN_STEPS + 1):
+        u = scale * np.sinh(top * i / MERIDIAN_STEPS)
         base = 1.0 + (u / scale) ** 2 / exponent
         z = height * base**-exponent
         slope = -2.0 * z * u / (scale * scale * base)
@@ -60,13 +60,13 @@ def bell_heights(
     """Heights (W, n) of W bells over bins with nodes at tangent coordinates x, y (n, q); `places` (W, 2)."""
     walkers, bins = out.shape
     nodes = x.shape[1]
-    table = np.zeros(PLACES)
+    table = np.zeros(TABLE_PLACES)
     for w in range(walkers):
         far = 0.0
         for i in range(bins):
             for q in range(nodes):
                 far = max(far, (x[i, q] - places[w, 0]) ** 2 + (y[i, q] - places[w, 1]) ** 2)
-        spacing = max(np.sqrt(far), 1e-3 * tip) / (PLACES - 2)
+        spacing = max(np.sqrt(far), 1e-3 * tip) / (TABLE_PLACES - 2)
         bell_trace(heights[w], scales[w], exponents[w], tip, table, spacing)
         for i in range(bins):
             total = 0.0

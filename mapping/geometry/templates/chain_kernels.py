@@ -9,15 +9,15 @@ from numba import njit
 
 from mapping import FloatArray, IntArray
 
-NONE = -1e300
+NO_ROOT = -1e300
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _last_exit(square, along, gap):  # type: ignore[no-untyped-def]
-    """Largest root of square t^2 + 2 along t + gap = 0, or NONE; for along > 0 in the form that does not cancel."""
+    """Largest root of square t^2 + 2 along t + gap = 0, or NO_ROOT; for along > 0 in the form that does not cancel."""
     discriminant = along * along - square * gap
     if discriminant < 0.0 or square < 1e-300:
-        return NONE
+        return NO_ROOT
     root = np.sqrt(discriminant)
     if along > 0.0:
         return -gap / (along + root)
@@ -72,7 +72,7 @@ def chain_heights(
             qz = feet[i, 2] + tip_radius * nz
             # Further out than this the trace is below the base's over the whole bin.
             far = total * (total + 2.0 * half_bin[i])
-            best, mx, my, mz = NONE, 0.0, 0.0, 0.0
+            best, mx, my, mz = NO_ROOT, 0.0, 0.0, 0.0
             if last_leg < 0:
                 start, stop = first[i], first[i] + 1
             else:
@@ -111,11 +111,11 @@ def chain_heights(
                         for _ in range(4):
                             x = -place if place < 0.0 else place - length[k]
                             if x >= reach:
-                                t = NONE
+                                t = NO_ROOT
                                 break
                             size = inner + np.sqrt((reach - x) * (reach + x))
                             t = _last_exit(square, along, (distance - size) * (distance + size))
-                            if t == NONE or abs(n_along) < 1e-12:
+                            if t == NO_ROOT or abs(n_along) < 1e-12:
                                 break
                             place = o_along + t * n_along
                         if t > best:

@@ -9,7 +9,7 @@ from mapping import FloatArray
 # Share of a crest by which an ideal shape may be wrong about a real detail.
 SHAPE_ERROR = 0.04
 # Places that contradict a shape by more than this many standard deviations belong to something else.
-OUTLIER = 5.0
+CREST_OUTLIER_SDS = 5.0
 
 
 def crest_trace(distance: FloatArray, height: float, half_width: float) -> FloatArray:
@@ -23,4 +23,4 @@ def crest_trace(distance: FloatArray, height: float, half_width: float) -> Float
 
 def misfit(residual: FloatArray, sd: FloatArray, height: float) -> FloatArray:
     """Squares of residuals in standard deviations, none counted as more than an outlier."""
-    return np.asarray(np.minimum((residual / np.hypot(sd, SHAPE_ERROR * height)) ** 2, OUTLIER**2))
+    return np.asarray(np.minimum((residual / np.hypot(sd, SHAPE_ERROR * height)) ** 2, CREST_OUTLIER_SDS**2))

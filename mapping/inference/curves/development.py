@@ -10,12 +10,12 @@ from mapping.geometry.mesh import arclengths, directions, nearest_on, resample
 from mapping.inference.curves.smooth_axis import smooth_axis
 
 # Points that follow a curve over the base: to a half-width of the feature, and in all
-DENSE, FEWEST, MOST = 10.0, 64, 400
+DENSE, FEWEST_CURVE_POINTS, MOST_CURVE_POINTS = 10.0, 64, 400
 # Normals that differ by less are those of a plane
 PLANE = 1e-9
 # Height from which a point's own face is looked for, in tip radii
-CLOSE = 1e-3
-ROUNDS = 2
+FACE_LOOKUP_HEIGHT = 1e-3
+UNROLLING_ROUNDS = 2
 
 
 def developed(points: FloatArray, normals: FloatArray) -> FloatArray:
@@ -87,12 +87,12 @@ def smooth_on_base(
     line, degree = smooth_axis(axis, sd, most, least)
     if np.array_equal(axis[0], axis[-1]) or len(axis) < 3:
         return line, degree
-    count = int(np.clip(np.ceil(DENSE * arclengths(line)[-1] / half_width), FEWEST, MOST))
-    for _ in range(ROUNDS):
+    count = int(np.clip(np.ceil(DENSE * arclengths(line)[-1] / half_width), FEWEST_CURVE_POINTS, MOST_CURVE_POINTS))
+    for _ in range(UNROLLING_ROUNDS):
         dense = resample(line, count)
         points, lift = onto_base(dense, normals_along(dense, axis, normals), base, tip_radius)
         # the ball itself would rest on a fold while its foot goes from one side to the other
-        up = base.foot(points + CLOSE * tip_radius * lift, tip_radius).normals
+        up = base.foot(points + FACE_LOOKUP_HEIGHT * tip_radius * lift, tip_radius).normals
         if np.ptp(up, axis=0).max() < PLANE:
             return line, degree
         line, degree = _smoothed(points, up, axis, sd, most, least)

@@ -10,8 +10,8 @@ HIGHEST_DEGREE = 8
 # A fit whose typical square residual exceeds this many variances follows the axis at no degree: the axis is kept.
 POOR = 9.0
 # Degrees of freedom of the residuals' tails, and the median of chi-square with two.
-TAIL, MEDIAN = 4.0, 1.386
-ROUNDS = 8
+RESIDUAL_TAIL_FREEDOM, MEDIAN = 4.0, 1.386
+REWEIGHTING_ROUNDS = 8
 
 
 def smooth_axis(axis: FloatArray, sd: float, most: int = HIGHEST_DEGREE, least: int = 1) -> tuple[FloatArray, int]:
@@ -39,7 +39,9 @@ def smooth_axis(axis: FloatArray, sd: float, most: int = HIGHEST_DEGREE, least: 
         coefficients, square = _fit(axis[:points], x[:points], degree, closed, sd)
         # All coordinates but one are across the axis; that one is the order of the crossings, not a datum.
         freedom = (axis.shape[1] - 1.0) * len(coefficients)
-        cost = float(((TAIL + 2.0) * np.log1p(square / TAIL)).sum()) + freedom * float(np.log(points))
+        cost = float(
+            ((RESIDUAL_TAIL_FREEDOM + 2.0) * np.log1p(square / RESIDUAL_TAIL_FREEDOM)).sum()
+        ) + freedom * float(np.log(points))
         if cost < best_cost:
             best, best_cost, best_misfit = degree, cost, float(np.median(square)) / MEDIAN
             curve = _design(dense, degree, closed) @ coefficients
@@ -57,7 +59,7 @@ def _fit(axis: FloatArray, places: FloatArray, degree: int, closed: bool, sd: fl
     those along the curve are taken out by moving the crossing along it.
     """
     weight, gap = np.ones(len(axis)), 2.0 / len(axis)
-    for _ in range(ROUNDS if len(axis) > 3 else 1):
+    for _ in range(REWEIGHTING_ROUNDS if len(axis) > 3 else 1):
         design = _design(places, degree, closed)
         root = np.sqrt(weight)[:, None]
         coefficients = np.linalg.lstsq(root * design, root * axis, rcond=None)[0]
@@ -67,7 +69,7 @@ def _fit(axis: FloatArray, places: FloatArray, degree: int, closed: bool, sd: fl
         residual = axis - design @ coefficients
         along = np.einsum("ij,ij->i", residual, tangent)
         square = ((residual - along[:, None] * tangent) ** 2).sum(axis=1) / sd**2
-        weight = (TAIL + 2.0) / (TAIL + square)
+        weight = (RESIDUAL_TAIL_FREEDOM + 2.0) / (RESIDUAL_TAIL_FREEDOM + square)
         places = places + np.clip(along / speed, -0.5 * gap, 0.5 * gap)
         if not closed:
             places = np.clip(places, -1.0, 1.0)

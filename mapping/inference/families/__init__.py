@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from mapping.inference.families.free_tip import with_free_tip as with_free_tip, with_nominal_tip as with_nominal_tip
     from mapping.inference.families.hollow import GrooveShape as GrooveShape, PitShape as PitShape
     from mapping.inference.families.problem import (
+        MEETING_REACH as MEETING_REACH,
         MODEL_FLOOR as MODEL_FLOOR,
-        NEAR as NEAR,
         Problem as Problem,
         Surroundings as Surroundings,
         sizes_of as sizes_of,
@@ -32,7 +32,7 @@ _PUBLIC = {
     "feature_trace": ("feature_trace",),
     "free_tip": ("with_free_tip", "with_nominal_tip"),
     "hollow": ("GrooveShape", "PitShape"),
-    "problem": ("MODEL_FLOOR", "NEAR", "Problem", "Surroundings", "sizes_of", "touches"),
+    "problem": ("MEETING_REACH", "MODEL_FLOOR", "Problem", "Surroundings", "sizes_of", "touches"),
     "ridge": ("RidgeShape", "rounding_of"),
     "spots": ("bump_shape", "spot_problem"),
     "step": ("StepShape",),

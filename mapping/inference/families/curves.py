@@ -7,7 +7,16 @@ import numpy as np
 from mapping import Feature, FloatArray
 from mapping.inference.curves import HIGHEST_DEGREE, Chart, CurveModes, chart_along, normals_along, smooth_on_base
 from mapping.inference.families.hollow import GrooveShape
-from mapping.inference.families.problem import NEAR, Problem, Sizes, Surroundings, pose, sizes_of, touches, window_for
+from mapping.inference.families.problem import (
+    MEETING_REACH,
+    Problem,
+    Sizes,
+    Surroundings,
+    pose,
+    sizes_of,
+    touches,
+    window_for,
+)
 from mapping.inference.families.ridge import RidgeShape
 from mapping.inference.families.spots import height_prior, hollow_priors, radius_prior
 from mapping.inference.families.step import StepShape
@@ -19,7 +28,7 @@ SAG = 0.005
 MOST_LEGS = 300
 HIGHEST_MODE = 8
 # After so many degrees in a row that are no better than a lower one, no higher one is tried.
-PATIENCE = 2
+FUTILE_DEGREES = 2
 
 
 def curve_problem(feature: Feature, around: Surroundings) -> Problem:
@@ -54,7 +63,7 @@ def curve_problem(feature: Feature, around: Surroundings) -> Problem:
             break
         costs.append(least if other is best else _cost(other))
         best, least = (other, costs[-1]) if costs[-1] < least else (best, least)
-        if len(costs) > PATIENCE and min(costs[-PATIENCE:]) >= min(costs[:-PATIENCE]):
+        if len(costs) > FUTILE_DEGREES and min(costs[-FUTILE_DEGREES:]) >= min(costs[:-FUTILE_DEGREES]):
             break
     return best
 
@@ -169,7 +178,7 @@ def _end_limits(
     for k, (least, most) in zip(np.argsort(ends), ((low, middle), (middle, high)), strict=True):
         tip = axis[[0, -1][k]]
         if any(touches(tip, other, sizes.half_width) for other in around.others if other is not feature):
-            reach = NEAR * sizes.half_width
+            reach = MEETING_REACH * sizes.half_width
             at = float(np.clip(ends[k], least + 0.1 * reach, most - 0.1 * reach))
             least, most = max(least, at - reach), min(most, at + reach)
         limits.append((least, most))

@@ -10,7 +10,7 @@ from mapping import Feature, FloatArray
 from mapping.geometry.templates import chain_height, contact_half_width, radius_of_cap, rim_height
 
 # A crest disturbs the trace up to its half-width over a flat base, and hardly further over a hollow one
-BESIDE = 1.5
+CREST_TRACE_REACH = 1.5
 
 
 def feature_trace(feature: Feature, feet: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
@@ -29,7 +29,7 @@ def feature_trace(feature: Feature, feet: FloatArray, normals: FloatArray, tip_r
     if feature.kind in ("ridge", "bump") and height > 0.0:
         radius = float(feature.extra.get("radius", radius_of_cap(height, width)))
         # a low and wide one is a part of a large ball, which on a bent base comes out again elsewhere
-        near = _distance(feet, feature.axis) < BESIDE * contact_half_width(height, radius, tip_radius)
+        near = _distance(feet, feature.axis) < CREST_TRACE_REACH * contact_half_width(height, radius, tip_radius)
         crest = feature.axis + (height - radius) * feature.normals
         over = np.minimum(chain_height(feet, normals, crest, radius, tip_radius), height)
         return np.where(near, over, 0.0)

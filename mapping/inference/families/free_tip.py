@@ -13,7 +13,7 @@ from mapping.inference.families.problem import Problem
 from mapping.inference.likelihood import Normal, Prior, Shape
 
 # A tip is at least this share of its nominal radius.
-SMALLEST = 0.1
+SMALLEST_TIP_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class FreeTipShape:
 def with_free_tip(problem: Problem, sd: float) -> Problem:
     """The problem with the tip's radius as a parameter: Gaussian about the nominal one, sd in m."""
     felt: Any = problem.target.shape
-    prior = Normal(felt.tip_radius, sd, SMALLEST * felt.tip_radius)
+    prior = Normal(felt.tip_radius, sd, SMALLEST_TIP_SHARE * felt.tip_radius)
     nominal = np.full((len(problem.beginnings), 1), felt.tip_radius)
     target = replace(problem.target, shape=FreeTipShape(felt, prior))
     return replace(problem, target=target, beginnings=np.hstack([problem.beginnings, nominal]))

@@ -25,8 +25,8 @@ from mapping.inference.likelihood import (
 from mapping.instrument import Noise
 
 # Bins of x_c/30 lose 0.7 % of the information (theory section 8); windows reach 3 x_c to either side of the crest.
-BINS_PER_HALF_WIDTH = 30.0
-REACH = 3.0
+WINDOW_BINS_PER_HALF_WIDTH = 30.0
+WINDOW_REACH = 3.0
 # More bins than this are made coarser: a long ridge has information to spare.
 MOST_BINS = 4000
 # Noise below this share of the height no longer hides what a smoothed path and wide bins do to flanks and kinks (2 um
@@ -128,8 +128,8 @@ def _position_sd(feature: Feature, half_width: float) -> float:
 
 def window_for(crest: FloatArray, sizes: Sizes, around: Surroundings) -> Window:
     """The bins near a crest polyline (K, 3) on the base, lifted by the caller to the ball's centre, m."""
-    width = sizes.half_width / BINS_PER_HALF_WIDTH
-    reach = REACH * sizes.half_width + 2.0 * sizes.position_sd
+    width = sizes.half_width / WINDOW_BINS_PER_HALF_WIDTH
+    reach = WINDOW_REACH * sizes.half_width + 2.0 * sizes.position_sd
     samples = gather(around.trace, around.base, crest, reach)
     precise = around.noise.sd <= PRECISE * sizes.height
     most, smooth_over = (2 * MOST_BINS, 0.0) if precise else (MOST_BINS, sizes.half_width)
@@ -165,9 +165,9 @@ def _likelihood(
 
 # An end at which a line meets another lies that near to where it was detected, in half-widths: what the other one
 # covers does not tell it
-NEAR = 0.5
+MEETING_REACH = 0.5
 
 
 def touches(end: FloatArray, other: Feature, half_width: float) -> bool:
     """True if a line whose end (3,) this is meets another feature there."""
-    return len(other.axis) > 1 and bool(distances(end[None], other.axis)[0] < NEAR * half_width)
+    return len(other.axis) > 1 and bool(distances(end[None], other.axis)[0] < MEETING_REACH * half_width)

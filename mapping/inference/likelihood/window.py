@@ -12,7 +12,7 @@ from mapping import EmptyWindowError, FloatArray, IntArray, Trace
 from mapping.base import Base, Feet
 
 # Samples are looked at in blocks of this many: the cost of the rest of a long log is that of its boxes.
-BLOCK = 64
+SAMPLES_PER_BLOCK = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,14 +58,14 @@ def samples_near(trace: Trace, points: FloatArray, reach: float) -> IntArray:
 
     if len(trace) == 0:
         return np.zeros(0, dtype=np.int64)
-    cuts = np.arange(0, len(trace), BLOCK)
+    cuts = np.arange(0, len(trace), SAMPLES_PER_BLOCK)
     low, high = np.minimum.reduceat(trace.centers, cuts), np.maximum.reduceat(trace.centers, cuts)
     box_low, box_high = points.min(axis=0) - reach, points.max(axis=0) + reach
     near = np.flatnonzero(((low <= box_high) & (high >= box_low)).all(axis=1))
     tree = cKDTree(points)
     middle, radius = 0.5 * (low[near] + high[near]), 0.5 * np.linalg.norm(high[near] - low[near], axis=1)
     near = near[tree.query(middle)[0] <= reach + radius]
-    index = (near[:, None] * BLOCK + np.arange(BLOCK)).ravel()
+    index = (near[:, None] * SAMPLES_PER_BLOCK + np.arange(SAMPLES_PER_BLOCK)).ravel()
     index = index[index < len(trace)]
     distance = tree.query(trace.centers[index], distance_upper_bound=reach)[0]
     return np.asarray(index[np.isfinite(distance)])
@@ -122,7 +122,7 @@ def bin_samples(samples: Samples, width: float, noise_level: float, scale: float
 
 def _whole_runs(index: IntArray, sweep: IntArray) -> tuple[IntArray, IntArray]:
     """Indices with short gaps closed (noise scatters samples about the rim of a window), and where runs begin."""
-    gaps = np.flatnonzero((np.diff(index) > BLOCK) | (np.diff(sweep[index]) != 0))
+    gaps = np.flatnonzero((np.diff(index) > SAMPLES_PER_BLOCK) | (np.diff(sweep[index]) != 0))
     firsts, lasts = index[np.append(0, gaps + 1)], index[np.append(gaps, len(index) - 1)]
     sizes = lasts - firsts + 1
     begins = np.cumsum(sizes) - sizes

@@ -20,7 +20,7 @@ FREE_BINS = 12_000
 INDEPENDENT = 0.5
 # A chain counts as long when it holds this many autocorrelation times, and their estimate has settled.
 TIMES = 100
-SETTLED = 0.01
+SETTLED_TIME_CHANGE = 0.01
 FIRST_LOOK = 200
 GROWTH = 1.06
 
@@ -89,7 +89,7 @@ def sample_ensemble(
     while True:
         state = sampler.run_mcmc(state, look - sampler.iteration, skip_initial_state_check=True)
         previous, tau = tau, _autocorrelation(sampler.get_chain())
-        settled = abs(tau - previous) < SETTLED * tau
+        settled = abs(tau - previous) < SETTLED_TIME_CHANGE * tau
         if (settled and look > TIMES * tau) or look >= max_steps or not np.isfinite(tau):
             break
         # The last stretch is short, so that the estimate is compared with one from nearly the same chain.

@@ -13,8 +13,8 @@ from mapping.inference.sampler.laplace import Laplace
 from mapping.inference.sampler.proposal import DEGREES, Proposal, root_of
 from mapping.inference.sampler.psis import effective_size, smooth_weights
 
-ROUNDS = 12
-DRAWS = 1000
+PROPOSAL_ROUNDS = 12
+DRAWS_PER_ROUND = 1000
 FINAL_DRAWS = 4000
 # The proposal learns from the final draws, too, if they cannot be trusted yet: so often at most are they drawn.
 FINALS = 3
@@ -54,10 +54,10 @@ def importance_sample(target: Target, modes: Sequence[Laplace], rng: np.random.G
     Reference: Cappe et al. (2008) for the adaptation; Vehtari et al. (2024) for the test.
     """
     proposal = _first_proposal(modes)
-    for _ in range(ROUNDS):
-        draws, ratios = _weigh(target, proposal, rng, DRAWS)
+    for _ in range(PROPOSAL_ROUNDS):
+        draws, ratios = _weigh(target, proposal, rng, DRAWS_PER_ROUND)
         weights, k_hat = smooth_weights(ratios)
-        if effective_size(weights) > EFFICIENT * DRAWS and k_hat < TRUSTED_K_HAT:
+        if effective_size(weights) > EFFICIENT * DRAWS_PER_ROUND and k_hat < TRUSTED_K_HAT:
             break
         proposal = _learned(proposal, draws, ratios)
     for final in range(FINALS):

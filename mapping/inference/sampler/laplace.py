@@ -11,10 +11,10 @@ from mapping.inference.likelihood import Target
 
 ITERATIONS = 60
 # Gain in chi-square of a step after which the optimum is known: a thirtieth of a standard deviation.
-SETTLED = 1e-3
+SETTLED_CHI_SQUARE_GAIN = 1e-3
 # Log density below the best optimum at which another one does not matter, and how many are kept.
-NEGLIGIBLE = 12.0
-MODES = 3
+NEGLIGIBLE_LOG_DENSITY = 12.0
+MOST_MODES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,14 +37,14 @@ def find_optima(target: Target, starts: FloatArray) -> list[FloatArray]:
     """Distinct optima (P,) reached by Levenberg-Marquardt from the starts (M, P), best first.
 
     Optima that hold a negligible share of the probability, or lie within a fraction of a step of a better one, are
-    left out; at most MODES are kept.
+    left out; at most MOST_MODES are kept.
     """
     found = np.array([_descend(target, start) for start in starts])
     values = target.log_density(found)
     kept: list[FloatArray] = []
     for i in np.argsort(-values, kind="stable"):
         apart = [np.abs((found[i] - other) / target.shape.step).max() > 0.5 for other in kept]
-        if values[i] > values.max() - NEGLIGIBLE and all(apart) and len(kept) < MODES:
+        if values[i] > values.max() - NEGLIGIBLE_LOG_DENSITY and all(apart) and len(kept) < MOST_MODES:
             kept.append(found[i])
     return kept or [starts[0]]
 
@@ -88,7 +88,7 @@ def _descend(target: Target, start: FloatArray) -> FloatArray:
         theta, damping = candidates[pick], max(float(dampings[pick]), 1e-12)
         residual, jacobian = _jacobian(target, theta, 0.1 * scale)
         cost = float(residual @ residual)
-        if gain < SETTLED:
+        if gain < SETTLED_CHI_SQUARE_GAIN:
             break
     return np.asarray(theta)
 

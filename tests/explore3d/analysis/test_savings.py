@@ -14,8 +14,8 @@ import pytest
 import explore3d
 from explore3d.analysis.result import Analysis
 from explore3d.analysis.savings import with_savings, without_needless_dynamics
-from explore3d.analysis.stages import OPTIONAL, Stages
-from explore3d.bench.scenes.plate_sweeps import DIAMETER, TIP, Heights, plate, sweeps, wire
+from explore3d.analysis.stages import OPTIONAL_STAGES, Stages
+from explore3d.bench.scenes.plate_sweeps import DIAMETER, TIP_RADIUS, Heights, plate, sweeps, wire
 from explore3d.errors import UserError
 from explore3d.jobs.analyze import analyze
 from explore3d.log.record import KIND, base_event
@@ -43,7 +43,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Record:
         places = np.linspace(-half / 2, half / 2, count)
         trace = sweeps(heights, white=white, places=places, spacing=half / 500, half=half)
         path = tmp_path_factory.mktemp("log") / "log.mcap"
-        with LogWriter(path, tip_radius=TIP, scene_text=scene) as log:
+        with LogWriter(path, tip_radius=TIP_RADIUS, scene_text=scene) as log:
             log.event(KIND, base_event(plate()))
             for _, part in trace.sweeps():
                 log.write(Move(path=part.centers[[0, -1]], approach=np.array([0.0, 0.0, -1.0])), part)
@@ -93,7 +93,7 @@ def test_a_trace_without_noise_needs_no_smoothing_and_one_moves_no_point(record)
     for estimate in (raw.estimate, smoothed.estimate):
         points = estimate.points[estimate.labels == TOUCHED]
         to_wire = np.abs(np.hypot(points[:, 1], points[:, 2] - DIAMETER / 2) - DIAMETER / 2)
-        assert np.minimum(to_wire, np.abs(points[:, 2])).max() < 1e-4 * TIP
+        assert np.minimum(to_wire, np.abs(points[:, 2])).max() < 1e-4 * TIP_RADIUS
     assert raw.model.features[0].height == smoothed.model.features[0].height
 
 
@@ -156,7 +156,7 @@ def test_a_stage_that_there_is_not_cannot_be_forced_and_the_possible_ones_are_na
 def test_every_stage_that_is_asked_whether_it_is_needed_can_be_forced():
     sources = [path.read_text() for path in Path(explore3d.__file__ or "").parent.rglob("*.py")]
     asked = {name for text in sources for name in re.findall(r"stages\.(?:needed|is_forced)\(\s*\"([^\"]+)\"", text)}
-    assert asked == set(OPTIONAL)
+    assert asked == set(OPTIONAL_STAGES)
 
 
 def test_without_contact_data_the_algorithms_that_need_it_stay_left_out_even_if_forced(wired):

@@ -11,9 +11,9 @@ from explore3d.bench import apparatus
 def test_without_errors_the_centre_runs_as_the_closed_form_says():
     trace = apparatus.crossing("sliding", apparatus.WIRE, None)
     x, z = (trace.centers @ apparatus._tilt())[:, [0, 2]].T
-    arm = apparatus.TIP + apparatus.WIRE / 2
+    arm = apparatus.TIP_RADIUS + apparatus.WIRE / 2
     over = np.maximum(apparatus.WIRE - x**2 / (arm + np.sqrt(arm**2 - np.minimum(np.abs(x), arm) ** 2)), 0.0)
-    np.testing.assert_allclose(z, apparatus.TIP + over, atol=1e-8)
+    np.testing.assert_allclose(z, apparatus.TIP_RADIUS + over, atol=1e-8)
 
 
 def test_the_paper_s_findings_come_out_for_a_finger_without_errors():
@@ -29,10 +29,10 @@ def test_the_paper_s_findings_come_out_for_a_finger_without_errors():
 def test_the_table_has_one_line_for_each_case():
     found = [
         apparatus.Finding(motion, wire, n, noise, 1.0, 0.5, 0.0)
-        for motion in apparatus.LENGTHS
+        for motion in apparatus.MOTION_LENGTHS
         for wire in (1e-3, 2e-3)
         for noise in (False, True)
-        for n in apparatus.COLUMNS
+        for n in apparatus.ALGORITHM_COLUMNS
     ]
     lines = apparatus.findings_table(found).splitlines()
     assert len(lines) == 2 + 8

@@ -34,9 +34,9 @@ def test_the_same_figure_is_drawn_every_time(written):
 
 def test_the_traced_section_follows_the_parallel_surface_outside_the_interference_points(written):
     trace = figures.section_trace()
-    flank, plain = figures.BUMP.interference(figures.TIP)
+    flank, plain = figures.BUMP.interference(figures.FIGURE_TIP_RADIUS)
     u = np.r_[np.linspace(0, flank, 400), np.linspace(plain, 2.0, 400)]
-    x, z = figures.BUMP.parallel(u, figures.TIP)
+    x, z = figures.BUMP.parallel(u, figures.FIGURE_TIP_RADIUS)
     expected = np.interp(np.abs(trace.centers[:, 0]), x, z)
     assert np.abs(trace.centers[:, 2] - expected)[np.abs(trace.centers[:, 0]) < 1.9].max() < 1e-4
 

@@ -49,7 +49,7 @@ def test_a_long_log_holds_what_was_asked_for(tmp_path: Path):
 
 
 def test_finished_sizes_are_not_run_again(tmp_path: Path, monkeypatch):
-    monkeypatch.setattr(bench_scaling, "TRIANGLES", (100, 200))
+    monkeypatch.setattr(bench_scaling, "TRIANGLE_COUNTS", (100, 200))
     first = list(bench_scaling.bench_scaling(tmp_path / "store.jsonl", ["triangles"]))
     assert [cost.size for cost in first] == [100, 200]
     assert all(cost.found > 0 and cost.memory > 1e7 for cost in first)

@@ -23,13 +23,13 @@ def test_every_check_says_what_it_is_needed_for() -> None:
 
 
 def test_a_missing_package_is_named_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(doctor.REQUIRED, "no-such-package", ("no_such_package", "the test"))
+    monkeypatch.setitem(doctor.REQUIRED_PACKAGES, "no-such-package", ("no_such_package", "the test"))
     check = by_subject(monkeypatch, "no-such-package")
     assert (check.state, check.found, check.remedy) == ("missing", "not installed", "make setup")
 
 
 def test_a_package_that_does_not_load_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(doctor.REQUIRED, "emcee", ("emcee.no_such_module", "the test"))
+    monkeypatch.setitem(doctor.REQUIRED_PACKAGES, "emcee", ("emcee.no_such_module", "the test"))
     check = by_subject(monkeypatch, "emcee")
     assert check.state == "missing"
     assert "does not load: ModuleNotFoundError" in check.found

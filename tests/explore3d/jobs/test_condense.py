@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from explore3d.bench.scenes.long_log import RADIUS, write_long_log
+from explore3d.bench.scenes.long_log import WIRE_RADIUS, write_long_log
 from explore3d.jobs import condense as module
 from explore3d.jobs.condense import Condensed, condense
 from explore3d.log.reader import read_log
@@ -63,8 +63,8 @@ def test_a_streamed_log_shows_the_same_crossings(log: Path):
 
 
 def test_all_samples_near_a_crossing_are_kept_and_its_range_counts_in_them(log: Path, monkeypatch):
-    monkeypatch.setattr(module, "KEPT", 500)
-    monkeypatch.setattr(module, "NEAR", 0.1)
+    monkeypatch.setattr(module, "KEPT_BACKGROUND_SAMPLES", 500)
+    monkeypatch.setattr(module, "CROSSING_REACH", 0.1)
     found = condense(LogStream(log), base_of(log), None, chunk=CHUNK)
     assert len(found.trace) < 0.8 * SAMPLES
     parts = dict(found.trace.sweeps())
@@ -111,13 +111,13 @@ def same(one: Condensed, other: Condensed) -> None:
 
 def test_one_sample_in_sixty_is_enough_between_the_crossings(tmp_path: Path, monkeypatch):
     (axis,) = write_long_log(tmp_path / "log.mcap", 400_000, wires=1)
-    monkeypatch.setattr(module, "KEPT", 400_000 // 60)
+    monkeypatch.setattr(module, "KEPT_BACKGROUND_SAMPLES", 400_000 // 60)
     base = base_of(tmp_path / "log.mcap")
     found = condense(LogStream(tmp_path / "log.mcap"), base, None)
     assert len(found.trace) < found.samples / 2
     (ridge,) = assemble(found.detections, found.trace, base)
     assert ridge.evidence.crossings == len(found.detections.crossings) >= 10
-    assert ridge.height.median == pytest.approx(2 * RADIUS, abs=0.02e-3)
+    assert ridge.height.median == pytest.approx(2 * WIRE_RADIUS, abs=0.02e-3)
     ends = ridge.axis[[0, -1]] if ridge.axis[0, 0] < ridge.axis[-1, 0] else ridge.axis[[-1, 0]]
     assert np.linalg.norm((ends - axis)[:, :2], axis=1).max() < 1e-3
 

@@ -12,7 +12,7 @@ import pytest
 
 from explore3d.log.reader import read_log
 from explore3d.log.writer import LogWriter
-from hw.emulated.faults import KINDS, Fault
+from hw.emulated.faults import FAULT_KINDS, Fault
 from hw.emulated.force import OptoForceEmulator
 from hw.emulated.grbl import GrblEmulator
 from hw.emulated.pty_server import PtyServer
@@ -124,10 +124,10 @@ def test_a_sensor_that_comes_back_costs_a_sweep_and_no_more(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", FAULT_KINDS)
 @pytest.mark.parametrize("number", range(34))
 def test_random_faults_are_survived(kind: str, number: int, tmp_path: Path) -> None:
-    rng = np.random.default_rng((KINDS.index(kind), number))
+    rng = np.random.default_rng((FAULT_KINDS.index(kind), number))
     slide = number % 2 == 1
     device = int(rng.integers(2)) if slide else 0
     survive(Fault.random(kind, rng, 3.0, device), slide, tmp_path)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from explore3d.bench.detection.classify import classified, noisy, touched
-from explore3d.bench.scenes.kinds import BODIES
+from explore3d.bench.scenes.kinds import BODIES_BY_KIND
 from hw.simulated.finger import SimulatedFinger
 from hw.simulated.noise_source import NoiseSource
 from mapping.base.base import Base
@@ -23,7 +23,7 @@ TIP = 0.01
 @pytest.mark.parametrize("kind", ["convex edge", "concave corner"])
 @pytest.mark.parametrize("white", [pytest.param(0.0, marks=pytest.mark.slow), 0.2e-3])
 def test_a_fold_is_an_edge_where_the_faces_meet(kind, white):
-    (edge,) = classified(noisy(touched(kind, "two ways", 0), NoiseSource(white), 1), Base(BODIES[kind]().base))
+    (edge,) = classified(noisy(touched(kind, "two ways", 0), NoiseSource(white), 1), Base(BODIES_BY_KIND[kind]().base))
     assert edge.kind == kind
     assert np.abs(edge.axis[:, 0]).max() < 0.3e-3
     assert edge.extra["angle"] == pytest.approx(np.radians(20.0), abs=np.radians(0.2))

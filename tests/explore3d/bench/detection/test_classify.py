@@ -9,7 +9,7 @@ import pytest
 
 from explore3d.bench.detection import classify
 from explore3d.bench.detection.classify import bench_classify, classify_table, trial
-from explore3d.bench.scenes.kinds import BODIES
+from explore3d.bench.scenes.kinds import BODIES_BY_KIND
 
 KINDS = [
     "bump",
@@ -57,9 +57,9 @@ def test_the_bench_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
     assert classify_table(records).splitlines()[1] == "bump,apparatus,two ways,4,1,1,0,1,0.1"
 
 
-@pytest.mark.parametrize("name", sorted(BODIES))
+@pytest.mark.parametrize("name", sorted(BODIES_BY_KIND))
 def test_every_body_has_the_truth_that_it_is_named_for(name: str) -> None:
-    kinds = {true.kind for true in BODIES[name]().truth}
+    kinds = {true.kind for true in BODIES_BY_KIND[name]().truth}
     expected = {"junction Y": "ridge", "junction T": "ridge", "O-ring": "ridge", "crossing": "ridge"}
     expected |= {"curved ridge": "ridge", "fine groove": "groove"}
     assert kinds == (set() if name == "empty" else {expected.get(name, name)})

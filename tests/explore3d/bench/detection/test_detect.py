@@ -11,7 +11,7 @@ import pytest
 
 from explore3d.bench.detection.detect import (
     DETECTORS,
-    TIP,
+    TIP_RADIUS,
     Case,
     all_cases,
     bench_detect,
@@ -26,7 +26,7 @@ WIRE = Case("wire", 0.065, "white", 0.02, 0)
 
 def test_the_bound_is_that_of_the_theory():
     # theory section 6: the smallest wire found with 95 % at sigma = 0.2 mm is 0.081 mm
-    small = [matched_filter_bound(replace(WIRE, size=d / TIP)) for d in (0.079e-3, 0.083e-3)]
+    small = [matched_filter_bound(replace(WIRE, size=d / TIP_RADIUS)) for d in (0.079e-3, 0.083e-3)]
     assert small[0] < 0.95 < small[1]
     assert matched_filter_bound(WIRE) > 0.999999
     # d' of an OU process of 0.2 mm over 1 mm: 4.9 for the paper's wire, and u = 4.2
@@ -37,7 +37,7 @@ def test_a_simulated_sweep_has_the_feature_where_it_says_and_normals_across_the_
     trace, place, extent = simulated_sweep(replace(WIRE, noise=1e-6))
     x, z = trace.centers[:, 0], trace.centers[:, 2]
     assert abs(x[z.argmax()] - place) < 0.02 * extent
-    np.testing.assert_allclose(z.max() - TIP, 0.65e-3, rtol=1e-3)
+    np.testing.assert_allclose(z.max() - TIP_RADIUS, 0.65e-3, rtol=1e-3)
     inner = np.abs(x - place) < 0.8 * extent
     slope = np.gradient(z, x)[inner]
     np.testing.assert_allclose(np.median(trace.normals[inner, 0] / trace.normals[inner, 2] / -slope), 1.0, atol=0.01)
@@ -73,8 +73,8 @@ def test_the_quick_campaign_is_a_part_of_the_whole():
 def test_smooth_bodies_hold_nothing_without_noise_and_no_more_than_asked_with_it(body, noise):
     from scipy.stats import poisson
 
-    from explore3d.bench.detection.false_alarms import RATE, run_case
+    from explore3d.bench.detection.false_alarms import COUNTABLE_ALARM_RATE, run_case
 
     records = [run_case(body, noise, seed) for seed in range(1 if noise == "none" else 12)]
     found, metres = sum(r["found"] for r in records), sum(r["metres"] for r in records)
-    assert found <= (0 if noise == "none" else poisson.ppf(0.999, RATE * metres))
+    assert found <= (0 if noise == "none" else poisson.ppf(0.999, COUNTABLE_ALARM_RATE * metres))
