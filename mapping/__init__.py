@@ -35,10 +35,10 @@ if TYPE_CHECKING:
         JUNCTION as JUNCTION,
         KINDS as KINDS,
         Anchor as Anchor,
-        Evidence as Evidence,
         Feature as Feature,
         Interval as Interval,
         LeftOut as LeftOut,
+        Support as Support,
     )
     from mapping.geometry.contact.first_contact import BallContact as BallContact
     from mapping.geometry.curvature.curvature import Curvature as Curvature
@@ -76,7 +76,7 @@ _PUBLIC = {
     ),
     "estimate.envelope.envelope": ("estimate_surface",),
     "estimate.envelope.estimate": ("Estimate",),
-    "feature": ("Anchor", "Evidence", "Feature", "Interval", "JUNCTION", "KINDS", "LeftOut"),
+    "feature": ("Anchor", "Feature", "Interval", "JUNCTION", "KINDS", "LeftOut", "Support"),
     "geometry.contact.first_contact": ("BallContact",),
     "geometry.curvature.curvature": ("Curvature",),
     "geometry.curvature.principal_curvatures": ("principal_curvatures",),

@@ -64,7 +64,7 @@ class Anchor:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class Support:
     """Why the feature is believed.
 
     Args:
@@ -113,7 +113,7 @@ class Feature:
     height: Interval
     width: Interval
     length: Interval
-    evidence: Evidence
+    evidence: Support
     curvature_feature: bool
     position_sd: float
     posterior: Posterior | None = None

@@ -215,6 +215,32 @@ def test_a_public_name_that_reads_like_its_file_is_not_covered_by_it() -> None:
     assert run.stdout.strip() == "True"
 
 
+def test_a_constants_name_has_one_value_in_the_whole_house() -> None:
+    values = defaultdict(set)
+    for module in modules():
+        for node in tree(module).body:
+            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+            value = getattr(node, "value", None)
+            for target in targets if isinstance(node, ast.Assign | ast.AnnAssign) and value is not None else ():
+                several = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+                pairs = zip(target.elts, value.elts, strict=True) if several else [(target, value)]
+                for name, each in pairs:
+                    if isinstance(name, ast.Name) and name.id.isupper() and not name.id.startswith("_"):
+                        values[name.id].add(ast.unparse(each))
+    assert len(values) > 400
+    assert {name: found for name, found in values.items() if len(found) > 1} == {}
+
+
+def test_array_types_are_defined_once() -> None:
+    aliases = [
+        (module, ast.unparse(node))
+        for module in modules()
+        for node in tree(module).body
+        if isinstance(node, ast.Assign) and ast.unparse(node.value).startswith("NDArray[")
+    ]
+    assert {module for module, _ in aliases} == {"mapping.arrays"}
+
+
 def test_only_one_module_imports_open3d() -> None:
     users = {module for module in modules() for when in ("top", "function") if "open3d" in outside(module, when)}
     assert users == {"mapping.geometry.mesh.open3d_import"}

@@ -16,7 +16,7 @@ from explore3d.analysis.stages import Stages
 from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature, compare
 from explore3d.log import Log
-from explore3d.scene import Settings
+from explore3d.scene import AnalysisSettings
 from mapping import Feature, LeftOut, Trace
 from mapping.assembly import assemble, why_none_sought
 from mapping.base import Base, Pose, estimate_pose, fit_base, over_base, refined
@@ -49,7 +49,7 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
         base: the given global model, or None to have it fitted.
         stages: the account of what runs and what is left out.
     """
-    settings = Settings.of(scene)
+    settings = AnalysisSettings.of(scene)
     base = _base(log.trace, base, stages)
     base = _placed(log.trace, base, scene, stages)
     trace = _over(log.trace, base, stages)
@@ -151,7 +151,7 @@ def _ended(log: Log) -> str:
     return str(data.get("detail") or data.get("reason") or "")
 
 
-def _detect(trace: Trace, base: Base, settings: Settings, stages: Stages) -> Detections:
+def _detect(trace: Trace, base: Base, settings: AnalysisSettings, stages: Stages) -> Detections:
     if not trace.has_contact_data:
         stages.needed("algorithms 1 and 2", "the log holds positions alone, no contact normals", possible=False)
     with stages.stage("detection"):
@@ -159,7 +159,7 @@ def _detect(trace: Trace, base: Base, settings: Settings, stages: Stages) -> Det
 
 
 def _assemble(
-    detections: Detections, trace: Trace, base: Base, settings: Settings, asked: float | None, stages: Stages
+    detections: Detections, trace: Trace, base: Base, settings: AnalysisSettings, asked: float | None, stages: Stages
 ) -> tuple[Feature, ...]:
     if not stages.needed("grammar", "" if detections.crossings else _why_no_lines(detections, trace, base, asked)):
         return ()
@@ -181,7 +181,7 @@ def _refine(
     trace: Trace,
     base: Base,
     detections: Detections,
-    settings: Settings,
+    settings: AnalysisSettings,
     stages: Stages,
 ) -> tuple[Feature, ...]:
     if not stages.needed("posterior", "" if features else "no feature was found, so no chain was run"):
@@ -263,7 +263,7 @@ def _tip_counts(features: tuple[Feature, ...], tip_radius: float) -> tuple[TipCo
     return tuple(counts)
 
 
-def _provenance(log: Log, scene: Scene | None, settings: Settings, detections: Detections) -> dict[str, Any]:
+def _provenance(log: Log, scene: Scene | None, settings: AnalysisSettings, detections: Detections) -> dict[str, Any]:
     return {
         "software": f"explore3d {__version__}",
         "scene": scene.title if scene else None,

@@ -7,7 +7,7 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from explore3d.bench.apparatus import write_apparatus as write_apparatus
     from explore3d.bench.curvature import (
-        CurvatureError as CurvatureError,
+        CurvatureAccuracy as CurvatureAccuracy,
         available as available,
         bench_curvature as bench_curvature,
         curvature_table as curvature_table,
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "apparatus": ("write_apparatus",),
-    "curvature": ("CurvatureError", "available", "bench_curvature", "curvature_table", "write_bench"),
+    "curvature": ("CurvatureAccuracy", "available", "bench_curvature", "curvature_table", "write_bench"),
     "dynamics": ("dynamics_curve", "dynamics_table", "wire_trace"),
     "explore_curves": ("write_curves",),
     "exploring": ("FINGER_NOISES", "STRATEGIES", "bench_exploring", "one_run", "records"),

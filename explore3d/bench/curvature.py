@@ -35,7 +35,7 @@ LARGE_POINT_COUNT = 20_000
 
 
 @dataclass(frozen=True)
-class CurvatureError:
+class CurvatureAccuracy:
     """One line of the table.
 
     Args:
@@ -135,7 +135,7 @@ def available() -> tuple[list[str], list[str]]:
     return [name for name in COMPARED_METHODS if name not in missing], sentences
 
 
-def bench_curvature(vertices: Iterable[int], methods: Iterable[str], seed: int = 0) -> Iterator[CurvatureError]:
+def bench_curvature(vertices: Iterable[int], methods: Iterable[str], seed: int = 0) -> Iterator[CurvatureAccuracy]:
     """Measure every case, each in a process of its own; noise only up to 20 000 vertices, where it has been studied."""
     for count in vertices:
         for body in BODIES_OF_KNOWN_CURVATURE if count <= LARGE_POINT_COUNT else ("bump",):
@@ -145,7 +145,7 @@ def bench_curvature(vertices: Iterable[int], methods: Iterable[str], seed: int =
                         yield pool.submit(measure, method, body, count, noise, seed).result()
 
 
-def measure(method: str, body: str, vertices: int, noise: float, seed: int = 0) -> CurvatureError:
+def measure(method: str, body: str, vertices: int, noise: float, seed: int = 0) -> CurvatureAccuracy:
     """Error and cost of one method on one body."""
     known, compute = BODIES_OF_KNOWN_CURVATURE[body](vertices), COMPARED_METHODS[method]
     compute(BODIES_OF_KNOWN_CURVATURE[body](400).surface)  # loads the kernels
@@ -160,7 +160,7 @@ def measure(method: str, body: str, vertices: int, noise: float, seed: int = 0) 
     finer, truly = (
         np.maximum(np.abs(a), np.abs(b)) > 1 / CURVATURE_TIP_RADIUS for a, b in ((k1, k2), (known.k1, known.k2))
     )
-    return CurvatureError(
+    return CurvatureAccuracy(
         method,
         body,
         len(known.k1),
@@ -174,7 +174,7 @@ def measure(method: str, body: str, vertices: int, noise: float, seed: int = 0) 
     )
 
 
-def curvature_table(lines: Iterable[CurvatureError]) -> Iterator[str]:
+def curvature_table(lines: Iterable[CurvatureAccuracy]) -> Iterator[str]:
     """One line for each case as it comes."""
     yield (
         f"{'method':32}{'body':7}{'vertices':>9}{'noise':>7}{'median':>10}{'p95':>10}{'wrong side':>12}"
@@ -187,7 +187,7 @@ def curvature_table(lines: Iterable[CurvatureError]) -> Iterator[str]:
         )
 
 
-def write_bench(lines: list[CurvatureError], out: Path) -> list[Path]:
+def write_bench(lines: list[CurvatureAccuracy], out: Path) -> list[Path]:
     """The lines as CSV and JSON, and a picture, in a folder that is made if absent."""
     out.mkdir(parents=True, exist_ok=True)
     rows = [asdict(line) for line in lines]
@@ -203,7 +203,7 @@ def _cell(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) else f"{value:.6g}"
 
 
-def picture(lines: list[CurvatureError]) -> bytes:
+def picture(lines: list[CurvatureAccuracy]) -> bytes:
     """PNG: median and 95th percentile of each method over the noise, one panel a body, smallest meshes."""
     fewest = min(line.vertices for line in lines)
     bodies = list(dict.fromkeys(line.body for line in lines if line.vertices < 1.1 * fewest))

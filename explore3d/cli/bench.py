@@ -70,15 +70,15 @@ def curvature(
 
     Example: explore3d bench curvature --largest 1000000 --out out/curvature
     """
-    from explore3d.bench import CurvatureError, available, bench_curvature, curvature_table, write_bench
+    from explore3d.bench import CurvatureAccuracy, available, bench_curvature, curvature_table, write_bench
 
     methods, missing = available()
     if peers:
         _print(missing)
     sizes = [count for count in (10_000, 100_000, 1_000_000) if count <= largest]
-    lines: list[CurvatureError] = []
+    lines: list[CurvatureAccuracy] = []
 
-    def kept() -> Iterable[CurvatureError]:
+    def kept() -> Iterable[CurvatureAccuracy]:
         for line in bench_curvature(sizes, methods if peers else methods[:1]):
             lines.append(line)
             yield line

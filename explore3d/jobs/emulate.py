@@ -17,7 +17,7 @@ from explore3d import UserError
 from explore3d.scene import load_mesh
 from hw import FingerError
 from hw.emulated import ForceEmulator, GrblEmulator, LineSensorEmulator, OptoForceEmulator, PtyServer, TouchedBody
-from hw.grbl import Frame
+from hw.grbl import StageFrame
 
 Vector = tuple[float, float, float]
 
@@ -57,7 +57,7 @@ class Emulation:
     def devices(self) -> list[GrblEmulator | ForceEmulator]:
         """The controller, and the sensor if there is one. Raises UserError: the object is out of reach."""
         surface = load_mesh(self.mesh, self.units)
-        frame = Frame.of(self.origin, self.turn)
+        frame = StageFrame.of(self.origin, self.turn)
         body = TouchedBody(surface, self.tip_radius, frame, self.stiffness)
         stage = GrblEmulator(
             body,

@@ -11,7 +11,7 @@ from explore3d import SceneError
 from explore3d.jobs.emulate import Emulation, EmulatorProcess
 from explore3d.scene import EMULATOR, MachineTable, Scene, SensorTable
 from hw import Finger, open_finger
-from hw.grbl import Frame
+from hw.grbl import StageFrame
 from hw.probing import Peck, Slide
 from hw.sensors import ForceSensor, LineSensor, OptoForce
 
@@ -36,7 +36,7 @@ def machine_finger(scene: Scene, armed: bool) -> Finger:
         "grbl",
         port=ports[0],
         tip_radius=scene.tip.radius,
-        frame=Frame.of(machine.origin, machine.turn),
+        frame=StageFrame.of(machine.origin, machine.turn),
         peck=_peck(machine, scene.tip.radius) if machine.touch == "peck" else None,
         slide=_slide(sensor, ports[1], scene.tip.radius) if machine.touch == "slide" and sensor else None,
         armed=armed or not needs_arming(scene),

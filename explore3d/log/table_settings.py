@@ -33,7 +33,7 @@ def _proper(rotation: tuple[Row, Row, Row]) -> tuple[Row, Row, Row]:
     return rotation
 
 
-class Frame(Table):
+class TableFrame(Table):
     """Pose of the table's frame in the object's: object = rotation @ table + origin."""
 
     origin: Point = (0.0, 0.0, 0.0)
@@ -55,7 +55,7 @@ class TableSettings(Table):
     units: LengthUnit | dict[Role, LengthUnit] | None = None
     tip_radius: Length | None = None
     columns: Annotated[dict[Role, str | int], BeforeValidator(_split_columns)] = Field(default_factory=dict)
-    frame: Frame = Frame()
+    frame: TableFrame = TableFrame()
     jump: Length | None = None
     reference: Literal["centre", "bottom"] = "centre"
 

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from explore3d.scene.machine import EMULATOR as EMULATOR, MachineTable as MachineTable, SensorTable as SensorTable
     from explore3d.scene.mesh_files import load_mesh as load_mesh
     from explore3d.scene.scene import Scene as Scene, load_scene as load_scene, parse_scene as parse_scene
-    from explore3d.scene.settings import Settings as Settings
+    from explore3d.scene.settings import AnalysisSettings as AnalysisSettings
     from explore3d.scene.to_toml import scene_text as scene_text
     from explore3d.scene.values import Length as Length, LengthUnit as LengthUnit, Point as Point, Table as Table
 
@@ -18,7 +18,7 @@ _PUBLIC = {
     "machine": ("EMULATOR", "MachineTable", "SensorTable"),
     "mesh_files": ("load_mesh",),
     "scene": ("Scene", "load_scene", "parse_scene"),
-    "settings": ("Settings",),
+    "settings": ("AnalysisSettings",),
     "to_toml": ("scene_text",),
     "values": ("Length", "LengthUnit", "Point", "Table"),
 }

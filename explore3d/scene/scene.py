@@ -118,7 +118,7 @@ class FingerTable(Table):
         return self
 
 
-class Survey(Table):
+class SurveyTable(Table):
     """Sweeps over the whole model: the least height to be found (m), the least span of a ridge (m), m/s, N.
 
     Without `shortest_ridge` nothing of that height is missed, bumps included; with it, ridges that span less may be.
@@ -165,7 +165,7 @@ class Scene(Table):
     tip: Tip
     model: GlobalModel
     finger: FingerTable
-    survey: Survey
+    survey: SurveyTable
     detection: Detection = Detection()
     explore: Exploration = Exploration()
     truth: tuple[Truth, ...] = ()

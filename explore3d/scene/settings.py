@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Settings:
+class AnalysisSettings:
     """What a recording is asked for.
 
     Args:
@@ -30,7 +30,7 @@ class Settings:
     noise: StatedNoise | None = None
 
     @classmethod
-    def of(cls, scene: Scene | None) -> Settings:
+    def of(cls, scene: Scene | None) -> AnalysisSettings:
         """The settings of a scene; the defaults without one."""
         if scene is None:
             return cls()

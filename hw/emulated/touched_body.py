@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hw.grbl import Frame
+from hw.grbl import StageFrame
 from mapping import FloatArray, Surface
 from mapping.geometry.contact import BallContact
 
@@ -28,10 +28,12 @@ class TouchedBody:
         stiffness: of the tip, N/m.
     """
 
-    def __init__(self, surface: Surface, tip_radius: float, frame: Frame | None = None, stiffness: float = 2e4) -> None:
+    def __init__(
+        self, surface: Surface, tip_radius: float, frame: StageFrame | None = None, stiffness: float = 2e4
+    ) -> None:
         import igl
 
-        self.frame = Frame.of() if frame is None else frame
+        self.frame = StageFrame.of() if frame is None else frame
         self.surface, self.tip_radius, self.stiffness = surface, tip_radius, stiffness
         self._ball = BallContact(surface, tip_radius)
         self._seen, self._clear = np.zeros(3), 0.0

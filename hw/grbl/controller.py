@@ -14,7 +14,7 @@ import numpy as np
 
 from hw import FingerError, Lines, Link, LinkError, StoppedError
 from hw.grbl import protocol as protocol
-from hw.grbl.protocol import Probed, Settings, Status
+from hw.grbl.protocol import GrblSettings, Probed, Status
 from mapping import FloatArray
 
 # A status is asked for this often while something is waited for (10 to 50 Hz), s
@@ -60,7 +60,7 @@ class GrblController:
         self.link = Link(port, Lines(), self._hear, baudrate=baudrate, lost=self._notify)
         self.wake = wake
         self.version = ""
-        self.settings = Settings()
+        self.settings = GrblSettings()
         self.offset = np.zeros(3)
         self.alarm: str | None = None
         self.stop_reason: str | None = None
@@ -85,7 +85,7 @@ class GrblController:
                 )
             self.alarm = "the machine is locked (state Alarm)" if status.state == "Alarm" else None
             self.version = " ".join(line for line in self._ask("$I") if line.startswith("["))
-            self.settings = Settings.of(self._ask("$$"))
+            self.settings = GrblSettings.of(self._ask("$$"))
             if not self.settings.values:
                 raise FingerError(f"{self.link.port}: answers, but prints no settings to $$: not a Grbl controller?")
             if self.alarm is None:

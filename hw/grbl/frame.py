@@ -11,7 +11,7 @@ from mapping import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class StageFrame:
     """The object frame seen from the machine: machine = origin + rotation @ object.
 
     Args:
@@ -23,7 +23,7 @@ class Frame:
     rotation: FloatArray
 
     @classmethod
-    def of(cls, origin: ArrayLike = (0.0, 0.0, 0.0), turn: ArrayLike = (0.0, 0.0, 0.0)) -> Frame:
+    def of(cls, origin: ArrayLike = (0.0, 0.0, 0.0), turn: ArrayLike = (0.0, 0.0, 0.0)) -> StageFrame:
         """From the origin (m) and a rotation vector (3,): axis times angle, rad."""
         axis = np.asarray(turn, dtype=np.float64)
         angle = float(np.linalg.norm(axis))

@@ -9,7 +9,7 @@ import numpy as np
 
 from hw import FingerError, LinkError, StoppedError
 from hw.grbl.controller import GrblController
-from hw.grbl.frame import Frame
+from hw.grbl.frame import StageFrame
 from hw.sensors import ForceSensor
 from mapping import FloatArray
 
@@ -35,7 +35,7 @@ class GuardedStage:
     """
 
     controller: GrblController
-    frame: Frame
+    frame: StageFrame
     bounds: FloatArray
     speed: float
     over_travel: float

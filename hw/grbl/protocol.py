@@ -85,13 +85,13 @@ class Probed:
 
 
 @dataclass(frozen=True)
-class Settings:
+class GrblSettings:
     """What `$$` printed; numbers by their code. Lengths are millimetres whatever the report units are."""
 
     values: dict[int, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, lines: Iterable[str]) -> Settings:
+    def of(cls, lines: Iterable[str]) -> GrblSettings:
         """From the answer's lines; others (start-up lines, texts) are left out."""
         found = (re.fullmatch(r"\$(\d+)=(-?[\d.]+)(?:\s*\(.*\))?", line) for line in lines)
         return cls({int(m[1]): float(m[2]) for m in found if m})

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hw import FingerError, LinkError, Move, StopOnSignal, StoppedError, Workspace
-from hw.grbl import Frame, GrblController, GuardedStage
+from hw.grbl import GrblController, GuardedStage, StageFrame
 from hw.probing.lag import measured_delay
 from hw.probing.peck import Peck, Touched
 from hw.probing.slide import Slide
@@ -46,7 +46,7 @@ class GrblFinger:
 
     port: str
     tip_radius: float
-    frame: Frame = field(default_factory=Frame.of)
+    frame: StageFrame = field(default_factory=StageFrame.of)
     peck: Peck | None = None
     slide: Slide | None = None
     armed: bool = False

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import Evidence, Feature, FloatArray, Interval
+from mapping import Feature, FloatArray, Interval, Support
 from mapping.assembly.branches import main_line
 from mapping.assembly.inspection import Inspection
 from mapping.assembly.lines import Around
@@ -114,7 +114,7 @@ def _edge(group: list[Hinge], around: Around) -> tuple[Feature, FloatArray]:
         height=Interval.normal(rise, around.tip_radius * float(np.std(tangents)) / np.sqrt(len(group))),
         width=Interval(0.0, 0.0, 2 * abs(shift)),
         length=Interval(length, length, np.inf, censored=True),
-        evidence=Evidence(float(np.sqrt(sum(c.snr**2 for c in crossings))), len(group), (around.detections.algorithm,)),
+        evidence=Support(float(np.sqrt(sum(c.snr**2 for c in crossings))), len(group), (around.detections.algorithm,)),
         curvature_feature=True,
         position_sd=float(np.median([c.position_sd for c in crossings])),
         notes=(f"the body turns by {np.degrees(angle):.1f} degrees; its height is given one tip radius beyond",),

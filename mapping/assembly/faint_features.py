@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mapping import Evidence, Feature, Interval, Trace
+from mapping import Feature, Interval, Support, Trace
 from mapping.assembly.faint_lines import FEWEST_AGREEING_SWEEPS, SECTIONS, FaintLine, faint_lines
 from mapping.assembly.inspection import Inspection, inspect
 from mapping.assembly.line_ends import line_end
@@ -110,7 +110,7 @@ def _feature(line: FaintLine, inspection: Inspection, base: Base, detections: De
         height=Interval.normal(line.height, line.height_sd),
         width=body_width(line.height, line.half_width, tip_radius),
         length=Interval(length, max(length - shorter, 0.0), length + longer, not seen),
-        evidence=Evidence(line.snr, line.sweeps, (detections.algorithm,)),
+        evidence=Support(line.snr, line.sweeps, (detections.algorithm,)),
         curvature_feature=bool(abs(2 * line.height / line.half_width**2) > 1 / (2 * tip_radius)),
         position_sd=0.3 * line.half_width,
         notes=("seen by no single sweep, but by all that crossed it together",),

@@ -12,7 +12,7 @@ import numpy as np
 from mapping import FloatArray
 from mapping.assembly.inspection import Inspection
 from mapping.geometry.mesh import arclengths
-from mapping.geometry.templates import crest_trace, misfit
+from mapping.geometry.templates import crest_trace, robust_cost
 
 # Rise of the misfit (twice the log-likelihood) at the ends of a central 90 % interval, and where a line may be said
 # not to go on.
@@ -61,7 +61,7 @@ def line_end(axis: FloatArray, height: float, half_width: float, inspection: Ins
     reach = step * np.arange(1, END_SEARCH_STEPS + 1)
     beyond = np.maximum(along[near][:, None] - reach, 0.0)
     model = crest_trace(np.hypot(beyond, across[near][:, None]), height, half_width)
-    rise = misfit(inspection.height[places[near]][:, None] - model, inspection.sd[places[near], None], height).sum(
+    rise = robust_cost(inspection.height[places[near]][:, None] - model, inspection.sd[places[near], None], height).sum(
         axis=0
     )
     rise -= rise.min()

@@ -17,7 +17,7 @@ from mapping.assembly.runs import RunPoint
 from mapping.base import Base
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import arclengths, distances
-from mapping.geometry.templates import crest_trace, misfit
+from mapping.geometry.templates import crest_trace, robust_cost
 
 # A crossing lower than this share of a neighbour, or of one within a half-width, passed beside an end;
 # so did the last crossing of a line if it is lower than this share of the one before.
@@ -179,7 +179,7 @@ def _section(axis: FloatArray, members: list[Crossing], around: Around) -> tuple
         shape = crest_trace(distance[near], np.sign(guess), half_width) * np.sign(guess)
         square = max(float((shape / sd) @ (shape / sd)), np.finfo(float).tiny)
         height = float(np.clip((shape / sd) @ (found / sd) / square / guess, 0.3, 3.0)) * guess
-        cost = float(misfit(found - height * shape, sd, height).sum())
+        cost = float(robust_cost(found - height * shape, sd, height).sum())
         best = min(best, (cost, height, float(half_width), 1.0 / float(np.sqrt(square))))
     scatter = 0.5 * float(np.std([c.height for c in highest])) / np.sqrt(len(highest))
     return best[1], best[2], float(np.hypot(best[3], scatter))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import Evidence, Feature, FloatArray, Interval
+from mapping import Feature, FloatArray, Interval, Support
 from mapping.assembly.inspection import Inspection
 from mapping.assembly.runs import RunPoint
 from mapping.detection import Crossing, Detections
@@ -42,11 +42,11 @@ def point_feature(
     )
 
 
-def evidence(members: Sequence[Crossing], detections: Detections) -> Evidence:
+def evidence(members: Sequence[Crossing], detections: Detections) -> Support:
     """All crossings together; the points of one run count as the one crossing that they are."""
     runs = {(c.sweep, c.snr): c for c in members if isinstance(c, RunPoint)}
     single = [c for c in members if not isinstance(c, RunPoint)] + list(runs.values())
-    return Evidence(float(np.sqrt(sum(c.snr**2 for c in single))), len(single), (detections.algorithm,))
+    return Support(float(np.sqrt(sum(c.snr**2 for c in single))), len(single), (detections.algorithm,))
 
 
 def body_width(height: float, half_width: float, tip_radius: float) -> Interval:

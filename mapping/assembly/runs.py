@@ -14,7 +14,7 @@ from mapping import BoolArray, FloatArray
 from mapping.assembly.inspection import Inspection
 from mapping.base import Base
 from mapping.detection import Crossing
-from mapping.geometry.templates import crest_trace, misfit
+from mapping.geometry.templates import crest_trace, robust_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,7 @@ def _fitted(
     shapes = sign * crest_trace(across[None] - offsets[:, None], sign, width)
     square = np.maximum((shapes**2 / sds**2).sum(axis=1), np.finfo(float).tiny)
     crests = (shapes * heights / sds**2).sum(axis=1) / square
-    costs = misfit(heights - crests[:, None] * shapes, sds, height).sum(axis=1)
+    costs = robust_cost(heights - crests[:, None] * shapes, sds, height).sum(axis=1)
     best = int(costs.argmin())
     sd = 0.5 * max(float(np.ptp(offsets[costs < costs[best] + 1.0])), float(offsets[1] - offsets[0]))
     said = (shapes[best] / sds)[other]

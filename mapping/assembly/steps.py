@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mapping import Evidence, Feature, Interval
+from mapping import Feature, Interval, Support
 from mapping.assembly.branches import main_line
 from mapping.assembly.lines import ONE_POINT, Around, mean_point, merged
 from mapping.assembly.linking import groups
@@ -47,7 +47,7 @@ def _step(line: list[Crossing], around: Around) -> Feature:
         height=Interval.normal(height, sd),
         width=Interval(0.0, 0.0, 2 * half_width),
         length=Interval(length, length, length + slack),
-        evidence=Evidence(float(np.sqrt(sum(c.snr**2 for c in line))), len(line), (around.detections.algorithm,)),
+        evidence=Support(float(np.sqrt(sum(c.snr**2 for c in line))), len(line), (around.detections.algorithm,)),
         curvature_feature=any(c.curvature_feature for c in line),
         position_sd=float(np.median([c.position_sd for c in line])),
     )

@@ -11,7 +11,7 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray
 from mapping.detection.cap_fit import Disturbance, fit_cap
-from mapping.detection.height_profile import HeightProfile
+from mapping.detection.height_profile import SweepHeights
 from mapping.detection.matched_filter import Bank
 from mapping.instrument import Noise
 
@@ -36,7 +36,7 @@ SCARCE = 0.1
 
 
 def find_disturbances(
-    profile: HeightProfile, bank: Bank, noise: Noise, threshold: float, tip_radius: float
+    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float
 ) -> tuple[Disturbance, ...]:
     """Every disturbance above the threshold, the strongest first.
 
@@ -61,7 +61,7 @@ def find_disturbances(
     return tuple(found)
 
 
-def quiet_bins(profile: HeightProfile, bank: Bank, noise: Noise, threshold: float, tip_radius: float) -> BoolArray:
+def quiet_bins(profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float) -> BoolArray:
     """(n,) True where a profile shows nothing above the threshold; nowhere if it is too short for any filter."""
     short = bank.filters[0].half_width > LARGEST_SHARE * profile.length
     quiet = np.full(len(profile.height), not short)
@@ -71,7 +71,7 @@ def quiet_bins(profile: HeightProfile, bank: Bank, noise: Noise, threshold: floa
 
 
 def _stretches(
-    profile: HeightProfile, bank: Bank, noise: Noise, threshold: float, tip_radius: float
+    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float
 ) -> Iterator[tuple[FloatArray, int, int, float, float]]:
     """(heights, first bin, past-last bin, crest, signal-to-noise) of each stretch.
 
@@ -99,7 +99,7 @@ def _stretches(
             height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
 
 
-def _scarcity(profile: HeightProfile, bank: Bank) -> FloatArray:
+def _scarcity(profile: SweepHeights, bank: Bank) -> FloatArray:
     """(n,) share by which the noise's variance in a bin exceeds the average for want of samples; 0 if none does."""
     counts = np.maximum(np.diff(profile.first), 1)
     white = bank.noise.white**2 / bank.samples
@@ -107,7 +107,7 @@ def _scarcity(profile: HeightProfile, bank: Bank) -> FloatArray:
     return np.asarray(share * (bank.samples / counts - 1.0))
 
 
-def _certainties(profile: HeightProfile, bank: Bank) -> Callable[[int], FloatArray | None]:
+def _certainties(profile: SweepHeights, bank: Bank) -> Callable[[int], FloatArray | None]:
     """Of the k-th filter, when asked: expected over actual sd of what it sees in each bin (n,), at most 1.
 
     None where it is 1 throughout.
@@ -168,7 +168,7 @@ def _extent(
     place: int,
     half_width: float,
     crest: float,
-    profile: HeightProfile,
+    profile: SweepHeights,
     noise: Noise,
     tip_radius: float,
 ) -> tuple[int, int]:
@@ -184,7 +184,7 @@ def _extent(
 
 
 def _smoothing(
-    crest: float, half_width: float, profile: HeightProfile, noise: Noise, tip_radius: float
+    crest: float, half_width: float, profile: SweepHeights, noise: Noise, tip_radius: float
 ) -> tuple[int, float]:
     """Half-size in bins of a running mean that keeps every physical structure, and the sd of its output."""
     sharpest = float(np.sqrt(2 * tip_radius * abs(crest)))
@@ -217,7 +217,7 @@ def _crests(
     begin: int,
     end: int,
     crest: float,
-    profile: HeightProfile,
+    profile: SweepHeights,
     noise: Noise,
     tip_radius: float,
 ) -> list[tuple[int, int]]:

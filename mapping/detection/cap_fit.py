@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import FloatArray
-from mapping.detection.height_profile import HeightProfile
+from mapping.detection.height_profile import SweepHeights
 from mapping.instrument import Noise
 
 # Improvement in twice the log-likelihood that a plateau must bring over a cap.
@@ -55,7 +55,7 @@ def fit_cap(
     height: FloatArray,
     bounds: tuple[int, int],
     sign: float,
-    profile: HeightProfile,
+    profile: SweepHeights,
     noise: Noise,
     drift: int,
     tip_radius: float,
@@ -107,7 +107,7 @@ def _whitened(
     height: FloatArray,
     low: int,
     high: int,
-    profile: HeightProfile,
+    profile: SweepHeights,
     noise: Noise,
     drift: int,
     neighbours: tuple[bool, bool],

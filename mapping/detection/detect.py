@@ -13,7 +13,7 @@ from mapping.detection.candidates import find_disturbances
 from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import Crossing
 from mapping.detection.false_alarms import threshold_for
-from mapping.detection.height_profile import HeightProfile, arclength, height_profiles
+from mapping.detection.height_profile import SweepHeights, arclength, height_profiles
 from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, smallest_half_width
 from mapping.detection.paper_algorithms import along_chord, curvature_features
 from mapping.detection.quiet_noise import SMALLEST_CREST_SNR, background, first_noise, floored, raw_stretches
@@ -165,7 +165,7 @@ def _step(sweep: Sweep) -> float:
     return float(s[-1] / (len(s) - 1))
 
 
-def _profiles(usable: list[Sweep], base: Base, noise: Noise, tip: float) -> list[HeightProfile]:
+def _profiles(usable: list[Sweep], base: Base, noise: Noise, tip: float) -> list[SweepHeights]:
     """Profiles of every sweep in bins that the smallest visible crest spans FILTER_BINS_PER_HALF_WIDTH times."""
     spacings = np.empty(len(usable))
     for alike in _alike(np.array([_step(sweep) for sweep in usable])):
@@ -188,7 +188,7 @@ def _alike(steps: FloatArray) -> list[IntArray]:
     return [*groups, order[begin:]]
 
 
-def _stands_out(found: Disturbance, profile: HeightProfile, noise: Noise, tip: float) -> bool:
+def _stands_out(found: Disturbance, profile: SweepHeights, noise: Noise, tip: float) -> bool:
     """True unless a detail gentler than the tip hides among the samples of a profile whose base was fitted.
 
     One profile cannot tell roughness from the base's own shape, and its shape is unknown: such a detail must
@@ -214,7 +214,7 @@ def _judged(crossings: list[Crossing], usable: list[Sweep], algorithm: int, nois
     return judged
 
 
-def _crossings(found: Disturbance, profile: HeightProfile, base: Base, tip: float) -> list[Crossing]:
+def _crossings(found: Disturbance, profile: SweepHeights, base: Base, tip: float) -> list[Crossing]:
     """A crest as one crossing; a plateau as the step up and the step down at its ends."""
     if found.flat == 0.0:
         kind = "convex" if found.height > 0 else "concave"
@@ -238,7 +238,7 @@ def _crossing(
     place: float,
     start: float,
     stop: float,
-    profile: HeightProfile,
+    profile: SweepHeights,
     base: Base,
     tip: float,
 ) -> Crossing:

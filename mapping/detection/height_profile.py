@@ -24,7 +24,7 @@ FEW_SAMPLES_PER_BIN = 4
 
 
 @dataclass(frozen=True, eq=False)
-class HeightProfile:
+class SweepHeights:
     """Heights at equal steps of arclength along one sweep.
 
     Args:
@@ -99,7 +99,7 @@ def _progress(trace: Trace, size: int, blocks: int) -> tuple[FloatArray, FloatAr
     return place, place[: blocks * size].reshape(blocks, size).mean(axis=1)
 
 
-def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing: float) -> tuple[HeightProfile, ...]:
+def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing: float) -> tuple[SweepHeights, ...]:
     """The sweep's heights in bins of the given width; more than one profile where contact was lost in between.
 
     Args:
@@ -131,7 +131,7 @@ def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing
         have = occupied[begin:end]
         edges = np.append(first, len(s))[np.searchsorted(occupied, np.append(wanted, wanted[-1] + 1))]
         profiles.append(
-            HeightProfile(
+            SweepHeights(
                 sweep,
                 float(s[0] + (wanted[0] + 0.5) * spacing - 0.5 * step),
                 spacing,

@@ -10,7 +10,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray, Trace
 from mapping.base import Base
 from mapping.detection.candidates import quiet_bins
-from mapping.detection.height_profile import HeightProfile
+from mapping.detection.height_profile import SweepHeights
 from mapping.detection.matched_filter import Bank, build_bank, filter_sd, smallest_half_width
 from mapping.instrument import Blocks, Noise, NoiseFit, StatedNoise, estimate_noise, fit_noise, perturbed, relative_sd
 
@@ -86,7 +86,7 @@ def floored(noise: Noise, tip_radius: float) -> Noise:
 
 
 def background(
-    profiles: Sequence[HeightProfile],
+    profiles: Sequence[SweepHeights],
     base: Base,
     given: Noise | None,
     stretches: Sequence[Stretch],
@@ -125,7 +125,7 @@ def background(
     return Background(level, banks, {spacing: _uncertainty(fit, bank) for spacing, bank in banks.items()})
 
 
-def _likely(profile: HeightProfile, noise: Noise, drift: int) -> BoolArray:
+def _likely(profile: SweepHeights, noise: Noise, drift: int) -> BoolArray:
     """(n,) False where a bin is too far off a known base for noise: pieces too short for any filter hide much."""
     if drift:
         return np.ones(len(profile.height), dtype=bool)
@@ -134,7 +134,7 @@ def _likely(profile: HeightProfile, noise: Noise, drift: int) -> BoolArray:
 
 
 def _banks(
-    profiles: Sequence[HeightProfile], noise: Noise, tip_radius: float, largest: float, drift: int
+    profiles: Sequence[SweepHeights], noise: Noise, tip_radius: float, largest: float, drift: int
 ) -> dict[float, Bank]:
     """Filters for the profiles of each width of bins."""
     banks = {}
@@ -146,7 +146,7 @@ def _banks(
 
 
 def _fit(
-    profiles: Sequence[HeightProfile],
+    profiles: Sequence[SweepHeights],
     quiet: Sequence[BoolArray],
     stretches: Sequence[Stretch],
     start: Noise,
@@ -165,7 +165,7 @@ def _fit(
 
 
 def _raw_blocks(
-    stretches: Sequence[Stretch], profiles: Sequence[HeightProfile], quiet: Sequence[BoolArray], size: int
+    stretches: Sequence[Stretch], profiles: Sequence[SweepHeights], quiet: Sequence[BoolArray], size: int
 ) -> Blocks:
     """Means over `size` samples; NaN where a profile is not quiet."""
     values, steps = [], []
@@ -187,7 +187,7 @@ def _raw_blocks(
     return Blocks(np.concatenate(values), np.concatenate(steps), float(size))
 
 
-def _is_quiet(s: FloatArray, sweep: int, profiles: Sequence[HeightProfile], quiet: Sequence[BoolArray]) -> BoolArray:
+def _is_quiet(s: FloatArray, sweep: int, profiles: Sequence[SweepHeights], quiet: Sequence[BoolArray]) -> BoolArray:
     """True where a profile of the sweep covers the arclengths s (N,) and shows nothing there."""
     result = np.zeros(len(s), dtype=bool)
     for profile, keep in zip(profiles, quiet, strict=True):
@@ -198,7 +198,7 @@ def _is_quiet(s: FloatArray, sweep: int, profiles: Sequence[HeightProfile], quie
     return result
 
 
-def _profile_blocks(profile: HeightProfile, keep: BoolArray) -> Blocks:
+def _profile_blocks(profile: SweepHeights, keep: BoolArray) -> Blocks:
     steps = np.full(len(keep), profile.spacing)
     steps[0] = -profile.spacing
     return Blocks(np.where(keep, profile.height, np.nan), steps, profile.samples)
@@ -212,7 +212,7 @@ def _uncertainty(fit: NoiseFit, bank: Bank) -> float:
     return relative_sd(fit, np.log(np.array(others) / own) / 0.1)
 
 
-def _robust(profiles: Sequence[HeightProfile], quiet: Sequence[BoolArray], first: Noise) -> Noise:
+def _robust(profiles: Sequence[SweepHeights], quiet: Sequence[BoolArray], first: Noise) -> Noise:
     """Noise of the profiles' quiet bins by robust statistics; the white level of single samples."""
     heights, places, offset = [], [], 0.0
     for profile, keep in zip(profiles, quiet, strict=True):

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapping.inference.families import Problem, Surroundings, spot_problem, with_free_tip
-from mapping.inference.likelihood import Target
+from mapping.inference.families import PosteriorProblem, Surroundings, spot_problem, with_free_tip
+from mapping.inference.likelihood import LogPosterior
 from mapping.inference.sampler import find_optima, importance_sample, laplace
 
 
-def log_evidence(problem: Problem, rng: np.random.Generator) -> float:
+def log_evidence(problem: PosteriorProblem, rng: np.random.Generator) -> float:
     """Log of the integral of likelihood and prior over the parameters, by importance sampling.
 
     A prior wider than the data need costs what it should (Occam's factor). Evidences compare between problems that
@@ -22,13 +22,13 @@ def log_evidence(problem: Problem, rng: np.random.Generator) -> float:
     return importance_sample(problem.target, [laplace(problem.target, each) for each in optima], rng).log_evidence
 
 
-def log_evidence_of_nothing(target: Target) -> float:
+def log_evidence_of_nothing(target: LogPosterior) -> float:
     """The same where only the base, and neighbours that the target knows of, left the trace."""
     bare = np.zeros((1, len(target.likelihood.window))) if target.beside is None else target.beside[None]
     return float(target.likelihood.log_density(bare)[0])
 
 
-def better_profile(cap: Problem, around: Surroundings, rng: np.random.Generator) -> Problem | None:
+def better_profile(cap: PosteriorProblem, around: Surroundings, rng: np.random.Generator) -> PosteriorProblem | None:
     """The problem of a bell if it has more evidence than a cap under the noise of the trace, else None.
 
     Args:

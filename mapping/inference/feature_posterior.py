@@ -10,7 +10,7 @@ import numpy as np
 from mapping import EmptyWindowError, Feature, FloatArray, MappingError, Posterior, Trace
 from mapping.base import Base, fit_base
 from mapping.inference.evidence import better_profile, log_evidence_of_nothing
-from mapping.inference.families import Problem, Surroundings, curve_problem, spot_problem, with_free_tip
+from mapping.inference.families import PosteriorProblem, Surroundings, curve_problem, spot_problem, with_free_tip
 from mapping.inference.model_error import account_for_misfit
 from mapping.inference.sampler import (
     TRUSTED_K_HAT,
@@ -43,7 +43,7 @@ class Solution:
         chain: what emcee did, or None if it did not run.
     """
 
-    problem: Problem
+    problem: PosteriorProblem
     posterior: Posterior
     importance: Importance
     chain: Chain | None
@@ -161,7 +161,7 @@ def odds_against_nothing(solution: Solution) -> float:
     return solution.importance.log_evidence - log_evidence_of_nothing(solution.problem.target)
 
 
-def pose_problem(feature: Feature, around: Surroundings) -> Problem:
+def pose_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
     """The posterior density of a feature of any kind that has a closed form."""
     if feature.kind in ("bump", "pit"):
         problem = spot_problem(feature, around)
@@ -173,7 +173,9 @@ def pose_problem(feature: Feature, around: Surroundings) -> Problem:
     return with_free_tip(problem, around.tip_sd) if around.tip_sd > 0.0 else problem
 
 
-def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool = True, adapt: bool = True) -> Solution:
+def solve_problem(
+    problem: PosteriorProblem, rng: np.random.Generator, *, confirm: bool = True, adapt: bool = True
+) -> Solution:
     """Optimum, misfit (unless `adapt` is False: the noise is known), importance sampling, and emcee where needed."""
     optima = find_optima(problem.target, problem.beginnings)
     if adapt:
@@ -187,7 +189,7 @@ def solve_problem(problem: Problem, rng: np.random.Generator, *, confirm: bool =
     return Solution(problem, _from_chain(problem, fast, chain, rng), fast, chain)
 
 
-def _starts(problem: Problem, fast: Importance, rng: np.random.Generator, walkers: int) -> FloatArray:
+def _starts(problem: PosteriorProblem, fast: Importance, rng: np.random.Generator, walkers: int) -> FloatArray:
     """Walkers at weighted draws, pulled apart a little so that no two coincide."""
     target = problem.target
     starts = fast.draws[resample(rng, fast.weights, walkers)]
@@ -197,7 +199,7 @@ def _starts(problem: Problem, fast: Importance, rng: np.random.Generator, walker
     return np.where(sound[:, None], moved, starts)
 
 
-def _from_importance(problem: Problem, fast: Importance, rng: np.random.Generator) -> Posterior:
+def _from_importance(problem: PosteriorProblem, fast: Importance, rng: np.random.Generator) -> Posterior:
     shape = problem.target.shape
     samples = fast.draws[resample(rng, fast.weights, KEPT_DRAWS)]
     reason = f"importance sampling of the Laplace approximation has k-hat {fast.k_hat:.2f} < {TRUSTED_K_HAT}"
@@ -205,7 +207,7 @@ def _from_importance(problem: Problem, fast: Importance, rng: np.random.Generato
     return Posterior(shape.names, shape.units, samples, nan, nan, "not needed", reason, fast.k_hat, fast.ess)
 
 
-def _from_chain(problem: Problem, fast: Importance, chain: Chain, rng: np.random.Generator) -> Posterior:
+def _from_chain(problem: PosteriorProblem, fast: Importance, chain: Chain, rng: np.random.Generator) -> Posterior:
     shape = problem.target.shape
     samples = chain.samples
     if len(samples) > 4 * KEPT_DRAWS:

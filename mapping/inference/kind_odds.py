@@ -14,9 +14,9 @@ import numpy as np
 from mapping import Feature, MappingError, Trace
 from mapping.base import Base
 from mapping.inference.evidence import log_evidence, log_evidence_of_nothing
-from mapping.inference.families import BrokenRidgeShape, Problem, RidgeShape, Surroundings, bump_shape, spot_at
+from mapping.inference.families import BrokenRidgeShape, PosteriorProblem, RidgeShape, Surroundings, bump_shape, spot_at
 from mapping.inference.feature_posterior import pose_problem
-from mapping.inference.likelihood import Target
+from mapping.inference.likelihood import LogPosterior
 from mapping.inference.sampler import find_optima
 from mapping.instrument import Noise
 
@@ -56,7 +56,7 @@ def bump_or_ridge(
     return log_evidence(ridge, rng) - log_evidence(as_bump(ridge, feature, around), rng)
 
 
-def as_bump(ridge: Problem, feature: Feature, around: Surroundings) -> Problem:
+def as_bump(ridge: PosteriorProblem, feature: Feature, around: Surroundings) -> PosteriorProblem:
     """The problem of a bump on the samples of a ridge's problem."""
     middle = len(feature.axis) // 2
     point, normal = feature.axis[middle], feature.normals[middle]
@@ -67,7 +67,9 @@ def as_bump(ridge: Problem, feature: Feature, around: Surroundings) -> Problem:
     shifts = np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]) * ridge.sizes.half_width
     beginnings = np.tile(shape.start, (len(shifts), 1))
     beginnings[:, :2] += shifts
-    return replace(ridge, target=Target(shape, ridge.target.likelihood, ridge.target.beside), beginnings=beginnings)
+    return replace(
+        ridge, target=LogPosterior(shape, ridge.target.likelihood, ridge.target.beside), beginnings=beginnings
+    )
 
 
 def two_ridges_or_one(
@@ -92,13 +94,13 @@ def two_ridges_or_one(
     return log_evidence(as_broken(whole), rng) - log_evidence(whole, rng)
 
 
-def as_broken(ridge: Problem) -> Problem:
+def as_broken(ridge: PosteriorProblem) -> PosteriorProblem:
     """The problem of two ridges in line on the samples of one ridge's problem."""
     whole = ridge.target.shape
     if not isinstance(whole, RidgeShape) or whole.chart.closed:
         raise MappingError("only an open ridge can be two ridges in line")
     shape = BrokenRidgeShape(whole, ridge.sizes.half_width)
-    target = Target(shape, ridge.target.likelihood, ridge.target.beside)
+    target = LogPosterior(shape, ridge.target.likelihood, ridge.target.beside)
     unbroken = find_optima(ridge.target, ridge.beginnings)[0]
     low, high = unbroken[-4], unbroken[-3]
     # Gaps all along the ridge, and beyond its ends, where they leave it whole.

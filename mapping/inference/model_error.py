@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mapping import FloatArray
-from mapping.inference.families import MODEL_FLOOR, Problem
+from mapping.inference.families import MODEL_FLOOR, PosteriorProblem
 from mapping.inference.likelihood import bin_filter
 from mapping.inference.sampler import find_optima
 from mapping.instrument import Noise
@@ -19,7 +19,9 @@ MOST_OUTLIER_SHARE = 0.03
 EXCESS = 5.0
 
 
-def account_for_misfit(problem: Problem, optima: list[FloatArray]) -> tuple[Problem, list[FloatArray]]:
+def account_for_misfit(
+    problem: PosteriorProblem, optima: list[FloatArray]
+) -> tuple[PosteriorProblem, list[FloatArray]]:
     """The problem with outliers trusted less and, if the residual is still too large, with noise to match.
 
     Lone wild bins get the variance that makes them ordinary (a Gaussian scale mixture, one step of its EM). A
@@ -42,12 +44,12 @@ def account_for_misfit(problem: Problem, optima: list[FloatArray]) -> tuple[Prob
     return problem, find_optima(problem.target, np.array([*optima, *problem.beginnings]))
 
 
-def _residual(problem: Problem, optima: list[FloatArray]) -> FloatArray:
+def _residual(problem: PosteriorProblem, optima: list[FloatArray]) -> FloatArray:
     """(n,) whitened residual at the best optimum."""
     return problem.target.residuals(optima[0][None])[0, : len(problem.window)]
 
 
-def _noise_of_residual(problem: Problem, optimum: FloatArray) -> Noise:
+def _noise_of_residual(problem: PosteriorProblem, optimum: FloatArray) -> Noise:
     """The most likely noise, not below the given one, for the heights that the optimum leaves over."""
     window = problem.window
     over = window.height - problem.target.templates(optimum[None])[0]

@@ -18,7 +18,7 @@ from mapping.inference.families import (
     BumpShape,
     GrooveShape,
     PitShape,
-    Problem,
+    PosteriorProblem,
     RidgeShape,
     StepShape,
     width_at_half_height,
@@ -30,7 +30,7 @@ FEW_DRAWS = 400
 AXIS_POINTS = 64
 
 
-def describe(problem: Problem, posterior: Posterior, base: Base) -> Feature:
+def describe(problem: PosteriorProblem, posterior: Posterior, base: Base) -> Feature:
     """The detected feature with axis, intervals and standard deviation from the draws of its posterior."""
     full, problem = posterior, with_nominal_tip(problem)
     shape = problem.target.shape
@@ -53,7 +53,7 @@ def _warnings(posterior: Posterior) -> tuple[str, ...]:
 
 
 def _describe_spot(
-    problem: Problem, shape: BumpShape | BellShape | PitShape, posterior: Posterior, base: Base
+    problem: PosteriorProblem, shape: BumpShape | BellShape | PitShape, posterior: Posterior, base: Base
 ) -> Feature:
     draws = posterior.samples
     place = np.zeros((1, 2))
@@ -79,7 +79,7 @@ def _describe_spot(
 
 
 def _describe_curve(
-    problem: Problem, shape: RidgeShape | GrooveShape | StepShape, posterior: Posterior, base: Base
+    problem: PosteriorProblem, shape: RidgeShape | GrooveShape | StepShape, posterior: Posterior, base: Base
 ) -> Feature:
     draws, chart, modes = posterior.samples, shape.chart, shape.modes
     has_ends = not chart.closed and not isinstance(shape, StepShape)
@@ -115,7 +115,9 @@ def _describe_curve(
     )
 
 
-def _section(problem: Problem, shape: object, draws: FloatArray) -> tuple[Interval, Interval, dict[str, float], str]:
+def _section(
+    problem: PosteriorProblem, shape: object, draws: FloatArray
+) -> tuple[Interval, Interval, dict[str, float], str]:
     """Height, width, extra values and a remark."""
     if isinstance(shape, StepShape):
         sign = 1.0 if problem.feature.height.median >= 0.0 else -1.0
@@ -142,7 +144,7 @@ def _section(problem: Problem, shape: object, draws: FloatArray) -> tuple[Interv
 
 
 def _length(
-    problem: Problem, shape: RidgeShape | GrooveShape | StepShape, draws: FloatArray, has_ends: bool
+    problem: PosteriorProblem, shape: RidgeShape | GrooveShape | StepShape, draws: FloatArray, has_ends: bool
 ) -> tuple[Interval, list[str]]:
     chart, modes = shape.chart, shape.modes
     some = draws[:: max(1, len(draws) // FEW_DRAWS)]
@@ -167,7 +169,7 @@ UNSEEN = 3.0
 GOES_ON = "the axis goes on beyond what was explored"
 
 
-def explored(problem: Problem, draws: FloatArray) -> tuple[bool, bool]:
+def explored(problem: PosteriorProblem, draws: FloatArray) -> tuple[bool, bool]:
     """For the first and the last end: True if the data say that the axis does not go on.
 
     The best of the draws is moved out to the limit of the end's prior; if the density hardly drops, nothing was

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mapping import KINDS, Anchor, Evidence, Feature, FloatArray, Interval, LeftOut, ModelError, Posterior
+from mapping import KINDS, Anchor, Feature, FloatArray, Interval, LeftOut, ModelError, Posterior, Support
 
 MODEL_SCHEMA = "explore3d/model/1"
 
@@ -115,7 +115,7 @@ def _read_anchor(record: Record | None) -> Anchor | None:
     return Anchor(face=int(record["face"]), **parts)
 
 
-def _evidence_record(evidence: Evidence) -> Record:
+def _evidence_record(evidence: Support) -> Record:
     return {
         "snr": plain(float(evidence.snr)),
         "crossings": int(evidence.crossings),
@@ -124,9 +124,9 @@ def _evidence_record(evidence: Evidence) -> Record:
     }
 
 
-def _read_evidence(record: Record) -> Evidence:
+def _read_evidence(record: Record) -> Support:
     odds = record["log_odds"]
-    return Evidence(
+    return Support(
         snr=_number(record["snr"]),
         crossings=int(record["crossings"]),
         algorithms=tuple(record["algorithms"]),

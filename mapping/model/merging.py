@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import BoolArray, Evidence, Feature, FloatArray, Interval
+from mapping import BoolArray, Feature, FloatArray, Interval, Support
 from mapping.geometry.mesh import arclengths, nearest_on, resample
 from mapping.model.object_model import ObjectModel
 
@@ -107,7 +107,7 @@ def merge_features(known: Feature, new: Feature, source: str) -> Feature:
     better, other = sorted((known, new), key=lambda each: (each.length.censored, each.position_sd))
     precision = 1.0 / np.maximum([better.position_sd, other.position_sd], np.finfo(float).tiny) ** 2
     axis = joined_axis(better.axis, other.axis, float(precision[1] / precision.sum()))
-    evidence = Evidence(
+    evidence = Support(
         float(np.hypot(known.evidence.snr, new.evidence.snr)),
         known.evidence.crossings + new.evidence.crossings,
         tuple(sorted({*known.evidence.algorithms, *new.evidence.algorithms})),

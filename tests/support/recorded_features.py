@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mapping.base.base import Base
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.geometry.templates.shapes import chain_height
 from mapping.instrument.noise import Noise
 from mapping.surface import Surface
@@ -39,7 +39,7 @@ def feature(kind, axis, height, width, crossings=4, sd=0.1e-3):
     axis = np.atleast_2d(np.asarray(axis, dtype=float))
     length = float(np.linalg.norm(axis[-1] - axis[0]))
     sizes = Interval.normal(height, 0.1 * abs(height)), Interval(width, 0.5 * width, 2 * width)
-    evidence = Evidence(50.0, crossings)
+    evidence = Support(50.0, crossings)
     return Feature(kind, axis, np.tile(UP, (len(axis), 1)), *sizes, Interval.normal(length, 1e-3), evidence, True, sd)
 
 

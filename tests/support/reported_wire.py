@@ -4,7 +4,7 @@ import numpy as np
 
 from mapping.base.base import Base
 from mapping.detection.crossing import Crossing
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.geometry.templates.shapes import chain_height
 from mapping.surface import Surface
 from mapping.trace import Trace
@@ -59,7 +59,7 @@ def ridge() -> Feature:
         Interval.normal(HEIGHT, 1e-5),
         Interval.normal(HEIGHT, 3e-5),
         Interval.normal(0.04, 1e-4),
-        Evidence(99.0, 7, (3,)),
+        Support(99.0, 7, (3,)),
         True,
         1e-5,
     )

@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 
 from explore3d.bench.scenes import SAMPLE_SPACING, simulate_noise
-from mapping import Evidence, Feature, FloatArray, Interval, Surface, Trace
+from mapping import Feature, FloatArray, Interval, Support, Surface, Trace
 from mapping.base import Base
 from mapping.geometry.templates import chain_height, groove_height, rim_height, step_height, width_of_cap
 from mapping.inference import Solution, pose_problem, solve_problem
-from mapping.inference.families import Problem, RidgeShape, Surroundings, rounding_of
+from mapping.inference.families import PosteriorProblem, RidgeShape, Surroundings, rounding_of
 from mapping.inference.likelihood import Normal, Prior, Uniform
 from mapping.instrument import Noise
 
@@ -84,7 +84,7 @@ def run_case(case: Case) -> Row:
 
 
 @cache
-def _blank(kind: str) -> Problem:
+def _blank(kind: str) -> PosteriorProblem:
     """The problem of a feature's nominal shape over a bare plate: it holds the prior and the chart."""
     feature, paths = nominal(kind)
     bare = record(paths, np.zeros(sum(len(path) for path in paths)))
@@ -105,7 +105,7 @@ def nominal(kind: str) -> tuple[Feature, list[FloatArray]]:
         Interval.normal(height, 0.05 * abs(height)),
         Interval(width, 0.5 * width, 1.5 * width),
         zero if point else Interval.normal(24e-3, 1e-3),
-        Evidence(50.0, 5),
+        Support(50.0, 5),
         True,
         0.1e-3,
     )
@@ -140,7 +140,7 @@ def record(paths: list[FloatArray], heights: FloatArray) -> Trace:
     return Trace(2e-4 * np.arange(float(len(centers))), centers, sweep, TIP_RADIUS)
 
 
-def _with_priors(problem: Problem) -> Problem:
+def _with_priors(problem: PosteriorProblem) -> PosteriorProblem:
     """The problem under priors that truths can be drawn from: proper, and about the nominal feature."""
     shape: Any = problem.target.shape
     half = problem.sizes.half_width
@@ -161,7 +161,7 @@ def _with_priors(problem: Problem) -> Problem:
     return replace(problem, target=replace(problem.target, shape=replace(shape, priors=priors)))
 
 
-def _true_heights(kind: str, problem: Problem, truth: FloatArray, feet: FloatArray) -> FloatArray:
+def _true_heights(kind: str, problem: PosteriorProblem, truth: FloatArray, feet: FloatArray) -> FloatArray:
     """(N,) heights of the true feature over raw foot points on the plate, from the closed forms, not binned."""
     shape: Any = problem.target.shape
     up = np.tile([0.0, 0.0, 1.0], (len(feet), 1))

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from explore3d.bench.posterior.calibration import plate, record, straight_path
-from mapping import Evidence, Feature, FloatArray, Interval
+from mapping import Feature, FloatArray, Interval, Support
 from mapping.inference import as_broken, as_bump, log_evidence, log_evidence_of_nothing, pose_problem
-from mapping.inference.families import BrokenRidgeShape, BumpShape, Problem, Surroundings
+from mapping.inference.families import BrokenRidgeShape, BumpShape, PosteriorProblem, Surroundings
 from mapping.instrument import Noise
 
 # So low that most of what the priors hold is not plain to see.
@@ -42,7 +42,7 @@ class OddsCase:
 
 
 @cache
-def hypotheses(pair: str) -> tuple[Problem, Problem | None]:
+def hypotheses(pair: str) -> tuple[PosteriorProblem, PosteriorProblem | None]:
     """The two problems on one window; None is nothing but the base."""
     kind = "bump" if pair == "bump or nothing" else "ridge"
     height = LOW_CREST_HEIGHT if pair != "two ridges or one" else 4.0 * LOW_CREST_HEIGHT
@@ -62,7 +62,7 @@ def _feature(kind: str, height: float, half: float) -> Feature:
     axis = np.zeros((1, 3)) if kind == "bump" else np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
     sizes = Interval.normal(height, 0.1 * height), Interval(height, 0.5 * height, 2.0 * height)
     length = Interval.normal(2.0 * half, half)
-    return Feature(kind, axis, np.tile([0.0, 0.0, 1.0], (len(axis), 1)), *sizes, length, Evidence(5.0, 4), True, 0.2e-3)
+    return Feature(kind, axis, np.tile([0.0, 0.0, 1.0], (len(axis), 1)), *sizes, length, Support(5.0, 4), True, 0.2e-3)
 
 
 def run_odds(pair: str, seed: int) -> OddsCase:
@@ -81,7 +81,7 @@ def run_odds(pair: str, seed: int) -> OddsCase:
     return OddsCase(pair, seed, truth, log_evidence(asked, rng) - log_evidence(other, rng))
 
 
-def _place(true: Problem | None, theta: FloatArray) -> FloatArray:
+def _place(true: PosteriorProblem | None, theta: FloatArray) -> FloatArray:
     """(3,) middle of what is there, m."""
     assert true is not None
     shape: Any = true.target.shape
@@ -94,7 +94,7 @@ def _place(true: Problem | None, theta: FloatArray) -> FloatArray:
     return np.asarray(points[0] + ridge.modes.lateral(own[None, : ridge.modes.count], s)[0, 0] * laterals[0])
 
 
-def _begun(problem: Problem, place: FloatArray | None, theta: FloatArray | None) -> Problem:
+def _begun(problem: PosteriorProblem, place: FloatArray | None, theta: FloatArray | None) -> PosteriorProblem:
     """The problem with its search begun near what is there, as it is after a detection, under either hypothesis."""
     shape: Any = problem.target.shape
     start = shape.start.copy()
@@ -115,7 +115,7 @@ def _begun(problem: Problem, place: FloatArray | None, theta: FloatArray | None)
 
 
 def simulated(
-    true: Problem | None, window_of: Problem, rng: np.random.Generator
+    true: PosteriorProblem | None, window_of: PosteriorProblem, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray | None]:
     """(n,) bin heights drawn from the prior of a problem (None: nothing is there) and from the likelihood.
 
@@ -136,7 +136,7 @@ def simulated(
     return heights, theta
 
 
-def _given(problem: Problem, heights: FloatArray) -> Problem:
+def _given(problem: PosteriorProblem, heights: FloatArray) -> PosteriorProblem:
     likelihood = replace(problem.target.likelihood, window=replace(problem.window, height=heights))
     return replace(problem, target=problem.target.with_likelihood(likelihood))
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from explore3d.bench.scenes import SAMPLE_SPACING, simulate_noise
-from mapping import Evidence, Feature, Interval, Surface, Trace
+from mapping import Feature, Interval, Support, Surface, Trace
 from mapping.base import Base
 from mapping.geometry.templates import chain_height
 from mapping.inference import Solution, pose_problem, solve_problem
-from mapping.inference.families import Problem, Surroundings
+from mapping.inference.families import PosteriorProblem, Surroundings
 from mapping.instrument import Noise
 
 TIP_RADIUS = 10e-3
@@ -77,7 +77,7 @@ def crossings(count: int, elsewhere: int = 0) -> tuple[Trace, Base, Feature]:
     ends = axis[:, :] * np.array([0.7, 1.0, 0.0])
     sizes = Interval.normal(DIAMETER, 0.05e-3), Interval(DIAMETER, 0.3e-3, 1e-3), Interval.normal(2 * reach, 5e-3)
     guess = ends if count > 1 else np.zeros((1, 3))
-    feature = Feature("ridge", guess, up[: len(guess)], *sizes, Evidence(50.0, count), True, 0.1e-3)
+    feature = Feature("ridge", guess, up[: len(guess)], *sizes, Support(50.0, count), True, 0.1e-3)
     return trace, base, feature
 
 
@@ -104,7 +104,7 @@ def default_emcee(trace: Trace, base: Base, feature: Feature, steps: int = 2000)
     """emcee as it comes: stretch moves, 32 walkers about the first guess, one template a call, no proposal learnt."""
     import emcee
 
-    problem: Problem = pose_problem(feature, Surroundings(trace, base, APPARATUS_NOISE))
+    problem: PosteriorProblem = pose_problem(feature, Surroundings(trace, base, APPARATUS_NOISE))
     target, rng = problem.target, np.random.default_rng(1)
     start = target.shape.start + target.shape.step * rng.standard_normal((32, len(target.shape.start)))
     start = np.clip(start, target.low, target.high)

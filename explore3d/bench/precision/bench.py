@@ -13,7 +13,7 @@ from time import perf_counter
 from explore3d.bench.precision import inference as bench_inference, runs as bench_runs, surfaces as bench_surfaces
 from explore3d.bench.precision.bench_page import bench_page
 from explore3d.bench.precision.diagram import diagram
-from explore3d.bench.precision.work_precision import Measured, Omission, Point, Stage
+from explore3d.bench.precision.work_precision import LeftOutMethod, Measured, Point, Stage
 from explore3d.report import machine
 from mapping.geometry.mesh import write_whole
 
@@ -33,9 +33,9 @@ def bench(quick: bool, peers: bool, told: Callable[[Measured], None] = lambda _:
         try:
             found = stage.measure(quick, peers)
         except Exception as error:  # the page says which stage failed, and why
-            found = [Omission(stage.name, "all", f"failed: {type(error).__name__}: {error}")]
+            found = [LeftOutMethod(stage.name, "all", f"failed: {type(error).__name__}: {error}")]
         points = tuple(each for each in found if isinstance(each, Point))
-        omissions = tuple(each for each in found if isinstance(each, Omission))
+        omissions = tuple(each for each in found if isinstance(each, LeftOutMethod))
         measured.append(Measured(stage, points, omissions, perf_counter() - begin))
         told(measured[-1])
     return measured

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from explore3d.bench.precision.work_precision import Omission, Point
+from explore3d.bench.precision.work_precision import LeftOutMethod, Point
 from explore3d.report import Html, element, figure, machine_section, page, paragraph, section, table
 
 if TYPE_CHECKING:
@@ -60,5 +60,5 @@ def _row(point: Point) -> tuple[str, ...]:
     return point.method, point.setting, f"{point.seconds:.3g} s", finger, f"{point.error:.2e}", str(point.repeats)
 
 
-def _omission(each: Omission) -> tuple[str, str]:
+def _omission(each: LeftOutMethod) -> tuple[str, str]:
     return each.method, each.reason

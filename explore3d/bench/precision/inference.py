@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from explore3d.bench.posterior import APPARATUS_NOISE, DIAMETER, crossings
-from explore3d.bench.precision.work_precision import Omission, Point, Stage, timed
+from explore3d.bench.precision.work_precision import LeftOutMethod, Point, Stage, timed
 from explore3d.bench.scenes import plate, sweeps, wire
 from mapping import Feature, FloatArray, Trace
 from mapping.base import Base
@@ -17,7 +17,7 @@ from mapping.detection import along_chord, curvature_features, detect
 from mapping.inference import pose_problem, sample_posterior
 from mapping.inference.families import Surroundings
 
-Result = list[Point | Omission]
+Result = list[Point | LeftOutMethod]
 
 WHITE_NOISE = 0.2e-3
 SWEEP_PLACES = np.linspace(-40e-3, 40e-3, 21)
@@ -37,7 +37,7 @@ def detection(quick: bool, peers: bool) -> Result:
             seconds, repeats, errors = timed(partial(_by_threshold, trace, algorithm), 1)
             _add(out, f"the paper's algorithm {algorithm}", name, seconds, repeats, errors)
     why = "contact normals are needed; this trace has positions alone"
-    return [*out, Omission("detection", "the paper's algorithms 1 and 2", why)]
+    return [*out, LeftOutMethod("detection", "the paper's algorithms 1 and 2", why)]
 
 
 def _by_threshold(trace: Trace, algorithm: int) -> list[float]:
@@ -55,7 +55,7 @@ def _add(out: Result, method: str, setting: str, seconds: float, repeats: int, p
     missed, false = len(SWEEP_PLACES) - len(good), len(places) - len(good)
     if missed > 0 or false > 0:
         why = f"{setting}: {max(missed, 0)} of {len(SWEEP_PLACES)} crossings missed, {false} invented"
-        out.append(Omission("detection", method, why))
+        out.append(LeftOutMethod("detection", method, why))
     if good:
         error = float(np.sqrt(np.mean(np.square(good))))
         out.append(Point("detection", method, setting, seconds, error, repeats))
@@ -79,7 +79,9 @@ def posterior(quick: bool, peers: bool) -> Result:
     clocked = [timed(partial(chain, seed), 1) for seed in range(200, 202 if quick else 208)]
     other = np.mean([np.median(run, axis=0) for _, _, run in clocked], axis=0)
     doubt = float((np.abs(reference - other) / spread).max())
-    out: Result = [Omission("posterior", "reference", f"importance sampling and emcee agree within {doubt:.2f} sd")]
+    out: Result = [
+        LeftOutMethod("posterior", "reference", f"importance sampling and emcee agree within {doubt:.2f} sd")
+    ]
 
     def error(samples: FloatArray) -> float:
         return float(np.sqrt(np.mean(((np.median(samples, axis=0) - reference) / spread) ** 2)))
@@ -93,7 +95,7 @@ def posterior(quick: bool, peers: bool) -> Result:
     add("emcee, learnt proposal (ours)", "until converged", float(np.median([t for t, _, _ in clocked])), chains)
     out += _default_emcee(trace, base, feature, (100, 300, 1000) if quick else (100, 300, 1000, 3000, 10_000), error)
     why = "the width of the bins follows from the feature (x_c/30) and is no public setting"
-    return [*out, Omission("posterior", "bins", why)]
+    return [*out, LeftOutMethod("posterior", "bins", why)]
 
 
 def _default_emcee(

@@ -9,10 +9,10 @@ from time import perf_counter
 import numpy as np
 
 from explore3d.bench import STRATEGIES, one_run
-from explore3d.bench.precision.work_precision import Omission, Point, Stage
+from explore3d.bench.precision.work_precision import LeftOutMethod, Point, Stage
 from explore3d.bench.scenes import SCENES
 
-Result = list[Point | Omission]
+Result = list[Point | LeftOutMethod]
 
 SCENE = Path(__file__).parents[3] / "assets" / "scenes" / "wire_on_plate.toml"
 QUICK_STRATEGIES = 2
@@ -31,7 +31,7 @@ def exploration(quick: bool, peers: bool) -> Result:
         ends = [record["end_error"] for record in found]
         if any(end is None for end in ends):
             why = f"the wire was not found in {sum(end is None for end in ends)} of {len(ends)} runs"
-            out.append(Omission("exploration", name, why))
+            out.append(LeftOutMethod("exploration", name, why))
             continue
         computing = [record["planning_seconds"] + record["modelling_seconds"] for record in found]
         finger = float(np.median([record["finger_seconds"] for record in found]))
@@ -39,14 +39,14 @@ def exploration(quick: bool, peers: bool) -> Result:
         out.append(Point("exploration", name, f"{finger:.0f} s of the finger", float(np.median(computing)), error,
                          len(found), finger))  # fmt: skip
     if quick:
-        out.append(Omission("exploration", ", ".join(names[QUICK_STRATEGIES:]), "left out by --quick"))
+        out.append(LeftOutMethod("exploration", ", ".join(names[QUICK_STRATEGIES:]), "left out by --quick"))
     return out
 
 
 def whole_runs(quick: bool, peers: bool) -> Result:
     """`explore3d run` of the paper's wire for ever finer precision: everything, from the scene to the report."""
     if not SCENE.is_file():
-        return [Omission("whole runs", "explore3d run", f"{SCENE} is not there: run it in a checkout")]
+        return [LeftOutMethod("whole runs", "explore3d run", f"{SCENE} is not there: run it in a checkout")]
     from explore3d.jobs import run
     from explore3d.scene import parse_scene
 
@@ -63,12 +63,12 @@ def whole_runs(quick: bool, peers: bool) -> Result:
         ends = [row.end_error for row in analysis.errors if np.isfinite(row.end_error)]
         finger = float(analysis.trace.t[-1] - analysis.trace.t[0])
         if not ends:
-            out.append(Omission("whole runs", "explore3d run", f"{precision}: the wire was not found"))
+            out.append(LeftOutMethod("whole runs", "explore3d run", f"{precision}: the wire was not found"))
             continue
         out.append(Point("whole runs", "explore3d run", f"{precision} asked, {rate}", seconds, max(ends), 1, finger))
     if quick:
         left = ", ".join(each for each in ASKED_PRECISIONS if each != QUICK_PRECISION)
-        out.append(Omission("whole runs", f"asked for {left}, at 5 kHz", "left out by --quick"))
+        out.append(LeftOutMethod("whole runs", f"asked for {left}, at 5 kHz", "left out by --quick"))
     return out
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from explore3d.bench import bump_mesh, by_opencamlib
-from explore3d.bench.precision.work_precision import Omission, Point, Stage, timed
+from explore3d.bench.precision.work_precision import LeftOutMethod, Point, Stage, timed
 from explore3d.bench.scenes import DIAMETER, TIP_RADIUS, sweeps, wire
 from mapping import FloatArray, Surface, Trace
 from mapping.estimate.envelope import Estimate, estimate_surface
@@ -21,7 +21,7 @@ from mapping.geometry.mesh import open3d
 from mapping.geometry.templates import BumpOfRevolution
 from mapping.instrument import Noise
 
-Result = list[Point | Omission]
+Result = list[Point | LeftOutMethod]
 
 STEEPNESS, BUMP_BALL_RADIUS = 15.0, 0.5
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -63,7 +63,7 @@ def traced(quick: bool, peers: bool) -> Result:
     """Heights of the ball's centre over ever finer meshes of the paper's bump."""
     true = dilated(BUMP_PLACES)
     doubt = float(np.abs(true - paralleled(BUMP_PLACES)).max())
-    out: Result = [Omission("traced surface", "reference", f"its two ways of computing agree to {doubt:.0e}")]
+    out: Result = [LeftOutMethod("traced surface", "reference", f"its two ways of computing agree to {doubt:.0e}")]
     start = np.column_stack([BUMP_PLACES, np.full(len(BUMP_PLACES), 0.003), np.full(len(BUMP_PLACES), 4.0)])
     for size in (512, 2048, 8192, 32_768) if quick else (512, 2048, 8192, 32_768, 131_072, 524_288):
         mesh = bump_mesh(size)
@@ -78,8 +78,10 @@ def traced(quick: bool, peers: bool) -> Result:
         for size in (512, 2048, 8192):
             out.append(_opencamlib(size, start, true))
     else:
-        out.append(Omission("traced surface", "OpenCAMLib BallCutter", missing or "peers were not asked for: --peers"))
-    out.append(Omission("traced surface", "every vertex (brute force), above 40 000 triangles", "minutes a point"))
+        out.append(
+            LeftOutMethod("traced surface", "OpenCAMLib BallCutter", missing or "peers were not asked for: --peers")
+        )
+    out.append(LeftOutMethod("traced surface", "every vertex (brute force), above 40 000 triangles", "minutes a point"))
     return out
 
 
@@ -147,7 +149,7 @@ def estimated(quick: bool, peers: bool) -> Result:
             name = f"a sample every {spacing * 1e6:g} um"
             out.append(Point("estimated surface", method, name, seconds, _off_body(inside), repeats))
     why = "reconstruction from tangent balls (gpytoolbox) and Poisson need packages beyond this project's"
-    return [*out, Omission("estimated surface", "Reach for the Spheres, Poisson", why)]
+    return [*out, LeftOutMethod("estimated surface", "Reach for the Spheres, Poisson", why)]
 
 
 def _normals(centers: FloatArray) -> FloatArray:
@@ -177,11 +179,11 @@ def curvature(quick: bool, peers: bool) -> Result:
             out.append(Point("curvature", method, f"{len(clean.vertices)} vertices", seconds, error, repeats))
     found_peer = importlib.util.find_spec("pymeshlab") is not None
     if peers and found_peer:
-        out.append(Omission("curvature", "pymeshlab quadric", "its filter has no option for outward signs here"))
+        out.append(LeftOutMethod("curvature", "pymeshlab quadric", "its filter has no option for outward signs here"))
     else:
         why = "peers were not asked for: --peers" if found_peer else "not installed: pip install explore3d[peers]"
-        out.append(Omission("curvature", "pymeshlab quadric", why))
-    return [*out, Omission("curvature", "CGAL jets, APSS, Open3D", "no wheels, or no curvature")]
+        out.append(LeftOutMethod("curvature", "pymeshlab quadric", why))
+    return [*out, LeftOutMethod("curvature", "CGAL jets, APSS, Open3D", "no wheels, or no curvature")]
 
 
 def _curvature_error(mesh: Surface, found: Any) -> float:

@@ -37,7 +37,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Omission:
+class LeftOutMethod:
     """What a diagram does not show, and why."""
 
     stage: str
@@ -61,7 +61,7 @@ class Stage:
     error: str
     reference: str
     look: str
-    measure: Callable[[bool, bool], list[Point | Omission]]
+    measure: Callable[[bool, bool], list[Point | LeftOutMethod]]
 
 
 def timed(work: Callable[[], Value], repeats: int = 3) -> tuple[float, int, Value]:
@@ -90,5 +90,5 @@ class Measured:
 
     stage: Stage
     points: tuple[Point, ...]
-    omissions: tuple[Omission, ...]
+    omissions: tuple[LeftOutMethod, ...]
     seconds: float

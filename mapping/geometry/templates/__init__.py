@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         CREST_OUTLIER_SDS as CREST_OUTLIER_SDS,
         SHAPE_ERROR as SHAPE_ERROR,
         crest_trace as crest_trace,
-        misfit as misfit,
+        robust_cost as robust_cost,
     )
 
 _PUBLIC = {
@@ -45,6 +45,6 @@ _PUBLIC = {
         "rim_height",
         "step_height",
     ),
-    "small_heights": ("CREST_OUTLIER_SDS", "SHAPE_ERROR", "crest_trace", "misfit"),
+    "small_heights": ("CREST_OUTLIER_SDS", "SHAPE_ERROR", "crest_trace", "robust_cost"),
 }
 doorway(__name__, _PUBLIC)

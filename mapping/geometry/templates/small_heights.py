@@ -21,6 +21,6 @@ def crest_trace(distance: FloatArray, height: float, half_width: float) -> Float
     return np.asarray(height * (1.0 - u**2 if height > 0 else (1.0 - u) ** 2))
 
 
-def misfit(residual: FloatArray, sd: FloatArray, height: float) -> FloatArray:
+def robust_cost(residual: FloatArray, sd: FloatArray, height: float) -> FloatArray:
     """Squares of residuals in standard deviations, none counted as more than an outlier."""
     return np.asarray(np.minimum((residual / np.hypot(sd, SHAPE_ERROR * height)) ** 2, CREST_OUTLIER_SDS**2))

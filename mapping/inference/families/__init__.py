@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from mapping.inference.families.problem import (
         MEETING_REACH as MEETING_REACH,
         MODEL_FLOOR as MODEL_FLOOR,
-        Problem as Problem,
+        PosteriorProblem as PosteriorProblem,
         Surroundings as Surroundings,
         sizes_of as sizes_of,
         touches as touches,
@@ -32,7 +32,7 @@ _PUBLIC = {
     "feature_trace": ("feature_trace",),
     "free_tip": ("with_free_tip", "with_nominal_tip"),
     "hollow": ("GrooveShape", "PitShape"),
-    "problem": ("MEETING_REACH", "MODEL_FLOOR", "Problem", "Surroundings", "sizes_of", "touches"),
+    "problem": ("MEETING_REACH", "MODEL_FLOOR", "PosteriorProblem", "Surroundings", "sizes_of", "touches"),
     "ridge": ("RidgeShape", "rounding_of"),
     "spots": ("bump_shape", "spot_problem"),
     "step": ("StepShape",),

@@ -9,7 +9,7 @@ from mapping.inference.curves import HIGHEST_DEGREE, Chart, CurveModes, chart_al
 from mapping.inference.families.hollow import GrooveShape
 from mapping.inference.families.problem import (
     MEETING_REACH,
-    Problem,
+    PosteriorProblem,
     Sizes,
     Surroundings,
     pose,
@@ -31,7 +31,7 @@ HIGHEST_MODE = 8
 FUTILE_DEGREES = 2
 
 
-def curve_problem(feature: Feature, around: Surroundings) -> Problem:
+def curve_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
     """Pose the posterior of a ridge, groove or step.
 
     The trace decides how freely the axis bends over the base (BIC): few crossings cannot tell a gentle bend from
@@ -42,7 +42,7 @@ def curve_problem(feature: Feature, around: Surroundings) -> Problem:
     course = _chart(axis, normals, feature, sizes, crossings, HIGHEST_DEGREE, around)
     window = window_for(_crest(course, around.trace.tip_radius, sizes), sizes, around)
 
-    def posed(most: int, least: int = 1) -> tuple[Problem, int]:
+    def posed(most: int, least: int = 1) -> tuple[PosteriorProblem, int]:
         line, degree = smooth_on_base(
             axis, normals, sizes.position_sd, most, least, around.base, around.trace.tip_radius, sizes.half_width
         )
@@ -68,7 +68,7 @@ def curve_problem(feature: Feature, around: Surroundings) -> Problem:
     return best
 
 
-def _cost(problem: Problem) -> float:
+def _cost(problem: PosteriorProblem) -> float:
     """Bayesian information criterion at the optimum nearest to the detection (Schwarz 1978), halved."""
     best = find_optima(problem.target, problem.beginnings[:1])[0]
     fit = float(problem.target.likelihood.log_density(problem.target.templates(best[None]))[0])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray
-from mapping.inference.families.problem import Problem
+from mapping.inference.families.problem import PosteriorProblem
 from mapping.inference.likelihood import Normal, Prior, Shape
 
 # A tip is at least this share of its nominal radius.
@@ -64,7 +64,7 @@ class FreeTipShape:
         return other
 
 
-def with_free_tip(problem: Problem, sd: float) -> Problem:
+def with_free_tip(problem: PosteriorProblem, sd: float) -> PosteriorProblem:
     """The problem with the tip's radius as a parameter: Gaussian about the nominal one, sd in m."""
     felt: Any = problem.target.shape
     prior = Normal(felt.tip_radius, sd, SMALLEST_TIP_SHARE * felt.tip_radius)
@@ -73,7 +73,7 @@ def with_free_tip(problem: Problem, sd: float) -> Problem:
     return replace(problem, target=target, beginnings=np.hstack([problem.beginnings, nominal]))
 
 
-def with_nominal_tip(problem: Problem) -> Problem:
+def with_nominal_tip(problem: PosteriorProblem) -> PosteriorProblem:
     """The problem as the nominal tip feels it; the same if the tip was not free."""
     shape = problem.target.shape
     if not isinstance(shape, FreeTipShape):

@@ -1,4 +1,4 @@
-"""Problem: one feature's posterior, posed: what is known beforehand, which samples matter, and the density."""
+"""PosteriorProblem: one feature's posterior, posed: what is known beforehand, which samples matter, and the density."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from mapping.geometry.templates import contact_half_width, radius_of_cap
 from mapping.inference.families.feature_trace import feature_trace
 from mapping.inference.likelihood import (
     Likelihood,
+    LogPosterior,
     Nuisance,
     Shape,
-    Target,
     Window,
     bin_samples,
     build_likelihood,
@@ -75,7 +75,7 @@ class Surroundings:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class PosteriorProblem:
     """A posed posterior.
 
     Args:
@@ -89,7 +89,7 @@ class Problem:
 
     feature: Feature
     sizes: Sizes
-    target: Target
+    target: LogPosterior
     noise: Noise
     nuisance: Nuisance
     beginnings: FloatArray
@@ -98,7 +98,7 @@ class Problem:
     def window(self) -> Window:
         return self.target.likelihood.window
 
-    def under(self, noise: Noise, inflation: FloatArray | None = None) -> Problem:
+    def under(self, noise: Noise, inflation: FloatArray | None = None) -> PosteriorProblem:
         """The same problem under another noise, or with some bins trusted less."""
         likelihood = _likelihood(self.window, noise, self.nuisance, self.sizes.height, inflation)
         return replace(self, noise=noise, target=self.target.with_likelihood(likelihood))
@@ -142,7 +142,7 @@ def window_for(crest: FloatArray, sizes: Sizes, around: Surroundings) -> Window:
 
 def pose(
     feature: Feature, sizes: Sizes, shape: Shape, window: Window, around: Surroundings, beginnings: FloatArray
-) -> Problem:
+) -> PosteriorProblem:
     """Join a shape, its window and the noise to a posterior density."""
     vague = 3.0 * max(sizes.height, around.noise.sd)
     bend = 0.0 if around.base.kind == "mesh" else 0.3 * sizes.height
@@ -154,7 +154,7 @@ def pose(
         traces = [feature_trace(other, window.feet, window.normals, around.trace.tip_radius) for other in near]
         highest, lowest = np.max(traces, axis=0), np.min(traces, axis=0)
         beside = np.where(highest > 0.0, highest, lowest)
-    return Problem(feature, sizes, Target(shape, likelihood, beside), around.noise, nuisance, beginnings)
+    return PosteriorProblem(feature, sizes, LogPosterior(shape, likelihood, beside), around.noise, nuisance, beginnings)
 
 
 def _likelihood(

@@ -8,7 +8,7 @@ from mapping import Feature, FloatArray
 from mapping.inference.families.bell import bell_shape
 from mapping.inference.families.bump import BumpShape, Spot, spot_at
 from mapping.inference.families.hollow import PitShape
-from mapping.inference.families.problem import Problem, Sizes, Surroundings, pose, sizes_of, window_for
+from mapping.inference.families.problem import PosteriorProblem, Sizes, Surroundings, pose, sizes_of, window_for
 from mapping.inference.likelihood import Prior, Shape, StudentT, Uniform, Window
 
 # A position across the sweeps is asked for only if they spread over this share of the disturbance.
@@ -17,7 +17,7 @@ SPREAD = 0.1
 RADIUS_SCALE = 1.0
 
 
-def spot_problem(feature: Feature, around: Surroundings, *, bell: bool = False) -> Problem:
+def spot_problem(feature: Feature, around: Surroundings, *, bell: bool = False) -> PosteriorProblem:
     """Pose the posterior of a bump (a cap, or with `bell` a bump with a skirt) or a pit."""
     tip = around.trace.tip_radius
     sizes = sizes_of(feature, tip)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         StudentT as StudentT,
         Uniform as Uniform,
     )
-    from mapping.inference.likelihood.target import Shape as Shape, Target as Target
+    from mapping.inference.likelihood.target import LogPosterior as LogPosterior, Shape as Shape
     from mapping.inference.likelihood.window import (
         Window as Window,
         bin_samples as bin_samples,
@@ -30,7 +30,7 @@ _PUBLIC = {
     "bin_filter": ("bin_filter",),
     "gaussian": ("Likelihood", "Nuisance", "build_likelihood"),
     "priors": ("Normal", "Prior", "StudentT", "Uniform"),
-    "target": ("Shape", "Target"),
+    "target": ("LogPosterior", "Shape"),
     "window": ("Window", "bin_samples", "distance_along", "gather", "samples_near"),
 }
 doorway(__name__, _PUBLIC)

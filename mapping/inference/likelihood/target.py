@@ -1,4 +1,4 @@
-"""Target: the posterior density of one shape's parameters given a window of the trace."""
+"""LogPosterior: the log posterior density of one shape's parameters given a window of the trace."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Shape(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class LogPosterior:
     """Unnormalised log posterior, vectorised over parameter vectors.
 
     Args:
@@ -96,6 +96,6 @@ class Target:
     def _data_residuals(self, theta: FloatArray) -> FloatArray:
         return self.likelihood.residuals(self.templates(theta))
 
-    def with_likelihood(self, likelihood: Likelihood) -> Target:
+    def with_likelihood(self, likelihood: Likelihood) -> LogPosterior:
         """The same shape under another noise."""
         return replace(self, likelihood=likelihood)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray, SamplerError
-from mapping.inference.likelihood import Target
+from mapping.inference.likelihood import LogPosterior
 from mapping.inference.sampler.proposal import DEGREES, Proposal
 
 # Walkers at least and at most; so many bins a step cost no more than what emcee does beside them, whoever sees them.
@@ -54,7 +54,7 @@ def walkers_for(bins: int, parameters: int) -> int:
 
 
 def sample_ensemble(
-    target: Target,
+    target: LogPosterior,
     starts: FloatArray,
     rng: np.random.Generator,
     *,

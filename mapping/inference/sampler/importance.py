@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import FloatArray
-from mapping.inference.likelihood import Target
+from mapping.inference.likelihood import LogPosterior
 from mapping.inference.sampler.laplace import Laplace
 from mapping.inference.sampler.proposal import DEGREES, Proposal, root_of
 from mapping.inference.sampler.psis import effective_size, smooth_weights
@@ -45,7 +45,7 @@ class Importance:
     log_evidence: float
 
 
-def importance_sample(target: Target, modes: Sequence[Laplace], rng: np.random.Generator) -> Importance:
+def importance_sample(target: LogPosterior, modes: Sequence[Laplace], rng: np.random.Generator) -> Importance:
     """Draws of the target, the proposal adapted from Laplace approximations by its own weighted draws.
 
     While few draws carry the weight it is tempered, so that the proposal grows towards the target instead of
@@ -80,7 +80,9 @@ def _first_proposal(modes: Sequence[Laplace]) -> Proposal:
     return Proposal(shares, means, roots)
 
 
-def _weigh(target: Target, proposal: Proposal, rng: np.random.Generator, size: int) -> tuple[FloatArray, FloatArray]:
+def _weigh(
+    target: LogPosterior, proposal: Proposal, rng: np.random.Generator, size: int
+) -> tuple[FloatArray, FloatArray]:
     count = proposal.means.shape[1]
     draws = proposal.draw(rng.random(size), rng.standard_normal((size, count)), rng.chisquare(DEGREES, size))
     return draws, target.log_density(draws) - proposal.log_density(draws)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import FloatArray
-from mapping.inference.likelihood import Target
+from mapping.inference.likelihood import LogPosterior
 
 ITERATIONS = 60
 # Gain in chi-square of a step after which the optimum is known: a thirtieth of a standard deviation.
@@ -33,7 +33,7 @@ class Laplace:
     log_density: float
 
 
-def find_optima(target: Target, starts: FloatArray) -> list[FloatArray]:
+def find_optima(target: LogPosterior, starts: FloatArray) -> list[FloatArray]:
     """Distinct optima (P,) reached by Levenberg-Marquardt from the starts (M, P), best first.
 
     Optima that hold a negligible share of the probability, or lie within a fraction of a step of a better one, are
@@ -49,7 +49,7 @@ def find_optima(target: Target, starts: FloatArray) -> list[FloatArray]:
     return kept or [starts[0]]
 
 
-def laplace(target: Target, optimum: FloatArray) -> Laplace:
+def laplace(target: LogPosterior, optimum: FloatArray) -> Laplace:
     """The Gaussian at an optimum; differences are taken over a good part of a standard deviation.
 
     A posterior with kinks (an end between two sweeps) has no useful curvature at a point: along each parameter whose
@@ -64,7 +64,7 @@ def laplace(target: Target, optimum: FloatArray) -> Laplace:
     return Laplace(optimum, covariance, float(target.log_density(optimum[None])[0]))
 
 
-def _descend(target: Target, start: FloatArray) -> FloatArray:
+def _descend(target: LogPosterior, start: FloatArray) -> FloatArray:
     low, high, scale = target.low, target.high, target.shape.step
     theta = np.clip(start, low, high)
     damping, (residual, jacobian) = 1e-3, _jacobian(target, theta, 0.1 * scale)
@@ -93,7 +93,7 @@ def _descend(target: Target, start: FloatArray) -> FloatArray:
     return np.asarray(theta)
 
 
-def _jacobian(target: Target, theta: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _jacobian(target: LogPosterior, theta: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Residuals (m,) and their central differences (m, P), one-sided at a bound; a single batch of templates."""
     count = len(theta)
     up = np.minimum(theta + step, target.high)
@@ -106,21 +106,21 @@ def _jacobian(target: Target, theta: FloatArray, step: FloatArray) -> tuple[Floa
     return residuals[-1], ((residuals[:count] - residuals[count : 2 * count]) / span[:, None]).T
 
 
-def _widths(target: Target) -> FloatArray:
+def _widths(target: LogPosterior) -> FloatArray:
     """(P,) standard deviations of the priors where bounded, else generous multiples of the step."""
     with np.errstate(invalid="ignore"):
         width = (target.high - target.low) / np.sqrt(12.0)
     return np.asarray(np.where(np.isfinite(width), width, 1e3 * target.shape.step))
 
 
-def _inverse(hessian: FloatArray, target: Target) -> FloatArray:
+def _inverse(hessian: FloatArray, target: LogPosterior) -> FloatArray:
     """Inverse with the priors' widths as the least curvature, scaled so that units do not matter."""
     width = _widths(target)
     scaled = hessian * np.outer(width, width) + np.eye(len(width))
     return np.asarray(np.linalg.inv(scaled) * np.outer(width, width))
 
 
-def _scanned(target: Target, optimum: FloatArray, covariance: FloatArray) -> FloatArray:
+def _scanned(target: LogPosterior, optimum: FloatArray, covariance: FloatArray) -> FloatArray:
     """The covariance with rows rescaled where a scan along a parameter finds another conditional spread."""
     precision = np.linalg.inv(covariance)
     conditional = 1.0 / np.sqrt(np.diag(precision))

@@ -11,13 +11,13 @@ import pytest
 
 from explore3d.analysis.forecast import forecast, worst_errors
 from explore3d.analysis.truth import Comparison, TrueFeature
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.instrument.noise import Noise
 from mapping.trace import Trace
 
 RIDGE = Feature(
     "ridge", np.array([[0.0, 0, 0], [0.01, 0, 0]]), np.tile([0.0, 0, 1], (2, 1)), Interval.normal(1e-3, 1e-5),
-    Interval(1e-3, 5e-4, 2e-3), Interval.normal(0.01, 1e-4), Evidence(50.0, 5), True, 3e-5,
+    Interval(1e-3, 5e-4, 2e-3), Interval.normal(0.01, 1e-4), Support(50.0, 5), True, 3e-5,
 )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import pytest
 from explore3d.analysis.arviz_export import arviz_export
 from explore3d.pictures.corner import corner_picture
 from mapping.base.base import Base
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.model.object_model import ObjectModel
 from mapping.posterior import Posterior
 from mapping.surface import Surface
@@ -18,7 +18,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def bump(posterior):
     sizes = Interval.normal(0.5e-3, 1e-5), Interval.normal(1e-3, 1e-4), Interval(0.0, 0.0, 0.0)
-    return Feature("bump", np.zeros((1, 3)), UP[None], *sizes, Evidence(30.0, 4), True, 1e-5, posterior)
+    return Feature("bump", np.zeros((1, 3)), UP[None], *sizes, Support(30.0, 4), True, 1e-5, posterior)
 
 
 def model():

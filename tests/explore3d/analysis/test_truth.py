@@ -5,7 +5,7 @@ import pytest
 
 from explore3d.analysis.truth import TrueFeature, compare
 from mapping.base.base import Base
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.model.object_model import ObjectModel
 from mapping.surface import Surface
 
@@ -23,7 +23,7 @@ def found(kind: str, axis: list[list[float]], height: float = 6.5e-4) -> Feature
         Interval.normal(height, 2e-5),
         Interval.normal(6e-4, 2e-5),
         Interval.normal(length, 2e-4),
-        Evidence(20.0, 9),
+        Support(20.0, 9),
         True,
         1e-5,
     )

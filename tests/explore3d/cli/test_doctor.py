@@ -36,12 +36,10 @@ def test_a_package_that_does_not_load_is_missing(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_missing_system_library_of_open3d_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    from mapping.geometry.mesh import open3d_import
-
     def fails() -> None:
         raise ImportError("libGL.so.1: cannot open shared object file")
 
-    monkeypatch.setattr(open3d_import, "open3d", fails)
+    monkeypatch.setattr(doctor, "open3d", fails)
     check = by_subject(monkeypatch, "open3d")
     assert check.state == "missing"
     assert "libGL.so.1" in check.found

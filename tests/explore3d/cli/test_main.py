@@ -144,12 +144,11 @@ def _length(path: list[list[float]]) -> float:
 
 
 def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    import explore3d.analyze
-    import explore3d.report.findings
+    from explore3d import jobs, report
 
     calls: list[tuple[tuple[object, ...], dict[str, object]]] = []
-    monkeypatch.setattr(explore3d.analyze, "analyze", lambda *given, **options: calls.append((given, options)))
-    monkeypatch.setattr(explore3d.report.findings, "show", lambda *given: None)
+    monkeypatch.setattr(jobs, "analyze", lambda *given, **options: calls.append((given, options)))
+    monkeypatch.setattr(report, "show", lambda *given: None)
     options = ["--tip-radius", "2 um", "--units", "mm", "--columns", "x=1, z=2", "--frame", "0 mm, 1 mm,5 mm"]
     options += ["--model", "body.ply", "--model-units", "mm", "--force", "curvature"]
     assert explore3d_main(monkeypatch, "analyze", "a.csv", "b.mcap", "--out", tmp_path, *options) == 0

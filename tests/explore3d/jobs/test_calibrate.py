@@ -10,7 +10,7 @@ import trimesh
 
 from explore3d.jobs.calibrate import calibrate, selftest, write_profile
 from explore3d.scene.scene import parse_scene
-from explore3d.scene.settings import Settings
+from explore3d.scene.settings import AnalysisSettings
 
 SCENE = """
 schema = "explore3d/scene/1"
@@ -60,9 +60,9 @@ def test_the_simulated_tip_is_found_within_its_interval_and_written_as_a_profile
     assert named.tip.radius == profile.tip.radius
     resolved = parse_scene(named.resolved, tmp_path / "resolved.toml")
     assert resolved.tip.radius == profile.tip.radius
-    assert Settings.of(named).tip_sd == Settings.of(resolved).tip_sd == profile.tip.radius_sd > 0.0
+    assert AnalysisSettings.of(named).tip_sd == AnalysisSettings.of(resolved).tip_sd == profile.tip.radius_sd > 0.0
     sure = text.replace('profile = "tip.toml"', 'profile = "tip.toml"\nradius_sd = 0')
-    assert Settings.of(parse_scene(sure, tmp_path / "sure.toml")).tip_sd == 0.0
+    assert AnalysisSettings.of(parse_scene(sure, tmp_path / "sure.toml")).tip_sd == 0.0
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import pytest
 from reported_wire import AXIS, BASE, HEIGHT, TIP, crossing, ridge, sweeps
 
 from explore3d.pictures.cross_section import cross_section
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.geometry.templates.shapes import cap_height, step_height
 from mapping.trace import Trace
 
@@ -29,7 +29,7 @@ def test_without_a_crossing_the_nearest_sweep_is_taken() -> None:
 
 def test_a_feature_that_no_sweep_came_near_has_no_section() -> None:
     size = Interval.normal(1e-4, 1e-6)
-    far = Feature("bump", np.array([[0.0, 0.5, 0.0]]), UP[None], size, size, size, Evidence(9.0, 1), True, 1e-5)
+    far = Feature("bump", np.array([[0.0, 0.5, 0.0]]), UP[None], size, size, size, Support(9.0, 1), True, 1e-5)
     assert cross_section(far, sweeps(), BASE, []) is None
 
 
@@ -39,7 +39,7 @@ def test_a_step_is_turned_and_shifted_to_the_side_that_is_high(side: float) -> N
     z = TIP - 2e-4 + step_height(side * y, 5e-4, TIP)
     trace = Trace(np.arange(float(len(y))), np.column_stack([0 * y, y, z]), np.zeros(len(y), dtype=int), TIP)
     size = Interval.normal(5e-4, 1e-6)
-    step = Feature("step", AXIS, np.tile(UP, (2, 1)), size, Interval(0, 0, 0), size, Evidence(9.0, 1), True, 1e-5)
+    step = Feature("step", AXIS, np.tile(UP, (2, 1)), size, Interval(0, 0, 0), size, Support(9.0, 1), True, 1e-5)
     section = cross_section(step, trace, BASE, [])
     assert section is not None
     # Linear interpolation between samples cuts the kink by at most its slope times a quarter of their spacing.

@@ -14,7 +14,7 @@ from explore3d.report.pictures import Pictures
 from explore3d.report.report import report_page, write_report
 from mapping.base.base import Base
 from mapping.detection.detect import Detections
-from mapping.feature import Evidence, Feature, Interval, LeftOut
+from mapping.feature import Feature, Interval, LeftOut, Support
 from mapping.geometry.templates.shapes import chain_height
 from mapping.instrument.noise import Noise
 from mapping.model.object_model import ObjectModel
@@ -110,7 +110,7 @@ def test_a_profile_is_drawn_as_a_profile(tmp_path: Path) -> None:
         Interval.normal(1e-6, 1e-8),
         Interval.normal(4e-6, 1e-7),
         Interval(0, 0, 0),
-        Evidence(50.0, 1, (3,)),
+        Support(50.0, 1, (3,)),
         False,
         1e-8,
     )

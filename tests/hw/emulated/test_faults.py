@@ -19,7 +19,7 @@ from hw.emulated.pty_server import PtyServer
 from hw.emulated.touched_body import TouchedBody
 from hw.errors import FingerError
 from hw.framing import Lines
-from hw.grbl.frame import Frame
+from hw.grbl.frame import StageFrame
 from hw.link import Link
 from hw.move import Move
 from hw.probing.grbl_finger import GrblFinger
@@ -29,7 +29,7 @@ from hw.sensors.optoforce import OptoForce
 from mapping.surface import Surface
 
 R, STIFFNESS, LIMIT = 0.005, 1e4, 4.0
-FRAME = Frame.of((-0.15, -0.15, -0.05))
+FRAME = StageFrame.of((-0.15, -0.15, -0.05))
 DOWN = np.array([0.0, 0.0, -1.0])
 # Connecting, sweeping, giving up and leaving must all be over by then, s, on a host that is busy otherwise
 LONGEST = 30.0

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hw.errors import StoppedError
-from hw.grbl.frame import Frame
+from hw.grbl.frame import StageFrame
 from hw.grbl.guarded_stage import GuardedStage
 
 OVER_TRAVEL, STIFFNESS = 2e-4, 1e4
@@ -63,7 +63,7 @@ class Spring:
 def stage_with(late: float) -> GuardedStage:
     controller: Any = SwiftController()
     sensor: Any = Spring(controller, late)
-    return GuardedStage(controller, Frame.of(), BOUNDS, 0.03, OVER_TRAVEL, sensor)
+    return GuardedStage(controller, StageFrame.of(), BOUNDS, 0.03, OVER_TRAVEL, sensor)
 
 
 def test_contact_is_felt_though_the_stage_is_always_there_first() -> None:

@@ -10,7 +10,7 @@ from hw.emulated.grbl import GrblEmulator
 from hw.emulated.pty_server import PtyServer
 from hw.emulated.touched_body import TouchedBody
 from hw.grbl.controller import GrblController, Report
-from hw.grbl.frame import Frame
+from hw.grbl.frame import StageFrame
 from hw.grbl.guarded_stage import GuardedStage
 from hw.grbl.protocol import parse_status
 from hw.probing.fusion import estimate_delay, known_at, positions_at, prompt, rigid_centers
@@ -91,7 +91,7 @@ def test_on_one_side_the_spring_pulls_along_its_normal() -> None:
 
 @pytest.mark.slow
 def test_a_latency_put_into_the_emulated_sensor_is_measured_through_the_ports() -> None:
-    frame, found = Frame.of((-0.15, -0.15, -0.05)), []
+    frame, found = StageFrame.of((-0.15, -0.15, -0.05)), []
     corners = 0.02 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     body = TouchedBody(Surface(corners, [[0, 1, 2], [0, 2, 3]]), 0.005, frame, 1e4)
     for latency in (0.0, 0.06):

@@ -21,7 +21,7 @@ from hw.errors import FingerError, LinkError, StoppedError
 from hw.finger import Finger
 from hw.grbl import protocol as protocol
 from hw.grbl.controller import GrblController
-from hw.grbl.frame import Frame
+from hw.grbl.frame import StageFrame
 from hw.move import Move
 from hw.probing.grbl_finger import GrblFinger
 from hw.probing.peck import Peck
@@ -33,7 +33,7 @@ from mapping.surface import Surface
 from mapping.trace import Trace
 
 R = 0.005
-FRAME = Frame.of((-0.15, -0.15, -0.05), (0.0, 0.0, 0.4))
+FRAME = StageFrame.of((-0.15, -0.15, -0.05), (0.0, 0.0, 0.4))
 DOWN = np.array([0.0, 0.0, -1.0])
 PECK = Peck(step=1e-3, clearance=5e-4, speed=0.02, stroke=R)
 

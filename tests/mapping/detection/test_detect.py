@@ -13,7 +13,7 @@ from mapping.base.base import Base
 from mapping.detection.candidates import find_disturbances
 from mapping.detection.detect import Detections, detect
 from mapping.detection.false_alarms import _intensity, false_alarm_rate, threshold_for
-from mapping.detection.height_profile import HeightProfile, height_profiles
+from mapping.detection.height_profile import SweepHeights, height_profiles
 from mapping.detection.matched_filter import build_bank, filter_sd
 from mapping.errors import DetectionError
 from mapping.geometry.templates.shapes import cap_height, groove_height, step_height
@@ -117,12 +117,12 @@ def test_a_reversed_sweep_tells_the_same():
     np.testing.assert_allclose(a.tangent, -b.tangent, atol=1e-2)
 
 
-def bare_profile(samples: np.ndarray, rng: np.random.Generator) -> HeightProfile:
+def bare_profile(samples: np.ndarray, rng: np.random.Generator) -> SweepHeights:
     """White noise of 0.2 mm in bins of 0.1 mm with so many samples each."""
     count = len(samples)
     first = np.concatenate([[0], np.cumsum(samples)]).round().astype(np.int64)
     height = rng.standard_normal(count) * 2e-4 / np.sqrt(samples)
-    return HeightProfile(
+    return SweepHeights(
         0, 0.0, 1e-4, height, float(samples.mean()), first, np.arange(float(count)), np.zeros((count, 3))
     )
 

@@ -25,7 +25,7 @@ from recorded_features import (
 
 from explore3d.bench.posterior.calibration import Case, campaign, noise_of, run_case
 from explore3d.bench.posterior.calibration_verdicts import verdicts
-from mapping.feature import Evidence
+from mapping.feature import Support
 from mapping.geometry.templates.shapes import cap_height, step_height
 from mapping.inference.families.problem import Surroundings
 from mapping.inference.feature_posterior import pose_problem, refine, sample_posterior
@@ -106,7 +106,7 @@ def test_ten_million_samples_are_read_in_seconds():
     count = 10_000_000 - len(near)
     far = np.column_stack([np.linspace(0.05, 0.09, count), np.full(count, 0.05), np.full(count, TIP)])
     whole = Trace.concatenate([near, Trace(np.arange(count) * 1e-3, far, np.full(count, 99), TIP)])
-    guess = replace(GUESS, evidence=Evidence(50.0, 4))
+    guess = replace(GUESS, evidence=Support(50.0, 4))
     begin = time.perf_counter()
     found = refine(guess, whole, np.random.default_rng(0), base=plate(), noise=WHITE, confirm=False)
     assert len(whole) == 10_000_000 and time.perf_counter() - begin < 20.0

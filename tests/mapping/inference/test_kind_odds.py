@@ -9,7 +9,7 @@ import pytest
 
 from explore3d.bench.posterior.odds import OddsCase, reliability, run_odds
 from mapping.base.base import Base
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.geometry.templates.shapes import chain_height
 from mapping.inference.feature_posterior import odds_against_nothing, solve
 from mapping.inference.kind_odds import bump_or_ridge, two_ridges_or_one
@@ -36,7 +36,7 @@ def setting(kind):
     corners = np.array([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]])
     axis = np.zeros((1, 3)) if kind == "bump" else np.array([[-4e-3, 0.1e-3, 0], [4e-3, 0, 0]])
     sizes = Interval.normal(D, 0.05e-3), Interval(D, 0.5 * D, 2 * D), Interval.normal(8e-3, 2e-3)
-    evidence = Evidence(50.0, 3)
+    evidence = Support(50.0, 3)
     feature = Feature(kind, axis, np.tile(UP, (len(axis), 1)), *sizes, evidence, True, 0.1e-3)
     return feature, Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
 
@@ -74,7 +74,7 @@ def test_two_ridges_in_line_are_told_from_one():
     whole = np.array([[-10e-3, 0, 0], [10e-3, 0, 0]]) + lift
     feature, base = setting("ridge")
     axis = np.array([[-9e-3, 0.1e-3, 0], [9e-3, 0, 0]])
-    feature = replace(feature, axis=axis, evidence=Evidence(50.0, 5))
+    feature = replace(feature, axis=axis, evidence=Support(50.0, 5))
     odds = []
     for chains in (parts, [whole]):
         height = np.max([chain_height(feet, up, chain, D / 2, TIP) for chain in chains], axis=0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mapping.base.base import Base
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.model.merging import associate, merge_intervals, merge_model
 from mapping.model.object_model import ObjectModel
 from mapping.surface import Surface
@@ -25,7 +25,7 @@ def ridge(y, sd=20e-6, x=(-0.02, 0.02), height=0.65e-3, censored=False):
     axis = np.array([[x[0], y, 0], [x[1], y, 0]])
     length = replace(Interval.normal(x[1] - x[0], 0.1e-3), censored=censored)
     sizes = Interval.normal(height, 10e-6), Interval.normal(height, 100e-6), length
-    return Feature("ridge", axis, np.tile(UP, (2, 1)), *sizes, Evidence(30.0, 4, (3,)), True, sd)
+    return Feature("ridge", axis, np.tile(UP, (2, 1)), *sizes, Support(30.0, 4, (3,)), True, sd)
 
 
 def test_the_same_ridge_is_updated_and_another_one_is_added():

@@ -10,7 +10,7 @@ import pytest
 from mapping.base.anchor import tangent_frame
 from mapping.base.base import Base
 from mapping.errors import ModelError
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.model.object_model import LeftOut, ObjectModel
 from mapping.posterior import Posterior
 from mapping.surface import Surface
@@ -35,7 +35,7 @@ def ridge(far: float = 0.0) -> Feature:
         Interval.from_draws(draws[:, 0]),
         Interval(6.4e-4, 6.0e-4, 7.0e-4),
         Interval(0.06, 0.0595, float("nan"), censored=True),
-        Evidence(42.0, 17, (3,), None),
+        Support(42.0, 17, (3,), None),
         True,
         2.5e-5,
         posterior,
@@ -54,7 +54,7 @@ def bump(far: float = 0.0) -> Feature:
         size,
         size,
         point,
-        Evidence(9.0, 3, (3,), 4.5),
+        Support(9.0, 3, (3,), 4.5),
         False,
         1e-4,
     )

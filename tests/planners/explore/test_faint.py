@@ -11,7 +11,7 @@ from explore3d.bench.scenes.bodies import plate
 from hw.move import Move
 from mapping.base.base import Base
 from mapping.detection.detect import Detections, detect
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.instrument.noise import Noise
 from mapping.surface import Surface
 from mapping.trace import Trace
@@ -56,7 +56,7 @@ def test_a_lead_begins_in_the_middle_with_passes_that_follow_from_the_height() -
 
     def line(snr: float) -> Feature:
         size = Interval(2e-3, 2e-3, 2e-3)
-        return Feature("groove", axis, up, height, size, size, Evidence(snr, 36), True, 3e-4)
+        return Feature("groove", axis, up, height, size, size, Support(snr, 36), True, 3e-4)
 
     seen = Detections((), Noise(2e-4), 3, 1.3e-4, 0.95, 4.8, 10.0)
     begun = lead(line(12.0), seen, PLATE, 0.01)

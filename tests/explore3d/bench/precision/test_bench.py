@@ -11,17 +11,17 @@ import pytest
 
 from explore3d.bench.precision import bench, summary, write
 from explore3d.bench.precision.surfaces import BUMP_PLACES, dilated, paralleled
-from explore3d.bench.precision.work_precision import Omission, Point, Stage, timed
+from explore3d.bench.precision.work_precision import LeftOutMethod, Point, Stage, timed
 
 PICTURES = {"a_stage.png", "a_stage.svg"}
 
 
-def _falls(quick: bool, peers: bool) -> list[Point | Omission]:
+def _falls(quick: bool, peers: bool) -> list[Point | LeftOutMethod]:
     points = [Point("a stage", "halving <&>", f"step {k}", 10.0**-k, 2.0 ** (k - 9), 3) for k in range(4)]
-    return [*points, Omission("a stage", "another", "not installed")]
+    return [*points, LeftOutMethod("a stage", "another", "not installed")]
 
 
-def _fails(quick: bool, peers: bool) -> list[Point | Omission]:
+def _fails(quick: bool, peers: bool) -> list[Point | LeftOutMethod]:
     raise ValueError("no such thing")
 
 

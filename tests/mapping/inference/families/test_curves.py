@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mapping.base.base import Base
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.geometry.templates.shapes import chain_height
 from mapping.inference.families.problem import Surroundings
 from mapping.inference.feature_posterior import pose_problem, refine
@@ -35,7 +35,7 @@ def crossed(axis: np.ndarray) -> Trace:
 def guess(axis: np.ndarray, sd: float) -> Feature:
     height, width = Interval.normal(D, 0.05 * D), Interval(D, 0.5 * D, 2 * D)
     length, normals = Interval.normal(0.04, 1e-3), np.tile(UP, (len(axis), 1))
-    return Feature("ridge", axis, normals, height, width, length, Evidence(50.0, 7), True, sd)
+    return Feature("ridge", axis, normals, height, width, length, Support(50.0, 7), True, sd)
 
 
 def course(bend: float) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapping.feature import Evidence, Feature, Interval
+from mapping.feature import Feature, Interval, Support
 from mapping.inference.families.feature_trace import feature_trace
 
 TIP, BODY = 0.01, 0.02
@@ -19,7 +19,7 @@ def bump(height: float, width: float) -> Feature:
         height=Interval(height, height, height),
         width=Interval(width, width, width),
         length=Interval(0.0, 0.0, 0.0),
-        evidence=Evidence(5.0, 1, (3,)),
+        evidence=Support(5.0, 1, (3,)),
         curvature_feature=True,
         position_sd=1e-4,
     )
