@@ -110,6 +110,7 @@ def test_analysing_the_log_of_a_run_gives_the_model_of_the_run(wire: tuple[Path,
     assert record(tmp_path / "again") == record(out)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_model_and_another_seed_another(
     wire: tuple[Path, Analysis], tmp_path: Path
 ) -> None:

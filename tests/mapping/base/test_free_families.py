@@ -83,6 +83,7 @@ def test_a_round_body_of_no_family_is_fitted_to_the_noise(lines: list[FloatArray
     assert np.quantile(missed(base, lines), 0.95) < 1.5 * NOISE
 
 
+@pytest.mark.slow
 def test_a_crest_does_not_draw_a_star_body_to_itself() -> None:
     bare, lifted = np.concatenate(egg(31)), np.concatenate(egg(31, 6e-4))
     base = fit_base(swept(egg(31, 6e-4)))
@@ -90,6 +91,7 @@ def test_a_crest_does_not_draw_a_star_body_to_itself() -> None:
     assert np.abs(height - np.linalg.norm(lifted - bare, axis=1)).max() < 5e-5
 
 
+@pytest.mark.slow
 def test_the_same_trace_gives_the_same_star_body() -> None:
     once, again = (fit_base(swept(egg())).surface for _ in range(2))
     np.testing.assert_array_equal(once.vertices, again.vertices)

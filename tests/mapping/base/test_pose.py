@@ -93,6 +93,7 @@ def test_an_edge_shows_all_six_motions() -> None:
     assert np.abs(pose.onto(corners) - true.onto(corners)).max() < 2e-5
 
 
+@pytest.mark.slow
 def test_the_covariance_holds_what_happens() -> None:
     base = Base(mesh("tile"))
     moves = list(Survey(base=base, tip_radius=5e-3, smallest=3e-4).sweeps())[1::4]

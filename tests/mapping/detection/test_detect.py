@@ -232,6 +232,7 @@ def test_a_bin_that_a_sweep_only_ends_in_does_not_count_as_a_full_one() -> None:
     assert np.abs(profile.height).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_rounding_of_the_positions_is_no_feature_but_a_wire_beneath_it_is() -> None:
     step = 4e-6
 

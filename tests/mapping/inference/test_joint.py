@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from recorded_features import CROSSINGS, ENDS, SLIDES, D, feature, line, plate, record, wire
 
 from mapping.feature import JUNCTION
@@ -37,6 +38,7 @@ def guesses(off):
     return [replace(feature("ridge", axis, D, D, 6, 0.1e-3), notes=(JUNCTION,)) for axis in axes]
 
 
+@pytest.mark.slow
 def test_arms_that_meet_share_the_place_where_they_do():
     told = []
     found = refine_all(

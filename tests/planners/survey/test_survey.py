@@ -187,6 +187,7 @@ def test_crossed_sweeps_are_several_times_shorter_than_strips() -> None:
     assert crossed(plate(), 2e-3).crossed(0.35) is None  # strips are shorter there
 
 
+@pytest.mark.slow
 def test_crossed_sweeps_on_a_sphere_meet_every_arc_of_the_asked_span() -> None:
     trimesh = pytest.importorskip("trimesh")
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.04)

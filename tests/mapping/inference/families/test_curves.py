@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from mapping.base.base import Base
 from mapping.feature import Feature, Interval, Support
@@ -44,6 +45,7 @@ def course(bend: float) -> np.ndarray:
     return np.column_stack([x, bend * (1.0 - (x / 0.02) ** 2), 0.0 * x])
 
 
+@pytest.mark.slow
 def test_a_bend_that_the_crossings_did_not_ask_for_is_found_in_the_trace() -> None:
     straight = np.linspace([-0.02, 0.1e-3, 0.0], [0.02, 0.1e-3, 0.0], 7)
     found = refine(guess(straight, 0.2e-3), crossed(course(0.3e-3)), np.random.default_rng(0), base=PLATE, noise=NOISE)
