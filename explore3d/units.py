@@ -1,6 +1,6 @@
-"""Units: quantities as people write them ("0.65 mm", "5 kHz") become SI numbers, here and nowhere else.
+"""Units: quantities as people write them ("0.65 mm", "5 kHz") become SI numbers and back, here and nowhere else.
 
-Quantities as people read them: the unit that fits, and no more digits than are known.
+Numbers become text in the unit that fits, with no more digits than are known.
 """
 
 from __future__ import annotations

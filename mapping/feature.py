@@ -1,7 +1,4 @@
-"""Feature: a detail of the object finer than its global model, and the values that describe it.
-
-LeftOut: a stage that a run did without, and why.
-"""
+"""Feature: a detail of the object finer than its global model, and the values that describe it; and LeftOut."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Inspected: which faces of the base are free of features above which height, and with which probability.
-
-The certainty map of the base: which of its vertices the ball touched, bridged, or never came near.
-"""
+"""Inspected: which faces of the base are free of features above which height, and where the ball touched it at all."""
 
 from __future__ import annotations
 

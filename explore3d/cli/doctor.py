@@ -1,7 +1,4 @@
-"""Doctor: what of the installation works, what is missing, and what it is needed for.
-
-explore3d doctor: is everything there?
-"""
+"""explore3d doctor: what of the installation works, what is missing, and what it is needed for."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""calibrate, selftest: what a reference sphere says of the tip, its noise, and how well and fast it scans.
-
-Sweeps over a reference sphere: the lines along which a tip is calibrated and a finger tested.
-"""
+"""calibrate, selftest: what sweeps over a reference sphere say of the tip, its noise, and how fast it scans."""
 
 from __future__ import annotations
 

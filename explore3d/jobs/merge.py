@@ -1,7 +1,4 @@
-"""merge: a model meets later logs of the same object.
-
-Whether a log shows the object of a model, in its frame: by the mesh that it was recorded for, and by its samples.
-"""
+"""merge: a model meets later logs of the same object; by mesh and samples it is judged whether they are."""
 
 from __future__ import annotations
 

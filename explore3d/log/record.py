@@ -1,6 +1,6 @@
 """Log: what was recorded, as the analysis takes it, be it from our own log or from a table.
 
-The base as an event of the log: a log can be analysed where the scene's mesh files are not at hand.
+The base is an event of the log: it can be analysed where the scene's mesh files are not at hand.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """LogWriter: the append-only MCAP log of one exploration; whatever kills the program, the log opens.
 
 Each `write` ends in a flush, so that a killed program loses nothing that `write` had returned from. Apart from
-`started` the writer looks at no clock: the same samples and metadata give the same bytes.
-
-Recorder: a log writer that remembers what it wrote, so that a run's analysis need not read the log again.
+`started` the writer looks at no clock: the same samples and metadata give the same bytes. A Recorder also remembers
+what it wrote, so that a run's analysis need not read the log again.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Page: a self-contained HTML page in the report's style, for benches and tables.
-
-The report's style sheet.
-"""
+"""Page: a self-contained HTML page in the report's style, for benches and tables."""
 
 from __future__ import annotations
 

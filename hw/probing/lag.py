@@ -1,10 +1,9 @@
-"""Lag: how much later than the stage's reports the force is stamped, learnt from the surface itself while sliding.
+"""Lag: how much later than the stage's reports a sensor's samples are stamped.
 
-A touch tells the delay to half a millisecond (measured_delay); on a tip of 1e4 N/m, while the force changes by 10 N/s,
-0.15 ms are 0.15 um, and the width of a wire of 0.65 mm comes out 4 um wrong. But the surface does not know how hard
-it is pressed: what is left of the stage's chatter in the rigid trace is stage speed times lag.
-
-Delay: how much later a sensor's samples are stamped than the stage's reports, measured by touching and leaving.
+Touching and leaving tells it to half a millisecond (measured_delay). On a tip of 1e4 N/m, while the force changes by
+10 N/s, 0.15 ms are 0.15 um, and the width of a wire of 0.65 mm comes out 4 um wrong; so the slide itself tells the rest
+(Lag): the surface does not know how hard it is pressed, and what is left of the stage's chatter in the rigid trace is
+stage speed times lag.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Branches: the smooth lines that points of one connected detail lie on, joined where lines meet.
+"""Branches: the smooth lines of the skeleton graph of one connected detail, joined where lines meet.
 
-Rejoining: pieces of one line that the tree of its points left apart.
+Pieces of one line that the tree of its points left apart are joined again at their free ends.
 """
 
 from __future__ import annotations

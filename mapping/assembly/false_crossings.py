@@ -1,8 +1,8 @@
-"""Unseen: a crossing that claims to be clear, but that the mean heights of its own sweep do not show.
+"""Crossings that are none: three ways in which one sweep mistakes what it felt.
 
-Plateau end: a sweep that came down from a crest to the base, taken for a hollow in the crest's level.
-
-Open crest: a disturbance that the sweep began or ended in, which may as well be a step seen from above.
+Unseen: it claims to be clear, but the mean heights of its own sweep do not show it. Plateau end: the sweep came down
+from a crest to the base, taken for a hollow in the crest's level. Open crest: the sweep began or ended in the
+disturbance, which may as well be a step seen from above.
 """
 
 from __future__ import annotations

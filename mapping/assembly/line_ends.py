@@ -1,7 +1,4 @@
-"""Line end: how far a ridge or groove goes, from what the places beyond its last crossing felt.
-
-Closing: does a line return to its own beginning?
-"""
+"""Line ends: how far a ridge or groove goes beyond its last crossing, and whether it closes on its own beginning."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Point feature: a bump or pit from the crossings of one group, or any crossing of a single profile.
-
-Outline: is a compact group of crossings one round spot or a short line?
-"""
+"""Points: a bump or pit from the crossings of one compact group, if its outline is that of a round spot."""
 
 from __future__ import annotations
 

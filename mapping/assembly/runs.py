@@ -1,6 +1,6 @@
-"""Runs: sweeps that ran along a ridge or groove instead of across it.
+"""Runs: sweeps that ran along a ridge or groove instead of across it (tangential sweeps).
 
-Run crest: where, beside a sweep that ran along a line, the crest of the line lies, as the other sweeps felt it.
+Where the crest lies beside such a sweep is read from the other sweeps.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Cap fit: the cap, or the flat-topped plateau, that explains a stretch of a profile best.
-
-Disturbance: one crest, dip or plateau of a height profile, measured.
-"""
+"""Cap fit: the crest, dip or flat-topped plateau (a Disturbance) that explains a stretch of a profile best."""
 
 from __future__ import annotations
 

@@ -1,10 +1,8 @@
 """False alarms: how often a bank of matched filters is fooled by noise alone, and the threshold for a given rate.
 
 Outputs above a threshold come in clumps: neighbouring places and widths see the same noise. The rate of clumps is
-the rate of single exceedances, each counted by one over the size of its clump (Aldous, Probability Approximations
-via the Poisson Clumping Heuristic, 1989).
-
-Clumps: how many outputs of a bank of matched filters exceed a threshold together, where noise makes one do so.
+the rate of single exceedances, each counted by one over the size of its clump, and that size is simulated (Aldous,
+Probability Approximations via the Poisson Clumping Heuristic, 1989).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Evidence: how probable the trace is under one family of shapes, its parameters integrated out.
+"""Evidence: the marginal likelihood of the trace under one family of shapes, its parameters integrated out.
 
-Which profile a bump has: a cap, or a bell with a skirt, whichever the trace makes the likelier.
+By it a bump's section is chosen: a cap, or a bell with a skirt.
 """
 
 from __future__ import annotations

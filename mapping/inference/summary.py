@@ -1,7 +1,4 @@
-"""Summary: the feature that posterior draws describe.
-
-Extent: whether the ends of an axis were seen, or only that it goes at least so far.
-"""
+"""Summary: the feature that posterior draws describe, and which of its ends were only seen to go at least so far."""
 
 from __future__ import annotations
 

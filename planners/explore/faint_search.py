@@ -1,6 +1,6 @@
-"""Faint: ridges and grooves that only many sweeps together show, sought by a closer survey.
+"""Faint search: ridges and grooves that only many sweeps together show, sought by a closer survey.
 
-Sweep by sweep: crossings of a long survey, looked for as it goes on, under a noise that its own sweeps tell.
+The survey is looked at sweep by sweep as it goes on, under the noise that its own sweeps tell.
 """
 
 from __future__ import annotations

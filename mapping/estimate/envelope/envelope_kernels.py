@@ -1,4 +1,4 @@
-"""Compiled loops of the estimated surface: the envelope of balls, and tangents along sweeps."""
+"""Compiled loops of the estimated surface: the envelope of balls."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""Envelope of balls under a profile: the exact morphological erosion of its trace, in O(n).
+"""Envelope of balls under a profile or a height map: the exact morphological erosion of a trace.
 
-Penetration: how deep points lie inside balls where no body can be.
-
-Height map under balls: the highest body that scattered ball centres allow, on a grid of nodes.
+Under a profile in O(n); under scattered centres on a grid of nodes. Points that lie inside a ball where no body can be
+are told by how deep they do (penetration).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Normals of the traced surface at the points of its sweeps, from positions alone.
 
-Slope of the traced surface across its sweeps, from the neighbouring rows.
+Along a sweep its own tangent tells; across the sweeps the slope comes from the neighbouring rows.
 """
 
 from __future__ import annotations

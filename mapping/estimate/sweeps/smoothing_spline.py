@@ -1,7 +1,4 @@
-"""The cubic smoothing spline.
-
-The scale of smoothing: how long a spline must average so that the noise leaves the curvature 1/r standing out.
-"""
+"""The cubic smoothing spline, and the length over which it must average so that 1/r stands out of the noise."""
 
 from __future__ import annotations
 
