@@ -15,6 +15,7 @@ from explore3d.scene.machine import EMULATOR, MachineTable, SensorTable
 from explore3d.scene.mesh_files import load_mesh
 from explore3d.scene.to_toml import scene_text
 from explore3d.scene.values import (
+    INFORMATIVE,
     Angle,
     Extent,
     Force,
@@ -48,7 +49,8 @@ class Tip(Table):
 
     radius: Length
     radius_sd: Extent = 0.0
-    profile: Path | None = None
+    # beside a radius it only says where that came from (see _with_profile)
+    profile: Annotated[Path | None, INFORMATIVE] = None
 
 
 class Region(Table):

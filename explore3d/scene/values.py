@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic.fields import FieldInfo
 
 from explore3d import (
     UnitError,
@@ -51,6 +52,16 @@ def _known_unit(unit: str) -> str:
 
 
 LengthUnit = Annotated[str, AfterValidator(_known_unit)]
+
+
+# Of a key that tells people something and that no job reads; every other key must change something
+INFORMATIVE = Field(json_schema_extra={"informative": True})
+
+
+def is_informative(key: FieldInfo) -> bool:
+    """True if no job reads the key."""
+    extra = key.json_schema_extra
+    return isinstance(extra, dict) and bool(extra.get("informative"))
 
 
 class Table(BaseModel):
