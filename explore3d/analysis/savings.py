@@ -64,10 +64,8 @@ def without_needless_dynamics(scene: Scene, stages: Stages) -> Scene:
 
     noise = scene.finger.noise
     sigma, kink = math.hypot(noise.white, noise.correlated), float(kink_angle(tallest, tallest / 2, scene.tip.radius))
-    stiff = tallest > 0 and not Dynamics(**table.model_dump()).needed(scene.survey.speed, kink, sigma)
+    stiff = tallest > 0 and not Dynamics(**table.model_dump()).needed(scene.sweep_speed, kink, sigma)
     why_not = "the tip follows the rigid trace within the noise: lambda > 10 v tan(phi) / sigma" if stiff else ""
     if stages.needed("dynamics", why_not):
         return scene
-    rigid = scene.model_copy(update={"finger": scene.finger.model_copy(update={"dynamics": None})})
-    rigid._path, rigid._text = scene._path, scene._text
-    return rigid
+    return scene.model_copy(update={"finger": scene.finger.model_copy(update={"dynamics": None})})

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         bench_exploring as bench_exploring,
         one_run as one_run,
         records as records,
+        write_bench_scenes as write_bench_scenes,
     )
     from explore3d.bench.figures import write_figures as write_figures
     from explore3d.bench.scaling import AXES as AXES, bench_scaling as bench_scaling, scaling_lines as scaling_lines
@@ -40,7 +41,7 @@ _PUBLIC = {
     "curvature": ("CurvatureAccuracy", "available", "bench_curvature", "curvature_table", "write_bench"),
     "dynamics": ("dynamics_curve", "dynamics_table", "wire_trace"),
     "explore_curves": ("write_curves",),
-    "exploring": ("FINGER_NOISES", "STRATEGIES", "bench_exploring", "one_run", "records"),
+    "exploring": ("FINGER_NOISES", "STRATEGIES", "bench_exploring", "one_run", "records", "write_bench_scenes"),
     "figures": ("write_figures",),
     "scaling": ("AXES", "bench_scaling", "scaling_lines"),
     "trace": ("bench_trace", "bump_mesh", "by_opencamlib", "trace_table"),

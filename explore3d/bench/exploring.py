@@ -1,6 +1,8 @@
 """Exploration bench: error of the found extents against finger time, for exploring and for blind baselines.
 
-Every run is one line of a JSONL file; what is already in the file is not run again.
+Each body is a scene whose meshes stay in memory; finger and explorer are made from it as `explore3d run` makes them
+(explore3d.jobs.expedition), and the samples go into the model without a log. Every run is one line of a JSONL file;
+what is already in the file is not run again.
 
     explore3d bench explore --store OUT.jsonl --seeds 3 --scenes straight,empty
 """
@@ -9,7 +11,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -17,94 +18,52 @@ from typing import Any
 import numpy as np
 
 from explore3d.analysis import Comparison, TrueFeature, compare
-from explore3d.bench.scenes import SCENES, BenchScene
-from hw import Move
+from explore3d.bench.scenes import BENCH_TIP_RADIUS, SCENES, BenchScene
+from explore3d.jobs import Explored, Explorer, explorer, scene_finger
+from explore3d.scene import AnalysisSettings, Scene
+from hw import Finger, Move
 from hw.simulated import SimulatedFinger
 from mapping import Trace
 from mapping.assembly import assemble
 from mapping.base import Base, estimate_pose, refined as base_refined
 from mapping.detection import detect
 from mapping.inference import refine_all
-from mapping.instrument import Noise
 from mapping.model import ObjectModel
-from planners import Plan, drive
-from planners.explore import Discover, Explore, Locate
-from planners.survey import Ergodic, RandomSweeps, Raster, fastest_speed
+from planners import Outcome, Plan
+from planners.survey import Ergodic, RandomSweeps, Raster
 
-TIP_RADIUS = 0.01
 # Wanted half-width of the 90 % interval of an end, m: as good as it gets while nobody knows whether an end is round or
 # square (0.03 mm for the wire); and others, for the curve of error against time
 PRECISION, CURVE_PRECISIONS = 0.05e-3, (0.02e-3, 0.1e-3, 0.2e-3)
-# Speeds between which everyone may sweep, m/s: the paper's, and one at which a tip of 0.1 kg on a contact of 1e5 N/m
-# still keeps contact over the wire and lags by at most 0.012 mm behind the rigid trace (hw.simulated.dynamics)
+# Speeds at which baselines sweep, m/s: the paper's, and one at which a tip of 0.1 kg on a contact of 1e5 N/m still
+# keeps contact over the wire and lags by at most 0.012 mm behind the rigid trace (hw.simulated.dynamics). Exploring
+# takes the faster one, too: the noise would allow more (planners.survey.pace), and everyone is to have the same limit
 SLOW, FAST = 0.03, 0.1
 # The apparatus of the paper (theory section 6), and one whose noise is correlated over as much as a wire disturbs
-APPARATUS: dict[str, Any] = {"rate": 5000.0, "white": 0.2e-3, "correlated": 0.02e-3, "correlation_length": 1e-3}
+APPARATUS: dict[str, float] = {"rate": 5000.0, "white": 0.2e-3, "correlated": 0.02e-3, "correlation_length": 1e-3}
 FINGER_NOISES = {"apparatus": APPARATUS, "correlated": APPARATUS | {"correlated": 0.06e-3, "correlation_length": 2e-3}}
 
-Strategy = Callable[[BenchScene, np.random.Generator], Plan]
+# Of whoever sweeps blindly: the plan of all sweeps over a base
+Blind = Callable[[Base, np.random.Generator], Plan]
 
 
-def _explore(precision: float) -> Strategy:
-    return lambda scene, rng: _exploration(scene, precision)
+def _raster(pitch: float, speed: float) -> Blind:
+    return lambda base, rng: Raster(base=base, tip_radius=BENCH_TIP_RADIUS, pitch=pitch, speed=speed).plan(rng)
 
 
-def _exploration(scene: BenchScene, precision: float) -> Plan:
-    """Find the base and explore it; the outcome's value is the base."""
-    base = Base(scene.base)
-    if scene.misplaced:
-        locate = Locate(base=base, tip_radius=TIP_RADIUS, smallest=scene.smallest, speed=_speed(scene))
-        located = yield from locate.plan()
-        if located.value is None:
-            return located
-        base = located.value.moved(base)
-    if scene.sides:
-        low, high = scene.region
-        discover = Discover(
-            low=low, high=high, tip_radius=TIP_RADIUS, smallest=scene.smallest, sides=scene.sides, speed=_speed(scene)
-        )
-        discovered = yield from discover.plan()
-        if discovered.value is None:
-            return discovered
-        base = discovered.value
-    explore = Explore(
-        base=base,
-        tip_radius=TIP_RADIUS,
-        smallest=scene.smallest,
-        shortest_ridge=scene.shortest_ridge,
-        precision=precision,
-        speed=_speed(scene),
-    )
-    explored = yield from explore.plan()
-    return replace(explored, value=base)
-
-
-def _speed(scene: BenchScene) -> float:
-    """As fast as the apparatus, by its data sheet, still sees the smallest feature asked for, m/s."""
-    noise = Noise(APPARATUS["white"], APPARATUS["correlated"], APPARATUS["correlation_length"])
-    return fastest_speed(noise, APPARATUS["rate"], TIP_RADIUS, scene.smallest, SLOW, FAST)
-
-
-def _raster(pitch: float, speed: float) -> Strategy:
-    return lambda scene, rng: Raster(base=Base(scene.base), tip_radius=TIP_RADIUS, pitch=pitch, speed=speed).plan(rng)
-
-
-def _random(seconds: float, speed: float) -> Strategy:
-    return lambda scene, rng: RandomSweeps(
-        base=Base(scene.base), tip_radius=TIP_RADIUS, seconds=seconds, speed=speed
-    ).plan(rng)
-
-
-def _ergodic(seconds: float, speed: float) -> Strategy:
-    return lambda scene, rng: Ergodic(base=Base(scene.base), tip_radius=TIP_RADIUS, seconds=seconds, speed=speed).plan(
+def _random(seconds: float, speed: float) -> Blind:
+    return lambda base, rng: RandomSweeps(base=base, tip_radius=BENCH_TIP_RADIUS, seconds=seconds, speed=speed).plan(
         rng
     )
 
 
-def _strategies() -> dict[str, Strategy]:
-    """Exploring to several precisions, and every baseline at both speeds."""
-    known = {"explore": _explore(PRECISION)}
-    known |= {f"explore to {1e3 * precision:g} mm": _explore(precision) for precision in CURVE_PRECISIONS}
+def _ergodic(seconds: float, speed: float) -> Blind:
+    return lambda base, rng: Ergodic(base=base, tip_radius=BENCH_TIP_RADIUS, seconds=seconds, speed=speed).plan(rng)
+
+
+def _baselines() -> dict[str, Blind]:
+    """Every baseline at both speeds."""
+    known: dict[str, Blind] = {}
     for speed, ending in ((SLOW, ""), (FAST, f" at {1e3 * FAST:g} mm/s")):
         known |= {f"raster {1e3 * p:g} mm{ending}": _raster(p, speed) for p in (8e-3, 4e-3, 2e-3, 1e-3, 0.5e-3)}
         known |= {f"random {s:g} s{ending}": _random(s, speed) for s in (90.0, 180.0, 360.0)}
@@ -112,7 +71,10 @@ def _strategies() -> dict[str, Strategy]:
     return known
 
 
-STRATEGIES = _strategies()
+# Exploring, by the precision that it is asked for, m; and the baselines
+EXPLORING = {"explore": PRECISION} | {f"explore to {1e3 * wanted:g} mm": wanted for wanted in CURVE_PRECISIONS}
+BASELINES = _baselines()
+STRATEGIES = (*EXPLORING, *BASELINES)
 
 
 def bench_exploring(
@@ -141,15 +103,30 @@ def records(store: Path) -> list[dict[str, Any]]:
     return [json.loads(text) for text in store.read_text().splitlines()] if store.exists() else []
 
 
+def write_bench_scenes(scenes: list[str], seeds: int, folder: Path, noise: str = "apparatus") -> Iterator[Path]:
+    """Write what "explore" runs on as scene files with their meshes, for `explore3d run`; yields every scene file."""
+    for name in scenes:
+        for seed in range(seeds):
+            body = SCENES[name](np.random.default_rng(seed))
+            text = body.text(seed, FINGER_NOISES[noise], PRECISION, FAST)
+            yield body.write(text, folder / f"{name.replace(' ', '_')}-{seed}")
+
+
+def bench_scene(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus") -> Scene:
+    """The scene of one run; the precision is exploring's, baselines have none."""
+    return body.scene(body.text(seed, FINGER_NOISES[noise], EXPLORING.get(strategy, PRECISION), FAST))
+
+
 def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus") -> dict[str, Any]:
     """Sweep the body by one strategy, build its model, and compare it with the truth."""
-    finger = SimulatedFinger(object=body.object, tip_radius=TIP_RADIUS, seed=seed, **FINGER_NOISES[noise])
-    clock = _Clock(finger)
-    record, outcome = drive(STRATEGIES[strategy](body, np.random.default_rng(seed)), clock.execute)
+    scene = bench_scene(body, strategy, seed, noise)
+    with scene_finger(scene) as finger:
+        assert isinstance(finger, SimulatedFinger)  # every bench scene names it
+        clock = _Clock(finger)
+        outcome = _swept(strategy, explorer(scene, finger.workspace), body, clock.execute, seed)
     after = clock.idle
-    trace = Trace.concatenate([felt for _, felt in record if len(felt)])
     start = perf_counter()
-    model = modelled(trace, body, seed, outcome.value if body.sides else None)
+    model = modelled(Trace.concatenate(clock.felt), body, scene, outcome.value.base if body.sides else None)
     modelling = perf_counter() - start
     return {
         "finger_seconds": finger.clock,
@@ -157,25 +134,34 @@ def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus"
         "modelling_seconds": modelling,
         "latency_median": float(np.median(clock.waits[1:])),
         "latency_worst": float(max(clock.waits[1:])),
-        "moves": len(record),
+        "moves": len(clock.waits),
         "outcome": outcome.reason,
     } | errors(model, body)
 
 
-def modelled(trace: Trace, body: BenchScene, seed: int, found: Base | None = None) -> ObjectModel:
+def _swept(strategy: str, explorer: Explorer, body: BenchScene, execute: Callable[[Move], Trace], seed: int) -> Outcome:
+    """Explore, or sweep blindly under the same checks; the outcome's value is an Explored."""
+    if strategy in EXPLORING:
+        return explorer.go(execute)
+    base = Base(body.base)
+    outcome, _ = explorer.carry_out(BASELINES[strategy](base, np.random.default_rng(seed)), base, execute)
+    return Outcome(outcome.reason, outcome.detail, Explored(base))
+
+
+def modelled(trace: Trace, body: BenchScene, scene: Scene, found: Base | None = None) -> ObjectModel:
     """The annotated model of all samples, by the stages of `explore3d analyze`, on the base that was found, if any."""
     base = Base(body.base) if found is None else base_refined(found, trace)
     if body.misplaced:
         base = estimate_pose(trace, base).moved(base)
-    detections = detect(trace, base)
+    detections = detect(trace, base, **AnalysisSettings.of(scene).detection)
     features = assemble(detections, trace, base)
-    refined = refine_all(features, trace, seed, base=base, noise=detections.noise, confirm=False)
+    refined = refine_all(features, trace, scene.seed, base=base, noise=detections.noise, confirm=False)
     return ObjectModel.attach(base, tuple(f for f in refined if f.evidence.likely), provenance={})
 
 
 def errors(model: ObjectModel, body: BenchScene) -> dict[str, Any]:
     """Counts of found, mistaken, missed and invented features, and the largest errors of the found ones, m."""
-    pairs = compare(model, body.truth, TIP_RADIUS)
+    pairs = compare(model, body.truth, BENCH_TIP_RADIUS)
     found = [pair for pair in pairs if pair.status == "found" and pair.true and pair.found]
     ends = [error for pair in found for error in free_end_errors(pair, body.truth)]
     return {
@@ -205,9 +191,10 @@ def free_end_errors(pair: Comparison, truth: Sequence[TrueFeature]) -> list[floa
 class _Clock:
     """Executes moves, and keeps how long the finger waited for each of them: the simulation is no part of planning."""
 
-    def __init__(self, finger: SimulatedFinger) -> None:
+    def __init__(self, finger: Finger) -> None:
         self.finger = finger
         self.waits: list[float] = []
+        self.felt: list[Trace] = []
         self._idle = perf_counter()
 
     @property
@@ -218,5 +205,7 @@ class _Clock:
     def execute(self, move: Move) -> Trace:
         self.waits.append(self.idle)
         trace = self.finger.execute(move)
+        if len(trace):
+            self.felt.append(trace)
         self._idle = perf_counter()
         return trace

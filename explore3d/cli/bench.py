@@ -168,25 +168,36 @@ def odds(
 
 @bench.command()
 def explore(
-    store: Store,
+    store: Annotated[
+        Path | None, typer.Option("--store", help="JSONL file of finished runs; what it holds is not run again.")
+    ] = None,
     scenes: Annotated[str | None, typer.Option(help="Scenes, separated by commas; all if left out.")] = None,
     strategies: Annotated[str | None, typer.Option(help="Strategies, separated by commas; all if left out.")] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Seeds of the features' places and of the noise.")] = 3,
     noise: Annotated[str, typer.Option(help="apparatus, or correlated: over half a wire's width.")] = "apparatus",
     seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
     out: Annotated[Path | None, typer.Option(help="Folder for the table and the curves of all finished runs.")] = None,
+    write: Annotated[
+        Path | None, typer.Option("--write-scenes", help="Only write the scenes as files for explore3d run, there.")
+    ] = None,
 ) -> None:
     """Error of the found extents against finger time: exploring beside rasters, random and ergodic sweeps.
 
     Example: explore3d bench explore --store explore.jsonl --scenes straight,empty --seeds 1
+    Example: explore3d bench explore --write-scenes scenes --scenes straight --seeds 1
     """
     import json
 
-    from explore3d.bench import FINGER_NOISES, STRATEGIES, bench_exploring, records, write_curves
+    from explore3d.bench import FINGER_NOISES, STRATEGIES, bench_exploring, records, write_bench_scenes, write_curves
     from explore3d.bench.scenes import SCENES
 
     chosen = _names(scenes, "--scenes", list(SCENES)), _names(strategies, "--strategies", list(STRATEGIES))
     _names(noise, "--noise", list(FINGER_NOISES))
+    if write is not None:
+        _print(str(path) for path in write_bench_scenes(chosen[0], seeds, write, noise))
+        return
+    if store is None:
+        raise UserError("--store: give the JSONL file of finished runs, or --write-scenes a folder")
     _print(json.dumps(record) for record in bench_exploring(*chosen, seeds, store, noise, seconds))
     if out is not None:
         _print(str(path) for path in write_curves([r for r in records(store) if r["noise"] == noise], out))

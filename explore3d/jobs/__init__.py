@@ -13,20 +13,22 @@ if TYPE_CHECKING:
         write_profile as write_profile,
     )
     from explore3d.jobs.emulate import Emulation as Emulation, serve as serve
+    from explore3d.jobs.expedition import Explored as Explored, Explorer as Explorer, explorer as explorer
     from explore3d.jobs.machine_finger import needs_arming as needs_arming
     from explore3d.jobs.merge import merge as merge
     from explore3d.jobs.plan import plan_scene as plan_scene, show_plan as show_plan
     from explore3d.jobs.reprobe import reprobe as reprobe
-    from explore3d.jobs.run import run as run
+    from explore3d.jobs.run import run as run, scene_finger as scene_finger
 
 _PUBLIC = {
     "analyze": ("analyze",),
     "calibrate": ("as_json", "calibrate", "selftest", "write_profile"),
     "emulate": ("Emulation", "serve"),
+    "expedition": ("Explored", "Explorer", "explorer"),
     "machine_finger": ("needs_arming",),
     "merge": ("merge",),
     "plan": ("plan_scene", "show_plan"),
     "reprobe": ("reprobe",),
-    "run": ("run",),
+    "run": ("run", "scene_finger"),
 }
 doorway(__name__, _PUBLIC)

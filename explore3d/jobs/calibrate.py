@@ -134,7 +134,7 @@ def as_json(record: dict[str, Any]) -> str:
 
 
 def _swept(finger: Any, scene: Scene, radius: float, center: tuple[float, float, float], lines: int) -> Trace:
-    speed = min(scene.survey.speed, finger.workspace.max_speed)
+    speed = min(scene.sweep_speed, finger.workspace.max_speed)
     moves = meridians(center, radius, scene.tip.radius, lines, speed=speed, force=scene.survey.force)
     return Trace.concatenate([finger.execute(move) for move in moves])
 

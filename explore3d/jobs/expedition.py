@@ -1,16 +1,19 @@
-"""Expedition: the finger finds out what it explores on, then explores; every move is checked, routed and logged."""
+"""Expedition: the finger finds out what it explores on, then explores; every move is checked and routed.
+
+`explorer` is the one place where a scene becomes exploratory procedures: `run`, `plan` and the bench build theirs here.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from explore3d import SceneError
-from explore3d.log import KIND, LogWriter, base_event
-from hw import Finger, Move
+from explore3d.log import KIND, base_event
+from hw import Move, Workspace
 from mapping import Trace
 from mapping.base import Base
 from planners import Outcome, Plan, Spent, drive, within
@@ -19,71 +22,57 @@ from planners.paths import Limits, Ways, routed
 
 if TYPE_CHECKING:
     from explore3d.scene import Scene
-    from planners.explore import Discover, Explore, Locate
+
+Execute = Callable[[Move], Trace]
+# Told the kind of an event, and its data
+Event = Callable[[str, dict[str, Any]], None]
 
 
-@dataclass
-class Expedition:
-    """One finger on its way over one object.
+def unheard(kind: str, data: dict[str, Any]) -> None:
+    """An event that nobody notes."""
 
-    Args:
-        scene: what to explore, and how.
-        finger: opened.
-        execute: carries out and logs one move.
-        log: of the session.
-        seconds: finger time that was spent so far.
+
+def explorer(scene: Scene, workspace: Workspace) -> Explorer:
+    """All that a scene says of exploring with a finger of that workspace.
+
+    Raises:
+        SceneError: a mesh that cannot be read, or a speed that cannot be known.
     """
-
-    scene: Scene
-    finger: Finger
-    execute: Callable[[Move], Trace]
-    log: LogWriter
-    seconds: float = field(default=0.0)
-
-    def go(self) -> Outcome:
-        """Find the base, explore it; why it ended."""
-        outcome = self._base()
-        base: Base | None = outcome.value
-        if base is None:
-            return outcome
-        left = self.scene.explore.time_budget - self.seconds
-        if left <= 0:
-            return Outcome("budget", f"the budget was spent before exploring began: {outcome.detail}")
-        found = self._carry_out(explorer(self.scene, base, left).plan(), base)
-        detail = f"{found.detail}; before that, to know the base: {outcome.detail}" if outcome.detail else found.detail
-        return replace(found, detail=detail)
-
-    def _base(self) -> Outcome:
-        """The base to explore on, as the outcome's value: as given, where the object stands, or as discovered."""
-        given = known_base(self.scene)
-        if given is None:
-            found = self._carry_out(discoverer(self.scene).plan(), None)
-            base = found.value
-        else:
-            self.log.event(KIND, base_event(given))
-            if self.scene.model.pose == "given":
-                return Outcome("done", value=given)
-            found = self._carry_out(locator(self.scene, given).plan(), given)
-            base = None if found.value is None else found.value.moved(given)
-        if base is not None:
-            self.log.event(KIND, base_event(base))
-        return replace(found, value=base)
-
-    def _carry_out(self, plan: Plan, base: Base | None) -> Outcome:
-        workspace, tip = self.finger.workspace, self.scene.tip.radius
-        spent = Spent(workspace.max_speed)
-        plan = within(plan, spent, self.scene.explore.time_budget - self.seconds)
-        if base is not None:
-            plan = routed(plan, Ways(base, tip, workspace.low, workspace.high, workspace.max_speed))
-        _, outcome = drive(
-            plan,
-            self.execute,
-            check=Limits.of(workspace, base, tip).violation,
-            note=lambda text: self.log.event("refused", {"what": text}),
-            empty=Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip),
+    model, tip, smallest = scene.model, scene.tip.radius, scene.survey.smallest_feature
+    speed, force = scene.sweep_speed, scene.survey.force
+    base, region = known_base(scene), None
+    if model.region is not None:
+        region = np.array(model.region.low), np.array(model.region.high)
+    discover = locate = None
+    if base is None and region is not None:
+        low, high = region
+        discover = Discover(
+            low=low, high=high, tip_radius=tip, smallest=smallest, sides=model.sides, speed=speed, force=force
         )
-        self.seconds += spent.seconds
-        return outcome
+    elif base is not None and model.pose == "estimate":
+        locate = Locate(
+            base=base,
+            tip_radius=tip,
+            smallest=smallest,
+            shift=model.shift,
+            turn=model.turn,
+            speed=speed,
+            force=force,
+        )
+    explore = partial(
+        Explore,
+        tip_radius=tip,
+        smallest=smallest,
+        precision=scene.explore.precision,
+        region=None if base is None else region,
+        speed=speed,
+        force=force,
+        shortest_ridge=scene.survey.shortest_ridge,
+        travel_speed=workspace.max_speed,
+        false_alarms_per_metre=scene.detection.false_alarms_per_metre,
+        stated=scene.noise,
+    )
+    return Explorer(base, discover, locate, explore, workspace, tip, scene.explore.time_budget)
 
 
 def known_base(scene: Scene) -> Base | None:
@@ -92,46 +81,111 @@ def known_base(scene: Scene) -> Base | None:
     return None if surface is None else Base(surface)
 
 
-def discoverer(scene: Scene) -> Discover:
-    """The procedure that finds an unknown body in the scene's region. Raises SceneError."""
-    region = scene.model.region
-    if region is None:
-        raise SceneError(f"{scene.path}: model: give a mesh, or a region to look for the body in")
-    return Discover(
-        low=np.array(region.low),
-        high=np.array(region.high),
-        tip_radius=scene.tip.radius,
-        smallest=scene.survey.smallest_feature,
-        sides=scene.model.sides,
-        speed=scene.survey.speed,
-        force=scene.survey.force,
-    )
+@dataclass(frozen=True, eq=False)
+class Explored:
+    """What a finished expedition knows.
+
+    Args:
+        base: that it explored on: as given, where the object stands, or as found; None if none was found.
+        found: the exploration's own account (planners.explore.found.Found); None if it did not come to that.
+    """
+
+    base: Base | None
+    found: Any = None
 
 
-def locator(scene: Scene, base: Base) -> Locate:
-    """The procedure that finds where the object stands."""
-    return Locate(
-        base=base,
-        tip_radius=scene.tip.radius,
-        smallest=scene.survey.smallest_feature,
-        shift=scene.model.shift,
-        turn=scene.model.turn,
-        speed=scene.survey.speed,
-        force=scene.survey.force,
-    )
+@dataclass(frozen=True, eq=False)
+class Explorer:
+    """The procedures, checks and ways of one expedition, made before anything moves.
 
+    Args:
+        given: the global model as the scene gives it; None if it gives a region alone.
+        discover: finds the body in its region; None if it is given.
+        locate: finds where it stands; None if it stands as given.
+        explore: the exploration of a base with the scene's settings; wants `base` and `time_budget` (s).
+        workspace: of the finger.
+        tip_radius: m.
+        time_budget: finger time for everything, s.
+    """
 
-def explorer(scene: Scene, base: Base, time_budget: float | None = None) -> Explore:
-    """The exploratory procedure with the scene's settings; `time_budget` in s, None takes the scene's."""
-    region = None if scene.model.region is None or scene.model.mesh is None else scene.model.region
-    return Explore(
-        base=base,
-        tip_radius=scene.tip.radius,
-        smallest=scene.survey.smallest_feature,
-        precision=scene.explore.precision,
-        time_budget=scene.explore.time_budget if time_budget is None else time_budget,
-        region=None if region is None else (np.array(region.low), np.array(region.high)),
-        speed=scene.survey.speed,
-        force=scene.survey.force,
-        false_alarms_per_metre=scene.detection.false_alarms_per_metre,
-    )
+    given: Base | None
+    discover: Discover | None
+    locate: Locate | None
+    explore: partial[Explore]
+    workspace: Workspace
+    tip_radius: float
+    time_budget: float
+
+    @property
+    def nothing(self) -> Trace:
+        """What a move gives that touches nothing."""
+        return Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), self.tip_radius)
+
+    def limits(self, base: Base | None) -> Limits:
+        """What every move must keep to."""
+        return Limits.of(self.workspace, base, self.tip_radius)
+
+    def prepared(self, plan: Plan, base: Base | None, spent: Spent, seconds: float) -> Plan:
+        """The plan within `seconds` of finger time, counted in `spent`, on ways that lead round the base."""
+        plan = within(plan, spent, seconds)
+        if base is None:
+            return plan
+        space = self.workspace
+        return routed(plan, Ways(base, self.tip_radius, space.low, space.high, space.max_speed))
+
+    def carry_out(
+        self, plan: Plan, base: Base | None, execute: Execute, event: Event = unheard, seconds: float = np.inf
+    ) -> tuple[Outcome, float]:
+        """Drive a plan with every check; why it ended, and the finger time that it took, s.
+
+        Args:
+            base: that the moves must not run into; None while it is unknown.
+            execute: carries out one move.
+            event: told what was refused.
+            seconds: finger time that the plan may take.
+        """
+        spent = Spent(self.workspace.max_speed)
+        _, outcome = drive(
+            self.prepared(plan, base, spent, seconds),
+            execute,
+            check=self.limits(base).violation,
+            note=lambda text: event("refused", {"what": text}),
+            empty=self.nothing,
+        )
+        return outcome, spent.seconds
+
+    def go(self, execute: Execute, event: Event = unheard) -> Outcome:
+        """Find the base, explore it; why it ended, with an Explored as its value.
+
+        Args:
+            execute: carries out one move.
+            event: told the base, and what was refused.
+        """
+        outcome, seconds = self._base(execute, event)
+        base: Base | None = outcome.value
+        if base is None:
+            return replace(outcome, value=Explored(None))
+        left = self.time_budget - seconds
+        if left <= 0:
+            detail = f"the budget was spent before exploring began: {outcome.detail}"
+            return Outcome("budget", detail, Explored(base))
+        found, _ = self.carry_out(self.explore(base=base, time_budget=left).plan(), base, execute, event, left)
+        detail = f"{found.detail}; before that, to know the base: {outcome.detail}" if outcome.detail else found.detail
+        return Outcome(found.reason, detail, Explored(base, found.value))
+
+    def _base(self, execute: Execute, event: Event) -> tuple[Outcome, float]:
+        """The base to explore on, as the outcome's value: as given, where the object stands, or as discovered; and
+        the finger time that it took, s."""
+        if self.given is not None:
+            event(KIND, base_event(self.given))
+        if self.locate is not None:
+            found, seconds = self.carry_out(self.locate.plan(), self.given, execute, event, self.time_budget)
+            base = None if found.value is None else found.value.moved(self.given)
+        elif self.discover is not None:
+            found, seconds = self.carry_out(self.discover.plan(), None, execute, event, self.time_budget)
+            base = found.value
+        else:
+            return Outcome("done", value=self.given), 0.0
+        if base is not None:
+            event(KIND, base_event(base))
+        return replace(found, value=base), seconds

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 
 from explore3d import count_text, length_text, seconds_text
-from explore3d.jobs.expedition import discoverer, explorer, known_base, locator
+from explore3d.jobs.expedition import Explorer, explorer
 from explore3d.jobs.run import scene_finger
 from explore3d.jobs.session import Session
 from explore3d.pictures import plan_picture
-from explore3d.scene import Scene, load_scene
+from explore3d.scene import load_scene
 from hw import Move
 from hw.simulated import SimulatedFinger
-from mapping import Surface, Trace
+from mapping import Surface
 from mapping.base import Base
 from planners import Spent, drive, dry_run
-from planners.paths import Limits, Ways, routed
+from planners.explore import Discover
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +31,7 @@ class DryRun:
         tip_radius: m.
         moves: in their order.
         metres, seconds: finger path and time, the ways between the sweeps included.
+        speed: of the sweeps, m/s.
         covered: share of the surface that the sweeps inspect; None if the time budget ends before the survey.
         reach: distance from a sweep up to which the smallest feature is seen, m; None likewise.
         violations: (number of the move, what limit it breaks).
@@ -42,6 +43,7 @@ class DryRun:
     moves: tuple[Move, ...]
     metres: float
     seconds: float
+    speed: float
     covered: float | None
     reach: float | None
     violations: tuple[tuple[int, str], ...]
@@ -54,6 +56,7 @@ class DryRun:
             "moves": [{"purpose": move.purpose, "path": move.path.tolist()} for move in self.moves],
             "length": self.metres,
             "time": self.seconds,
+            "speed": self.speed,
             "covered": self.covered,
             "reach": self.reach,
             "violations": [{"move": number, "what": what} for number, what in self.violations],
@@ -62,7 +65,10 @@ class DryRun:
     def lines(self) -> list[str]:
         """The plan in words."""
         sweeps = count_text(sum(move.purpose == "sweep" for move in self.moves), "sweep")
-        first = f"{sweeps}, {length_text(self.metres)} of finger path, {seconds_text(self.seconds)}"
+        first = (
+            f"{sweeps} at {1e3 * self.speed:.3g} mm/s, {length_text(self.metres)} of finger path, "
+            f"{seconds_text(self.seconds)}"
+        )
         within = []
         if self.covered is not None and self.reach is not None:
             within = [f"{100 * self.covered:.1f} % of the surface lies within {length_text(self.reach)} of a sweep"]
@@ -82,39 +88,57 @@ def plan_scene(path: Path | str) -> DryRun:
         SceneError: a scene that cannot be used.
     """
     scene = load_scene(path)
-    base, finger, tip = known_base(scene), scene_finger(scene), scene.tip.radius
-    with finger:
-        workspace = finger.workspace
-    if base is None:
-        first, base = imagined(scene)
-        assumed = "the body is not known: planned as if it were flat and lay in the middle of the region"
-    else:
-        first, assumed = [], ""
-    nothing = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip)
-    if scene.model.pose == "estimate" and scene.model.mesh is not None:
-        first, _ = dry_run(locator(scene, base).plan(), nothing)
-    ways = Ways(base, tip, workspace.low, workspace.high, workspace.max_speed)
-    explore = explorer(scene, base)
-    plan = routed(explore.plan(), ways)
-    planned, outcome = dry_run(plan, nothing)
-    moves, limits = [*first, *planned], Limits.of(workspace, base, tip)
-    before: list[Move | None] = [None, *moves]
-    checked = enumerate(zip(moves, before, strict=False), 1)
+    with scene_finger(scene) as finger:
+        planned = explorer(scene, finger.workspace)
+    first, base, assumed = _to_know_the_base(planned)
+    before, budget = Spent(planned.workspace.max_speed), planned.time_budget
+    for move in first:
+        before.count(move)
+    then, survey = list[Move](), None
+    if before.seconds < budget:
+        exploring = planned.explore(base=base, time_budget=budget - before.seconds).plan()
+        exploring = planned.prepared(exploring, base, Spent(before.travel_speed), np.inf)
+        then, outcome = dry_run(exploring, planned.nothing)
+        survey = outcome.value.survey
+    moves, limits = [*first, *then], planned.limits(base)
+    lasts: list[Move | None] = [None, *moves]
+    checked = enumerate(zip(moves, lasts, strict=False), 1)
     violations = [(number, what) for number, (move, last) in checked if (what := limits.violation(move, last))]
-    spent = Spent(25.0 * tip if explore.travel_speed is None else explore.travel_speed)
+    spent = Spent(before.travel_speed)
     for move in moves:
         spent.count(move)
-    survey = outcome.value.survey
     if survey is None:
         short = "the time budget ends before the survey does: raise explore.time_budget or survey.smallest_feature"
         assumed = f"{assumed}; {short}" if assumed else short
     covered, reach = (None, None) if survey is None else (survey.fraction, survey.reach)
-    return DryRun(base, tip, tuple(moves), spent.metres, spent.seconds, covered, reach, tuple(violations), assumed)
+    return DryRun(
+        base,
+        scene.tip.radius,
+        tuple(moves),
+        spent.metres,
+        spent.seconds,
+        scene.sweep_speed,
+        covered,
+        reach,
+        tuple(violations),
+        assumed,
+    )
 
 
-def imagined(scene: Scene) -> tuple[list[Move], Base]:
+def _to_know_the_base(planned: Explorer) -> tuple[list[Move], Base, str]:
+    """The moves before exploring, the base that they are taken to find, and what was assumed; a sentence or ""."""
+    if planned.discover is not None:
+        moves, base = imagined(planned.discover)
+        return moves, base, "the body is not known: planned as if it were flat and lay in the middle of the region"
+    assert planned.given is not None  # a scene gives a mesh or a region
+    if planned.locate is None:
+        return [], planned.given, ""
+    locating = planned.prepared(planned.locate.plan(), planned.given, Spent(planned.workspace.max_speed), np.inf)
+    return dry_run(locating, planned.nothing)[0], planned.given, ""
+
+
+def imagined(discover: Discover) -> tuple[list[Move], Base]:
     """How the discovery of an unknown body would go if it were a flat one in the middle of the region; its base."""
-    discover = discoverer(scene)
     low, high = discover.low, discover.high
     axis = "xyz".index(discover.sides[0][1])
     first, second = ((axis + 1) % 3, (axis + 2) % 3)[:: 1 if discover.sides[0][0] == "+" else -1]

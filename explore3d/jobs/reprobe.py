@@ -99,7 +99,7 @@ def reprobe(folder: Path | str, at: tuple[float, float, float], *, touches: int 
         resolution = finger.info.get("resolution", 0.0)
         with LogWriter(path, tip_radius=scene.tip.radius, metadata=about, resolution=resolution) as writer:
             for _ in range(touches):
-                move = Move(center[None, :], approach, scene.survey.speed, scene.survey.force)
+                move = Move(center[None, :], approach, scene.sweep_speed, scene.survey.force)
                 trace = finger.execute(move)
                 writer.write(move, trace)
                 if len(trace):

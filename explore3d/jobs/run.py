@@ -8,7 +8,7 @@ from pathlib import Path
 from explore3d import UserError, __version__
 from explore3d.analysis import Analysis, Progress, Stages, silent, without_needless_dynamics
 from explore3d.jobs.conclude import conclude
-from explore3d.jobs.expedition import Expedition, known_base
+from explore3d.jobs.expedition import explorer, known_base
 from explore3d.jobs.resume import EARLIER, Replay, earlier_log
 from explore3d.jobs.session import Session
 from explore3d.log import Log, Recorder, read_base
@@ -98,7 +98,7 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
             finger.notice = log.felt  # a slow sweep's samples are on disk before it ends
         touch = finger.execute if replay is None else replay.before(finger.execute, getattr(finger, "skip", None))
         execute = _logged(touch, log, scene.explore.time_budget, share)
-        outcome = Expedition(scene, finger, execute, log).go()
+        outcome = explorer(scene, finger.workspace).go(execute, log.event)
         # what the connection counted and learnt of its clocks on the way
         log.event("outcome", {"reason": outcome.reason, "detail": outcome.detail, "finger": finger.info})
         if not log.samples:

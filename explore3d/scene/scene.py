@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,10 +14,30 @@ from explore3d.scene.complaint import complaint
 from explore3d.scene.machine import EMULATOR, MachineTable, SensorTable
 from explore3d.scene.mesh_files import load_mesh
 from explore3d.scene.to_toml import scene_text
-from explore3d.scene.values import Angle, Extent, Force, Length, LengthUnit, Point, Rate, Signed, Speed, Table, Time
+from explore3d.scene.values import (
+    INFORMATIVE,
+    Angle,
+    Extent,
+    Force,
+    Length,
+    LengthUnit,
+    Point,
+    Rate,
+    Signed,
+    SweepSpeed,
+    Table,
+    Time,
+)
+from hw.simulated import TOP_SPEED_RADII, Dynamics
 from mapping import KINDS, Surface
+from mapping.geometry.templates import kink_angle
+from mapping.instrument import Noise, StatedNoise
+from planners.survey import fastest_speed
 
 SCENE_SCHEMA = "explore3d/scene/1"
+# The slowest speed that is tried is this many times slower than the fastest: the height that white noise hides falls
+# with its power 2/5, four times over the range, and what is still hidden then is better felt by many fast sweeps
+SPEED_RANGE = 30.0
 
 
 class Tip(Table):
@@ -28,7 +49,8 @@ class Tip(Table):
 
     radius: Length
     radius_sd: Extent = 0.0
-    profile: Path | None = None
+    # beside a radius it only says where that came from (see _with_profile)
+    profile: Annotated[Path | None, INFORMATIVE] = None
 
 
 class Region(Table):
@@ -111,6 +133,10 @@ class FingerTable(Table):
     def _has_what_its_kind_needs(self) -> FingerTable:
         if self.kind == "grbl" and self.machine is None:
             raise ValueError("a finger of kind grbl needs the table finger.machine; found none")
+        if self.kind == "simulated" and (self.machine is not None or self.sensor is not None):
+            raise ValueError("the tables finger.machine and finger.sensor are of kind grbl; the kind is simulated")
+        if self.kind == "grbl" and (self.dynamics is not None or self.contact_data):
+            raise ValueError("dynamics and contact_data are of the simulated finger; the kind is grbl")
         if self.machine is not None and self.machine.touch == "slide" and self.sensor is None:
             raise ValueError("sliding needs a force sensor: give the table finger.sensor")
         if self.object is None and (self.machine is None or self.machine.port == EMULATOR):
@@ -122,11 +148,12 @@ class SurveyTable(Table):
     """Sweeps over the whole model: the least height to be found (m), the least span of a ridge (m), m/s, N.
 
     Without `shortest_ridge` nothing of that height is missed, bumps included; with it, ridges that span less may be.
+    The speed "fastest" is the greatest at which a sweep still shows the smallest feature (`Scene.sweep_speed`).
     """
 
     smallest_feature: Length
     shortest_ridge: Length | None = None
-    speed: Speed = 0.03
+    speed: SweepSpeed = 0.03
     force: Force = 1.0
 
 
@@ -171,6 +198,7 @@ class Scene(Table):
     truth: tuple[Truth, ...] = ()
     _path: Path = PrivateAttr(default=Path("scene.toml"))
     _text: str = PrivateAttr(default="")
+    _meshes: Mapping[Path, Surface] = PrivateAttr(default_factory=dict)
 
     @property
     def path(self) -> Path:
@@ -187,6 +215,44 @@ class Scene(Table):
         """The scene as TOML with every default written out, lengths in SI and paths absolute."""
         return scene_text(self.model_dump(mode="json", by_alias=True, exclude_none=True))
 
+    @property
+    def noise(self) -> StatedNoise | None:
+        """The noise of the centres as the scene states it, None where it states none."""
+        told = self.finger.noise
+        noise = Noise(told.white, told.correlated, told.correlation_length)
+        return StatedNoise(noise, told.doubt) if noise.sd > 0 else None
+
+    @property
+    def sweep_speed(self) -> float:
+        """Speed of the sweeps, m/s: as given, or the fastest at which one still shows the smallest feature.
+
+        That is bounded by the noise, whose white part averages less where samples lie further apart
+        (planners.survey.pace); by the finger's inertia, whose tip must follow the smallest feature's kinks within
+        the noise (hw.simulated.dynamics); and by what the simulated finger can do.
+
+        Raises:
+            SceneError: "fastest" is asked for, and the finger's noise or what it can follow is not known.
+        """
+        speed, finger = self.survey.speed, self.finger
+        if speed != "fastest":
+            return speed
+        if finger.kind != "simulated":
+            raise SceneError(
+                f"{self._path}: survey.speed: the fastest speed that a machine can follow is not known; found kind "
+                f'"{finger.kind}", possible are a number as "20 mm/s", or the kind "simulated"'
+            )
+        if self.noise is None:
+            raise SceneError(
+                f"{self._path}: survey.speed: the fastest speed follows from the noise, and finger.noise states none; "
+                'give white or correlated, or a number as "30 mm/s"'
+            )
+        smallest, tip = self.survey.smallest_feature, self.tip.radius
+        limit = TOP_SPEED_RADII * tip
+        if finger.dynamics is not None:
+            kink = float(kink_angle(smallest, 0.5 * smallest, tip))
+            limit = min(limit, Dynamics(**finger.dynamics.model_dump()).fastest(kink, self.noise.noise.sd))
+        return fastest_speed(self.noise.noise, finger.rate, tip, smallest, limit / SPEED_RANGE, limit)
+
     def base_surface(self) -> Surface | None:
         """The global model's mesh in metres, None if only a region is known. Raises SceneError."""
         return None if self.model.mesh is None else self._surface("model.mesh", self.model.mesh, self.model.units)
@@ -200,6 +266,8 @@ class Scene(Table):
         return self._surface("finger.object", self.finger.object, self.finger.units)
 
     def _surface(self, field: str, mesh: Path, units: str) -> Surface:
+        if mesh in self._meshes:
+            return self._meshes[mesh]
         try:
             return load_mesh(mesh, units)
         except (MeshFileError, UnitError) as error:
@@ -223,8 +291,15 @@ def load_scene(path: Path | str) -> Scene:
     return parse_scene(text, path)
 
 
-def parse_scene(text: str, path: Path | str) -> Scene:
-    """The scene in a text that stood, or might have stood, in the file `path`. Raises SceneError."""
+def parse_scene(text: str, path: Path | str, meshes: Mapping[str, Surface] | None = None) -> Scene:
+    """The scene in a text that stood, or might have stood, in the file `path`.
+
+    Args:
+        meshes: surfaces (m) that are held in memory, by the names that the text has for their files; None: none.
+
+    Raises:
+        SceneError: see `load_scene`.
+    """
     path = Path(path)
     try:
         scene = Scene.model_validate(_with_profile(tomllib.loads(text), path))
@@ -234,6 +309,8 @@ def parse_scene(text: str, path: Path | str) -> Scene:
         raise SceneError(f"{path}: {complaint(error, Scene)}") from error
     scene = _with_absolute_paths(scene, path.resolve().parent)
     scene._path, scene._text = path, text
+    scene._meshes = {(path.resolve().parent / name).resolve(): each for name, each in (meshes or {}).items()}
+    _ = scene.sweep_speed  # a speed that cannot be known is refused here, as every other value
     return scene
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from mapping.instrument import Noise, StatedNoise
+from mapping.instrument import StatedNoise
 
 if TYPE_CHECKING:
     from explore3d.scene.scene import Scene
@@ -34,10 +34,8 @@ class AnalysisSettings:
         """The settings of a scene; the defaults without one."""
         if scene is None:
             return cls()
-        told, of = scene.finger.noise, scene.detection
-        noise = Noise(told.white, told.correlated, told.correlation_length)
-        stated = StatedNoise(noise, told.doubt) if noise.sd > 0 else None
-        return cls(of.algorithm, of.false_alarms_per_metre, scene.seed, scene.tip.radius_sd, stated)
+        of = scene.detection
+        return cls(of.algorithm, of.false_alarms_per_metre, scene.seed, scene.tip.radius_sd, scene.noise)
 
     @property
     def detection(self) -> dict[str, Any]:

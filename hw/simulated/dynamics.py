@@ -19,6 +19,8 @@ from mapping import FloatArray
 
 # Halvings of the interval between two control instants, at most: 2^-30 of 6 um is below an atom
 DEEPEST = 30
+# The tip lags behind a kink by v tan(phi) / (e lambda) at most: at this margin by less than 0.04 sigma
+FOLLOWING_MARGIN = 10.0
 # Share of the tolerance that the rigid trace may take: an error of its slope grows while the tip flies, by how much
 # only a second ride can tell, over a trace FINER times as fine; below LEAST_ERROR_SHARE of it only rounding is left
 RIGID_ERROR_SHARE, FINER, LEAST_ERROR_SHARE = 0.004, 8.0, 1e-7
@@ -75,8 +77,12 @@ class Dynamics:
         Args:
             speed: m/s; kink: largest angle of the rigid trace's kinks, rad; sigma: noise of the centre, m.
         """
+        return speed >= self.fastest(kink, sigma)
+
+    def fastest(self, kink: float, sigma: float) -> float:
+        """The speed below which the tip follows a kink of that angle (rad) within the noise sigma (m), m/s."""
         rate = float(np.sqrt(self.stiffness / self.mass))
-        return bool(rate * sigma <= 10.0 * speed * np.tan(kink))
+        return np.inf if kink == 0.0 else float(rate * sigma / (FOLLOWING_MARGIN * np.tan(kink)))
 
     def ride(self, height: Callable[[FloatArray], FloatArray], times: FloatArray, force: float) -> Ride:
         """Ride over a rigid trace, ever finer until the gap keeps to the tolerance.

@@ -13,6 +13,9 @@ from hw.simulated.noise_source import NoiseSource
 from mapping import BoolArray, FloatArray, Surface, Trace
 from mapping.geometry.contact import BallContact, Contacts
 
+# The simulated finger's top speed unless it is given, in tip radii per second: no machine's, only a bound for plans
+TOP_SPEED_RADII = 25.0
+
 
 @dataclass(kw_only=True)
 class SimulatedFinger:
@@ -61,7 +64,7 @@ class SimulatedFinger:
 
     def __post_init__(self, margin: float | None) -> None:
         self._require_positive("tip_radius", "rate", "correlation_length", "max_force")
-        fastest = 25.0 * self.tip_radius if self.max_speed is None else self.max_speed
+        fastest = TOP_SPEED_RADII * self.tip_radius if self.max_speed is None else self.max_speed
         if not 0 < fastest < np.inf:
             raise FingerError(f"simulated finger: max_speed must be positive; found {fastest}")
         for name in ("white", "correlated", "angle", "contact"):

@@ -11,7 +11,7 @@ import numpy as np
 from mapping import FloatArray
 from mapping.base import Base
 from mapping.detection import Crossing
-from mapping.instrument import Noise
+from mapping.instrument import Noise, StatedNoise
 from planners import Outcome, Plan, PlannerError, Spent, within
 from planners.explore.faint_search import CloserLook, FaintLead, FaintSearch
 from planners.explore.found import Found
@@ -70,6 +70,7 @@ class Explore:
         travel_speed: between sweeps, m/s; None: 25 tip radii per second.
         false_alarms_per_metre: accepted rate of false crossings, 1/m.
         noise: of the samples; None: learnt from the first sweeps.
+        stated: what is known of the noise before, say from a data sheet; learning begins from it.
     """
 
     base: Base
@@ -85,6 +86,7 @@ class Explore:
     travel_speed: float | None = None
     false_alarms_per_metre: float = 0.01
     noise: Noise | None = None
+    stated: StatedNoise | None = None
 
     def __post_init__(self) -> None:
         for name in ("tip_radius", "smallest", "precision", "speed", "time_budget"):
@@ -119,7 +121,7 @@ class Explore:
         get_ready(self.tip_radius)
         found = Found(self.tip_radius, noise=self.noise)
         spent = Spent(25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed)
-        surveyor = Surveyor(self.survey, found, self.false_alarms_per_metre)
+        surveyor = Surveyor(self.survey, found, self.false_alarms_per_metre, self.stated)
         everything = self._everything(surveyor, found)
         outcome = yield from within(everything, spent, self.time_budget, self.path_budget)
         if found.surveyed:
@@ -165,7 +167,7 @@ class Explore:
         """Where no single sweep shows the smallest ridge asked for, look for lines that many show."""
         rate = CANDIDATES * self.false_alarms_per_metre
         noise, learns = found.noise or Noise(0.0), self.noise is None
-        search = FaintSearch(self.survey, surveyor.limit, noise, rate, learns)
+        search = FaintSearch(self.survey, surveyor.limit, noise, rate, learns, self.stated)
         if self.survey.crossed(self.survey.visible) is None or search.crossings == 1:
             return Outcome("not needed")
         searched = yield from search.plan()

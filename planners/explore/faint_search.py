@@ -13,7 +13,7 @@ from mapping import Feature, FloatArray, Trace
 from mapping.assembly import with_faint_lines
 from mapping.base import Base
 from mapping.detection import Crossing, Detections, detect
-from mapping.instrument import Noise
+from mapping.instrument import Noise, StatedNoise
 from planners import Outcome, Plan
 from planners.follow import SEEN_CHI_SQUARE_FALL
 from planners.survey import Survey
@@ -68,6 +68,7 @@ class FaintSearch:
         noise: of the samples.
         false_alarms_per_metre: accepted rate of false lines, 1/m.
         learns: True if the noise was learnt from the survey, and may be learnt better.
+        stated: what is known of the noise before; None: nothing.
     """
 
     survey: Survey
@@ -75,6 +76,7 @@ class FaintSearch:
     noise: Noise
     false_alarms_per_metre: float
     learns: bool = True
+    stated: StatedNoise | None = None
 
     @property
     def crossings(self) -> int:
@@ -84,7 +86,12 @@ class FaintSearch:
     def plan(self) -> Plan:
         """Make the sweeps; the outcome's value is a CloserLook."""
         look = SweepBySweep(
-            self.survey.base, self.noise, self.limit, self.false_alarms_per_metre, learnt=not self.learns
+            self.survey.base,
+            self.noise,
+            self.limit,
+            self.false_alarms_per_metre,
+            learnt=not self.learns,
+            stated=self.stated,
         )
         planned = self._planned(self.limit)
         yield from self._sweep(planned, look)
@@ -165,6 +172,7 @@ class SweepBySweep:
         limit: least height that a single sweep detects, m.
         false_alarms_per_metre: accepted rate of false crossings, 1/m.
         learnt: True if the noise need not be learnt, or was.
+        stated: what is known of the noise before; None: nothing.
         felt: traces of the sweeps.
         seen: what they show.
     """
@@ -174,6 +182,7 @@ class SweepBySweep:
     limit: float
     false_alarms_per_metre: float
     learnt: bool
+    stated: StatedNoise | None = None
     felt: list[Trace] = field(default_factory=list)
     seen: list[Detections] = field(default_factory=list)
 
@@ -199,4 +208,5 @@ class SweepBySweep:
         self.learnt = True
 
     def _detected(self, trace: Trace, noise: Noise | None) -> Detections:
-        return detect(trace, self.base, noise=noise, false_alarms_per_metre=self.false_alarms_per_metre)
+        rate = self.false_alarms_per_metre
+        return detect(trace, self.base, noise=noise, stated=self.stated, false_alarms_per_metre=rate)

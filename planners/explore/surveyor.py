@@ -8,6 +8,7 @@ import numpy as np
 
 from mapping import FloatArray, Trace
 from mapping.detection import Coverage, detect
+from mapping.instrument import StatedNoise
 from planners import Outcome, Plan
 from planners.explore.found import Found
 from planners.survey import Survey
@@ -31,6 +32,7 @@ class Surveyor:
         survey: what to sweep.
         found: where crossings and noise are noted.
         false_alarms_per_metre: accepted rate of false crossings in the end, 1/m.
+        stated: what is known of the noise before; None: nothing.
         visible: share of the smallest feature's height that stays visible between two sweeps.
         paths: touched by the sweeps so far, each (K, 3), m.
         limit: least height that the sweeps detect one by one, m.
@@ -39,6 +41,7 @@ class Surveyor:
     survey: Survey
     found: Found
     false_alarms_per_metre: float
+    stated: StatedNoise | None = None
     visible: float = field(init=False)
     paths: list[FloatArray] = field(init=False, default_factory=list)
     limit: float = field(init=False, default=0.0)
@@ -76,7 +79,7 @@ class Surveyor:
         if len(first) < FEWEST_SWEEP_SAMPLES:
             return
         smallest = self.survey.smallest
-        limit = detect(first, self.survey.base, noise=self.found.noise).detection_limit
+        limit = detect(first, self.survey.base, noise=self.found.noise, stated=self.stated).detection_limit
         if limit > smallest:
             self.found.unseen.append(
                 f"features lower than {1e3 * limit:.2g} mm: a single sweep does not show them through the noise, "
@@ -91,6 +94,7 @@ class Surveyor:
             Trace.concatenate(waiting),
             self.survey.base,
             noise=self.found.noise,
+            stated=self.stated,
             false_alarms_per_metre=CANDIDATES * self.false_alarms_per_metre,
         )
         self.found.noise = felt.noise

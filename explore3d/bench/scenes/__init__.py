@@ -6,7 +6,11 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from explore3d.bench.scenes.bodies import joined as joined, tube as tube
-    from explore3d.bench.scenes.exploring import SCENES as SCENES, BenchScene as BenchScene
+    from explore3d.bench.scenes.exploring import (
+        BENCH_TIP_RADIUS as BENCH_TIP_RADIUS,
+        SCENES as SCENES,
+        BenchScene as BenchScene,
+    )
     from explore3d.bench.scenes.kinds import (
         BODIES_BY_KIND as BODIES_BY_KIND,
         INSPECTED_HALF_SIDE as INSPECTED_HALF_SIDE,
@@ -28,7 +32,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "bodies": ("joined", "tube"),
-    "exploring": ("BenchScene", "SCENES"),
+    "exploring": ("BENCH_TIP_RADIUS", "BenchScene", "SCENES"),
     "kinds": ("BODIES_BY_KIND", "INSPECTED_HALF_SIDE", "MIDDLE"),
     "long_log": ("write_long_log",),
     "noise": ("SAMPLE_SPACING", "simulate_noise"),

@@ -1,9 +1,14 @@
-"""Scenes of the exploration bench: a global model, what the finger really touches, and the features that differ."""
+"""Scenes of the exploration bench: a global model, what the finger really touches, and the features that differ.
+
+Each is an ordinary scene: a text as a file holds it, and two meshes that the text names, in memory or written out.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +25,9 @@ from explore3d.bench.scenes.bodies import (
     sphere_mesh,
     tube,
 )
+from explore3d.scene import Scene, parse_scene, scene_text
 from mapping import FloatArray, Surface
+from mapping.geometry.mesh import write_whole
 from planners.explore import APPROACH_SIDES
 
 WIRE = 0.65e-3
@@ -30,6 +37,12 @@ PLATE_LENGTH, PLATE_WIDTH = 0.1, 0.08
 SHORTEST_RIDGE_SPAN = 0.025
 # The box that an unknown body is looked for in is so much larger, m
 BOX_MARGIN = 0.004
+# Of the bench's fingertip, m: the paper's
+BENCH_TIP_RADIUS = 0.01
+# Names of the meshes that a bench scene's text gives
+BASE_MESH, OBJECT_MESH = "base.obj", "object.obj"
+# Finger time that a bench run may take: longer than any of them needs
+BENCH_TIME_BUDGET = "1 h"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +68,54 @@ class BenchScene:
     misplaced: bool = False
     sides: tuple[str, ...] = ()
     region: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
+
+    def text(self, seed: int, finger: Mapping[str, float], precision: float, speed: float) -> str:
+        """The scene file's text.
+
+        Args:
+            seed: of the finger's noise and the chains.
+            finger: its `rate` (Hz), and its noise as [finger.noise] has it, m.
+            precision: wanted half-width of the 90 % interval of an end, m.
+            speed: of the sweeps, m/s.
+        """
+        model: dict[str, Any] = {"mesh": BASE_MESH}
+        if self.sides:
+            low, high = self.region.tolist()
+            model = {"sides": list(self.sides), "region": {"low": low, "high": high}}
+        elif self.misplaced:
+            model |= {"pose": "estimate"}
+        survey = {"smallest_feature": self.smallest, "speed": speed}
+        if self.shortest_ridge is not None:
+            survey |= {"shortest_ridge": self.shortest_ridge}
+        noise = {name: level for name, level in finger.items() if name != "rate"}
+        tables = {
+            "schema": "explore3d/scene/1",
+            "seed": seed,
+            "tip": {"radius": BENCH_TIP_RADIUS},
+            "model": model,
+            "finger": {"object": OBJECT_MESH, "rate": finger["rate"], "noise": noise},
+            "survey": survey,
+            "explore": {"precision": precision, "time_budget": BENCH_TIME_BUDGET},
+            "truth": [
+                {"kind": true.kind, "axis": true.axis.tolist(), "height": true.height}
+                | ({} if true.width is None else {"width": true.width})
+                for true in self.truth
+            ],
+        }
+        return scene_text(tables)
+
+    def scene(self, text: str) -> Scene:
+        """The scene of such a text, whose meshes stay in memory."""
+        return parse_scene(text, "bench.toml", {BASE_MESH: self.base, OBJECT_MESH: self.object})
+
+    def write(self, text: str, folder: Path) -> Path:
+        """The scene as files for `explore3d run`: scene.toml and its meshes in a folder, which is made if absent."""
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, surface in ((BASE_MESH, self.base), (OBJECT_MESH, self.object)):
+            lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in surface.vertices.tolist()]
+            lines += [f"f {a} {b} {c}" for a, b, c in (surface.faces + 1).tolist()]
+            write_whole(folder / name, "\n".join(lines) + "\n")
+        return write_whole(folder / "scene.toml", text)
 
 
 def wires(

@@ -11,11 +11,11 @@ import pytest
 from explore3d.bench import exploring as bench_explore
 from explore3d.bench.scenes.bodies import tube
 from explore3d.bench.scenes.exploring import SCENES, misplaced
+from explore3d.jobs.expedition import explorer
+from explore3d.jobs.plan import plan_scene
+from explore3d.jobs.run import scene_finger
+from explore3d.scene.scene import load_scene
 from mapping.geometry.mesh.nearest import NearestPoint
-from mapping.trace import Trace
-from planners.drive import dry_run
-
-EMPTY = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), bench_explore.TIP_RADIUS)
 
 
 def test_every_tube_is_closed_and_has_the_volume_of_a_capsule() -> None:
@@ -84,10 +84,24 @@ def test_exploring_finds_every_ridge_and_its_ends(scene: str, seed: int) -> None
 
 
 @pytest.mark.slow
-def test_on_an_empty_plate_exploring_is_no_more_than_the_survey() -> None:
+def test_on_an_empty_plate_exploring_is_no_more_than_the_survey(tmp_path: Path) -> None:
     result = bench_explore.one_run(SCENES["empty"](np.random.default_rng(0)), "explore", 0)
     assert result["outcome"] == "nothing found" and result["invented"] == 0
-    survey = bench_explore.STRATEGIES["explore"]
-    moves, _ = dry_run(survey(SCENES["empty"](np.random.default_rng(0)), np.random.default_rng(0)), EMPTY)
-    planned = sum(move.duration for move in moves)
-    assert result["finger_seconds"] < 1.15 * planned  # and the ways between the sweeps
+    (scene,) = bench_explore.write_bench_scenes(["empty"], 1, tmp_path)
+    assert result["finger_seconds"] == pytest.approx(plan_scene(scene).seconds, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["two", "unknown fold", "wrong pose"])
+def test_a_written_bench_scene_explores_as_the_one_in_memory(name: str, tmp_path: Path) -> None:
+    body = SCENES[name](np.random.default_rng(1))
+    held = bench_explore.bench_scene(body, "explore", 1)
+    files = list(bench_explore.write_bench_scenes([name], 2, tmp_path, "apparatus"))
+    scene = load_scene(files[1])
+    assert scene.text == held.text
+    for mine, other in ((scene.base_surface(), held.base_surface()), (scene.object_surface(), held.object_surface())):
+        assert (mine is None) == (other is None)
+        assert mine is None or other is None or np.array_equal(mine.vertices, other.vertices)
+    with scene_finger(scene) as finger, scene_finger(held) as clone:
+        one, two = explorer(scene, finger.workspace), explorer(held, clone.workspace)
+    assert {**one.explore.keywords, "region": None} == {**two.explore.keywords, "region": None}
+    assert (one.locate is None, one.discover is None) == (two.locate is None, two.discover is None)

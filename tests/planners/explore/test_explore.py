@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from hw.simulated.finger import SimulatedFinger
 from mapping.base.base import Base
 from mapping.geometry.templates.shapes import cap_height
 from mapping.instrument.noise import Noise
+from mapping.instrument.stated import StatedNoise
 from mapping.surface import Surface
 from mapping.trace import Trace
 from planners.budget import Spent, within
@@ -72,7 +74,7 @@ def with_tubes(*axes: np.ndarray) -> Surface:
     return Surface(np.concatenate(vertices), np.concatenate(faces))
 
 
-def explore(body: Surface, *, seed: int = 0, **settings: float) -> tuple[Found, SimulatedFinger, Outcome]:
+def explore(body: Surface, *, seed: int = 0, **settings: Any) -> tuple[Found, SimulatedFinger, Outcome]:
     finger = SimulatedFinger(object=body, tip_radius=R, rate=1500.0, seed=seed, white=1e-4, correlated=1e-5)
     procedure = Explore(base=Base(PLATE), tip_radius=R, smallest=3e-4, **settings)
     limits = Limits.of(finger.workspace, procedure.base, R)
@@ -294,6 +296,17 @@ def test_an_end_moved_back_takes_the_points_beyond_it_along() -> None:
         shorter = track.with_end(index, moved)
         assert shorter.length == pytest.approx(0.037)
         assert shorter.ends[index] is moved
+
+
+def test_the_noise_that_is_learnt_begins_from_what_is_stated_and_does_not_end_there() -> None:
+    true = Noise(1e-4, 1e-5)
+    learnt, _, _ = explore(PLATE, shortest_ridge=0.03)
+    told, _, _ = explore(PLATE, shortest_ridge=0.03, stated=StatedNoise(true, 0.01))
+    misled, _, _ = explore(PLATE, shortest_ridge=0.03, stated=StatedNoise(Noise(3e-4, 1e-5), 0.1))
+    assert learnt.noise is not None and told.noise is not None and misled.noise is not None
+    assert told.noise.correlated == pytest.approx(true.correlated, rel=0.05)
+    assert abs(told.noise.correlated - true.correlated) < abs(learnt.noise.correlated - true.correlated)
+    assert misled.noise.white == pytest.approx(true.white, rel=0.05)
 
 
 def test_what_the_survey_may_have_missed_is_said_where_the_exploration_ends() -> None:

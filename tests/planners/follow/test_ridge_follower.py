@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from explore3d.bench.exploring import APPARATUS, TIP_RADIUS
-from explore3d.bench.scenes.exploring import groove
+from explore3d.bench.exploring import APPARATUS
+from explore3d.bench.scenes.exploring import BENCH_TIP_RADIUS as TIP_RADIUS, groove
 from hw.simulated.finger import SimulatedFinger
 from mapping.base.base import Base
 from mapping.detection.crossing import Crossing

@@ -1,0 +1,67 @@
+"""Plans: what a key of the scene costs or saves in finger time, before anything moves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from explore3d.errors import SceneError
+from explore3d.jobs.plan import DryRun, plan_scene
+from explore3d.scene.scene import parse_scene
+
+WIRE = Path(__file__).resolve().parents[3] / "assets" / "scenes" / "wire_on_plate.toml"
+TEXT = WIRE.read_text().replace('"../meshes', f'"{WIRE.parents[1]}/meshes')
+RIDGE = TEXT.replace("[survey]", '[survey]\nshortest_ridge = "40 mm"')
+FASTEST = RIDGE.replace('speed = "30 mm/s"', 'speed = "fastest"')
+
+
+def planned(folder: Path, text: str) -> DryRun:
+    path = folder / "scene.toml"
+    path.write_text(text)
+    return plan_scene(path)
+
+
+def sweeping(plan: DryRun) -> float:
+    """Time of the sweeps, s."""
+    return sum(move.duration for move in plan.moves if move.purpose == "sweep")
+
+
+def test_the_span_of_the_shortest_ridge_and_the_fastest_speed_save_finger_time(tmp_path: Path) -> None:
+    ridges, fast = planned(tmp_path, RIDGE), planned(tmp_path, FASTEST)
+    assert sweeping(ridges) < 80.0  # 253 s where bumps are looked for, too
+    assert not ridges.violations and not fast.violations
+    assert fast.speed == pytest.approx(0.25) and fast.record()["speed"] == fast.speed
+    assert sweeping(fast) == pytest.approx(sweeping(ridges) * 0.03 / 0.25, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "speed"),
+    [
+        ({}, 0.25),  # 25 tip radii per second
+        ({"[survey]": "[finger.dynamics]\n[survey]"}, 0.0808),  # 1000 / s x 0.201 mm / (10 tan 14 degrees)
+        ({"[survey]": "[finger.dynamics]\nmass = 0.4\n[survey]"}, 0.0404),  # half the rate
+        # 0.2 mm / 1.25 is to stand out 6.5 times: 24.6 um, of which the correlated part takes 15.3, so that white noise
+        # may take 19.3 = 200 sqrt(15 Delta / (16 w)) with w = 1.79 mm: Delta = 17.7 um, 88 mm/s; the next tried
+        ({'"0.3 mm"': '"0.2 mm"'}, 0.082),
+    ],
+)
+def test_the_fastest_speed_follows_from_noise_dynamics_and_the_smallest_feature(
+    changes: dict[str, str], speed: float
+) -> None:
+    text = FASTEST
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new, 1)
+    assert parse_scene(text, WIRE).sweep_speed == pytest.approx(speed, rel=0.08)
+
+
+def test_a_fastest_speed_that_cannot_be_known_is_refused() -> None:
+    silent = FASTEST.replace('white = "0.2 mm"', "").replace('correlated = "0.02 mm"', "")
+    with pytest.raises(SceneError, match=r"survey\.speed: the fastest speed follows from the noise, and finger\.noise"):
+        parse_scene(silent, WIRE)
+    pecked = WIRE.with_name("grbl_peck.toml")
+    with pytest.raises(SceneError, match=r"survey\.speed: the fastest speed that a machine can follow is not known"):
+        parse_scene(pecked.read_text().replace('speed = "20 mm/s"', 'speed = "fastest"'), pecked)
+    with pytest.raises(SceneError, match=r'survey\.speed: expected a speed .*or write "fastest"'):
+        parse_scene(FASTEST.replace('"fastest"', '"fast"'), WIRE)
