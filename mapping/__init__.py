@@ -1,4 +1,8 @@
-"""Surfaces and inference: arrays in, values out. It knows no machine, no file dialogue, no clock."""
+"""Surfaces and inference: arrays in, values out. It knows no machine, no file dialogue, no clock.
+
+"The paper" in all modules is A. M. Okamura and M. R. Cutkosky, Haptic exploration of fine surface features, ICRA 1999;
+"theory" is docs/theory.md, where the references stand in full.
+"""
 
 from typing import TYPE_CHECKING
 

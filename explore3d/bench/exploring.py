@@ -38,7 +38,7 @@ PRECISION, CURVE_PRECISIONS = 0.05e-3, (0.02e-3, 0.1e-3, 0.2e-3)
 # Speeds between which everyone may sweep, m/s: the paper's, and one at which a tip of 0.1 kg on a contact of 1e5 N/m
 # still keeps contact over the wire and lags by at most 0.012 mm behind the rigid trace (hw.simulated.dynamics)
 SLOW, FAST = 0.03, 0.1
-# The apparatus of the paper (theory section 6), and one whose noise is correlated over as much as a wire disturbs
+# The apparatus of the paper (theory section 1.1), and one whose noise is correlated over as much as a wire disturbs
 APPARATUS: dict[str, Any] = {"rate": 5000.0, "white": 0.2e-3, "correlated": 0.02e-3, "correlation_length": 1e-3}
 FINGER_NOISES = {"apparatus": APPARATUS, "correlated": APPARATUS | {"correlated": 0.06e-3, "correlation_length": 2e-3}}
 

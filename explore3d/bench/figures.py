@@ -89,7 +89,7 @@ def parallel_surface() -> Any:
     wide, close = figure.subplots(1, 2, width_ratios=(1.35, 1.0))
     for axes in (wide, close):
         _body(axes)
-        axes.plot(x, z, color=MUTED, lw=1.2, ls=(0, (4, 2)), label="parallel surface (equation 4)")
+        axes.plot(x, z, color=MUTED, lw=1.2, ls=(0, (4, 2)), label="parallel surface (the paper's equation 4)")
         axes.plot(trace[:, 0], trace[:, 2], color=TRACED, lw=2.2, label="traced surface")
         for sign in (-1, 1):
             names = ("caustic point, 1 + r k = 0", "interference point") if sign > 0 else ("", "")

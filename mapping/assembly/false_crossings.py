@@ -1,4 +1,6 @@
-"""Unseen: a crossing that claims to be clear, but that the mean heights of its own sweep do not show.
+"""False crossings: three tests that reject a crossing.
+
+Unseen: a high signal-to-noise ratio is stated, but the mean heights of the same sweep do not show the section.
 
 Plateau end: a sweep that came down from a crest to the base, taken for a hollow in the crest's level.
 
@@ -18,15 +20,15 @@ from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import crest_trace
 
-# Only what is claimed to be so clear is held to account, and to this share of its claim.
+# Only crossings of at least this signal-to-noise ratio are tested, for this share of it.
 CLAIM, SEEN_CLAIM_SHARE = 20.0, 0.3
 
 
 def is_unseen(crossing: Crossing, inspection: Inspection) -> bool:
     """True if a clear crossing's section is not found in the heights, neither over the base nor over those beside.
 
-    A detection's signal-to-noise ratio is of the whole stretch that was fitted together; a slight crossing beside a
-    strong one may owe all of it to the other.
+    A detection's signal-to-noise ratio is of the whole stretch that was fitted together; a low crossing beside a high
+    one may get all of it from the other.
     """
     if crossing.snr < CLAIM or crossing.half_width < 1.2 * inspection.spacing:
         return False

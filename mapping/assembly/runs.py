@@ -1,4 +1,4 @@
-"""Runs: sweeps that ran along a ridge or groove instead of across it.
+"""Runs: sweeps tangential to a ridge or groove, that went along it instead of across.
 
 Run crest: where, beside a sweep that ran along a line, the crest of the line lies, as the other sweeps felt it.
 """

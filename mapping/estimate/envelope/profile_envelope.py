@@ -31,7 +31,7 @@ def envelope_heights(
     Raises:
         EnvelopeError: arrays of different lengths, values that are not finite, a radius that is not positive.
 
-    Reference: ISO 16610-41 (erosion by a disc); theory section 1.
+    Reference: ISO 16610-41:2015 (erosion by a disc); theory equation 1.3.
     """
     centers = np.array([np.asarray(x, dtype=np.float64), np.asarray(z, dtype=np.float64)])
     query = centers[0] if at is None else np.asarray(at, dtype=np.float64)
