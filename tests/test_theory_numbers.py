@@ -1,4 +1,4 @@
-"""The numbers that docs/theory.md states for the paper's wire, computed a second way: by dense algebra, in millimetres."""
+"""The numbers that docs/theory.md states for the paper's wire, computed again by dense algebra, in millimetres."""
 
 from __future__ import annotations
 
