@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,7 @@ def room_of(module: str) -> str:
     return f"{parts[0]}.{parts[1] if len(parts) > 1 and folder.is_dir() else NOUNS}"
 
 
+@cache
 def defined_in(folder: str) -> dict[str, str]:
     """The names on a folder's doorway, and the module of each."""
     for node in ast.parse((ROOT / folder.replace(".", "/") / "__init__.py").read_text("utf-8")).body:
