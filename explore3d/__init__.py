@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         unit_factor as unit_factor,
     )
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _PUBLIC = {
     "errors": ("FolderError", "MeshFileError", "PointCloudError", "SceneError", "UnitError", "UserError"),

@@ -1,4 +1,8 @@
-"""Surfaces and inference: arrays in, values out. It knows no machine, no file dialogue, no clock."""
+"""Surfaces and inference: arrays in, values out. It knows no machine, no file dialogue, no clock.
+
+"The paper" in all modules is A. M. Okamura and M. R. Cutkosky, Haptic exploration of fine surface features, ICRA 1999;
+"theory" is docs/theory.md, where the references stand in full.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -41,6 +45,11 @@ if TYPE_CHECKING:
         Support as Support,
     )
     from mapping.geometry.contact.first_contact import BallContact as BallContact
+    from mapping.geometry.contact.interference_points import interference_points as interference_points
+    from mapping.geometry.contact.parallel_surface import (
+        ParallelSurface as ParallelSurface,
+        parallel_surface as parallel_surface,
+    )
     from mapping.geometry.curvature.curvature import Curvature as Curvature
     from mapping.geometry.curvature.principal_curvatures import principal_curvatures as principal_curvatures
     from mapping.inference.feature_posterior import refine as refine, sample_posterior as sample_posterior
@@ -78,6 +87,8 @@ _PUBLIC = {
     "estimate.envelope.estimate": ("Estimate",),
     "feature": ("Anchor", "Feature", "Interval", "JUNCTION", "KINDS", "LeftOut", "Support"),
     "geometry.contact.first_contact": ("BallContact",),
+    "geometry.contact.interference_points": ("interference_points",),
+    "geometry.contact.parallel_surface": ("ParallelSurface", "parallel_surface"),
     "geometry.curvature.curvature": ("Curvature",),
     "geometry.curvature.principal_curvatures": ("principal_curvatures",),
     "inference.feature_posterior": ("refine", "sample_posterior"),

@@ -14,8 +14,8 @@ from mapping.posterior import Posterior
 KINDS = ("bump", "ridge", "pit", "groove", "step", "convex edge", "concave corner")
 
 
-# Log Bayes factor below which evidence is "barely worth mentioning" (Jeffreys, Theory of Probability, appendix B): what
-# was sought in many places has odds against it before.
+# Log Bayes factor below which evidence is "barely worth mentioning" (Jeffreys, Theory of Probability, 1961, appendix
+# B): what was sought in many places has odds against it before.
 SUBSTANTIAL = 0.5 * math.log(10.0)
 
 

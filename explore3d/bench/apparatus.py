@@ -1,8 +1,8 @@
-"""The paper's experiment (section 4.2.2) simulated: a wire on a tilted plate, rolled and slid over, four algorithms.
+"""The experiment of the paper's section 4.2.2 simulated: four algorithms on a wire on a tilted plate.
 
-A 10 mm hemisphere crosses a wire on a plate tilted by 45 degrees at 30 mm/s, sampled at 5 kHz; the centre is known to
-0.2 mm, the contact's place to 0.5 mm and its angle to 1 degree. Figure 7 shows what is recorded, figure 8 what each
-algorithm of figure 4 makes of it; the table counts over seeds what each finds of the wire's {-}{+}{-}.
+A 10 mm hemisphere rolls or slides over a wire on a plate tilted by 45 degrees at 30 mm/s, sampled at 5 kHz; the centre
+is known to 0.2 mm, the contact's place to 0.5 mm and its angle to 1 degree. Figure 7 shows what is recorded, figure 8
+what each algorithm of figure 4 makes of it; the table counts over seeds what each finds of the wire's {-}{+}{-}.
 """
 
 from __future__ import annotations
@@ -236,7 +236,7 @@ def _on_plate(points: FloatArray) -> FloatArray:
 
 def _explained(table: str) -> str:
     return (
-        "# The four algorithms on the simulated apparatus (section 4.2.2)\n\n"
+        "# The four algorithms on the simulated apparatus (the paper's section 4.2.2)\n\n"
         "Tip radius 10 mm, 5 kHz, 30 mm/s, plate at 45 degrees; centre +-0.2 mm, contact +-0.5 mm, angle +-1 degree, "
         "white, as standard deviations. `+` share of crossings whose crest is found, `-` share of the two "
         "interference points beside it, and features elsewhere per metre.\n\n" + table

@@ -39,7 +39,7 @@ PRECISION, CURVE_PRECISIONS = 0.05e-3, (0.02e-3, 0.1e-3, 0.2e-3)
 # keeps contact over the wire and lags by at most 0.012 mm behind the rigid trace (hw.simulated.dynamics). Exploring
 # takes the faster one, too: the noise would allow more (planners.survey.pace), and everyone is to have the same limit
 SLOW, FAST = 0.03, 0.1
-# The apparatus of the paper (theory section 6), and one whose noise is correlated over as much as a wire disturbs
+# The apparatus of the paper (theory section 1.1), and one whose noise is correlated over as much as a wire disturbs
 APPARATUS: dict[str, float] = {"rate": 5000.0, "white": 0.2e-3, "correlated": 0.02e-3, "correlation_length": 1e-3}
 FINGER_NOISES = {"apparatus": APPARATUS, "correlated": APPARATUS | {"correlated": 0.06e-3, "correlation_length": 2e-3}}
 

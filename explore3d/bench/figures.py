@@ -1,4 +1,4 @@
-"""The paper's figures 1, 2, 3 and 5, drawn anew from this project's public functions alone."""
+"""The paper's figures 1, 2, 3 and 5, and figure 2 of a mesh, drawn from this project's public functions alone."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mapping import FloatArray, Trace
 from mapping.detection import detect
 from mapping.estimate.envelope import envelope_heights, estimate_surface
 from mapping.estimate.sweeps import BRIDGED, smooth
-from mapping.geometry.contact import BallContact
+from mapping.geometry.contact import BallContact, ParallelSurface, interference_points, parallel_surface
 from mapping.geometry.mesh import write_whole
 from mapping.geometry.templates import BumpOfRevolution
 from mapping.instrument import Noise
@@ -23,10 +23,16 @@ BUMP, FIGURE_TIP_RADIUS = BumpOfRevolution(15.0), 1.0
 SIGMA = 0.1
 SECTION_SAMPLES = 6000
 EXTENT = 2.6
+# The mesh of figure 2 reaches as far as the ball does beyond the caustics; the ball slides over so many diameters of it
+MESH_RINGS, MESH_SECTORS, DIAMETERS = 150, 120, 12
+# On a mesh the ball touches twice at every concave edge too; there the contact leaps by a facet, at most 0.03 radii
+WIDEST_FACET = 0.1
 
 
 def write_figures(out: Path) -> list[Path]:
     """Write figures 1, 2, 3 and 5 of the paper as PNG files into a folder, which is made if absent.
+
+    Figure 2 comes twice: from the closed forms, and from a mesh, as it can be had for any body.
 
     Returns:
         The files, in the order of the paper.
@@ -37,7 +43,8 @@ def write_figures(out: Path) -> list[Path]:
     out.mkdir(parents=True, exist_ok=True)
     figures = {
         "figure1_traced_and_estimated.png": traced_and_estimated,
-        "figure2_parallel_surface.png": parallel_surface,
+        "figure2_parallel_surface.png": folded_section,
+        "figure2_of_a_mesh.png": folded_mesh,
         "figure3_curvature_features.png": curvature_features,
         "figure5_noise.png": noisy_trace,
     }
@@ -78,7 +85,7 @@ def traced_and_estimated() -> Any:
     return figure
 
 
-def parallel_surface() -> Any:
+def folded_section() -> Any:
     """Figure 2: the parallel surface folds at caustic points; at the interference point the ball touches twice."""
     u = np.linspace(-EXTENT, EXTENT, 4001)
     x, z = _parallel(u)
@@ -89,7 +96,7 @@ def parallel_surface() -> Any:
     wide, close = figure.subplots(1, 2, width_ratios=(1.35, 1.0))
     for axes in (wide, close):
         _body(axes)
-        axes.plot(x, z, color=MUTED, lw=1.2, ls=(0, (4, 2)), label="parallel surface (equation 4)")
+        axes.plot(x, z, color=MUTED, lw=1.2, ls=(0, (4, 2)), label="parallel surface (the paper's equation 4)")
         axes.plot(trace[:, 0], trace[:, 2], color=TRACED, lw=2.2, label="traced surface")
         for sign in (-1, 1):
             names = ("caustic point, 1 + r k = 0", "interference point") if sign > 0 else ("", "")
@@ -107,6 +114,59 @@ def parallel_surface() -> Any:
         axes.set_anchor("N")  # else their titles stand at different heights
     handles, labels = wide.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, handlelength=1.8)
+    return figure
+
+
+@cache
+def mesh_fold() -> tuple[ParallelSurface, FloatArray]:
+    """The parallel surface of the bump's mesh, and the centres (M, 3) where a ball that slides over it leaps."""
+    mesh = BUMP.mesh(EXTENT + FIGURE_TIP_RADIUS, MESH_RINGS, MESH_SECTORS)
+    u = np.hypot(*mesh.vertices[:, :2].T)
+    radial, axial = BUMP.normal(u)
+    away = mesh.vertices[:, :2] / np.maximum(u, np.finfo(np.float64).tiny)[:, None]
+    normals = np.column_stack([away * radial[:, None], axial])
+    folded = parallel_surface(mesh, FIGURE_TIP_RADIUS, normals, *BUMP.curvatures(u))
+    ball, down, found = BallContact(mesh, FIGURE_TIP_RADIUS), np.array([0.0, 0.0, -1.0]), []
+    for turn in np.pi * (np.arange(DIAMETERS) + 0.25) / DIAMETERS:
+        along = np.array([np.cos(turn), np.sin(turn), 0.0])
+        path = np.outer([-2.0, 2.0], along) - 4 * FIGURE_TIP_RADIUS * down
+        met = interference_points(ball, path, down, 0.2 * FIGURE_TIP_RADIUS).centers
+        before, after = (ball.press(met + step * along - down, down).points for step in (-1e-3, 1e-3))
+        found.append(met[np.linalg.norm(after - before, axis=1) > WIDEST_FACET * FIGURE_TIP_RADIUS])
+    return folded, np.concatenate(found)
+
+
+def folded_mesh() -> Any:
+    """Figure 2 from a mesh alone: where its parallel surface folds, and where a sliding ball touches twice."""
+    folded, met = mesh_fold()
+    rings = np.concatenate([BUMP.parallel(BUMP.caustics(FIGURE_TIP_RADIUS), FIGURE_TIP_RADIUS)[0], _meeting()[:1]])
+    figure = new_figure(7.2, 4.3)
+    above, section = figure.subplots(1, 2)
+    for axes, across in ((above, False), (section, True)):
+
+        def place(points: FloatArray, across: bool = across) -> tuple[FloatArray, FloatArray]:
+            return (np.hypot(*points[:, :2].T), points[:, 2]) if across else (points[:, 0], points[:, 1])
+
+        for reached, color, name in ((True, TRACED, "parallel surface"), (False, ESTIMATED, "turned inside out")):
+            there = folded.surface.vertices[folded.reachable == reached]
+            axes.plot(*place(there), ".", color=color, ms=1.6 if reached else 2.2, mew=0, alpha=0.55, label=name)
+        axes.plot(*place(folded.caustics), ".", color=TRUTH, ms=3.0, mew=0, label="caustic points of the mesh")
+        axes.plot(*place(met), "o", color=INK, ms=4.0, label="interference points of a sliding ball")
+    angle = np.linspace(0, 2 * np.pi, 361)
+    for ring in rings:
+        above.plot(ring * np.cos(angle), ring * np.sin(angle), color=MUTED, lw=0.7, ls=(0, (3, 3)), zorder=0.5)
+    section.plot(*_parallel(np.linspace(0, EXTENT, 2001)), color=MUTED, lw=0.7, zorder=0.5, label="closed forms")
+    above.set_title("Figure 2 from a mesh, seen from above")
+    section.set_title("The same in a section through the axis")
+    reach = 1.12 * float(rings.max())
+    _frame(above, (-reach, reach), (-reach, reach))
+    above.set_ylabel("y")
+    heights = folded.caustics[:, 2]
+    _frame(section, (0.9 * float(rings.min()), reach), (float(heights.min()) - 0.06, float(heights.max()) + 0.06))
+    section.set_xlabel("distance from the axis")
+    section.set_aspect("auto")
+    section.set_box_aspect(1)
+    figure.legend(*section.get_legend_handles_labels(), loc="outside lower center", ncols=3, markerscale=2.0)
     return figure
 
 

@@ -11,7 +11,10 @@ from explore3d.cli.options import Out
 
 
 def figures(
-    out: Out, seeds: Annotated[int, typer.Option(min=1, help="Seeds of the noise in the table of section 4.2.2.")] = 20
+    out: Out,
+    seeds: Annotated[
+        int, typer.Option(min=1, help="Seeds of the noise in the table of the paper's section 4.2.2.")
+    ] = 20,
 ) -> None:
     """Draw the paper's figures 1, 2, 3, 5, 7 and 8, and tabulate its four algorithms on the simulated apparatus.
 

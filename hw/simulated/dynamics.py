@@ -72,7 +72,8 @@ class Dynamics:
             )
 
     def needed(self, speed: float, kink: float, sigma: float) -> bool:
-        """False where the tip follows so fast that the rigid trace says as much: lambda > 10 v tan(phi) / sigma.
+        """False where the tip follows so fast that the rigid trace says as much: lambda > 10 v tan(phi) / sigma
+        (theory equation 9.3).
 
         Args:
             speed: m/s; kink: largest angle of the rigid trace's kinks, rad; sigma: noise of the centre, m.

@@ -1,4 +1,4 @@
-"""Grammar: crossings of sweeps become bumps, ridges, pits, grooves, steps and edges."""
+"""Assemble: by the paper's grammar, crossings of sweeps become bumps, ridges, pits, grooves, steps and edges."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ KINDS_BY_SIGN = {1: ("bump", "ridge"), -1: ("pit", "groove")}
 # A group of crossings that spreads over more than this many half-widths cannot be one round bump: sweeps further
 # than one half-width from its crest miss it.
 WIDEST_SPOT = 2.6
-# A crossing lower than this share of its group's is a stray if it lies so many half-widths off the others, and so many
-# from any other low one; where others are so many that they are a line, not a spot with low rims.
+# A crossing lower than this share of its group's is an outlier if it lies so many half-widths off the others, and so
+# many from any other low one; where others are so many that they are a line, not a spot with low rims.
 STRAY, STRAY_DISTANCE, MATES, LINE = 0.6, 1.3, 3.0, 5
 
 
@@ -34,12 +34,12 @@ def assemble(
 ) -> tuple[Feature, ...]:
     """Features of the base, the strongest evidence first, with preliminary intervals.
 
-    Crossings of one sign are linked where no inspected place between them denies a line. A group is one bump (or pit)
-    unless the heights of all places around say that it is longer: then a ridge (or groove), or several that meet,
-    each with its ends, closed if it returns to its beginning. Steps are linked likewise; those that a ridge explains,
-    because a sweep ran along it, are dropped, and crests that the sweep began or ended on are believed only if no step
-    explains them. Ridges and grooves too low for any one sweep are found where many sweeps agree. In a single profile
-    every crossing is a bump, a pit or a step.
+    Crossings of one sign are linked unless an inspected place between them was found clearly lower. A group is one bump
+    (or pit) unless the heights of all places around say that it is longer: then a ridge (or groove), or several that
+    meet, each with its ends, closed if it returns to its beginning. Steps are linked likewise; those that a ridge
+    explains, because a sweep ran along it, are dropped, and crests that the sweep began or ended on are accepted only
+    if no step explains them. Ridges and grooves too low for any one sweep are found where many sweeps agree. In a
+    single profile every crossing is a bump, a pit or a step.
 
     Args:
         detections: of the trace.
@@ -114,13 +114,13 @@ def _grouped(
 
 
 def _without_strays(group: list[Crossing], scale: float) -> list[list[Crossing]]:
-    """The group, and each low crossing that lies alone off its crest as one of its own: it is no arm of the line."""
+    """The group, and each isolated low crossing off its crest as a group of its own: an outlier, not a branch."""
     top = float(np.quantile([abs(c.height) for c in group], 0.8))
     low = [c for c in group if abs(c.height) + 2 * c.height_sd < STRAY * top]
     crest = [c.point for c in group if not any(c is other for other in low)]
     if len(crest) < LINE:
         return [group]
-    # what lies on the flanks of the crest is no mate of what lies off it
+    # what lies on the flanks of the crest is no neighbour of what lies off it
     off = [c for c in low if _nearest(c.point, crest) > STRAY_DISTANCE * scale]
     strays = []
     for c in off:

@@ -293,7 +293,7 @@ FreeEnd = tuple[int, int]
 
 
 def rejoined(lines: list[Branch], half_width: float, denied: Callable[[FloatArray, FloatArray], bool]) -> list[Branch]:
-    """The lines, those of them joined that go straight on into each other over a gap that nothing denies.
+    """The lines, those of them joined that go straight on into each other over a gap without a lower place.
 
     Where two lines run side by side with few crossings, the way across to the other one may be shorter than the way on:
     the tree of all points then hangs a line on its neighbour in pieces. Such a piece may be a single point, which goes

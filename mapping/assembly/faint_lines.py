@@ -2,8 +2,8 @@
 
 A line of height H crossed by k sweeps stands out of the noise sqrt(k) times as clearly as one crossing. The heights
 of all inspected places are matched with a straight crest or hollow at every place, in every direction and of every
-length (the Radon transform of Detection theory, weighted by the line's own section), and the best is believed only if
-noise alone would hardly ever look so like a line anywhere.
+length (a Radon transform, theory section 6.8, weighted by the line's own section), and the best is accepted only if
+noise alone would hardly ever reach its signal-to-noise ratio anywhere.
 """
 
 from __future__ import annotations
@@ -276,13 +276,13 @@ class _Support:
 
     @property
     def loudest(self) -> int:
-        """Number of the sweep that speaks most for the line."""
+        """Number of the sweep with the largest share of the line's signal-to-noise ratio."""
         return int(self.numbers[(np.sign(self.signal.sum()) * self.signal).argmax()])
 
     def agreed(self, sd: float) -> bool:
         """True if enough sweeps show the line, and it stands without the one that shows it best.
 
-        A sweep that runs at a slant over the line says more of it than the others, and may.
+        A sweep that runs at a slant over the line has more places on it than the others, and may.
         """
         if len(self.signal) < FEWEST_AGREEING_SWEEPS:
             return False

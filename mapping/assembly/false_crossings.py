@@ -1,4 +1,4 @@
-"""Crossings that are none: three ways in which one sweep mistakes what it felt.
+"""Crossings that are none: three ways in which one sweep misleads.
 
 Unseen: it claims to be clear, but the mean heights of its own sweep do not show it. Plateau end: the sweep came down
 from a crest to the base, taken for a hollow in the crest's level. Open crest: the sweep began or ended in the
@@ -18,15 +18,15 @@ from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import crest_trace
 
-# Only what is claimed to be so clear is held to account, and to this share of its claim.
+# Only crossings of at least this signal-to-noise ratio are tested, for this share of it.
 CLAIM, SEEN_CLAIM_SHARE = 20.0, 0.3
 
 
 def is_unseen(crossing: Crossing, inspection: Inspection) -> bool:
     """True if a clear crossing's section is not found in the heights, neither over the base nor over those beside.
 
-    A detection's signal-to-noise ratio is of the whole stretch that was fitted together; a slight crossing beside a
-    strong one may owe all of it to the other.
+    A detection's signal-to-noise ratio is of the whole stretch that was fitted together; a low crossing beside a high
+    one may get all of it from the other.
     """
     if crossing.snr < CLAIM or crossing.half_width < 1.2 * inspection.spacing:
         return False

@@ -91,7 +91,7 @@ ARC = 1.3
 
 
 def closes(axis: FloatArray, height: float, half_width: float, inspection: Inspection) -> bool:
-    """True if a smooth arc from the last point of an axis (K, 3) back to the first is not denied by what was felt."""
+    """True if a smooth arc from the end of an axis (K, 3) back to its start meets no place found clearly lower."""
     gap = float(np.linalg.norm(axis[-1] - axis[0]))
     if len(axis) < 4 or gap > min(LONGEST_SHARE * arclengths(axis)[-1], LONGEST_CLOSING_GAP * half_width):
         return False

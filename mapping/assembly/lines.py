@@ -1,4 +1,4 @@
-"""Line feature: ridges and grooves, with their ends and meetings, from the crossings of one group."""
+"""Line features: ridges and grooves, with their ends and junctions, from the crossings of one group."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Linking: which crossings of different sweeps belong to one detail on the base."""
+"""Linking: single linkage of crossings that belong to one detail on the base, with a veto by what was inspected.
+
+Reference: Gower and Ross, Minimum spanning trees and single linkage cluster analysis, Applied Statistics 18, 1969;
+theory section 5.2.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +53,7 @@ def _pairs(points: FloatArray, reach: float) -> list[tuple[int, int]]:
 
 
 def linked(a: Crossing, b: Crossing, inspection: Inspection, scale: float) -> bool:
-    """True if both may be the same line: like heights, and no place between them denies it."""
+    """True if both may be the same line: like heights, and no inspected place between them is clearly lower."""
     low, high = sorted((abs(a.height), abs(b.height)))
     if low < HEIGHT_RATIO * high or a.normal @ b.normal < 0:
         return False

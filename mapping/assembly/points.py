@@ -91,10 +91,10 @@ class Outline:
 
 
 def outline(members: list[Crossing], inspection: Inspection, half_width: float) -> Outline:
-    """The spot, or the line if the heights of all places around demand it.
+    """The spot, or the line if the heights of all places around fit it better (theory section 5.2).
 
-    Both are fitted to the mean heights of the inspected places near the crossings, so that also the places that
-    felt nothing have their say.
+    Both are fitted to the mean heights of the inspected places near the crossings, so that the places without a
+    height count as well.
     """
     points = np.array([c.point for c in members])
     highest = max(members, key=lambda c: abs(c.height))

@@ -1,4 +1,4 @@
-"""Ties: links of a tree of crest points that hold two lines together which only run side by side."""
+"""Spanning tree, cut: links of a tree of crest points that join two lines which only run side by side are removed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TURN_BACK_COSINE = 0.3
 def untied(tree: Tree, points: FloatArray, half_width: float) -> list[Tree]:
     """The trees that are left without ties.
 
-    Where no sweep passed between two lines, nothing denies that they are one detail, and a tree of all points has a
+    Where no sweep passed between two lines, no inspected place shows that they are two, and a tree of all points has a
     link across. At both its ends a line goes straight past it, or at one of them a line ends from which it turns back,
     and no crossing lies on it.
 

@@ -116,7 +116,8 @@ def estimate_pose(trace: Trace, base: Base, *, shift: float = 3e-3, turn: float 
     Raises:
         TraceError: too few samples.
 
-    Reference: Chen and Medioni 1992 (point to plane); theory sections 1 and 6.
+    Reference: Chen and Medioni, Object modelling by registration of multiple range images, Image and Vision Computing
+    10, 1992 (point to plane); theory sections 1.3 and 10.2.
     """
     cells = Cells.of(trace, MOST_POSE_CELLS)
     if len(cells.centers) < FEWEST_CELLS:

@@ -130,7 +130,7 @@ class Fitted:
         return self.mesh(cloud, spacing)
 
 
-def _sheet(
+def height_field(
     design: Callable[[FloatArray, FloatArray], FloatArray], kind: str, cloud: Cloud, bends: FloatArray | None = None
 ) -> Fitted:
     """A height field z = design(x, y) @ coefficients over the principal plane.
@@ -189,12 +189,12 @@ def _grid_faces(rows: int, columns: int) -> IntArray:
 
 def plane(cloud: Cloud) -> Fitted:
     """z = c0 + c1 x + c2 y."""
-    return _sheet(lambda x, y: np.column_stack([np.ones_like(x), x, y]), "plane", cloud)
+    return height_field(lambda x, y: np.column_stack([np.ones_like(x), x, y]), "plane", cloud)
 
 
 def quadric(cloud: Cloud) -> Fitted:
     """z = a quadratic polynomial of x and y."""
-    return _sheet(lambda x, y: np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y]), "quadric", cloud)
+    return height_field(lambda x, y: np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y]), "quadric", cloud)
 
 
 def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
@@ -222,7 +222,7 @@ def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
         for i in range(2)
     )
     bends = np.vstack([np.kron(along, np.eye(count[1])), np.kron(np.eye(count[0]), across)])
-    return _sheet(design, "sheet", cloud, bends)
+    return height_field(design, "sheet", cloud, bends)
 
 
 def sphere(cloud: Cloud) -> Fitted | None:

@@ -8,7 +8,8 @@ import numpy as np
 
 from mapping import FloatArray
 
-# Tukey's bisquare at 4.685 standard deviations keeps 95 % efficiency on Gaussian residuals.
+# Tukey's bisquare at 4.685 standard deviations keeps 95 % efficiency on Gaussian residuals (Beaton and Tukey, The
+# fitting of power series, Technometrics 16, 1974).
 BISQUARE = 4.685
 MAD_TO_SD = 1.4826
 # A residual beyond so many standard deviations counts as a feature: its size does not matter any more.

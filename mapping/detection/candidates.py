@@ -28,7 +28,7 @@ MEASURED = 0.5
 # The tip draws no cap higher than w^2 / (2 r); twice as much is no contact but a disturbance of the measurement.
 PHYSICAL = 2.0
 LARGEST_SHARE = 0.6
-# A disturbance weaker than this many thresholds hides no other: what it leaves behind are its own side lobes.
+# A disturbance weaker than this many thresholds hides no other: its residual is its own side lobes.
 HIDING = 1.5
 MOST_DISTURBANCE_ROUNDS = 50
 # Samples are scarce where the noise's variance is raised by more than this share: less is the binning's own.

@@ -1,4 +1,4 @@
-"""False alarms: how often a bank of matched filters is fooled by noise alone, and the threshold for a given rate.
+"""False alarms: how often noise alone passes a threshold of a bank of matched filters, and the threshold for a rate.
 
 Outputs above a threshold come in clumps: neighbouring places and widths see the same noise. The rate of clumps is
 the rate of single exceedances, each counted by one over the size of its clump, and that size is simulated (Aldous,

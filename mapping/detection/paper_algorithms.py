@@ -107,7 +107,7 @@ def _normal_derivative(trace: Trace, _: Noise | None) -> CurvatureProfile:
     angle = np.unwrap(np.arctan2(normals @ along, normals @ outward))
     level = robust_sd(np.diff(angle)) / np.sqrt(2)
     spacing = float(np.ptp(x)) / (len(x) - 1)
-    # slope of a line over 2 w: sd^2 = 3 sigma^2 Delta / (2 w^3)
+    # slope of a line over 2 w: sd^2 = 3 sigma^2 Delta / (2 w^3) (theory equation 6.5)
     threshold = 1 / (2 * trace.tip_radius)
     half_width = max(
         float((13.5 * level**2 * spacing / threshold**2) ** (1 / 3)), 4 * spacing, NARROWEST_FIT * trace.tip_radius

@@ -1,4 +1,9 @@
-"""Quiet noise: the noise of the stretches that hold no feature, and the matched filters that tell which these are."""
+"""Quiet noise: CFAR's training cells. The noise of the stretches without a feature, and the filters that find these.
+
+The background beside what is tested sets the threshold, and what looks like a target is left out of it, so that the
+rate of false alarms stays constant (censored CFAR; Rohling, Radar CFAR thresholding in clutter and multiple target
+situations, IEEE Transactions on Aerospace and Electronic Systems 19, 1983; theory section 6.7).
+"""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ def leading_solutions(first, columns, smallest):  # type: ignore[no-untyped-def]
         columns: (n, P) right-hand sides.
         smallest: the smallest k that is kept.
 
-    Reference: Golub & Van Loan, Matrix Computations, algorithm 4.7.2.
+    Reference: Golub and Van Loan, Matrix Computations, third edition 1996, algorithm 4.7.2 (Levinson).
     """
     n, count = columns.shape
     kept = np.zeros((n + 1 - smallest, n, count))

@@ -104,7 +104,7 @@ def refine(
     noise = noise or noise_of_trace(trace, base)
     try:
         solution = solve(feature, trace, rng, base=base, noise=noise, others=others, tip_sd=tip_sd, confirm=confirm)
-    except EmptyWindowError as error:  # one feature that nothing speaks for must not cost all others
+    except EmptyWindowError as error:  # one feature without a sample must not cost all others
         nothing = replace(feature.evidence, log_odds=0.0)
         return replace(feature, evidence=nothing, notes=(*feature.notes, f"no posterior: {error}"))
     found = describe(solution.problem, solution.posterior, base)
@@ -141,7 +141,7 @@ def solve(
 def settle(feature: Feature, around: Surroundings) -> Feature:
     """The feature at the optimum of its posterior: laid out beside its neighbours, without intervals.
 
-    Kinds without a closed form, and features that no sample speaks for, come back as they are.
+    Kinds without a closed form, and features without a sample near them, come back as they are.
     """
     if feature.kind not in SAMPLED_KINDS:
         return feature

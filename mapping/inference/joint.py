@@ -16,7 +16,8 @@ from mapping.inference.junctions import Meeting, brought_together, meetings
 from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise
 
-# What fewer crossings show may be false, and would take its part of a true neighbour's trace and live on that
+# What fewer crossings show may be false, and would explain a part of a true neighbour's trace and be supported by it
+# alone
 FEWEST_CERTAIN_CROSSINGS = 3
 
 

@@ -1,4 +1,4 @@
-"""Meeting: the one place at which lines meet, told by the courses of all of them."""
+"""Junctions: the one place at which lines meet, estimated from the courses of all of them."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ def brought_together(
 ) -> list[Feature]:
     """The features with the ends of those that meet at the place that is nearest to all courses there.
 
-    Each course pulls across itself with the precision that its draws give it; along itself an end that others cover
-    is hardly told by its own samples.
+    Each course is weighted across itself with the precision that its draws give it; along itself an end that others
+    cover is hardly determined by its own samples.
 
     Args:
         features: refined ones, in the order of the detected ones that `met` was found with.

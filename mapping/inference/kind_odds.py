@@ -1,59 +1,22 @@
-"""Kind odds: log Bayes factors between what a detection may be, on the same samples.
+"""Kind odds: the problem of another kind of feature on the same samples, to compare by log evidence.
 
-Each is the ratio of two evidences under the same noise, window and nuisance. With equal odds beforehand the
-probability of the first is 1 / (1 + exp(-log odds)); `explore3d bench odds` checks that such probabilities come true.
+The difference of two log evidences under the same noise, window and nuisance is the log Bayes factor. With equal odds
+beforehand the probability of the first is 1 / (1 + exp(-log odds)); `explore3d bench odds` checks that such
+probabilities come true.
+
+Reference: theory section 8.4.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from mapping import Feature, MappingError, Trace
-from mapping.base import Base
-from mapping.inference.evidence import log_evidence, log_evidence_of_nothing
+from mapping import Feature, MappingError
 from mapping.inference.families import BrokenRidgeShape, PosteriorProblem, RidgeShape, Surroundings, bump_shape, spot_at
-from mapping.inference.feature_posterior import pose_problem
 from mapping.inference.likelihood import LogPosterior
 from mapping.inference.sampler import find_optima
-from mapping.instrument import Noise
-
-
-def something_or_nothing(
-    feature: Feature,
-    trace: Trace,
-    rng: np.random.Generator,
-    *,
-    base: Base,
-    noise: Noise,
-    others: Sequence[Feature] = (),
-) -> float:
-    """Log Bayes factor of a feature against the bare base; arguments as for `refine`."""
-    problem = pose_problem(feature, Surroundings(trace, base, noise, others))
-    return log_evidence(problem, rng) - log_evidence_of_nothing(problem.target)
-
-
-def bump_or_ridge(
-    feature: Feature,
-    trace: Trace,
-    rng: np.random.Generator,
-    *,
-    base: Base,
-    noise: Noise,
-    others: Sequence[Feature] = (),
-) -> float:
-    """Log Bayes factor of a ridge against a round bump; positive where the ridge is the likelier.
-
-    Both are asked about the samples near the ridge, with the same priors of height and section.
-
-    Args:
-        feature: a bump or ridge as detected; the other arguments as for `refine`.
-    """
-    around = Surroundings(trace, base, noise, [other for other in others if other is not feature])
-    ridge = pose_problem(replace(feature, kind="ridge"), around)
-    return log_evidence(ridge, rng) - log_evidence(as_bump(ridge, feature, around), rng)
 
 
 def as_bump(ridge: PosteriorProblem, feature: Feature, around: Surroundings) -> PosteriorProblem:
@@ -72,30 +35,12 @@ def as_bump(ridge: PosteriorProblem, feature: Feature, around: Surroundings) -> 
     )
 
 
-def two_ridges_or_one(
-    feature: Feature,
-    trace: Trace,
-    rng: np.random.Generator,
-    *,
-    base: Base,
-    noise: Noise,
-    others: Sequence[Feature] = (),
-) -> float:
-    """Log Bayes factor of two ridges in line, with a gap between them, against one.
-
-    Args:
-        feature: an open ridge that spans both; the other arguments as for `refine`.
+def as_broken(ridge: PosteriorProblem) -> PosteriorProblem:
+    """The problem of two ridges in line, with a gap between them, on the samples of one ridge's problem.
 
     Raises:
-        MappingError: a feature that is not an open ridge.
+        MappingError: a problem that is not of an open ridge.
     """
-    around = Surroundings(trace, base, noise, [other for other in others if other is not feature])
-    whole = pose_problem(feature, around)
-    return log_evidence(as_broken(whole), rng) - log_evidence(whole, rng)
-
-
-def as_broken(ridge: PosteriorProblem) -> PosteriorProblem:
-    """The problem of two ridges in line on the samples of one ridge's problem."""
     whole = ridge.target.shape
     if not isinstance(whole, RidgeShape) or whole.chart.closed:
         raise MappingError("only an open ridge can be two ridges in line")

@@ -1,4 +1,4 @@
-"""Misfit: what the best shape leaves over is put into the noise before anything is claimed."""
+"""Model error: the residual of the best shape beyond the noise is put into the noise (theory section 8.1)."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ EXCESS = 5.0
 def account_for_misfit(
     problem: PosteriorProblem, optima: list[FloatArray]
 ) -> tuple[PosteriorProblem, list[FloatArray]]:
-    """The problem with outliers trusted less and, if the residual is still too large, with noise to match.
+    """The problem with outliers given more variance and, if the residual is still too large, with noise to match.
 
-    Lone wild bins get the variance that makes them ordinary (a Gaussian scale mixture, one step of its EM). A
+    Single outlying bins get the variance that makes them ordinary (a Gaussian scale mixture, one step of its EM). A
     residual too large all over means that the feature is not of the family, or the noise is not what was said:
-    white and correlated levels that explain it are then found by maximum likelihood, so that the intervals tell of
-    it (model discrepancy; Kennedy & O'Hagan 2001).
+    white and correlated levels that explain it are then found by maximum likelihood, so that the intervals
+    contain it (model discrepancy; Kennedy and O'Hagan, Bayesian calibration of computer models, JRSS B 63, 2001).
     """
     residual = _residual(problem, optima)
     wild = np.abs(residual) > WHITENED_OUTLIER_SDS

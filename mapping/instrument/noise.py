@@ -127,9 +127,9 @@ class Noise:
 def estimate_noise(residual: ArrayLike, s: ArrayLike) -> Noise:
     """Level and correlation of the noise in a residual that may hold features.
 
-    The difference of adjoining block means (the Allan deviation) knows no offset and little drift; its median
-    absolute value at every block length knows little of features that cover a small part of the path. The three
-    parameters are fitted to it.
+    The difference of adjoining block means (the Allan deviation; theory section 6.1) knows no offset and little
+    drift; its median absolute value at every block length knows little of features that cover a small part of the
+    path. The three parameters are fitted to it.
 
     Args:
         residual: (N,) heights over the base, m; N >= 16. May be several sweeps in a row.

@@ -59,7 +59,7 @@ class CloserLook:
 class FaintSearch:
     """Crossed sweeps so close that every line of the span asked for is crossed often enough.
 
-    The signal-to-noise ratio of a crossing grows with the height to the power 5/4 (theory section 6: the square of
+    The signal-to-noise ratio of a crossing grows with the height to the power 5/4 (theory equation 11.2: the square of
     the height times the half-width), that of k crossings together with the root of k.
 
     Args:

@@ -1,4 +1,4 @@
-"""Strokes: the short sweeps that exploratory procedures are made of, laid on the base."""
+"""Strokes: short sweeps of a stated length on the base, of which the exploratory procedures are made."""
 
 from __future__ import annotations
 

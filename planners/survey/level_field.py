@@ -1,4 +1,4 @@
-"""LevelField: a field on a chart whose level sets are evenly spaced, so that sweeps can run along them."""
+"""LevelField: a level-set field on a part without creases; sweeps run along its evenly spaced level sets."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _narrowest(points: FloatArray) -> FloatArray:
 def _geodesic(vertices: FloatArray, faces: IntArray) -> FloatArray | None:
     """(V,) heat geodesic distance from the vertex at one end of the chart; None if it fails.
 
-    Reference: Crane, Weischedel and Wardetzky, Geodesics in heat, 2013.
+    Reference: Crane, Weischedel and Wardetzky, Geodesics in heat, ACM Transactions on Graphics 32, 2013.
     """
     import igl
 

@@ -1,4 +1,4 @@
-"""Slices: crossed families of plane sections, so spaced that no ridge of a given span slips between them."""
+"""Slices: plane sections of a body, in crossed families so spaced that every ridge of a given span is crossed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Slices:
     The two farthest points of a ridge lie a distance L apart, its span. Along at least one of k perpendicular
     axes they differ by L / sqrt(k) or more, and its ends are seen up to y beyond: planes L / sqrt(k) + 2 y
     apart along every axis cross it for certain, however it lies and bends. (A needle dropped on crossed lines:
-    Laplace's extension of Buffon's problem, asked for certainty.)
+    Laplace's extension of Buffon's problem, asked for certainty.) Reference: theory equation 11.1.
 
     Args:
         axes: (k, 3) unit normals of the planes; two in the plane of a flat body, otherwise three.

@@ -30,7 +30,7 @@ from planners.paths import Strokes
 
 TIP_RADIUS, SAMPLE_RATE, SPEED = 0.01, 5000.0, 0.03
 PITCH = 4e-3
-# The apparatus of the paper (theory section 6), and none.
+# The apparatus of the paper (theory section 1.1), and none.
 NOISE_SOURCES = {"none": NoiseSource(), "apparatus": NoiseSource(white=0.2e-3)}
 # Different placements of the sweeps over one body; further seeds only change the noise.
 POSES = 10

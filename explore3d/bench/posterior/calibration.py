@@ -1,9 +1,9 @@
 """Calibration bench: do 90 % intervals cover 90 %, and are the ranks of the truth uniform?
 
-Simulation-based calibration (Talts et al. 2018): truths are drawn from the prior, traces are simulated from them at
-the sampling rate of the apparatus and analysed by the same code as real ones; the place of each true value within its
-posterior must then be uniform. Every simulation is one line of a JSONL file: an interrupted run goes on where it
-stopped, and the same seeds give the same lines.
+Simulation-based calibration (Talts et al., arXiv:1804.06788, 2018): truths are drawn from the prior, traces are
+simulated from them at the sampling rate of the apparatus and analysed by the same code as real ones; the place of each
+true value within its posterior must then be uniform. Every simulation is one line of a JSONL file: an interrupted run
+goes on where it stopped, and the same seeds give the same lines.
 """
 
 from __future__ import annotations

@@ -42,7 +42,10 @@ def dilated(places: FloatArray) -> FloatArray:
 
 
 def paralleled(places: FloatArray) -> FloatArray:
-    """The same from equation 11: the highest point of the parallel curve over each place, by bisection."""
+    """The same from the parallel curve: its highest point over each place, by bisection.
+
+    Reference: the paper's equation 11; theory equation 2.6.
+    """
     bump = BumpOfRevolution(STEEPNESS)
     u = np.linspace(-0.2, 1.2, 28_001)
     place = np.sign(u) * bump.parallel(np.abs(u), BUMP_BALL_RADIUS)[0]
@@ -141,7 +144,9 @@ def estimated(quick: bool, peers: bool) -> Result:
             ),
             "envelope of the raw trace": partial(estimate_surface, trace, spacing=0.0),
             "recorded contact normals": partial(estimate_surface, trace, "contact", spacing=0.0),
-            "normals of the raw trace (equation 12)": partial(estimate_surface, trace, "normals", spacing=0.0),
+            "normals of the raw trace (the paper's equation 12)": partial(
+                estimate_surface, trace, "normals", spacing=0.0
+            ),
         }
         for method, way in ways.items():
             seconds, repeats, found = timed(way)
@@ -197,7 +202,7 @@ def _curvature_error(mesh: Surface, found: Any) -> float:
 
 SURFACE_STAGES = (
     Stage("traced surface", "root mean square error of the ball's height, in heights of the bump",
-          "The smooth bump's own trace, by dilation and, independently, from equation 11.",
+          "The smooth bump's own trace, by dilation and, independently, from the paper's equation 11.",
           "Every curve falls with the mesh's own error. The tree pays little for more triangles, brute force for "
           "each, and rays on the displaced mesh are ten times less exact: it folds beside the kink.", traced),
     Stage("estimated surface", "root mean square distance from the true body (m), touched and bridged",

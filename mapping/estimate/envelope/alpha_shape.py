@@ -1,4 +1,8 @@
-"""Alpha shape: the envelope of balls at unorganised centres, from positions alone (Edelsbrunner and Mücke 1994)."""
+"""Alpha shape: the envelope of balls at unorganised centres, from positions alone.
+
+Reference: Edelsbrunner and Mücke, Three-dimensional alpha shapes, ACM Transactions on Graphics 13, 1994; theory
+section 1.2.
+"""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def estimate_surface(
 
     Args:
         method: "envelope": the envelope of the balls, from positions alone; "contact": centre - r normal by
-            recorded contact normals; "normals": equation 12, with the normals of the traced surface itself
+            recorded contact normals; "normals": the paper's equation 12, with the normals of the traced surface itself
             and no regard to its kinks; "alpha": the envelope of unorganised balls, whose corners bound the body
             but are nowhere called touched.
         base, outward: which side the finger is on: the base, or (3,) or (N, 3) directions away from the body.

@@ -77,35 +77,3 @@ def envelope_at(
             height[m] = z[i] - np.sqrt((r - d) * (r + d))
             owner[m] = i
     return height, owner
-
-
-@njit(cache=True)
-def splat_balls(
-    x: FloatArray,
-    y: FloatArray,
-    z: FloatArray,
-    r: float,
-    x0: float,
-    y0: float,
-    step: float,
-    rows: int,
-    columns: int,
-) -> tuple[FloatArray, IntArray]:
-    """Lower envelope on a grid of balls at scattered centres (N,): (height, owner)."""
-    height = np.full((rows, columns), np.inf)
-    owner = np.full((rows, columns), -1, np.int64)
-    for i in range(len(x)):
-        low_p = max(0, int(np.ceil((y[i] - r - y0) / step)))
-        high_p = min(rows - 1, int(np.floor((y[i] + r - y0) / step)))
-        for p in range(low_p, high_p + 1):
-            dy = y0 + p * step - y[i]
-            half = np.sqrt(max((r - dy) * (r + dy), 0.0))
-            low_q = max(0, int(np.ceil((x[i] - half - x0) / step)))
-            high_q = min(columns - 1, int(np.floor((x[i] + half - x0) / step)))
-            for q in range(low_q, high_q + 1):
-                dx = x0 + q * step - x[i]
-                value = z[i] - np.sqrt(max(r * r - dx * dx - dy * dy, 0.0))
-                if value < height[p, q]:
-                    height[p, q] = value
-                    owner[p, q] = i
-    return height, owner

@@ -178,9 +178,9 @@ def shared(doubt: FloatArray, reach: int = 2) -> FloatArray:
 def smooth_slope(v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Slope, second derivative and doubt of the slope at the middle column of w(v), (N, 2 k + 1), NaN where missing.
 
-    Essentially non-oscillatory (Harten et al. 1987): of all quartics, cubics and parabolas through the middle and
-    its neighbours, the one of highest degree whose last term is small beside its curvature. A kink that runs along
-    the sweeps therefore stays outside, even where it mimics a curvature in three rows.
+    Essentially non-oscillatory (ENO III, Harten et al. 1987): of all quartics, cubics and parabolas through the
+    middle and its neighbours, the one of highest degree whose last term is small beside its curvature. A kink that
+    runs along the sweeps therefore stays outside, even where it mimics a curvature in three rows.
     """
     middle = v.shape[1] // 2
     with np.errstate(invalid="ignore", divide="ignore"):  # missing rows are NaN and lose every comparison

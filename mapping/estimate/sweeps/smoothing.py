@@ -72,7 +72,7 @@ def smooth(trace: Trace, noise: Noise | None = None, *, outward: ArrayLike | Non
     Returns:
         The smoothed trace; noise of level zero returns the trace itself.
 
-    Reference: the paper, section 3.3; theory sections 3 and 6; Reinsch 1967 (smoothing spline).
+    Reference: the paper, section 3.3; theory sections 3 and 6; Reinsch, Smoothing by spline functions, 1967.
     """
     away = _outward(trace, outward)
     noise = _residual_noise(trace, away) if noise is None else noise

@@ -22,7 +22,8 @@ def smoothing_spline(x: FloatArray, y: FloatArray, weight: IntArray, lam: float)
         weight: (N,) positive.
         lam: 0 interpolates.
 
-    Reference: Reinsch 1967; Green and Silverman 1994, section 2.3.3.
+    Reference: Reinsch, Smoothing by spline functions, Numerische Mathematik 10, 1967; Green and Silverman,
+    Nonparametric Regression and Generalized Linear Models, 1994, section 2.3.3.
     """
     from scipy.interpolate import CubicHermiteSpline
     from scipy.linalg import solveh_banded
@@ -54,7 +55,7 @@ def _second_differences(bend: FloatArray, before: FloatArray, middle: FloatArray
     return out
 
 
-# Curvature must stand this many standard deviations out of its noise: theory section 6 takes three.
+# Curvature must stand this many standard deviations out of its noise: theory section 6.2 takes three.
 CONFIDENCE = 3.0
 
 
@@ -82,7 +83,10 @@ def position_sd(noise: Noise, spacing: float, h: float) -> float:
 
 
 def _remaining(noise: Noise, spacing: float, h: float, power: int) -> float:
-    """Root of the spectrum's integral: a smoothing spline damps the frequency w by 1 / (1 + (h w)^4)."""
+    """Root of the spectrum's integral: a smoothing spline damps the frequency w by 1 / (1 + (h w)^4).
+
+    Reference: theory equation 6.6.
+    """
     x = np.geomspace(1e-6, 1e3, 2000)  # x = h w
     density = noise.white**2 * spacing + 2 * noise.correlated**2 * noise.length / (1 + (x * noise.length / h) ** 2)
     integrand = density * x**power / (1 + x**4) ** 2

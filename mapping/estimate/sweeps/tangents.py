@@ -36,7 +36,7 @@ def tangents(points: FloatArray, cuts: IntArray) -> FloatArray:
     """(N, 3) unit tangents of a sweep (N, 3) whose smooth pieces begin at `cuts` (sorted, without 0).
 
     Each tangent is that of the quartic through five points of its own piece, chosen as ENO schemes do
-    (Harten et al. 1987): the central five, unless others are much smoother, so that a jump of curvature
+    (Harten et al., ENO III, 1987): the central five, unless others are much smoother, so that a jump of curvature
     spoils none of them. Pieces of fewer points use what they have.
     """
     from mapping.estimate.sweeps.tangent_kernels import sweep_tangents as kernel

@@ -1,4 +1,4 @@
-"""Interference points: where a sliding ball touches two places at once, and its path has a kink (paper 2.2)."""
+"""Interference points: a sliding ball touches two places at once, its path has a kink (the paper, section 2.2)."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from mapping import BoolArray, FloatArray, IntArray, ParallelError, Surface
 
 @dataclass(frozen=True, eq=False)
 class ParallelSurface:
-    """The parallel surface f + r z of a mesh (equation 4).
+    """The parallel surface f + r z of a mesh (the paper's equation 4; theory equation 1.1).
 
     Args:
         surface: the displaced mesh, same faces. It is the traced surface where nothing folds and nothing else
@@ -43,7 +43,7 @@ def parallel_surface(
         tip_radius: distance r, m; negative for the inner parallel surface.
         normals: (V, 3) outward unit normals at the vertices.
         k1, k2: (V,) principal curvatures, 1/m, positive where the body bulges out; for a mesh without a formula
-            take mapping.geometry.curvature.curvature.principal_curvatures.
+            take mapping.principal_curvatures.
 
     Raises:
         ParallelError: shapes that do not match the vertices, or values that are not finite.

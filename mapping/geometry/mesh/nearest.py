@@ -24,7 +24,7 @@ class Nearest:
         distance: (N,) unsigned distances, m.
         side: (N,) +1 outside (on the side of the outward normals), -1 inside.
         normals: (N, 3) unit pseudonormals of the mesh at the closest points (angle-weighted at edges
-            and vertices; Baerentzen & Aanaes 2005).
+            and vertices; Bærentzen and Aanæs 2005, in full in the theory).
         face: (N,) face that the point lies in.
         barycentric: (N, 3) its coordinates in that face.
     """

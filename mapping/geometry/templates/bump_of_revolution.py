@@ -41,12 +41,15 @@ class BumpOfRevolution:
         return 2 * a * (1 - 3 * a * u**2) / (c * d) ** 3, 2 * a / (c * d**2)
 
     def normal(self, u: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Radial and axial component of the outward unit normal (equation 9)."""
+        """Radial and axial component of the outward unit normal (the paper's equation 9; theory equation 2.3)."""
         u, c, d = np.asarray(u, dtype=np.float64), self._c(u), self._d(u)
         return 2 * self.sharpness * u / (c * d**2), 1.0 / c
 
     def parallel(self, u: ArrayLike, tip_radius: float) -> tuple[FloatArray, FloatArray]:
-        """Distance from the axis and height of the parallel surface at tip_radius (equation 11)."""
+        """Distance from the axis and height of the parallel surface at tip_radius.
+
+        Reference: the paper's equation 11, corrected: theory equation 2.6.
+        """
         radial, axial = self.normal(u)
         return np.asarray(u, dtype=np.float64) + tip_radius * radial, self.height(u) + tip_radius * axial
 

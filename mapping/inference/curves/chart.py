@@ -1,4 +1,7 @@
-"""Chart: a curve on the base with the frames along it, in which ridges and grooves are described."""
+"""Chart: Fermi coordinates, distances along and across a curve on the base, in which lines are described.
+
+Reference: theory section 10.3.
+"""
 
 from __future__ import annotations
 

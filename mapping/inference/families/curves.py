@@ -35,7 +35,7 @@ def curve_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
     """Pose the posterior of a ridge, groove or step.
 
     The trace decides how freely the axis bends over the base (BIC): few crossings cannot tell a gentle bend from
-    their own scatter, and one that a neighbour pulled aside asks for bends that are not there.
+    their own scatter, and one that a neighbour displaced fits bends that are not there.
     """
     sizes = sizes_of(feature, around.trace.tip_radius)
     axis, normals, crossings = _axis_of(feature, sizes, around)
@@ -69,7 +69,7 @@ def curve_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
 
 
 def _cost(problem: PosteriorProblem) -> float:
-    """Bayesian information criterion at the optimum nearest to the detection (Schwarz 1978), halved."""
+    """Half the Bayesian information criterion (Schwarz, Annals of Statistics 6, 1978) at the detection's optimum."""
     best = find_optima(problem.target, problem.beginnings[:1])[0]
     fit = float(problem.target.likelihood.log_density(problem.target.templates(best[None]))[0])
     return 0.5 * len(best) * float(np.log(len(problem.window))) - fit

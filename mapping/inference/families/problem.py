@@ -24,7 +24,8 @@ from mapping.inference.likelihood import (
 )
 from mapping.instrument import Noise
 
-# Bins of x_c/30 lose 0.7 % of the information (theory section 8); windows reach 3 x_c to either side of the crest.
+# Bins of x_c/30 cost under 1 % of every standard deviation (theory equation 8.1); windows reach 3 x_c to either side
+# of the crest.
 WINDOW_BINS_PER_HALF_WIDTH = 30.0
 WINDOW_REACH = 3.0
 # More bins than this are made coarser: a long ridge has information to spare.
@@ -32,7 +33,7 @@ MOST_BINS = 4000
 # Noise below this share of the height no longer hides what a smoothed path and wide bins do to flanks and kinks (2 um
 # of a wire of 0.65 mm felt by a stage that moves by steps): the path stays as it is, and twice as many bins are taken.
 PRECISE = 0.01
-# What shape and base leave out, as a share of the feature's height: a noise-free log is not believed further.
+# What shape and base leave out, as a share of the feature's height: noise below it is not assumed.
 MODEL_FLOOR = 1e-4
 
 
@@ -99,7 +100,7 @@ class PosteriorProblem:
         return self.target.likelihood.window
 
     def under(self, noise: Noise, inflation: FloatArray | None = None) -> PosteriorProblem:
-        """The same problem under another noise, or with some bins trusted less."""
+        """The same problem under another noise, or with more variance for some bins."""
         likelihood = _likelihood(self.window, noise, self.nuisance, self.sizes.height, inflation)
         return replace(self, noise=noise, target=self.target.with_likelihood(likelihood))
 

@@ -64,8 +64,9 @@ def height_prior(sizes: Sizes) -> Prior:
 def radius_prior(sizes: Sizes, tip: float) -> Prior:
     """Log radius: about a round wire or ball lying on the base, a = H/2.
 
-    Under a much larger tip only radius + tip counts, and the data say little: the prior then speaks, within a factor
-    of e or so. Its tails are heavy: a gentle cap of a thousand times that radius is found where the trace shows it.
+    Under a much larger tip only radius + tip counts, and the data hardly determine the radius: the prior does, within
+    a factor of e or so. Its tails are heavy: a gentle cap of a thousand times that radius is found where the trace
+    shows it.
     """
     guess = float(np.log(0.5 * sizes.height))
     return StudentT(guess, RADIUS_SCALE, 4.0, guess - 7.0, float(np.log(1e4 * max(tip, sizes.height, sizes.radius))))

@@ -37,7 +37,8 @@ class Likelihood:
         basis: (n, Q) orthonormal whitened nuisance directions of each run.
         shrink: (runs, Q) share of each direction that the nuisance explains, 0 to 1.
 
-    Reference: theory sections 6 and 8; linear nuisance marginalised as in Rasmussen & Williams (2006), section 2.7.
+    Reference: theory sections 6 and 8; linear nuisance marginalised as in Rasmussen and
+    Williams, Gaussian Processes for Machine Learning, 2006, section 2.7.
     """
 
     window: Window

@@ -255,7 +255,7 @@ def _smooth(values: FloatArray, place: FloatArray, width: float, scale: float) -
 
 
 def _filtered(values: FloatArray, width: float, scale: float) -> FloatArray:
-    """The filter of Savitzky & Golay (1964); at both ends the parabola of the outermost stretch is read off."""
+    """Savitzky and Golay's filter (Analytical Chemistry 36, 1964); its outermost parabolas serve at both ends."""
     half = min(int(0.25 * scale / width), (len(values) - 1) // 2)
     if half < 2:
         return values

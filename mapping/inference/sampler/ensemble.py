@@ -75,7 +75,8 @@ def sample_ensemble(
         proposal: the adapted importance proposal, or None.
         max_steps: steps after which the run ends unconverged.
 
-    Reference: Foreman-Mackey et al. (2013); ter Braak (2006); theory section 8.
+    Reference: theory section 8.3, with Foreman-Mackey et al. 2013 (emcee), Goodman and Weare 2010 (stretch move),
+    ter Braak 2006 (differential evolution) and ter Braak and Vrugt 2008 (snooker) in full.
     """
     import emcee
 

@@ -1,4 +1,4 @@
-"""Importance: weighted draws of a posterior from a proposal that learns it, and how far they can be trusted."""
+"""Importance sampling: weighted draws of a posterior from an adapted proposal, and the diagnostic of their weights."""
 
 from __future__ import annotations
 
@@ -51,7 +51,8 @@ def importance_sample(target: LogPosterior, modes: Sequence[Laplace], rng: np.ra
     While few draws carry the weight it is tempered, so that the proposal grows towards the target instead of
     collapsing on the best draw.
 
-    Reference: Cappe et al. (2008) for the adaptation; Vehtari et al. (2024) for the test.
+    Reference: theory section 8.2; Cappé et al. 2008 for the adaptation (proposal.py has it in full), Vehtari et al.
+    2024 for the test (psis.py).
     """
     proposal = _first_proposal(modes)
     for _ in range(PROPOSAL_ROUNDS):

@@ -63,7 +63,7 @@ class Proposal:
     def learned(self, draws: FloatArray, weights: FloatArray) -> Proposal:
         """The mixture after one step of expectation maximisation on weighted draws (S, P).
 
-        Reference: Cappe, Douc, Guillin, Marin & Robert, "Adaptive importance sampling in general mixture classes",
+        Reference: Cappé, Douc, Guillin, Marin & Robert, "Adaptive importance sampling in general mixture classes",
         Statistics and Computing 18 (2008), section 4.2.
         """
         parts = self._log_parts(draws)

@@ -14,9 +14,9 @@ def written(tmp_path_factory):
     return folder, figures.write_figures(folder)
 
 
-def test_four_whole_pictures_are_written(written):
+def test_five_whole_pictures_are_written(written):
     folder, files = written
-    assert [path.name[:7] for path in files] == ["figure1", "figure2", "figure3", "figure5"]
+    assert [path.name[:7] for path in files] == ["figure1", "figure2", "figure2", "figure3", "figure5"]
     assert sorted(folder.iterdir()) == sorted(files)
     for path in files:
         content = path.read_bytes()
@@ -29,7 +29,7 @@ def test_the_same_figure_is_drawn_every_time(written):
     from explore3d.pictures.figure import png, styled
 
     with styled():
-        assert png(figures.curvature_features()) == written[1][2].read_bytes()
+        assert png(figures.curvature_features()) == written[1][3].read_bytes()
 
 
 def test_the_traced_section_follows_the_parallel_surface_outside_the_interference_points(written):
@@ -39,6 +39,16 @@ def test_the_traced_section_follows_the_parallel_surface_outside_the_interferenc
     x, z = figures.BUMP.parallel(u, figures.FIGURE_TIP_RADIUS)
     expected = np.interp(np.abs(trace.centers[:, 0]), x, z)
     assert np.abs(trace.centers[:, 2] - expected)[np.abs(trace.centers[:, 0]) < 1.9].max() < 1e-4
+
+
+def test_the_mesh_folds_and_the_ball_leaps_where_the_closed_forms_say(written):
+    folded, met = figures.mesh_fold()
+    r = figures.FIGURE_TIP_RADIUS
+    rings = figures.BUMP.parallel(figures.BUMP.caustics(r), r)[0]
+    found = np.hypot(*folded.caustics[:, :2].T)
+    assert np.abs(found[:, None] - rings).min(axis=1).max() < 0.02
+    assert len(met) == 2 * figures.DIAMETERS
+    assert np.abs(np.hypot(*met[:, :2].T) - figures._meeting()[0]).max() < 2e-3
 
 
 def test_a_folder_that_cannot_be_made_is_an_error(tmp_path):

@@ -9,7 +9,6 @@ import pytest
 
 from mapping.base.base import Base
 from mapping.detection.detect import detect
-from mapping.detection.online import OnlineDetector
 from mapping.detection.paper_algorithms import curvature_features
 from mapping.errors import DetectionError
 from mapping.estimate.sweeps.curvature import curvature_along, curvature_sd, features_beyond, half_width_for
@@ -120,23 +119,6 @@ def test_contact_data_is_asked_for_where_it_is_needed():
         curvature_features(plain, 2)
     with pytest.raises(DetectionError, match="1, 2, 3 and 4"):
         curvature_features(plain, 0)
-
-
-def test_online_finds_what_offline_finds_within_the_stated_delay():
-    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    base = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
-    spacing, noise = 6e-6, Noise(2e-4)
-    x = np.arange(-0.15, 0.15, spacing)
-    places = (-0.1, 0.02, 0.045)
-    z = sum(wire(x - place) for place in places) + TIP + 2e-4 * np.random.default_rng(5).standard_normal(len(x))
-    trace = Trace.from_profile(x, z, TIP, x / 0.03 + 5)
-    online = OnlineDetector(base, TIP, spacing, noise)
-    reports = [(t, c) for t, p in zip(trace.t, trace.centers, strict=True) for c in online.push(t, p)]
-    found = [c for _, c in reports] + list(online.finish())
-    offline = detect(trace, base, noise=noise, largest=TIP)
-    np.testing.assert_allclose([c.point[0] for c in found], places, atol=3e-4)
-    np.testing.assert_allclose([c.point[0] for c in found], [c.point[0] for c in offline.crossings], atol=1e-4)
-    assert all((t - c.t) * 0.03 <= online.delay for t, c in reports)
 
 
 def test_detection_says_what_each_algorithm_makes_of_a_crossing():

@@ -11,8 +11,9 @@ from explore3d.bench.posterior.odds import OddsCase, reliability, run_odds
 from mapping.base.base import Base
 from mapping.feature import Feature, Interval, Support
 from mapping.geometry.templates.shapes import chain_height
+from mapping.inference import as_broken, as_bump, log_evidence, pose_problem
+from mapping.inference.families import Surroundings
 from mapping.inference.feature_posterior import odds_against_nothing, solve
-from mapping.inference.kind_odds import bump_or_ridge, two_ridges_or_one
 from mapping.instrument.noise import Noise
 from mapping.surface import Surface
 from mapping.trace import Trace
@@ -44,10 +45,11 @@ def setting(kind):
 def test_a_ridge_is_told_from_a_bump():
     wire, ball = np.array([[-7e-3, 0, D / 2], [7e-3, 0, D / 2]]), np.array([[0, 0, D / 2]])
     feature, base = setting("ridge")
-    odds = [
-        bump_or_ridge(feature, traced(chain), np.random.default_rng(0), base=base, noise=NOISE)
-        for chain in (wire, ball)
-    ]
+    odds = []
+    for chain in (wire, ball):
+        around, rng = Surroundings(traced(chain), base, NOISE), np.random.default_rng(0)
+        ridge = pose_problem(feature, around)
+        odds.append(log_evidence(ridge, rng) - log_evidence(as_bump(ridge, feature, around), rng))
     assert odds[0] > 10.0 and odds[1] < 0.0
 
 
@@ -80,7 +82,8 @@ def test_two_ridges_in_line_are_told_from_one():
         height = np.max([chain_height(feet, up, chain, D / 2, TIP) for chain in chains], axis=0)
         height = height + NOISE.white * np.random.default_rng(1).standard_normal(len(feet))
         trace = Trace(np.arange(float(len(feet))), feet + np.outer(TIP + height, UP), sweep, TIP)
-        odds.append(two_ridges_or_one(feature, trace, np.random.default_rng(0), base=base, noise=NOISE))
+        whole_ridge, rng = pose_problem(feature, Surroundings(trace, base, NOISE)), np.random.default_rng(0)
+        odds.append(log_evidence(as_broken(whole_ridge), rng) - log_evidence(whole_ridge, rng))
     assert odds[0] > 10.0 and odds[1] < 0.0
 
 

@@ -318,7 +318,7 @@ def test_crossing_sweeps_become_one_mesh():
     assert (estimate.surface.face_normals[:, 2] > 0).mean() > 0.99
 
 
-def test_equation_12_alone_fills_a_kink_with_points_inside_other_balls():
+def test_the_papers_equation_12_alone_fills_a_kink_with_points_inside_other_balls():
     x = np.arange(-0.01, 0.01, 2e-5) + 1.1e-6
     trace = Trace.from_profile(x, wire(x), R)
     naive, exact = estimate_surface(trace, "normals"), estimate_surface(trace)

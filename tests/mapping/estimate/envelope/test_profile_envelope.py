@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from mapping.errors import EnvelopeError
-from mapping.estimate.envelope.profile_envelope import envelope_heights, envelope_map
+from mapping.estimate.envelope.profile_envelope import envelope_heights
 
 
 def brute_force(x, z, r, at):
@@ -60,19 +60,6 @@ def test_closing_a_profile_equals_flat_array_erosion():
     assert np.abs(heights - flat_array(trace, step, r, 1))[inner].max() <= 1e-9 * r
 
 
-def test_closing_a_height_map_equals_flat_array_erosion():
-    rng = np.random.default_rng(1)
-    step, r = 0.05, 0.6
-    body = rng.random((40, 50)) * 0.3
-    trace = flat_array(body, step, r, -1)
-    y, x = np.meshgrid(step * np.arange(40), step * np.arange(50), indexing="ij")
-    centers = np.column_stack([x.ravel(), y.ravel(), trace.ravel()])
-    heights, owner = envelope_map(centers, r, (0.0, 0.0), step, body.shape)
-    assert np.abs(heights - flat_array(trace, step, r, 1)).max() <= 1e-9 * r
-    assert (heights >= body - 1e-12).all()
-    assert (owner >= 0).all()
-
-
 def test_closing_leaves_untouched_what_the_ball_reaches_and_fills_the_rest():
     step, r = 1e-3, 0.5
     x = np.arange(-2, 2, step)
@@ -116,12 +103,8 @@ def test_a_million_samples_take_less_than_two_seconds():
 def test_a_radius_that_is_no_length_is_refused(bad):
     with pytest.raises(EnvelopeError, match="positive"):
         envelope_heights([0.0, 1.0], [0.0, 0.0], bad)
-    with pytest.raises(EnvelopeError, match="positive"):
-        envelope_map(np.zeros((1, 3)), bad, (0, 0), 0.1, (2, 2))
 
 
 def test_values_that_are_not_finite_are_refused():
     with pytest.raises(EnvelopeError, match="finite"):
         envelope_heights([0.0, np.nan], [0.0, 0.0], 1.0)
-    with pytest.raises(EnvelopeError, match="finite"):
-        envelope_map(np.full((1, 3), np.nan), 1.0, (0, 0), 0.1, (2, 2))

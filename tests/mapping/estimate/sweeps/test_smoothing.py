@@ -9,7 +9,7 @@ from mapping.estimate.sweeps.smoothing_spline import curvature_sd, position_sd, 
 from mapping.instrument.noise import Noise
 from mapping.trace import Trace
 
-R, SIGMA, SPACING = 0.01, 2e-4, 6e-6  # the paper's apparatus (theory section 6)
+R, SIGMA, SPACING = 0.01, 2e-4, 6e-6  # the paper's apparatus (theory section 1.1)
 
 
 def noisy_profile(height, seed=0, extent=0.03):
