@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from mapping.estimate.envelope.envelope import estimate_surface as estimate_surface
     from mapping.estimate.envelope.estimate import Estimate as Estimate
     from mapping.feature import (
-        JUNCTION as JUNCTION,
         KINDS as KINDS,
         Anchor as Anchor,
         Feature as Feature,
@@ -76,7 +75,7 @@ _PUBLIC = {
     ),
     "estimate.envelope.envelope": ("estimate_surface",),
     "estimate.envelope.estimate": ("Estimate",),
-    "feature": ("Anchor", "Feature", "Interval", "JUNCTION", "KINDS", "LeftOut", "Support"),
+    "feature": ("Anchor", "Feature", "Interval", "KINDS", "LeftOut", "Support"),
     "geometry.contact.first_contact": ("BallContact",),
     "geometry.curvature.curvature": ("Curvature",),
     "geometry.curvature.principal_curvatures": ("principal_curvatures",),

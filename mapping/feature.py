@@ -104,7 +104,10 @@ class Feature:
         posterior: draws of the shape's parameters, or None before sampling.
         anchor: where it hangs on the base, or None before attachment.
         id: name within its model, "" before attachment.
-        notes: remarks for the report, for example why a value is censored.
+        notes: remarks for people, for example why a value is censored; nothing is computed from them.
+        extra: JSON values beyond these, as the model's file holds them; `details` reads them with their types.
+        junction: True for one of several lines that meet.
+        faint: True of a line that no single sweep showed.
     """
 
     kind: str
@@ -121,15 +124,13 @@ class Feature:
     id: str = ""
     notes: tuple[str, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict)
+    junction: bool = False
+    faint: bool = False
 
     @property
     def closed(self) -> bool:
         """True for a ridge or groove that returns to its beginning."""
         return len(self.axis) > 2 and bool(np.array_equal(self.axis[0], self.axis[-1]))
-
-
-# Note of a line that others meet
-JUNCTION = "junction"
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mapping import JUNCTION, Feature, FloatArray, Interval
+from mapping import Feature, FloatArray, Interval
 from mapping.base import Base, onto_base
 from mapping.geometry.mesh import arclengths, nearest_on
 from mapping.inference.families import MEETING_REACH, touches
@@ -38,7 +38,7 @@ class Meeting:
 def meetings(features: Sequence[Feature], half_widths: Sequence[float]) -> list[Meeting]:
     """The places at which ridges and grooves that were detected as one detail end on one another."""
     found: list[Meeting] = []
-    lines = [k for k, feature in enumerate(features) if feature.kind in LINES and JUNCTION in feature.notes]
+    lines = [k for k, feature in enumerate(features) if feature.kind in LINES and feature.junction]
     for number in lines:
         feature, half_width = features[number], half_widths[number]
         for end in () if feature.closed else (0, -1):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from recorded_features import TIP, UP, D, feature, plate
 
-from mapping.feature import JUNCTION, Feature, Interval
+from mapping.feature import Feature, Interval
 from mapping.geometry.mesh.polyline import arclengths
 from mapping.inference.junctions import brought_together, meetings
 
@@ -21,7 +21,7 @@ def arm(start: np.ndarray, stop: np.ndarray, sd: float = 30e-6, count: int = 9) 
     extra = {"axis_sd": [sd] * count, "end_intervals": [[-5e-5, 5e-5]] * 2, "ends_seen": [True, True]}
     far = float(np.linalg.norm(np.subtract(stop, start)))
     length = Interval(far, far - 7e-5, far + 7e-5)
-    return replace(found, extra=extra, length=length, notes=(JUNCTION,))
+    return replace(found, extra=extra, length=length, junction=True)
 
 
 def star(hub: np.ndarray, angles: tuple[float, ...] = (10.0, 130.0, 250.0)) -> list[Feature]:
@@ -98,10 +98,10 @@ def test_lines_that_do_not_meet_and_closed_ones_are_left_alone() -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 60)
     ring = np.column_stack([0.02 * np.cos(turn) - 0.02, 0.02 * np.sin(turn), 0 * turn])
     ring[-1] = ring[0]
-    closed = replace(feature("ridge", ring, D, D), notes=(JUNCTION,))
+    closed = replace(feature("ridge", ring, D, D), junction=True)
     assert together([one, closed], [one, closed]) == [one, closed]
     # an end that was seen near another line is an end
-    apart = [replace(each, notes=()) for each in star(np.zeros(3))]
+    apart = [replace(each, junction=False) for each in star(np.zeros(3))]
     assert together(apart, apart) == apart
 
 
