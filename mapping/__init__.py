@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from mapping.feature import (
         KINDS as KINDS,
         Anchor as Anchor,
+        Details as Details,
         Feature as Feature,
         Interval as Interval,
         LeftOut as LeftOut,
@@ -75,7 +76,7 @@ _PUBLIC = {
     ),
     "estimate.envelope.envelope": ("estimate_surface",),
     "estimate.envelope.estimate": ("Estimate",),
-    "feature": ("Anchor", "Feature", "Interval", "KINDS", "LeftOut", "Support"),
+    "feature": ("Anchor", "Details", "Feature", "Interval", "KINDS", "LeftOut", "Support"),
     "geometry.contact.first_contact": ("BallContact",),
     "geometry.curvature.curvature": ("Curvature",),
     "geometry.curvature.principal_curvatures": ("principal_curvatures",),

@@ -330,10 +330,10 @@ def tip_counts(features: tuple[Feature, ...], tip_radius: float) -> tuple[TipCou
     """How many features are finer than this tip, and than a larger one."""
     finer = sum(feature.curvature_feature for feature in features)
     counts = [TipCount(tip_radius, finer, len(features) - finer)]
-    crests = [feature.extra.get("trace_curvature") for feature in features]
+    crests = [feature.details.trace_curvature for feature in features]
     if features and all(crest is not None for crest in crests):
         other = OTHER_TIP * tip_radius
-        finer = sum(abs(float(crest)) > 1.0 / (2.0 * other) for crest in crests if crest is not None)
+        finer = sum(abs(crest) > 1.0 / (2.0 * other) for crest in crests if crest is not None)
         counts.append(TipCount(other, finer, len(features) - finer))
     return tuple(counts)
 
