@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from explore3d.analysis.build_model import build_model
+from explore3d.analysis.method import Work
 from explore3d.analysis.stages import Stages
+from explore3d.analysis.truth import TrueFeature
 from explore3d.bench.scenes.plate_sweeps import DIAMETER, plate, sweeps, wire
 from explore3d.log.record import Log
-from explore3d.scene.scene import parse_scene
 from mapping.base import laid_trace
 from mapping.base.base import Base
-
-SCENE = Path(__file__).parents[3] / "assets" / "scenes" / "wire_on_plate.toml"
 
 
 def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height_twice(monkeypatch):
@@ -35,8 +33,9 @@ def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height
     monkeypatch.setattr(laid_trace, "height_profiles", counted_heights)
     places = np.linspace(-30e-3, 30e-3, 10)
     trace = sweeps(wire(), white=0.1e-3, places=places, spacing=2.5e-6, half=20e-3)
-    scene = parse_scene(SCENE.read_text(encoding="utf-8"), SCENE)
-    analysis = build_model(Log(trace=trace, scene_text=""), scene, plate(), Stages())
+    axis = np.array([[-50e-3, 0.0, 0.0], [50e-3, 0.0, 0.0]])
+    monkeypatch.setattr(Work, "truth", (TrueFeature("ridge", axis, DIAMETER, DIAMETER, 0.1),))
+    analysis = build_model(Log(trace), None, plate(), Stages())
     (ridge,) = analysis.model.features
     assert ridge.height.median == pytest.approx(DIAMETER, rel=0.03)
     assert len(analysis.time_curve) > 1  # the curve looks at the features eight times over

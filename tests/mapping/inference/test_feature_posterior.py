@@ -24,6 +24,7 @@ from recorded_features import (
 
 from mapping.base.base import Base
 from mapping.base.projection import onto_base
+from mapping.feature import Details
 from mapping.geometry.templates.shapes import cap_height, groove_height, rim_height, step_height
 from mapping.inference.feature_posterior import refine, sample_posterior, solve
 from mapping.inference.sampler.psis import resample
