@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from mapping.estimate.envelope.envelope import estimate_surface as estimate_surface
     from mapping.estimate.envelope.estimate import Estimate as Estimate
     from mapping.feature import (
-        JUNCTION as JUNCTION,
         KINDS as KINDS,
         Anchor as Anchor,
+        Details as Details,
         Feature as Feature,
         Interval as Interval,
         LeftOut as LeftOut,
@@ -85,7 +85,7 @@ _PUBLIC = {
     ),
     "estimate.envelope.envelope": ("estimate_surface",),
     "estimate.envelope.estimate": ("Estimate",),
-    "feature": ("Anchor", "Feature", "Interval", "JUNCTION", "KINDS", "LeftOut", "Support"),
+    "feature": ("Anchor", "Details", "Feature", "Interval", "KINDS", "LeftOut", "Support"),
     "geometry.contact.first_contact": ("BallContact",),
     "geometry.contact.interference_points": ("interference_points",),
     "geometry.contact.parallel_surface": ("ParallelSurface", "parallel_surface"),

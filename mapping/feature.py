@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -83,6 +84,49 @@ class Support:
 
 
 @dataclass(frozen=True, eq=False)
+class Details:
+    """What only some features have, and other stages compute with; None where it is not known. Kept in JSON's "extra".
+
+    Args:
+        trace_curvature: of the trace over the crest, 1/m.
+        radius: of a protruding section's cap, m.
+        scale, exponent: of a bump of revolution with a skirt (m, 1).
+        axis_sd: (K,) standard deviation of the axis across itself, at even steps along it, m.
+        end_intervals: (2, 2) 90 % interval of the first and the last end along the axis, m, from where it is stated.
+        ends_seen: whether the data say that the axis does not go on there.
+    """
+
+    trace_curvature: float | None = None
+    radius: float | None = None
+    scale: float | None = None
+    exponent: float | None = None
+    axis_sd: FloatArray | None = None
+    end_intervals: FloatArray | None = None
+    ends_seen: tuple[bool, bool] | None = None
+
+    def known(self) -> dict[str, Any]:
+        """What is known, by name."""
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {name: value for name, value in values.items() if value is not None}
+
+    def or_of(self, other: Details) -> Details:
+        """These, and from the other what is not known here."""
+        return replace(other, **self.known())
+
+    @classmethod
+    def read(cls, record: Mapping[str, Any]) -> Details:
+        """The details among the values of a record."""
+        found = {each.name: record[each.name] for each in fields(cls) if record.get(each.name) is not None}
+        for name in ("axis_sd", "end_intervals"):
+            if name in found:
+                found[name] = np.array(found[name], dtype=np.float64)
+        if "ends_seen" in found:
+            first, last = found["ends_seen"]
+            found["ends_seen"] = (bool(first), bool(last))
+        return cls(**found)
+
+
+@dataclass(frozen=True, eq=False)
 class Feature:
     """One fine surface feature on the base.
 
@@ -101,7 +145,11 @@ class Feature:
         posterior: draws of the shape's parameters, or None before sampling.
         anchor: where it hangs on the base, or None before attachment.
         id: name within its model, "" before attachment.
-        notes: remarks for the report, for example why a value is censored.
+        notes: remarks for people, for example why a value is censored; nothing is computed from them.
+        extra: further JSON values for the model's file; nothing is computed from them.
+        junction: True for one of several lines that meet.
+        faint: True of a line that no single sweep showed.
+        details: what only some features have.
     """
 
     kind: str
@@ -118,15 +166,14 @@ class Feature:
     id: str = ""
     notes: tuple[str, ...] = ()
     extra: dict[str, Any] = field(default_factory=dict)
+    junction: bool = False
+    faint: bool = False
+    details: Details = Details()
 
     @property
     def closed(self) -> bool:
         """True for a ridge or groove that returns to its beginning."""
         return len(self.axis) > 2 and bool(np.array_equal(self.axis[0], self.axis[-1]))
-
-
-# Note of a line that others meet
-JUNCTION = "junction"
 
 
 @dataclass(frozen=True)

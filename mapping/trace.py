@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mapping.arrays import FloatArray, IntArray
+from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.errors import TraceError
 
 
@@ -162,8 +162,8 @@ class Trace:
         for start, stop in zip([0, *cuts], [*cuts, len(self)], strict=True):
             yield int(self.sweep[start]), self._view(slice(int(start), int(stop)))
 
-    def _view(self, cut: slice) -> Trace:
-        """Consecutive samples; not checked again, and sharing the memory of these."""
+    def _view(self, cut: slice | BoolArray) -> Trace:
+        """Some samples; not checked again, and sharing the memory of these if they are consecutive."""
         part = object.__new__(Trace)
         for each in fields(self):
             value = getattr(self, each.name)

@@ -9,7 +9,7 @@ import numpy as np
 
 from explore3d import length_text
 from mapping import FloatArray, Surface, Trace
-from mapping.base import Base, Cells
+from mapping.base import Base, Cells, LaidTrace
 from mapping.detection import Detections, found_heights
 from mapping.estimate.envelope import Estimate
 from mapping.estimate.sweeps import EXTRAPOLATED, pitch
@@ -45,7 +45,10 @@ class Inspected:
         if base.kind == "profile":  # a strip as wide as one likes: all of it lies under the one sweep
             height = np.full(len(base.surface.faces), limit)
             return cls(height, base.surface.face_areas, limit, detections.probability, asked)
-        places = base.foot(Cells.of(trace, MOST_INSPECTED_CELLS).centers, trace.tip_radius).points
+        if len(trace) <= MOST_INSPECTED_CELLS:  # each sample is a cell
+            places = LaidTrace.of(trace, base).feet().points
+        else:
+            places = base.foot(Cells.of(trace, MOST_INSPECTED_CELLS).centers, trace.tip_radius).points
         if not np.isfinite(limit):
             places = places[:0]
         height = found_heights(base.surface, places, trace.tip_radius, limit)

@@ -186,8 +186,8 @@ def _trace_of(
         return step_height(x, abs(height), tip_radius)
     # The radius that the record may hold belongs to its median height.
     own = height == feature.height.median
-    extra = {name: value for name, value in feature.extra.items() if own or name != "radius"}
-    so_high = replace(feature, height=Interval(height, height, height), extra=extra)
+    details = feature.details if own else replace(feature.details, radius=None)
+    so_high = replace(feature, height=Interval(height, height, height), details=details)
     return feature_trace(so_high, points, normals, tip_radius)
 
 

@@ -23,7 +23,7 @@ def extent_picture(features: Sequence[Feature], truths: Sequence[FloatArray | No
         features: those to show; bumps and pits have no extent and are left out.
         truths: true axis (K, 3) of each, or None.
     """
-    pairs = [(f, t) for f, t in zip(features, truths, strict=True) if len(f.axis) > 1 and "axis_sd" in f.extra]
+    pairs = [(f, t) for f, t in zip(features, truths, strict=True) if len(f.axis) > 1 and f.details.axis_sd is not None]
     if not pairs:
         return None
     columns = min(EXTENTS_PER_ROW, len(pairs))
@@ -42,8 +42,8 @@ def _panel(axes: Any, feature: Feature, true: FloatArray | None) -> None:
     """The axis in a plane: along the chord between its ends (a ring: its first diameter), and across."""
     along, across, origin = _plane(feature)
     x, y = (feature.axis - origin) @ along, (feature.axis - origin) @ across
-    sd = np.asarray(feature.extra["axis_sd"], dtype=np.float64)
-    if len(sd) != len(x):
+    sd = feature.details.axis_sd
+    if sd is None or len(sd) != len(x):
         sd = np.full(len(x), feature.position_sd)
     tangent = np.gradient(np.column_stack([x, y]), axis=0)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -69,7 +69,7 @@ def _panel(axes: Any, feature: Feature, true: FloatArray | None) -> None:
 
 def _end(axes: Any, feature: Feature, end: int, direction: float, place: tuple[float, float], factor: float) -> None:
     """A bar for an end that was seen; an arrow for one that goes on beyond what was explored."""
-    intervals, seen = feature.extra.get("end_intervals"), feature.extra.get("ends_seen")
+    intervals, seen = feature.details.end_intervals, feature.details.ends_seen
     if feature.closed:
         return
     if intervals is None or seen is None or not seen[end]:

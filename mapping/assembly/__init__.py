@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.assembly.assemble import assemble as assemble
+    from mapping.assembly.assemble import assemble as assemble, place_spacing as place_spacing
     from mapping.assembly.faint_features import why_none_sought as why_none_sought, with_faint_lines as with_faint_lines
 
 _PUBLIC = {
-    "assemble": ("assemble",),
+    "assemble": ("assemble", "place_spacing"),
     "faint_features": ("why_none_sought", "with_faint_lines"),
 }
 doorway(__name__, _PUBLIC)

@@ -16,7 +16,7 @@ from mapping.assembly.linking import groups
 from mapping.assembly.points import outline, point_feature
 from mapping.assembly.runs import along, split_runs, told_crests
 from mapping.assembly.steps import step_features
-from mapping.base import Base
+from mapping.base import Base, LaidTrace
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances
 
@@ -30,7 +30,13 @@ STRAY, STRAY_DISTANCE, MATES, LINE = 0.6, 1.3, 3.0, 5
 
 
 def assemble(
-    detections: Detections, trace: Trace, base: Base, *, false_alarms_per_metre: float = 0.01
+    detections: Detections,
+    trace: Trace,
+    base: Base,
+    *,
+    false_alarms_per_metre: float = 0.01,
+    spacing: float | None = None,
+    faint: bool = True,
 ) -> tuple[Feature, ...]:
     """Features of the base, the strongest evidence first, with preliminary intervals.
 
@@ -43,23 +49,34 @@ def assemble(
 
     Args:
         detections: of the trace.
-        trace: any set of sweeps.
+        trace: any set of sweeps; of a LaidTrace nothing is laid on the base again.
         base: the global model.
         false_alarms_per_metre: expected number of lines found in noise alone, 1/m of inspected path.
+        spacing: distance between the places of a sweep whose heights are looked at, m; None: `place_spacing`.
+        faint: False to leave out the search for lines too low for any one sweep.
 
     Reference: paper definitions 2 and 3; theory section 5.
     """
     crossings = detections.crossings
     if len(np.unique(trace.sweep)) == 1:
         return _strongest_first([point_feature([c], _name(c), detections, trace.tip_radius) for c in crossings])
-    features = _linked(detections, trace, base) if crossings else []
-    return _strongest_first(with_faint_lines(features, detections, trace, base, false_alarms_per_metre))
+    laid = LaidTrace.of(trace, base)
+    features = _linked(detections, laid, spacing) if crossings else []
+    if faint:
+        features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre)
+    return _strongest_first(features)
 
 
-def _linked(detections: Detections, trace: Trace, base: Base) -> list[Feature]:
+def place_spacing(crossings: Sequence[Crossing], tip_radius: float) -> float:
+    """Distance between inspected places of a sweep, m: five to a half-width of a sharp crest of the typical height."""
+    return 0.2 * _scale(crossings, tip_radius)
+
+
+def _linked(detections: Detections, trace: LaidTrace, spacing: float | None) -> list[Feature]:
     """Features of the crossings that single sweeps detected."""
-    tip, scale = trace.tip_radius, _scale(detections.crossings, trace.tip_radius)
-    around = Around(inspect(trace, base, detections.noise, 0.2 * scale), base, detections, tip)
+    tip, scale, base = trace.tip_radius, _scale(detections.crossings, trace.tip_radius), trace.base
+    spacing = place_spacing(detections.crossings, tip) if spacing is None else spacing
+    around = Around(inspect(trace, base, detections.noise, spacing), base, detections, tip)
     edges, crossings = edge_features(detections.crossings, around)
     crests, steps = _crests_and_steps(crossings, around, scale)
     certain, doubtful = _grouped(crests, around.inspection, scale)

@@ -114,4 +114,5 @@ def _feature(line: FaintLine, inspection: Inspection, base: Base, detections: De
         curvature_feature=bool(abs(2 * line.height / line.half_width**2) > 1 / (2 * tip_radius)),
         position_sd=0.3 * line.half_width,
         notes=("seen by no single sweep, but by all that crossed it together",),
+        faint=True,
     )

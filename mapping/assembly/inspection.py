@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray, IntArray, Trace
-from mapping.base import Base
-from mapping.detection import arclength, height_profiles
+from mapping.base import Base, LaidTrace
 from mapping.instrument import Noise
 
 # Sweeps that tell the typical distance between neighbours.
@@ -111,14 +110,14 @@ class Inspection:
 def inspect(trace: Trace, base: Base, noise: Noise, spacing: float) -> Inspection:
     """Mean heights over stretches of the given length along every sweep of the trace."""
     points, height, sweep, count = [], [], [], []
-    for number, part in trace.sweeps():
-        s = arclength(part, base)
-        if len(part) < 2 or not s[-1] > 0:
+    for own in LaidTrace.of(trace, base).laid_sweeps:
+        if len(own.trace) < 2 or not own.arclength[-1] > 0:
             continue
-        for profile in height_profiles(number, part, s, base, spacing):
-            points.append(base.foot(profile.centers, part.tip_radius).points)
+        for profile in own.heights(spacing):
+            under = base.foot(profile.centers, trace.tip_radius).points if profile.feet is None else profile.feet
+            points.append(under)
             height.append(profile.height)
-            sweep.append(np.full(len(profile.height), number))
+            sweep.append(np.full(len(profile.height), own.number))
             count.append(np.diff(profile.first))
     if not points:
         return Inspection(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), spacing)

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from mapping import JUNCTION, Feature, FloatArray, Interval
+from mapping import Feature, FloatArray, Interval
 from mapping.assembly.branches import Branch, branches, rejoined
 from mapping.assembly.inspection import Inspection
 from mapping.assembly.line_ends import LineEnd, closes, line_end
@@ -133,7 +133,7 @@ def mean_point(cluster: list[Crossing]) -> FloatArray:
 def _line_feature(branch: Branch, members: list[Crossing], kind: str, around: Around) -> Feature:
     axis = branch.axis
     height, half_width, sd = _section(axis, members, around)
-    notes: tuple[str, ...] = (JUNCTION,) if branch.junction else ()
+    notes: tuple[str, ...] = ("junction",) if branch.junction else ()
     if branch.closed or (branch.free == (True, True) and closes(axis, height, half_width, around.inspection)):
         axis = np.vstack([axis, axis[:1]])
         length = _exactly(axis)
@@ -154,6 +154,7 @@ def _line_feature(branch: Branch, members: list[Crossing], kind: str, around: Ar
         curvature_feature=bool(abs(2 * height / half_width**2) > 1 / (2 * around.tip_radius)),
         position_sd=float(np.median([c.position_sd for c in members])),
         notes=notes,
+        junction=branch.junction,
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import Feature, FloatArray, Interval, Support
+from mapping import Details, Feature, FloatArray, Interval, Support
 from mapping.assembly.inspection import Inspection
 from mapping.assembly.runs import RunPoint
 from mapping.detection import Crossing, Detections
@@ -35,7 +35,7 @@ def point_feature(
         evidence=evidence(members, detections),
         curvature_feature=bool(best.curvature_feature),
         position_sd=best.position_sd,
-        extra={"trace_curvature": best.trace_curvature},
+        details=Details(trace_curvature=best.trace_curvature),
     )
 
 

@@ -10,6 +10,7 @@ from mapping import BoolArray, FloatArray, IntArray, Surface, SurfaceError, Trac
 from mapping.base.base import Base, Feet
 from mapping.base.cells import Cells
 from mapping.base.fit import fit_base
+from mapping.base.laid_trace import LaidTrace
 from mapping.base.robust import robust_scale
 
 MOST_EXTENT_CELLS = 4000
@@ -84,7 +85,7 @@ def rolled_off(height: FloatArray, sweep: IntArray, tip_radius: float) -> BoolAr
 
 def over_base(trace: Trace, base: Base) -> BoolArray:
     """(N,) True where the ball's centre stands over the base, False where it stands beyond its border."""
-    return ~_beyond(base, base.foot(trace.centers, trace.tip_radius))
+    return ~_beyond(base, LaidTrace.of(trace, base).feet())
 
 
 def _beyond(base: Base, feet: Feet) -> BoolArray:

@@ -82,14 +82,20 @@ class Pose:
 
     def moved(self, base: Base) -> Base:
         """The base where it really stands; its parameters keep the whole motion from the given mesh as "pose"."""
-        before = base.parameters.get("pose")
-        whole = self if before is None else self.after(Pose.read(before))
+        before = Pose.of(base)
+        whole = self if before is None else self.after(before)
         return base.moved(self.rotation, self.translation, base.parameters | {"pose": whole.record()})
 
     def record(self) -> dict[str, Any]:
         """JSON values that `read` understands, SI units."""
         arrays = {name: getattr(self, name).tolist() for name in ("rotation", "translation", "center", "covariance")}
         return arrays | {"observable": self.observable, "scatter": self.scatter}
+
+    @classmethod
+    def of(cls, base: Base) -> Pose | None:
+        """The whole motion of a base that was moved, None of one that stands as given."""
+        record = base.parameters.get("pose")
+        return None if record is None else cls.read(record)
 
     @classmethod
     def read(cls, record: dict[str, Any]) -> Pose:

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     )
     from mapping.detection.crossing import Crossing as Crossing
     from mapping.detection.detect import Detections as Detections, detect as detect
-    from mapping.detection.height_profile import arclength as arclength, height_profiles as height_profiles
     from mapping.detection.paper_algorithms import (
         along_chord as along_chord,
         curvature_features as curvature_features,
@@ -24,7 +23,6 @@ _PUBLIC = {
     "coverage": ("Coverage", "coverage", "face_samples", "found_heights"),
     "crossing": ("Crossing",),
     "detect": ("Detections", "detect"),
-    "height_profile": ("arclength", "height_profiles"),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
 }
 doorway(__name__, _PUBLIC)

@@ -10,8 +10,8 @@ from functools import cache
 import numpy as np
 
 from mapping import BoolArray, FloatArray
+from mapping.base import SweepHeights
 from mapping.detection.cap_fit import Disturbance, fit_cap
-from mapping.detection.height_profile import SweepHeights
 from mapping.detection.matched_filter import Bank
 from mapping.instrument import Noise
 

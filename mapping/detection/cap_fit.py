@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import FloatArray
-from mapping.detection.height_profile import SweepHeights
+from mapping.base import SweepHeights
 from mapping.instrument import Noise
 
 # Improvement in twice the log-likelihood that a plateau must bring over a cap.

@@ -8,19 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import DetectionError, FloatArray, IntArray, Trace
-from mapping.base import Base, fit_base
+from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
 from mapping.detection.candidates import find_disturbances
 from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import Crossing
 from mapping.detection.false_alarms import threshold_for
-from mapping.detection.height_profile import SweepHeights, arclength, height_profiles
 from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, smallest_half_width
 from mapping.detection.paper_algorithms import along_chord, curvature_features
 from mapping.detection.quiet_noise import SMALLEST_CREST_SNR, background, first_noise, floored, raw_stretches
 from mapping.instrument import Noise, StatedNoise
-
-# Number, samples and arclengths (N,) m of a sweep
-Sweep = tuple[int, Trace, FloatArray]
 
 # Half-width of the widest disturbance that counts as fine, in tip radii.
 LARGEST = 4.0
@@ -87,7 +83,7 @@ def detect(
     a cap of any size at any place.
 
     Args:
-        trace: one or many sweeps.
+        trace: one or many sweeps; a LaidTrace keeps what is laid on its base for who comes after.
         base: the known global model; None: fitted to the trace.
         algorithm: number in figure 4 of the paper.
         false_alarms_per_metre: expected number of false crossings per metre of path, 1/m.
@@ -109,20 +105,14 @@ def detect(
     if base is None:
         base = fit_base(trace)
     tip = trace.tip_radius
-    sweeps = [(number, part, arclength(part, base)) for number, part in trace.sweeps()]
-    usable = [sweep for sweep in sweeps if len(sweep[1]) >= 8 and sweep[2][-1] > 0]
-    left_out = tuple(
-        f"sweep {number}: {len(part)} samples over {s[-1] if len(s) else 0:.3g} m are too few to inspect"
-        for number, part, s in sweeps
-        if len(part) < 8 or not s[-1] > 0
-    )
+    usable, left_out = _usable(LaidTrace.of(trace, base))
     if not usable:
         return Detections((), noise or Noise(0.0), algorithm, np.inf, PROBABILITY, np.inf, 0.0, left_out)
     raw = float(np.median([_step(sweep) for sweep in usable]))
-    stretches = [] if noise else raw_stretches(usable, base)
+    stretches = [] if noise else raw_stretches(usable)
     first = floored(noise, tip) if noise else first_noise(stretches, raw, tip)
     widest = LARGEST * tip if largest is None else largest
-    profiles = _profiles(usable, base, first, tip)
+    profiles = _profiles(usable, first, tip)
     behind = background(profiles, base, noise, stretches, first, tip, widest, stated)
     level = behind.noise
     thresholds = {
@@ -159,13 +149,26 @@ def _resolved(crossings: list[Crossing], resolution: float) -> tuple[list[Crossi
     return kept, (f"{lost} details of at most {low:.3g} m may be rounding: the positions come in steps",)
 
 
-def _step(sweep: Sweep) -> float:
+def _usable(laid: LaidTrace) -> tuple[list[LaidSweep], tuple[str, ...]]:
+    """The sweeps that are long enough, and a sentence for each that is not."""
+    usable, left_out = [], []
+    for sweep in laid.laid_sweeps:
+        count, s = len(sweep.trace), sweep.arclength
+        if count >= 8 and s[-1] > 0:
+            usable.append(sweep)
+        else:
+            length = s[-1] if len(s) else 0
+            left_out.append(f"sweep {sweep.number}: {count} samples over {length:.3g} m are too few to inspect")
+    return usable, tuple(left_out)
+
+
+def _step(sweep: LaidSweep) -> float:
     """Mean distance of a sweep's samples, m."""
-    s = sweep[2]
+    s = sweep.arclength
     return float(s[-1] / (len(s) - 1))
 
 
-def _profiles(usable: list[Sweep], base: Base, noise: Noise, tip: float) -> list[SweepHeights]:
+def _profiles(usable: list[LaidSweep], noise: Noise, tip: float) -> list[SweepHeights]:
     """Profiles of every sweep in bins that the smallest visible crest spans FILTER_BINS_PER_HALF_WIDTH times."""
     spacings = np.empty(len(usable))
     for alike in _alike(np.array([_step(sweep) for sweep in usable])):
@@ -173,7 +176,7 @@ def _profiles(usable: list[Sweep], base: Base, noise: Noise, tip: float) -> list
         smallest = smallest_half_width(noise, raw, 1.0, tip, SMALLEST_CREST_SNR)
         spacings[alike] = raw * max(1, int(smallest / (FILTER_BINS_PER_HALF_WIDTH * raw)))
     each = zip(usable, spacings.tolist(), strict=True)
-    return [p for (number, part, s), spacing in each for p in height_profiles(number, part, s, base, spacing)]
+    return [profile for sweep, spacing in each for profile in sweep.heights(spacing)]
 
 
 def _alike(steps: FloatArray) -> list[IntArray]:
@@ -201,12 +204,13 @@ def _stands_out(found: Disturbance, profile: SweepHeights, noise: Noise, tip: fl
     return bool(abs(found.height) > ROUGHNESS * np.sqrt(variance))
 
 
-def _judged(crossings: list[Crossing], usable: list[Sweep], algorithm: int, noise: Noise) -> list[Crossing]:
+def _judged(crossings: list[Crossing], usable: list[LaidSweep], algorithm: int, noise: Noise) -> list[Crossing]:
     """Crossings whose `curvature_feature` says whether the paper's algorithm reports a feature of their sign there."""
     judged = []
-    for number, part, _ in usable:
+    for sweep in usable:
+        part = sweep.trace
         features = curvature_features(part, algorithm, noise)
-        for c in (c for c in crossings if c.sweep == number and part.t[0] <= c.t <= part.t[-1]):
+        for c in (c for c in crossings if c.sweep == sweep.number and part.t[0] <= c.t <= part.t[-1]):
             low, high = sorted(along_chord(part, part.centers[[c.start, min(c.stop, len(part)) - 1]]))
             sign = 1 if c.height > 0 else -1
             reported = any(f.sign == sign and f.start <= high and f.stop >= low for f in features)

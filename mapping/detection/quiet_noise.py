@@ -12,10 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, Trace
-from mapping.base import Base
+from mapping import BoolArray, FloatArray
+from mapping.base import Base, LaidSweep, SweepHeights
 from mapping.detection.candidates import quiet_bins
-from mapping.detection.height_profile import SweepHeights
 from mapping.detection.matched_filter import Bank, build_bank, filter_sd, smallest_half_width
 from mapping.instrument import Blocks, Noise, NoiseFit, StatedNoise, estimate_noise, fit_noise, perturbed, relative_sd
 
@@ -62,14 +61,14 @@ class Background:
     uncertainties: dict[float, float]
 
 
-def raw_stretches(usable: Sequence[tuple[int, Trace, FloatArray]], base: Base) -> list[Stretch]:
-    """The middles of the sweeps (number, samples, arclengths), together no more than about RAW_SAMPLES."""
+def raw_stretches(usable: Sequence[LaidSweep]) -> list[Stretch]:
+    """The middles of the sweeps, together no more than about RAW_SAMPLES."""
     share = max(64, RAW_SAMPLES // len(usable))
     stretches = []
-    for number, part, s in usable:
-        begin = max(0, (len(part) - share) // 2)
+    for sweep in usable:
+        begin = max(0, (len(sweep.trace) - share) // 2)
         cut = slice(begin, begin + share)
-        stretches.append(Stretch(number, base.foot(part.centers[cut], part.tip_radius).height, s[cut]))
+        stretches.append(Stretch(sweep.number, sweep.feet(cut).height, sweep.arclength[cut]))
     return stretches
 
 

@@ -108,7 +108,7 @@ def refine(
         nothing = replace(feature.evidence, log_odds=0.0)
         return replace(feature, evidence=nothing, notes=(*feature.notes, f"no posterior: {error}"))
     found = describe(solution.problem, solution.posterior, base)
-    if solution.problem.noise != noise.rounded(trace.resolution):  # intervals hold within the family only
+    if solution.problem.misfit > 0.0:  # intervals hold within the family only
         note = f"no ideal {found.kind} fits the trace within its noise: the sizes are those of the closest one"
         found = replace(found, notes=(*found.notes, note))
     odds = odds_against_nothing(solution)
@@ -131,7 +131,7 @@ def solve(
     noise = (noise or noise_of_trace(trace, base)).rounded(trace.resolution)
     around = Surroundings(trace, base, noise, others, tip_sd)
     solution = solve_problem(pose_problem(feature, around), rng, confirm=confirm)
-    if feature.kind != "bump" or solution.problem.noise == noise:
+    if feature.kind != "bump" or solution.problem.misfit == 0.0:
         return solution
 
     bell = better_profile(solution.problem, around, rng)

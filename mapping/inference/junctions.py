@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from mapping import JUNCTION, Feature, FloatArray, Interval
+from mapping import Details, Feature, FloatArray, Interval
 from mapping.base import Base, onto_base
 from mapping.geometry.mesh import arclengths, nearest_on
 from mapping.inference.families import MEETING_REACH, touches
@@ -38,7 +37,7 @@ class Meeting:
 def meetings(features: Sequence[Feature], half_widths: Sequence[float]) -> list[Meeting]:
     """The places at which ridges and grooves that were detected as one detail end on one another."""
     found: list[Meeting] = []
-    lines = [k for k, feature in enumerate(features) if feature.kind in LINES and JUNCTION in feature.notes]
+    lines = [k for k, feature in enumerate(features) if feature.kind in LINES and feature.junction]
     for number in lines:
         feature, half_width = features[number], half_widths[number]
         for end in () if feature.closed else (0, -1):
@@ -110,7 +109,8 @@ def _course(feature: Feature, point: FloatArray, half_width: float) -> tuple[Flo
     s = arclengths(line)
     leg = int(np.clip(np.searchsorted(s, at[0], side="right"), 1, len(line) - 1))
     way = line[leg] - line[leg - 1]
-    known = np.asarray(feature.extra.get("axis_sd", [feature.position_sd]), dtype=np.float64)
+    along = feature.details.axis_sd
+    known = np.array([feature.position_sd]) if along is None else along
     share = (at[0] - half_width) / max(s[-1] - 2.0 * half_width, np.finfo(float).tiny)
     sd = float(np.interp(share, np.linspace(0.0, 1.0, len(known)), known))
     return foot[0], way / np.linalg.norm(way), sd
@@ -144,25 +144,25 @@ def _ended_at(
     points[-1] = place
     way = (line[-1] - line[-2]) / np.linalg.norm(line[-1] - line[-2])
     spread = NORMAL_QUANTILE_95 * float(np.sqrt(way @ covariance @ way))
-    extra, length = _measured(feature, end, points, spread)
-    notes = with_open_ends(feature.notes, extra.get("ends_seen", (True, True)))
-    sd = np.asarray(extra.get("axis_sd", ()), dtype=np.float64)[order]
-    if len(sd) == len(axis):
-        extra["axis_sd"] = np.interp(along, np.arange(len(axis)), sd)[order].tolist()
-    return replace(feature, axis=points[order], normals=normals[order], length=length, extra=extra, notes=notes)
+    details, length = _measured(feature, end, points, spread)
+    notes = with_open_ends(feature.notes, details.ends_seen or (True, True))
+    sd = details.axis_sd
+    if sd is not None and len(sd) == len(axis):
+        details = replace(details, axis_sd=np.interp(along, np.arange(len(axis)), sd[order])[order])
+    return replace(feature, axis=points[order], normals=normals[order], length=length, details=details, notes=notes)
 
 
-def _measured(feature: Feature, end: int, axis: FloatArray, spread: float) -> tuple[dict[str, Any], Interval]:
+def _measured(feature: Feature, end: int, axis: FloatArray, spread: float) -> tuple[Details, Interval]:
     """What is known of the ends, and the length (m), once an end lies within `spread` of its place."""
-    extra, length = dict(feature.extra), float(arclengths(axis)[-1])
-    if "end_intervals" not in extra:
+    details, length = feature.details, float(arclengths(axis)[-1])
+    if details.end_intervals is None or details.ends_seen is None:
         off = length - feature.length.median
-        return extra, replace(
+        return details, replace(
             feature.length, median=length, low=feature.length.low + off, high=feature.length.high + off
         )
-    intervals, seen = [list(each) for each in extra["end_intervals"]], list(extra["ends_seen"])
+    intervals, seen = details.end_intervals.copy(), list(details.ends_seen)
     intervals[end], seen[end] = [-spread, spread], True
-    extra |= {"end_intervals": intervals, "ends_seen": seen}
+    details = replace(details, end_intervals=intervals, ends_seen=(seen[0], seen[1]))
     shorter = float(np.hypot(intervals[0][1], intervals[1][0]))
     longer = float(np.hypot(intervals[0][0], intervals[1][1]))
-    return extra, Interval(length, max(length - shorter, 0.0), length + longer, not all(seen))
+    return details, Interval(length, max(length - shorter, 0.0), length + longer, not all(seen))

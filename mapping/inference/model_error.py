@@ -37,10 +37,12 @@ def account_for_misfit(
         optima = find_optima(problem.target, np.array(optima))
         residual = _residual(problem, optima)
     count = len(residual)
-    if float(residual @ residual) <= count + EXCESS * np.sqrt(2.0 * count):
+    excess = (float(residual @ residual) - count) / np.sqrt(2.0 * count)
+    if excess <= EXCESS:
         return problem, optima
     noise = _noise_of_residual(problem, optima[0])
-    problem = problem.under(noise)
+    misfit = 0.0 if noise == problem.noise else float(excess)
+    problem = replace(problem.under(noise), misfit=misfit)
     return problem, find_optima(problem.target, np.array([*optima, *problem.beginnings]))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,7 @@ def _describe_spot(
         length=Interval(0.0, 0.0, 0.0),
         position_sd=sd,
         notes=(*problem.feature.notes, *notes),
-        extra={**problem.feature.extra, **radius},
+        details=replace(problem.feature.details, **radius),
     )
 
 
@@ -95,10 +96,10 @@ def _describe_curve(
     height, width, radius, note = _section(problem, shape, draws)
     length, notes = _length(problem, shape, draws, has_ends)
     # Along the axis: how well it is known across itself, and its two ends along itself (first, last).
-    known: dict[str, object] = {"axis_sd": courses.std(axis=0).tolist()}
+    known: dict[str, Any] = {"axis_sd": courses.std(axis=0)}
     if has_ends:
         spans = np.quantile(draws[:, -4:-2], [0.05, 0.95], axis=0) - [low, high]
-        known |= {"end_intervals": spans.T.tolist(), "ends_seen": list(explored(problem, draws))}
+        known |= {"end_intervals": spans.T, "ends_seen": explored(problem, draws)}
     return replace(
         problem.feature,
         axis=axis,
@@ -108,14 +109,14 @@ def _describe_curve(
         length=length,
         position_sd=float(np.sqrt(courses.var(axis=0).mean())),
         notes=(*problem.feature.notes, *notes, *([note] if note else [])),
-        extra={**problem.feature.extra, **radius, **known},
+        details=replace(problem.feature.details, **radius, **known),
     )
 
 
 def _section(
     problem: PosteriorProblem, shape: object, draws: FloatArray
-) -> tuple[Interval, Interval, dict[str, float], str]:
-    """Height, width, extra values and a remark."""
+) -> tuple[Interval, Interval, dict[str, Any], str]:
+    """Height, width, details of the section and a remark."""
     if isinstance(shape, StepShape):
         sign = 1.0 if problem.feature.height.median >= 0.0 else -1.0
         return Interval.from_draws(sign * draws[:, -1]), Interval(0.0, 0.0, 0.0), {}, ""
@@ -126,8 +127,8 @@ def _section(
     if isinstance(shape, BellShape):
         scale, exponent = np.exp(draws[:, -2]), np.exp(draws[:, -1])
         full = Interval.from_draws(width_at_half_height(scale, exponent))
-        extra = {"scale": float(np.median(scale)), "exponent": float(np.median(exponent))}
-        return Interval.from_draws(draws[:, -3]), full, extra, "its flank runs out in a skirt: width at half height"
+        bell = {"scale": float(np.median(scale)), "exponent": float(np.median(exponent))}
+        return Interval.from_draws(draws[:, -3]), full, bell, "its flank runs out in a skirt: width at half height"
     width, depth = np.exp(draws[:, -2]), np.exp(draws[:, -1])
     tip = shape.tip_radius  # type: ignore[attr-defined]
     unhindered = -rim_height(0.5 * width, tip)

@@ -58,8 +58,8 @@ def _size(feature: Feature) -> tuple[float, float]:
 
 def _meridian(feature: Feature, height: float, width: float) -> FloatArray:
     """(M, 2) distances from the axis of a point feature and heights, m, from the crest down to the base."""
-    if "exponent" in feature.extra and feature.height.median > 0.0:
-        p = float(feature.extra["exponent"])
+    p = feature.details.exponent
+    if p is not None and feature.height.median > 0.0:
         share = np.linspace(0.0, 1.0, 2 * CORNERS)
         # evenly spaced in the distance up to where the skirt is hardly higher than the base
         place = share * np.sqrt(p * np.expm1(-np.log(DRAWN_BELL_SHARE) / p))

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
-from mapping import KINDS, Anchor, Feature, FloatArray, Interval, LeftOut, ModelError, Posterior, Support
+from mapping import KINDS, Anchor, Details, Feature, FloatArray, Interval, LeftOut, ModelError, Posterior, Support
+
+# Names of the values under "extra" that have a type of their own
+DETAILS = frozenset(each.name for each in fields(Details))
 
 MODEL_SCHEMA = "explore3d/model/1"
 
@@ -52,7 +56,7 @@ def feature_record(feature: Feature) -> Record:
         "curvature_feature": bool(feature.curvature_feature),
         "posterior": None if feature.posterior is None else _posterior_record(feature.posterior),
         "notes": list(feature.notes),
-        "extra": plain(feature.extra, f"feature {feature.id}: extra"),
+        "extra": plain({**feature.extra, **feature.details.known()}, f"feature {feature.id}: extra"),
     }
 
 
@@ -80,7 +84,8 @@ def read_feature(record: Record, draws: FloatArray | None) -> Feature:
             anchor=_read_anchor(record["anchor"]),
             id=record["id"],
             notes=tuple(record["notes"]),
-            extra=dict(record["extra"]),
+            extra={name: value for name, value in record["extra"].items() if name not in DETAILS},
+            details=Details.read(record["extra"]),
         )
     except KeyError as error:
         raise ModelError(f"feature {name}: field {error.args[0]!r} is missing") from error

@@ -135,6 +135,7 @@ def merge_features(known: Feature, new: Feature, source: str) -> Feature:
         position_sd=scale * float(1.0 / np.sqrt(precision.sum())),
         notes=tuple(dict.fromkeys((*better.notes, *(other.notes if better.length.censored else ()), *doubt))),
         extra={**other.extra, **better.extra, "history": [*known.extra.get("history", []), record]},
+        details=better.details.or_of(other.details),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping import BoolArray, EnvelopeError, FloatArray, Surface, Trace
-from mapping.base import Base
+from mapping.base import Base, LaidTrace
 from mapping.estimate.envelope.alpha_shape import alpha_estimate
 from mapping.estimate.envelope.bridging import bridged_faces, resting_points, split
 from mapping.estimate.envelope.estimate import Estimate
@@ -20,6 +20,7 @@ from mapping.estimate.sweeps import (
     LABELS,
     TOUCHED,
     ContactRow,
+    Directions,
     Smoothed,
     at_kinks,
     contact_row,
@@ -80,12 +81,14 @@ def estimate_surface(
         raise EnvelopeError("cannot estimate a surface from a trace of no samples")
     if method == "contact" and trace.normals is None:
         raise EnvelopeError("method 'contact' needs recorded contact normals; this trace has positions alone")
-    away, slack = _outward(trace, base, outward), OVERLAP_TOLERANCE * trace.tip_radius
+    slack = OVERLAP_TOLERANCE * trace.tip_radius
     smoothed = None
     if noise is not None and noise.sd > 0:
-        smoothed = smooth(trace, noise, outward=away)
-        trace, away = smoothed.trace, away[smoothed.sample]
+        smoothed = smooth(trace, noise, outward=_directions(trace, base, outward))
+        trace, away = smoothed.trace, smoothed.outward
         slack = max(slack, 4 * smoothed.sd)
+    else:
+        away = _outward(trace, base, outward)
     if method == "alpha":
         estimate = alpha_estimate(trace.centers, away, trace.tip_radius, trace.sweep)
         return estimate if smoothed is None else replace(estimate, sd=smoothed.sd)
@@ -109,12 +112,20 @@ def _step(points: Estimate, apart: float) -> float:
     return max(apart / 4, length / MOST_POINTS) if apart > 0 else 0.0
 
 
+def _directions(trace: Trace, base: Base | None, outward: ArrayLike | None) -> FloatArray | Directions:
+    """Directions away from the body: over a base those of any centre, so that block means are laid on it, no sample."""
+    if outward is not None or base is None:
+        return _outward(trace, base, outward)
+    over, tip_radius = base, trace.tip_radius
+    return lambda centers: over.foot(centers, tip_radius).normals
+
+
 def _outward(trace: Trace, base: Base | None, outward: ArrayLike | None) -> FloatArray:
     """(N, 3) directions away from the body."""
     if outward is not None:
         return np.array(np.broadcast_to(np.asarray(outward, dtype=np.float64), trace.centers.shape))
     if base is not None:
-        return base.foot(trace.centers, trace.tip_radius).normals
+        return LaidTrace.of(trace, base).feet().normals
     if trace.normals is not None:
         return trace.normals
     return np.array(np.broadcast_to([0.0, 0.0, 1.0], trace.centers.shape))

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     )
     from mapping.estimate.sweeps.normals import at_kinks as at_kinks, surface_normals as surface_normals
     from mapping.estimate.sweeps.rows import parallel_rows as parallel_rows, pitch as pitch, thinned as thinned
-    from mapping.estimate.sweeps.smoothing import Smoothed as Smoothed, smooth as smooth
+    from mapping.estimate.sweeps.smoothing import Directions as Directions, Smoothed as Smoothed, smooth as smooth
     from mapping.estimate.sweeps.tangents import unit as unit
 
 _PUBLIC = {
@@ -34,7 +34,7 @@ _PUBLIC = {
     "labels": ("BRIDGED", "EXTRAPOLATED", "LABELS", "TOUCHED"),
     "normals": ("at_kinks", "surface_normals"),
     "rows": ("parallel_rows", "pitch", "thinned"),
-    "smoothing": ("Smoothed", "smooth"),
+    "smoothing": ("Directions", "Smoothed", "smooth"),
     "tangents": ("unit",),
 }
 doorway(__name__, _PUBLIC)

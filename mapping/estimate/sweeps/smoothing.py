@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,9 @@ MOST_SMOOTHING_ROUNDS = 10
 # A smoothing spline needs five points.
 FEWEST_SPLINE_POINTS = 5
 
+# Gives directions (M, 3) away from the body at ball centres (M, 3)
+Directions = Callable[[FloatArray], FloatArray]
+
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
@@ -31,6 +35,7 @@ class Smoothed:
         sd: standard deviation of the noise that is left in a position, m.
         removed: number of original samples that were removed as impossible.
         noise: the noise that the scale was chosen for.
+        outward: (M, 3) directions away from the body.
     """
 
     trace: Trace
@@ -40,6 +45,7 @@ class Smoothed:
     sd: float
     removed: int
     noise: Noise
+    outward: FloatArray
 
     @property
     def dented(self) -> BoolArray:
@@ -56,7 +62,7 @@ class Smoothed:
         return near
 
 
-def smooth(trace: Trace, noise: Noise | None = None, *, outward: ArrayLike | None = None) -> Smoothed:
+def smooth(trace: Trace, noise: Noise | None = None, *, outward: ArrayLike | Directions | None = None) -> Smoothed:
     """Remove impossible points of a trace, smooth the rest by a cubic smoothing spline over time.
 
     A ball's trace bulges by no more than k_t = 1/r; the estimated surface dents by no more than k_e = -1/r, which
@@ -67,7 +73,8 @@ def smooth(trace: Trace, noise: Noise | None = None, *, outward: ArrayLike | Non
 
     Args:
         noise: of the centres; None estimates it from the residual of a first smoothing.
-        outward: (3,) or (N, 3) directions away from the body; None takes recorded normals, else +z.
+        outward: (3,) or (N, 3) directions away from the body, or what gives them for centres: it is asked for block
+            means only; None takes recorded normals, else +z.
 
     Returns:
         The smoothed trace; noise of level zero returns the trace itself.
@@ -76,11 +83,13 @@ def smooth(trace: Trace, noise: Noise | None = None, *, outward: ArrayLike | Non
     """
     away = _outward(trace, outward)
     noise = _residual_noise(trace, away) if noise is None else noise
-    parts = [(own.start, _Sweep(part, away[own], trace.tip_radius)) for own, part in _sweeps(trace)]
+    parts = [(own.start, _Sweep(part, _of_part(away, own), trace.tip_radius)) for own, part in _sweeps(trace)]
     spacing = float(np.median([part.spacing for _, part in parts])) if parts else 0.0
     if noise.sd == 0 or spacing == 0:
-        curvature = np.concatenate([part.fitted(0.0).curvature for _, part in parts]) if parts else np.zeros(0)
-        return Smoothed(trace, np.arange(len(trace)), curvature, 0.0, 0.0, 0, noise)
+        alike = [part.fitted(0.0) for _, part in parts]
+        curvature = np.concatenate([fit.curvature for fit in alike]) if parts else np.zeros(0)
+        directions = np.concatenate([fit.outward for fit in alike]) if parts else np.zeros((0, 3))
+        return Smoothed(trace, np.arange(len(trace)), curvature, 0.0, 0.0, 0, noise, directions)
     scale = smoothing_length(noise, spacing, trace.tip_radius)
     fits = [part.fitted(scale) for _, part in parts]
     return Smoothed(
@@ -91,23 +100,25 @@ def smooth(trace: Trace, noise: Noise | None = None, *, outward: ArrayLike | Non
         position_sd(noise, spacing, scale),
         sum(fit.removed for fit in fits),
         noise,
+        np.concatenate([fit.outward for fit in fits]),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """One smoothed sweep: block means, the sample in the middle of each, curvature, samples removed."""
+    """One smoothed sweep: block means, the sample in the middle of each, curvature, samples removed, directions."""
 
     trace: Trace
     sample: IntArray
     curvature: FloatArray
     removed: int
+    outward: FloatArray
 
 
 class _Sweep:
     """One sweep ready to be fitted at any scale."""
 
-    def __init__(self, trace: Trace, outward: FloatArray, tip_radius: float) -> None:
+    def __init__(self, trace: Trace, outward: FloatArray | Directions, tip_radius: float) -> None:
         self.trace, self.outward, self.tip_radius = trace, outward, tip_radius
         steady = len(trace) > 1 and bool((np.diff(trace.t) > 0).all())
         t = trace.t - trace.t[0] if steady else np.arange(len(trace), dtype=np.float64)
@@ -121,7 +132,8 @@ class _Sweep:
         """The sweep smoothed at one scale and cleared of impossible blocks."""
         blocks = self._blocks(scale)
         s, centers, weight = self._means(self.s, blocks), self._means(self.trace.centers, blocks), np.diff(blocks)
-        outward = unit(self._means(self.outward, blocks))
+        given = self.outward
+        outward = given(centers) if callable(given) else unit(self._means(given, blocks))
         kept = np.ones(len(s), dtype=bool)
         positions, curvature = _spline(s, centers, weight, outward, kept, scale, self.spacing)
         for _ in range(MOST_SMOOTHING_ROUNDS if scale > 0 else 0):
@@ -131,7 +143,8 @@ class _Sweep:
             kept &= ~worst
             positions, curvature = _spline(s, centers, weight, outward, kept, scale, self.spacing)
         middles = ((blocks[:-1] + blocks[1:]) // 2)[kept]
-        return _Fit(self._trace(positions, blocks, kept), middles, curvature[kept], int(weight[~kept].sum()))
+        away = outward[kept] if callable(given) else given[middles]
+        return _Fit(self._trace(positions, blocks, kept), middles, curvature[kept], int(weight[~kept].sum()), away)
 
     def _trace(self, positions: FloatArray, blocks: IntArray, kept: BoolArray) -> Trace:
         def mean(values: FloatArray | None) -> FloatArray | None:
@@ -197,16 +210,18 @@ def _spline(
     return spline(x) * unit_length + origin, -np.einsum("ij,ij->i", second, normal) / speed
 
 
-def _residual_noise(trace: Trace, outward: FloatArray) -> Noise:
+def _residual_noise(trace: Trace, outward: FloatArray | Directions) -> Noise:
     """Noise of the height residual about splines as stiff as a third of the tip's radius."""
     residuals, places, end = [], [], 0.0
     for own, part in _sweeps(trace):
-        sweep = _Sweep(part, outward[own], trace.tip_radius)
+        away = _of_part(outward, own)
+        sweep = _Sweep(part, away, trace.tip_radius)
         fitted = sweep.fitted(trace.tip_radius / 3).trace
         if len(fitted) < 2:
             continue
         expected = np.column_stack([np.interp(part.t, fitted.t, fitted.centers[:, k]) for k in range(3)])
-        residuals.append(np.einsum("ij,ij->i", part.centers - expected, unit(outward[own])))
+        up = unit(away(part.centers) if callable(away) else away)
+        residuals.append(np.einsum("ij,ij->i", part.centers - expected, up))
         places.append(sweep.s + end)
         end = float(places[-1][-1]) + 100 * trace.tip_radius
     return estimate_noise(np.concatenate(residuals), np.concatenate(places))
@@ -220,7 +235,13 @@ def _sweeps(trace: Trace) -> list[tuple[slice, Trace]]:
     return parts
 
 
-def _outward(trace: Trace, outward: ArrayLike | None) -> FloatArray:
+def _of_part(outward: FloatArray | Directions, own: slice) -> FloatArray | Directions:
+    return outward if callable(outward) else outward[own]
+
+
+def _outward(trace: Trace, outward: ArrayLike | Directions | None) -> FloatArray | Directions:
+    if callable(outward):
+        return outward
     if outward is None:
         outward = (0.0, 0.0, 1.0) if trace.normals is None else trace.normals
     return np.array(np.broadcast_to(np.asarray(outward, dtype=np.float64), trace.centers.shape))

@@ -24,10 +24,11 @@ def feature_trace(feature: Feature, feet: FloatArray, normals: FloatArray, tip_r
         tip_radius: radius of the fingertip, m.
     """
     height, width = feature.height.median, max(feature.width.median, 1e-12)
-    if "exponent" in feature.extra:
+    if feature.details.exponent is not None:
         return _bell(feature, feet, tip_radius)
     if feature.kind in ("ridge", "bump") and height > 0.0:
-        radius = float(feature.extra.get("radius", radius_of_cap(height, width)))
+        known = feature.details.radius
+        radius = float(radius_of_cap(height, width) if known is None else known)
         # a low and wide one is a part of a large ball, which on a bent base comes out again elsewhere
         near = _distance(feet, feature.axis) < CREST_TRACE_REACH * contact_half_width(height, radius, tip_radius)
         crest = feature.axis + (height - radius) * feature.normals
@@ -43,8 +44,8 @@ def _bell(feature: Feature, feet: FloatArray, tip_radius: float) -> FloatArray:
     from mapping.geometry.templates import bell_heights
 
     away = np.linalg.norm(feet - feature.axis[0], axis=1)[:, None]
-    height, scale = np.array([feature.height.median]), np.array([float(feature.extra["scale"])])
-    exponent, out = np.array([float(feature.extra["exponent"])]), np.empty((1, len(feet)))
+    height, scale = np.array([feature.height.median]), np.array([feature.details.scale], dtype=np.float64)
+    exponent, out = np.array([feature.details.exponent], dtype=np.float64), np.empty((1, len(feet)))
     bell_heights(away, np.zeros_like(away), np.zeros((1, 2)), height, scale, exponent, tip_radius, out)
     return np.asarray(out[0])
 

@@ -86,6 +86,8 @@ class PosteriorProblem:
         noise: the noise in its likelihood.
         nuisance: prior of the base under each run.
         beginnings: (M, P) places to start the search for the optimum from.
+        misfit: standard deviations of chi-square by which the best shape's residual exceeds the noise that was given,
+            where the noise had to be raised for that; 0 where the shape fits.
     """
 
     feature: Feature
@@ -94,6 +96,7 @@ class PosteriorProblem:
     noise: Noise
     nuisance: Nuisance
     beginnings: FloatArray
+    misfit: float = 0.0
 
     @property
     def window(self) -> Window:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping import EmptyWindowError, FloatArray, IntArray, Trace
-from mapping.base import Base, Feet
+from mapping.base import Base, Feet, LaidTrace
 
 # Samples are looked at in blocks of this many: the cost of the rest of a long log is that of its boxes.
 SAMPLES_PER_BLOCK = 64
@@ -98,7 +98,7 @@ def gather(trace: Trace, base: Base, points: FloatArray, reach: float) -> Sample
             f"{np.array2string(points.mean(axis=0), precision=6)} m"
         )
     index, breaks = _whole_runs(index, trace.sweep)
-    return Samples(base.foot(trace.centers[index], trace.tip_radius), breaks)
+    return Samples(LaidTrace.of(trace, base).feet(index), breaks)
 
 
 def bin_samples(samples: Samples, width: float, noise_level: float, scale: float) -> Window:

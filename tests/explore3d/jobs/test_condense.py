@@ -16,8 +16,8 @@ from explore3d.log.record import read_base
 from explore3d.log.stream import LogStream, count_samples, head, large_log
 from mapping.assembly.assemble import assemble
 from mapping.base.base import Base
+from mapping.base.height_profile import arclength
 from mapping.detection.detect import detect
-from mapping.detection.height_profile import arclength
 
 SAMPLES, CHUNK = 60_000, 12_000
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import binom, poisson
 
 from mapping.base.base import Base
+from mapping.base.height_profile import arclength
 from mapping.detection.detect import detect
-from mapping.detection.height_profile import arclength
 from mapping.geometry.contact.first_contact import BallContact
 from mapping.geometry.templates.shapes import cap_height
 from mapping.instrument.noise import Noise

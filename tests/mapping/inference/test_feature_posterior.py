@@ -24,6 +24,7 @@ from recorded_features import (
 
 from mapping.base.base import Base
 from mapping.base.projection import onto_base
+from mapping.feature import Details
 from mapping.geometry.templates.shapes import cap_height, groove_height, rim_height, step_height
 from mapping.inference.feature_posterior import refine, sample_posterior, solve
 from mapping.inference.sampler.psis import resample
@@ -135,7 +136,7 @@ def refined_profile(height_at, noise=FINE):
 def test_a_bump_that_no_shape_fits_says_so_and_a_cap_does_not():
     cap = refined_profile(lambda x: cap_height(x, 0.5e-3, 3e-3, TIP))
     lopsided = refined_profile(lambda x: 0.5e-3 / (1.0 + (x / np.where(x > 0, 3e-3, 0.7e-3)) ** 2))
-    assert "no ideal" not in " ".join(cap.notes) and "scale" not in cap.extra
+    assert "no ideal" not in " ".join(cap.notes) and cap.details.scale is None
     assert "no ideal bump fits" in " ".join(lopsided.notes)
 
 
@@ -145,7 +146,7 @@ def test_the_papers_bump_has_the_height_of_its_skirted_body():
     assert "no ideal" not in " ".join(found.notes) and any("skirt" in note for note in found.notes)
     assert inside(found.height, 0.6e-3) and found.height.high - found.height.low < 0.1e-3
     assert inside(found.width, 2.4e-3, 20e-6)
-    assert abs(np.log(found.extra["exponent"])) < 0.5
+    assert abs(np.log(found.details.exponent)) < 0.5
 
 
 def test_a_groove_and_its_hidden_bottom():
@@ -210,7 +211,7 @@ def test_a_second_wire_near_by_is_taken_into_account():
     other_ends = [(-15e-3, 5e-3, 0), (16e-3, 5e-3, 0)]
     both = lambda feet: np.maximum(wire(ENDS)(feet), wire(other_ends)(feet))  # noqa: E731
     other = feature("ridge", other_ends, D, D)
-    other = replace(other, extra={"radius": D / 2})
+    other = replace(other, details=Details(radius=D / 2))
     trace = record(CROSSINGS + SLIDES, both)
     found = refine(
         GUESS, trace, np.random.default_rng(0), base=plate(), noise=WHITE, others=(GUESS, other), confirm=False

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from recorded_features import CROSSINGS, ENDS, SLIDES, D, feature, line, plate, record, wire
 
-from mapping.feature import JUNCTION
 from mapping.inference.feature_posterior import refine
 from mapping.inference.joint import refine_all
 from mapping.instrument.noise import Noise
@@ -35,7 +34,7 @@ def trace_over_arms():
 def guesses(off):
     """The arms as they may be detected: with a wrong meeting place."""
     axes = [np.linspace(HUB + off, arm[1], 5) for arm in ARMS]
-    return [replace(feature("ridge", axis, D, D, 6, 0.1e-3), notes=(JUNCTION,)) for axis in axes]
+    return [replace(feature("ridge", axis, D, D, 6, 0.1e-3), junction=True) for axis in axes]
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from recorded_features import TIP, UP, D, feature, plate
 
-from mapping.feature import JUNCTION, Feature, Interval
+from mapping.feature import Details, Feature, Interval
 from mapping.geometry.mesh.polyline import arclengths
 from mapping.inference.junctions import brought_together, meetings
 
@@ -18,10 +18,10 @@ HALF_WIDTH = 3.7e-3
 def arm(start: np.ndarray, stop: np.ndarray, sd: float = 30e-6, count: int = 9) -> Feature:
     """A refined ridge: its ends known to 0.05 mm, its course to `sd`."""
     found = feature("ridge", np.linspace(start, stop, count), D, D)
-    extra = {"axis_sd": [sd] * count, "end_intervals": [[-5e-5, 5e-5]] * 2, "ends_seen": [True, True]}
+    details = Details(axis_sd=np.full(count, sd), end_intervals=np.array([[-5e-5, 5e-5]] * 2), ends_seen=(True, True))
     far = float(np.linalg.norm(np.subtract(stop, start)))
     length = Interval(far, far - 7e-5, far + 7e-5)
-    return replace(found, extra=extra, length=length, notes=(JUNCTION,))
+    return replace(found, details=details, length=length, junction=True)
 
 
 def star(hub: np.ndarray, angles: tuple[float, ...] = (10.0, 130.0, 250.0)) -> list[Feature]:
@@ -52,8 +52,8 @@ def test_three_arms_end_where_their_courses_cross() -> None:
         np.testing.assert_array_equal(one.axis[-1], before.axis[-1])
         assert one.length.median == pytest.approx(0.03, abs=5e-6)
         # the hub is known as well as the courses that cross in it, the other end as before
-        assert one.extra["end_intervals"][0] == pytest.approx([-4e-5, 4e-5], abs=1e-5)
-        assert one.extra["end_intervals"][1] == [-5e-5, 5e-5]
+        assert one.details.end_intervals[0] == pytest.approx([-4e-5, 4e-5], abs=1e-5)
+        assert one.details.end_intervals[1].tolist() == [-5e-5, 5e-5]
         assert one.length.high - one.length.median == pytest.approx(np.hypot(5e-5, 4e-5), abs=1e-5)
 
 
@@ -64,7 +64,7 @@ def test_it_does_not_matter_in_which_order_the_points_of_an_axis_come() -> None:
     plain = together(refined, detected)
     found = together([refined[0], turned[1], refined[2]], [detected[0], turned[0], detected[2]])
     np.testing.assert_allclose(found[1].axis, plain[1].axis[::-1], atol=1e-12)
-    assert found[1].extra["end_intervals"] == plain[1].extra["end_intervals"][::-1]
+    assert (found[1].details.end_intervals == plain[1].details.end_intervals[::-1]).all()
 
 
 def test_a_line_that_ends_on_one_that_goes_on_does_not_end_that_one() -> None:
@@ -90,7 +90,7 @@ def test_nearly_parallel_lines_keep_the_place_where_they_were_seen_to_meet() -> 
     found = together([first, second], [first, second])
     np.testing.assert_allclose(found[0].axis[0], 0.0, atol=1e-6)
     # how far along they meet is known no better than before
-    assert found[0].extra["end_intervals"][0][1] > 2e-3
+    assert found[0].details.end_intervals[0, 1] > 2e-3
 
 
 def test_lines_that_do_not_meet_and_closed_ones_are_left_alone() -> None:
@@ -98,10 +98,10 @@ def test_lines_that_do_not_meet_and_closed_ones_are_left_alone() -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 60)
     ring = np.column_stack([0.02 * np.cos(turn) - 0.02, 0.02 * np.sin(turn), 0 * turn])
     ring[-1] = ring[0]
-    closed = replace(feature("ridge", ring, D, D), notes=(JUNCTION,))
+    closed = replace(feature("ridge", ring, D, D), junction=True)
     assert together([one, closed], [one, closed]) == [one, closed]
     # an end that was seen near another line is an end
-    apart = [replace(each, notes=()) for each in star(np.zeros(3))]
+    apart = [replace(each, junction=False) for each in star(np.zeros(3))]
     assert together(apart, apart) == apart
 
 
@@ -109,10 +109,10 @@ def test_an_end_that_was_not_seen_is_known_once_it_meets_another_line() -> None:
     hub = np.zeros(3)
     detected, refined = star(hub), far(star(hub))
     note = "the axis goes on beyond what was explored at its first and its last point: at least this long"
-    open_ends = refined[0].extra | {"ends_seen": [False, False]}
-    refined[0] = replace(refined[0], extra=open_ends, notes=("junction", note))
+    open_ends = replace(refined[0].details, ends_seen=(False, False))
+    refined[0] = replace(refined[0], details=open_ends, notes=("junction", note))
     found = together(refined, detected)[0]
-    assert found.extra["ends_seen"] == [True, False] and found.length.censored
+    assert found.details.ends_seen == (True, False) and found.length.censored
     assert found.notes == ("junction", note.replace("first and its last", "last"))
 
 

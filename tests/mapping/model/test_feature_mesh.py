@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mapping.feature import Feature, Interval, Support
+from mapping.feature import Details, Feature, Interval, Support
 from mapping.inference.families.bell import width_at_half_height
 from mapping.inference.families.feature_trace import feature_trace
 from mapping.model.feature_mesh import drawn_at_least, feature_mesh
@@ -14,9 +14,11 @@ HEIGHT, SCALE, EXPONENT = 0.5e-3, 1e-3, 1.0
 UP = np.array([[0.0, 0.0, 1.0]])
 
 
-def bump(**extra: float) -> Feature:
+def bump(**details: float) -> Feature:
     height, width, none = (Interval(v, v, v) for v in (HEIGHT, float(width_at_half_height(SCALE, EXPONENT)), 0.0))
-    return Feature("bump", np.zeros((1, 3)), UP, height, width, none, Support(9.0, 3), True, 1e-5, extra=extra)
+    return Feature(
+        "bump", np.zeros((1, 3)), UP, height, width, none, Support(9.0, 3), True, 1e-5, details=Details(**details)
+    )
 
 
 BELL = bump(scale=SCALE, exponent=EXPONENT)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from mapping import FloatArray, IntArray, Trace
-from mapping.base import Base
+from mapping.base.base import Base, Feet
 
 # Blocks of a sweep are long enough once doubling them shortens its length by less than this: noise zigzags,
 # the path does not.
@@ -36,6 +37,7 @@ class SweepHeights:
         first: (n + 1,) index within the sweep of the first sample of each bin.
         t: (n,) mean times, s.
         centers: (n, 3) mean ball centres, m.
+        feet: (n, 3) points of the base under these, m; None where single samples were laid, not means.
     """
 
     sweep: int
@@ -46,6 +48,7 @@ class SweepHeights:
     first: IntArray
     t: FloatArray
     centers: FloatArray
+    feet: FloatArray | None = None
 
     @property
     def s(self) -> FloatArray:
@@ -99,13 +102,22 @@ def _progress(trace: Trace, size: int, blocks: int) -> tuple[FloatArray, FloatAr
     return place, place[: blocks * size].reshape(blocks, size).mean(axis=1)
 
 
-def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing: float) -> tuple[SweepHeights, ...]:
+def height_profiles(
+    sweep: int,
+    trace: Trace,
+    s: FloatArray,
+    base: Base,
+    spacing: float,
+    feet: Callable[[], Feet] | None = None,
+) -> tuple[SweepHeights, ...]:
     """The sweep's heights in bins of the given width; more than one profile where contact was lost in between.
 
     Args:
         trace: the samples of one sweep.
         s: (N,) their arclengths, m (see `arclength`), not decreasing.
+        base: the global model.
         spacing: width of the bins, m.
+        feet: gives where the samples stand over the base, if that is kept somewhere.
     """
     # half a step off: evenly spaced samples would sit on the bins' borders, where rounding decides
     step = (s[-1] - s[0]) / max(len(s) - 1, 1)
@@ -115,10 +127,13 @@ def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing
     counts = np.diff(np.append(first, len(s)))
     centers = np.add.reduceat(trace.centers, first, axis=0) / counts[:, None]
     times = np.add.reduceat(trace.t, first) / counts
+    under = None
     if counts.mean() < FEW_SAMPLES_PER_BIN:
-        height = np.add.reduceat(base.foot(trace.centers, trace.tip_radius).height, first) / counts
+        laid = base.foot(trace.centers, trace.tip_radius) if feet is None else feet()
+        height = np.add.reduceat(laid.height, first) / counts
     else:
-        height = base.foot(centers, trace.tip_radius).height
+        laid = base.foot(centers, trace.tip_radius)
+        height, under = laid.height, laid.points
     longest = max(LONGEST_BIN_GAP, int(NARROW * trace.tip_radius / spacing))
     cuts = np.flatnonzero(np.diff(occupied) > longest + 1) + 1
     profiles = []
@@ -130,6 +145,7 @@ def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing
         wanted = np.arange(occupied[begin], occupied[end - 1] + 1)
         have = occupied[begin:end]
         edges = np.append(first, len(s))[np.searchsorted(occupied, np.append(wanted, wanted[-1] + 1))]
+        middles = np.column_stack([np.interp(wanted, have, centers[begin:end, k]) for k in range(3)])
         profiles.append(
             SweepHeights(
                 sweep,
@@ -139,10 +155,22 @@ def height_profiles(sweep: int, trace: Trace, s: FloatArray, base: Base, spacing
                 float(counts[begin:end].mean()),
                 edges,
                 np.interp(wanted, have, times[begin:end]),
-                np.column_stack([np.interp(wanted, have, centers[begin:end, k]) for k in range(3)]),
+                middles,
+                None if under is None else _filled(under[begin:end], have - wanted[0], middles, base, trace.tip_radius),
             )
         )
     return tuple(profiles)
+
+
+def _filled(under: FloatArray, have: IntArray, centers: FloatArray, base: Base, tip_radius: float) -> FloatArray:
+    """(n, 3) feet of the bins' centres: those known of the bins `have`, and of the empty ones between."""
+    if len(have) == len(centers):
+        return under
+    points = np.empty_like(centers)
+    points[have] = under
+    empty = np.setdiff1d(np.arange(len(centers)), have)
+    points[empty] = base.foot(centers[empty], tip_radius).points
+    return points
 
 
 def _block_means(points: FloatArray, size: int) -> FloatArray:

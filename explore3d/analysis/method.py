@@ -1,0 +1,354 @@
+"""Method: what each stage from the samples to the annotated model does, and why it may be left out.
+
+The order of the stages stands in build_model.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from explore3d import __version__
+from explore3d.analysis.inspected import Inspected, base_reach
+from explore3d.analysis.result import TipCount
+from explore3d.analysis.stages import Stages
+from explore3d.analysis.time_curve import time_curve
+from explore3d.analysis.truth import TrueFeature
+from explore3d.log import Log
+from explore3d.scene import AnalysisSettings, Scene
+from mapping import Feature, LeftOut, Trace
+from mapping.assembly import assemble, why_none_sought
+from mapping.base import Base, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
+from mapping.detection import Detections, detect
+from mapping.estimate.envelope import estimate_surface
+from mapping.geometry.curvature import principal_curvatures
+from mapping.inference import refine_all
+from mapping.model import ObjectModel
+
+if TYPE_CHECKING:
+    from mapping.estimate.envelope import Estimate
+    from mapping.geometry.curvature import Curvature
+
+# The report also says what a tip of this many times the radius would call finer than itself.
+OTHER_TIP = 2.5
+# A pose beyond what the scene allows by this factor is not believed
+BELIEVED = 1.25
+# Less noise than this many tip radii is rounding: nothing to smooth away
+NOISE_FREE = 2e-8
+
+# Told the share of a stage that is done, 0 to 1
+Share = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class MethodStage:
+    """One stage of the method.
+
+    Args:
+        name: in the account of timings and of what was left out; "" for what is too short to be timed.
+        why_not: one sentence saying why the stage is not needed, "" if it is, None if the question does not arise;
+            no function at all: it always runs.
+        run: does the stage's work; None for a part of another stage.
+        possible: False where there is nothing to work on: then the stage is left out even if forced.
+    """
+
+    name: str
+    why_not: Callable[[Work], str | None] | None
+    run: Callable[[Work, Share], None] | None
+    possible: Callable[[Work], bool] = lambda work: True
+
+
+@dataclass
+class Work:
+    """What is given, and what the stages have found so far.
+
+    Args:
+        log: what was recorded.
+        scene: the scene that it was recorded for, or None.
+        given: the global model as it was given, or None.
+        stages: the account of what runs and what is left out.
+        trace: the samples that count; on the base once that is known.
+        base: the global model.
+        detections: crossings, noise, detection limit.
+        features: as they are known by now.
+        asked: whether a stage was asked for, by its name.
+    """
+
+    log: Log
+    scene: Scene | None
+    given: Base | None
+    stages: Stages
+    trace: Trace = field(init=False)
+    base: Base = field(init=False)
+    laid: LaidTrace = field(init=False)
+    detections: Detections = field(init=False)
+    model: ObjectModel = field(init=False)
+    inspected: Inspected = field(init=False)
+    features: tuple[Feature, ...] = ()
+    estimate: Estimate | None = None
+    curvature: Curvature | None = None
+    time_curve: tuple[tuple[float, float], ...] = ()
+    asked: dict[str, bool] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.trace = self.log.trace
+        self.settings = AnalysisSettings.of(self.scene)
+        if self.given is not None:
+            self.base = self.given
+
+    @property
+    def truth(self) -> tuple[TrueFeature, ...]:
+        """True features of a simulated scene."""
+        true = self.scene.truth if self.scene else ()
+        return tuple(TrueFeature(t.kind, t.axis, t.height, t.width, t.length or None) for t in true)
+
+    @property
+    def smallest_feature(self) -> float | None:
+        """Height of the smallest feature that the scene asks for, m, or None."""
+        return None if self.scene is None else self.scene.survey.smallest_feature
+
+    def wants(self, name: str) -> bool:
+        """True if the part of a stage with this name was asked for."""
+        return self.asked.get(name, False)
+
+    def do(self, stage: MethodStage) -> None:
+        """Ask whether a stage is needed, and run and time it or note why not."""
+        if stage.why_not is not None:
+            reason = stage.why_not(self)
+            self.asked[stage.name] = reason is not None and self.stages.needed(
+                stage.name, reason, possible=stage.possible(self)
+            )
+            if not self.asked[stage.name]:
+                return
+        if stage.run is None:
+            return
+        if not stage.name:
+            stage.run(self, lambda share: None)
+            return
+        with self.stages.stage(stage.name) as share:
+            stage.run(self, share)
+
+
+def why_no_fit(work: Work) -> str:
+    """A base that was found by feeling is fitted again, a given one is not."""
+    return "" if work.given is None or _was_found(work.given) else "the global model was given"
+
+
+def fitted(work: Work, share: Share) -> None:
+    """The base; one that was found by feeling is known better by all that was felt since."""
+    again = work.given is not None and _was_found(work.given)
+    work.base = refined(work.base, work.trace) if again else fit_base(work.trace)
+
+
+def _was_found(base: Base) -> bool:
+    return base.kind not in ("mesh", "profile")
+
+
+def why_no_pose(work: Work) -> str:
+    """Without a scene nothing says how far off the object may stand; a base that was felt stands where it was felt."""
+    estimated = work.scene is not None and work.scene.model.pose == "estimate"
+    return "" if estimated else "the model's pose was given"
+
+
+def placed(work: Work, share: Share) -> None:
+    """The base where the object really stands, by everything that was felt; the first sweeps told it roughly."""
+    if work.scene is None:
+        return
+    allowed = work.scene.model
+    pose = estimate_pose(work.trace, work.base, shift=allowed.shift, turn=allowed.turn)
+    before = Pose.of(work.base)
+    whole = pose if before is None else pose.after(before)
+    if whole.within(BELIEVED * allowed.shift, BELIEVED * allowed.turn):
+        work.base = pose.moved(work.base)
+        return
+    reason = "the object would stand further off its model than the scene allows"
+    work.stages.left_out.append(LeftOut("pose", reason))
+
+
+def kept_over_base(work: Work, share: Share) -> None:
+    """The trace on its base, without the part beyond the border of one found by feeling: there nothing is known."""
+    work.laid = LaidTrace.of(work.trace, work.base)
+    if _was_found(work.base):
+        inside = over_base(work.laid, work.base)
+        if inside.any() and not inside.all():
+            beyond = f"{int((~inside).sum())} samples lie beyond the body's border"
+            work.stages.left_out.append(LeftOut("part of the trace", beyond))
+            work.laid = work.laid.within(inside)
+            work.trace = work.trace.select(inside)
+
+
+def why_no_contact_algorithms(work: Work) -> str | None:
+    """Algorithms 1 and 2 of the paper are a part of the detection."""
+    if work.log.detections:
+        return None
+    return "" if work.trace.has_contact_data else "the log holds positions alone, no contact normals"
+
+
+def why_no_detection(work: Work) -> str | None:
+    """A log that was detected in while it was read brings its detections along."""
+    if not work.log.detections:
+        return ""
+    work.detections = work.log.detections
+    return None
+
+
+def detected(work: Work, share: Share) -> None:
+    """Crossings of single sweeps."""
+    work.detections = detect(work.laid, work.base, **work.settings.detection)
+
+
+def why_no_lines(work: Work) -> str:
+    """Why a trace without a single crossing cannot, or need not, hold what only many sweeps together show."""
+    asked, limit = work.smallest_feature, work.detections.detection_limit
+    if work.detections.crossings:
+        return ""
+    if asked is not None and limit <= asked:
+        return "nothing was detected, though a single sweep shows all that the scene asks for"
+    why_not = why_none_sought(work.detections, work.trace, work.base)
+    return f"nothing was detected, and lines too faint for one sweep are not sought: {why_not}" if why_not else ""
+
+
+def assembled(work: Work, share: Share) -> None:
+    """Features from the crossings."""
+    rate = work.settings.false_alarms_per_metre
+    work.features = assemble(work.detections, work.laid, work.base, false_alarms_per_metre=rate)
+
+
+def why_no_posterior(work: Work) -> str:
+    """Nothing found needs none."""
+    return "" if work.features else "no feature was found, so no chain was run"
+
+
+def refined_all(work: Work, share: Share) -> None:
+    """The posterior of every feature."""
+    work.features = refine_all(
+        work.features,
+        work.laid,
+        work.settings.seed,
+        base=work.base,
+        noise=work.detections.noise,
+        tip_sd=work.settings.tip_sd,
+        confirm=work.stages.is_forced("long chain"),
+        progress=share,
+    )
+
+
+def why_no_chain(work: Work) -> str | None:
+    """Importance sampling says by k-hat where it can be trusted; the chain is a part of the posterior."""
+    if not work.wants("posterior"):
+        return None
+    regular = sum(each.posterior is not None and each.posterior.status == "not needed" for each in work.features)
+    of_all = f"{regular} of {len(work.features)}"
+    return f"the posterior of {of_all} is regular (k-hat below 0.5)" if regular else ""
+
+
+def believed(work: Work, share: Share) -> None:
+    """Without what all sweeps together hardly speak for: a false alarm that later sweeps passed by."""
+    # without a posterior nothing was found
+    kept = tuple(f for f in work.features if f.evidence.likely)
+    for feature in (f for f in work.features if f not in kept):
+        x, y, z = np.round(1e3 * feature.axis[0], 2)
+        reason = f"all sweeps together hardly speak for it (log odds {feature.evidence.log_odds:.1f})"
+        work.stages.left_out.append(LeftOut(f"a {feature.kind} at ({x:g}, {y:g}, {z:g}) mm", reason))
+    work.features = kept
+
+
+def why_no_smoothing(work: Work) -> str | None:
+    """Noise is smoothed away before the surface is estimated; it is a part of that stage."""
+    if why_no_surface(work) and not work.stages.is_forced("estimated surface"):
+        return None
+    free = work.detections.noise.sd <= NOISE_FREE * work.trace.tip_radius
+    return "the trace has no noise beyond rounding" if free else ""
+
+
+def why_no_surface(work: Work) -> str:
+    """Where nothing was found the base is the surface."""
+    return "" if work.features else "no feature was found; the base is the estimate"
+
+
+def surface_estimated(work: Work, share: Share) -> None:
+    """The body's surface under the path of the ball's centre."""
+    noise = work.detections.noise if work.wants("smoothing") else None
+    work.estimate = estimate_surface(work.laid, base=work.base, noise=noise)
+
+
+def why_no_curvature(work: Work) -> str:
+    """Curvatures are those of the estimated surface."""
+    if work.estimate is None:
+        return "there is no estimated surface to take it from"
+    return "" if work.estimate.surface else "a single profile has no surface: its curvature is in the crossings"
+
+
+def curvature_taken(work: Work, share: Share) -> None:
+    """Principal curvatures at the vertices of the estimated surface."""
+    if work.estimate is not None and work.estimate.surface is not None:
+        work.curvature = principal_curvatures(work.estimate.surface, noise=work.estimate.sd)
+
+
+def inspected(work: Work, share: Share) -> None:
+    """Which places are free of features, and above which height."""
+    work.inspected = Inspected.of(work.laid, work.base, work.detections, work.smallest_feature)
+
+
+def modelled(work: Work, share: Share) -> None:
+    """The features anchored on the base."""
+    work.model = ObjectModel.attach(
+        work.base,
+        in_model_frame(work.features, work.base),
+        provenance=_provenance(work) | {"inspection": work.inspected.record()},
+        inspected=work.inspected.height,
+        reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
+    )
+
+
+def in_model_frame(features: tuple[Feature, ...], base: Base) -> tuple[Feature, ...]:
+    """The features with their axes also in the frame of the given mesh, where the object does not stand as given."""
+    pose = Pose.of(base)
+    if pose is None:
+        return features
+
+    return tuple(
+        replace(feature, extra=feature.extra | {"axis_in_model_frame": pose.back(feature.axis).tolist()})
+        for feature in features
+    )
+
+
+def why_no_time_curve(work: Work) -> str:
+    """Errors need a truth."""
+    return "" if work.truth and work.model.features else "the truth is not known, or nothing was found"
+
+
+def compared_in_time(work: Work, share: Share) -> None:
+    """The worst error of an axis against the finger's time."""
+    work.time_curve = time_curve(work.detections, work.laid, work.model, work.truth, share)
+
+
+def tip_counts(features: tuple[Feature, ...], tip_radius: float) -> tuple[TipCount, ...]:
+    """How many features are finer than this tip, and than a larger one."""
+    finer = sum(feature.curvature_feature for feature in features)
+    counts = [TipCount(tip_radius, finer, len(features) - finer)]
+    crests = [feature.details.trace_curvature for feature in features]
+    if features and all(crest is not None for crest in crests):
+        other = OTHER_TIP * tip_radius
+        finer = sum(abs(crest) > 1.0 / (2.0 * other) for crest in crests if crest is not None)
+        counts.append(TipCount(other, finer, len(features) - finer))
+    return tuple(counts)
+
+
+def _provenance(work: Work) -> dict[str, Any]:
+    log, noise = work.log, work.detections.noise
+    return {
+        "software": f"explore3d {__version__}",
+        "scene": work.scene.title if work.scene else None,
+        "tip_radius": log.trace.tip_radius,
+        "seed": work.settings.seed,
+        "log_sha256": log.sha256,
+        "samples": len(log.trace),
+        "recovered": log.recovered,
+        "noise": {"white": noise.white, "correlated": noise.correlated, "length": noise.length},
+        "detection_limit": work.detections.detection_limit,
+        "false_alarms_per_metre": work.settings.false_alarms_per_metre,
+    }

@@ -1,0 +1,102 @@
+"""A trace on its base: each sample is laid once, and what is read from it is what laying it anew would give."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from mapping.base.base import Base, Feet
+from mapping.base.height_profile import arclength, height_profiles
+from mapping.base.laid_trace import LaidTrace
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+TIP = 5e-3
+CORNERS = 0.05 * np.array([[-1.0, -1, 0], [1, -1, 0.2], [1, 1, 0], [-1, 1, 0.2]])
+
+
+class Counted(Base):
+    """A base that counts the points laid on it."""
+
+    points = 0
+
+    def foot(self, centers, tip_radius):  # type: ignore[no-untyped-def]
+        type(self).points += len(centers)
+        return super().foot(centers, tip_radius)
+
+
+@pytest.fixture
+def base() -> Base:
+    Counted.points = 0
+    return Counted(Surface(CORNERS, [[0, 1, 2], [0, 2, 3]]))
+
+
+def sweeps(count: int = 3, first: int = 0) -> Trace:
+    rng = np.random.default_rng(first)
+    x = np.tile(np.linspace(-0.02, 0.02, 400), count)
+    y = np.repeat(np.linspace(-0.01, 0.01, count), 400)
+    centers = np.column_stack([x, y, 8e-3 + 1e-4 * rng.normal(size=len(x))])
+    return Trace(np.arange(float(len(x))), centers, first + np.repeat(np.arange(count), 400), TIP)
+
+
+def same(found: Feet, wanted: Feet) -> bool:
+    return all(np.array_equal(getattr(found, each.name), getattr(wanted, each.name)) for each in fields(Feet))
+
+
+def test_a_sample_is_laid_on_the_base_the_first_time_that_it_is_asked_for_and_never_again(base):
+    trace = sweeps()
+    laid = LaidTrace(trace, base)
+    assert Counted.points == 0
+    some = np.array([3, 17, 399, 400, 900])
+    assert same(laid.feet(some), base.foot(trace.centers[some], TIP))
+    Counted.points = 0
+    laid.feet(some)
+    laid.feet(np.array([17, 18]))
+    assert Counted.points == 1
+    assert same(laid.feet(), Base(base.surface).foot(trace.centers, TIP))
+    assert Counted.points == len(trace) - len(some)
+
+
+def test_arclengths_and_heights_are_those_of_the_sweep_alone_and_are_kept(base):
+    laid = LaidTrace(sweeps(), base)
+    for sweep in laid.laid_sweeps:
+        s = arclength(sweep.trace, base)
+        assert np.array_equal(sweep.arclength, s)
+        for spacing in (1e-4, 5e-4, 5e-3):  # bins of one sample, of a few, of many
+            (found,), (alone,) = (
+                sweep.heights(spacing),
+                height_profiles(sweep.number, sweep.trace, s, base, spacing),
+            )
+            assert np.array_equal(found.height, alone.height) and np.array_equal(found.centers, alone.centers)
+            if found.feet is not None:
+                assert np.array_equal(found.feet, base.foot(found.centers, TIP).points)
+    Counted.points = 0
+    assert [sweep.heights(5e-4) for sweep in laid.laid_sweeps] and Counted.points == 0
+
+
+def test_further_sweeps_are_appended_and_some_are_taken_without_laying_what_is_known(base):
+    laid = LaidTrace(sweeps(), base)
+    laid.feet()
+    Counted.points = 0
+    both = laid.appended(sweeps(2, first=3))
+    both.feet()
+    assert Counted.points == 800 and len(both) == 2000
+    part = both.of_sweeps({1, 4})
+    wanted = both.select(np.isin(both.sweep, [1, 4]))
+    assert np.array_equal(part.centers, wanted.centers) and [s.number for s in part.laid_sweeps] == [1, 4]
+    assert same(part.feet(), Base(base.surface).foot(wanted.centers, TIP)) and Counted.points == 800
+    keep = both.centers[:, 0] > 0.0
+    assert same(both.within(keep).feet(), Base(base.surface).foot(both.centers[keep], TIP)) and Counted.points == 800
+
+
+def test_a_laid_trace_is_a_trace_and_another_base_lays_it_anew(base):
+    trace = sweeps()
+    laid = LaidTrace.of(trace, base)
+    assert isinstance(laid, Trace) and len(laid) == len(trace) and laid.tip_radius == TIP
+    assert LaidTrace.of(laid, base) is laid
+    other = Base(base.surface)
+    assert LaidTrace.of(laid, other) is not laid and LaidTrace.of(laid, other).base is other
+    empty = LaidTrace(trace.select(slice(0, 0)), base)
+    assert len(empty.feet().points) == 0 and empty.laid_sweeps == ()
