@@ -15,7 +15,7 @@ from explore3d.analysis.savings import with_savings
 from explore3d.analysis.stages import Stages
 from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature, compare
-from explore3d.log import Log
+from explore3d.log import Log, stop_of
 from explore3d.scene import AnalysisSettings
 from mapping import Feature, LeftOut, Trace
 from mapping.assembly import assemble, why_none_sought
@@ -86,6 +86,7 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
         left_out=with_savings(stages.left_out, stages.timings),
         recovered=log.recovered,
         ended=_ended(log),
+        stopped=stop_of(log),
         time_curve=curve,
         tip_counts=_tip_counts(features, trace.tip_radius),
         inspected=inspected,
@@ -264,6 +265,7 @@ def _tip_counts(features: tuple[Feature, ...], tip_radius: float) -> tuple[TipCo
 
 
 def _provenance(log: Log, scene: Scene | None, settings: AnalysisSettings, detections: Detections) -> dict[str, Any]:
+    stop = stop_of(log)
     return {
         "software": f"explore3d {__version__}",
         "scene": scene.title if scene else None,
@@ -272,6 +274,8 @@ def _provenance(log: Log, scene: Scene | None, settings: AnalysisSettings, detec
         "log_sha256": log.sha256,
         "samples": len(log.trace),
         "recovered": log.recovered,
+        "stopped": None if stop is None else stop.text,
+        "complete": stop is None or not stop.incomplete,
         "noise": {
             "white": detections.noise.white,
             "correlated": detections.noise.correlated,

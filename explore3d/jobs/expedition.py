@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from explore3d import SceneError
-from explore3d.log import KIND, LogWriter, base_event
+from explore3d.log import KIND, SURVEY, LogWriter, Stop, base_event
 from hw import Finger, Move
 from mapping import Trace
 from mapping.base import Base
 from planners import Outcome, Plan, Spent, drive, within
-from planners.explore import Discover, Explore, Locate
+from planners.explore import Discover, Explore, Locate, SurveyCount
 from planners.paths import Limits, Ways, routed
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ class Expedition:
         execute: carries out and logs one move.
         log: of the session.
         seconds: finger time that was spent so far.
+        count: how far the survey is.
     """
 
     scene: Scene
@@ -39,6 +40,10 @@ class Expedition:
     execute: Callable[[Move], Trace]
     log: LogWriter
     seconds: float = field(default=0.0)
+    count: SurveyCount = field(default_factory=SurveyCount)
+    _sweeps: int = field(init=False, default=0)
+    _before: int = field(init=False, default=0)
+    _told: bool = field(init=False, default=False)
 
     def go(self) -> Outcome:
         """Find the base, explore it; why it ended."""
@@ -49,7 +54,8 @@ class Expedition:
         left = self.scene.explore.time_budget - self.seconds
         if left <= 0:
             return Outcome("budget", f"the budget was spent before exploring began: {outcome.detail}")
-        found = self._carry_out(explorer(self.scene, base, left).plan(), base)
+        self._before = self._sweeps
+        found = self._carry_out(explorer(self.scene, base, left).plan(count=self.count), base)
         detail = f"{found.detail}; before that, to know the base: {outcome.detail}" if outcome.detail else found.detail
         return replace(found, detail=detail)
 
@@ -69,6 +75,23 @@ class Expedition:
             self.log.event(KIND, base_event(base))
         return replace(found, value=base)
 
+    @property
+    def surveyed(self) -> bool:
+        """True if every sweep of the survey was made."""
+        return self.count.planned is not None and self.count.made >= self.count.planned
+
+    def stop(self, cause: str) -> Stop:
+        """What to say if it ends now."""
+        return Stop(cause, self.count.made, self.count.planned)
+
+    def _execute(self, move: Move) -> Trace:
+        if self.count.planned is not None and not self._told:
+            self._told = True
+            self.log.event(SURVEY, {"sweeps": self.count.planned, "before": self._before})
+        trace = self.execute(move)
+        self._sweeps += move.purpose == "sweep"
+        return trace
+
     def _carry_out(self, plan: Plan, base: Base | None) -> Outcome:
         workspace, tip = self.finger.workspace, self.scene.tip.radius
         spent = Spent(workspace.max_speed)
@@ -77,7 +100,7 @@ class Expedition:
             plan = routed(plan, Ways(base, tip, workspace.low, workspace.high, workspace.max_speed))
         _, outcome = drive(
             plan,
-            self.execute,
+            self._execute,
             check=Limits.of(workspace, base, tip).violation,
             note=lambda text: self.log.event("refused", {"what": text}),
             empty=Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip),

@@ -126,7 +126,8 @@ def test_a_failed_run_keeps_what_the_finger_felt(tmp_path: Path) -> None:
             raise error
         log = read_log(tmp_path / name / "log.mcap")
         assert len(log.trace) == 7 and log.complete
-        assert state(tmp_path / name) == "failed"
+        assert state(tmp_path / name) == "stopped"
+        assert "kept: " in error.__notes__[-1]
 
 
 def test_a_file_appears_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -144,7 +145,8 @@ def test_a_log_in_the_folder_can_be_analysed_into_the_same_folder(tmp_path: Path
     log = tmp_path / "out" / "log.mcap"
     for number in range(2):
         with Session(tmp_path / "out", keep=[log]) as session:
-            assert len(read_log(log).trace) == 7 and not (tmp_path / "out" / "report.html").exists()
+            assert len(read_log(log).trace) == 7
+            assert (tmp_path / "out" / "report.html").exists() is (number == 0)  # until the new one is complete
             session.write("model.json", str(number))
     with pytest.raises(UserError), Session(tmp_path / "out", keep=[log]) as session:
         raise UserError("bad input")
@@ -161,7 +163,7 @@ def test_two_sessions_cannot_write_into_one_folder(tmp_path: Path) -> None:
             pass
         assert contents(tmp_path / "out") == {"a.txt": "first"}
     with Session(tmp_path / "out"):
-        pass
+        assert contents(tmp_path / "out") == {"a.txt": "first"}  # it stays until the new one is complete
     assert contents(tmp_path / "out") == {}
 
 
@@ -188,6 +190,7 @@ def test_a_killed_session_keeps_its_log_and_can_be_replaced(tmp_path: Path) -> N
     assert state(tmp_path / "out") == "running" and not (tmp_path / "out" / "half.txt").exists()
     assert len(read_log(tmp_path / "out" / "log.mcap").trace) == 9
     with Session(tmp_path / "out") as session:
+        assert len(read_log(tmp_path / "out" / "log.mcap").trace) == 9
         session.open_log(tip_radius=0.01).write(MOVE, samples(1))
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"session.json", "log.mcap"}
 
