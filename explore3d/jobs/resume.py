@@ -36,8 +36,7 @@ class Replay:
         self.samples = len(log.trace)
         self.replayed = 0
         self.live = False
-        self._sweeps = max((int(t.sweep.max()) for _, t in self._moves if len(t)), default=0)
-        self._time = max((float(t.t[-1]) for _, t in self._moves if len(t)), default=0.0) + PAUSE
+        self._sweeps, self._time = 0, PAUSE
 
     def before(
         self,
@@ -59,7 +58,7 @@ class Replay:
                 self.replayed += 1
                 if skip is not None:
                     skip(move)
-                return self._moves.pop(0)[1]
+                return self._passed(self._moves.pop(0)[1])
             if same:
                 self._moves.clear()  # it is made again
             self.rest(keep, skip)  # from the first difference on the plan goes another way
@@ -74,10 +73,17 @@ class Replay:
     def rest(self, keep: Callable[[Move, Trace], None], skip: Callable[[Move], None] | None = None) -> None:
         """Hand over what was not asked for again."""
         for move, trace in self._moves:
-            keep(move, trace)
+            keep(move, self._passed(trace))
             if skip is not None:
                 skip(move)
         self._moves.clear()
+
+    def _passed(self, trace: Trace) -> Trace:
+        """The trace; what the finger feels later counts its sweeps and its time from there on."""
+        if len(trace):
+            self._sweeps = max(self._sweeps, int(trace.sweep.max()))
+            self._time = max(self._time, float(trace.t[-1]) + PAUSE)
+        return trace
 
 
 def _moves(log: Log) -> list[tuple[Move, Trace]]:

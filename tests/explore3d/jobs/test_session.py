@@ -9,13 +9,15 @@ import subprocess
 import sys
 import textwrap
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from explore3d.errors import FolderError, UserError
-from explore3d.jobs.session import Session
+from explore3d.jobs.session import Job, Session
 from explore3d.log.reader import read_log
 from hw.move import Move
 from mapping.trace import Trace
@@ -172,7 +174,7 @@ def test_a_killed_session_keeps_its_log_and_can_be_replaced(tmp_path: Path) -> N
         import sys, time
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         from test_session import MOVE, samples
-        from explore3d.jobs.session import Session
+        from explore3d.jobs.session import Job, Session
         with Session({str(tmp_path / "out")!r}) as session:
             session.open_log(tip_radius=0.01).write(MOVE, samples(9))
             with session.staging() as folder:
@@ -193,6 +195,77 @@ def test_a_killed_session_keeps_its_log_and_can_be_replaced(tmp_path: Path) -> N
         assert len(read_log(tmp_path / "out" / "log.mcap").trace) == 9
         session.open_log(tip_radius=0.01).write(MOVE, samples(1))
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"session.json", "log.mcap"}
+
+
+def older(folder: Path) -> dict[str, str]:
+    """A whole session with a file of somebody else beside it."""
+    with Session(folder) as session:
+        session.write("old.txt", "old")
+        session.write("both.txt", "old")
+    (folder / "notes.md").write_text("mine")
+    return contents(folder)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), SystemExit(143), RuntimeError("lost"), UserError("bad")])
+def test_whatever_ends_a_session_the_older_one_stays(tmp_path: Path, error: BaseException) -> None:
+    before, marker = older(tmp_path), (tmp_path / "session.json").read_bytes()
+    with pytest.raises(type(error)), Session(tmp_path) as session:
+        session.write("both.txt", "new")
+        session.open_log(tip_radius=0.01).write(MOVE, samples(4))
+        raise error
+    assert {name: (tmp_path / name).read_text() for name in before} == before
+    assert (tmp_path / "session.json").read_bytes() == marker
+    assert len(read_log(tmp_path / "unfinished-1" / "log.mcap").trace) == 4
+    assert str(tmp_path / "unfinished-1" / "log.mcap") in error.__notes__[-1]
+
+
+@pytest.mark.parametrize("steps", range(8))
+def test_a_kill_in_the_midst_of_the_exchange_is_finished_by_the_next_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, steps: int
+) -> None:
+    older(tmp_path)
+    left = [steps]
+
+    def mortal(real: Callable[..., None]) -> Callable[..., None]:
+        def call(*given: object, **options: object) -> None:
+            left[0] -= committing[0]
+            if left[0] < 0:
+                raise Killed
+            real(*given, **options)
+
+        return call
+
+    committing = [0]
+    with suppress(Killed), Session(tmp_path) as session:
+        session.write("both.txt", "new")
+        session.write("pictures/new.txt", "new")
+        committing[0] = 1
+        for name in ("rename", "replace", "unlink", "rmdir"):
+            monkeypatch.setattr(os, name, mortal(getattr(os, name)))
+    monkeypatch.undo()
+    assert (tmp_path / "notes.md").read_text() == "mine"
+    with suppress(UserError), Session(tmp_path):
+        now = {name: text for name, text in contents(tmp_path).items() if not name.startswith("unfinished")}
+        raise UserError("look only")
+    whole = {"both.txt": "new", "pictures/new.txt": "new", "notes.md": "mine"}
+    assert now in (whole, {"both.txt": "old", "old.txt": "old", "notes.md": "mine"})
+    assert steps < 2 or now == whole
+
+
+class Killed(BaseException):
+    """A kill: nothing of the program runs after it."""
+
+
+def test_another_subject_needs_overwrite(tmp_path: Path) -> None:
+    with Session(tmp_path, Job("run", "one")) as session:
+        session.write("a.txt", "one")
+    for other in (Job("run", "two"), Job("analyze", "one")):
+        with pytest.raises(FolderError, match="--overwrite"), Session(tmp_path, other):
+            pass
+    assert contents(tmp_path) == {"a.txt": "one"}
+    with Session(tmp_path, Job("run", "two"), overwrite=True) as session:
+        session.write("b.txt", "two")
+    assert contents(tmp_path) == {"b.txt": "two"}
 
 
 # --- folders that cannot be written ---------------------------------------------------------------------
