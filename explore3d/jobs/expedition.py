@@ -76,13 +76,19 @@ class Expedition:
         return replace(found, value=base)
 
     @property
+    def made(self) -> int:
+        """Sweeps of the survey that the finger made; those that it refused do not count."""
+        made = self._sweeps - self._before
+        return made if self.count.planned is None else min(made, self.count.planned)
+
+    @property
     def surveyed(self) -> bool:
-        """True if every sweep of the survey was made."""
+        """True if the survey came to its end; a single sweep of it may have been refused."""
         return self.count.planned is not None and self.count.made >= self.count.planned
 
     def stop(self, cause: str) -> Stop:
         """What to say if it ends now."""
-        return Stop(cause, self.count.made, self.count.planned)
+        return Stop(cause, self.made, self.count.planned)
 
     def _execute(self, move: Move) -> Trace:
         if self.count.planned is not None and not self._told:

@@ -186,5 +186,5 @@ def _ended(outcome: Outcome, expedition: Expedition, scene: Scene) -> dict[str, 
         "detail": outcome.detail,
         "cause": why,
         "finished": finished,
-        "sweeps": expedition.count.made,
+        "sweeps": expedition.made,
     }
