@@ -167,6 +167,9 @@ class Recording:
                 error.add_note(f"stopped after {self.sweeps} of {count_text(self.planned, 'sweep')}: {cause(error)}")
                 go_on = f"; go on with: {self.again} --resume" if self.again else ""
                 error.add_note(f"kept: {self.log.path}, and no profile was written{go_on}")
+            elif error is not None and (not isinstance(error, Exception) or isinstance(error, OSError)):
+                again = f"; begin again with: {self.again}" if self.again else ""
+                error.add_note(f"nothing was recorded, {self.profile} is as it was{again}")
 
     def begin(self, scene: Scene, finger: Finger, lines: int) -> Execute:
         """The way to carry out a move and keep what it gave; the finger is connected."""
