@@ -127,6 +127,7 @@ class Recording:
         self.replay: Replay | None = None
         self.sweeps, self.planned = 0, 0
         self._source: Path | None = None
+        self._begun: Path | None = None
         self._lock: IO[bytes] | None = None
 
     def __enter__(self) -> Recording:
@@ -160,8 +161,8 @@ class Recording:
             if self.log is not None:
                 with suppress(UserError):  # a full disk: what is in the file already is whole
                     self.log.close("closed" if error is None else f"{type(error).__name__}: {error}")
-                if not samples:
-                    self.log.path.unlink(missing_ok=True)
+            if self._begun is not None and not samples:  # a signal may have come while the log was being made
+                self._begun.unlink(missing_ok=True)
             self._leave()
             if error is not None and self.log is not None and samples:
                 error.add_note(f"stopped after {self.sweeps} of {count_text(self.planned, 'sweep')}: {cause(error)}")
@@ -176,6 +177,7 @@ class Recording:
         about = {"software": f"explore3d {__version__}", "job": "calibrate", "finger": finger.info}
         resolution = finger.info.get("resolution", 0.0)
         path = self._numbered(1 + max(self._numbers(), default=0))
+        self._begun = path
         log = LogWriter(
             path,
             tip_radius=scene.tip.radius,
