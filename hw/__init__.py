@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hw.framing import Frames as Frames, Framing as Framing, Lines as Lines
     from hw.link import Link as Link
     from hw.move import Move as Move
-    from hw.safety import StopOnSignal as StopOnSignal
+    from hw.safety import SIGNALS as SIGNALS, StopOnSignal as StopOnSignal
     from hw.simulated.finger import SimulatedFinger as SimulatedFinger
 
 _PUBLIC = {
@@ -25,7 +25,7 @@ _PUBLIC = {
     "framing": ("Frames", "Framing", "Lines"),
     "link": ("Link",),
     "move": ("Move",),
-    "safety": ("StopOnSignal",),
+    "safety": ("SIGNALS", "StopOnSignal"),
     "simulated.finger": ("SimulatedFinger",),
 }
 doorway(__name__, _PUBLIC)

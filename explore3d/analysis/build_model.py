@@ -37,7 +37,7 @@ from explore3d.analysis.result import Analysis
 from explore3d.analysis.savings import with_savings
 from explore3d.analysis.stages import Stages
 from explore3d.analysis.truth import compare
-from explore3d.log import Log
+from explore3d.log import Log, stop_of
 from explore3d.scene import Scene
 from mapping.base import Base
 
@@ -103,6 +103,7 @@ def _result(work: Work) -> Analysis:
         left_out=with_savings(stages.left_out, stages.timings),
         recovered=log.recovered,
         ended=_ended(log),
+        stopped=stop_of(log),
         time_curve=work.time_curve,
         tip_counts=tip_counts(work.features, trace.tip_radius),
         inspected=work.inspected,

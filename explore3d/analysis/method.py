@@ -17,7 +17,7 @@ from explore3d.analysis.result import TipCount
 from explore3d.analysis.stages import Stages
 from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature
-from explore3d.log import Log
+from explore3d.log import Log, stop_of
 from explore3d.scene import AnalysisSettings, Scene
 from mapping import Feature, LeftOut, Trace
 from mapping.assembly import assemble, why_none_sought
@@ -339,7 +339,7 @@ def tip_counts(features: tuple[Feature, ...], tip_radius: float) -> tuple[TipCou
 
 
 def _provenance(work: Work) -> dict[str, Any]:
-    log, noise = work.log, work.detections.noise
+    log, noise, stop = work.log, work.detections.noise, stop_of(work.log)
     return {
         "software": f"explore3d {__version__}",
         "scene": work.scene.title if work.scene else None,
@@ -348,6 +348,8 @@ def _provenance(work: Work) -> dict[str, Any]:
         "log_sha256": log.sha256,
         "samples": len(log.trace),
         "recovered": log.recovered,
+        "stopped": None if stop is None else stop.text,
+        "complete": stop is None or not stop.incomplete,
         "noise": {"white": noise.white, "correlated": noise.correlated, "length": noise.length},
         "detection_limit": work.detections.detection_limit,
         "false_alarms_per_metre": work.settings.false_alarms_per_metre,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mapping import LeftOut, Trace
@@ -12,6 +13,7 @@ from mapping.model import ObjectModel
 if TYPE_CHECKING:
     from explore3d.analysis.inspected import Inspected
     from explore3d.analysis.truth import Comparison, TrueFeature
+    from explore3d.log import Stop
     from explore3d.scene import Scene
     from mapping.detection import Detections
     from mapping.estimate.envelope import Estimate
@@ -55,6 +57,9 @@ class Analysis:
         time_curve: (seconds of finger time, worst error of an axis in m) while exploring, if known.
         tip_counts: counts of finer and gentler features, this tip's radius first.
         inspected: above which height each face is free of features that were not found; None if not asked.
+        stopped: why the exploration ended early, None if it did not.
+        go_on: the command that goes on with it, "" if there is none.
+        folder: where it was written, None if it was not.
     """
 
     title: str
@@ -74,3 +79,6 @@ class Analysis:
     time_curve: tuple[tuple[float, float], ...] = ()
     tip_counts: tuple[TipCount, ...] = ()
     inspected: Inspected | None = None
+    stopped: Stop | None = None
+    go_on: str = ""
+    folder: Path | None = None

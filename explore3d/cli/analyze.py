@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Force, Json, Out
+from explore3d.cli.options import Force, Json, Out, Overwrite
 
 
 def analyze(
@@ -31,6 +31,7 @@ def analyze(
     model_units: Annotated[str, typer.Option(help="Unit of that mesh's coordinates.")] = "m",
     force: Force = None,
     json: Json = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Build the annotated model and the report from recordings alone.
 
@@ -50,6 +51,7 @@ def analyze(
             model_units=model_units,
             progress=progress,
             force=force or (),
+            overwrite=overwrite,
             units=units,
             columns=columns,
             frame=origin,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -70,6 +71,7 @@ def calibrate(
     lines: Annotated[int, typer.Option(help="Sweeps over the sphere.", min=2)] = 24,
     radius_sd: Annotated[str, typer.Option(help="Standard uncertainty of the sphere's radius.")] = "0 mm",
     arm: Arm = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the last recording beside --out.")] = False,
     json: Json = False,
 ) -> None:
     """Find the tip's radius, its noise and the sensor's delay on a reference sphere; write a tip profile.
@@ -77,10 +79,14 @@ def calibrate(
     Example: explore3d calibrate scene.toml --radius "12.5 mm" --out tip.toml --arm
     """
     from explore3d import parse_length
-    from explore3d.jobs import as_json, calibrate as find, write_profile
+    from explore3d.jobs import Recording, as_json, calibrate as find
 
-    profile = find(scene, parse_length(radius), _point(center), lines=lines, radius_sd=parse_length(radius_sd), arm=arm)
-    write_profile(profile, out)
+    words = ["explore3d", "calibrate", str(scene), "--radius", radius, "--center", center, "--out", str(out)]
+    words += ["--lines", str(lines), "--radius-sd", radius_sd, *["--arm"] * arm]
+    sphere, doubt = parse_length(radius), parse_length(radius_sd)
+    with Recording(out, shlex.join(words), resume) as kept:
+        profile = find(scene, sphere, _point(center), lines=lines, radius_sd=doubt, arm=arm, recording=kept)
+        kept.write(profile)
     print(as_json(profile.record()) if json else "\n".join([*profile.lines(), f"profile: {out}"]))
 
 

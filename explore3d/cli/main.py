@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+from types import FrameType
 from typing import Annotated
 
 import typer
@@ -14,10 +16,12 @@ from explore3d.cli.bench import bench
 from explore3d.cli.doctor import doctor
 from explore3d.cli.figures import figures
 from explore3d.cli.hardware import calibrate, emulate, reprobe, selftest
+from explore3d.cli.interrupted import DISK_ERRORS, InterruptedJobError, is_kept, one_line, told
 from explore3d.cli.merge import merge
+from explore3d.cli.options import INCOMPLETE
 from explore3d.cli.run import plan, run
 from explore3d.cli.stability import stability
-from hw import FingerError, MoveError
+from hw import SIGNALS, FingerError, MoveError
 from mapping import MappingError
 from planners import PlannerError
 
@@ -32,7 +36,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for command in (run, plan, analyze, merge, figures, doctor, emulate, calibrate, selftest, reprobe, stability):
-    app.command()(command)
+    app.command()(one_line(command))
 app.add_typer(bench, name="bench")
 
 
@@ -51,18 +55,32 @@ def _common(
 
 
 def main() -> None:
-    """Entry point: what the user can mend ends with one line on stderr and status 2, never with a traceback."""
+    """Entry point: what the user can mend ends with one line on stderr, never with a traceback.
 
+    Exit status: 0 done; 2 refused or not possible, nothing was recorded; 3 ended early, what was recorded is kept;
+    130 and 143 (128 and the signal's number) by Ctrl-C and SIGTERM, and what was recorded is kept, too.
+    """
+    for number in set(SIGNALS) - {signal.SIGINT}:
+        signal.signal(number, _leave)
     # Our matrices are small: more threads of linear algebra only wait for each other, for minutes on a busy machine.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         app()
-    except (UserError, MappingError, PlannerError, MoveError, FingerError) as error:
-        print(f"explore3d: {' '.join(str(error).split())}", file=sys.stderr)
-        sys.exit(2)
+    except InterruptedJobError as error:
+        print(f"explore3d: {error}", file=sys.stderr)
+        sys.exit(error.status)
+    except (UserError, MappingError, PlannerError, MoveError, FingerError, OSError) as error:
+        if isinstance(error, OSError) and error.errno not in DISK_ERRORS:
+            raise
+        print(f"explore3d: {told(error)}", file=sys.stderr)
+        sys.exit(INCOMPLETE if is_kept(error) else 2)
     except KeyboardInterrupt:
-        print("explore3d: interrupted", file=sys.stderr)
+        print("explore3d: interrupted (Ctrl-C)", file=sys.stderr)
         sys.exit(130)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    raise SystemExit(128 + number)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Out
+from explore3d.cli.options import Out, Overwrite
 
 
 def merge(
@@ -15,6 +15,7 @@ def merge(
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Later logs of the same object.")],
     out: Out,
     pose_sd: Annotated[str, typer.Option(help='Standard deviation of the pose between the logs, "0.1 mm".')] = "0 mm",
+    overwrite: Overwrite = False,
 ) -> None:
     """Update a model's features by later logs instead of finding them anew; none is removed.
 
@@ -26,5 +27,5 @@ def merge(
     from explore3d.jobs import merge as join
     from explore3d.report import feature_line
 
-    merged = join(model, logs, out, parse_length(pose_sd))
+    merged = join(model, logs, out, parse_length(pose_sd), overwrite)
     print("\n".join([*map(feature_line, merged.features), f"model: {out / 'model.json'}"]))

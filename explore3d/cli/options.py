@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
+# Exit status of a job that moved and ended early: its results are of a part
+INCOMPLETE = 3
+
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the results; made if it is not there.")]
+Overwrite = Annotated[
+    bool,
+    typer.Option(
+        "--overwrite", help="Replace a session of something else in that folder, as soon as the new one is complete."
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, and no progress.")]
 Force = Annotated[
     list[str] | None,

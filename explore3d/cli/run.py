@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Force, Json, Out
+from explore3d.cli.options import INCOMPLETE, Force, Json, Out, Overwrite
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene to explore.")]
 
@@ -23,6 +23,7 @@ def run(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on where a broken-off session in that folder stopped.")
     ] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Explore the scene with its finger; write the log, the annotated model and the report.
 
@@ -32,7 +33,7 @@ def run(
     from explore3d.scene import load_scene
 
     if not arm and needs_arming(load_scene(scene)):
-        plan(scene, out, json)
+        plan(scene, out, json, overwrite)
         if not json:
             print("dry run: connected and checked, nothing was moved; add --arm to explore with the real machine")
         return
@@ -41,14 +42,19 @@ def run(
     from explore3d.report import show
 
     with shown(quiet=json) as progress:
-        analysis = explore(scene, out, progress=progress, force=force or (), arm=arm, resume=resume)
+        analysis = explore(
+            scene, out, progress=progress, force=force or (), arm=arm, resume=resume, overwrite=overwrite
+        )
     show(analysis, out, json)
+    if analysis.stopped is not None and analysis.stopped.incomplete:
+        raise typer.Exit(INCOMPLETE)
 
 
 def plan(
     scene: SceneFile,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for a picture of the sweeps.")] = None,
     json: Json = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Show the planned sweeps, their length, time and limit violations; nothing is moved.
 
@@ -56,4 +62,4 @@ def plan(
     """
     from explore3d.jobs import plan_scene, show_plan
 
-    show_plan(plan_scene(scene), out, json)
+    show_plan(plan_scene(scene), out, json, overwrite)

@@ -7,6 +7,7 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from explore3d.jobs.analyze import analyze as analyze
     from explore3d.jobs.calibrate import (
+        Recording as Recording,
         as_json as as_json,
         calibrate as calibrate,
         selftest as selftest,
@@ -18,17 +19,17 @@ if TYPE_CHECKING:
     from explore3d.jobs.merge import merge as merge
     from explore3d.jobs.plan import plan_scene as plan_scene, show_plan as show_plan
     from explore3d.jobs.reprobe import reprobe as reprobe
-    from explore3d.jobs.run import run as run, scene_finger as scene_finger
+    from explore3d.jobs.run import cause as cause, run as run, scene_finger as scene_finger
 
 _PUBLIC = {
     "analyze": ("analyze",),
-    "calibrate": ("as_json", "calibrate", "selftest", "write_profile"),
+    "calibrate": ("Recording", "as_json", "calibrate", "selftest", "write_profile"),
     "emulate": ("Emulation", "serve"),
     "expedition": ("Explored", "Explorer", "explorer"),
     "machine_finger": ("needs_arming",),
     "merge": ("merge",),
     "plan": ("plan_scene", "show_plan"),
     "reprobe": ("reprobe",),
-    "run": ("run", "scene_finger"),
+    "run": ("cause", "run", "scene_finger"),
 }
 doorway(__name__, _PUBLIC)

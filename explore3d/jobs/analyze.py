@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from explore3d import parse_length
 from explore3d.analysis import Analysis, Progress, Stages, build_model, silent
 from explore3d.jobs.conclude import conclude
-from explore3d.jobs.session import Session
-from explore3d.log import large_log, load_logs, read_base
+from explore3d.jobs.session import Job, Session
+from explore3d.log import LOG, digest, large_log, load_logs, read_base
 from explore3d.scene import load_mesh, parse_scene
 from mapping.base import Base
 
@@ -24,6 +26,7 @@ def analyze(
     model_units: str = "m",
     progress: Progress = silent,
     force: Collection[str] = (),
+    overwrite: bool = False,
     **table: Any,
 ) -> Analysis:
     """Build the annotated model of what was recorded.
@@ -36,24 +39,77 @@ def analyze(
         model_units: of that file.
         progress: told the stage and the share of it that is done.
         force: stages to run although the recording does not need them.
+        overwrite: replace, once this one is complete, a session of another recording in that folder.
         table: units, columns, frame, jump, reference of a table (explore3d.log.table.read_table).
 
     Raises:
         UserError: input that cannot be used, named by file and field.
     """
     paths = [logs] if isinstance(logs, str | Path) else list(logs)
+    if out is not None:
+        again = _command(paths, out, tip_radius, model, model_units, force, table)
+        with results(paths, out, Job("analyze", digest_of(paths), again=again), overwrite) as session:
+            found = _analyze(paths, session, tip_radius, model, model_units, progress, force, table)
+        return replace(found, folder=session.folder)
+    return _analyze(paths, None, tip_radius, model, model_units, progress, force, table)
+
+
+def results(paths: Sequence[Path | str], out: Path | str, job: Job, overwrite: bool) -> Session:
+    """The session of what comes of recordings; one that lies in the folder itself stays there, with its scene."""
+    own = [log_path(path) for path in paths if log_path(path).resolve().parent == Path(out).resolve()]
+    return Session(out, job, keep=[*own, *([Path(out) / "scene.toml"] if own else [])], overwrite=overwrite)
+
+
+def digest_of(paths: Sequence[Path | str]) -> str:
+    """What makes two sets of recordings the same for a session: their bytes. Those that are missing count as empty."""
+    files = [log_path(path) for path in paths]
+    return "+".join(digest(file) if file.is_file() else "" for file in files)
+
+
+def log_path(path: Path | str) -> Path:
+    """The recording itself where the folder of a session is given."""
+    return Path(path) / LOG if Path(path).is_dir() else Path(path)
+
+
+def _command(
+    paths: Sequence[Path | str],
+    out: Path | str,
+    tip_radius: str | float | None,
+    model: Path | str | None,
+    model_units: str,
+    force: Collection[str],
+    table: dict[str, Any],
+) -> str:
+    words = ["explore3d", "analyze", *map(str, paths), "--out", str(out)]
+    words += [] if tip_radius is None else ["--tip-radius", str(tip_radius)]
+    words += [] if model is None else ["--model", str(model), "--model-units", model_units]
+    words += [part for name in ("units", "columns") if table.get(name) for part in (f"--{name}", str(table[name]))]
+    origin = (table.get("frame") or {}).get("origin")
+    words += [] if origin is None else ["--frame", ", ".join(map(str, origin))]
+    return shlex.join([*words, *(part for name in force for part in ("--force", name))])
+
+
+def _analyze(
+    paths: Sequence[Path | str],
+    session: Session | None,
+    tip_radius: str | float | None,
+    model: Path | str | None,
+    model_units: str,
+    progress: Progress,
+    force: Collection[str],
+    table: dict[str, Any],
+) -> Analysis:
     if len(paths) == 1 and (large := large_log(paths[0])) is not None:
         from explore3d.jobs.streaming import analyze_stream
 
         given = None if model is None else Base(load_mesh(model, model_units))
         radius = None if tip_radius is None else parse_length(tip_radius)
-        return analyze_stream(large, out, base=given, tip_radius=radius, progress=progress, force=force)
+        return analyze_stream(large, session, base=given, tip_radius=radius, progress=progress, force=force)
     stages = Stages(progress, force)
     with stages.stage("reading"):
         log = load_logs(paths, tip_radius=tip_radius, **table)
         scene = parse_scene(log.scene_text, log.sources[0]) if log.scene_text else None
         base = Base(load_mesh(model, model_units)) if model is not None else read_base(log.events)
-    if out is None:
+    if session is None:
         return build_model(log, scene, base, stages)
-    with Session(out, keep=log.sources) as session:
-        return conclude(session, log, scene, base, stages)
+    return conclude(session, log, scene, base, stages)

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import json
 import time
+import tomllib
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explore3d import UserError, __version__
-from explore3d.jobs.run import scene_finger
+from explore3d import UserError, __version__, count_text
+from explore3d.jobs.resume import Execute, Replay
+from explore3d.jobs.run import cause, scene_finger
+from explore3d.jobs.session import locked, undisturbed
+from explore3d.log import OUTCOME, LogWriter, read_log
 from explore3d.scene import Scene, load_scene, scene_text
-from hw import Move
+from hw import Finger, Move
 from hw.probing import GrblFinger
 from mapping import Trace
+from mapping.geometry.mesh import write_whole
 from mapping.instrument import TipCalibration, calibrate_tip
 
 PROFILE = "explore3d/tip/1"
@@ -68,6 +75,7 @@ def calibrate(
     lines: int = 24,
     radius_sd: float = 0.0,
     arm: bool = False,
+    recording: Recording | None = None,
 ) -> TipProfile:
     """Sweep over a reference sphere and fit tip and noise to it.
 
@@ -77,6 +85,7 @@ def calibrate(
         center: of the sphere, about, m, object frame.
         lines: sweeps over the sphere.
         arm: let a real machine move.
+        recording: entered; keeps every sweep as soon as it is made.
 
     Raises:
         FingerError: the finger is lost, or not armed.
@@ -86,21 +95,144 @@ def calibrate(
     delay = None
     with scene_finger(scene, arm) as finger:
         begun = time.monotonic()
-        trace = _swept(finger, scene, radius, center, lines)
+        trace = _swept(finger, scene, radius, center, lines, recording)
         seconds = time.monotonic() - begun
         if isinstance(finger, GrblFinger) and finger.slide is not None:
             delay = finger.measured_delay()
         return TipProfile(calibrate_tip(trace, radius, reference_sd=radius_sd), delay, seconds, finger.info)
 
 
+class Recording:
+    """The sweeps of a calibration on disk, and the place of its profile: both checked before anything moves.
+
+    A context manager. The sweeps go into `tip-1.mcap` beside `tip.toml`, or the next free number: no recording is ever
+    written over. An earlier profile stays until the new one is whole.
+
+    Args:
+        profile: where the profile belongs.
+        again: the command that begins again, or goes on.
+        resume: go on with the recording of the highest number.
+
+    Raises:
+        UserError: (on entering) the place cannot be written, holds something that is no tip profile, another
+            calibration writes there, or there is nothing to go on with.
+    """
+
+    def __init__(self, profile: Path | str, again: str = "", resume: bool = False) -> None:
+        self.profile, self.again, self.resume = Path(profile), again, resume
+        self.log: LogWriter | None = None
+        self.replay: Replay | None = None
+        self.sweeps, self.planned = 0, 0
+        self._source: Path | None = None
+        self._begun: Path | None = None
+        self._lock: IO[bytes] | None = None
+
+    def __enter__(self) -> Recording:
+        if self.profile.exists():
+            try:
+                known = tomllib.loads(self.profile.read_text("utf-8")).get("schema")
+            except (OSError, ValueError):
+                known = None
+            if known != PROFILE:
+                raise UserError(f"{self.profile}: is in the way and no tip profile; choose another --out")
+        try:
+            self.profile.parent.mkdir(parents=True, exist_ok=True)
+            self._lock = self._draft.open("ab")
+        except OSError as error:
+            raise UserError(f"{self.profile}: cannot write the tip profile: {error.strerror}") from error
+        if not locked(self._lock.fileno()):
+            self._lock.close()
+            raise UserError(f"{self.profile}: another calibration is writing there; choose another --out")
+        try:
+            self._find_source()
+        except BaseException:
+            self._leave()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        with undisturbed():
+            samples = 0 if self.log is None else self.log.samples
+            if self.log is not None:
+                with suppress(UserError):  # a full disk: what is in the file already is whole
+                    self.log.close("closed" if error is None else f"{type(error).__name__}: {error}")
+            if self._begun is not None and not samples:  # a signal may have come while the log was being made
+                self._begun.unlink(missing_ok=True)
+            self._leave()
+            if error is not None and self.log is not None and samples:
+                error.add_note(f"stopped after {self.sweeps} of {count_text(self.planned, 'sweep')}: {cause(error)}")
+                go_on = f"; go on with: {self.again} --resume" if self.again else ""
+                error.add_note(f"kept: {self.log.path}, and no profile was written{go_on}")
+            elif error is not None and (not isinstance(error, Exception) or isinstance(error, OSError)):
+                again = f"; begin again with: {self.again}" if self.again else ""
+                error.add_note(f"nothing was recorded, {self.profile} is as it was{again}")
+
+    def begin(self, scene: Scene, finger: Finger, lines: int) -> Execute:
+        """The way to carry out a move and keep what it gave; the finger is connected."""
+        about = {"software": f"explore3d {__version__}", "job": "calibrate", "finger": finger.info}
+        resolution = finger.info.get("resolution", 0.0)
+        path = self._numbered(1 + max(self._numbers(), default=0))
+        self._begun = path
+        log = LogWriter(
+            path,
+            tip_radius=scene.tip.radius,
+            scene_text=scene.resolved,
+            metadata=about,
+            resolution=resolution,
+        )
+        self.log, self.planned = log, lines
+        touch: Execute = finger.execute
+        if self.replay is not None:
+            touch = self.replay.before(finger.execute, getattr(finger, "skip", None))
+
+        def execute(move: Move) -> Trace:
+            trace = touch(move)
+            log.write(move, trace)
+            self.sweeps += 1
+            return trace
+
+        return execute
+
+    def write(self, profile: TipProfile) -> None:
+        """The profile in its place; the recording says "done" and is not gone on with. Raises UserError."""
+        write_profile(profile, self.profile)
+        if self.log is not None:
+            self.log.event(OUTCOME, {"reason": "done"})
+
+    def _find_source(self) -> None:
+        if not self.resume:
+            return
+        numbers = self._numbers()
+        if not numbers:
+            raise UserError(f"{self.profile}: nothing to resume: no {self._numbered(1).name}; leave --resume out")
+        self._source = self._numbered(max(numbers))
+        self.replay = Replay(read_log(self._source))
+
+    def _numbered(self, number: int) -> Path:
+        return self.profile.with_name(f"{self.profile.stem}-{number}.mcap")
+
+    def _numbers(self) -> list[int]:
+        ends = [path.stem.removeprefix(f"{self.profile.stem}-") for path in self.profile.parent.glob("*.mcap")]
+        return [int(end) for end in ends if end.isdecimal() and self._numbered(int(end)).exists()]
+
+    @property
+    def _draft(self) -> Path:
+        return self.profile.with_name(f".{self.profile.name}.lock")
+
+    def _leave(self) -> None:
+        if self._lock is not None:
+            self._draft.unlink(missing_ok=True)
+            self._lock.close()
+
+
 def write_profile(profile: TipProfile, path: Path) -> None:
-    """The profile as TOML, for `profile = "..."` in a scene's [tip]. Raises UserError."""
+    """The profile as TOML, for `profile = "..."` in a scene's [tip]; whole or not at all. Raises UserError."""
     record = {key: value for key, value in profile.record().items() if key != "finger"}
-    part = path.with_name(f".part-{path.name}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(scene_text(record), encoding="utf-8")
-        part.replace(path)
+        write_whole(path, scene_text(record))
     except OSError as error:
         raise UserError(f"{path}: cannot write the tip profile: {error.strerror}") from error
 
@@ -133,10 +265,18 @@ def as_json(record: dict[str, Any]) -> str:
     return json.dumps(record)
 
 
-def _swept(finger: Any, scene: Scene, radius: float, center: tuple[float, float, float], lines: int) -> Trace:
+def _swept(
+    finger: Any,
+    scene: Scene,
+    radius: float,
+    center: tuple[float, float, float],
+    lines: int,
+    recording: Recording | None,
+) -> Trace:
     speed = min(scene.sweep_speed, finger.workspace.max_speed)
     moves = meridians(center, radius, scene.tip.radius, lines, speed=speed, force=scene.survey.force)
-    return Trace.concatenate([finger.execute(move) for move in moves])
+    execute = finger.execute if recording is None else recording.begin(scene, finger, len(moves))
+    return Trace.concatenate([execute(move) for move in moves])
 
 
 def meridians(

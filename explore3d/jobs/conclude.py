@@ -12,9 +12,15 @@ from explore3d.scene import Scene
 from mapping.base import Base
 
 
-def conclude(session: Session, log: Log, scene: Scene | None, base: Base | None, stages: Stages) -> Analysis:
-    """Build the model of a log and write it, with its pictures and report, into a session's folder."""
-    analysis = build_model(log, scene, base, stages)
+def conclude(
+    session: Session, log: Log, scene: Scene | None, base: Base | None, stages: Stages, go_on: str = ""
+) -> Analysis:
+    """Build the model of a log and write it, with its pictures and report, into a session's folder.
+
+    Args:
+        go_on: the command that goes on with an exploration that ended early.
+    """
+    analysis = replace(build_model(log, scene, base, stages), go_on=go_on)
     with session.staging() as folder:
         with stages.stage("report"):
             write_report(analysis, folder, stages.is_forced("rendered pictures"))

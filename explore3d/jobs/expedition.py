@@ -6,18 +6,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from explore3d.log import KIND, base_event
+from explore3d.log import KIND, SURVEY, Stop, base_event
 from hw import Move, Workspace
 from mapping import Trace
 from mapping.base import Base
 from planners import Outcome, Plan, Spent, drive, within
-from planners.explore import Discover, Explore, Locate
+from planners.explore import Discover, Explore, Locate, SurveyCount
 from planners.paths import Limits, Ways, routed
 
 if TYPE_CHECKING:
@@ -30,6 +30,52 @@ Event = Callable[[str, dict[str, Any]], None]
 
 def unheard(kind: str, data: dict[str, Any]) -> None:
     """An event that nobody notes."""
+
+
+@dataclass
+class SurveyWatch:
+    """Carries out moves, and knows how far the survey is.
+
+    Args:
+        execute: carries out one move.
+        event: told once how many sweeps the survey has.
+        count: how far the survey's own account is.
+    """
+
+    execute: Execute
+    event: Event
+    count: SurveyCount = field(default_factory=SurveyCount)
+    _sweeps: int = field(init=False, default=0)
+    _before: int = field(init=False, default=0)
+    _told: bool = field(init=False, default=False)
+
+    def begun(self) -> SurveyCount:
+        """The count to keep up: the survey begins, what was swept before was to know the base."""
+        self._before = self._sweeps
+        return self.count
+
+    def __call__(self, move: Move) -> Trace:
+        if self.count.planned is not None and not self._told:
+            self._told = True
+            self.event(SURVEY, {"sweeps": self.count.planned, "before": self._before})
+        trace = self.execute(move)
+        self._sweeps += move.purpose == "sweep"
+        return trace
+
+    @property
+    def made(self) -> int:
+        """Sweeps of the survey that the finger made; those that it refused do not count."""
+        made = self._sweeps - self._before
+        return made if self.count.planned is None else min(made, self.count.planned)
+
+    @property
+    def surveyed(self) -> bool:
+        """True if the survey came to its end; a single sweep of it may have been refused."""
+        return self.count.planned is not None and self.count.made >= self.count.planned
+
+    def stop(self, cause: str) -> Stop:
+        """What to say if it ends now."""
+        return Stop(cause, self.made, self.count.planned)
 
 
 def explorer(scene: Scene, workspace: Workspace) -> Explorer:
@@ -154,12 +200,13 @@ class Explorer:
         )
         return outcome, spent.seconds
 
-    def go(self, execute: Execute, event: Event = unheard) -> Outcome:
+    def go(self, execute: Execute, event: Event = unheard, watch: SurveyWatch | None = None) -> Outcome:
         """Find the base, explore it; why it ended, with an Explored as its value.
 
         Args:
             execute: carries out one move.
             event: told the base, and what was refused.
+            watch: counts the sweeps of the survey, if anyone asks.
         """
         outcome, seconds = self._base(execute, event)
         base: Base | None = outcome.value
@@ -169,7 +216,8 @@ class Explorer:
         if left <= 0:
             detail = f"the budget was spent before exploring began: {outcome.detail}"
             return Outcome("budget", detail, Explored(base))
-        found, _ = self.carry_out(self.explore(base=base, time_budget=left).plan(), base, execute, event, left)
+        plan = self.explore(base=base, time_budget=left).plan(count=None if watch is None else watch.begun())
+        found, _ = self.carry_out(plan, base, execute, event, left)
         detail = f"{found.detail}; before that, to know the base: {outcome.detail}" if outcome.detail else found.detail
         return Outcome(found.reason, detail, Explored(base, found.value))
 

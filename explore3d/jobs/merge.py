@@ -2,33 +2,52 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from explore3d import FolderError, UserError
+from explore3d import UserError
 from explore3d.analysis import Stages, build_model
+from explore3d.jobs.analyze import digest_of
+from explore3d.jobs.session import Job, Session
 from explore3d.log import Log, read_base, read_log
 from mapping.base import Base
 from mapping.model import ObjectModel, merge_model
 
 
-def merge(model: Path | str, logs: Sequence[Path | str], out: Path | str, pose_sd: float = 0.0) -> ObjectModel:
+def merge(
+    model: Path | str, logs: Sequence[Path | str], out: Path | str, pose_sd: float = 0.0, overwrite: bool = False
+) -> ObjectModel:
     """Analyse logs on a model's base, join what they hold with what it knows, and save the result.
 
     Args:
         model: folder or model.json of the known model; it is not changed.
         logs: later logs of the same object in the same frame, each analysed on its own.
-        out: folder for the merged model; may be the model's own.
+        out: folder for the merged model; may be the model's own, whose other files then stay.
         pose_sd: standard deviation of the pose between the logs, m.
+        overwrite: replace, once this one is complete, a session of something else in that folder.
 
     Raises:
         ModelError: a model that cannot be read.
         UserError: a log that cannot be read, is in the model already (it would count twice) or shows another
             object, or a folder that cannot be written.
     """
+    own = Path(model).resolve() in (Path(out).resolve(), Path(out).resolve() / "model.json")
+    keep = [path for path in Path(out).rglob("*") if path.is_file()] if own else []
+    subject = digest_of([Path(model) / "model.json" if Path(model).is_dir() else Path(model), *logs])
+    words = ["explore3d", "merge", str(model), *map(str, logs), "--out", str(out), "--pose-sd", f"{pose_sd:g} m"]
+    job = Job("merge", subject, again=shlex.join(words))
+    with Session(out, job, keep=keep, overwrite=overwrite) as session:
+        known = _merged(model, logs, pose_sd)
+        with session.staging() as folder:
+            known.save(folder)
+    return known
+
+
+def _merged(model: Path | str, logs: Sequence[Path | str], pose_sd: float) -> ObjectModel:
     known = ObjectModel.load(model)
     for path in logs:
         log = read_log(path)
@@ -41,10 +60,6 @@ def merge(model: Path | str, logs: Sequence[Path | str], out: Path | str, pose_s
         known = merge_model(known, analysis.model.features, "/".join(Path(path).resolve().parts[-2:]), pose_sd)
         hashes = [*known.provenance.get("merged_sha256", []), log.sha256]
         known = replace(known, provenance={**known.provenance, "merged_sha256": hashes})
-    try:
-        known.save(out)
-    except OSError as error:
-        raise FolderError(f"{out}: cannot write the merged model: {error.strerror or error}") from error
     return known
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from explore3d import count_text, length_text, seconds_text
 from explore3d.jobs.expedition import Explorer, explorer
-from explore3d.jobs.run import scene_finger
-from explore3d.jobs.session import Session
+from explore3d.jobs.run import scene_digest, scene_finger
+from explore3d.jobs.session import Job, Session
 from explore3d.pictures import plan_picture
 from explore3d.scene import load_scene
 from hw import Move
@@ -36,6 +36,7 @@ class DryRun:
         reach: distance from a sweep up to which the smallest feature is seen, m; None likewise.
         violations: (number of the move, what limit it breaks).
         assumed: what had to be assumed of the object, and what the plan falls short of; a sentence or "".
+        subject: digest of the scene (explore3d.jobs.run.scene_digest).
     """
 
     base: Base
@@ -48,6 +49,7 @@ class DryRun:
     reach: float | None
     violations: tuple[tuple[int, str], ...]
     assumed: str = ""
+    subject: str = ""
 
     def record(self) -> dict[str, Any]:
         """The plan in JSON values: SI units."""
@@ -122,6 +124,7 @@ def plan_scene(path: Path | str) -> DryRun:
         reach,
         tuple(violations),
         assumed,
+        scene_digest(scene),
     )
 
 
@@ -151,12 +154,12 @@ def imagined(discover: Discover) -> tuple[list[Move], Base]:
     return [move for move, _ in record], outcome.value
 
 
-def show_plan(plan: DryRun, out: Path | None, as_json: bool) -> None:
+def show_plan(plan: DryRun, out: Path | None, as_json: bool, overwrite: bool = False) -> None:
     """Print the plan in words or as JSON; with a folder, write plan.json and plan.png into it."""
     import json
 
     if out is not None:
-        with Session(out) as session:
+        with Session(out, Job("plan", plan.subject), overwrite=overwrite) as session:
             session.write("plan.json", json.dumps(plan.record(), indent=1))
             session.write("plan.png", plan.picture())
     if as_json:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from explore3d import UserError, __version__, count_text, length_text
-from explore3d.jobs.run import scene_finger
+from explore3d.jobs.run import cause, scene_finger
 from explore3d.log import LOG, Log, LogWriter, read_log
 from explore3d.scene import load_scene
 from hw import Move
@@ -98,12 +98,20 @@ def reprobe(folder: Path | str, at: tuple[float, float, float], *, touches: int 
     with scene_finger(scene, arm) as finger:
         resolution = finger.info.get("resolution", 0.0)
         with LogWriter(path, tip_radius=scene.tip.radius, metadata=about, resolution=resolution) as writer:
-            for _ in range(touches):
-                move = Move(center[None, :], approach, scene.sweep_speed, scene.survey.force)
-                trace = finger.execute(move)
-                writer.write(move, trace)
-                if len(trace):
-                    felt.append(trace.centers.mean(axis=0))
+            try:
+                for _ in range(touches):
+                    move = Move(center[None, :], approach, scene.sweep_speed, scene.survey.force)
+                    trace = finger.execute(move)
+                    writer.write(move, trace)
+                    if len(trace):
+                        felt.append(trace.centers.mean(axis=0))
+            except BaseException as error:
+                error.add_note(
+                    f"stopped after {len(felt)} of {count_text(touches, 'touch', 'touches')}: {cause(error)}"
+                )
+                if felt:
+                    error.add_note(f"kept: {path}, and {folder} as it was")
+                raise
     if not felt:
         raise UserError(f"{folder}: nothing is met any more at {np.round(1e3 * center, 3).tolist()} mm")
     return Reprobed(sample, int(there.sum()), center, approach, np.array(felt), path)

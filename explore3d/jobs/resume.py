@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from explore3d import UserError
-from explore3d.log import LOG, Log, read_log
+from explore3d.log import OUTCOME, Log
 from hw import Move
 from mapping import Trace
 
-# The earlier log under another name, until the new one holds all that it held
-EARLIER = "earlier.mcap"
 # Between the last sample of the earlier log and the clock's new beginning, s: times must rise
 PAUSE = 1e-3
+# Reason of an outcome that an exception or a signal brought about
+BROKEN_OFF = "broken off"
 
 Execute = Callable[[Move], Trace]
 
@@ -25,7 +23,8 @@ class Replay:
     """Answers the moves that an earlier log holds from the log, all later ones from the finger.
 
     A plan is a function of what it was sent, so it asks for the same moves again. The last move of a log that
-    was not closed in good order may be cut short: it is made again.
+    was not closed in good order may be cut short: it is made again. What the earlier log holds and the plan does not
+    ask for any more is handed over all the same: nothing that was felt is lost.
 
     Args:
         log: of the earlier session.
@@ -33,55 +32,58 @@ class Replay:
 
     def __init__(self, log: Log) -> None:
         self._moves = _moves(log)
-        if not _ended_well(log) and self._moves:
-            self._moves.pop()
+        self._doubtful = bool(self._moves) and not _ended_well(log)
+        self.samples = len(log.trace)
         self.replayed = 0
-        self._sweeps = max((int(t.sweep.max()) for _, t in self._moves if len(t)), default=0)
-        self._time = max((float(t.t[-1]) for _, t in self._moves if len(t)), default=0.0) + PAUSE
+        self.live = False
+        self._sweeps, self._time = 0, PAUSE
 
-    def before(self, execute: Execute, skip: Callable[[Move], None] | None = None) -> Execute:
+    def before(
+        self,
+        execute: Execute,
+        skip: Callable[[Move], None] | None = None,
+        keep: Callable[[Move, Trace], None] = lambda move, trace: None,
+    ) -> Execute:
         """`execute`, with the earlier log's answers in front of it.
 
         Args:
             skip: told every move that is answered from the log, by a finger that then keeps count of sweeps and
                 time itself, as a simulated one does; without it its sweeps and times are put after the log's.
+            keep: handed every move of the earlier log that is not asked for again, with what it gave.
         """
 
         def resumed(move: Move) -> Trace:
-            if self._moves and _same(self._moves[0][0], move):
+            same = bool(self._moves) and _same(self._moves[0][0], move)
+            if same and not (self._doubtful and len(self._moves) == 1):
                 self.replayed += 1
                 if skip is not None:
                     skip(move)
-                return self._moves.pop(0)[1]
-            self._moves.clear()  # from the first difference on the plan goes another way
+                return self._passed(self._moves.pop(0)[1])
+            if same:
+                self._moves.clear()  # it is made again
+            self.rest(keep, skip)  # from the first difference on the plan goes another way
             trace = execute(move)
+            self.live = True
             if skip is not None:
                 return trace
             return replace(trace, t=trace.t + self._time, sweep=trace.sweep + self._sweeps)
 
         return resumed
 
+    def rest(self, keep: Callable[[Move, Trace], None], skip: Callable[[Move], None] | None = None) -> None:
+        """Hand over what was not asked for again."""
+        for move, trace in self._moves:
+            keep(move, self._passed(trace))
+            if skip is not None:
+                skip(move)
+        self._moves.clear()
 
-def earlier_log(folder: Path | str) -> tuple[Log, bytes]:
-    """The log to go on from in a session's folder, and its bytes: the one that holds more.
-
-    Raises:
-        UserError: there is none.
-    """
-    paths = [path for name in (LOG, EARLIER) if (path := Path(folder) / name).is_file()]
-    if not paths:
-        raise UserError(f"{folder}: nothing to resume: no {LOG} in it; leave --resume out")
-    logs = []
-    for path in paths:
-        try:
-            logs.append((read_log(path), path))
-        except UserError:
-            if len(paths) == 1:
-                raise
-    if not logs:
-        raise UserError(f"{folder}: nothing to resume: no log in it holds a sample; leave --resume out")
-    log, path = max(logs, key=lambda pair: len(pair[0].trace))
-    return log, path.read_bytes()
+    def _passed(self, trace: Trace) -> Trace:
+        """The trace; what the finger feels later counts its sweeps and its time from there on."""
+        if len(trace):
+            self._sweeps = max(self._sweeps, int(trace.sweep.max()))
+            self._time = max(self._time, float(trace.t[-1]) + PAUSE)
+        return trace
 
 
 def _moves(log: Log) -> list[tuple[Move, Trace]]:
@@ -100,8 +102,8 @@ def _moves(log: Log) -> list[tuple[Move, Trace]]:
 
 def _ended_well(log: Log) -> bool:
     """True if the plan came to its end: nothing was cut short."""
-    reasons = [event.data.get("reason") for event in log.events if event.kind == "outcome"]
-    return bool(reasons) and reasons[-1] != "finger refuses"
+    reasons = [event.data.get("reason") for event in log.events if event.kind == OUTCOME]
+    return bool(reasons) and reasons[-1] not in (BROKEN_OFF, "finger refuses")
 
 
 def _same(one: Move, other: Move) -> bool:

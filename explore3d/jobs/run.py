@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import shlex
+import signal
+import tomllib
 from collections.abc import Callable, Collection
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from explore3d import UserError, __version__
+from explore3d import UserError, __version__, seconds_text
 from explore3d.analysis import Analysis, Progress, Stages, silent, without_needless_dynamics
 from explore3d.jobs.conclude import conclude
-from explore3d.jobs.expedition import explorer, known_base
-from explore3d.jobs.resume import EARLIER, Replay, earlier_log
-from explore3d.jobs.session import Session
-from explore3d.log import Log, Recorder, read_base
+from explore3d.jobs.expedition import SurveyWatch, explorer, known_base
+from explore3d.jobs.resume import BROKEN_OFF, Replay
+from explore3d.jobs.session import Job, Session
+from explore3d.log import EXPLORATION, OUTCOME, Log, read_base, read_log, stop_of
 from explore3d.scene import Scene, load_scene
 from hw import Finger, Move, open_finger
 from hw.simulated import Dynamics
 from mapping import Trace
+from planners import Outcome
+
+# A shell's exit status of a program that a signal ended is this and the signal's number
+SIGNAL_EXIT = 128
 
 
 def run(
@@ -26,8 +38,12 @@ def run(
     force: Collection[str] = (),
     arm: bool = False,
     resume: bool = False,
+    overwrite: bool = False,
 ) -> Analysis:
     """Explore, log, and build the annotated model.
+
+    An earlier session in the folder stays until this one is complete. One that ended early is concluded all the same:
+    the result's `stopped` says why, and its `folder` where it is.
 
     Args:
         scene: a scene or its file.
@@ -36,6 +52,7 @@ def run(
         force: stages to run although the scene does not need them.
         arm: let a real machine move; without it every move is refused.
         resume: go on from the log of a session that was broken off in that folder.
+        overwrite: replace, once this one is complete, a session of another scene in that folder.
 
     Raises:
         UserError: a scene or folder that cannot be used.
@@ -46,16 +63,41 @@ def run(
         scene = scene if isinstance(scene, Scene) else load_scene(scene)
         known_base(scene)  # a mesh that cannot be used is refused before a folder is made
         finger = scene_finger(without_needless_dynamics(scene, stages), arm)
-    replay = None
-    if resume:
-        log, content = earlier_log(out)
-        replay = Replay(log)
-    with Session(out) as session:
+    words = [part for name in force for part in ("--force", name)] + ["--arm"] * arm
+    again = shlex.join(["explore3d", "run", str(scene.path), "--out", str(out), *words])
+    go_on = f"{again} --resume"
+    job = Job("run", scene_digest(scene), ("plan",), go_on, again)
+    with Session(out, job, resume=resume, overwrite=overwrite) as session:
+        replay = None if session.source is None else Replay(read_log(session.source))
         session.write("scene.toml", scene.resolved)
-        if resume:
-            session.write(EARLIER, content)
         log = _explore(scene, finger, session, stages, replay)
-        return conclude(session, log, scene, read_base(log.events), stages)
+        stop = stop_of(log)
+        session.stopped = stop.text if stop is not None and stop.incomplete else ""
+        try:
+            analysis = conclude(session, log, scene, read_base(log.events), stages, go_on)
+        except BaseException as error:
+            session.stopped = session.stopped or f"stopped after all sweeps, before the report: {cause(error)}"
+            error.add_note(session.stopped)
+            raise
+    return replace(analysis, folder=session.place)
+
+
+def scene_digest(scene: Scene) -> str:
+    """What makes two scenes the same for a session: everything but their title and how far the exploration may go."""
+    tables = tomllib.loads(scene.resolved)
+    tables.pop("title", None)
+    for name in ("time_budget", "precision"):
+        tables.get("explore", {}).pop(name, None)
+    return hashlib.sha256(json.dumps(tables, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def cause(error: BaseException) -> str:
+    """Why a job ended, in a few words."""
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted (Ctrl-C)"
+    if isinstance(error, SystemExit) and isinstance(error.code, int) and error.code > SIGNAL_EXIT:
+        return f"terminated ({signal.Signals(error.code - SIGNAL_EXIT).name})"
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def scene_finger(scene: Scene, arm: bool = False) -> Finger:
@@ -87,7 +129,7 @@ def scene_finger(scene: Scene, arm: bool = False) -> Finger:
 def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, replay: Replay | None = None) -> Log:
     """Carry out the exploration; every sample is in the session's log before the next move begins."""
     with stages.stage("exploration") as share, finger:
-        about = {"software": f"explore3d {__version__}", "seed": scene.seed, "finger": finger.info}
+        about = {"software": f"explore3d {__version__}", "seed": scene.seed, "finger": finger.info} | EXPLORATION
         log = session.open_log(
             tip_radius=scene.tip.radius,
             scene_text=scene.resolved,
@@ -96,25 +138,53 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
         )
         if hasattr(finger, "notice"):
             finger.notice = log.felt  # a slow sweep's samples are on disk before it ends
-        touch = finger.execute if replay is None else replay.before(finger.execute, getattr(finger, "skip", None))
-        execute = _logged(touch, log, scene.explore.time_budget, share)
-        outcome = explorer(scene, finger.workspace).go(execute, log.event)
+        touch: Callable[[Move], Trace] = finger.execute
+        if replay is not None:
+            log.event("resumed", {"samples": replay.samples})
+            touch = replay.before(finger.execute, getattr(finger, "skip", None), log.write)
+
+        def execute(move: Move) -> Trace:
+            trace = touch(move)
+            log.write(move, trace)
+            if replay is not None and replay.live:
+                session.settle()  # everything that the earlier log holds is in this one
+            if len(trace):
+                share(min(1.0, float(trace.t[-1]) / scene.explore.time_budget))
+            return trace
+
+        watch = SurveyWatch(execute, log.event)
+        try:
+            outcome = explorer(scene, finger.workspace).go(watch, log.event, watch)
+        except BaseException as error:
+            if log.samples:
+                stop = watch.stop(cause(error))
+                session.stopped = stop.text
+                error.add_note(stop.text)
+                ended = {"reason": BROKEN_OFF, "cause": stop.cause, "finished": False, "sweeps": stop.sweeps}
+                with suppress(UserError):  # of a full disk, for example: the log then ends without a word
+                    log.event(OUTCOME, ended)
+            raise
+        if replay is not None:
+            replay.rest(log.write)
         # what the connection counted and learnt of its clocks on the way
-        log.event("outcome", {"reason": outcome.reason, "detail": outcome.detail, "finger": finger.info})
+        log.event(OUTCOME, _ended(outcome, watch, scene) | {"finger": finger.info})
         if not log.samples:
             raise UserError(f"{session.folder}: nothing was felt: {outcome.detail or outcome.reason}")
+        session.settle()
         log.close()  # its digest goes into the model
         return log.recorded()
 
 
-def _logged(
-    touch: Callable[[Move], Trace], log: Recorder, budget: float, share: Callable[[float], None]
-) -> Callable[[Move], Trace]:
-    def execute(move: Move) -> Trace:
-        trace = touch(move)
-        log.write(move, trace)
-        if len(trace):
-            share(min(1.0, float(trace.t[-1]) / budget))
-        return trace
-
-    return execute
+def _ended(outcome: Outcome, watch: SurveyWatch, scene: Scene) -> dict[str, Any]:
+    """Why an exploration ended, as an event of its log."""
+    why = outcome.detail or outcome.reason
+    if outcome.reason == "budget":
+        why = f"the time budget of {seconds_text(scene.explore.time_budget)} was used up"
+    finished = watch.surveyed and outcome.reason != "finger refuses"
+    return {
+        "reason": outcome.reason,
+        "detail": outcome.detail,
+        "cause": why,
+        "finished": finished,
+        "sweeps": watch.made,
+    }

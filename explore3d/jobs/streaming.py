@@ -18,7 +18,7 @@ from mapping.base import Base, fit_base
 
 def analyze_stream(
     path: Path,
-    out: Path | str | None,
+    session: Session | None,
     *,
     base: Base | None = None,
     tip_radius: float | None = None,
@@ -29,13 +29,17 @@ def analyze_stream(
     """The annotated model of one large log; arguments and errors as for explore3d.jobs.analyze.analyze.
 
     What came of each chunk stays in `<out>.chunks` until the whole is done: a rerun takes it from there.
+
+    Args:
+        session: entered, for model and report; None writes nothing.
     """
     stages = Stages(progress, force)
     scene_text, events = head(path)
     scene = parse_scene(scene_text, path) if scene_text else None
     base = base or read_base(events) or _fitted(path, tip_radius, stages)
     settings = AnalysisSettings.of(scene)
-    folder = None if out is None else Path(out).with_name(Path(out).name + ".chunks")
+    out = None if session is None else session.folder.resolve()
+    folder = None if out is None else out.with_name(out.name + ".chunks")
     stream = LogStream(path, tip_radius)
     with stages.stage("detection") as share:
         condensed = condense(stream, base, folder, share, chunk, **settings.detection)
@@ -43,10 +47,9 @@ def analyze_stream(
     far = condensed.samples - len(condensed.trace)
     searched = f"all {condensed.samples:,} samples were searched; {far:,} of them, away from crossings, were not kept"
     stages.left_out.append(LeftOut("part of the trace", searched))
-    if out is None:
+    if session is None:
         return build_model(log, scene, base, stages)
-    with Session(out, keep=log.sources) as session:
-        analysis = conclude(session, log, scene, base, stages)
+    analysis = conclude(session, log, scene, base, stages)
     if folder is not None:
         shutil.rmtree(folder, ignore_errors=True)
     return analysis

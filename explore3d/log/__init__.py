@@ -9,11 +9,16 @@ if TYPE_CHECKING:
     from explore3d.log.load import load_logs as load_logs
     from explore3d.log.reader import digest as digest, iter_log as iter_log, read_log as read_log
     from explore3d.log.record import (
+        EXPLORATION as EXPLORATION,
         KIND as KIND,
+        OUTCOME as OUTCOME,
+        SURVEY as SURVEY,
         Event as Event,
         Log as Log,
+        Stop as Stop,
         base_event as base_event,
         read_base as read_base,
+        stop_of as stop_of,
     )
     from explore3d.log.stream import (
         LogStream as LogStream,
@@ -27,7 +32,18 @@ _PUBLIC = {
     "format": ("LOG",),
     "load": ("load_logs",),
     "reader": ("digest", "iter_log", "read_log"),
-    "record": ("Event", "KIND", "Log", "base_event", "read_base"),
+    "record": (
+        "EXPLORATION",
+        "Event",
+        "KIND",
+        "Log",
+        "OUTCOME",
+        "SURVEY",
+        "Stop",
+        "base_event",
+        "read_base",
+        "stop_of",
+    ),
     "stream": ("LogStream", "count_samples", "head", "large_log"),
     "writer": ("LogWriter", "Recorder"),
 }

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from explore3d import UserError
+from explore3d import UserError, count_text
 from mapping import Surface, SurfaceError, Trace
 from mapping.base import Base
 
@@ -103,6 +103,55 @@ def _shifted(event: Event, samples: int) -> Event:
 
 def _name(log: Log) -> str:
     return ", ".join(log.sources) or "a log"
+
+
+@dataclass(frozen=True)
+class Stop:
+    """An exploration that ended before all was done.
+
+    Args:
+        cause: why, in a few words.
+        sweeps: of the survey that were made.
+        planned: sweeps that the survey wanted; None: it was not known yet.
+        incomplete: False if the survey is whole, and the time that the scene allows ended what came after it.
+    """
+
+    cause: str
+    sweeps: int
+    planned: int | None
+    incomplete: bool = True
+
+    @property
+    def text(self) -> str:
+        """The same in words: "stopped after 3 of 15 sweeps: ..."."""
+        if self.planned is not None and self.sweeps >= self.planned:
+            return f"stopped after the {self.planned} sweeps of the survey, in what followed it: {self.cause}"
+        if self.planned is None:
+            return f"stopped after {count_text(self.sweeps, 'sweep')}, before the survey was planned: {self.cause}"
+        return f"stopped after {self.sweeps} of {count_text(self.planned, 'sweep')}: {self.cause}"
+
+
+# Of a log's metadata: an exploration, which ends with an outcome; other logs (reprobe's, a program's own) have none
+EXPLORATION = {"job": "run"}
+# Kinds of events: how many sweeps the survey has, and why the exploration ended
+SURVEY, OUTCOME = "survey", "outcome"
+
+
+def stop_of(log: Log) -> Stop | None:
+    """Why the exploration of a log ended early, None if it did not, or is none of ours."""
+    if log.metadata.get("job") != EXPLORATION["job"]:
+        return None
+    outcome = next((event.data for event in reversed(log.events) if event.kind == OUTCOME), {})
+    survey = next((event.data for event in reversed(log.events) if event.kind == SURVEY), {})
+    made = sum(event.kind == "move" and event.data["purpose"] == "sweep" for event in log.events)
+    planned = None if not survey else int(survey["sweeps"])
+    sweeps = int(outcome.get("sweeps", made - int(survey.get("before", 0))))
+    sweeps = sweeps if planned is None else min(sweeps, planned)
+    if not outcome:
+        return Stop("the program was killed, the machine lost its power, or the disk was full", sweeps, planned)
+    if outcome.get("finished"):
+        return Stop(str(outcome["cause"]), sweeps, planned, False) if outcome["reason"] == "budget" else None
+    return Stop(str(outcome.get("cause") or outcome.get("detail") or outcome["reason"]), sweeps, planned)
 
 
 KIND = "base"

@@ -135,6 +135,18 @@ class LogWriter:
         self._message("event", {"t": self._t, "kind": kind, "data": dict(data)})
         self._flush()
 
+    def move_to(self, path: Path) -> None:
+        """Put the file in another place on the same disk, replacing what is there; writing goes on.
+
+        Raises:
+            UserError: the disk does not take it.
+        """
+        if not self._file.closed:
+            self._flush(sync=True)
+        with self._disk("move"):
+            os.replace(self.path, path)
+        self.path = path
+
     def close(self, reason: str = "closed") -> None:
         """Write the end and the index; further calls do nothing."""
         if self._file.closed:
@@ -263,6 +275,11 @@ class Recorder(LogWriter):
         if len(trace):
             self._traces.append(trace)
             self._reading.samples += len(trace)
+
+    def move_to(self, path: Path) -> None:
+        """Put the file in another place, as LogWriter.move_to does."""
+        super().move_to(path)
+        self._reading.path = path
 
     def recorded(self) -> Log:
         """What explore3d.log.reader.read_log would read from the closed file."""

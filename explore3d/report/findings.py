@@ -9,6 +9,8 @@ from explore3d import count_text, interval_text, length_text
 from explore3d.analysis import Analysis
 from mapping import Feature, Interval
 
+# Share of the surface from which on it counts as all of it: it is printed in whole per cent
+NEARLY_ALL = 0.995
 MOST_LISTED_FEATURES = 20  # features that are listed one by one; the report has them all
 
 
@@ -19,14 +21,22 @@ def show(analysis: Analysis, out: Path, as_json: bool) -> None:
     if as_json:
         print(json.dumps(analysis.model.document(), ensure_ascii=False, allow_nan=False))
     else:
-        print("\n".join([*summary(analysis), f"report: {out / 'report.html'}"]))
+        place = out if analysis.folder is None else analysis.folder
+        print("\n".join([*stop_lines(analysis), *summary(analysis), f"report: {place / 'report.html'}"]))
+
+
+def stop_lines(analysis: Analysis) -> list[str]:
+    """What must be read before anything else: that the exploration ended early, and how to go on."""
+    if analysis.stopped is None:
+        return []
+    return [f"{analysis.stopped.text}; go on with: {analysis.go_on}" if analysis.go_on else analysis.stopped.text]
 
 
 def summary(analysis: Analysis) -> list[str]:
     """One line on the whole, one a feature, and one on what would have been seen."""
     features = analysis.model.features
     finer = sum(feature.curvature_feature for feature in features)
-    lines = [f"{count_text(len(features), 'feature')} found"]
+    lines = [f"{count_text(len(features), 'feature')} found{swept_part(analysis)}"]
     if features:
         lines[0] += f", {finer} of them finer than the tip of {length_text(analysis.trace.tip_radius)}"
     if analysis.recovered:
@@ -51,8 +61,16 @@ def limit_sentence(analysis: Analysis) -> str:
         return "The trace is too short to say what would have been seen."
     return (
         f"A sharp crest {length_text(detections.detection_limit, 2)} high or higher is seen with "
-        f"{100 * detections.probability:.0f} % probability where a sweep crosses it."
+        f"{100 * detections.probability:.0f} % probability where a sweep crosses it{swept_part(analysis)}."
     )
+
+
+def swept_part(analysis: Analysis) -> str:
+    """'' on the 21 % of the surface that was swept'' where the sweeps did not come near all of it, else ''."""
+    inspected = analysis.inspected
+    if inspected is None or analysis.base.kind == "profile" or (share := 1.0 - inspected.untouched) > NEARLY_ALL:
+        return ""
+    return f" on the {100 * share:.0f} % of the surface that was swept"
 
 
 def feature_line(feature: Feature) -> str:

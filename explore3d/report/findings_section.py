@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from explore3d import UNKNOWN_TEXT, count_text, interval_text, length_text
 from explore3d.analysis import Analysis
-from explore3d.report.findings import limit_sentence
+from explore3d.report.findings import limit_sentence, stop_lines, swept_part
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.report.pictures import Pictures, is_profile
 from mapping import Feature, Interval
@@ -16,13 +16,13 @@ from mapping.geometry.mesh import arclengths
 
 def headline(analysis: Analysis) -> Html:
     """The title, and the result in a sentence or two."""
-    warning = element("p", analysis.recovered, class_="warning") if analysis.recovered else Html("")
+    warnings = [*stop_lines(analysis), *([analysis.recovered] if analysis.recovered else [])]
     return element(
         "header",
         element("p", "Haptic exploration", class_="kind"),
         element("h1", analysis.title or "Untitled"),
+        *(element("p", f"{_capital(sentence)}.", class_="warning") for sentence in warnings),
         element("p", found_sentence(analysis), class_="lead"),
-        warning,
     )
 
 
@@ -30,7 +30,7 @@ def found_sentence(analysis: Analysis) -> str:
     """What was found, and what a lone feature measures."""
     features = analysis.model.features
     if not features:
-        return "Nothing was found that the base does not explain. " + limit_sentence(analysis)
+        return f"Nothing was found that the base does not explain{swept_part(analysis)}. {limit_sentence(analysis)}"
     kinds = Counter(feature.kind for feature in features)
     counts = [count_text(number, kind, _plural(kind)) for kind, number in kinds.items()]
     sentence = f"{_listed(counts)} {'was' if len(features) == 1 else 'were'} found."

@@ -116,7 +116,8 @@ class ObjectModel:
     def document(self) -> Record:
         """The content of model.json: plain JSON values, SI units (docs/model.md)."""
         surface = self.base.surface
-        return {
+        stopped = self.provenance.get("stopped")  # what came of an exploration that ended early says so first
+        return ({"stopped": stopped} if stopped else {}) | {
             "schema": MODEL_SCHEMA,
             "units": "m",
             "base": {

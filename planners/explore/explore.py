@@ -15,7 +15,7 @@ from mapping.instrument import Noise, StatedNoise
 from planners import Outcome, Plan, PlannerError, Spent, within
 from planners.explore.faint_search import CloserLook, FaintLead, FaintSearch
 from planners.explore.found import Found
-from planners.explore.surveyor import CANDIDATES, Surveyor
+from planners.explore.surveyor import CANDIDATES, SurveyCount, Surveyor
 from planners.explore.warm_up import get_ready
 from planners.follow import (
     AxisTrack,
@@ -116,12 +116,17 @@ class Explore:
         """Sweeps with this fingertip on this base."""
         return Strokes(self.base, self.tip_radius, self.speed, self.force)
 
-    def plan(self, rng: np.random.Generator | None = None) -> Plan:
-        """The whole exploration; the outcome's value is a Found. Nothing in it is random: `rng` is not used."""
+    def plan(self, rng: np.random.Generator | None = None, count: SurveyCount | None = None) -> Plan:
+        """The whole exploration; the outcome's value is a Found. Nothing in it is random: `rng` is not used.
+
+        Args:
+            count: is kept up while the survey goes on.
+        """
         get_ready(self.tip_radius)
         found = Found(self.tip_radius, noise=self.noise)
         spent = Spent(25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed)
-        surveyor = Surveyor(self.survey, found, self.false_alarms_per_metre, self.stated)
+        count = SurveyCount() if count is None else count
+        surveyor = Surveyor(self.survey, found, self.false_alarms_per_metre, self.stated, count)
         everything = self._everything(surveyor, found)
         outcome = yield from within(everything, spent, self.time_budget, self.path_budget)
         if found.surveyed:

@@ -25,6 +25,19 @@ FEWEST_SWEEP_SAMPLES = 16
 
 
 @dataclass
+class SurveyCount:
+    """How far a survey is, for whoever watches it.
+
+    Args:
+        planned: sweeps that it wants, known once the first has told the noise; None before.
+        made: sweeps that it was answered, also those that could not be made.
+    """
+
+    planned: int | None = None
+    made: int = 0
+
+
+@dataclass
 class Surveyor:
     """One survey under way.
 
@@ -36,12 +49,14 @@ class Surveyor:
         visible: share of the smallest feature's height that stays visible between two sweeps.
         paths: touched by the sweeps so far, each (K, 3), m.
         limit: least height that the sweeps detect one by one, m.
+        count: kept up as it goes.
     """
 
     survey: Survey
     found: Found
     false_alarms_per_metre: float
     stated: StatedNoise | None = None
+    count: SurveyCount = field(default_factory=SurveyCount)
     visible: float = field(init=False)
     paths: list[FloatArray] = field(init=False, default_factory=list)
     limit: float = field(init=False, default=0.0)
@@ -54,10 +69,14 @@ class Surveyor:
         strips = self.survey.crossed(self.survey.visible) is None
         if strips and (first := next(self.survey.sweeps(), None)) is not None:
             trace = yield first
+            self.count.made += 1
             self._widen(trace)
         waiting, felt = list[Trace](), 0.0
-        for move in self.survey.sweeps(self.visible):
+        moves = list(self.survey.sweeps(self.visible))
+        self.count.planned = self.count.made + len(moves)
+        for move in moves:
             trace = yield move
+            self.count.made += 1
             self.paths.append(move.path + self.survey.tip_radius * move.approach)
             if len(trace) == 0:
                 self.found.left_out.append("a survey sweep felt no contact")

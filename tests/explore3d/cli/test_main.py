@@ -163,6 +163,7 @@ def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatc
         "model": Path("body.ply"),
         "model_units": "mm",
         "force": ["curvature"],
+        "overwrite": False,
     }
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from explore3d.errors import UserError
-from explore3d.jobs.resume import EARLIER, Replay, earlier_log
+from explore3d.errors import FolderError
+from explore3d.jobs.resume import Replay
+from explore3d.jobs.session import Session
 from explore3d.log.reader import read_log
 from explore3d.log.writer import LogWriter
 from hw.move import Move
@@ -57,9 +59,7 @@ def broken_off(path: Path, after: int, outcome: str = "") -> None:
 
 def test_the_resumed_session_feels_what_the_whole_one_would_have_felt(tmp_path: Path) -> None:
     broken_off(tmp_path / "log.mcap", 5)
-    log, content = earlier_log(tmp_path)
-    assert content == (tmp_path / "log.mcap").read_bytes()
-    replay, live = Replay(log), finger()
+    replay, live = Replay(read_log(tmp_path / "log.mcap")), finger()
     made = []
 
     def execute(move: Move) -> Trace:
@@ -117,14 +117,49 @@ def test_from_the_first_difference_on_the_finger_moves(tmp_path: Path) -> None:
     assert replay.replayed == 1 and len(made) == 3
 
 
-def test_the_fuller_of_two_logs_is_gone_on_from(tmp_path: Path) -> None:
-    """A resumed session that was killed while it replayed has a short log beside the whole earlier one."""
-    broken_off(tmp_path / EARLIER, 5)
-    broken_off(tmp_path / "log.mcap", 2)
-    log, _ = earlier_log(tmp_path)
-    assert len({int(s) for s in log.trace.sweep}) == 5
+def test_what_the_plan_does_not_ask_for_again_is_handed_over(tmp_path: Path) -> None:
+    broken_off(tmp_path / "log.mcap", 5)
+    log = read_log(tmp_path / "log.mcap")
+    replay, kept = Replay(log), list[Trace]()
+
+    def other() -> Plan:
+        yield Move(np.array([[0.02, 0.02, R], [0.05, 0.02, R]]), np.array([0.0, 0.0, -1.0]))
+        yield Move(np.array([[0.02, 0.09, R], [0.05, 0.09, R]]), np.array([0.0, 0.0, -1.0]))
+        return Outcome("done")
+
+    record, _ = drive(other(), replay.before(finger().execute, keep=lambda move, trace: kept.append(trace)))
+    assert replay.replayed == 1 and replay.live and len(kept) == 4
+    everything = [record[0][1], *kept, record[1][1]]
+    assert sum(map(len, everything)) == len(log.trace) + len(record[1][1])
+    assert [int(trace.sweep[0]) for trace in everything] == [1, 2, 3, 4, 5, 6]
+    assert (np.diff(Trace.concatenate(everything).t) > 0).all()
 
 
 def test_a_folder_without_a_log_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="nothing to resume"):
-        earlier_log(tmp_path)
+    with pytest.raises(FolderError, match="nothing to resume"), Session(tmp_path / "out", resume=True):
+        pass
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_unfinished_session_with_the_larger_log_is_gone_on_from(tmp_path: Path) -> None:
+    for count in (0, 3, 5, 2):  # the first one is whole
+        with suppress(KeyboardInterrupt), Session(tmp_path) as session:
+            log = session.open_log(tip_radius=R)
+            drive(plan(max(count, 1)), logged(finger().execute, log))
+            if count:
+                raise KeyboardInterrupt
+    with Session(tmp_path, resume=True) as session:
+        assert session.source == tmp_path / "unfinished-2" / "log.mcap"
+        replay = Replay(read_log(session.source))
+        log = session.open_log(tip_radius=R)
+        drive(plan(), logged(replay.before(finger().execute), log))
+        assert len({int(sweep) for sweep in read_log(session.source).trace.sweep}) == 5  # until the new one holds all
+        session.settle()
+        assert len({int(sweep) for sweep in read_log(session.source).trace.sweep}) == 8
+    assert len({int(sweep) for sweep in read_log(tmp_path / "log.mcap").trace.sweep}) == 8
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "log.mcap",
+        "session.json",
+        "unfinished-1",
+        "unfinished-3",
+    ]

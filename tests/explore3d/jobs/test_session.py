@@ -9,13 +9,15 @@ import subprocess
 import sys
 import textwrap
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from explore3d.errors import FolderError, UserError
-from explore3d.jobs.session import Session
+from explore3d.jobs.session import Job, Session
 from explore3d.log.reader import read_log
 from hw.move import Move
 from mapping.trace import Trace
@@ -126,7 +128,8 @@ def test_a_failed_run_keeps_what_the_finger_felt(tmp_path: Path) -> None:
             raise error
         log = read_log(tmp_path / name / "log.mcap")
         assert len(log.trace) == 7 and log.complete
-        assert state(tmp_path / name) == "failed"
+        assert state(tmp_path / name) == "stopped"
+        assert "kept: " in error.__notes__[-1]
 
 
 def test_a_file_appears_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -144,7 +147,8 @@ def test_a_log_in_the_folder_can_be_analysed_into_the_same_folder(tmp_path: Path
     log = tmp_path / "out" / "log.mcap"
     for number in range(2):
         with Session(tmp_path / "out", keep=[log]) as session:
-            assert len(read_log(log).trace) == 7 and not (tmp_path / "out" / "report.html").exists()
+            assert len(read_log(log).trace) == 7
+            assert (tmp_path / "out" / "report.html").exists() is (number == 0)  # until the new one is complete
             session.write("model.json", str(number))
     with pytest.raises(UserError), Session(tmp_path / "out", keep=[log]) as session:
         raise UserError("bad input")
@@ -161,7 +165,7 @@ def test_two_sessions_cannot_write_into_one_folder(tmp_path: Path) -> None:
             pass
         assert contents(tmp_path / "out") == {"a.txt": "first"}
     with Session(tmp_path / "out"):
-        pass
+        assert contents(tmp_path / "out") == {"a.txt": "first"}  # it stays until the new one is complete
     assert contents(tmp_path / "out") == {}
 
 
@@ -170,7 +174,7 @@ def test_a_killed_session_keeps_its_log_and_can_be_replaced(tmp_path: Path) -> N
         import sys, time
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         from test_session import MOVE, samples
-        from explore3d.jobs.session import Session
+        from explore3d.jobs.session import Job, Session
         with Session({str(tmp_path / "out")!r}) as session:
             session.open_log(tip_radius=0.01).write(MOVE, samples(9))
             with session.staging() as folder:
@@ -188,8 +192,80 @@ def test_a_killed_session_keeps_its_log_and_can_be_replaced(tmp_path: Path) -> N
     assert state(tmp_path / "out") == "running" and not (tmp_path / "out" / "half.txt").exists()
     assert len(read_log(tmp_path / "out" / "log.mcap").trace) == 9
     with Session(tmp_path / "out") as session:
+        assert len(read_log(tmp_path / "out" / "log.mcap").trace) == 9
         session.open_log(tip_radius=0.01).write(MOVE, samples(1))
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"session.json", "log.mcap"}
+
+
+def older(folder: Path) -> dict[str, str]:
+    """A whole session with a file of somebody else beside it."""
+    with Session(folder) as session:
+        session.write("old.txt", "old")
+        session.write("both.txt", "old")
+    (folder / "notes.md").write_text("mine")
+    return contents(folder)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), SystemExit(143), RuntimeError("lost"), UserError("bad")])
+def test_whatever_ends_a_session_the_older_one_stays(tmp_path: Path, error: BaseException) -> None:
+    before, marker = older(tmp_path), (tmp_path / "session.json").read_bytes()
+    with pytest.raises(type(error)), Session(tmp_path) as session:
+        session.write("both.txt", "new")
+        session.open_log(tip_radius=0.01).write(MOVE, samples(4))
+        raise error
+    assert {name: (tmp_path / name).read_text() for name in before} == before
+    assert (tmp_path / "session.json").read_bytes() == marker
+    assert len(read_log(tmp_path / "unfinished-1" / "log.mcap").trace) == 4
+    assert str(tmp_path / "unfinished-1" / "log.mcap") in error.__notes__[-1]
+
+
+@pytest.mark.parametrize("steps", range(8))
+def test_a_kill_in_the_midst_of_the_exchange_is_finished_by_the_next_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, steps: int
+) -> None:
+    older(tmp_path)
+    left = [steps]
+
+    def mortal(real: Callable[..., None]) -> Callable[..., None]:
+        def call(*given: object, **options: object) -> None:
+            left[0] -= committing[0]
+            if left[0] < 0:
+                raise Killed
+            real(*given, **options)
+
+        return call
+
+    committing = [0]
+    with suppress(Killed), Session(tmp_path) as session:
+        session.write("both.txt", "new")
+        session.write("pictures/new.txt", "new")
+        committing[0] = 1
+        for name in ("rename", "replace", "unlink", "rmdir"):
+            monkeypatch.setattr(os, name, mortal(getattr(os, name)))
+    monkeypatch.undo()
+    assert (tmp_path / "notes.md").read_text() == "mine"
+    with suppress(UserError), Session(tmp_path):
+        now = {name: text for name, text in contents(tmp_path).items() if not name.startswith("unfinished")}
+        raise UserError("look only")
+    whole = {"both.txt": "new", "pictures/new.txt": "new", "notes.md": "mine"}
+    assert now in (whole, {"both.txt": "old", "old.txt": "old", "notes.md": "mine"})
+    assert steps < 2 or now == whole
+
+
+class Killed(BaseException):
+    """A kill: nothing of the program runs after it."""
+
+
+def test_another_subject_needs_overwrite(tmp_path: Path) -> None:
+    with Session(tmp_path, Job("run", "one")) as session:
+        session.write("a.txt", "one")
+    for other in (Job("run", "two"), Job("analyze", "one")):
+        with pytest.raises(FolderError, match="--overwrite"), Session(tmp_path, other):
+            pass
+    assert contents(tmp_path) == {"a.txt": "one"}
+    with Session(tmp_path, Job("run", "two"), overwrite=True) as session:
+        session.write("b.txt", "two")
+    assert contents(tmp_path) == {"b.txt": "two"}
 
 
 # --- folders that cannot be written ---------------------------------------------------------------------

@@ -17,10 +17,17 @@ def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
     )
 
 
-def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.12e-3) -> Any:
+def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.12e-3, untouched: float = 0.0) -> Any:
     model, trace = SimpleNamespace(features=features), SimpleNamespace(tip_radius=0.01)
     detections = SimpleNamespace(detection_limit=limit, probability=0.95)
-    return SimpleNamespace(model=model, trace=trace, recovered=recovered, detections=detections)
+    return SimpleNamespace(
+        model=model,
+        trace=trace,
+        recovered=recovered,
+        detections=detections,
+        inspected=SimpleNamespace(untouched=untouched),
+        base=SimpleNamespace(kind="mesh"),
+    )
 
 
 def test_nothing_found_is_said_so() -> None:
@@ -33,6 +40,12 @@ def test_what_would_have_been_seen_is_said_with_every_result() -> None:
     found = analysis(feature("bump-1", True, Interval(0.0, 0.0, 0.0)))
     assert summary(found)[-1] == seen
     assert summary(analysis(limit=inf))[-1] == "The trace is too short to say what would have been seen."
+
+
+def test_no_sentence_speaks_of_a_surface_that_was_not_swept() -> None:
+    first, last = summary(analysis(untouched=0.79))
+    assert first == "no features found on the 21 % of the surface that was swept"
+    assert last.endswith("where a sweep crosses it on the 21 % of the surface that was swept.")
 
 
 def test_each_feature_has_a_line_with_its_intervals() -> None:

@@ -1,0 +1,259 @@
+"""Ended at any moment and by anything, a job leaves the older session bit for bit, its own log, and one line."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import trimesh
+from interrupting import Ended, bare_tile, digests, explore3d
+
+from explore3d.cli.main import main
+from explore3d.errors import UserError
+from explore3d.jobs.run import run
+from explore3d.log.reader import read_log
+from hw.errors import LinkError
+from hw.move import Move
+from hw.simulated.finger import SimulatedFinger
+from mapping.trace import Trace
+
+SIGNALS = {"SIGINT": 130, "SIGTERM": 143, "SIGKILL": -9}
+FULL = "full disk"
+CALIBRATION = """
+schema = "explore3d/scene/1"
+[tip]
+radius = "10 mm"
+[model]
+mesh = "sphere.ply"
+units = "mm"
+[finger]
+object = "sphere.ply"
+units = "mm"
+rate = "1 kHz"
+[survey]
+smallest_feature = "1 mm"
+speed = "30 mm/s"
+"""
+# s after its first file: about how long each job takes on a machine with nothing else to do
+LASTS = {"run": 3.0, "analyze": 2.0, "merge": 1.0, "calibrate": 0.4}
+
+
+@dataclass(frozen=True)
+class Older:
+    """Complete older sessions, and what is needed to make them again."""
+
+    folder: Path
+    scene: Path
+
+    def words(self, job: str, out: Path) -> list[object]:
+        if job == "run":
+            return ["run", self.scene, "--out", out]
+        if job == "analyze":
+            return ["analyze", self.folder / "run" / "log.mcap", "--out", out]
+        if job == "merge":
+            return ["merge", self.folder / "analyze", self.folder / "second" / "log.mcap", "--out", out]
+        sphere = self.folder / "sphere.toml"
+        return ["calibrate", sphere, "--radius", "12.5 mm", "--lines", 60, "--out", out / "tip.toml"]
+
+    def first_sign(self, job: str, out: Path) -> Path:
+        return out / ("tip-2.mcap" if job == "calibrate" else "unfinished-1")
+
+
+@pytest.fixture(scope="module")
+def older(tmp_path_factory: pytest.TempPathFactory) -> Older:
+    folder = tmp_path_factory.mktemp("older")
+    made = Older(folder, bare_tile(folder))
+    trimesh.creation.icosphere(subdivisions=4, radius=12.5).export(folder / "sphere.ply")
+    (folder / "sphere.toml").write_text(CALIBRATION)
+    run(bare_tile(folder, seed=5), folder / "second")
+    run(made.scene, folder / "run")
+    for job in ("analyze", "merge", "calibrate"):
+        (folder / job).mkdir()
+        assert explore3d(*made.words(job, folder / job)).status == 0
+    return made
+
+
+@contextmanager
+def small_disk(folder: Path) -> Iterator[Path]:
+    """A file system of 16 MB in a folder; skips the test where none can be made."""
+    place = folder / "disk"
+    place.mkdir(exist_ok=True)
+    if os.geteuid() != 0 or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", place]).returncode != 0:
+        pytest.skip("a small disk can only be made by root, with mount")
+    try:
+        yield place
+    finally:
+        subprocess.run(["umount", "-l", place], check=True)
+
+
+def check(ended: Ended, job: str, how: str, out: Path, before: dict[str, str]) -> str:
+    """What came of an interruption, in a word; fails unless nothing older was lost and the line is right."""
+    said = f"{job} {how}: status {ended.status}: {ended.err}"
+    assert "Traceback" not in ended.err, said
+    if ended.status == 0:
+        return "finished"
+    after = digests(out)
+    assert {name: after.get(name) for name in before} == before, said
+    logs = [*out.glob("unfinished-*/log.mcap"), *(path for path in out.glob("tip-*.mcap") if path.name not in before)]
+    samples = 0
+    for log in logs:
+        try:
+            samples += len(read_log(log).trace)
+        except UserError as error:
+            assert "samples: the log holds none" in str(error) and how in ("SIGKILL", FULL), said
+    if how == "SIGKILL":
+        assert ended.status == -9, said
+        return "killed"
+    assert ended.status in ((2, 3) if how == FULL else (SIGNALS[how],)), said
+    if samples:
+        assert re.match(r"explore3d: stopped after .*; kept: .*; go on with: explore3d .* --resume$", ended.last), said
+        return "kept"
+    assert ended.last.startswith("explore3d: ") and ("as it was" in ended.last or how == FULL), said
+    return "as it was"
+
+
+def interrupt(older: Older, job: str, how: str, share: float, folder: Path) -> str:
+    """End a job by a signal after a share of its time, over a copy of the older session."""
+    out = folder / "out"
+    shutil.copytree(older.folder / job, out)
+    before = digests(out)
+    words = older.words(job, out)
+    ended = explore3d(*words, after=share * LASTS[job], how=how, when=older.first_sign(job, out))
+    return check(ended, job, how, out, before)
+
+
+def fill(older: Older, job: str, free: int, folder: Path) -> str:
+    """Carry a job out over a copy of the older session, on a disk with so many bytes left."""
+    with small_disk(folder) as disk:
+        out = disk / "out"
+        shutil.copytree(older.folder / job, out)
+        before = digests(out)
+        state = os.statvfs(disk)
+        (disk / "filler").write_bytes(bytes(max(0, state.f_bavail * state.f_frsize - free)))
+        return check(explore3d(*older.words(job, out)), job, FULL, out, before)
+
+
+@pytest.mark.parametrize(("job", "how"), [("run", "SIGINT"), ("merge", "SIGTERM"), ("run", "SIGKILL")])
+def test_a_job_that_a_signal_ends_leaves_the_older_session(older: Older, tmp_path: Path, job: str, how: str) -> None:
+    assert interrupt(older, job, how, 0.3, tmp_path) in ("kept", "killed", "as it was")
+
+
+@pytest.mark.parametrize("free", [60_000, 2_000_000])
+def test_a_full_disk_leaves_the_older_session_and_the_log(older: Older, tmp_path: Path, free: int) -> None:
+    assert fill(older, "run", free, tmp_path) == "kept"
+
+
+@pytest.mark.slow
+def test_fifty_interruptions_at_random_moments_cost_nothing(older: Older, tmp_path: Path) -> None:
+    chance = random.Random(21)
+    jobs = ["run"] * 24 + ["analyze"] * 9 + ["merge"] * 8 + ["calibrate"] * 9
+    hows = (*SIGNALS, FULL)
+    came: list[str] = []
+    for number, job in enumerate(jobs):
+        how, what = hows[number % 4], "finished"
+        share = chance.random()
+        # results of 0.2 MB (a model) to 5.3 MB (a report) must not fit
+        most = {"merge": 1e4, "calibrate": 1e4}.get(job, 5e6 if number % 8 > 3 else 2e5)
+        free = int(chance.random() * most)
+        for attempt in range(4):
+            if what != "finished":
+                break
+            folder = tmp_path / f"{number}-{attempt}"
+            folder.mkdir()
+            what = (
+                fill(older, job, free >> attempt, folder)
+                if how == FULL
+                else interrupt(older, job, how, share / 2**attempt, folder)
+            )
+        came.append(f"{job} {how}: {what}")
+        print(came[-1], flush=True)
+        assert what != "finished", came[-1]
+    assert len(came) == 50
+
+
+# --- going on ---------------------------------------------------------------------------------------------
+
+
+def state(folder: Path) -> dict[str, object]:
+    record: dict[str, object] = json.loads((folder / "session.json").read_text())
+    return record
+
+
+def test_a_time_budget_that_ends_the_survey_is_said_first_and_gone_on_with(older: Older, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    short = explore3d("run", bare_tile(tmp_path, "10 s"), "--out", out)
+    assert short.status == 3
+    first = short.out.splitlines()[0]
+    assert re.match(
+        r"stopped after 4 of 14 sweeps: the time budget of 10 s was used up; go on with: .* --resume", first
+    )
+    assert " % of the surface that was swept" in short.out.splitlines()[1]
+    page, model = (out / "report.html").read_text(), json.loads((out / "model.json").read_text())
+    assert page.index("Stopped after 4 of 14 sweeps") < page.index("Nothing was found")
+    assert next(iter(model)) == "stopped" and model["provenance"]["complete"] is False
+    assert state(out)["state"] == "stopped"
+    analysis = run(bare_tile(tmp_path), out, resume=True)
+    assert analysis.stopped is None and state(out)["state"] == "complete"
+    assert {path.name for path in out.glob("*.mcap")} == {"log.mcap"}
+    log, whole = read_log(out / "log.mcap"), read_log(older.folder / "run" / "log.mcap")
+    assert (log.trace.centers == whole.trace.centers).all() and (log.trace.t == whole.trace.t).all()
+
+
+def test_a_pulled_cable_is_said_first_with_status_3(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def cut(scene: object, arm: bool = False) -> SimulatedFinger:
+        finger = whole(scene, arm)
+        touch, made = finger.execute, [0]
+
+        def execute(move: Move) -> Trace:
+            made[0] += move.purpose == "sweep"
+            if made[0] > 3:
+                raise LinkError("the cable was pulled")
+            return touch(move)
+
+        finger.execute = execute
+        return finger
+
+    job = importlib.import_module("explore3d.jobs.run")
+    whole = job.scene_finger
+    monkeypatch.setattr(job, "scene_finger", cut)
+    monkeypatch.setattr(sys, "argv", ["explore3d", "run", str(bare_tile(tmp_path)), "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 3
+    first, second, *_ = capsys.readouterr().out.splitlines()
+    assert re.match(
+        r"stopped after 3 of 14 sweeps: .*the cable was pulled; go on with: explore3d run .* --resume$", first
+    )
+    assert second.startswith("no features found on the ") and second.endswith(" % of the surface that was swept")
+
+
+@pytest.mark.parametrize("change", [lambda path: path.replace("seed = 4", "seed = 6")])
+def test_another_scene_needs_overwrite_and_is_refused_before_anything_moves(
+    older: Older, tmp_path: Path, change: Callable[[str], str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(older.folder / "run", out)
+    before = digests(out)
+    other = tmp_path / "other.toml"
+    other.write_text(change(older.scene.read_text()))
+    for more in ([], ["--resume"]):
+        refused = explore3d("run", other, "--out", out, *more)
+        assert refused.status == 2 and "--overwrite" in refused.last and "exploration" not in refused.err
+        assert digests(out) == before and not list(out.glob("unfinished-*"))
+    refused = explore3d("analyze", older.folder / "second", "--out", out)
+    assert refused.status == 2 and "--overwrite" in refused.last and digests(out) == before
+    run(other, out, overwrite=True)
+    assert "seed = 6" in (out / "scene.toml").read_text() and state(out)["state"] == "complete"
