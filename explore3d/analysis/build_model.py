@@ -272,6 +272,7 @@ def _provenance(log: Log, scene: Scene | None, settings: AnalysisSettings, detec
         "log_sha256": log.sha256,
         "samples": len(log.trace),
         "recovered": log.recovered,
+        "read_as": log.metadata.get("read_as", []),
         "noise": {
             "white": detections.noise.white,
             "correlated": detections.noise.correlated,
