@@ -6,6 +6,7 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from explore3d.log.format import LOG as LOG
+    from explore3d.log.inspect import Inspection as Inspection, inspect as inspect
     from explore3d.log.load import load_logs as load_logs
     from explore3d.log.reader import digest as digest, iter_log as iter_log, read_log as read_log
     from explore3d.log.record import (
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "format": ("LOG",),
+    "inspect": ("Inspection", "inspect"),
     "load": ("load_logs",),
     "reader": ("digest", "iter_log", "read_log"),
     "record": ("Event", "KIND", "Log", "base_event", "read_base"),

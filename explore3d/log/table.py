@@ -12,7 +12,15 @@ import numpy as np
 
 from explore3d import UserError
 from explore3d.log.record import Log
-from explore3d.log.table_columns import LENGTH_ROLES, POSITION, VECTORS, find_columns, label, length_factors, time_factor
+from explore3d.log.table_columns import (
+    LENGTH_ROLES,
+    POSITION,
+    VECTORS,
+    find_columns,
+    label,
+    length_factors,
+    time_factor,
+)
 from explore3d.log.table_order import Order, clipped, cloud_order, profile_order, sentinels
 from explore3d.log.table_settings import TableSettings, load_settings
 from explore3d.log.text import LEAST_ROWS, TableText, length_factor, read_text
@@ -207,7 +215,7 @@ def _good_rows(text: TableText, rows: FloatArray, roles: dict[str, int]) -> tupl
             )
             good &= ~none
     padding = _zeros_at_the_end(rows, good, [roles[role] for role in POSITION if role in roles])
-    if padding > 1:
+    if padding > 1 and len(rows) >= LEAST_ROWS:
         said.append((f"{padding} rows of zeros at the end are left out", f"{padding} left out: zeros at the end"))
         good[np.flatnonzero(good)[-padding:]] = False
     return good, said
@@ -219,7 +227,7 @@ def _zeros_at_the_end(rows: FloatArray, good: BoolArray, columns: list[int]) -> 
     tail = kept[-1:]
     if rows[tail][:, columns].any():
         return 0
-    some = np.any(rows[np.ix_(kept, columns)] != 0, axis=1)
+    some = np.any(rows[kept][:, columns] != 0, axis=1)
     return int(len(kept) - 1 - np.flatnonzero(some)[-1]) if some.any() else 0
 
 
@@ -254,7 +262,7 @@ def _order(values: Columns, jump: float | None, text: TableText, blocks: IntArra
         if found_order is None:
             raise UserError(
                 f"{text.path}: field order: the rows are in no order in which a finger could have moved, and nothing "
-                "says which order it was; give a column of times or of sweeps (--columns \"t=..., sweep=...\"), or sort"
+                'says which order it was; give a column of times or of sweeps (--columns "t=..., sweep=..."), or sort'
             )
         order = found_order
     return Order(rows[order.rows], order.sweep, "; ".join(filter(None, (said, order.said))))
@@ -296,7 +304,8 @@ def _trace(values: Columns, settings: TableSettings, text: TableText, order: Ord
     t = values["t"] if "t" in values else np.arange(len(x), dtype=np.float64)
     centers = table @ rotation.T + origin if moved else table
     try:
-        return Trace(t, centers, order.sweep, radius, vectors.get("normals"), vectors.get("contacts"), vectors.get("force"))
+        return Trace(
+            t, centers, order.sweep, radius, vectors.get("normals"), vectors.get("contacts"), vectors.get("force")
+        )
     except TraceError as error:
         raise UserError(f"{text.path}: {error}") from error
-

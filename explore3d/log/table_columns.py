@@ -39,7 +39,9 @@ def find_columns(table: TableText, given: Mapping[Role, str | int]) -> dict[str,
     for role in ("x", "y", "z"):
         if role in roles and roles[role] in table.texts:
             some = table.texts[roles[role]][0][:30]
-            raise UserError(f"{table.path}: field columns.{role}: {label(table, roles[role])} holds text, such as {some!r}")
+            raise UserError(
+                f"{table.path}: field columns.{role}: {label(table, roles[role])} holds text, such as {some!r}"
+            )
     for field, names in VECTORS.items():
         some_names = [name for name in names if name in roles]
         if some_names and len(some_names) < 3:

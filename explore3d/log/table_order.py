@@ -17,12 +17,14 @@ SENTINELS = np.sort(
 )  # fmt: skip
 OUTSIDE = 0.5  # of the range of the others: a sentinel of that kind stands off by more
 LONELY = 5.0  # ranges of the others: a value that repeats and is no known sentinel must stand off by more
+FEWEST = 7  # rows that show what is usual: fewer have no value far off all others
 REPEATS = 3  # such a value comes so often at least: two equal outliers may be chance
 TURN = 0.1  # of the extent along the rows: less is noise or a start, not the end of a row
 STRAIGHT = 0.3  # a row strays sideways by less of its own length; a half circle by 0.5
 ADVANCE = 0.7  # net advance per path: noise takes a little of it, there and back leaves half
 SHORT_ROW = 4  # samples: zigzags of fewer are noise, or rows in no order
 DISORDER = 10.0  # a usual step that is so many times the distance to the nearest point is no finger's
+MOST_STEPS = 100_000  # steps that tell the direction of the rows
 WIDE = 0.1  # of the extent: the steps of points in no order are longer
 
 
@@ -48,7 +50,7 @@ def sentinels(values: FloatArray) -> BoolArray:
     known = finite & ((SENTINELS[near] == values) | (np.abs(values) >= 1e30))
     rest = values[finite & ~known]
     found: BoolArray = np.zeros(len(values), dtype=np.bool_)
-    if len(rest) < 2:
+    if len(rest) < FEWEST:
         return found
     low, high = float(rest.min()), float(rest.max())
     room = OUTSIDE * (high - low)
@@ -92,10 +94,18 @@ def profile_order(x: FloatArray) -> Order:
         return Order(rows, one, f"x steps back {back} times")
     turns = turning_points(x, TURN * length)
     sweep = _cut(count, turns)
-    if count >= SHORT_ROW * (sweep[-1] + 1) and _progress(x, sweep) > ADVANCE:
+    if count >= SHORT_ROW * (sweep[-1] + 1) and _progress(x, sweep) > ADVANCE and _overlap(x, sweep):
         return Order(rows, sweep, f"x turns back {sweep[-1]} times: {sweep[-1] + 1} sweeps")
     order = np.argsort(x, kind="stable")
     return Order(order, one, "the rows stood in no order and are sorted by x")
+
+
+def _overlap(x: FloatArray, sweep: IntArray) -> bool:
+    """True if any two sweeps share a part of x: parts side by side are one sweep, in a wrong order."""
+    starts = np.flatnonzero(np.diff(sweep, prepend=-1))
+    low, high = np.minimum.reduceat(x, starts), np.maximum.reduceat(x, starts)
+    order = np.argsort(low)
+    return bool((np.maximum.accumulate(high[order])[:-1] > low[order][1:]).any())
 
 
 def _progress(x: FloatArray, sweep: IntArray) -> float:
@@ -135,8 +145,11 @@ def _counted(cuts: BoolArray) -> IntArray:
 
 
 def _main_direction(points: FloatArray) -> FloatArray:
-    steps = np.diff(points, axis=0)
-    direction: FloatArray = np.linalg.eigh(steps.T @ steps)[1][:, -1]
+    """The direction of most steps, short or long: the step from row to row may be longer than those along a row."""
+    steps: FloatArray = np.diff(points[: MOST_STEPS + 1], axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    steps = steps[lengths > 0] / lengths[lengths > 0, None]
+    direction: FloatArray = np.asarray(np.linalg.eigh(steps.T @ steps)[1])[:, -1]
     return direction
 
 
@@ -146,13 +159,19 @@ def _rows_that_turn(points: FloatArray) -> IntArray | None:
         return None
     direction = _main_direction(points)
     u = points @ direction
-    sweep = _cut(len(u), turning_points(u, TURN * float(np.ptp(u))))
+    off = points - u[:, None] * direction
+    turns = turning_points(u, TURN * float(np.ptp(u)))
+    # noise may move the turn by a sample: the longest step aside leads from row to row
+    aside_steps = np.linalg.norm(np.diff(off, axis=0), axis=1)
+    near = np.clip(turns[:, None] + np.array([-1, 0, 1]), 0, len(u) - 2)
+    single = np.isin(turns + 1, turns) | np.isin(turns - 1, turns)  # the step back of a raster one way
+    best = near[np.arange(len(turns)), np.argmax(aside_steps[near], axis=1)]
+    sweep = _cut(len(u), np.where(single, turns, best))
     rows = int(sweep[-1]) + 1
     if rows < 2 or len(u) < SHORT_ROW * rows or _progress(u, sweep) < ADVANCE:
         return None
     starts = np.flatnonzero(np.diff(sweep, prepend=-1))
     along = np.maximum.reduceat(u, starts) - np.minimum.reduceat(u, starts)
-    off = points - u[:, None] * direction
     aside = np.linalg.norm(np.maximum.reduceat(off, starts) - np.minimum.reduceat(off, starts), axis=1)
     straight = aside < STRAIGHT * along
     full = along > 0.5 * np.median(along)
@@ -176,7 +195,7 @@ def turning_points(u: FloatArray, least: float) -> IntArray:
                 extreme = high if high > low else low
                 if min(high, low) > 0:
                     turns.append(min(high, low))
-        elif direction * (value - values[extreme]) >= 0:
+        elif direction * (value - values[extreme]) > 0:
             extreme = index
         elif direction * (values[extreme] - value) > least:
             turns.append(extreme)
@@ -203,7 +222,7 @@ def _disordered(points: FloatArray, steps: FloatArray) -> bool:
     usual = float(np.median(steps))
     if len(steps) < 50 or usual < WIDE * extent:
         return False
-    low, high = np.quantile(steps, [0.1, 0.9])
+    low, high = float(np.quantile(steps, 0.1)), float(np.quantile(steps, 0.9))
     if high < 2.5 * low:  # steps all alike are a pattern, however wide
         return False
     from scipy.spatial import cKDTree

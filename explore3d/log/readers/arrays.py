@@ -19,7 +19,7 @@ class NpyArray:
     """One array: (N, C) numbers, or (N,) with named fields."""
 
     name = "a NumPy array (.npy)"
-    unsaid = ("the units", "the names of the columns, unless the array has fields", TIP, POINT)
+    unsaid: tuple[str, ...] = ("the units", "the names of the columns, unless the array has fields", TIP, POINT)
 
     def sniff(self, first: bytes) -> float:
         return 1.0 if first.startswith(b"\x93NUMPY") else 0.0
@@ -29,7 +29,9 @@ class NpyArray:
             # mapped, so that a size that the header claims and the file has not takes no memory
             array = np.load(path, mmap_mode="r", allow_pickle=False)
         except (ValueError, OSError, EOFError, SyntaxError) as error:
-            raise UserError(f"{path}: is not a NumPy array of numbers that can be read: {_first_line(error)}") from error
+            raise UserError(
+                f"{path}: is not a NumPy array of numbers that can be read: {_first_line(error)}"
+            ) from error
         return numbers_log(path, *columns_of(path, array), settings, "a NumPy array")
 
 
@@ -37,7 +39,7 @@ class NpzArrays:
     """Several arrays: one (N, C), or one (N,) for each column; kinds of columns are known by their names."""
 
     name = "NumPy arrays (.npz)"
-    unsaid = ("the units", TIP, POINT)
+    unsaid: tuple[str, ...] = ("the units", TIP, POINT)
 
     def sniff(self, first: bytes) -> float:
         # a local file header's name stands at byte 30; the zip reader is less sure
@@ -61,7 +63,9 @@ class NpzArrays:
         lengths = {len(array) for array in columns.values()}
         if len(columns) < 2 or len(lengths) != 1:
             shapes = ", ".join(f"{name} {array.shape}" for name, array in list(found.items())[:8])
-            raise UserError(f"{path}: field columns: expected one (N, C) array or columns of one length; found {shapes}")
+            raise UserError(
+                f"{path}: field columns: expected one (N, C) array or columns of one length; found {shapes}"
+            )
         rows = np.column_stack([array.astype(np.float64) for array in columns.values()])
         return numbers_log(path, tuple(columns), rows, settings, "NumPy arrays")
 
@@ -73,7 +77,9 @@ def columns_of(path: Path, array: np.ndarray) -> tuple[tuple[str, ...], np.ndarr
         UserError: it is no table of numbers.
     """
     if array.dtype.names and array.ndim == 1:
-        names = tuple(name for name in array.dtype.names if array.dtype[name].kind in "fiub" and not array.dtype[name].shape)
+        names = tuple(
+            name for name in array.dtype.names if array.dtype[name].kind in "fiub" and not array.dtype[name].shape
+        )
         return names, np.column_stack([array[name].astype(np.float64) for name in names]) if names else np.zeros((0, 0))
     if array.dtype.kind not in "fiub" or array.ndim != 2:
         raise UserError(

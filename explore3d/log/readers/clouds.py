@@ -28,7 +28,7 @@ class PlyPoints:
     """Vertices without faces, with all their scalar properties (t, sweep, nx ... are known by name)."""
 
     name = "points in a PLY file"
-    unsaid = _UNSAID
+    unsaid: tuple[str, ...] = _UNSAID
 
     def sniff(self, first: bytes) -> float:
         return 1.0 if re.match(rb"ply\r?\n", first) else 0.0
@@ -60,7 +60,7 @@ class PcdPoints:
     """Points of the Point Cloud Library, in text or binary; compressed ones are refused."""
 
     name = "points in a PCD file"
-    unsaid = _UNSAID
+    unsaid: tuple[str, ...] = _UNSAID
 
     def sniff(self, first: bytes) -> float:
         return 1.0 if re.search(rb"(?m)^VERSION \S+\r?\nFIELDS ", first) else 0.0
@@ -80,14 +80,16 @@ class PcdPoints:
             raise UserError(f"{path}: is a PCD file whose fields are no plain numbers")
         if form not in ("ascii", "binary"):
             raise UserError(f"{path}: is a PCD file with {form!r} data; save it as ascii or binary")
-        return _cloud_log(path, names, types, _whole(path, count), body, form == "ascii", settings, "points of a PCD file")
+        return _cloud_log(
+            path, names, types, _whole(path, count), body, form == "ascii", settings, "points of a PCD file"
+        )
 
 
 class ObjPoints:
     """Vertices of a Wavefront OBJ file without faces."""
 
     name = "points in an OBJ file"
-    unsaid = _UNSAID
+    unsaid: tuple[str, ...] = _UNSAID
 
     def sniff(self, first: bytes) -> float:
         return 0.9 if re.search(rb"(?m)^v[ \t]+[-+.\d]", first) else 0.0
@@ -105,7 +107,7 @@ class StlMesh:
     """Never a recording: triangles have no order of movement."""
 
     name = "an STL mesh"
-    unsaid = ()
+    unsaid: tuple[str, ...] = ()
 
     def sniff(self, first: bytes) -> float:
         if re.match(rb"\s*solid\b.*\s+facet normal", first, re.S):
@@ -136,14 +138,23 @@ def _whole(path: Path, word: str) -> int:
 
 
 def _cloud_log(
-    path: Path, names: list[str], types: list[str], count: int, body: bytes, text: bool, settings: Mapping[str, Any], kind: str
+    path: Path,
+    names: list[str],
+    types: list[str],
+    count: int,
+    body: bytes,
+    text: bool,
+    settings: Mapping[str, Any],
+    kind: str,
 ) -> Log:
     """The log of `count` points, if the file is long enough to hold them: what its header claims takes no memory."""
     if len(set(names)) != len(names):
         raise UserError(f"{path}: field columns: two properties have one name: {', '.join(names)}")
     least = 2 * len(names) if text else np.dtype(",".join(types) + ",").itemsize
     if count * least > len(body) + 1:
-        raise UserError(f"{path}: its header claims {count} points, for which its {len(body)} bytes are too few; it is cut")
+        raise UserError(
+            f"{path}: its header claims {count} points, for which its {len(body)} bytes are too few; it is cut"
+        )
     if text:
         try:
             rows = np.loadtxt(body.decode("latin-1").splitlines()[:count], ndmin=2, dtype=np.float64) if count else None

@@ -33,7 +33,7 @@ class TextTable:
     """CSV and TXT; the last that is asked, since any text may be a table."""
 
     name = "a table of numbers"
-    unsaid = (TIP, POINT)
+    unsaid: tuple[str, ...] = (TIP, POINT)
 
     def sniff(self, first: bytes) -> float:
         return 0.1

@@ -28,7 +28,7 @@ class Gzip:
     """One file in gzip."""
 
     name = "a gzip archive"
-    unsaid = ()
+    unsaid: tuple[str, ...] = ()
 
     def __init__(self, read: Read) -> None:
         self._read = read
@@ -48,7 +48,7 @@ class Zip:
     """A ZIP archive with one recording; what else it holds must be a sidecar in TOML."""
 
     name = "a ZIP archive"
-    unsaid = ()
+    unsaid: tuple[str, ...] = ()
 
     def __init__(self, read: Read) -> None:
         self._read = read
@@ -66,7 +66,9 @@ class Zip:
                 files = [each for each in inside if not each.is_dir() and not _beside(each.filename)]
                 if len(files) != 1:
                     names = ", ".join(each.filename for each in files[:5]) or "nothing"
-                    raise UserError(f"{path}: expected one recording in the archive; found {names}; unpack it and name one")
+                    raise UserError(
+                        f"{path}: expected one recording in the archive; found {names}; unpack it and name one"
+                    )
                 with packed.open(files[0]) as member:
                     return _read_inside(path, Path(files[0].filename).name, member, self._read, settings)
         except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
@@ -92,10 +94,10 @@ def _bounded(path: Path, packed: int, unpacked: int) -> None:
 
 
 def _beside(name: str) -> bool:
-    return name.startswith(("__MACOSX/", ".")) or name.endswith(".toml") or name.endswith(".DS_Store")
+    return name.startswith(("__MACOSX/", ".")) or name.endswith((".toml", ".DS_Store"))
 
 
-def _read_inside(path: Path, name: str, packed: IO[bytes], read: Read, settings: Mapping[str, Any]) -> Log:
+def _read_inside(path: Path, name: str, packed: IO[bytes] | gzip.GzipFile, read: Read, settings: Mapping[str, Any]) -> Log:
     """Unpack piece by piece into a folder of its own, that is gone afterwards, and read."""
     with TemporaryDirectory(prefix="explore3d-") as folder:
         inner = Path(folder) / (name or "recording")

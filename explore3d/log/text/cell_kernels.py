@@ -45,7 +45,7 @@ def read_cells(data, start, delimiter, decimal, thousands, textual, rows, lines,
     end = len(data)
     while at < end:
         first = at
-        while at < end and (data[at] == BLANK or data[at] == TAB and delimiter != TAB):
+        while at < end and (data[at] == BLANK or (data[at] == TAB and delimiter != TAB)):
             at += 1
         if data[at] == NEWLINE or data[at] == RETURN:
             blank = blank or row > 0
@@ -87,7 +87,7 @@ def read_cells(data, start, delimiter, decimal, thousands, textual, rows, lines,
                         odds += 1
             column += 1
             stop = data[at]
-            if stop == NEWLINE or stop == RETURN or (column >= columns and _comment(data, at)):
+            if stop in (NEWLINE, RETURN) or (column >= columns and _comment(data, at)):
                 break
             if delimiter != 0:
                 at += 1  # the delimiter
@@ -128,12 +128,12 @@ def _comment(data, at):  # type: ignore[no-untyped-def]
 def _ends(data, at, delimiter, quoted):  # type: ignore[no-untyped-def]
     """True if a cell ends at this byte."""
     byte = data[at]
-    if byte == NEWLINE or byte == RETURN:
+    if byte in (NEWLINE, RETURN):
         return True
     if quoted:
         return byte == QUOTE and data[at + 1] != QUOTE
     if delimiter == 0:
-        return byte == BLANK or byte == TAB
+        return byte in (BLANK, TAB)
     return byte == delimiter
 
 
@@ -161,8 +161,8 @@ def _plain(data, at, delimiter, decimal):  # type: ignore[no-untyped-def]
             byte = np.int64(data[at])
         after = at - start
     digits = before + max(after, 0)
-    ended = byte == delimiter or byte == NEWLINE or byte == RETURN
-    if delimiter == 0 and (byte == BLANK or byte == TAB):
+    ended = byte in (delimiter, NEWLINE, RETURN)
+    if delimiter == 0 and (byte in (BLANK, TAB)):
         ended = True
         while data[at] == BLANK or data[at] == TAB:
             at += 1
@@ -233,7 +233,8 @@ def _cell(data, at, delimiter, decimal, thousands):  # type: ignore[no-untyped-d
     while not _ends(data, at, delimiter, quoted):
         # what follows the number is blank, or else the cell is not a plain number
         if data[at] != BLANK and data[at] != TAB:
-            if delimiter != 0 and not quoted and _comment(data, at) and good and at > left:
+            behind = at > left and (data[at - 1] == BLANK or data[at - 1] == TAB)
+            if delimiter != 0 and not quoted and _comment(data, at) and good and behind:
                 break
             good = False
             right = at + 1
@@ -253,7 +254,7 @@ def _cell(data, at, delimiter, decimal, thousands):  # type: ignore[no-untyped-d
     if not good or number > EXACT or power > 22 or power < -22:
         return OTHER, np.nan, 0, -1, 0, left, right, at
     value = float(number) * TENS[power] if power >= 0 else float(number) / TENS[-power]
-    leading = 1 if zero and before > 1 or (zero and after >= 0) else 0
+    leading = 1 if (zero and before > 1) or (zero and after >= 0) else 0
     if after < 0 and exponent:
         after = 0
     return NUMBER, -value if negative else value, before, after, leading, left, right, at

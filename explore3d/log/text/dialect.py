@@ -11,9 +11,7 @@ from functools import cache
 
 COMMENTS = ("#", "%", "//")
 MISSING = frozenset(
-    "|-|--|---|*|**|***|****|*****|******|nan|+nan|-nan|na|n/a|#n/a|<na>|null|none|nil|inf|-inf|+inf|infinity|-infinity"
-    "|missing|invalid|bad|err|error|?|.|x|1.#qnan|-1.#ind|1.#ind|1.#inf|-1.#inf|1.#qnb|nan(ind)|-nan(ind)|nan(snan)|nd"
-    "|n.a.|n.d.|overrange|underrange|#num!|#value!|#div/0!|#ref!|nv|out|over|under".split("|")
+    ["", "-", "--", "---", "*", "**", "***", "****", "*****", "******", "nan", "+nan", "-nan", "na", "n/a", "#n/a", "<na>", "null", "none", "nil", "inf", "-inf", "+inf", "infinity", "-infinity", "missing", "invalid", "bad", "err", "error", "?", ".", "x", "1.#qnan", "-1.#ind", "1.#ind", "1.#inf", "-1.#inf", "1.#qnb", "nan(ind)", "-nan(ind)", "nan(snan)", "nd", "n.a.", "n.d.", "overrange", "underrange", "#num!", "#value!", "#div/0!", "#ref!", "nv", "out", "over", "under"]
 )
 # Decimal sign and sign between thousands, in the order of trust
 _SIGNS = ((".", ""), (",", ""), (".", ","), (",", "."), (".", "'"), (",", "'"), (".", " "), (",", " "))
@@ -76,7 +74,7 @@ def _judged(cells: Sequence[Sequence[str]], decimal: str, thousands: str) -> tup
     numeric = []
     for column in range(columns):
         hits = Counter(row[column] for row in rows)
-        numeric.append(hits[True] > 0 and hits[True] >= hits[False] or hits[False] == 0)
+        numeric.append((hits[True] > 0 and hits[True] >= hits[False]) or hits[False] == 0)
     good = sum(
         sum(hit is True for hit in row) >= 2
         and all(hit is not False for hit, number in zip(row, numeric, strict=True) if number)
@@ -117,4 +115,6 @@ def split(line: str, delimiter: str | None) -> list[str]:
 def _quoted(line: str, delimiter: str | None) -> list[str]:
     if delimiter is None:
         return [(quoted or plain).strip() for quoted, plain in re.findall(r'"([^"]*)"|([^\s"]+)', line)]
-    return [cell.strip() for cell in next(csv.reader([line.strip(" \r\n")], delimiter=delimiter, skipinitialspace=True))]
+    return [
+        cell.strip() for cell in next(csv.reader([line.strip(" \r\n")], delimiter=delimiter, skipinitialspace=True))
+    ]

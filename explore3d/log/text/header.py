@@ -31,7 +31,9 @@ _UNITS_SAID = re.compile(
     r"(?i)\b(?:(?P<axis>[xyz])[\s_-]*(?:axis|achse)?[\s_-]*)?(?:units?|einheit(?:en)?|unité)\b\s*[:=;,\t ]\s*[\"'\[(]*(?P<unit>[^\s\"'\]);,]+)"
 )
 _ALL_IN = re.compile(r"(?i)\b(?:all|values|coordinates|positions|lengths|data)\b.*\bin\s+\[?(?P<unit>[a-zµμÅ]+)\b")
-_SCALE = re.compile(r"(?i)\b\w*(?:scale|factor|multiplier|gain)\w*\b[^\d+-]{0,20}(?P<number>[-+]?\d+(?:[.,]\d+)?(?:e[-+]?\d+)?)")
+_SCALE = re.compile(
+    r"(?i)\b\w*(?:scale|factor|multiplier|gain)\w*\b[^\d+-]{0,20}(?P<number>[-+]?\d+(?:[.,]\d+)?(?:e[-+]?\d+)?)"
+)
 
 
 @dataclass(frozen=True)
@@ -82,26 +84,28 @@ def read_header(lines: Sequence[str], columns: int, delimiter: str | None, count
         elif not fits and known >= 2 and len(cells) == known:
             unfit = line.strip()
     names, units = ["" for _ in range(columns)], ["" for _ in range(columns)]
-    line = None
+    named_at: int | None = None
     if best is not None:
-        line = best[1]
+        named_at = best[1]
         parts = [name_and_unit(cell) for cell in best[2]]
         names, units = [name for name, _ in parts], [unit for _, unit in parts]
-        for below in lines[line + 1 : line + 3]:
-            cells = _cells(below, columns, delimiter, counter)
-            if cells is not None and all(is_unit(cell) for cell in cells) and any(cells):
-                stated = [cell.strip("[](){}<> ") for cell in cells]
+        for below in lines[named_at + 1 : named_at + 3]:
+            row = _cells(below, columns, delimiter, counter)
+            if row is not None and all(is_unit(cell) for cell in row) and any(row):
+                stated = [cell.strip("[](){}<> ") for cell in row]
                 units = [old or new for old, new in zip(units, stated, strict=True)]
     all_units, axis_units, scale = _said(lines)
     if best is not None and best[0]:
         unfit = ""
-    return Header(tuple(names), tuple(units), line, all_units, axis_units, scale, unfit)
+    return Header(tuple(names), tuple(units), named_at, all_units, axis_units, scale, unfit)
 
 
 def _last(lines: Sequence[str], at: int) -> bool:
     """True if nothing but units, rules and blanks stands between a line and the rows: a header of unknown names."""
     rest = [bare for line in lines[at + 1 :] if (bare := line.strip(" #%/\r\n\t"))]
-    return all(all(is_unit(cell) for cell in re.split(r"[;,\t|\s]+", line)) or not re.search(r"\w", line) for line in rest)
+    return all(
+        all(is_unit(cell) for cell in re.split(r"[;,\t|\s]+", line)) or not re.search(r"\w", line) for line in rest
+    )
 
 
 def _bare(line: str) -> str:
@@ -161,11 +165,11 @@ def _said(lines: Sequence[str]) -> tuple[str, dict[str, str], str]:
                 axes[hit["axis"].lower()] = hit["unit"]
             elif not everything:
                 everything = hit["unit"]
-        if (hit := _ALL_IN.search(line)) and length_factor(hit["unit"]) and not everything:
-            everything = hit["unit"]
-        if hit := _SCALE.search(line):
+        if (words := _ALL_IN.search(line)) and length_factor(words["unit"]) and not everything:
+            everything = words["unit"]
+        if factor := _SCALE.search(line):
             try:
-                one = float(hit["number"].replace(",", ".")) == 1.0
+                one = float(factor["number"].replace(",", ".")) == 1.0
             except ValueError:
                 one = False
             scale = scale if one else line.strip()

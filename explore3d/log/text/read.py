@@ -12,9 +12,9 @@ import numpy as np
 from explore3d import UserError
 from explore3d.log.text.decode import decoded
 from explore3d.log.text.dialect import COMMENTS, MISSING, Dialect, find_dialect, split
-from explore3d.log.text.header import FEW, Header, read_header, role_of
+from explore3d.log.text.header import FEW, read_header, role_of
 from explore3d.log.text.spelling import length_factor
-from mapping import FloatArray, IntArray
+from mapping import BoolArray, FloatArray, IntArray
 
 SAMPLE_LINES = 80  # at the beginning, in the middle, at the end: what finds the dialect
 MOST_ODD = 1000  # cells a column, at first, that are no plain number: the rest is read again with room for all
@@ -108,11 +108,14 @@ class _Reading:
         self.path, self.data, self.whole, self.dialect, self.asked = path, data, whole, dialect, decimal
         self.said: list[str] = []
         self.cut = False
+        self.footer: int | None = None
+        self.repeated: set[int] = set()
+        self.heads: set[str] = set()
 
     def table(self) -> TableText:
         columns = len(self.dialect.numeric)
         preamble, start = self._preamble()
-        self.start = start
+        self.start, self.heads = start, {line.strip() for line in preamble if not _blank_or_comment(line)}
         self.bytes = np.frombuffer(self.data, dtype=np.uint8)
         units_in_cells: dict[int, str] = {}
         rows, lines, blocks, spans, odd, strange, marks = self._cells()
@@ -134,7 +137,7 @@ class _Reading:
                 f"{self.path}: field columns: the header {header.unfit[:40]!r} does not name {columns} columns, as "
                 f"line {self.before + int(lines[0]) + 1} has: {self._line(int(lines[0]))[:40]!r}"
             )
-        keep = self._strange(strange, len(rows), preamble, header)
+        keep = self._strange(strange, len(rows))
         if keep is not None:
             rows, lines, blocks = rows[keep], lines[keep], blocks[keep]
             texts = {c: [cell for cell, kept in zip(cells, keep, strict=True) if kept] for c, cells in texts.items()}
@@ -142,7 +145,9 @@ class _Reading:
         for column, unit in enumerate(units):
             axis = header.axis_units.get(header.names[column][:1].lower(), "") if header.names[column] else ""
             both = length_factor(header.all_units) is not None
-            units[column] = unit or axis or (header.all_units if both and not _not_a_length(header.names[column]) else "")
+            units[column] = (
+                unit or axis or (header.all_units if both and not _not_a_length(header.names[column]) else "")
+            )
         unknown = header.all_units if header.all_units and length_factor(header.all_units) is None else ""
         if unknown:
             self.said.append(f"the file speaks of the unit {unknown!r}, which is no length")
@@ -211,7 +216,7 @@ class _Reading:
         if len(texts) < LEAST_ROWS:
             return first
         cells = [split(line, self.dialect.delimiter) for line in texts]
-        whole = [all(re.fullmatch(r"[-+]?\d+", cell) for cell in row) for row in cells]
+        whole = [all(re.fullmatch(r"[-+]?\d+|", cell) for cell in row) for row in cells]
         if not whole[0] or any(whole[1:]):
             return first
         numbers = np.array([[self._value(cell) for cell in row] for row in cells])
@@ -220,7 +225,8 @@ class _Reading:
         usual = np.nanmedian(steps, axis=0) if len(steps) else np.zeros(used.shape[1])
         spread = np.nanmax(used[1:], axis=0) - np.nanmin(used[1:], axis=0)
         far = np.abs(used[1] - used[0]) > FAR_STEP * np.maximum(usual, 0.1 * spread)
-        named = used[0].tolist() in (list(range(used.shape[1])), list(range(1, used.shape[1] + 1)))
+        known = used[0][np.isfinite(used[0])].tolist()
+        named = known in (list(range(len(known))), list(range(1, len(known) + 1)))
         if not (far.any() or named):
             return first
         self.said.append(f"the line {texts[0].strip()[:30]!r} left out: a header of numbers, not a point")
@@ -283,6 +289,9 @@ class _Reading:
             value = self._value(cell)
             if value is None:
                 line = self.before + int(self.lines[row])
+                if self._line(int(self.lines[row])).strip() in self.heads:
+                    self.repeated.add(row)
+                    continue
                 if row >= len(rows) - 10:
                     rows[row:] = np.nan  # perhaps a footer: judged with the lines that do not fit
                     self._footer_from(row, cell, column, line)
@@ -299,8 +308,6 @@ class _Reading:
         self.footer = row
         self.said.append(f"{len(tail)} lines after the numbers left out: {tail[0].strip()[:30]!r}")
 
-    footer: int | None = None
-
     def _unambiguous(self, marks: IntArray) -> None:
         """Refuse numbers that may be a thousand times as large."""
         if self.asked is not None:
@@ -311,7 +318,7 @@ class _Reading:
         if self.dialect.thousands:
             return
         both = doubtful.sum() > 0 and otherwise.sum() == 0
-        if both and sign == "," or (both and ((doubtful > 0) & (plain > 0)).any()):
+        if (both and sign == ",") or (both and ((doubtful > 0) & (plain > 0)).any()):
             other = "." if sign == "," else ","
             raise UserError(
                 f"{self.path}: field decimal: all numbers with {sign!r} have three digits after it: 1{sign}234 may be "
@@ -324,20 +331,22 @@ class _Reading:
                 "another delimiter, such as ;"
             )
 
-    def _strange(
-        self, strange: IntArray, rows: int, preamble: Sequence[str], header: Header
-    ) -> np.ndarray | None:
+    def _strange(self, strange: IntArray, rows: int) -> BoolArray | None:
         """Judge the lines that have another number of cells: footer, repeated header, cut line, or an error."""
         columns = len(self.dialect.numeric)
         count = rows if self.footer is None else self.footer
         last = int(self.lines[count - 1]) if count else -1
-        heads = {line.strip() for line in preamble}
-        footer, repeated = [], 0
+        footer, repeated = [], len(self.repeated)
         for line, cells, first, end in strange.tolist():
             text = self.data[first : self.data.find(b"\n", first)].decode("utf-8", "replace").strip()
-            if text in heads:
+            if text in self.heads:
                 repeated += 1
-            elif line > last and not self.whole and self.data.find(b"\n", end) == len(self.data) - 1 and self._begins(text):
+            elif (
+                line > last
+                and not self.whole
+                and self.data.find(b"\n", end) == len(self.data) - 1
+                and self._begins(text)
+            ):
                 self.cut = True
             elif line > last and not self._begins(text):
                 footer.append(text)
@@ -349,7 +358,11 @@ class _Reading:
             self.said.append(f"{len(footer)} lines after the numbers left out: {footer[0][:30]!r}")
         if repeated:
             self.said.append(f"{repeated} repeated header lines left out")
-        return None if self.footer is None else np.arange(rows) < self.footer
+        if self.footer is None and not self.repeated:
+            return None
+        keep: BoolArray = np.arange(rows) < count
+        keep[list(self.repeated)] = False
+        return keep
 
     def _begins(self, text: str) -> bool:
         """True if a line begins with a number, as a row does."""

@@ -70,4 +70,10 @@ def is_unit(cell: str) -> bool:
     """True if a whole cell is nothing but a unit, or says that there is none."""
     bare = cell.strip("[](){}<> ")
     known = bare.lower() in NO_UNIT or any(bare in units for units in UNITS.values())
-    return known or length_factor(bare) is not None or time_factor_of(bare) is not None or cell[:1] in "[(" and not cell[:1].isalnum()
+    return (
+        known
+        or length_factor(bare) is not None
+        or time_factor_of(bare) is not None
+        or (cell[:1] in "[("
+        and not cell[:1].isalnum())
+    )
