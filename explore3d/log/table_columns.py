@@ -81,8 +81,8 @@ def length_factors(
             )
         if table.scale and not asked:
             raise UserError(
-                f"{table.path}: field units: the file speaks of a factor ({table.scale[:40]!r}): are the numbers already "
-                f'multiplied by it? if so, give their unit with --units, or write units = "mm" in {table.path.name}.toml'
+                f"{table.path}: field units: the file speaks of a factor ({table.scale[:40]!r}): are the numbers "
+                f'already multiplied by it? then give their unit with --units, or units = "mm" in {table.path.name}.toml'
             )
         factors[role] = unit_factor(asked) if asked else known or 1.0
     return factors
@@ -127,7 +127,7 @@ def _positions(table: TableText, taken: set[int]) -> dict[str, int]:
 
 
 def _by_number(table: TableText, free: list[int]) -> dict[str, int]:
-    """Positions of a table without names: two columns are a profile, three are x, y, z, if nothing speaks against it."""
+    """Positions without names: two columns are a profile, three are x, y, z, if nothing speaks against it."""
     rows = table.rows[np.isfinite(table.rows[:, free]).all(axis=1)]
     columns = [rows[:, index] for index in free]
     if len(rows) < LEAST_ROWS:

@@ -10,11 +10,10 @@ from mapping import BoolArray, FloatArray, IntArray
 
 JUMP = 10.0  # median steps: noise alone never makes a step so long, a lifted finger nearly always does
 # Numbers that programs write where there is none: of nines, the ends of integers, powers of ten that no length has
-SENTINELS = np.sort(
-    [s * v for v in (999, 9999, 99999, 999999, 999.9, 9999.9, 999.99, 999.999, 32767, 2147483647, 1e10, 1e20, 1e30, 1e31)
-     for s in (-1, 1)]
-    + [1e36, 1e37, 1e38, -1e37, -1e38, -32768, 32768, 65535, 4294967295, -2147483648, 9.96921e36, -3.4028235e38, 3.4028235e38]
-)  # fmt: skip
+_NINES = (999, 9999, 99999, 999999, 999.9, 9999.9, 999.99, 999.999)
+_INTEGERS = (32767, 32768, 65535, 2147483647, 2147483648, 4294967295)
+_HUGE = (1e10, 1e20, 1e30, 1e31, 1e36, 1e37, 1e38, 9.96921e36, 3.4028235e38)
+SENTINELS = np.sort([sign * value for value in (*_NINES, *_INTEGERS, *_HUGE) for sign in (-1, 1)])
 OUTSIDE = 0.5  # of the range of the others: a sentinel of that kind stands off by more
 LONELY = 5.0  # ranges of the others: a value that repeats and is no known sentinel must stand off by more
 FEWEST = 7  # rows that show what is usual: fewer have no value far off all others
@@ -146,10 +145,11 @@ def _counted(cuts: BoolArray) -> IntArray:
 
 def _main_direction(points: FloatArray) -> FloatArray:
     """The direction of most steps, short or long: the step from row to row may be longer than those along a row."""
-    steps: FloatArray = np.diff(points[: MOST_STEPS + 1], axis=0)
-    lengths = np.linalg.norm(steps, axis=1)
-    steps = steps[lengths > 0] / lengths[lengths > 0, None]
-    direction: FloatArray = np.asarray(np.linalg.eigh(steps.T @ steps)[1])[:, -1]
+    some = points[: MOST_STEPS + 1]
+    steps: FloatArray = some[1:] - some[:-1]
+    lengths = np.sqrt(np.sum(steps**2, axis=1))[:, None]
+    unit = np.divide(steps, lengths, out=np.zeros_like(steps), where=lengths > 0)
+    direction: FloatArray = np.linalg.svd(unit.T @ unit)[2][0]
     return direction
 
 

@@ -28,7 +28,7 @@ class NpyArray:
         try:
             # mapped, so that a size that the header claims and the file has not takes no memory
             array = np.load(path, mmap_mode="r", allow_pickle=False)
-        except (ValueError, OSError, EOFError, SyntaxError) as error:
+        except Exception as error:  # the parser of headers raises whatever it stumbles over
             raise UserError(
                 f"{path}: is not a NumPy array of numbers that can be read: {_first_line(error)}"
             ) from error
@@ -54,7 +54,9 @@ class NpzArrays:
                 check_sizes(path, packed.infolist())
             with np.load(path, allow_pickle=False) as arrays:
                 found = {name: arrays[name] for name in arrays.files}
-        except (ValueError, OSError, EOFError, SyntaxError, zipfile.BadZipFile, zipfile.LargeZipFile) as error:
+        except UserError:
+            raise
+        except Exception as error:  # unpacking and the parser of headers raise whatever they stumble over
             raise UserError(f"{path}: is not an archive of NumPy arrays of numbers: {_first_line(error)}") from error
         tables = {name: array for name, array in found.items() if array.ndim == 2 or array.dtype.names}
         if len(tables) == 1:
@@ -88,8 +90,8 @@ def columns_of(path: Path, array: np.ndarray) -> tuple[tuple[str, ...], np.ndarr
         )
     if array.shape[0] < array.shape[1] <= 64 or array.shape[1] > 64:
         raise UserError(
-            f"{path}: field columns: expected (N, C), a row for each sample; found shape {array.shape}: transpose it, or is "
-            "it a map of heights, which states no position?"
+            f"{path}: field columns: expected (N, C), a row for each sample; found shape {array.shape}: transpose it, or "
+            "is it a map of heights, which states no position?"
         )
     return ("",) * array.shape[1], np.array(array, dtype=np.float64)
 

@@ -88,8 +88,8 @@ def check_sizes(path: Path, inside: Sequence[zipfile.ZipInfo]) -> None:
 def _bounded(path: Path, packed: int, unpacked: int) -> None:
     if unpacked > MOST_UNPACKED or unpacked > max(SMALL, MOST_RATIO * packed):
         raise UserError(
-            f"{path}: holds {unpacked:,} bytes or more in {packed:,}; a recording is at most {MOST_RATIO} times its packed "
-            f"size and {MOST_UNPACKED:,} bytes; unpack it yourself if you trust it"
+            f"{path}: holds {unpacked:,} bytes or more in {packed:,}; a recording is at most {MOST_RATIO} times its "
+            f"packed size and {MOST_UNPACKED:,} bytes; unpack it yourself if you trust it"
         )
 
 
@@ -97,7 +97,9 @@ def _beside(name: str) -> bool:
     return name.startswith(("__MACOSX/", ".")) or name.endswith((".toml", ".DS_Store"))
 
 
-def _read_inside(path: Path, name: str, packed: IO[bytes] | gzip.GzipFile, read: Read, settings: Mapping[str, Any]) -> Log:
+def _read_inside(
+    path: Path, name: str, packed: IO[bytes] | gzip.GzipFile, read: Read, settings: Mapping[str, Any]
+) -> Log:
     """Unpack piece by piece into a folder of its own, that is gone afterwards, and read."""
     with TemporaryDirectory(prefix="explore3d-") as folder:
         inner = Path(folder) / (name or "recording")

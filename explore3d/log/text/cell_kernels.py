@@ -176,7 +176,7 @@ def _plain(data, at, delimiter, decimal):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _cell(data, at, delimiter, decimal, thousands):  # type: ignore[no-untyped-def]
-    """One cell: kind, value, digits before and after the decimal sign (-1: none), leading zero, span, where it stops."""
+    """One cell: kind, value, digits before and after the decimal sign (-1: none), leading zero, span, and its end."""
     while data[at] == BLANK or (data[at] == TAB and delimiter != TAB):
         at += 1
     kind, plain, before, after, leading, stop = _plain(data, at, delimiter, decimal)

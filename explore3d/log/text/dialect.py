@@ -10,9 +10,12 @@ from dataclasses import dataclass
 from functools import cache
 
 COMMENTS = ("#", "%", "//")
-MISSING = frozenset(
-    ["", "-", "--", "---", "*", "**", "***", "****", "*****", "******", "nan", "+nan", "-nan", "na", "n/a", "#n/a", "<na>", "null", "none", "nil", "inf", "-inf", "+inf", "infinity", "-infinity", "missing", "invalid", "bad", "err", "error", "?", ".", "x", "1.#qnan", "-1.#ind", "1.#ind", "1.#inf", "-1.#inf", "1.#qnb", "nan(ind)", "-nan(ind)", "nan(snan)", "nd", "n.a.", "n.d.", "overrange", "underrange", "#num!", "#value!", "#div/0!", "#ref!", "nv", "out", "over", "under"]
-)
+_NONE = """
+    - -- --- * ** *** **** ***** ****** nan +nan -nan na n/a #n/a <na> null none nil inf -inf +inf infinity -infinity
+    missing invalid bad err error ? . x 1.#qnan -1.#ind 1.#ind 1.#inf -1.#inf 1.#qnb nan(ind) -nan(ind) nan(snan) nd
+    n.a. n.d. overrange underrange #num! #value! #div/0! #ref! nv out over under
+"""
+MISSING = frozenset(("", *_NONE.split()))
 # Decimal sign and sign between thousands, in the order of trust
 _SIGNS = ((".", ""), (",", ""), (".", ","), (",", "."), (".", "'"), (",", "'"), (".", " "), (",", " "))
 _DELIMITERS = (";", "\t", ",", "|", None)

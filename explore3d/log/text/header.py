@@ -14,9 +14,11 @@ NAMES = {
     "x": "x xpos posx xposition positionx xaxis axisx xachse xcoordinate coordinatex xcoord xtip tipx px position "
     "pos distance travel lateral lateralposition scanposition scandistance traceposition weg strecke abscissa "
     "xcenter xcentre xdistance xlength",
-    "y": "y ypos posy yposition positiony yaxis axisy yachse ycoordinate coordinatey ycoord ytip tipy py ycenter ycentre",
+    "y": "y ypos posy yposition positiony yaxis axisy yachse ycoordinate coordinatey ycoord ytip tipy py ycenter "
+    "ycentre",
     "z": "z height zpos posz zposition positionz zaxis axisz zachse zcoordinate coordinatez zcoord ztip tipz pz "
-    "totalprofile profile rawprofile topography elevation hoehe höhe hauteur altura zheight heightz zvalue zcenter zcentre",
+    "totalprofile profile rawprofile topography elevation hoehe höhe hauteur altura zheight heightz zvalue "
+    "zcenter zcentre",
     "t": "t time timestamp elapsed elapsedtime zeit stamp datetime date seconds",
     "sweep": "sweep line track pass scan scanline trace sweepid linenumber lineno",
     "valid": "valid ok mask isvalid",
@@ -28,7 +30,8 @@ VECTOR_NAMES = frozenset(f"{letter}{axis}" for letter in "ncf" for axis in "xyz"
 FEW = 400  # lines of a preamble that are looked at: instruments write tens
 
 _UNITS_SAID = re.compile(
-    r"(?i)\b(?:(?P<axis>[xyz])[\s_-]*(?:axis|achse)?[\s_-]*)?(?:units?|einheit(?:en)?|unité)\b\s*[:=;,\t ]\s*[\"'\[(]*(?P<unit>[^\s\"'\]);,]+)"
+    r"(?i)\b(?:(?P<axis>[xyz])[\s_-]*(?:axis|achse)?[\s_-]*)?(?:units?|einheit(?:en)?|unité)\b"
+    r"\s*[:=;,\t ]\s*[\"'\[(]*(?P<unit>[^\s\"'\]);,]+)"
 )
 _ALL_IN = re.compile(r"(?i)\b(?:all|values|coordinates|positions|lengths|data)\b.*\bin\s+\[?(?P<unit>[a-zµμÅ]+)\b")
 _SCALE = re.compile(

@@ -352,7 +352,8 @@ class _Reading:
                 footer.append(text)
             else:
                 raise UserError(
-                    f"{self.path}: line {self.before + line + 1}: expected {columns} columns; found {cells}: {text[:40]!r}"
+                    f"{self.path}: line {self.before + line + 1}: expected {columns} columns; found {cells}: "
+                    f"{text[:40]!r}"
                 )
         if footer:
             self.said.append(f"{len(footer)} lines after the numbers left out: {footer[0][:30]!r}")

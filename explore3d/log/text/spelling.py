@@ -74,6 +74,5 @@ def is_unit(cell: str) -> bool:
         known
         or length_factor(bare) is not None
         or time_factor_of(bare) is not None
-        or (cell[:1] in "[("
-        and not cell[:1].isalnum())
+        or (cell[:1] in "[(" and not cell[:1].isalnum())
     )
