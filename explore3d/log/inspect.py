@@ -13,10 +13,12 @@ from explore3d import UserError, length_text
 from explore3d.log.format import LOG
 from explore3d.log.readers import read_recording, reader_of
 from explore3d.log.record import Log
-from explore3d.log.text import TableText
+from explore3d.log.table_columns import EVEN, advances, counts
+from explore3d.log.table_order import sentinels
+from explore3d.log.text import TableText, read_text
 from mapping import FloatArray
 
-GAP = 5.0  # usual steps: a longer one within a sweep is a gap, samples were lost or left out there
+SAMPLE_GAP = 5.0  # usual steps: a longer one within a sweep is a gap, samples were lost or left out there
 MOST_LISTED_COLUMNS = 16  # columns that are listed one by one
 
 
@@ -76,7 +78,7 @@ class Inspection:
             unit = "" if self.metres else " (unit not stated)"
             lines.append(f"samples: {self.samples:,} in {self.sweeps} sweeps; extent {extent}{unit}")
             lines.append(
-                f"spacing: {length(self.spacing)}; {self.gaps} gaps longer than {GAP:g} spacings, "
+                f"spacing: {length(self.spacing)}; {self.gaps} gaps longer than {SAMPLE_GAP:g} spacings, "
                 f"{self.duplicates} repeated positions"
             )
         if self.tip_radius is not None:
@@ -146,7 +148,7 @@ def _with_log(found: Inspection, log: Log, assumed: set[str]) -> Inspection:
         len(np.unique(sweep)),
         tuple(float(size) for size in np.ptp(centers, axis=0)),
         spacing,
-        int((steps > GAP * spacing).sum()),
+        int((steps > SAMPLE_GAP * spacing).sum()),
         int((steps == 0).sum()),
         None if "tip_radius" in assumed else log.trace.tip_radius,
         metres,
@@ -158,7 +160,6 @@ def _with_log(found: Inspection, log: Log, assumed: set[str]) -> Inspection:
 
 def _columns(path: Path, settings: Mapping[str, Any]) -> list[dict[str, Any]]:
     from explore3d.log.table_settings import load_settings
-    from explore3d.log.text import read_text
 
     given, _ = load_settings(path, **{key: value for key, value in settings.items() if value is not None})
     try:
@@ -184,9 +185,6 @@ def _column(text: TableText, index: int) -> dict[str, Any]:
 
 def _habit(values: FloatArray) -> str:
     """How the numbers of a column go."""
-    from explore3d.log.table_columns import EVEN, advances, counts
-    from explore3d.log.table_order import sentinels
-
     if not len(values):
         return "holds no number"
     if len(values) == 1 or not np.ptp(values) > 0:

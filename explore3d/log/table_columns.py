@@ -82,7 +82,7 @@ def length_factors(
         if table.scale and not asked:
             raise UserError(
                 f"{table.path}: field units: the file speaks of a factor ({table.scale[:40]!r}): are the numbers "
-                f'already multiplied by it? then give their unit with --units, or units = "mm" in {table.path.name}.toml'
+                f'already multiplied by it? then give the unit: --units mm, or units = "mm" in {table.path.name}.toml'
             )
         factors[role] = unit_factor(asked) if asked else known or 1.0
     return factors

@@ -228,5 +228,5 @@ def _disordered(points: FloatArray, steps: FloatArray) -> bool:
     from scipy.spatial import cKDTree
 
     some = points[:: max(1, len(points) // 2000)]
-    nearest = cKDTree(points).query(some, 2)[0][:, 1]
+    nearest = np.asarray(cKDTree(points).query(some, 2)[0])[:, 1]
     return usual > DISORDER * float(np.median(nearest[nearest > 0]) if (nearest > 0).any() else 0.0)

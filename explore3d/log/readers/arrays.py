@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError
+from explore3d.log import Log
 from explore3d.log.readers.own import POINT, TIP
-from explore3d.log.record import Log
-from explore3d.log.text import TableText
+from explore3d.log.readers.packed import check_sizes
+from explore3d.log.text import TableText, name_and_unit
 
 
 class NpyArray:
@@ -47,8 +48,6 @@ class NpzArrays:
         return 1.0 if first.startswith(b"PK\x03\x04") and first[30 : 30 + length].endswith(b".npy") else 0.0
 
     def read(self, path: Path, settings: Mapping[str, Any]) -> Log:
-        from explore3d.log.readers.packed import check_sizes
-
         try:
             with zipfile.ZipFile(path) as packed:
                 check_sizes(path, packed.infolist())
@@ -90,17 +89,15 @@ def columns_of(path: Path, array: np.ndarray) -> tuple[tuple[str, ...], np.ndarr
         )
     if array.shape[0] < array.shape[1] <= 64 or array.shape[1] > 64:
         raise UserError(
-            f"{path}: field columns: expected (N, C), a row for each sample; found shape {array.shape}: transpose it, or "
-            "is it a map of heights, which states no position?"
+            f"{path}: field columns: expected (N, C), a row for each sample; found shape {array.shape}: transpose it, "
+            "or is it a map of heights, which states no position?"
         )
     return ("",) * array.shape[1], np.array(array, dtype=np.float64)
 
 
 def numbers_log(path: Path, names: tuple[str, ...], rows: np.ndarray, settings: Mapping[str, Any], kind: str) -> Log:
     """The log of named columns of numbers; units come from the names ("x_mm") or from the settings."""
-    from explore3d.log.table import table_log
-    from explore3d.log.table_settings import load_settings
-    from explore3d.log.text import name_and_unit
+    from explore3d.log import load_settings, table_log
 
     if not len(rows):
         raise UserError(f"{path}: field samples: it holds none")

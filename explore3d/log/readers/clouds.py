@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError
+from explore3d.log import Log
 from explore3d.log.readers.arrays import numbers_log
 from explore3d.log.readers.own import POINT, TIP
-from explore3d.log.record import Log
 
 _UNSAID = ("the units", "the order of movement (taken as the order of the points)", TIP, POINT)
 _PLY_TYPES = {

@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from explore3d import parse_length
-from explore3d.log.format import MAGIC
-from explore3d.log.reader import read_log
-from explore3d.log.record import Log
+from explore3d.log import MAGIC, Log, read_log
 
 TIP = "the radius of the fingertip"
 POINT = "whether heights are the tip's or the surface's (taken as the tip's)"
@@ -39,6 +37,6 @@ class TextTable:
         return 0.1
 
     def read(self, path: Path, settings: Mapping[str, Any]) -> Log:
-        from explore3d.log.table import read_table
+        from explore3d.log import read_table
 
         return read_table(path, **settings)

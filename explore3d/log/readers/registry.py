@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from explore3d import UserError
-from explore3d.log.format import LOG
+from explore3d.log import LOG, Log
 from explore3d.log.readers.arrays import NpyArray, NpzArrays
 from explore3d.log.readers.clouds import ObjPoints, PcdPoints, PlyPoints, StlMesh
 from explore3d.log.readers.own import McapLog, TextTable
 from explore3d.log.readers.packed import Gzip, Zip
 from explore3d.log.readers.reader import FIRST_BYTES, Reader
-from explore3d.log.record import Log
 
 GROUP = "explore3d.readers"
 
