@@ -257,7 +257,8 @@ def _order(values: Columns, jump: float | None, text: TableText, blocks: IntArra
     if "y" not in values and jump is None:
         order = profile_order(values["x"][rows])
     else:
-        points = np.column_stack([values["x"], values.get("y", np.zeros(count)), values["z"]])[rows]
+        points = np.stack([values["x"], values.get("y", np.zeros(count)), values["z"]]).T
+        points = points[rows] if said.startswith("the rows") else points
         found_order = cloud_order(points, jump)
         if found_order is None:
             raise UserError(
@@ -273,8 +274,10 @@ def _doubts(text: TableText, roles: dict[str, int], values: Columns, settings: T
     found = []
     if said := clipped(values["z"]):
         found.append(f"doubtful: z: {said}")
-    positions = np.column_stack([values[role] for role in POSITION if role in values])
-    same = int((np.diff(positions, axis=0) == 0).all(axis=1).sum())
+    still: BoolArray = np.ones(max(len(values["z"]) - 1, 0), dtype=np.bool_)
+    for role in (role for role in POSITION if role in values):
+        still &= values[role][1:] == values[role][:-1]
+    same = int(still.sum())
     if same:
         found.append(f"{same} rows repeat the one before")
     known = [index for index, name in enumerate(text.names) if index not in roles.values() and name]

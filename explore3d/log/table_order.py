@@ -119,7 +119,7 @@ def _progress(x: FloatArray, sweep: IntArray) -> float:
 def cloud_order(points: FloatArray, jump: float | None) -> Order | None:
     """Sweeps of points: cut at each jump, or where straight rows turn; None if the points are in no order."""
     rows = np.arange(len(points))
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    steps = np.sqrt(sum(np.diff(column) ** 2 for column in points.T))
     moving = steps[steps > 0]
     if jump is not None or not len(moving):
         return Order(rows, _counted(steps > (np.inf if jump is None else jump)))
@@ -159,20 +159,21 @@ def _rows_that_turn(points: FloatArray) -> IntArray | None:
         return None
     direction = _main_direction(points)
     u = points @ direction
-    off = points - u[:, None] * direction
+    off = [column - u * part for column, part in zip(points.T, direction, strict=True)]
     turns = turning_points(u, TURN * float(np.ptp(u)))
     # noise may move the turn by a sample: the longest step aside leads from row to row
-    aside_steps = np.linalg.norm(np.diff(off, axis=0), axis=1)
     near = np.clip(turns[:, None] + np.array([-1, 0, 1]), 0, len(u) - 2)
+    aside_steps = np.sqrt(sum((part[near + 1] - part[near]) ** 2 for part in off))
     single = np.isin(turns + 1, turns) | np.isin(turns - 1, turns)  # the step back of a raster one way
-    best = near[np.arange(len(turns)), np.argmax(aside_steps[near], axis=1)]
+    best = near[np.arange(len(turns)), np.argmax(aside_steps, axis=1)]
     sweep = _cut(len(u), np.where(single, turns, best))
     rows = int(sweep[-1]) + 1
     if rows < 2 or len(u) < SHORT_ROW * rows or _progress(u, sweep) < ADVANCE:
         return None
     starts = np.flatnonzero(np.diff(sweep, prepend=-1))
     along = np.maximum.reduceat(u, starts) - np.minimum.reduceat(u, starts)
-    aside = np.linalg.norm(np.maximum.reduceat(off, starts) - np.minimum.reduceat(off, starts), axis=1)
+    widths = [np.maximum.reduceat(part, starts) - np.minimum.reduceat(part, starts) for part in off]
+    aside = np.sqrt(sum(width**2 for width in widths))
     straight = aside < STRAIGHT * along
     full = along > 0.5 * np.median(along)
     return sweep if straight.mean() > 0.9 and full.mean() > 0.9 else None
