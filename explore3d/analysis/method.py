@@ -350,6 +350,7 @@ def _provenance(work: Work) -> dict[str, Any]:
         "recovered": log.recovered,
         "stopped": None if stop is None else stop.text,
         "complete": stop is None or not stop.incomplete,
+        "read_as": log.metadata.get("read_as", []),
         "noise": {"white": noise.white, "correlated": noise.correlated, "length": noise.length},
         "detection_limit": work.detections.detection_limit,
         "false_alarms_per_metre": work.settings.false_alarms_per_metre,

@@ -16,6 +16,7 @@ from explore3d.cli.bench import bench
 from explore3d.cli.doctor import doctor
 from explore3d.cli.figures import figures
 from explore3d.cli.hardware import calibrate, emulate, reprobe, selftest
+from explore3d.cli.inspect import inspect
 from explore3d.cli.interrupted import DISK_ERRORS, InterruptedJobError, is_kept, one_line, told
 from explore3d.cli.merge import merge
 from explore3d.cli.options import INCOMPLETE
@@ -35,7 +36,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, plan, analyze, merge, figures, doctor, emulate, calibrate, selftest, reprobe, stability):
+for command in (run, plan, analyze, inspect, merge, figures, doctor, emulate, calibrate, selftest, reprobe, stability):
     app.command()(one_line(command))
 app.add_typer(bench, name="bench")
 

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from explore3d.log.format import LOG as LOG
+    from explore3d.log.format import LOG as LOG, MAGIC as MAGIC
+    from explore3d.log.inspect import Inspection as Inspection, inspect as inspect
     from explore3d.log.load import load_logs as load_logs
     from explore3d.log.reader import digest as digest, iter_log as iter_log, read_log as read_log
     from explore3d.log.record import (
@@ -26,10 +27,13 @@ if TYPE_CHECKING:
         head as head,
         large_log as large_log,
     )
+    from explore3d.log.table import read_table as read_table, table_log as table_log
+    from explore3d.log.table_settings import load_settings as load_settings
     from explore3d.log.writer import LogWriter as LogWriter, Recorder as Recorder
 
 _PUBLIC = {
-    "format": ("LOG",),
+    "format": ("LOG", "MAGIC"),
+    "inspect": ("Inspection", "inspect"),
     "load": ("load_logs",),
     "reader": ("digest", "iter_log", "read_log"),
     "record": (
@@ -45,6 +49,8 @@ _PUBLIC = {
         "stop_of",
     ),
     "stream": ("LogStream", "count_samples", "head", "large_log"),
+    "table": ("read_table", "table_log"),
+    "table_settings": ("load_settings",),
     "writer": ("LogWriter", "Recorder"),
 }
 doorway(__name__, _PUBLIC)

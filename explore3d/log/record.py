@@ -83,11 +83,12 @@ def merge(logs: Sequence[Log]) -> Log:
         traces.append(replace(log.trace, sweep=sweep))
         events += [_shifted(event, samples) for event in log.events]
         samples, sweeps = samples + len(log.trace), int(sweep.max()) + 1
+    read_as = [f"{_name(log)}: {line}" for log in logs for line in log.metadata.get("read_as", [])]
     return Log(
         trace=Trace.concatenate(traces),
         scene_text=next((log.scene_text for log in logs if log.scene_text), ""),
         events=tuple(events),
-        metadata=first.metadata,
+        metadata=first.metadata | ({"read_as": read_as} if read_as else {}),
         complete=all(log.complete for log in logs),
         recovered="; ".join(f"{_name(log)}: {log.recovered}" for log in logs if log.recovered),
         sha256=hashlib.sha256("\n".join(log.sha256 for log in logs).encode()).hexdigest(),

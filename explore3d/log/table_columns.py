@@ -6,20 +6,17 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Literal
 
+import numpy as np
+
 from explore3d import UNITS, UserError, unit_factor
-from explore3d.log.table_text import TableText
+from explore3d.log.text import LEAST_ROWS, NO_UNIT, TableText, length_factor, role_of, time_factor_of
+from mapping import FloatArray
 
 Role = Literal["x", "y", "z", "t", "sweep", "valid", "nx", "ny", "nz", "cx", "cy", "cz", "fx", "fy", "fz"]
 POSITION: tuple[Role, ...] = ("x", "y", "z")
 VECTORS = {"normals": ("nx", "ny", "nz"), "contacts": ("cx", "cy", "cz"), "force": ("fx", "fy", "fz")}
 LENGTH_ROLES: tuple[Role, ...] = (*POSITION, "cx", "cy", "cz")
-
-_SYNONYMS = {
-    "t": ("t", "time"),
-    "sweep": ("sweep", "line", "track"),
-    "valid": ("valid", "ok", "mask"),
-    "z": ("z", "height"),
-}
+EVEN = 0.01  # share of the usual step by which the steps of a scan may differ and still be called even
 
 
 def find_columns(table: TableText, given: Mapping[Role, str | int]) -> dict[str, int]:
@@ -39,10 +36,18 @@ def find_columns(table: TableText, given: Mapping[Role, str | int]) -> dict[str,
         roles["z"] = roles.pop("y")  # a profile whose height is called y
     if not {"x", "z"} <= roles.keys():
         raise UserError(f"{table.path}: field columns: x and z (or x, y, z) are needed; found {', '.join(roles)}")
+    for role in ("x", "y", "z"):
+        if role in roles and roles[role] in table.texts:
+            some = table.texts[roles[role]][0][:30]
+            raise UserError(
+                f"{table.path}: field columns.{role}: {label(table, roles[role])} holds text, such as {some!r}"
+            )
     for field, names in VECTORS.items():
-        some = [name for name in names if name in roles]
-        if some and len(some) < 3:
-            raise UserError(f"{table.path}: field columns: {field} need {', '.join(names)}; found {', '.join(some)}")
+        some_names = [name for name in names if name in roles]
+        if some_names and len(some_names) < 3:
+            raise UserError(
+                f"{table.path}: field columns: {field} need {', '.join(names)}; found {', '.join(some_names)}"
+            )
     return roles
 
 
@@ -56,48 +61,138 @@ def length_factors(
     """
     factors: dict[str, float] = {}
     for role in (role for role in LENGTH_ROLES if role in roles):
-        stated = table.units[roles[role]]
-        stated = stated if stated in UNITS["length"] else ""
-        asked = units if isinstance(units, str) else (units or {}).get(role, "")
-        if asked and stated and unit_factor(asked) != unit_factor(stated):
+        stated = table.units[roles[role]].strip()
+        known = length_factor(stated)
+        column = label(table, roles[role])
+        if known is None and stated.lower() not in NO_UNIT:
             raise UserError(
-                f"{table.path}: field units: {asked!r} is asked for, but the file states {stated!r} for column "
-                f"{_label(table, roles[role])}"
+                f"{table.path}: field units: the file states {stated!r} for column {column}, which is no unit of "
+                f"length that is known; possible: {', '.join(UNITS['length'])}"
             )
-        if not (asked or stated):
+        asked = units if isinstance(units, str) else (units or {}).get(role, "")
+        if asked and known is not None and not np.isclose(unit_factor(asked), known, rtol=1e-9):
             raise UserError(
-                f"{table.path}: field units: missing for column {_label(table, roles[role])}; give them with "
+                f"{table.path}: field units: {asked!r} is asked for, but the file states {stated!r} for column {column}"
+            )
+        if not (asked or known is not None):
+            raise UserError(
+                f"{table.path}: field units: missing for column {column}; give them with "
                 f'--units mm, or write units = "mm" in {table.path.name}.toml'
             )
-        factors[role] = unit_factor(asked or stated)
+        if table.scale and not asked:
+            raise UserError(
+                f"{table.path}: field units: the file speaks of a factor ({table.scale[:40]!r}): are the numbers "
+                f'already multiplied by it? then give the unit: --units mm, or units = "mm" in {table.path.name}.toml'
+            )
+        factors[role] = unit_factor(asked) if asked else known or 1.0
     return factors
 
 
-def time_factor(table: TableText, roles: Mapping[str, int]) -> float:
-    """Seconds per unit of the column of times; seconds unless its header says otherwise."""
-    return UNITS["time"].get(table.units[roles["t"]], 1.0)
+# An hour's clock in so many units since 1970 is what a time without a unit and of that size can only be
+_EPOCH_UNITS = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "us"), (1e11, 1e-3, "ms"))
+
+
+def time_factor(table: TableText, roles: Mapping[str, int], times: FloatArray) -> tuple[float, str]:
+    """Seconds per unit of the column of times, and what is taken for granted about it."""
+    unit = table.units[roles["t"]]
+    factor = time_factor_of(unit)
+    if factor is not None:
+        return factor, ""
+    if unit.lower() not in NO_UNIT:
+        return 1.0, f"times are in {unit!r}, which is no unit of time that is known; taken as seconds"
+    size = float(np.max(np.abs(times))) if len(times) else 0.0
+    for least, factor, name in _EPOCH_UNITS:
+        if size > least:
+            return factor, f"times taken as {name} since 1970"
+    return 1.0, ""
 
 
 def _positions(table: TableText, taken: set[int]) -> dict[str, int]:
     named: dict[str, int] = {
         role: index for role in POSITION if (index := _named(table, role)) is not None and index not in taken
     }
-    if "x" in named and len(named) >= 2:
+    if len(named) >= 2:
+        if "x" not in named:
+            named["x"] = named.pop("y")  # a profile along y
         return named
-    free = [index for index in range(len(table.names)) if index not in taken]
+    if _named(table, "depth") is not None:
+        raise UserError(
+            f"{table.path}: field columns: a depth may count downwards; if it grows outwards, say "
+            f'--columns "x=..., z={table.names[_named(table, "depth") or 0]}", else turn its sign'
+        )
+    if any(table.names):
+        raise _cannot_tell(table, "")
+    free = [index for index in range(len(table.names)) if index not in taken and index not in table.texts]
+    return _by_number(table, free)
+
+
+def _by_number(table: TableText, free: list[int]) -> dict[str, int]:
+    """Positions without names: two columns are a profile, three are x, y, z, if nothing speaks against it."""
+    rows = table.rows[np.isfinite(table.rows[:, free]).all(axis=1)]
+    columns = [rows[:, index] for index in free]
+    if len(rows) < LEAST_ROWS:
+        if len(free) == 2:
+            return {"x": free[0], "z": free[1]}
+        if len(free) == 3:
+            return dict(zip(POSITION, free, strict=True))
+        raise _cannot_tell(table, "")
+    marks = [index for index, column in zip(free, columns, strict=True) if set(np.unique(column)) == {0.0, 1.0}]
+    if marks and len(free) > 2:
+        raise _cannot_tell(table, f"column {marks[0] + 1} holds nothing but 0 and 1: a mark?")
+    counter = counts(columns[0])
     if len(free) == 2:
+        if counter:
+            raise _cannot_tell(table, "column 1 counts the rows: an index, or x in steps of 1?")
+        if advances(columns[1]) and not advances(columns[0]):
+            raise _cannot_tell(table, "column 2 advances and column 1 does not: is x the second?")
         return {"x": free[0], "z": free[1]}
+    if counter and len(free) in (3, 4):
+        if len(free) == 4 or not np.ptp(columns[1]) > 0:
+            return dict(zip(POSITION, free[-3:], strict=True))
+        if advances(columns[1]):
+            return {"x": free[1], "z": free[2]}
+        raise _cannot_tell(table, "column 1 counts the rows: an index, or x in steps of 1?")
     if len(free) == 3:
+        if advances(columns[0]) and np.ptp(columns[1]) > 0:
+            why = "a time" if advances(columns[1]) else "x, with a height beside it"
+            raise _cannot_tell(table, f"column 1 never turns back: x of one slanting sweep, or {why}?")
         return dict(zip(POSITION, free, strict=True))
-    raise UserError(
-        f"{table.path}: field columns: cannot tell x, y, z or x, z among {_labels(table)}; "
+    raise _cannot_tell(table, "")
+
+
+def counts(column: FloatArray) -> bool:
+    """True if a column counts the rows: from 0 or 1 on in steps of 1."""
+    return bool(column[0] in (0.0, 1.0) and np.array_equal(column, column[0] + np.arange(len(column))))
+
+
+def advances(column: FloatArray) -> bool:
+    """True if a column never turns back: as time does, or x of one sweep."""
+    steps = np.diff(column)
+    return bool((steps > 0).all() or (steps < 0).all())
+
+
+def _cannot_tell(table: TableText, why: str) -> UserError:
+    return UserError(
+        f"{table.path}: field columns: cannot tell x, y, z or x, z among {_labels(table)}{': ' * bool(why)}{why}; "
         'say which with --columns "x=1, z=2" (names or numbers)'
     )
 
 
 def _named(table: TableText, role: str) -> int | None:
-    wanted = _SYNONYMS.get(role, (role,))
-    return next((i for name in wanted for i, have in enumerate(table.names) if have.strip().lower() == name), None)
+    """The column of that name; the plain letter before other words.
+
+    Raises:
+        UserError: two columns may be it.
+    """
+    found = [index for index, name in enumerate(table.names) if name and role_of(name) == role]
+    plain = [index for index in found if table.names[index].strip().lower() == role]
+    found = plain or found
+    if len(found) > 1 and role in (*POSITION, "t", "sweep"):
+        which = " and ".join(f"{table.names[index]!r} (column {index + 1})" for index in found)
+        raise UserError(
+            f'{table.path}: field columns: {which} may both be {role}; say which with --columns "x=1, z=2" (numbers)'
+        )
+    return found[0] if found else None
 
 
 def _index(table: TableText, role: str, column: str | int) -> int:
@@ -119,8 +214,9 @@ def _index(table: TableText, role: str, column: str | int) -> int:
 
 
 def _labels(table: TableText) -> str:
-    return ", ".join(_label(table, index) for index in range(len(table.names)))
+    return ", ".join(label(table, index) for index in range(len(table.names)))
 
 
-def _label(table: TableText, index: int) -> str:
+def label(table: TableText, index: int) -> str:
+    """A column by its name, or by its number from 1."""
     return repr(table.names[index]) if table.names[index] else str(index + 1)

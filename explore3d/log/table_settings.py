@@ -50,6 +50,7 @@ class TableSettings(Table):
         frame: pose of the table's frame in the object's.
         jump: distance between consecutive samples beyond which a new sweep begins, m; None: ten median steps.
         reference: the point of the ball that the coordinates give, its "centre" or its "bottom" (centre - r z).
+        decimal: sign of the numbers, where the file leaves it open ("1,234"); None: found.
     """
 
     units: LengthUnit | dict[Role, LengthUnit] | None = None
@@ -58,6 +59,7 @@ class TableSettings(Table):
     frame: TableFrame = TableFrame()
     jump: Length | None = None
     reference: Literal["centre", "bottom"] = "centre"
+    decimal: Literal[".", ","] | None = None
 
     @model_validator(mode="before")
     @classmethod

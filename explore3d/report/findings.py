@@ -39,6 +39,7 @@ def summary(analysis: Analysis) -> list[str]:
     lines = [f"{count_text(len(features), 'feature')} found{swept_part(analysis)}"]
     if features:
         lines[0] += f", {finer} of them finer than the tip of {length_text(analysis.trace.tip_radius)}"
+    lines = [*(f"read as: {line}" for line in analysis.model.provenance.get("read_as", [])), *lines]
     if analysis.recovered:
         lines.append(analysis.recovered)
     more = (

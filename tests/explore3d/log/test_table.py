@@ -79,7 +79,7 @@ def test_encodings_of_instruments_are_understood(tmp_path: Path, encoding: str) 
 
 @settings(max_examples=40, deadline=None)
 @given(
-    rows=st.lists(st.tuples(*[st.floats(-1e12, 1e12)] * 3), min_size=1, max_size=8),
+    rows=st.lists(st.tuples(*[st.floats(-1e12, 1e12)] * 3), min_size=1, max_size=7),
     delimiter=st.sampled_from([",", ";", "\t", " ", ";comma"]),
 )
 def test_numbers_written_in_full_come_back_bit_for_bit(
@@ -88,7 +88,8 @@ def test_numbers_written_in_full_come_back_bit_for_bit(
     lines = [delimiter[0].join(repr(value) for value in row) for row in rows]
     text = "\n".join(lines).replace(".", ",") if delimiter == ";comma" else "\n".join(lines)
     path = table(tmp_path_factory.mktemp("table"), text)
-    trace = read_table(path, units="m", tip_radius=1.0, jump=1e30).trace
+    decimal = "," if delimiter == ";comma" else "."
+    trace = read_table(path, units="m", tip_radius=1.0, jump=1e30, decimal=decimal).trace
     assert trace.centers.tolist() == [list(row) for row in rows]
 
 
@@ -139,7 +140,7 @@ def test_an_incomplete_last_line_is_left_out_and_said(tmp_path: Path) -> None:
 def test_a_cell_that_is_no_number_is_named_by_line_and_column(tmp_path: Path) -> None:
     refused(tmp_path, "x;z\n1;2\n3;4\n5;six\n7;8\n", "line 4, column 2", "'six'")
     refused(tmp_path, "1 2 3\n4 5\n6 7 8\n", "line 2", "expected 3 columns; found 2")
-    refused(tmp_path, "1;2;3\n4;5;6\nmean;0\n", "line 3", "expected 3 columns; found 2")
+    refused(tmp_path, "1;2;3\n4;5;6\n7;0\n1;2;3\n", "line 3", "expected 3 columns; found 2")
 
 
 @pytest.mark.parametrize(
@@ -223,7 +224,7 @@ def test_sweeps_are_cut_where_the_finger_jumped(tmp_path: Path, back_and_forth: 
 def test_noise_much_larger_than_the_spacing_does_not_cut_sweeps(tmp_path: Path) -> None:
     rng = np.random.default_rng(6)
     points = np.column_stack([np.arange(20_000) * 6e-3, *rng.normal(0, 0.2, (2, 20_000))])
-    assert np.unique(read(tmp_path, rows(points)).trace.sweep).tolist() == [0]
+    assert np.unique(read(tmp_path, "x y z\n" + rows(points)).trace.sweep).tolist() == [0]
 
 
 def test_a_length_of_jump_can_be_said(tmp_path: Path) -> None:

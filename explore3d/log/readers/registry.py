@@ -1,0 +1,79 @@
+"""The registry: readers of ours and of other packages; the one that is surest of a file's first bytes reads it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from explore3d import UserError
+from explore3d.log import LOG, Log
+from explore3d.log.readers.arrays import NpyArray, NpzArrays
+from explore3d.log.readers.clouds import ObjPoints, PcdPoints, PlyPoints, StlMesh
+from explore3d.log.readers.own import McapLog, TextTable
+from explore3d.log.readers.packed import Gzip, Zip
+from explore3d.log.readers.reader import FIRST_BYTES, Reader
+
+GROUP = "explore3d.readers"
+
+
+@cache
+def readers() -> tuple[Reader, ...]:
+    """All readers, ours first; of equally sure ones the first wins.
+
+    Raises:
+        UserError: a reader of another package that cannot be loaded, named with its package.
+    """
+    ours: list[Reader] = [McapLog(), NpyArray(), NpzArrays(), PlyPoints(), PcdPoints(), Gzip(read_recording)]
+    ours += [Zip(read_recording), ObjPoints(), StlMesh()]
+    for entry in entry_points(group=GROUP):
+        try:
+            made = entry.load()
+        except Exception as error:  # whatever another package stumbles over; it is named
+            raise UserError(f"reader {entry.name!r} ({entry.value}) cannot be loaded: {error}") from error
+        ours.append(made() if isinstance(made, type) else made)
+    return (*ours, TextTable())
+
+
+def reader_of(path: Path) -> Reader:
+    """The reader of a file, by its first bytes.
+
+    Raises:
+        UserError: the file cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            first = file.read(FIRST_BYTES)
+    except OSError as error:
+        raise UserError(f"{path}: cannot read it: {error.strerror}") from error
+    if not first and path.suffix != ".mcap":
+        raise UserError(f"{path}: is empty")
+    # a log of ours whose first bytes are destroyed is still one by its name
+    if path.suffix == ".mcap" and b"\0" in first and max(each.sniff(first) for each in readers()) <= 0.1:
+        return readers()[0]
+    return max(readers(), key=lambda each: each.sniff(first))
+
+
+def read_recording(path: Path, settings: Mapping[str, Any]) -> Log:
+    """What a file or a session's folder holds.
+
+    Args:
+        path: the file, or the folder, whose log is taken.
+        settings: those of read_table; None means not said.
+
+    Raises:
+        UserError: one line naming the file and the field.
+    """
+    if path.is_dir():
+        if not (path / LOG).is_file():
+            raise UserError(f"{path}: is a folder without {LOG}; expected a log, a table, or the folder of a session")
+        path = path / LOG
+    given = {key: value for key, value in settings.items() if value is not None}
+    read = reader_of(path).read(path, given)
+    if isinstance(read, Log):
+        return read
+    about = {"read_as": [f"{reader_of(path).name}, {len(read)} rows"]}
+    return Log(trace=read, metadata=about, sha256=hashlib.sha256(path.read_bytes()).hexdigest(), sources=(str(path),))
