@@ -26,6 +26,8 @@ class Link:
         baudrate: bits per second.
         write_timeout: longest time a write may take, s.
         lost: called once, in the reading thread, when the connection breaks.
+        still: keep the lines DTR and RTS low on opening and leave them alone: boards of the Arduino kind restart
+            when one of them is raised.
 
     Raises:
         LinkError: (on open) no such port, or another program has it.
@@ -40,6 +42,7 @@ class Link:
         baudrate: int = 115200,
         write_timeout: float = 0.5,
         lost: Callable[[], None] | None = None,
+        still: bool = False,
     ) -> None:
         self.port, self.framing = port, framing
         self.received = 0
@@ -47,7 +50,7 @@ class Link:
         self.error: str | None = None
         self.heard = time.monotonic()
         self._receive, self._lost = receive, lost
-        self._baudrate, self._write_timeout = baudrate, write_timeout
+        self._baudrate, self._write_timeout, self._still = baudrate, write_timeout, still
         self._writing = threading.RLock()  # a signal may strike while a write goes on, and stop the machine
         self._serial: Any = None
         self._reader: threading.Thread | None = None
@@ -65,6 +68,8 @@ class Link:
                 timeout=0.05,
                 write_timeout=self._write_timeout,
             )
+            if self._still:  # set before the port is open: afterwards the restart has begun
+                self._serial.dtr = self._serial.rts = False
             if "://" not in self.port:
                 self._serial.exclusive = True
             self._serial.open()
@@ -109,6 +114,12 @@ class Link:
             except (SerialException, OSError) as error:
                 self._break(f"{self.port}: cannot write ({error})")
                 raise LinkError(self.error or str(error)) from error
+
+    def raise_lines(self) -> None:
+        """Raise DTR and RTS: a native USB port sends nothing before it is asked so. May restart the device."""
+        with self._writing, suppress(OSError):  # a pseudo-terminal has no such lines
+            if self._serial is not None:
+                self._serial.dtr = self._serial.rts = True
 
     def reopen(self, within: float) -> bool:
         """Try for some seconds to open the port again after it was lost; True if it is open now."""

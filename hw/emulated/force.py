@@ -28,7 +28,7 @@ class ForceEmulator:
         stage: GrblEmulator,
         *,
         rate: float = 1000.0,
-        noise: float = 0.0,
+        noise: float = 0.003,
         latency: float = 0.0,
         drift: float = 0.0,
         seed: int = 0,

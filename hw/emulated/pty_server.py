@@ -70,6 +70,8 @@ class PtyServer:
         return [str(self._links[i]) if i < len(self._links) else self._slave(i) for i in range(len(self.devices))]
 
     def __enter__(self) -> PtyServer:
+        for device in self.devices:
+            device.out.clear()  # what was sent before anybody had the port open is lost, the greeting above all
         self._begun = time.monotonic()
         self._thread.start()
         return self

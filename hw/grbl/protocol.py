@@ -13,37 +13,70 @@ import numpy as np
 
 from mapping import FloatArray
 
+STATES = ("Idle", "Run", "Hold", "Jog", "Alarm", "Door", "Check", "Home", "Sleep", "Tool")
 STATUS, HOLD, RESUME, RESET, DOOR, JOG_CANCEL = b"?", b"!", b"~", b"\x18", b"\x84", b"\x85"
 RECEIVE_BUFFER = 128  # bytes
 
+# Grbl 1.1, doc/csv/error_codes_en_US.csv, alarm_codes_en_US.csv, and grblHAL's additions in errors.h, alarms.h
 ERRORS = {
     1: "a word has no letter",
     2: "a number is malformed",
     3: "unknown $ command",
+    4: "a value must not be negative",
+    5: "homing is not enabled ($22=0)",
+    6: "the step pulse is too short",
+    7: "the settings in the EEPROM were damaged and are the default ones again: check them ($$)",
     8: "this $ command needs an idle machine",
     9: "locked by an alarm or while jogging; unlock ($X) or home ($H) first",
     10: "soft limits need homing to be enabled",
     11: "line too long",
+    12: "a step rate beyond what the controller can make",
     13: "the safety door is open",
+    14: "the start-up or build line is too long",
     15: "the jog would leave the machine's travel",
     16: "malformed jog",
+    17: "laser mode needs a spindle with PWM",
+    18: "reset asserted",
     20: "unsupported G-code",
+    21: "two words of one modal group in a line",
     22: "no feed rate set",
+    23: "this word needs a whole number",
     24: "two commands that both need axis words",
+    25: "a word is there twice",
     26: "axis words missing",
+    27: "line number out of range",
+    28: "a value word is missing",
+    29: "no such work coordinate system",
     30: "G53 works with G0 and G1 only",
+    31: "axis words without a command that needs them",
+    32: "an arc without axis words of its plane",
     33: "the target is not possible, or is where the machine already stands",
+    34: "malformed arc",
+    35: "an arc without offsets",
+    36: "value words that nothing needs",
+    37: "a tool length offset for an axis that is not configured for it",
+    38: "tool number too large",
 }
 ALARMS = {
     1: "a hard limit was hit; the position is probably lost: home again ($H)",
     2: "the target lies outside the machine's travel; the position is kept: unlock ($X)",
     3: "reset while moving; the position is lost: home again ($H)",
-    4: "the probe was closed before probing began: back off and check its wiring",
-    5: "the probe met nothing",
+    4: "the probe was closed before probing began: back off and check its wiring; unlock ($X)",
+    5: "the probe met nothing within its way: check that it is connected; unlock ($X)",
     6: "reset while homing: home again",
     7: "the safety door was opened while homing: home again",
-    8: "homing could not leave the limit switch: check its wiring",
-    9: "homing did not find the limit switch",
+    8: "homing could not leave the limit switch: check its wiring, or make the pull-off ($27) longer; home again",
+    9: "homing did not find the limit switch: check its wiring and the travel ($130 to $132); home again",
+    10: "emergency stop, or homing two motors of one axis failed: release it, reset, home again ($H)",
+    11: "homing is required: home the machine ($H)",
+    12: "a limit switch is closed: move off it by hand, home again ($H)",
+    13: "the probe protection was hit while no probing was under way: back off, reset, check the probe",
+    14: "the spindle does not reach its speed; reset",
+    15: "homing did not find the second switch of an axis with two motors: check its wiring; home again",
+    16: "the self-test at power-on failed: switch it off and on, read its own messages",
+    17: "a motor driver reports a fault: check motors and supply, home again ($H)",
+    18: "homing failed: home again ($H)",
+    19: "a driver of the bus failed: check its cable, switch the machine off and on, home again ($H)",
 }
 
 
@@ -152,6 +185,8 @@ class GrblSettings:
 def parse_status(line: str) -> Status | None:
     """The report in a line <...>, or None if it is not a whole one."""
     match = re.fullmatch(r"<([A-Za-z]+)(?::(\d+))?\|([MW])Pos:([-\d.,]+)((?:\|[^|<>]*)*)>", line)
+    if match is not None and match[1] not in STATES:
+        return None  # garbled: "Jpg" must not pass for a machine that stands
     position = None if match is None else _vector(match[4])
     if match is None or position is None:
         return None
@@ -199,7 +234,8 @@ def describe(line: str) -> str:
     kind, _, code = line.partition(":")
     table = ALARMS if kind == "ALARM" else ERRORS
     number = int(code) if code.isdigit() else -1
-    return f"{line} ({table.get(number, code.strip() or 'see the firmware documents')})"
+    unknown = "not in the documents of Grbl 1.1 or grblHAL: see the firmware's; reset and home again ($H)"
+    return f"{line} ({table.get(number, unknown if number >= 0 else code.strip() or unknown)})"
 
 
 def words(axes: FloatArray) -> str:

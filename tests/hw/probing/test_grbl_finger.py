@@ -60,7 +60,7 @@ def machine(pace: float = 20.0, sensor: str = "", **settings: object) -> Iterato
 
 
 def pecker(server: PtyServer, **settings: object) -> GrblFinger:
-    given = {"armed": True, "peck": PECK, "frame": FRAME} | settings
+    given = {"armed": True, "peck": PECK, "frame": FRAME, "position_known": True} | settings
     return GrblFinger(port=server.ports[0], tip_radius=R, **given)  # type: ignore[arg-type]
 
 
@@ -95,7 +95,7 @@ def test_status_reports_are_read_as_the_document_writes_them() -> None:
 def test_probe_results_settings_and_offsets_are_read() -> None:
     probed = protocol.parse_probe("[PRB:-150.004,2.000,-7.125:1]")
     assert probed is not None and probed.hit and probed.position.tolist() == [-150.004, 2.0, -7.125]
-    settings = protocol.Settings.of(
+    settings = protocol.GrblSettings.of(
         ["$13=1", "$20=1 (soft limits, bool)", "$130=200.000", "$131=300", "$132=80", "$N0=G54"]
     )
     assert settings.report_scale == 0.0254 and settings.soft_limits
