@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol
 
-from hw.emulated.faults import Fault
+from hw.emulated.faults import BYTE_FAULTS, Fault
 
 TICK = 0.001  # s
 
@@ -161,7 +161,7 @@ class PtyServer:
 
     def _apply(self, fault: Fault, wall: float) -> None:
         index = fault.device
-        if fault.kind in ("lose", "garble"):
+        if fault.kind in BYTE_FAULTS:
             self._spoil[index] = fault
         elif fault.kind == "stall":
             self._quiet[index] = wall + fault.duration

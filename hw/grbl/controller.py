@@ -33,6 +33,11 @@ OFF_THE_WAY = 1e-4
 # So many reports in a row off the way are no garbled ones (one in a thousand passes for whole and wrong)
 OFF_THE_WAY_IN_A_ROW = 3
 
+OFFSET_CHANGED = (
+    "the work offset changed: another program, or a pendant, set G92, G10 or G54 to G59; end it, check the machine's "
+    "position and run again"
+)
+
 # Reports that are kept: ten seconds of asking as fast as a port can answer
 KEPT_REPORTS = 50_000
 
@@ -150,7 +155,7 @@ class GrblController:
             StoppedError: an alarm, a restart or a stop came instead.
             LinkError: no answer in time.
         """
-        self._check()
+        self.check()
         return self._ask(line, within)
 
     def _ask(self, line: str, within: float = 2.0) -> list[str]:
@@ -234,7 +239,7 @@ class GrblController:
         G38.3 raises no alarm where nothing is met. The latched position is where the probe closed; where the
         machine came to rest lies further on by its braking distance.
         """
-        self._check()
+        self.check()
         self._heading_for(target, anew=True)
         work = target - self.offset  # probing obeys the work coordinates: G53 is not for G38
         lines: list[str] = []
@@ -268,7 +273,7 @@ class GrblController:
             FingerError: an earlier line was refused.
             StoppedError, LinkError: as for `command`.
         """
-        self._check()
+        self.check()
         self._heading_for(target, anew=not self._sent and self._standing())
         line = f"$J=G53{protocol.words(target)}{protocol.feed_word(speed)}\n".encode("ascii")
         self._settle_answers()
@@ -303,7 +308,7 @@ class GrblController:
                 raise LinkError(f"{self.link.port}: still {state} {within:g} s after the jog was cancelled")
             time.sleep(0.1 * POLL)
         self._sent.clear()
-        self._check()
+        self.check()
 
     def wait_idle(self, within: float) -> None:
         """Wait until every jog is answered and nothing moves; an operator's hold stops the clock.
@@ -314,7 +319,7 @@ class GrblController:
         """
         patience, idle = Patience(within), 0
         while (state := self.status().state) in ("Jog", "Run", "Hold", "Door") or self._sent:
-            self._check()
+            self.check()
             self._settle_answers()
             idle = idle + 1 if state == "Idle" else 0
             if idle > UNANSWERED:
@@ -380,6 +385,13 @@ class GrblController:
             found.append(f"work offset {np.round(1e3 * self.offset, 3).tolist()} mm: taken into account")
         return found
 
+    def confirm_offset(self) -> None:
+        """Read the work offset again. Raises StoppedError: it is another one than on connecting."""
+        told = protocol.parse_offset(self._agreed("$#"), self._agreed("$G")) * self.settings.report_scale
+        if np.abs(told - self.offset).max() > self.settings.resolution:
+            self._lose_trust(OFFSET_CHANGED)
+        self.check()
+
     def _lose_trust(self, reason: str) -> None:
         """In the reading thread: from now on nothing moves."""
         self.vouched, self.distrust = False, f"{self.link.port}: {reason}"
@@ -423,10 +435,7 @@ class GrblController:
         elif np.abs(offset - known).max() <= self.settings.resolution:
             self._new_offset = None
         elif self._new_offset is not None and np.array_equal(self._new_offset, offset):
-            self._lose_trust(
-                "the work offset changed: another program, or a pendant, set G92, G10 or G54 to G59; end it, check the "
-                "machine's position and run again"
-            )
+            self._lose_trust(OFFSET_CHANGED)
         else:
             self._new_offset = offset
 
@@ -499,7 +508,8 @@ class GrblController:
         with self._news:
             self._news.notify_all()
 
-    def _check(self) -> None:
+    def check(self) -> None:
+        """Raise what stopped the machine, if anything did. Raises StoppedError, LinkError."""
         if self.stop_reason is not None:
             raise StoppedError(self.stop_reason)
         if self.alarm is not None:
@@ -524,7 +534,7 @@ class GrblController:
                 if self._news.wait_for(lambda: done() or self._trouble(restarts, alarm), timeout=POLL) and done():
                     return
             if self.alarm != alarm or self.stop_reason is not None or not self.link.is_open:
-                self._check()
+                self.check()
             if self._restarts != restarts:
                 raise StoppedError(f"{self.link.port}: the controller restarted; home it or check its position")
             if self.reports and self.reports[-1].at != seen:

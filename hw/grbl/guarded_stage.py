@@ -134,6 +134,7 @@ class GuardedStage:
         if not found.hit:
             left = float(np.linalg.norm(target - resting))
             if left > LATCH_STEPS * step + STANDING:
+                self.controller.confirm_offset()
                 raise StoppedError(
                     f"the machine stopped {1e3 * left:.3f} mm before the end of its way and met nothing; was it held? Run "
                     "again with --resume"
@@ -253,6 +254,7 @@ class GuardedStage:
         """
         patience = Patience(LONGEST_STANDSTILL)
         while True:
+            self.controller.check()
             self.listen(sensor, made)
             if self._touches(sensor):
                 return True
@@ -272,7 +274,8 @@ class GuardedStage:
         """
 
         def fresh() -> bool:
-            return sensor.fault is not None or (sensor.age <= FRESH and sensor.heard > since)
+            # what was taken after the last motion was sent is new enough, however late it came: nothing moves beyond it
+            return sensor.fault is not None or (sensor.heard > since if since > -np.inf else sensor.age <= FRESH)
 
         if sensor.fault is not None:
             raise StoppedError(sensor.fault)

@@ -175,6 +175,7 @@ class Slide:
         patience = Patience(LONGEST_STANDSTILL)
         left = max(queued, 1.5 * stage.controller.settings.resolution)
         while np.linalg.norm(stage.position() - here) > left:
+            stage.controller.check()
             if patience.over():
                 raise StoppedError("the machine does not follow; is it held, or its door open?")
         stage.listen(self.sensor, made)

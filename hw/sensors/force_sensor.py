@@ -24,6 +24,8 @@ HISTORY = 10.0
 # The least delay of a sample is that of the last one to two blocks of so long, s: a clock that is 1 % off what is known
 # of it is then 20 ms off at most, less than the 50 ms after which a sample is not steered by
 DELAY_BLOCK = 1.0
+# A host may hold back samples for 0.1 s: over so many s that makes the sensor's period uncertain by 2 %
+LONG_ENOUGH = 5.0
 
 
 class ForceSensor:
@@ -150,7 +152,7 @@ class ForceSensor:
         since = time.monotonic()
         self.wait(lambda: time.monotonic() > since + duration, duration + 0.5)
         ticks, arrivals, forces = self.recorded(since - HISTORY)
-        if len(ticks) > 1:
+        if len(ticks) > 1 and arrivals[-1] - arrivals[0] > LONG_ENOUGH:
             self._period = SensorClock.estimate(ticks.astype(float), arrivals, self.tick).period
             self._least = [np.inf, np.inf]
         ticks = ticks[arrivals > since].astype(float)
