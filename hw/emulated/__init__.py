@@ -6,14 +6,14 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from hw.emulated.force import (
+        SENSOR_FAULTS as SENSOR_FAULTS,
         ForceEmulator as ForceEmulator,
         LineSensorEmulator as LineSensorEmulator,
         OptoForceEmulator as OptoForceEmulator,
-        SENSOR_FAULTS as SENSOR_FAULTS,
     )
     from hw.emulated.grbl import GrblEmulator as GrblEmulator
-    from hw.emulated.stage import PROBE_FAULTS as PROBE_FAULTS
     from hw.emulated.pty_server import PtyServer as PtyServer
+    from hw.emulated.stage import PROBE_FAULTS as PROBE_FAULTS
     from hw.emulated.touched_body import TouchedBody as TouchedBody
 
 _PUBLIC = {

@@ -10,7 +10,6 @@ from hw.emulated.grbl import GrblEmulator
 from hw.sensors import CONFIGURE, RATE_CODES, checksum, encode_frame, encode_line
 from mapping import FloatArray
 
-
 # What a sensor may send instead of the force
 SENSOR_FAULTS = ("frozen", "zero", "nan", "saturated", "sign", "gain 10", "gain 0.1", "stale", "drift")
 # What a saturated one sends, N: the full scale of the 16 bits at 400 counts/N

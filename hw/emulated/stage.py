@@ -10,7 +10,6 @@ import numpy as np
 from hw.emulated.touched_body import TouchedBody
 from mapping import FloatArray
 
-
 # A probe that never closes, always is, or closes by itself on a third of its ways
 PROBE_FAULTS = ("open", "closed", "bouncing")
 BOUNCES = 1 / 3

@@ -221,6 +221,16 @@ class GrblController:
         """(3,) machine position now, m."""
         return self.machine_position(self.status())
 
+    def resting_position(self) -> FloatArray:
+        """(3,) machine position, m, as two reports of a standing machine in a row tell it. Raises LinkError."""
+        before = self.position()
+        for _ in range(TRIES_OF_A_LINE):
+            here = self.position()
+            if np.abs(here - before).max() < self.settings.resolution:
+                return here
+            before = here
+        raise LinkError(f"{self.link.port}: no two reports of where the machine stands agree; use a shielded cable")
+
     def machine_position(self, status: Status) -> FloatArray:
         """(3,) machine position in a report, m."""
         metres = status.position * self.settings.report_scale
@@ -259,7 +269,7 @@ class GrblController:
                     return result
             lines = self.command("$#")
         raise LinkError(
-            f"{self.link.port}: no two of {TRIES_OF_A_LINE} readings of where it probed agree; use a shielded, shorter cable"
+            f"{self.link.port}: no two of {TRIES_OF_A_LINE} readings of where it probed agree; use a shielded cable"
         )
 
     # streaming

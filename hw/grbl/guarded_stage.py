@@ -72,8 +72,8 @@ class GuardedStage:
             fastest = min(fastest, BLIND_SHARE * self.max_force / (self.stiffness * self.sensor.watch.blind))
             if fastest < CRAWL:
                 raise FingerError(
-                    f"a frozen force sensor would be noticed after {self.sensor.watch.blind:.1f} s only, so quiet or slow "
-                    "is it; take out its filter, raise its rate, or take a softer tip"
+                    f"a frozen force sensor would be noticed after {self.sensor.watch.blind:.1f} s only: it is "
+                    "too quiet or slow; take out its filter, raise its rate, or take a softer tip"
                 )
         return float(fastest)
 
@@ -93,7 +93,7 @@ class GuardedStage:
     def probe(self, target: FloatArray, speed: float) -> tuple[FloatArray, bool]:
         """Towards the target until contact: (latched position, True), or (target, False) if nothing is met."""
         self.check(target, "probing")
-        here = self.position()
+        here = self.position() if self.sensor is not None else self._resting()
         way = float(np.linalg.norm(target - here))
         if way < STANDING:
             return here, False
@@ -113,22 +113,22 @@ class GuardedStage:
         assert self.expected is not None
         return NotFeltError(
             f"nothing was felt {1e3 * self.expected.beyond:.2f} mm beyond the surface of the model, at "
-            f"{np.round(1e3 * where, 3).tolist()} mm (object frame): the probe or sensor is dead, or the body is not where "
-            'the model has it. Touch the tip and look whether it answers; check origin and turn; pose = "estimate" finds '
-            "the pose, beyond in [finger.machine] lets the tip go deeper"
+            f"{np.round(1e3 * where, 3).tolist()} mm (object frame): the probe or sensor is dead, or the body is not "
+            "where the model has it. Touch the tip and look whether it answers; check origin and turn; pose = "
+            '"estimate" finds the pose, beyond in [finger.machine] lets the tip go deeper'
         )
 
     def _peck(self, start: FloatArray, target: FloatArray, speed: float) -> tuple[FloatArray, bool]:
         """Probe under the controller's own eyes, and judge what it says by where the machine came to rest."""
         if self.closed():
             self._open_by_backing_off(start, target)
-            start = self.position()
+            start = self._resting()
         way = float(np.linalg.norm(target - start))
         inwards = (target - start) / way
         step = self.controller.settings.resolution
         for _ in range(TOLD):  # a line that was lost on the way moves nothing: it is said again
             found = self.controller.probe(self.frame.to_machine(target), speed, _patience(way, speed))
-            resting = self.position()
+            resting = self._resting()
             if found.hit or np.linalg.norm(resting - start) > STANDING:
                 break
         if not found.hit:
@@ -136,8 +136,8 @@ class GuardedStage:
             if left > LATCH_STEPS * step + STANDING:
                 self.controller.confirm_offset()
                 raise StoppedError(
-                    f"the machine stopped {1e3 * left:.3f} mm before the end of its way and met nothing; was it held? Run "
-                    "again with --resume"
+                    f"the machine stopped {1e3 * left:.3f} mm before the end of its way and met nothing; was it held? "
+                    "Run again with --resume"
                 )
             return target, False
         where = self.frame.to_object(found.position)
@@ -148,15 +148,18 @@ class GuardedStage:
         most = BRAKING_DOUBT * speed**2 / (2.0 * self._acceleration) + SEGMENT * speed + slack
         if aside > slack or not -slack <= along <= way + slack or not -slack <= ran_on <= most:
             raise LinkError(
-                f"the contact reported at {np.round(1e3 * where, 3).tolist()} mm does not fit to where the machine came "
-                f"to rest, {np.round(1e3 * resting, 3).tolist()} mm; the line was garbled: use a shielded, shorter cable"
+                f"the contact reported at {np.round(1e3 * where, 3).tolist()} mm does not fit to where the machine "
+                f"came to rest, {np.round(1e3 * resting, 3).tolist()} mm; the line was garbled: use a shielded cable"
             )
         if ran_on > slack and not self.closed():
             raise StoppedError(
-                "the probe closed, and was open again when the machine stood deeper in the body: it bounces, or its cable "
-                "picks up noise; check its contacts and shield"
+                "the probe closed, and was open again when the machine stood deeper in the body: it bounces, or its "
+                "cable picks up noise; check its contacts and shield"
             )
         return where, True
+
+    def _resting(self) -> FloatArray:
+        return self.frame.to_object(self.controller.resting_position())
 
     @contextmanager
     def unbounded(self) -> Iterator[None]:
@@ -182,8 +185,8 @@ class GuardedStage:
             if not self.closed():
                 return
         raise StoppedError(
-            f"the probe stays closed {1e3 * MOST_FREE_STEPS * FREE_STEP:.0f} mm off the contact: it sticks, is wired for "
-            "the other sense ($6), or its cable is broken"
+            f"the probe stays closed {1e3 * MOST_FREE_STEPS * FREE_STEP:.0f} mm off the contact: it sticks, is wired "
+            "for the other sense ($6), or its cable is broken"
         )
 
     def free(self, away: FloatArray) -> None:

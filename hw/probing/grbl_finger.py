@@ -48,7 +48,7 @@ class GrblFinger:
             it, `home` or `unlock`, nothing moves.
         surface: model of the body where it stands: beyond it the tip must have felt something.
         beyond: how far beyond, m; None: DEAD_SHARE of max_force over the stiffness, or over_travel for a touch probe.
-        ask: told to ask the user for a touch of the probe, whose answer is then awaited; None: the probe is not checked.
+        ask: told to ask the user for a touch of the probe, which is then awaited; None: the probe is not checked.
         unlock: send $X if the machine is locked on connecting (its position must be right). Moves nothing.
         home: send $H on connecting. MOVES the machine; needs `armed`.
         baudrate: of the port.
@@ -82,6 +82,7 @@ class GrblFinger:
     _begun: float = field(init=False, default=0.0)
     _lost: str | None = field(init=False, default=None)
     _left: bool = field(init=False, default=False)
+    _cut_short: list[str] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         if (self.peck is None) == (self.slide is None):
@@ -121,8 +122,8 @@ class GrblFinger:
         if self.armed and not self.home:
             if not (self.position_known or self.unlock):
                 raise FingerError(
-                    f"{self.port}: nobody knows where the machine stands: home it (home = true), or set position_known if "
-                    "it was homed since it was switched on and has not been moved by hand"
+                    f"{self.port}: nobody knows where the machine stands: home it (home = true), or set position_known "
+                    "if it was homed since it was switched on and has not been moved by hand"
                 )
             controller.vouch()
         bounds = controller.settings.bounds
@@ -217,6 +218,7 @@ class GrblFinger:
             "resolution": controller.settings.resolution,
             "firmware": controller.version,
             "doubts": controller.doubts,
+            "cut_short": self._cut_short,
             "settings": {f"${code}": value for code, value in controller.settings.values.items()},
             "origin": self.frame.origin.tolist(),
             "rotation": self.frame.rotation.tolist(),
@@ -245,7 +247,8 @@ class GrblFinger:
             self._retreat(stage)  # now, and not when the last samples are thought over: the tip may be pressed hard
             if not any(map(len, touched)):
                 raise
-        except FingerError:
+        except FingerError as error:
+            self._cut_short.append(str(error))
             if not any(map(len, touched)):  # one line was refused, a garbled one perhaps: what was felt before it stays
                 raise
         return Trace.concatenate(touched or [self._trace(Touched(np.zeros(0), np.zeros((0, 3))))])
@@ -312,7 +315,7 @@ class GrblFinger:
                 while stage.closed() != closed:
                     if patience.over():
                         raise StoppedError(
-                            f"the probe did not {'close' if closed else 'open'}: check its cable and input ($6: inverted)"
+                            f"the probe did not {'close' if closed else 'open'}: check its cable, and its sense ($6)"
                         )
                     time.sleep(LOOK)
 

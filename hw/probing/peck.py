@@ -75,8 +75,8 @@ class Peck:
                 left_out += 1
                 if left_out == MOST_LEFT_OUT:
                     raise StoppedError(
-                        f"{left_out} places in a row where no two of {MOST_TOUCHES} touches agree to {1e6 * AGREE:.0f} um: "
-                        "check the probe, its cable and its shield"
+                        f"{left_out} places in a row where no two of {MOST_TOUCHES} touches agree to {1e6 * AGREE:.0f} "
+                        "um: check the probe, its cable and its shield"
                     )
             else:
                 depth = min(depth, 0.0)

@@ -53,8 +53,8 @@ def press_test(stage: GuardedStage, sensor: ForceSensor, inwards: FloatArray, st
     found = rise / max(way, 1e-9)
     if not LEAST_RATIO <= found / stiffness <= MOST_RATIO:
         reason = (
-            f"press test: {1e6 * way:.0f} um into the contact the force changed by {rise:+.2f} N, {1e-3 * found:.2f} N/mm; "
-            f"stated are {1e-3 * stiffness:.2f} N/mm. {_cause(found / stiffness)}"
+            f"press test: {1e6 * way:.0f} um into the contact the force changed by {rise:+.2f} N, {1e-3 * found:.2f} "
+            f"N/mm; stated are {1e-3 * stiffness:.2f} N/mm. {_cause(found / stiffness)}"
         )
         stage.controller.halt(reason)
         raise StoppedError(reason)

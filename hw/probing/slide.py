@@ -35,10 +35,14 @@ SETTLED_FORCE_SHARE, SETTLING = 0.2, 50
 BLIND, UNUSUAL, HARMLESS_STAGE_STEPS = 0.5, 2.0, 2.0
 # Reports from so long before the samples are looked at: the last one may be that old, s
 BEFORE = 0.1
-# A body presses, it never pulls: friction at a steep side may, by less than this share of the wanted force (0.5 on steel)
+# A body presses, it never pulls: friction at a steep side may, by less than this share of the force (0.5 on steel)
 PULL = 0.6
 # The zero may move by this, as a displacement of the tip, during one sweep, m: its samples are off by as much
 ZERO_MOVED = 1.5e-5
+# What was felt so long before a stop may be wrong already, s: two requests for a status
+HELD_BACK = 0.1
+# A sweep takes longer than its path: touching, pressing, steep flanks, a host that is busy otherwise, s
+PRESSED = 3.0
 # A path of one point is touched for so many control periods
 DWELL = 10
 
@@ -72,10 +76,10 @@ class Slide:
 
     def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
         """Samples in contact with their forces, about every BATCH seconds; what was felt before a stop as well."""
-        self._tare(stage)
+        self._tare(stage, move.duration + PRESSED)
         self.sensor.watch.steepest = self.stiffness * max(move.speed, stage.guarded_speed)
         path, approach = spaced(move, move.speed * self.period)
-        where, hit = stage.probe(path[0] + self.reach * approach[0], self.approach_speed)
+        _, hit = stage.probe(path[0] + self.reach * approach[0], self.approach_speed)
         if not hit:
             return
         press_test(stage, self.sensor, approach[0], self.stiffness)
@@ -92,22 +96,31 @@ class Slide:
                         last = float(batch.times[-1])
                         yield batch
         except (StoppedError, LinkError):
-            yield self._fused(stage, last)
+            yield self._fused(stage, last, time.monotonic() - HELD_BACK)
             raise
         finally:
             if stage.controller.link.is_open and stage.controller.stop_reason is None:
                 stage.controller.cancel_jog()
         yield self._fused(stage, last)
 
-    def _tare(self, stage: GuardedStage) -> None:
-        """Take the zero anew; it must be about where it was before the last sweep."""
+    def _tare(self, stage: GuardedStage, duration: float) -> None:
+        """Take the zero anew; it must be about where it was before the last sweep, and stay there for the next one."""
         before, known = self.sensor.zero, self.sensor.watch.blind > 0.0
         self.sensor.tare()
         moved = float(np.linalg.norm(self.sensor.zero - before))
         if known and moved > max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0):
             reason = (
                 f"the sensor's zero moved by {moved:.2f} N during the last sweep, whose samples are off by up to "
-                f"{1e6 * moved / self.stiffness:.0f} um: leave those out; let the sensor warm up, or look what hangs on it"
+                f"{1e6 * moved / self.stiffness:.0f} um: leave those out; let the sensor warm up, look what hangs on it"
+            )
+            stage.controller.halt(reason)
+            raise StoppedError(reason)
+        drift = float(np.linalg.norm(self.sensor.drift))
+        if drift * duration > max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0):
+            reason = (
+                f"the sensor's zero drifts by {drift:.2f} N/s while nothing touches, "
+                f"{1e6 * drift * duration / self.stiffness:.0f} um of the tip during one sweep: let it warm up, or look "
+                "what hangs on it"
             )
             stage.controller.halt(reason)
             raise StoppedError(reason)
@@ -125,15 +138,15 @@ class Slide:
         settling = SETTLING  # periods to press on before the sweep begins
         left = 0 if end > 0 else DWELL
         bounds = np.full(len(path), np.inf) if stage.expected is None else stage.expected.bounds(path, approach)
-        made = -np.inf  # when the last jog was sent
+        made = time.monotonic()  # when the last jog was sent
         while True:
             inwards = _between(approach, at)
             inwards /= np.linalg.norm(inwards)
             pressing = self._pressing(stage, inwards, here, sum(queued), made)
             if pressing < -max(PULL * move.force, 0.5 * stage.touch_force):
                 raise StoppedError(
-                    f"the force pulls the tip by {-pressing:.2f} N where a body can only press: the sensor's sign turned or "
-                    "its zero jumped; check its cable, run again"
+                    f"the force pulls the tip by {-pressing:.2f} N where a body can only press: the sensor's sign "
+                    "turned or its zero jumped; check its cable, run again"
                 )
             missing = move.force - pressing
             settling = 0 if abs(missing) <= SETTLED_FORCE_SHARE * move.force else max(0, settling - 1)
@@ -147,9 +160,9 @@ class Slide:
                 raise StoppedError("the tip went too deep behind the commanded path: the body ends, or is elsewhere")
             if depth > max(bounds[int(at)], bounds[int(np.ceil(at))]):
                 raise NotFeltError(
-                    f"the tip sank {1e3 * stage.expected.beyond if stage.expected else 0.0:.2f} mm below the surface of the "
-                    "model without the force that belongs to it: the sensor's zero or gain drifted, or the body is lower "
-                    "there; check both, or set beyond in [finger.machine]"
+                    f"the tip sank {1e3 * stage.expected.beyond if stage.expected else 0.0:.2f} mm below the surface "
+                    "of the model without the force that belongs to it: the sensor's zero or gain drifted, or the body "
+                    "is lower there; check both, or set beyond in [finger.machine]"
                 )
             target = _between(path, at) + depth * inwards
             way = float(np.linalg.norm(target - here))

@@ -50,7 +50,7 @@ class ForceSensor:
         self.link = Link(port, framing, self._hear, baudrate=baudrate, lost=self._on_lost)
         self.rate, self.bits = rate, bits
         self.tick = 1.0 / rate if tick is None else tick
-        self.zero = np.zeros(3)
+        self.zero, self.drift = np.zeros(3), np.zeros(3)
         self._samples: deque[tuple[float, int, float, float, float]] = deque(maxlen=KEPT_SAMPLES)
         self._limit = np.inf
         self._halt: Callable[[str], None] = _nothing
@@ -143,7 +143,7 @@ class ForceSensor:
         return True
 
     def tare(self, duration: float = 0.2) -> None:
-        """Take the median force of the next moments, free of contact, as zero, and learn its noise.
+        """Take the median force of the next moments, free of contact, as zero, and learn its noise and drift (N/s).
 
         Raises:
             LinkError: no samples.
@@ -161,6 +161,8 @@ class ForceSensor:
             raise LinkError(f"{self.link.port}: no samples from the {self.name} for {duration:g} s")
         self.zero = np.median(recent, axis=0)  # a first sample after a reconnection may be anything
         if len(ticks) > 2:
+            at = (ticks - ticks.mean()) * self._period
+            self.drift = np.asarray(at @ recent / (at @ at))
             step = float(np.median(np.diff(ticks)))
             self.watch.learn(recent, step, step * self._period)
 

@@ -73,7 +73,7 @@ class Witness:
         if {
             "approach": z < R + 1e-3 and force == 0.0 and not self.touched,
             "midway": force > 0.2 and abs(x) < 3e-4,
-            "retreat": self.touched and x > 2.4e-3 and R < z,
+            "retreat": self.touched and x > 2.4e-3 and z > R,
         }[self.phase]:
             self.struck = time.monotonic()
             self.strike()
@@ -120,7 +120,9 @@ def run_case(kind: str, phase: str, touch: str, seed: int = 0, model: bool = Tru
             server.faults.append(Fault("disconnect", at=0.0))
         else:
             name = kind.split()[0]
-            server.faults += [Fault(name, at=0.0, rate=0.01, seed=seed, device=i) for i in range(len(devices)) if i != 1]
+            server.faults += [
+                Fault(name, at=0.0, rate=0.01, seed=seed, device=i) for i in range(len(devices)) if i != 1
+            ]
 
     witness = Witness(stage, phase, strike)
     devices.insert(1, witness)  # the sensor is served before it, and takes its samples at their own times

@@ -1,4 +1,4 @@
-"""Machines that lie: whatever the sensor, the probe, the controller or the cable does, the tip is not pressed harder."""
+"""Machines that lie: whatever sensor, probe, controller or cable do, the tip is not pressed harder."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hw.errors import StoppedError
-from hw.sensors.watch import SampleWatch, Sample
+from hw.sensors.watch import Sample, SampleWatch
 
 QUIET = 0.003  # N, noise of one component
 COUNTS = 400.0  # per newton
