@@ -186,7 +186,7 @@ class GrblController:
             raise FingerError(f"{self.link.port}: {line!r} refused: {protocol.describe(answer)}")
         return feedback
 
-    def status(self, within: float = 1.0) -> Status:
+    def status(self, within: float = LONGEST_CONTROLLER_SILENCE) -> Status:
         """A report asked for now. Raises LinkError."""
         since, patience = time.monotonic(), Patience(within)
         while not patience.over():

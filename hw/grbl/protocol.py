@@ -13,7 +13,7 @@ import numpy as np
 
 from mapping import FloatArray
 
-STATES = ("Idle", "Run", "Hold", "Jog", "Alarm", "Door", "Check", "Home", "Sleep", "Tool")
+MACHINE_STATES = ("Idle", "Run", "Hold", "Jog", "Alarm", "Door", "Check", "Home", "Sleep", "Tool")
 STATUS, HOLD, RESUME, RESET, DOOR, JOG_CANCEL = b"?", b"!", b"~", b"\x18", b"\x84", b"\x85"
 RECEIVE_BUFFER = 128  # bytes
 
@@ -185,7 +185,7 @@ class GrblSettings:
 def parse_status(line: str) -> Status | None:
     """The report in a line <...>, or None if it is not a whole one."""
     match = re.fullmatch(r"<([A-Za-z]+)(?::(\d+))?\|([MW])Pos:([-\d.,]+)((?:\|[^|<>]*)*)>", line)
-    if match is not None and match[1] not in STATES:
+    if match is not None and match[1] not in MACHINE_STATES:
         return None  # garbled: "Jpg" must not pass for a machine that stands
     position = None if match is None else _vector(match[4])
     if match is None or position is None:

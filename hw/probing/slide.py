@@ -42,7 +42,7 @@ ZERO_MOVED = 1.5e-5
 # What was felt so long before a stop may be wrong already, s: two requests for a status
 HELD_BACK = 0.1
 # A sweep takes longer than its path: touching, pressing, steep flanks, a host that is busy otherwise, s
-PRESSED = 3.0
+SWEEP_OVERHEAD = 3.0
 # A path of one point is touched for so many control periods
 DWELL = 10
 
@@ -76,7 +76,7 @@ class Slide:
 
     def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
         """Samples in contact with their forces, about every BATCH seconds; what was felt before a stop as well."""
-        self._tare(stage, move.duration + PRESSED)
+        self._tare(stage, move.duration + SWEEP_OVERHEAD)
         self.sensor.watch.steepest = self.stiffness * max(move.speed, stage.guarded_speed)
         path, approach = spaced(move, move.speed * self.period)
         _, hit = stage.probe(path[0] + self.reach * approach[0], self.approach_speed)
@@ -119,8 +119,8 @@ class Slide:
         if drift * duration > max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0):
             reason = (
                 f"the sensor's zero drifts by {drift:.2f} N/s while nothing touches, "
-                f"{1e6 * drift * duration / self.stiffness:.0f} um of the tip during one sweep: let it warm up, or look "
-                "what hangs on it"
+                f"{1e6 * drift * duration / self.stiffness:.0f} um of the tip during one sweep: let it warm up, or "
+                "look what hangs on it"
             )
             stage.controller.halt(reason)
             raise StoppedError(reason)

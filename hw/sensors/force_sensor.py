@@ -25,7 +25,7 @@ HISTORY = 10.0
 # of it is then 20 ms off at most, less than the 50 ms after which a sample is not steered by
 DELAY_BLOCK = 1.0
 # A host may hold back samples for 0.1 s: over so many s that makes the sensor's period uncertain by 2 %
-LONG_ENOUGH = 5.0
+PERIOD_SPAN = 5.0
 
 
 class ForceSensor:
@@ -152,7 +152,7 @@ class ForceSensor:
         since = time.monotonic()
         self.wait(lambda: time.monotonic() > since + duration, duration + 0.5)
         ticks, arrivals, forces = self.recorded(since - HISTORY)
-        if len(ticks) > 1 and arrivals[-1] - arrivals[0] > LONG_ENOUGH:
+        if len(ticks) > 1 and arrivals[-1] - arrivals[0] > PERIOD_SPAN:
             self._period = SensorClock.estimate(ticks.astype(float), arrivals, self.tick).period
             self._least = [np.inf, np.inf]
         ticks = ticks[arrivals > since].astype(float)
