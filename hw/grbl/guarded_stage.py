@@ -334,6 +334,7 @@ class GuardedStage:
             return
         sensor = self.sensor if self.sensor is not None and self.sensor.fault is None else None
         most = self.touch_force + (0.0 if sensor is None else float(np.linalg.norm(sensor.force())))
+        self.controller.wait_idle(LONGEST_STANDSTILL)  # an operator's hold: no jog is taken before it is let go
         self.controller.jog(self.frame.to_machine(target), self.guarded_speed)
         opened, met = False, 0
         while True:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -116,6 +117,8 @@ def run_case(kind: str, phase: str, touch: str, seed: int = 0, model: bool = Tru
             stage.trip(int(kind.split()[1]))
         elif kind in ("hold", "door"):
             stage.receive(b"!" if kind == "hold" else b"\x84", stage.motion.time)
+            # the operator lets it go on after a second
+            threading.Timer(1.0, lambda: stage.receive(b"~", stage.motion.time)).start()
         elif kind == "port gone":
             server.faults.append(Fault("disconnect", at=0.0))
         else:

@@ -206,7 +206,7 @@ def test_another_programs_work_offset_ends_the_trust() -> None:
     with machine() as (server, stage), pecker(server) as finger:
         finger.execute(across(x=0.003))
         stage.systems["G54"][:] = (0.0, 0.0, 0.004)
-        with pytest.raises(StoppedError, match="work offset changed"):
+        with pytest.raises(StoppedError, match=r"work offset changed|nothing sent it"):
             for _ in range(20):
                 finger.execute(across(x=0.003))
 
