@@ -10,21 +10,24 @@ if TYPE_CHECKING:
         GcodeError as GcodeError,
         LinkError as LinkError,
         MoveError as MoveError,
+        NotFeltError as NotFeltError,
         StoppedError as StoppedError,
     )
     from hw.finger import Finger as Finger, Workspace as Workspace, open_finger as open_finger
     from hw.framing import Frames as Frames, Framing as Framing, Lines as Lines
     from hw.link import Link as Link
     from hw.move import Move as Move
+    from hw.patience import Patience as Patience
     from hw.safety import SIGNALS as SIGNALS, StopOnSignal as StopOnSignal
     from hw.simulated.finger import SimulatedFinger as SimulatedFinger
 
 _PUBLIC = {
-    "errors": ("FingerError", "GcodeError", "LinkError", "MoveError", "StoppedError"),
+    "errors": ("FingerError", "GcodeError", "LinkError", "MoveError", "NotFeltError", "StoppedError"),
     "finger": ("Finger", "Workspace", "open_finger"),
     "framing": ("Frames", "Framing", "Lines"),
     "link": ("Link",),
     "move": ("Move",),
+    "patience": ("Patience",),
     "safety": ("SIGNALS", "StopOnSignal"),
     "simulated.finger": ("SimulatedFinger",),
 }

@@ -13,6 +13,10 @@ class StoppedError(FingerError):
     """The finger was stopped while it moved, by a limit, an alarm or the operator; says by which and what to do."""
 
 
+class NotFeltError(StoppedError):
+    """The tip went beyond the surface of the model and felt nothing."""
+
+
 class MoveError(ValueError):
     """A move that is malformed."""
 

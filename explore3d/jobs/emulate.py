@@ -47,7 +47,7 @@ class Emulation:
     sensor: str | None = None
     stiffness: float = 1e4
     counts_per_newton: float = 400.0
-    force_noise: float = 0.0
+    force_noise: float = 0.003
     repeatability: float = 0.0
     seed: int = 1
     locked: bool = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -14,6 +15,7 @@ from hw import Finger, open_finger
 from hw.grbl import StageFrame
 from hw.probing import Peck, Slide
 from hw.sensors import ForceSensor, LineSensor, OptoForce
+from mapping import Surface
 
 
 def needs_arming(scene: Scene) -> bool:
@@ -48,7 +50,21 @@ def machine_finger(scene: Scene, armed: bool) -> Finger:
         home=machine.home,
         baudrate=machine.baudrate,
         beside=beside,
+        position_known=machine.position_known or not needs_arming(scene),  # an emulator is where it says
+        surface=_expected(scene),
+        beyond=machine.beyond,
+        ask=_ask if needs_arming(scene) and machine.check_probe else None,
     )
+
+
+def _expected(scene: Scene) -> Surface | None:
+    """Where the body is, as far as it is known to more than a guess: the model's mesh, at the pose that it has."""
+    return scene.base_surface() if scene.model.pose == "given" else None
+
+
+def _ask(what: str) -> None:
+    """Ask the user at the machine; standard output may be a record that another program reads."""
+    print(what, file=sys.stderr, flush=True)
 
 
 def emulation(scene: Scene) -> Emulation:
@@ -65,7 +81,7 @@ def emulation(scene: Scene) -> Emulation:
         sensor=None if machine.touch == "peck" or sensor is None else sensor.kind,
         stiffness=2e4 if sensor is None else sensor.stiffness,
         counts_per_newton=400.0 if sensor is None else sensor.counts_per_newton[0],
-        force_noise=0.0 if sensor is None else sensor.noise,
+        force_noise=0.003 if sensor is None else sensor.noise,
         repeatability=machine.repeatability,
         pace=machine.pace,
         seed=scene.seed,

@@ -26,6 +26,10 @@ class MachineTable(Table):
         max_force: N.
         low, high: machine coordinates that the tip may take, within the controller's own limits (m).
         unlock, home: on connecting; homing moves the machine.
+        position_known: you vouch that it was homed since it was switched on; holds until the controller restarts.
+        beyond: how far the tip may go beyond the surface of the model without feeling it (m); else as far as the force
+            limit reaches by the stiffness of the sensor, or over_travel with a touch probe.
+        check_probe: ask for a touch of the probe by hand before the first peck of a real machine.
         pace, repeatability: of the emulator: its seconds per second, and the scatter of its probe (m).
     """
 
@@ -44,6 +48,9 @@ class MachineTable(Table):
     high: Point | None = None
     unlock: bool = False
     home: bool = False
+    position_known: bool = False
+    beyond: Length | None = None
+    check_probe: bool = True
     pace: Annotated[float, Field(gt=0)] = 1.0
     repeatability: Extent = 0.0
 
@@ -60,7 +67,7 @@ class SensorTable(Table):
         period: of the control loop (s).
         approach_speed: m/s.
         delay: by how much the force is stamped later than the stage's position (s); see explore3d calibrate.
-        noise: of the emulated sensor, each component (N).
+        noise: of the emulated sensor, each component (N); above 0: one without noise cannot be told from a frozen one.
     """
 
     kind: Literal["optoforce", "line"] = "optoforce"
@@ -72,4 +79,4 @@ class SensorTable(Table):
     period: Delay = 0.01
     approach_speed: Speed = 2e-3
     delay: Delay = 0.0
-    noise: Annotated[float, Field(ge=0)] = 0.0
+    noise: Annotated[float, Field(ge=0)] = 0.003

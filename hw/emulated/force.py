@@ -10,6 +10,13 @@ from hw.emulated.grbl import GrblEmulator
 from hw.sensors import CONFIGURE, RATE_CODES, checksum, encode_frame, encode_line
 from mapping import FloatArray
 
+# What a sensor may send instead of the force
+SENSOR_FAULTS = ("frozen", "zero", "nan", "saturated", "sign", "gain 10", "gain 0.1", "stale", "drift")
+# What a saturated one sends, N: the full scale of the 16 bits at 400 counts/N
+FULL_SCALE = 81.9
+# Drift of the offset, N/s: a hundred times that of a sensor that warms up
+DRIFT = 0.1
+
 
 class ForceEmulator:
     """Samples the force on the tip at its own rate and clock.
@@ -28,7 +35,7 @@ class ForceEmulator:
         stage: GrblEmulator,
         *,
         rate: float = 1000.0,
-        noise: float = 0.0,
+        noise: float = 0.003,
         latency: float = 0.0,
         drift: float = 0.0,
         seed: int = 0,
@@ -40,6 +47,9 @@ class ForceEmulator:
         self._rng = np.random.default_rng(seed)
         self._next = 0
         self._due: deque[tuple[float, bytes]] = deque()
+        self.fault = ""
+        self._since: float | None = None  # the fault
+        self._felt, self._index = np.zeros(3), 0
 
     def receive(self, data: bytes, now: float) -> None:
         """Nothing is listened to."""
@@ -52,10 +62,30 @@ class ForceEmulator:
             force = self.stage.body.force(self.stage.position)
             self.strongest = max(self.strongest, float(np.linalg.norm(force)))
             felt = force + self.noise * self._rng.standard_normal(3)
-            self._due.append((t + self.latency, self.frame(self._next, felt)))
+            self._due.append((t + self.latency, self._faulty_frame(t, felt)))
             self._next += 1
         while self._due and self._due[0][0] <= now:
             self.out += self._due.popleft()[1]
+
+    def _faulty_frame(self, t: float, felt: FloatArray) -> bytes:
+        """What is sent for a force: itself, or what a fault of SENSOR_FAULTS makes of it."""
+        index, down = self._next, np.array([0.0, 0.0, 1.0])
+        if not self.fault:
+            self._felt, self._index = felt, index
+            return self.frame(index, felt)
+        self._since = t if self._since is None else self._since
+        sent = {
+            "frozen": self._felt,
+            "zero": np.zeros(3),
+            "nan": np.full(3, np.nan),
+            "saturated": FULL_SCALE * down,
+            "sign": -felt,
+            "gain 10": 10.0 * felt,
+            "gain 0.1": 0.1 * felt,
+            "stale": self._felt,
+            "drift": felt - DRIFT * (t - self._since) * down,
+        }[self.fault]
+        return self.frame(self._index if self.fault == "stale" else index, sent)
 
     def frame(self, index: int, force: FloatArray) -> bytes:
         """The bytes of one sample."""
@@ -96,6 +126,8 @@ class OptoForceEmulator(ForceEmulator):
 
     def frame(self, index: int, force: FloatArray) -> bytes:
         """A data frame, saturated with the overload bits set where a force is too large."""
+        if not np.isfinite(force).all():  # its numbers are whole: it can only say that it is not well
+            return encode_frame(index, 1 << 10, (0, 0, 0))
         counts = np.round(force * self.counts_per_newton)
         over = np.abs(counts) > 32767
         status = sum(1 << bit for bit, out in zip((9, 8, 7), over, strict=True) if out)

@@ -61,6 +61,7 @@ class GrblEmulator:
         self._replies: deque[str] = deque()
         self.systems = {f"G{n}": np.zeros(3) for n in range(54, 60)}
         self._probed, self._hit = np.zeros(3), False
+        self._astray = np.zeros(3)  # what it believes of its position less what is true
         self._dwell: float | None = None
         self.power_up(locked)
 
@@ -78,6 +79,15 @@ class GrblEmulator:
         self._say(f"ALARM:{alarm}")
         if alarm in (1, 2):
             self._say("[MSG:Reset to continue]")
+
+    def lose_position(self) -> None:
+        """The supply failed, or steps were lost: it believes to stand at machine zero, and says nothing of it."""
+        self._astray = -self.motion.position
+
+    def power_cycle(self) -> None:
+        """Switched off and on, without homing enabled: not locked, greets, and takes where it stands for zero."""
+        self.power_up()
+        self.lose_position()
 
     def receive(self, data: bytes, now: float) -> None:
         """Bytes from the host; realtime ones act at once."""
@@ -140,14 +150,14 @@ class GrblEmulator:
 
     def report(self) -> str:
         """The status report."""
-        position, mask = self.position, int(self.settings[10])
+        position, mask = self.position + self._astray, int(self.settings[10])
         place = f"MPos:{self._units(position)}" if mask & 1 else f"WPos:{self._units(position - self.offset)}"
         fields = [self.state, place]
         if mask & 2:
             fields.append(f"Bf:{PLANNER_BLOCKS - len(self.motion.queue)},{RECEIVE_BUFFER - len(self._buffer)}")
         speed = self.motion.queue[0].speed * 60e3 if self.motion.queue and not self.motion.held else 0.0
         fields.append(f"FS:{speed:.0f},0")
-        if np.any(self.body.force(position)):
+        if self.motion.probe_closed():
             fields.append("Pn:P")
         if self._reports % 10 == 0:
             fields.append(f"WCO:{self._units(self.offset)}")
@@ -200,7 +210,7 @@ class GrblEmulator:
                 way = segment.end - latched
                 length = max(float(np.linalg.norm(way)), 1e-12)
                 latched = latched + way / length * self.repeatability * self._rng.standard_normal()
-            self._probed = self._steps(latched)
+            self._probed = self._steps(latched) + self._astray
             self._say(f"[PRB:{self._units(self._probed)}:{int(self._hit)}]")
             self._say("ok")
 
@@ -320,7 +330,7 @@ class GrblEmulator:
 
     def _target(self, block: Block, modes: dict[str, str]) -> FloatArray:
         unit = 0.0254 if modes["unit"] == "G20" else 1e-3
-        target = self.motion.end.copy()
+        target = self.motion.end + self._astray
         for axis, letter in enumerate("XYZ"):
             if letter in block.values:
                 value = block.values[letter] * unit
@@ -330,7 +340,7 @@ class GrblEmulator:
                     target[axis] += value
                 else:
                     target[axis] = value + self.offset[axis]
-        return target
+        return np.asarray(target - self._astray)
 
     def _move(self, target: FloatArray, motion: str) -> None:
         way = target - self.motion.end
@@ -343,7 +353,7 @@ class GrblEmulator:
         probing = motion.startswith("G38")
         if probing and length == 0:
             raise GcodeError(33)
-        if probing and np.any(self.body.force(self.motion.end)) and motion in ("G38.2", "G38.3"):
+        if probing and self.motion.probe_closed() and motion in ("G38.2", "G38.3"):
             self.trip(4)
             return
         if length == 0:
@@ -359,7 +369,7 @@ class GrblEmulator:
         return float(min(speed, np.divide(rates, share, out=np.full(3, np.inf), where=share > 1e-12).min()))
 
     def _outside(self, target: FloatArray) -> bool:
-        travel = np.array([self.settings[130 + axis] * 1e-3 for axis in range(3)])
+        travel, target = np.array([self.settings[130 + axis] * 1e-3 for axis in range(3)]), target + self._astray
         return bool(self.settings[20]) and bool(((target > 1e-9) | (target < -travel - 1e-9)).any())
 
     def _jog(self, block: Block) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol
 
-from hw.emulated.faults import Fault
+from hw.emulated.faults import BYTE_FAULTS, Fault
 
 TICK = 0.001  # s
 
@@ -70,6 +70,8 @@ class PtyServer:
         return [str(self._links[i]) if i < len(self._links) else self._slave(i) for i in range(len(self.devices))]
 
     def __enter__(self) -> PtyServer:
+        for device in self.devices:
+            device.out.clear()  # what was sent before anybody had the port open is lost, the greeting above all
         self._begun = time.monotonic()
         self._thread.start()
         return self
@@ -159,7 +161,7 @@ class PtyServer:
 
     def _apply(self, fault: Fault, wall: float) -> None:
         index = fault.device
-        if fault.kind in ("lose", "garble"):
+        if fault.kind in BYTE_FAULTS:
             self._spoil[index] = fault
         elif fault.kind == "stall":
             self._quiet[index] = wall + fault.duration

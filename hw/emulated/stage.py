@@ -10,6 +10,10 @@ import numpy as np
 from hw.emulated.touched_body import TouchedBody
 from mapping import FloatArray
 
+# A probe that never closes, always is, or closes by itself on a third of its ways
+PROBE_FAULTS = ("open", "closed", "bouncing")
+BOUNCES = 1 / 3
+
 
 @dataclass
 class Segment:
@@ -49,6 +53,8 @@ class StageMotion:
         self.moved_at = 0.0
         self.latched: FloatArray | None = None
         self.held = False
+        self.probe_fault = ""
+        self._rng = np.random.default_rng(1)
         self._time = 0.0
         self._brake_speed = 0.0
 
@@ -69,9 +75,17 @@ class StageMotion:
             way = segment.end - self.position
             length = float(np.linalg.norm(way))
             reach = self.body.distance(self.position, way / length)
-            if reach < length:
+            if self.probe_fault == "bouncing" and self._rng.uniform() < BOUNCES:
+                reach = min(reach, self._rng.uniform(0.0, length))
+            if reach < length and self.probe_fault != "open":
                 segment.trigger = self.position + way * (reach / length)
         self.queue.append(segment)
+
+    def probe_closed(self) -> bool:
+        """What the probe's input says."""
+        if self.probe_fault in ("open", "closed"):
+            return self.probe_fault == "closed"
+        return bool(np.any(self.body.force(self.position)))
 
     def brake(self) -> None:
         """Begin to stop on the present segment, which stays queued."""

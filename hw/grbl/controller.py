@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hw import FingerError, Lines, Link, LinkError, StoppedError
+from hw import FingerError, Lines, Link, LinkError, Patience, StoppedError
 from hw.grbl import protocol as protocol
 from hw.grbl.protocol import GrblSettings, Probed, Status
 from mapping import FloatArray
@@ -21,6 +21,23 @@ from mapping import FloatArray
 POLL = 0.05
 # With no sign of life for so long the controller is taken for lost, s
 LONGEST_CONTROLLER_SILENCE = 1.5
+
+# An idle machine that answers so many requests and still not the line before them has lost the line or its answer:
+# Grbl answers in order, and a line is parsed within 10 ms
+UNANSWERED = 6
+# So often is a line sent again, or an answer read again, that was lost or garbled: with 1 % of all bytes wrong, 4 % of
+# the `ok` and 30 % of the probing results are; 0.3^12 is one in two million
+TRIES_OF_A_LINE = 12
+# A report may lie this far off the box that holds where the machine was sent, m: ten times Grbl's junction deviation
+OFF_THE_WAY = 1e-4
+# So many reports in a row off the way, and this near to one another, m, are no garbled ones: at 30 mm/s the machine
+# makes 4.5 mm in three requests, a garbled digit seldom strikes the same place twice
+OFF_THE_WAY_IN_A_ROW, OFF_TOGETHER = 3, 5e-3
+
+OFFSET_CHANGED = (
+    "the work offset changed: another program, or a pendant, set G92, G10 or G54 to G59; end it, check the machine's "
+    "position and run again"
+)
 
 # Reports that are kept: ten seconds of asking as fast as a port can answer
 KEPT_REPORTS = 50_000
@@ -57,7 +74,7 @@ class GrblController:
     """
 
     def __init__(self, port: str, *, baudrate: int = 115200, wake: float = 4.0) -> None:
-        self.link = Link(port, Lines(), self._hear, baudrate=baudrate, lost=self._notify)
+        self.link = Link(port, Lines(), self._hear, baudrate=baudrate, lost=self._notify, still=True)
         self.wake = wake
         self.version = ""
         self.settings = GrblSettings()
@@ -71,6 +88,15 @@ class GrblController:
         self._feedback: list[str] = []
         self._sent: deque[int] = deque()
         self._restarts = 0
+        self._restart_expected = True  # opening the port may restart the board
+        self.vouched = False
+        self.distrust: str | None = None
+        self._offset_known = False
+        self.implausible = 0
+        self._off_the_way = 0
+        self._seen_off: FloatArray | None = None
+        self._new_offset: FloatArray | None = None
+        self._way: tuple[FloatArray, FloatArray] | None = None  # box of where it was sent; None: not known yet
 
     # connection
 
@@ -85,24 +111,27 @@ class GrblController:
                 )
             self.alarm = "the machine is locked (state Alarm)" if status.state == "Alarm" else None
             self.version = " ".join(line for line in self._ask("$I") if line.startswith("["))
-            self.settings = GrblSettings.of(self._ask("$$"))
+            self.settings = GrblSettings.of(self._agreed("$$"))
             if not self.settings.values:
                 raise FingerError(f"{self.link.port}: answers, but prints no settings to $$: not a Grbl controller?")
             if self.alarm is None:
                 self.set_up()
+            self._restart_expected = False
         except BaseException:
             self.link.close()
             raise
         return self
 
     def _first_status(self) -> Status:
-        until = time.monotonic() + self.wake
-        while time.monotonic() < until:
+        patience = Patience(self.wake)
+        while not patience.over():
             try:
                 return self.status(within=0.3)
             except LinkError:
                 if not self.link.is_open:
                     raise
+                if patience.left < 0.5 * self.wake:  # a native USB port that waits to be asked
+                    self.link.raise_lines()
         raise LinkError(
             f"{self.link.port}: no answer to a status request within {self.wake:g} s; "
             "is it a Grbl controller, powered, and is the baud rate right?"
@@ -111,7 +140,8 @@ class GrblController:
     def set_up(self) -> None:
         """Millimetres, absolute, feed per minute; read the work offset."""
         self.command("G21G90G94")
-        self.offset = protocol.parse_offset(self.command("$#"), self.command("$G")) * self.settings.report_scale
+        self.offset = protocol.parse_offset(self._agreed("$#"), self._agreed("$G")) * self.settings.report_scale
+        self._way, self._new_offset, self._offset_known = None, None, True
 
     def close(self) -> None:
         """Let go of the port."""
@@ -127,10 +157,25 @@ class GrblController:
             StoppedError: an alarm, a restart or a stop came instead.
             LinkError: no answer in time.
         """
-        self._check()
+        self.check()
         return self._ask(line, within)
 
     def _ask(self, line: str, within: float = 2.0) -> list[str]:
+        """Send a line, again if it or its answer was lost: what is said twice here does the same as said once."""
+        for _ in range(TRIES_OF_A_LINE - 1):
+            with suppress(_Unanswered):
+                return self._ask_once(line, within)
+        return self._ask_once(line, within)
+
+    def _agreed(self, line: str) -> list[str]:
+        """What two answers have in common: a garbled line of one is in no other."""
+        readings = [self._ask(line), self._ask(line)]
+        while len(readings) < TRIES_OF_A_LINE and readings[-1] != readings[-2]:
+            readings.append(self._ask(line))
+        told = {text: sum(text in reading for reading in readings) for reading in readings for text in reading}
+        return [text for text, times in told.items() if times > 1]
+
+    def _ask_once(self, line: str, within: float) -> list[str]:
         with self._news:
             self._answers.clear()
             self._feedback = []
@@ -143,13 +188,13 @@ class GrblController:
             raise FingerError(f"{self.link.port}: {line!r} refused: {protocol.describe(answer)}")
         return feedback
 
-    def status(self, within: float = 1.0) -> Status:
+    def status(self, within: float = LONGEST_CONTROLLER_SILENCE) -> Status:
         """A report asked for now. Raises LinkError."""
-        since = time.monotonic()
-        while time.monotonic() < since + within:
+        since, patience = time.monotonic(), Patience(within)
+        while not patience.over():
             self._request()
             with self._news:
-                if self._news.wait_for(lambda: self._fresh(since) or not self.link.is_open, timeout=0.2):
+                if self._news.wait_for(lambda: self._fresh(since) or not self.link.is_open, timeout=POLL):
                     break
         if not self._fresh(since):
             raise LinkError(self.link.error or f"{self.link.port}: no status report within {within:g} s")
@@ -178,6 +223,16 @@ class GrblController:
         """(3,) machine position now, m."""
         return self.machine_position(self.status())
 
+    def resting_position(self) -> FloatArray:
+        """(3,) machine position, m, as two reports of a standing machine in a row tell it. Raises LinkError."""
+        before = self.position()
+        for _ in range(TRIES_OF_A_LINE):
+            here = self.position()
+            if np.abs(here - before).max() < self.settings.resolution:
+                return here
+            before = here
+        raise LinkError(f"{self.link.port}: no two reports of where the machine stands agree; use a shielded cable")
+
     def machine_position(self, status: Status) -> FloatArray:
         """(3,) machine position in a report, m."""
         metres = status.position * self.settings.report_scale
@@ -185,6 +240,7 @@ class GrblController:
 
     def move(self, target: FloatArray, speed: float, within: float) -> None:
         """Straight to a target (3,), m, at a speed, m/s; returns when the machine stands there."""
+        self._heading_for(target, anew=True)
         self.command(f"G53G1{protocol.words(target)}{protocol.feed_word(speed)}")
         # a dwell is answered when all motion before it is done: sooner and surer than asking for the state
         self.command("G4P0.001", within)
@@ -195,15 +251,28 @@ class GrblController:
         G38.3 raises no alarm where nothing is met. The latched position is where the probe closed; where the
         machine came to rest lies further on by its braking distance.
         """
+        self.check()
+        self._heading_for(target, anew=True)
         work = target - self.offset  # probing obeys the work coordinates: G53 is not for G38
-        lines = self.command(f"G38.3{protocol.words(work)}{protocol.feed_word(speed)}", within)
-        found = [result for result in map(protocol.parse_probe, lines) if result is not None]
-        if not found:
-            # FluidNC and builds without the message still keep the result
-            found = [result for result in map(protocol.parse_probe, self.command("$#")) if result is not None]
-        if not found:
-            raise LinkError(f"{self.link.port}: the controller did not report where it probed; the line was garbled")
-        return Probed(found[-1].position * self.settings.report_scale, found[-1].hit)
+        lines: list[str] = []
+        with suppress(_Unanswered):  # not said again: the probe may be closed now. The result is kept, and read below
+            lines = self._ask_once(f"G38.3{protocol.words(work)}{protocol.feed_word(speed)}", within)
+        found = self._latched(lines)
+        return Probed(found.position * self.settings.report_scale, found.hit)
+
+    def _latched(self, lines: list[str]) -> Probed:
+        """The result that was told twice: in its message, and in what the controller keeps of it ($#)."""
+        told: list[str] = []
+        for _ in range(TRIES_OF_A_LINE):
+            told += [line for line in lines if protocol.parse_probe(line) is not None]
+            for line in told:
+                result = protocol.parse_probe(line)
+                if told.count(line) > 1 and result is not None:
+                    return result
+            lines = self.command("$#")
+        raise LinkError(
+            f"{self.link.port}: no two of {TRIES_OF_A_LINE} readings of where it probed agree; use a shielded cable"
+        )
 
     # streaming
 
@@ -216,13 +285,15 @@ class GrblController:
             FingerError: an earlier line was refused.
             StoppedError, LinkError: as for `command`.
         """
-        self._check()
+        self.check()
+        self._heading_for(target, anew=not self._sent and self._standing())
         line = f"$J=G53{protocol.words(target)}{protocol.feed_word(speed)}\n".encode("ascii")
         self._settle_answers()
         if sum(self._sent) + len(line) >= protocol.RECEIVE_BUFFER:
             restarts = self._restarts
             room = protocol.RECEIVE_BUFFER - len(line)
-            self._wait(lambda: self._room(room), within, "room in the receive buffer", restarts, None)
+            with suppress(_Unanswered):
+                self._wait(lambda: self._room(room), within, "room in the receive buffer", restarts, None)
             self._settle_answers()
         self._sent.append(len(line))
         self.link.write(line)
@@ -243,13 +314,13 @@ class GrblController:
         """Stop jogging, forget what is queued, wait until the machine stands."""
         self._settle_answers()
         self.link.write(protocol.JOG_CANCEL)
-        until = time.monotonic() + within
+        patience = Patience(within)
         while (state := self.status().state) in ("Jog", "Run"):
-            if time.monotonic() > until:
+            if patience.over():
                 raise LinkError(f"{self.link.port}: still {state} {within:g} s after the jog was cancelled")
             time.sleep(0.1 * POLL)
         self._sent.clear()
-        self._check()
+        self.check()
 
     def wait_idle(self, within: float) -> None:
         """Wait until every jog is answered and nothing moves; an operator's hold stops the clock.
@@ -258,13 +329,16 @@ class GrblController:
             FingerError: a jog was refused.
             StoppedError, LinkError: as for `command`.
         """
-        until = time.monotonic() + within
-        while self.status().state in ("Jog", "Run", "Hold", "Door") or self._sent:
-            self._check()
+        patience, idle = Patience(within), 0
+        while (state := self.status().state) in ("Jog", "Run", "Hold", "Door") or self._sent:
+            self.check()
             self._settle_answers()
+            idle = idle + 1 if state == "Idle" else 0
+            if idle > UNANSWERED:
+                self._sent.clear()  # their answers were lost
             if self.paused:
-                until = max(until, time.monotonic() + 1.0)
-            if time.monotonic() > until:
+                patience.at_least(1.0)
+            if patience.over():
                 raise LinkError(f"{self.link.port}: the motion does not end within {within:g} s")
             time.sleep(0.1 * POLL)
 
@@ -276,7 +350,7 @@ class GrblController:
 
     def home(self, within: float = 120.0) -> None:
         """$H: find machine zero. MOVES the machine."""
-        self.alarm = None
+        self.alarm, self._way = None, None
         self.link.write(b"$H\n")
         restarts = self._restarts
         with self._news:
@@ -285,7 +359,98 @@ class GrblController:
         self._wait(lambda: bool(self._answers), within, "the end of homing", restarts, None, stale=within)
         if (answer := self._answers.popleft()) != "ok":
             raise FingerError(f"{self.link.port}: homing refused: {protocol.describe(answer)}")
+        self.vouched, self.distrust = True, None
         self.set_up()
+
+    # trust
+
+    def vouch(self) -> None:
+        """The user vouches that the machine was homed since it was switched on; holds until it restarts.
+
+        Raises:
+            FingerError: it restarted when the port was opened, or claims a place outside of its own travel.
+        """
+        if self._restarts:
+            raise FingerError(
+                f"{self.link.port}: the controller restarted when the port was opened, so nobody knows where it "
+                "stands; home it (home = true), or break the reset line of the board (DTR to reset)"
+            )
+        here, (low, high) = self.position(), self.settings.bounds
+        if ((here < low - OFF_THE_WAY) | (here > high + OFF_THE_WAY)).any():
+            raise FingerError(
+                f"{self.link.port}: the controller believes to stand at {np.round(1e3 * here, 3).tolist()} mm, outside "
+                f"of its travel of {np.round(1e3 * low, 3).tolist()} to {np.round(1e3 * high, 3).tolist()} mm; home it"
+            )
+        self.vouched = True
+
+    @property
+    def doubts(self) -> list[str]:
+        """What in the controller's settings takes away a net that a driver should not be without."""
+        found = []
+        if not self.settings.homing:
+            found.append("$22=0: the machine has no homing, its position rests on your word alone")
+        if not self.settings.soft_limits:
+            found.append("$20=0: a line garbled on the way may lead out of the travel; set $20=1")
+        if not int(self.settings.values.get(10, 1.0)) & 1:
+            found.append("$10 is even: work positions are reported, which a changed work offset shifts; set $10=1")
+        if np.abs(self.offset).max() > 0:
+            found.append(f"work offset {np.round(1e3 * self.offset, 3).tolist()} mm: taken into account")
+        return found
+
+    def confirm_offset(self) -> None:
+        """Read the work offset again. Raises StoppedError: it is another one than on connecting."""
+        told = protocol.parse_offset(self._agreed("$#"), self._agreed("$G")) * self.settings.report_scale
+        if np.abs(told - self.offset).max() > self.settings.resolution:
+            self._lose_trust(OFFSET_CHANGED)
+        self.check()
+
+    def _lose_trust(self, reason: str) -> None:
+        """In the reading thread: from now on nothing moves."""
+        self.vouched, self.distrust = False, f"{self.link.port}: {reason}"
+        self.halt(self.distrust)
+
+    def _heading_for(self, target: FloatArray, anew: bool) -> None:
+        """Reports must lie in the box of the places between which it moves."""
+        with self._news:
+            if anew or self._way is None:
+                if not self.reports:
+                    return
+                here = self.machine_position(self.reports[-1].status)
+                self._way = (here, here)
+            self._way = (np.minimum(self._way[0], target), np.maximum(self._way[1], target))
+
+    def _standing(self) -> bool:
+        return bool(self.reports) and self.reports[-1].status.state == "Idle"
+
+    def _is_plausible(self, status: Status) -> bool:
+        """False for a report of a place where nothing sent it: garbled, or, if the next ones say so too, lost."""
+        if self._way is None or self.distrust is not None:
+            return True
+        here = self.machine_position(status)
+        if ((here >= self._way[0] - OFF_THE_WAY) & (here <= self._way[1] + OFF_THE_WAY)).all():
+            self._off_the_way = 0
+            return True
+        self.implausible += 1
+        together = self._seen_off is not None and np.abs(here - self._seen_off).max() <= OFF_TOGETHER
+        self._off_the_way, self._seen_off = self._off_the_way + 1 if together else 1, here
+        if self._off_the_way >= OFF_THE_WAY_IN_A_ROW:
+            self._lose_trust(
+                f"the machine reports {np.round(1e3 * here, 3).tolist()} mm, where nothing sent it: it restarted, its "
+                "zero was moved, or another program steers it; home it and run again with --resume"
+            )
+        return False
+
+    def _hear_offset(self, offset: FloatArray) -> None:
+        """A work offset that changes was garbled, or, if it is told twice, set by somebody else."""
+        known = self.offset
+        if not self._offset_known or not self.vouched:
+            self.offset = offset
+        elif np.abs(offset - known).max() <= self.settings.resolution:
+            self._new_offset = None
+        elif self._new_offset is not None and np.array_equal(self._new_offset, offset):
+            self._lose_trust(OFFSET_CHANGED)
+        else:
+            self._new_offset = offset
 
     # stopping
 
@@ -298,20 +463,24 @@ class GrblController:
 
     def clear(self, within: float = 3.0) -> bool:
         """After a halt: throw away what is queued and be ready again; True if the position is still known."""
-        until = time.monotonic() + within
+        patience = Patience(within)
         status = self.status()
-        while status.state in ("Run", "Jog", "Hold", "Home") and status.substate != 0 and time.monotonic() < until:
+        while status.state in ("Run", "Jog", "Hold", "Home") and status.substate != 0 and not patience.over():
             if status.state != "Hold":
                 self.link.write(protocol.HOLD)
             time.sleep(0.4 * POLL)
             status = self.status()
         before = self._restarts
+        self._restart_expected = True
         self.link.write(protocol.RESET)
         with self._news:
             self._news.wait_for(lambda: self._restarts > before, timeout=within)
         status = self.status()
-        self._restarts, self.stop_reason = before, None
+        self._restart_expected = False
+        self._restarts, self.stop_reason = before, self.distrust
         self._sent.clear()  # the reset threw away what was queued: it will not be answered
+        if self.distrust is not None:
+            return False
         if status.state == "Alarm" or self.alarm is not None:
             self.alarm = self.alarm or "the machine is locked (state Alarm)"
             return False
@@ -329,17 +498,22 @@ class GrblController:
     def _sort(self, now: float, line: str) -> None:
         if line.startswith("<"):
             status = protocol.parse_status(line)
-            if status is not None:
+            if status is not None and self._is_plausible(status):
                 asked, self._asked = self._asked, None
                 self.reports.append(Report(now, status, 0.0 if asked is None else now - asked))
                 if status.offset is not None:
-                    self.offset = status.offset * self.settings.report_scale
+                    self._hear_offset(status.offset * self.settings.report_scale)
         elif line == "ok" or line.startswith("error:"):
             self._answers.append(line)
         elif line.startswith("ALARM:"):
             self.alarm = protocol.describe(line)
-        elif line.startswith("Grbl"):
+        elif line.startswith("Grbl") or line.endswith("for help]"):
             self._restarts += 1
+            if not self._restart_expected:
+                self._lose_trust(
+                    "the controller restarted, so nobody knows where it stands; check its supply, home it and run "
+                    "again with --resume"
+                )
         else:
             self._feedback.append(line)
 
@@ -347,7 +521,8 @@ class GrblController:
         with self._news:
             self._news.notify_all()
 
-    def _check(self) -> None:
+    def check(self) -> None:
+        """Raise what stopped the machine, if anything did. Raises StoppedError, LinkError."""
         if self.stop_reason is not None:
             raise StoppedError(self.stop_reason)
         if self.alarm is not None:
@@ -365,23 +540,35 @@ class GrblController:
         stale: float = LONGEST_CONTROLLER_SILENCE,
     ) -> None:
         """Wait for news, asking for a status meanwhile, so that silence is noticed soon."""
-        until = time.monotonic() + within
+        patience, silence, heard = Patience(within), Patience(stale), self.link.heard
+        idle, seen = 0, len(self.reports) and self.reports[-1].at
         while True:
             with self._news:
                 if self._news.wait_for(lambda: done() or self._trouble(restarts, alarm), timeout=POLL) and done():
                     return
             if self.alarm != alarm or self.stop_reason is not None or not self.link.is_open:
-                self._check()
+                self.check()
             if self._restarts != restarts:
                 raise StoppedError(f"{self.link.port}: the controller restarted; home it or check its position")
-            now = time.monotonic()
+            if self.reports and self.reports[-1].at != seen:
+                seen = self.reports[-1].at
+                idle = idle + 1 if self._standing() else 0
+                if idle > UNANSWERED:
+                    self._sent.clear()
+                    raise _Unanswered(f"{self.link.port}: no answer while waiting for {what}; use a shielded cable")
+            if self.link.heard != heard:
+                heard, silence = self.link.heard, Patience(stale)
             if self.paused:
-                until = max(until, now + 1.0)  # by the operator: the clock stands
-            if now > until or now - self.link.heard > stale:
-                silent = f"{now - self.link.heard:.1f} s of silence while waiting for {what}"
+                patience.at_least(1.0)  # by the operator: the clock stands
+            if patience.over() or silence.over():
+                silent = f"{time.monotonic() - self.link.heard:.1f} s of silence while waiting for {what}"
                 raise LinkError(f"{self.link.port}: {silent}; check cable and power, reset the controller")
             self._request()
 
     def _trouble(self, restarts: int, alarm: str | None) -> bool:
         changed = self._restarts != restarts or self.alarm != alarm
         return changed or self.stop_reason is not None or not self.link.is_open
+
+
+class _Unanswered(LinkError):
+    """An idle controller that does not answer a line: the line, or its answer, was lost on the way."""

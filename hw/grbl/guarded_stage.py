@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
-from hw import FingerError, LinkError, StoppedError
+from hw import FingerError, LinkError, NotFeltError, Patience, StoppedError
 from hw.grbl.controller import GrblController
+from hw.grbl.expected import ExpectedSurface
 from hw.grbl.frame import StageFrame
 from hw.sensors import ForceSensor
 from mapping import FloatArray
@@ -19,6 +22,20 @@ STANDING = 5e-6
 FRESH, LONGEST_SENSOR_SILENCE = 0.05, 1.0
 # How long the machine may stand still in the midst of a motion, s
 LONGEST_STANDSTILL = 5.0
+# What a sensor that froze lets the tip press before it is noticed (SampleWatch.blind), in shares of the force limit:
+# with the force of the sweep itself, a fifth of the limit as a rule, and the run-on a quarter is left
+BLIND_SHARE = 0.5
+# Slower than this no sensor is worth a sweep, m/s: refused with the reason
+CRAWL = 1e-4
+# A probe is closed, or open, if so many reports say so: one may be garbled, a contact may bounce
+TOLD = 2
+# The tip is free when a step of this length, m, changes the force by less than a touch
+FREE_STEP, MOST_FREE_STEPS = 5e-4, 20
+# The latched position lies on the way up to the motors' steps of three axes, and the rounding of the report
+LATCH_STEPS = 3.0
+# The machine may run on after contact by its braking distance, which firmwares keep to 50 %, and by what it moves while
+# the input is looked at: Grbl's segments of 10 ms
+BRAKING_DOUBT, SEGMENT = 1.5, 0.01
 
 
 @dataclass(eq=False)
@@ -32,6 +49,8 @@ class GuardedStage:
         speed: of motion through free space, m/s.
         over_travel: how far the tip may run on after contact while it brakes, m: limits the speed of everything
             that may touch.
+        expected: where the body must have been felt, if that is known.
+        stiffness, max_force: of the tip under the sensor, N/m, and the limit, N; 0 and inf: a touch probe.
     """
 
     controller: GrblController
@@ -41,14 +60,22 @@ class GuardedStage:
     over_travel: float
     sensor: ForceSensor | None = None
     touch_force: float = 0.3
+    expected: ExpectedSurface | None = None
+    stiffness: float = 0.0
+    max_force: float = np.inf
 
     @property
     def guarded_speed(self) -> float:
         """Fastest speed whose braking distance stays within half of the over-travel, m/s."""
-        acceleration = np.nanmin(np.append(self.controller.settings.acceleration, np.inf))
-        if not np.isfinite(acceleration):
-            acceleration = 0.01  # a firmware that does not say: assume a lame one
-        return float(min(self.speed, np.sqrt(acceleration * self.over_travel)))
+        fastest = min(self.speed, np.sqrt(self._acceleration * self.over_travel))
+        if self.sensor is not None and self.sensor.watch.blind * self.stiffness > 0:
+            fastest = min(fastest, BLIND_SHARE * self.max_force / (self.stiffness * self.sensor.watch.blind))
+            if fastest < CRAWL:
+                raise FingerError(
+                    f"a frozen force sensor would be noticed after {self.sensor.watch.blind:.1f} s only: it is "
+                    "too quiet or slow; take out its filter, raise its rate, or take a softer tip"
+                )
+        return float(fastest)
 
     def position(self) -> FloatArray:
         """Where the tip centre is now."""
@@ -66,15 +93,141 @@ class GuardedStage:
     def probe(self, target: FloatArray, speed: float) -> tuple[FloatArray, bool]:
         """Towards the target until contact: (latched position, True), or (target, False) if nothing is met."""
         self.check(target, "probing")
-        here = self.position()
+        here = self.position() if self.sensor is not None else self._resting()
         way = float(np.linalg.norm(target - here))
         if way < STANDING:
             return here, False
+        inwards = (target - here) / way
+        bound = np.inf if self.expected is None else float(self.expected.bounds(here[None, :], inwards[None, :])[0])
+        if bound < way:
+            target = here + max(bound, 0.0) * inwards
+            if bound < STANDING:
+                raise self._not_felt(target)
         speed = min(speed, self.guarded_speed)
-        if self.sensor is not None:
-            return self._feel(target, speed, self.sensor)
-        found = self.controller.probe(self.frame.to_machine(target), speed, _patience(way, speed))
-        return self.frame.to_object(found.position), found.hit
+        where, hit = self._peck(here, target, speed) if self.sensor is None else self._feel(target, speed, self.sensor)
+        if not hit and bound < way:
+            raise self._not_felt(where)
+        return where, hit
+
+    def _not_felt(self, where: FloatArray) -> NotFeltError:
+        assert self.expected is not None
+        return NotFeltError(
+            f"nothing was felt {1e3 * self.expected.beyond:.2f} mm beyond the surface of the model, at "
+            f"{np.round(1e3 * where, 3).tolist()} mm (object frame): the probe or sensor is dead, or the body is not "
+            "where the model has it. Touch the tip and look whether it answers; check origin and turn; pose = "
+            '"estimate" finds the pose, beyond in [finger.machine] lets the tip go deeper'
+        )
+
+    def _peck(self, start: FloatArray, target: FloatArray, speed: float) -> tuple[FloatArray, bool]:
+        """Probe under the controller's own eyes, and judge what it says by where the machine came to rest."""
+        if self.closed():
+            self._open_by_backing_off(start, target)
+            start = self._resting()
+        way = float(np.linalg.norm(target - start))
+        inwards = (target - start) / way
+        step = self.controller.settings.resolution
+        for _ in range(TOLD):  # a line that was lost on the way moves nothing: it is said again
+            found = self.controller.probe(self.frame.to_machine(target), speed, _patience(way, speed))
+            resting = self._resting()
+            if found.hit or np.linalg.norm(resting - start) > STANDING:
+                break
+        if not found.hit:
+            left = float(np.linalg.norm(target - resting))
+            if left > LATCH_STEPS * step + STANDING:
+                self.controller.confirm_offset()
+                raise StoppedError(
+                    f"the machine stopped {1e3 * left:.3f} mm before the end of its way and met nothing; was it held? "
+                    "Run again with --resume"
+                )
+            return target, False
+        where = self.frame.to_object(found.position)
+        along = float((where - start) @ inwards)
+        aside = float(np.linalg.norm(where - start - along * inwards))
+        ran_on = float((resting - where) @ inwards)
+        slack = LATCH_STEPS * step
+        most = BRAKING_DOUBT * speed**2 / (2.0 * self._acceleration) + SEGMENT * speed + slack
+        if aside > slack or not -slack <= along <= way + slack or not -slack <= ran_on <= most:
+            raise LinkError(
+                f"the contact reported at {np.round(1e3 * where, 3).tolist()} mm does not fit to where the machine "
+                f"came to rest, {np.round(1e3 * resting, 3).tolist()} mm; the line was garbled: use a shielded cable"
+            )
+        # one report that says closed is enough: a garbled one leaves the letter out sooner than it makes it
+        if ran_on > slack and not any(self.controller.status().probe_closed for _ in range(2 * TOLD)):
+            raise StoppedError(
+                "the probe closed, and was open again when the machine stood deeper in the body: it bounces, or its "
+                "cable picks up noise; check its contacts and shield"
+            )
+        return where, True
+
+    def _resting(self) -> FloatArray:
+        return self.frame.to_object(self.controller.resting_position())
+
+    @contextmanager
+    def unbounded(self) -> Iterator[None]:
+        """For as long as the block runs the model bounds nothing: the probe has just been seen to live."""
+        expected, self.expected = self.expected, None
+        try:
+            yield
+        finally:
+            self.expected = expected
+
+    def closed(self) -> bool:
+        """True if the probe is closed: if most of the next reports say so."""
+        told = [self.controller.status().probe_closed]
+        while told.count(True) < TOLD and told.count(False) < TOLD:
+            told.append(self.controller.status().probe_closed)
+        return told.count(True) >= TOLD
+
+    def _open_by_backing_off(self, start: FloatArray, target: FloatArray) -> None:
+        """A probe that is closed before probing begins is in contact: back, the way it was to go."""
+        back = (start - target) / np.linalg.norm(start - target)
+        for _ in range(MOST_FREE_STEPS):
+            self.move(self._within(self.position() + FREE_STEP * back), self.guarded_speed)
+            if not self.closed():
+                return
+        raise StoppedError(
+            f"the probe stays closed {1e3 * MOST_FREE_STEPS * FREE_STEP:.0f} mm off the contact: it sticks, is wired "
+            "for the other sense ($6), or its cable is broken"
+        )
+
+    def free(self, away: FloatArray) -> None:
+        """Before the first motion: leave what the tip stands against, along `away`, until nothing changes any more.
+
+        Raises:
+            StoppedError: it presses harder that way, or never lets go.
+        """
+        if self.sensor is None:
+            if self.closed():
+                self._open_by_backing_off(self.position(), self.position() - away)
+            return
+        before = self._raw(self.sensor)
+        for _ in range(MOST_FREE_STEPS):
+            self.move(self._within(self.position() + FREE_STEP * away), min(self.guarded_speed, FREE_STEP / FRESH))
+            after = self._raw(self.sensor)
+            pressed = float(self.frame.turn_to_object(after - before) @ away)
+            if pressed > self.touch_force:
+                raise StoppedError(
+                    f"the tip stood in contact, and backing off pressed it by {pressed:.2f} N more; free it by hand"
+                )
+            if np.linalg.norm(after - before) < self.touch_force:
+                return
+            before = after
+        raise StoppedError("the force changes all the way off the body; is something caught at the tip?")
+
+    def _raw(self, sensor: ForceSensor) -> FloatArray:
+        self.listen(sensor, time.monotonic())
+        return sensor.force()
+
+    @property
+    def _acceleration(self) -> float:
+        lowest = float(np.nanmin(np.append(self.controller.settings.acceleration, np.inf)))
+        return lowest if np.isfinite(lowest) else 0.01  # a firmware that does not say: assume a lame one
+
+    def creep(self, target: FloatArray) -> None:
+        """A step in contact, at the guarded speed; returns when it is made."""
+        self.check(target, "pressing")
+        self.controller.jog(self.frame.to_machine(target), self.guarded_speed)
+        self.controller.wait_idle(LONGEST_STANDSTILL)
 
     def _feel(self, target: FloatArray, speed: float, sensor: ForceSensor) -> tuple[FloatArray, bool]:
         """Jog until the sensor feels contact; where the machine then came to rest."""
@@ -103,14 +256,15 @@ class GuardedStage:
         The force is looked at once at least, however fast the stage was there: on a busy host it always is, and
         would be sent into the body step by step.
         """
-        until = time.monotonic() + LONGEST_STANDSTILL
+        patience = Patience(LONGEST_STANDSTILL)
         while True:
+            self.controller.check()
             self.listen(sensor, made)
             if self._touches(sensor):
                 return True
             if np.linalg.norm(self.position() - here) <= near:
                 return False
-            if time.monotonic() > until:
+            if patience.over():
                 raise LinkError("the machine does not follow; is it held, or its door open?")
 
     def listen(self, sensor: ForceSensor, since: float = -np.inf) -> None:
@@ -124,8 +278,11 @@ class GuardedStage:
         """
 
         def fresh() -> bool:
-            return sensor.age <= FRESH and sensor.heard > since
+            # what was taken after the last motion was sent is new enough, however late it came: nothing moves beyond it
+            return sensor.fault is not None or (sensor.heard > since if since > -np.inf else sensor.age <= FRESH)
 
+        if sensor.fault is not None:
+            raise StoppedError(sensor.fault)
         if not fresh() and not sensor.wait(fresh, LONGEST_SENSOR_SILENCE):
             self.controller.halt(
                 f"no force sample for {sensor.age:.2f} s; check the sensor's cable and power, run again"
@@ -168,9 +325,32 @@ class GuardedStage:
         raise StoppedError(f"the way is blocked at {mm} mm (object frame); travel round it or lift higher")
 
     def lift(self, away: FloatArray, distance: float) -> None:
-        """Back off along `away`, as far as the limits allow; never feels, so only away from the body."""
-        here = self.position()
-        self.move(self._within(here + distance * away))
+        """Back off along `away`, as far as the limits allow.
+
+        Raises:
+            StoppedError: something stands there: the force rises, or the probe that had opened closes again.
+        """
+        target = self._within(self.position() + distance * away)
+        if float(np.linalg.norm(target - self.position())) < STANDING:
+            return
+        sensor = self.sensor if self.sensor is not None and self.sensor.fault is None else None
+        most = self.touch_force + (0.0 if sensor is None else float(np.linalg.norm(sensor.force())))
+        self.controller.wait_idle(LONGEST_STANDSTILL)  # an operator's hold: no jog is taken before it is let go
+        self.controller.jog(self.frame.to_machine(target), self.guarded_speed)
+        opened, met = False, 0
+        while True:
+            status = self.controller.status()
+            if sensor is not None:
+                met = TOLD if np.linalg.norm(sensor.force()) > most else 0
+            elif self.sensor is None:
+                opened = opened or not status.probe_closed
+                met = met + 1 if opened and status.probe_closed else 0
+            if met >= TOLD:
+                self.controller.cancel_jog()
+                raise StoppedError("something was met while the tip was lifted off; free it by hand")
+            if status.state != "Jog":
+                break
+        self.controller.wait_idle(LONGEST_STANDSTILL)
 
     def _within(self, target: FloatArray) -> FloatArray:
         machine = np.clip(self.frame.to_machine(target), self.bounds[0], self.bounds[1])

@@ -13,6 +13,7 @@ import numpy as np
 
 from mapping import FloatArray
 
+MACHINE_STATES = ("Idle", "Run", "Hold", "Jog", "Alarm", "Door", "Check", "Home", "Sleep", "Tool")
 STATUS, HOLD, RESUME, RESET, DOOR, JOG_CANCEL = b"?", b"!", b"~", b"\x18", b"\x84", b"\x85"
 RECEIVE_BUFFER = 128  # bytes
 
@@ -184,6 +185,8 @@ class GrblSettings:
 def parse_status(line: str) -> Status | None:
     """The report in a line <...>, or None if it is not a whole one."""
     match = re.fullmatch(r"<([A-Za-z]+)(?::(\d+))?\|([MW])Pos:([-\d.,]+)((?:\|[^|<>]*)*)>", line)
+    if match is not None and match[1] not in MACHINE_STATES:
+        return None  # garbled: "Jpg" must not pass for a machine that stands
     position = None if match is None else _vector(match[4])
     if match is None or position is None:
         return None
@@ -232,7 +235,7 @@ def describe(line: str) -> str:
     table = ALARMS if kind == "ALARM" else ERRORS
     number = int(code) if code.isdigit() else -1
     unknown = "not in the documents of Grbl 1.1 or grblHAL: see the firmware's; reset and home again ($H)"
-    return f"{line} ({table.get(number, unknown)})"
+    return f"{line} ({table.get(number, unknown if number >= 0 else code.strip() or unknown)})"
 
 
 def words(axes: FloatArray) -> str:

@@ -11,12 +11,29 @@ from mapping import BoolArray, FloatArray
 
 # A report that took longer than usual by this, s, came late to a busy host: nobody knows when it was true
 LATE = 5e-4
+# A machine that stands may be reported so far aside, report units (mm, or inches: then more is let pass): two steps of
+# usual motors
+STILL = 0.008
 
 
 def prompt(reports: Sequence[Report]) -> list[Report]:
     """The reports whose round trip took hardly longer than is usual: those that their stamps can be trusted of."""
     usual = float(np.median([report.round_trip for report in reports])) if reports else 0.0
     return [report for report in reports if report.round_trip <= usual + LATE]
+
+
+def smooth(reports: Sequence[Report]) -> list[Report]:
+    """The reports that lie between their neighbours: a digit garbled on the way puts the machine aside for one report.
+
+    Off is what lies farther from the middle between its neighbours than these are apart, and STILL.
+    """
+    if len(reports) < 3:
+        return list(reports)
+    places = np.array([report.status.position for report in reports])
+    apart = np.linalg.norm(places[2:] - places[:-2], axis=1)
+    off = np.linalg.norm(places[1:-1] - 0.5 * (places[2:] + places[:-2]), axis=1)
+    keep = np.concatenate([[True], off <= apart + STILL, [True]])
+    return [report for report, good in zip(reports, keep, strict=True) if good]
 
 
 def positions_at(times: FloatArray, reported: FloatArray, positions: FloatArray) -> FloatArray:

@@ -11,15 +11,22 @@ from typing import Any
 
 import numpy as np
 
-from hw import FingerError, LinkError, Move, StopOnSignal, StoppedError, Workspace
-from hw.grbl import GrblController, GuardedStage, StageFrame
+from hw import FingerError, LinkError, Move, Patience, StopOnSignal, StoppedError, Workspace
+from hw.grbl import ExpectedSurface, GrblController, GuardedStage, StageFrame
 from hw.probing.lag import measured_delay
 from hw.probing.peck import Peck, Touched
 from hw.probing.slide import Slide
-from mapping import FloatArray, Trace
+from mapping import FloatArray, Surface, Trace
 
 # How long to wait for a sensor to come back, s
 RECONNECT = 5.0
+# A dead sensor may let the tip press so much of the force limit behind the surface of the model: the force that was
+# held before and the rounding of the steps are the rest
+DEAD_SHARE = 0.8
+# How long the user has to touch the probe, s
+TOUCH_BY_HAND = 60.0
+# The probe is looked at so often meanwhile, s: a hand's touch lasts longer
+LOOK = 0.02
 
 
 @dataclass(kw_only=True)
@@ -37,6 +44,11 @@ class GrblFinger:
         over_travel: how far the tip may run on after contact, m.
         max_force: largest force that a move may ask for, N.
         limits: (2, 3) machine coordinates within the controller's own that the tip may take, m; None: all.
+        position_known: you vouch that the machine was homed since it was switched on. Holds until it restarts; without
+            it, `home` or `unlock`, nothing moves.
+        surface: model of the body where it stands: beyond it the tip must have felt something.
+        beyond: how far beyond, m; None: DEAD_SHARE of max_force over the stiffness, or over_travel for a touch probe.
+        ask: told to ask the user for a touch of the probe, which is then awaited; None: the probe is not checked.
         unlock: send $X if the machine is locked on connecting (its position must be right). Moves nothing.
         home: send $H on connecting. MOVES the machine; needs `armed`.
         baudrate: of the port.
@@ -56,6 +68,10 @@ class GrblFinger:
     limits: FloatArray | None = None
     unlock: bool = False
     home: bool = False
+    position_known: bool = False
+    surface: Surface | None = None
+    beyond: float | None = None
+    ask: Callable[[str], None] | None = None
     baudrate: int = 115200
     notice: Callable[[Trace], None] | None = None
     beside: AbstractContextManager[Any] = field(default_factory=nullcontext)
@@ -65,6 +81,8 @@ class GrblFinger:
     _sweeps: int = field(init=False, default=0)
     _begun: float = field(init=False, default=0.0)
     _lost: str | None = field(init=False, default=None)
+    _left: bool = field(init=False, default=False)
+    _cut_short: list[str] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
         if (self.peck is None) == (self.slide is None):
@@ -101,6 +119,13 @@ class GrblFinger:
                     f"{self.port}: {controller.alarm}; home it ($H), or set unlock if its position is right"
                 )
             controller.unlock()
+        if self.armed and not self.home:
+            if not (self.position_known or self.unlock):
+                raise FingerError(
+                    f"{self.port}: nobody knows where the machine stands: home it (home = true), or set position_known "
+                    "if it was homed since it was switched on and has not been moved by hand"
+                )
+            controller.vouch()
         bounds = controller.settings.bounds
         if self.limits is not None:
             low, high = self.limits
@@ -112,7 +137,21 @@ class GrblFinger:
         over_travel = self.over_travel
         if self.slide is not None:  # running on must not reach the force limit
             over_travel = min(over_travel, 0.5 * self.max_force / self.slide.stiffness)
-        self._stage = GuardedStage(controller, self.frame, bounds, speed, over_travel, sensor)
+        expected = None
+        if self.surface is not None:
+            beyond = self.over_travel if self.slide is None else DEAD_SHARE * self.max_force / self.slide.stiffness
+            expected = ExpectedSurface(self.surface, self.tip_radius, self.beyond or beyond)
+        self._stage = GuardedStage(
+            controller,
+            self.frame,
+            bounds,
+            speed,
+            over_travel,
+            sensor,
+            expected=expected,
+            stiffness=0.0 if self.slide is None else self.slide.stiffness,
+            max_force=np.inf if self.slide is None else self.max_force,
+        )
 
     def _speed_of(self, controller: GrblController) -> float:
         return float(np.nanmin(np.append(controller.settings.max_rate, self.travel_speed)))
@@ -132,8 +171,9 @@ class GrblFinger:
     def _retreat(self, stage: GuardedStage) -> None:
         """Stop what moves and leave the body; on a machine that is lost or locked nothing can be done."""
         controller = stage.controller
-        if not self.armed or self._away is None or not controller.link.is_open:
+        if not self.armed or self._away is None or self._left or not controller.link.is_open:
             return
+        self._left = True
         try:
             if controller.stop_reason is not None or controller.status().state not in ("Idle", "Alarm"):
                 controller.halt("leaving")
@@ -142,7 +182,9 @@ class GrblFinger:
             if controller.alarm is None:
                 stage.lift(self._away, 2.0 * self.tip_radius)
         except FingerError as error:
-            self._lost = f"could not retreat: {error}"
+            self._lost = (
+                f"{self._lost}; and could not retreat: {error}" if self._lost else f"could not retreat: {error}"
+            )
 
     # what a Finger offers
 
@@ -175,6 +217,8 @@ class GrblFinger:
             "tip_radius": self.tip_radius,
             "resolution": controller.settings.resolution,
             "firmware": controller.version,
+            "doubts": controller.doubts,
+            "cut_short": self._cut_short,
             "settings": {f"${code}": value for code, value in controller.settings.values.items()},
             "origin": self.frame.origin.tolist(),
             "rotation": self.frame.rotation.tolist(),
@@ -194,14 +238,17 @@ class GrblFinger:
             raise FingerError(self._lost)
         self._refuse_what_exceeds(move, stage)
         touched: list[Trace] = []
+        self._left = False
         try:
             self._carry_out(move, stage, touched)
         except (LinkError, StoppedError) as error:
             stage.controller.halt(str(error))
             self._lost = str(error)
+            self._retreat(stage)  # now, and not when the last samples are thought over: the tip may be pressed hard
             if not any(map(len, touched)):
                 raise
-        except FingerError:
+        except FingerError as error:
+            self._cut_short.append(str(error))
             if not any(map(len, touched)):  # one line was refused, a garbled one perhaps: what was felt before it stays
                 raise
         return Trace.concatenate(touched or [self._trace(Touched(np.zeros(0), np.zeros((0, 3))))])
@@ -238,6 +285,8 @@ class GrblFinger:
         lift = 0.5 * self.tip_radius
         if self._away is not None:
             stage.lift(self._away, lift)
+        else:
+            self._begin(stage, away)
         self._away = away
         if move.purpose in ("travel", "retreat"):
             for point, inwards in zip(move.path, move.approach, strict=True):
@@ -253,6 +302,22 @@ class GrblFinger:
             if self.notice is not None and len(batch.times):
                 self.notice(touched[-1])
         self._away = -move.approach[-1]
+
+    def _begin(self, stage: GuardedStage, away: FloatArray) -> None:
+        """Before the first motion: the probe answers to the user's touch, and the tip stands free."""
+        stage.free(away)
+        if self.slide is not None:
+            self.slide.sensor.tare()
+        elif self.ask is not None:
+            for closed, what in ((True, "touch the tip by hand"), (False, "let go of the tip")):
+                self.ask(f"{self.port}: {what}, within {TOUCH_BY_HAND:.0f} s")
+                patience = Patience(TOUCH_BY_HAND)
+                while stage.closed() != closed:
+                    if patience.over():
+                        raise StoppedError(
+                            f"the probe did not {'close' if closed else 'open'}: check its cable, and its sense ($6)"
+                        )
+                    time.sleep(LOOK)
 
     def _trace(self, batch: Touched) -> Trace:
         force = batch.forces

@@ -13,11 +13,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hw import LinkError, Move, StoppedError
+from hw import LinkError, Move, NotFeltError, Patience, StoppedError
 from hw.grbl import LONGEST_STANDSTILL, GuardedStage
-from hw.probing.fusion import known_at, positions_at, prompt, rigid_centers
+from hw.probing.fusion import known_at, positions_at, prompt, rigid_centers, smooth
 from hw.probing.lag import Lag
 from hw.probing.peck import Touched, spaced
+from hw.probing.press_test import press_test
 from hw.sensors import ForceSensor
 from mapping import BoolArray, FloatArray
 
@@ -34,6 +35,14 @@ SETTLED_FORCE_SHARE, SETTLING = 0.2, 50
 BLIND, UNUSUAL, HARMLESS_STAGE_STEPS = 0.5, 2.0, 2.0
 # Reports from so long before the samples are looked at: the last one may be that old, s
 BEFORE = 0.1
+# A body presses, it never pulls: friction at a steep side may, by less than this share of the force (0.5 on steel)
+PULL = 0.6
+# The zero may move by this, as a displacement of the tip, during one sweep, m: its samples are off by as much
+ZERO_MOVED = 1.5e-5
+# What was felt so long before a stop may be wrong already, s: two requests for a status
+HELD_BACK = 0.1
+# A sweep takes longer than its path: touching, pressing, steep flanks, a host that is busy otherwise, s
+SWEEP_OVERHEAD = 3.0
 # A path of one point is touched for so many control periods
 DWELL = 10
 
@@ -67,29 +76,54 @@ class Slide:
 
     def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
         """Samples in contact with their forces, about every BATCH seconds; what was felt before a stop as well."""
-        self.sensor.tare()
+        self._tare(stage, move.duration + SWEEP_OVERHEAD)
+        self.sensor.watch.steepest = self.stiffness * max(move.speed, stage.guarded_speed)
         path, approach = spaced(move, move.speed * self.period)
-        where, hit = stage.probe(path[0] + self.reach * approach[0], self.approach_speed)
+        _, hit = stage.probe(path[0] + self.reach * approach[0], self.approach_speed)
         if not hit:
             return
+        press_test(stage, self.sensor, approach[0], self.stiffness)
+        depth = float((stage.position() - path[0]) @ approach[0])
         last = told = time.monotonic()
         try:
-            for sliding in self._steer(stage, move, path, approach, float((where - path[0]) @ approach[0])):
+            for sliding in self._steer(stage, move, path, approach, depth):
                 if not sliding:
                     last = time.monotonic()  # what the tip feels while it settles is no sweep
                 elif time.monotonic() > told + BATCH:
                     told = time.monotonic()
-                    batch = self._fused(stage, last)
+                    batch = self._fused(stage, last, told - self.sensor.watch.blind)
                     if len(batch.times):
                         last = float(batch.times[-1])
                         yield batch
         except (StoppedError, LinkError):
-            yield self._fused(stage, last)
+            yield self._fused(stage, last, time.monotonic() - HELD_BACK)
             raise
         finally:
             if stage.controller.link.is_open and stage.controller.stop_reason is None:
                 stage.controller.cancel_jog()
         yield self._fused(stage, last)
+
+    def _tare(self, stage: GuardedStage, duration: float) -> None:
+        """Take the zero anew; it must be about where it was before the last sweep, and stay there for the next one."""
+        before, known = self.sensor.zero, self.sensor.watch.blind > 0.0
+        self.sensor.tare()
+        moved = float(np.linalg.norm(self.sensor.zero - before))
+        if known and moved > max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0):
+            reason = (
+                f"the sensor's zero moved by {moved:.2f} N during the last sweep, whose samples are off by up to "
+                f"{1e6 * moved / self.stiffness:.0f} um: leave those out; let the sensor warm up, look what hangs on it"
+            )
+            stage.controller.halt(reason)
+            raise StoppedError(reason)
+        drift = float(np.linalg.norm(self.sensor.drift))
+        if drift * duration > max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0):
+            reason = (
+                f"the sensor's zero drifts by {drift:.2f} N/s while nothing touches, "
+                f"{1e6 * drift * duration / self.stiffness:.0f} um of the tip during one sweep: let it warm up, or "
+                "look what hangs on it"
+            )
+            stage.controller.halt(reason)
+            raise StoppedError(reason)
 
     def _steer(
         self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, depth: float
@@ -103,11 +137,18 @@ class Slide:
         queued = [0.0] * QUEUED  # lengths of the last jogs
         settling = SETTLING  # periods to press on before the sweep begins
         left = 0 if end > 0 else DWELL
-        made = -np.inf  # when the last jog was sent
+        bounds = np.full(len(path), np.inf) if stage.expected is None else stage.expected.bounds(path, approach)
+        made = time.monotonic()  # when the last jog was sent
         while True:
             inwards = _between(approach, at)
             inwards /= np.linalg.norm(inwards)
-            missing = move.force - self._pressing(stage, inwards, here, sum(queued), made)
+            pressing = self._pressing(stage, inwards, here, sum(queued), made)
+            if pressing < -max(PULL * move.force, 0.5 * stage.touch_force):
+                raise StoppedError(
+                    f"the force pulls the tip by {-pressing:.2f} N where a body can only press: the sensor's sign "
+                    "turned or its zero jumped; check its cable, run again"
+                )
+            missing = move.force - pressing
             settling = 0 if abs(missing) <= SETTLED_FORCE_SHARE * move.force else max(0, settling - 1)
             pace = 0.0 if settling else _pace(missing / move.force)
             at = min(end, at + pace)
@@ -117,6 +158,12 @@ class Slide:
             depth += float(np.clip(wanted + pace * trend, *self._step_limits(stage)))
             if depth > self.reach:
                 raise StoppedError("the tip went too deep behind the commanded path: the body ends, or is elsewhere")
+            if depth > max(bounds[int(at)], bounds[int(np.ceil(at))]):
+                raise NotFeltError(
+                    f"the tip sank {1e3 * stage.expected.beyond if stage.expected else 0.0:.2f} mm below the surface "
+                    "of the model without the force that belongs to it: the sensor's zero or gain drifted, or the body "
+                    "is lower there; check both, or set beyond in [finger.machine]"
+                )
             target = _between(path, at) + depth * inwards
             way = float(np.linalg.norm(target - here))
             if way > 0:
@@ -138,10 +185,11 @@ class Slide:
         The machine paces the loop: a host that is late makes it stand, never run ahead. No force counts twice: a
         loop that goes on with what it felt before its last jog (`made`, s) would press deeper without feeling it.
         """
-        until = time.monotonic() + LONGEST_STANDSTILL
+        patience = Patience(LONGEST_STANDSTILL)
         left = max(queued, 1.5 * stage.controller.settings.resolution)
         while np.linalg.norm(stage.position() - here) > left:
-            if time.monotonic() > until:
+            stage.controller.check()
+            if patience.over():
                 raise StoppedError("the machine does not follow; is it held, or its door open?")
         stage.listen(self.sensor, made)
         force = stage.frame.turn_to_object(self.sensor.force())
@@ -151,9 +199,9 @@ class Slide:
         most = stage.guarded_speed * self.period
         return -most, 0.5 * most
 
-    def _fused(self, stage: GuardedStage, after: float) -> Touched:
-        """Samples in contact taken after that time, as far as the stage has reported where it was."""
-        reports = prompt(stage.controller.reported(after - BEFORE))
+    def _fused(self, stage: GuardedStage, after: float, until: float = np.inf) -> Touched:
+        """Samples in contact taken between these times, as far as the stage has reported where it was."""
+        reports = smooth(prompt(stage.controller.reported(after - BEFORE)))
         if len(reports) < 2:
             return Touched(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
         times, forces = self.sensor.timed(after)
@@ -170,6 +218,7 @@ class Slide:
         def touching(delay: float) -> tuple[BoolArray, FloatArray]:
             centers = positions_at(times - delay, stamps, places)
             sound = (pressing > self.contact) & np.isfinite(centers).all(axis=1) & (times > after)
+            sound &= times < until
             return sound & known_at(times - delay, stamps, places, normals, longest, step), centers
 
         sound, centers = touching(self.delay)

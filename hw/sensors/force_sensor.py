@@ -12,14 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from hw import Framing, Link, LinkError
+from hw import Framing, Link, LinkError, Patience
 from hw.sensors.clock import SensorClock, missing, unwrapped
+from hw.sensors.watch import SampleWatch
 from mapping import FloatArray, IntArray
 
 # Samples that are kept: a minute at 5 kHz
 KEPT_SAMPLES = 300_000
 # Before the samples asked for, the clock is known by those of so many seconds
 HISTORY = 10.0
+# The least delay of a sample is that of the last one to two blocks of so long, s: a clock that is 1 % off what is known
+# of it is then 20 ms off at most, less than the 50 ms after which a sample is not steered by
+DELAY_BLOCK = 1.0
+# A host may hold back samples for 0.1 s: over so many s that makes the sensor's period uncertain by 2 %
+PERIOD_SPAN = 5.0
 
 
 class ForceSensor:
@@ -44,12 +50,19 @@ class ForceSensor:
         self.link = Link(port, framing, self._hear, baudrate=baudrate, lost=self._on_lost)
         self.rate, self.bits = rate, bits
         self.tick = 1.0 / rate if tick is None else tick
-        self.zero = np.zeros(3)
+        self.zero, self.drift = np.zeros(3), np.zeros(3)
         self._samples: deque[tuple[float, int, float, float, float]] = deque(maxlen=KEPT_SAMPLES)
         self._limit = np.inf
         self._halt: Callable[[str], None] = _nothing
         self._news = threading.Condition()
         self.faulty = 0
+        self.fault: str | None = None
+        self._struck = False
+        self.watch = SampleWatch(bits)
+        self._period = self.tick
+        self._newest = -np.inf
+        self._least = [np.inf, np.inf]  # delay by the sensor's own clock, of the block before this one and of this one
+        self._block_ends = -np.inf
 
     def decode(self, frame: bytes) -> tuple[int, float, float, float] | None:
         """Count and force (N) in a frame; None if the sensor says that it is not to be trusted."""
@@ -59,8 +72,8 @@ class ForceSensor:
         """Tell the device to send."""
 
     def guard(self, limit: float, halt: Callable[[str], None]) -> None:
-        """From now on call `halt`, in the reading thread, as soon as a force exceeds `limit` (N)."""
-        self._limit, self._halt = limit, halt
+        """From now on call `halt`, in the reading thread, if a force exceeds `limit` (N) or is none (SampleWatch)."""
+        self._limit, self._halt, self._struck = limit, halt, False
 
     def __enter__(self) -> ForceSensor:
         self.link.open()
@@ -84,6 +97,9 @@ class ForceSensor:
     def reconnect(self, within: float) -> bool:
         """Try for some seconds to get back a sensor that was lost; True if it sends again. Tare it anew."""
         self._samples.clear()
+        self.watch.forget()
+        self.fault, self._struck = None, False
+        self._newest, self._least = -np.inf, [np.inf, np.inf]
         if not self.link.reopen(within):
             return False
         self.start()
@@ -101,13 +117,13 @@ class ForceSensor:
 
     @property
     def age(self) -> float:
-        """Time since the newest sample arrived, s."""
+        """Time since the newest sample was taken, s, by the sensor's own clock: old ones may still be arriving."""
         return time.monotonic() - self.heard
 
     @property
     def heard(self) -> float:
-        """When the newest sample arrived, s, time.monotonic; -inf before the first."""
-        return self._samples[-1][0] if self._samples else -np.inf
+        """When the newest sample was taken, s, time.monotonic, but for its least delay; -inf before the first."""
+        return self._newest
 
     def fresh(self) -> bool:
         """True if there is a sample at all."""
@@ -119,18 +135,36 @@ class ForceSensor:
 
     def wait(self, done: Callable[[], bool], within: float) -> bool:
         """Wait for samples until `done`; False if that took too long."""
+        patience = Patience(within)
         with self._news:
-            return self._news.wait_for(done, timeout=within)
+            while not self._news.wait_for(done, timeout=min(0.05, within)):
+                if patience.over():
+                    return False
+        return True
 
     def tare(self, duration: float = 0.2) -> None:
-        """Take the median force of the next moments, free of contact, as zero. Raises LinkError."""
+        """Take the median force of the next moments, free of contact, as zero, and learn its noise and drift (N/s).
+
+        Raises:
+            LinkError: no samples.
+            StoppedError: no axis changes: the value is frozen.
+        """
         since = time.monotonic()
         self.wait(lambda: time.monotonic() > since + duration, duration + 0.5)
-        _, arrivals, forces = self.recorded()
+        ticks, arrivals, forces = self.recorded(since - HISTORY)
+        if len(ticks) > 1 and arrivals[-1] - arrivals[0] > PERIOD_SPAN:
+            self._period = SensorClock.estimate(ticks.astype(float), arrivals, self.tick).period
+            self._least = [np.inf, np.inf]
+        ticks = ticks[arrivals > since].astype(float)
         recent = forces[arrivals > since]
         if len(recent) == 0:
             raise LinkError(f"{self.link.port}: no samples from the {self.name} for {duration:g} s")
         self.zero = np.median(recent, axis=0)  # a first sample after a reconnection may be anything
+        if len(ticks) > 2:
+            at = (ticks - ticks.mean()) * self._period
+            self.drift = np.asarray(at @ recent / (at @ at))
+            step = float(np.median(np.diff(ticks)))
+            self.watch.learn(recent, step, step * self._period)
 
     def recorded(self, since: float = -np.inf) -> tuple[IntArray, FloatArray, FloatArray]:
         """Ticks (N,), arrivals (N,) s and raw forces (N, 3) N of the samples that arrived after `since`."""
@@ -149,22 +183,52 @@ class ForceSensor:
         return clock.times(ticks[recent].astype(float)), forces[recent] - self.zero
 
     def _hear(self, now: float, frames: list[bytes]) -> None:
-        decoded = [self.decode(frame) for frame in frames]
-        good = [sample for sample in decoded if sample is not None]
-        self.faulty += len(decoded) - len(good)
+        good, taken_back = [], 0
+        for frame in frames:
+            sample = self.decode(frame)
+            if sample is None:
+                self.faulty += 1
+                continue
+            count, sound, fault = self.watch.judge(sample)
+            if fault is not None and self.fault is None:
+                self.fault, taken_back = f"the {self.name} {fault}", self.watch.doubtful
+                self._strike(self.fault)
+            if not sound or self.fault is not None:
+                sound = False
+                self.faulty += 1
+            else:
+                self._stamp(now, count)
+            # what is no sample of the record may still be a force: it counts for the limit below
+            good.append((sound, sample))
         limit = self._limit
-        if np.isfinite(limit):
+        if np.isfinite(limit) and not self._struck:
             zero = self.zero
-            for _, x, y, z in good:
+            for _, (_, x, y, z) in good:
                 felt = ((x - zero[0]) ** 2 + (y - zero[1]) ** 2 + (z - zero[2]) ** 2) ** 0.5
                 if felt > limit:
-                    self._halt(
+                    self._strike(
                         f"the force reached {felt:.2f} N, above the limit of {limit:g} N; check the path, run again"
                     )
                     break
         with self._news:
-            self._samples.extend((now, *sample) for sample in good)
+            self._samples.extend((now, *sample) for sound, sample in good if sound)
+            for _ in range(min(taken_back, len(self._samples))):
+                self._samples.pop()
             self._news.notify_all()
+
+    def _stamp(self, now: float, count: int) -> None:
+        """When was the sample of this running count taken, at the earliest?"""
+        delay = now - count * self._period
+        if now > self._block_ends:
+            self._block_ends, self._least = now + DELAY_BLOCK, [self._least[1], np.inf]
+        self._least[1] = min(self._least[1], delay)
+        self._newest = count * self._period + min(self._least)
+
+    def _strike(self, reason: str) -> None:
+        """Halt, but once: the way out of what it stopped must stay open."""
+        if not self._struck:
+            self._struck = True
+            self._halt(reason)
 
     def _on_lost(self) -> None:
         self._halt(f"the {self.name} was lost ({self.link.error})")

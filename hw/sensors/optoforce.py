@@ -23,6 +23,7 @@ RATE_CODES = {0: 0, 1000: 1, 333: 3, 100: 10, 30: 33, 10: 100}
 FILTERS = {0.0: 0, 500.0: 1, 150.0: 2, 50.0: 3, 15.0: 4, 5.0: 5, 1.5: 6}
 BAUDRATE = 1_000_000
 DISTRUST = 0xFC00  # any error of unit or sensor
+OVERLOAD = 0x0380  # of Fx, Fy, Fz: the value is clipped
 
 _BODY = struct.Struct(">4sHHhhhH")
 
@@ -82,4 +83,6 @@ class OptoForce(ForceSensor):
         _, counter, status, x, y, z, _ = _BODY.unpack(frame)
         if status & DISTRUST:
             return None
+        if status & OVERLOAD:  # more than it can say, and more than any limit
+            return counter, *(np.inf if status & bit else 0.0 for bit in (1 << 9, 1 << 8, 1 << 7))
         return counter, x * self._scale[0], y * self._scale[1], z * self._scale[2]

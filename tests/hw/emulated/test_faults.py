@@ -59,7 +59,14 @@ def survive(fault: Fault, slide: bool, folder: Path) -> str:
             else {"peck": Peck(5e-4, 5e-4, 0.02, R)}
         )
         finger = GrblFinger(
-            port=str(links[0]), tip_radius=R, frame=FRAME, armed=True, max_force=LIMIT, over_travel=1e-4, **touch
+            port=str(links[0]),
+            tip_radius=R,
+            frame=FRAME,
+            armed=True,
+            position_known=True,
+            max_force=LIMIT,
+            over_travel=1e-4,
+            **touch,
         )
         with ExitStack() as stack:
             log = stack.enter_context(LogWriter(folder / "log.mcap", tip_radius=R))
@@ -110,7 +117,9 @@ def test_a_sensor_that_comes_back_costs_a_sweep_and_no_more(tmp_path: Path) -> N
     pulled = Fault("disconnect", at=1e9, device=1, duration=0.3)
     with PtyServer(devices, links=links, faults=[pulled]) as server:
         slide = Slide(OptoForce(str(links[1]), 400.0), STIFFNESS, approach_speed=5e-3)
-        finger = GrblFinger(port=str(links[0]), tip_radius=R, frame=FRAME, armed=True, max_force=LIMIT, slide=slide)
+        finger = GrblFinger(
+            port=str(links[0]), tip_radius=R, frame=FRAME, armed=True, position_known=True, max_force=LIMIT, slide=slide
+        )
         with finger:
             whole = finger.execute(sweep(0))
             finger.notice = lambda batch: setattr(server.faults[0], "at", 0.0) if server.faults else None

@@ -32,6 +32,7 @@ class SwiftController:
     def position(self) -> Any:
         return self.place
 
+    def check(self) -> None: ...
     def wait_idle(self, within: float) -> None: ...
     def cancel_jog(self) -> None: ...
 
@@ -44,6 +45,7 @@ class Spring:
 
     def __init__(self, controller: SwiftController, late: float = 0.0) -> None:
         self.controller, self.late, self.heard, self.felt = controller, late, time.monotonic(), np.zeros(3)
+        self.fault, self.watch = None, SimpleNamespace(blind=0.0)
 
     @property
     def age(self) -> float:

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
+from hw.emulated.faults import Fault
 from hw.emulated.force import LineSensorEmulator, OptoForceEmulator
 from hw.emulated.grbl import GrblEmulator
 from hw.emulated.pty_server import PtyServer
@@ -60,7 +61,7 @@ def machine(pace: float = 20.0, sensor: str = "", **settings: object) -> Iterato
 
 
 def pecker(server: PtyServer, **settings: object) -> GrblFinger:
-    given = {"armed": True, "peck": PECK, "frame": FRAME} | settings
+    given = {"armed": True, "peck": PECK, "frame": FRAME, "position_known": True} | settings
     return GrblFinger(port=server.ports[0], tip_radius=R, **given)  # type: ignore[arg-type]
 
 
@@ -95,7 +96,7 @@ def test_status_reports_are_read_as_the_document_writes_them() -> None:
 def test_probe_results_settings_and_offsets_are_read() -> None:
     probed = protocol.parse_probe("[PRB:-150.004,2.000,-7.125:1]")
     assert probed is not None and probed.hit and probed.position.tolist() == [-150.004, 2.0, -7.125]
-    settings = protocol.Settings.of(
+    settings = protocol.GrblSettings.of(
         ["$13=1", "$20=1 (soft limits, bool)", "$130=200.000", "$131=300", "$132=80", "$N0=G54"]
     )
     assert settings.report_scale == 0.0254 and settings.soft_limits
@@ -166,6 +167,102 @@ def test_a_long_stream_of_jogs_never_overflows_the_receive_buffer() -> None:
         controller.close()
 
 
+# trust in the position
+
+
+def test_an_armed_machine_does_not_connect_before_somebody_vouches_for_its_position() -> None:
+    with machine() as (server, stage):
+        with pytest.raises(FingerError, match="home it"), pecker(server, position_known=False):
+            pass
+        with pecker(server, position_known=False, home=True) as finger:
+            assert finger.stage.controller.vouched
+            assert any("$20" in doubt for doubt in finger.info["doubts"]) is False
+        assert stage.motion.travelled > 0.0
+
+
+def test_a_board_that_restarts_when_the_port_is_opened_is_not_trusted() -> None:
+    with machine() as (server, stage):
+        controller = GrblController(server.ports[0])
+        stage.power_cycle()
+        controller.open()
+        controller._restarts = 1  # the greeting came while it opened
+        with pytest.raises(FingerError, match="restarted when the port was opened"):
+            controller.vouch()
+        controller.close()
+
+
+def test_a_restart_between_two_commands_ends_the_trust_and_all_motion() -> None:
+    with machine() as (server, stage), pecker(server) as finger:
+        finger.execute(across(x=0.003))
+        stage.power_cycle()
+        time.sleep(0.1)
+        before = stage.motion.travelled
+        with pytest.raises(StoppedError, match="restarted"):
+            finger.execute(across(x=0.003))
+        assert stage.motion.travelled == before
+
+
+def test_another_programs_work_offset_ends_the_trust() -> None:
+    with machine() as (server, stage), pecker(server) as finger:
+        finger.execute(across(x=0.003))
+        stage.systems["G54"][:] = (0.0, 0.0, 0.004)
+        with pytest.raises(StoppedError, match=r"work offset changed|nothing sent it"):
+            for _ in range(20):
+                finger.execute(across(x=0.003))
+
+
+def test_a_tip_that_stands_in_contact_is_backed_off_before_anything_else() -> None:
+    with machine() as (server, stage):
+        stage.motion.position = FRAME.to_machine(np.array([-0.02, 0.001, R - 1e-4]))
+        with pecker(server) as finger:
+            trace = finger.execute(across())
+        assert np.abs(off_the_body(trace.centers)).max() < 4e-6
+
+
+def test_the_probe_is_checked_by_the_users_touch() -> None:
+    asked: list[str] = []
+    with machine() as (server, stage):
+
+        def hand(what: str) -> None:
+            asked.append(what)
+            stage.motion.probe_fault = "closed" if "touch the tip" in what else ""
+
+        with pecker(server, ask=hand) as finger:
+            assert len(finger.execute(across(x=0.003))) > 3
+    assert len(asked) == 2
+
+
+def test_garbled_doubled_and_lost_reply_bytes_never_become_contacts() -> None:
+    for kind in ("lose", "double", "garble"):
+        with machine(pace=10.0) as (server, _), pecker(server) as finger:
+            server.faults.append(Fault(kind, at=0.0, rate=0.01, seed=3))
+            trace = finger.execute(across(x=0.004))
+        assert len(trace) > 0.9 * 24
+        assert np.abs(off_the_body(trace.centers)).max() < 2e-5
+
+
+def test_every_alarm_is_said_in_words_with_the_remedy() -> None:
+    for number in range(1, 20):
+        assert len(protocol.describe(f"ALARM:{number}")) > 30
+    assert "home again" in protocol.describe("ALARM:99")
+
+
+def test_dtr_and_rts_are_low_before_the_port_opens(monkeypatch: pytest.MonkeyPatch) -> None:
+    import serial
+
+    seen: dict[str, object] = {}
+
+    class Port:
+        def open(self) -> None:
+            seen.update(vars(self))
+            raise serial.SerialException("enough")
+
+    monkeypatch.setattr(serial, "serial_for_url", lambda *args, **settings: Port())
+    with pytest.raises(LinkError):
+        GrblController("/dev/none").open()
+    assert seen["dtr"] is False and seen["rts"] is False
+
+
 # pecking
 
 
@@ -228,9 +325,14 @@ def test_leaving_lifts_the_tip_off_and_frees_the_port_even_after_an_error() -> N
 
 def test_an_alarm_ends_the_sweep_keeps_its_samples_and_moves_nothing_more() -> None:
     with machine(pace=3.0) as (server, stage), pecker(server) as finger:
-        import threading
+        told: list[Trace] = []
 
-        threading.Timer(0.8, lambda: stage.trip(1)).start()
+        def trip(batch: Trace) -> None:
+            told.append(batch)
+            if len(told) == 5:
+                stage.trip(1)
+
+        finger.notice = trip
         trace = finger.execute(across())
         stopped = stage.motion.travelled
         assert 0 < len(trace) < 41

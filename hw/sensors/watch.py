@@ -1,0 +1,141 @@
+"""SampleWatch: is what a force sensor sends still a measurement? Judged sample by sample, in the thread that reads it.
+
+A sensor that froze, saturated, or lost its supply goes on sending whole frames. What gives it away is physics: noise
+never stands still for long, a force never jumps faster than the tip can be moved against its own stiffness.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import numpy as np
+
+from hw import StoppedError
+from mapping import FloatArray
+
+# Chance of a false stop per sample and axis: one in a thousand sessions of 10 h at 5 kHz (5e8 values)
+FALSE_STOP = 2e-12
+# So many standard deviations of a difference are noise: a Gaussian exceeds 8 once in 1e15
+NOISE_OF_A_DIFFERENCE = 8.0 * 2.0**0.5
+# Stick and slip under the tip is faster than the stage: a share of the friction of usual sweeps of 1 N, N
+SLIP = 0.3
+# The stage's speed may be felt twice over by a tip that rings
+RINGING = 2.0
+# A run of equal values that was seen while nothing touched may come this much longer, by correlated noise
+LONGER_THAN_SEEN = 4
+
+Sample = tuple[int, float, float, float]
+
+
+class SampleWatch:
+    """Learns the noise while nothing touches; judges every sample by it, and by how fast a force can change.
+
+    Args:
+        bits: width of the sensor's counter or clock.
+    """
+
+    def __init__(self, bits: int) -> None:
+        self._wrap = 1 << bits
+        self.steepest = np.inf
+        self.blind = 0.0
+        self.noise = np.zeros(3)
+        self._spacing, self._ticks = 0.0, 1.0
+        self._longest = [np.inf] * 3
+        self.forget()
+
+    def forget(self) -> None:
+        """The next sample is the first: the sensor was lost, or its counter started anew."""
+        self._last: Sample | None = None
+        self._odd: Sample | None = None
+        self._odd_count = 0
+        self._count = 0
+        self._equal = [1, 1, 1]
+        self.doubtful = 0
+
+    def learn(self, free: FloatArray, ticks: float, spacing: float) -> None:
+        """From samples (N, 3), N, without contact: how long a value may stay the same. They are `ticks` counts, and
+        `spacing` s, apart.
+
+        Equal neighbours have the probability p, by the rule of three at most (seen + 3) / (N + 3); a run of n by
+        chance p^(n - 1), which is FALSE_STOP at the longest run. An axis that never changed says nothing: a sensor
+        of one axis sends zeros for the others.
+
+        Raises:
+            StoppedError: no axis changes.
+        """
+        equal = np.diff(free, axis=0) == 0.0
+        share = (equal.sum(axis=0) + 3.0) / (len(free) + 3.0)
+        alive = ~equal.all(axis=0) if len(equal) else np.zeros(3, bool)
+        if not alive.any() and len(free) > 2:
+            raise StoppedError(
+                f"the force sensor sent the same value {len(free)} times while nothing touched: it is frozen, or so "
+                "quiet that nobody could tell; switch it off and on, take out its filter or dead band, run again"
+            )
+        runs = np.array([LONGER_THAN_SEEN * _longest_run(column) for column in equal.T])
+        longest = np.maximum(runs, 2.0 + np.log(FALSE_STOP) / np.log(np.minimum(share, 0.999)))
+        self._longest = [float(n) if on else np.inf for n, on in zip(longest, alive, strict=True)]
+        self._spacing, self._ticks = spacing, ticks
+        # until then nobody knows that the sensor is frozen: the axis that changes most tells first
+        self.blind = spacing * min(self._longest)
+        self.noise = 1.4826 * np.median(np.abs(free - np.median(free, axis=0)), axis=0)
+        self._equal = [1, 1, 1]
+
+    def judge(self, sample: Sample) -> tuple[int, bool, str | None]:
+        """The sample's running count, whether it may be kept, and what is wrong with the sensor, or None."""
+        if not (isfinite(sample[1]) and isfinite(sample[2]) and isfinite(sample[3])):
+            if any(np.isinf(sample[1:])):
+                return self._count, False, "is overloaded or saturated; check the path, and what presses on the tip"
+            return self._count, False, "sent a value that is no number; switch it off and on, check its amplifier"
+        last = self._last
+        if last is None:
+            self._last, self._count = sample, sample[0]
+            return self._count, True, None
+        step = (sample[0] - last[0]) % self._wrap
+        if step == 0 or step > self._wrap // 2:
+            return self._count, False, None  # an old sample again: no news, and without news nothing moves on
+        count = self._count + step
+        if self.steepest < np.inf and (fault := self._jump(sample, last, count)) is not None:
+            return count, False, fault or None
+        self._last, self._count = sample, count
+        for axis in range(3):
+            if sample[axis + 1] != last[axis + 1]:
+                self._equal[axis] = 1
+                continue
+            self._equal[axis] += 1
+            if self._equal[axis] > self._longest[axis]:
+                self.doubtful = self._equal[axis]  # so many of the samples kept are the frozen value
+                what = (
+                    f"sends the same {'xyz'[axis]} value {self._equal[axis]} times, at most {self._longest[axis]:.0f} "
+                )
+                return count, False, what + "are noise: it is frozen or saturated; switch it off and on, run again"
+        return count, True, None
+
+    def _jump(self, sample: Sample, last: Sample, count: int) -> str | None:
+        """None: no jump; "": a lone one, perhaps garbled; else what is wrong: it stays there."""
+        odd = self._odd
+        if self._far(sample, last, count - self._count):
+            self._odd, self._odd_count = sample, count
+            if odd is None or self._far(sample, odd, count - self._odd_count):
+                return ""
+            self._odd = None
+            change = max(abs(a - b) for a, b in zip(sample[1:], last[1:], strict=True))
+            self._last, self._count = sample, count
+            return (
+                f"jumped by {change:.2f} N, faster than the stage can move the tip: its gain, sign or zero changed; "
+                "check its cable and supply, run again"
+            )
+        self._odd = None
+        return None
+
+    def _far(self, sample: Sample, last: Sample, steps: int) -> bool:
+        samples = max(1.0, steps / self._ticks)
+        most = RINGING * self.steepest * self._spacing * samples + SLIP
+        return any(
+            abs(sample[k + 1] - last[k + 1]) > most + NOISE_OF_A_DIFFERENCE * float(self.noise[k]) for k in range(3)
+        )
+
+
+def _longest_run(equal: FloatArray) -> int:
+    """Longest run of equal values, from whether each neighbour (N - 1,) is equal."""
+    changes = np.flatnonzero(np.concatenate([[True], ~equal.astype(bool), [True]]))
+    return int(np.diff(changes).max())

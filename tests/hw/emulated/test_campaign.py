@@ -1,0 +1,45 @@
+"""Machines that lie: whatever sensor, probe, controller or cable do, the tip is not pressed harder."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from fault_campaign import PHASES, kinds, run_case
+
+# What the true force may reach at a limit of 5 N, and how long giving up may take, s
+MOST, LONGEST = 5.5, 5.0
+
+
+def holds(kind: str, phase: str, touch: str, seed: int = 0, model: bool = True) -> str:
+    """Run a case, check what must hold whatever it is, and return what was said."""
+    out = run_case(kind, phase, touch, seed, model)
+    assert out.struck
+    assert out.strongest <= MOST
+    assert out.wrong == 0
+    assert out.lasted <= LONGEST
+    assert out.moved == 0.0
+    return out.said
+
+
+@pytest.mark.parametrize(
+    ("kind", "touch", "why"),
+    [
+        ("frozen", "optoforce", "the same . value"),
+        ("nan", "line", "no number"),
+        ("sign", "optoforce", "jumped|pulls"),
+        ("open", "peck", "nothing was felt|open again"),
+        ("power cycle", "peck", "restarted"),
+    ],
+)
+def test_what_lies_midway_stops_the_machine_and_is_named(kind: str, touch: str, why: str) -> None:
+    said = holds(kind, "midway", touch)
+    assert re.search(why, said), said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("phase", PHASES)
+@pytest.mark.parametrize(("touch", "kind"), [(t, k) for t in ("optoforce", "line", "peck") for k in kinds(t)])
+def test_the_campaign(touch: str, kind: str, phase: str, seed: int) -> None:
+    holds(kind, phase, touch, seed)
