@@ -7,7 +7,7 @@ from itertools import islice
 
 from hw import FingerError, Move
 from mapping import Trace, TraceError
-from planners.plan import Outcome, Plan
+from planners.plan import Outcome, Plan, Refused
 
 # After so many refusals in a row the finger is taken for lost, and the plan for one that cannot be carried out
 MOST_REFUSALS, FORBIDDEN = 5, 100
@@ -26,7 +26,7 @@ def drive(
     """Carry the plan out; every executed move with what it felt, and why the plan ended.
 
     A move that the check forbids, that the finger refuses, or whose readings are unusable gives nothing: the plan
-    is sent an empty trace in its place and decides what to do without it. The drive gives up if too many in a row
+    is sent a planners.Refused in its place and decides what to do without it. The drive gives up if too many in a row
     fail.
 
     Args:
@@ -57,7 +57,7 @@ def drive(
                 if refused >= MOST_REFUSALS or forbidden >= FORBIDDEN or (not record and empty is None):
                     plan.close()
                     return record, Outcome("finger refuses", f"{_moves(max(refused, forbidden))} refused: {reason}")
-                trace = empty if empty is not None else record[-1][1].select(slice(0, 0))
+                trace = Refused.because(reason or "", (empty if empty is not None else record[-1][1]).tip_radius)
             else:
                 record.append((move, trace))
             move = plan.send(trace)

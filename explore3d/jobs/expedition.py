@@ -73,12 +73,14 @@ class Expedition:
         workspace, tip = self.finger.workspace, self.scene.tip.radius
         spent = Spent(workspace.max_speed)
         plan = within(plan, spent, self.scene.explore.time_budget - self.seconds)
+        limits = Limits.of(workspace, base, tip)
         if base is not None:
-            plan = routed(plan, Ways(base, tip, workspace.low, workspace.high, workspace.max_speed))
+            ways = Ways(base, tip, workspace.low, workspace.high, workspace.max_speed)
+            plan = routed(plan, ways, limits.violation)
         _, outcome = drive(
             plan,
             self.execute,
-            check=Limits.of(workspace, base, tip).violation,
+            check=limits.violation,
             note=lambda text: self.log.event("refused", {"what": text}),
             empty=Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip),
         )

@@ -18,7 +18,7 @@ from hw import Move
 from hw.simulated import SimulatedFinger
 from mapping import Surface, Trace
 from mapping.base import Base
-from planners import Spent, drive, dry_run
+from planners import Spent, drive
 from planners.paths import Limits, Ways, routed
 
 
@@ -91,19 +91,29 @@ def plan_scene(path: Path | str) -> DryRun:
     else:
         first, assumed = [], ""
     nothing = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip)
-    if scene.model.pose == "estimate" and scene.model.mesh is not None:
-        first, _ = dry_run(locator(scene, base).plan(), nothing)
-    ways = Ways(base, tip, workspace.low, workspace.high, workspace.max_speed)
-    explore = explorer(scene, base)
-    plan = routed(explore.plan(), ways)
-    planned, outcome = dry_run(plan, nothing)
-    moves, limits = [*first, *planned], Limits.of(workspace, base, tip)
-    before: list[Move | None] = [None, *moves]
-    checked = enumerate(zip(moves, before, strict=False), 1)
-    violations = [(number, what) for number, (move, last) in checked if (what := limits.violation(move, last))]
-    spent = Spent(25.0 * tip if explore.travel_speed is None else explore.travel_speed)
-    for move in moves:
+    limits = Limits.of(workspace, base, tip)
+    moves, violations = list[Move](first), list[tuple[int, str]]()
+    spent = Spent(workspace.max_speed)
+    for move in first:
         spent.count(move)
+
+    def check(move: Move, last: Move | None) -> str | None:
+        """What the run would refuse is refused here too: it is neither charged nor counted as covered."""
+        moves.append(move)
+        what = limits.violation(move, last)
+        violations.extend([(len(moves), what)] if what else [])
+        return what
+
+    def made(move: Move) -> Trace:
+        spent.count(move)
+        return nothing
+
+    explore = explorer(scene, base)
+    begun = locator(scene, base).plan() if scene.model.pose == "estimate" and scene.model.mesh is not None else None
+    for plan in (begun, explore.plan()):
+        if plan is not None:
+            ways = Ways(base, tip, workspace.low, workspace.high, workspace.max_speed)
+            _, outcome = drive(routed(plan, ways, limits.violation), made, check=check, empty=nothing)
     survey = outcome.value.survey
     if survey is None:
         short = "the time budget ends before the survey does: raise explore.time_budget or survey.smallest_feature"

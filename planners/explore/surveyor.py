@@ -8,7 +8,7 @@ import numpy as np
 
 from mapping import FloatArray, Trace
 from mapping.detection import Coverage, detect
-from planners import Outcome, Plan
+from planners import Outcome, Plan, executed
 from planners.explore.found import Found
 from planners.survey import Survey
 
@@ -55,12 +55,16 @@ class Surveyor:
         waiting, felt = list[Trace](), 0.0
         for move in self.survey.sweeps(self.visible):
             trace = yield move
-            self.paths.append(move.path + self.survey.tip_radius * move.approach)
+            done = executed(move, trace)
+            self.paths.extend(self.survey.touched(part) for part in done)
+            if not done:
+                self.found.left_out.append("a survey sweep was not carried out")
+                continue
             if len(trace) == 0:
                 self.found.left_out.append("a survey sweep felt no contact")
                 continue
             waiting.append(trace)
-            felt += move.length
+            felt += sum(part.length for part in done)
             if self.found.noise is not None or felt >= FIRST_NOISE_PATH * self.survey.tip_radius:
                 self._detect(waiting)
         if waiting:
