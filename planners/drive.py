@@ -21,6 +21,7 @@ def drive(
     *,
     check: Check | None = None,
     note: Callable[[str], None] | None = None,
+    refused_move: Callable[[Move, str], None] | None = None,
     empty: Trace | None = None,
 ) -> tuple[list[tuple[Move, Trace]], Outcome]:
     """Carry the plan out; every executed move with what it felt, and why the plan ended.
@@ -35,6 +36,7 @@ def drive(
         check: what is wrong with a move after the last executed one (None before the first), or None if nothing
             is (planners.paths.limits.Limits.violation).
         note: told about every move that gave nothing for one of these reasons.
+        refused_move: told the move itself and the reason, besides.
         empty: a trace without samples, to go on with where even the first move fails; without it that ends the plan.
     """
     record: list[tuple[Move, Trace]] = []
@@ -52,6 +54,8 @@ def drive(
                 except (FingerError, TraceError) as error:
                     reason, refused = str(error), refused + 1
             if trace is None:
+                if refused_move:
+                    refused_move(move, reason or "")
                 if note:
                     note(f"{move.purpose} not executed: {reason}" if forbidden else f"{move.purpose} failed: {reason}")
                 if refused >= MOST_REFUSALS or forbidden >= FORBIDDEN or (not record and empty is None):

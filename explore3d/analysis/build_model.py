@@ -13,6 +13,7 @@ from explore3d.analysis.inspected import Inspected, base_reach
 from explore3d.analysis.result import Analysis, TipCount
 from explore3d.analysis.savings import with_savings
 from explore3d.analysis.stages import Stages
+from explore3d.analysis.surface_account import SurfaceAccount
 from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature, compare
 from explore3d.log import Log
@@ -63,10 +64,13 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
         tuple(TrueFeature(t.kind, t.axis, t.height, t.width, t.length or None) for t in scene.truth) if scene else ()
     )
     inspected = Inspected.of(trace, base, detections, asked)
+    account = SurfaceAccount.of_log(log, base, scene)
     model = ObjectModel.attach(
         base,
         in_model_frame(features, base),
-        provenance=_provenance(log, scene, settings, detections) | {"inspection": inspected.record()},
+        provenance=_provenance(log, scene, settings, detections)
+        | {"inspection": inspected.record()}
+        | ({} if account is None else {"surface": account.record()}),
         inspected=inspected.height,
         reach=None if estimate is None else base_reach(base.surface, estimate),
     )
@@ -89,6 +93,7 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
         time_curve=curve,
         tip_counts=_tip_counts(features, trace.tip_radius),
         inspected=inspected,
+        account=account,
     )
 
 

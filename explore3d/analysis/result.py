@@ -11,6 +11,7 @@ from mapping.model import ObjectModel
 
 if TYPE_CHECKING:
     from explore3d.analysis.inspected import Inspected
+    from explore3d.analysis.surface_account import SurfaceAccount
     from explore3d.analysis.truth import Comparison, TrueFeature
     from explore3d.scene import Scene
     from mapping.detection import Detections
@@ -55,6 +56,7 @@ class Analysis:
         time_curve: (seconds of finger time, worst error of an axis in m) while exploring, if known.
         tip_counts: counts of finer and gentler features, this tip's radius first.
         inspected: above which height each face is free of features that were not found; None if not asked.
+        account: which part of the surface was swept, and what became of the rest; None without a scene.
     """
 
     title: str
@@ -74,3 +76,4 @@ class Analysis:
     time_curve: tuple[tuple[float, float], ...] = ()
     tip_counts: tuple[TipCount, ...] = ()
     inspected: Inspected | None = None
+    account: SurfaceAccount | None = None

@@ -9,6 +9,9 @@ import typer
 
 from explore3d.cli.options import Force, Json, Out
 
+# Exit status of a run that left more of the reachable surface unswept than it may; 1 and 2 are errors
+NOT_ALL_SWEPT = 3
+
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene to explore.")]
 
 
@@ -43,6 +46,8 @@ def run(
     with shown(quiet=json) as progress:
         analysis = explore(scene, out, progress=progress, force=force or (), arm=arm, resume=resume)
     show(analysis, out, json)
+    if analysis.account is not None and analysis.account.short:
+        raise typer.Exit(NOT_ALL_SWEPT)
 
 
 def plan(

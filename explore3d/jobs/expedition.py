@@ -81,11 +81,15 @@ class Expedition:
             plan,
             self.execute,
             check=limits.violation,
-            note=lambda text: self.log.event("refused", {"what": text}),
+            refused_move=self._refused,
             empty=Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip),
         )
         self.seconds += spent.seconds
         return outcome
+
+    def _refused(self, move: Move, why: str) -> None:
+        what = f"{move.purpose} not executed: {why}"
+        self.log.event("refused", {"what": what, "purpose": move.purpose, "path": move.path.tolist()})
 
 
 def known_base(scene: Scene) -> Base | None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from explore3d import count_text, length_text, seconds_text
+from explore3d.analysis import SurfaceAccount
 from explore3d.jobs.expedition import discoverer, explorer, known_base, locator
 from explore3d.jobs.run import scene_finger
 from explore3d.jobs.session import Session
@@ -34,6 +35,7 @@ class DryRun:
         covered: share of the surface that the sweeps inspect; None if the time budget ends before the survey.
         reach: distance from a sweep up to which the smallest feature is seen, m; None likewise.
         violations: (number of the move, what limit it breaks).
+        account: what of the surface the sweeps would sweep; None if the time budget ends before the survey.
         assumed: what had to be assumed of the object, and what the plan falls short of; a sentence or "".
     """
 
@@ -45,6 +47,7 @@ class DryRun:
     covered: float | None
     reach: float | None
     violations: tuple[tuple[int, str], ...]
+    account: SurfaceAccount | None = None
     assumed: str = ""
 
     def record(self) -> dict[str, Any]:
@@ -57,6 +60,7 @@ class DryRun:
             "covered": self.covered,
             "reach": self.reach,
             "violations": [{"move": number, "what": what} for number, what in self.violations],
+            "surface": None if self.account is None else self.account.record(),
         }
 
     def lines(self) -> list[str]:
@@ -68,7 +72,9 @@ class DryRun:
             within = [f"{100 * self.covered:.1f} % of the surface lies within {length_text(self.reach)} of a sweep"]
         broken = [f"move {number}: {what}" for number, what in self.violations]
         assumed = [self.assumed] if self.assumed else []
-        return [*assumed, first, *within, *(broken or ["no move breaks a limit"])]
+        account = [] if self.account is None else [self.account.sentence()]
+        warning = [self.account.warning()] if self.account is not None and self.account.short else []
+        return [*warning, *assumed, first, *within, *account, *(broken or ["no move breaks a limit"])]
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""
@@ -119,7 +125,13 @@ def plan_scene(path: Path | str) -> DryRun:
         short = "the time budget ends before the survey does: raise explore.time_budget or survey.smallest_feature"
         assumed = f"{assumed}; {short}" if assumed else short
     covered, reach = (None, None) if survey is None else (survey.fraction, survey.reach)
-    return DryRun(base, tip, tuple(moves), spent.metres, spent.seconds, covered, reach, tuple(violations), assumed)
+    broken = {number - 1: what for number, what in violations}
+    made = [move for number, move in enumerate(moves) if number not in broken]
+    refused = [(moves[number], what) for number, what in broken.items()]
+    account = None if survey is None else SurfaceAccount.of_plan(made, refused, base, scene)
+    return DryRun(
+        base, tip, tuple(moves), spent.metres, spent.seconds, covered, reach, tuple(violations), account, assumed
+    )
 
 
 def imagined(scene: Scene) -> tuple[list[Move], Base]:

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
         thinned as thinned,
         touched_points as touched_points,
     )
-    from planners.paths.sound import sound_parts as sound_parts
+    from planners.paths.reach import reachable as reachable
+    from planners.paths.sound import resampled as resampled, sound_parts as sound_parts
     from planners.paths.strokes import Strokes as Strokes, tangential as tangential, to_and_fro as to_and_fro
     from planners.paths.travel import Ways as Ways, routed as routed
 
@@ -23,7 +24,8 @@ _PUBLIC = {
     "isolines": ("Isoline", "isolines"),
     "limits": ("Limits",),
     "pressed_path": ("PRESS", "pressed_sweep", "thinned", "touched_points"),
-    "sound": ("sound_parts",),
+    "reach": ("reachable",),
+    "sound": ("resampled", "sound_parts"),
     "strokes": ("Strokes", "tangential", "to_and_fro"),
     "travel": ("Ways", "routed"),
 }
