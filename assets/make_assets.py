@@ -215,7 +215,13 @@ def make_l_bracket() -> None:
     write_mesh("l_bracket_with_details", together(bracket, *wires, bump_below(BRACKET_BUMP)))
     size = BRACKET_WIRE
     ridges = [
-        {"kind": "ridge", "axis": e["ends"], "height": size, "width": size, "length": np.linalg.norm(np.ptp(e["ends"], 0))}
+        {
+            "kind": "ridge",
+            "axis": e["ends"],
+            "height": size,
+            "width": size,
+            "length": np.linalg.norm(np.ptp(e["ends"], 0)),
+        }
         for e in BRACKET_WIRES
     ]
     width = 2 * np.sqrt(BRACKET_BUMP["height"] * (2 * BRACKET_BUMP["radius"] - BRACKET_BUMP["height"]))

@@ -85,7 +85,12 @@ def extruded(x: FloatArray, y: FloatArray, z: FloatArray, solid: BoolArray) -> M
     for i, j in np.argwhere(solid):
         a, b, c, d = number[i, j], number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]
         quads += [[a[0], d[0], c[0], b[0]], [a[-1], b[-1], c[-1], d[-1]]]
-        beside = ((ring[i + 1, j], a, b), (ring[i + 2, j + 1], b, c), (ring[i + 1, j + 2], c, d), (ring[i, j + 1], d, a))
+        beside = (
+            (ring[i + 1, j], a, b),
+            (ring[i + 2, j + 1], b, c),
+            (ring[i + 1, j + 2], c, d),
+            (ring[i, j + 1], d, a),
+        )
         for filled, p, q in beside:
             quads += [] if filled else np.stack([p[:-1], q[:-1], q[1:], p[1:]], axis=1).tolist()
     corners = np.array(quads)

@@ -59,12 +59,14 @@ class SurfaceAccount:
 
     @classmethod
     def of_log(cls, log: Log, base: Base, scene: Scene | None) -> SurfaceAccount | None:
-        """The account of a run by its log; None where no scene says what was to be inspected, or there is no surface."""
+        """The account of a run by its log; None without a scene that says what to inspect, or without a surface."""
         if scene is None or base.kind == "profile":
             return None
         made = [e.data for e in log.events if e.kind == "move"]
         refused = [e.data for e in log.events if e.kind == "refused"]
-        lengths = {name: sum(_length(d) for d in made if (d["purpose"] == "sweep") is (name == "sweep")) for name in _KINDS}
+        lengths = {
+            name: sum(_length(d) for d in made if (d["purpose"] == "sweep") is (name == "sweep")) for name in _KINDS
+        }
         paths = [np.asarray(d["path"]) for d in refused if d.get("purpose") == "sweep"]
         account = _shares(base, scene, log_feet(log.trace, base), paths)
         return cls(
@@ -133,7 +135,8 @@ class SurfaceAccount:
         sentence = (
             f"Of the surface {100 * self.swept:.1f} % was swept ({length_text(self.swept_path)} of sweeps, which see "
             f"{length_text(self.reach, 2)} to either side), {100 * self.refused:.1f} % refused, "
-            f"{100 * self.unreachable:.1f} % the finger cannot reach, {100 * self.not_inspected:.1f} % was not inspected."
+            f"{100 * self.unreachable:.1f} % the finger cannot reach, {100 * self.not_inspected:.1f} % was not "
+            "inspected."
         )
         if refused:
             told = "; ".join(f"{why} ({count})" for why, count in self.causes[:3])
@@ -171,7 +174,11 @@ def _shares(
     parts = {"swept": swept, "refused": ~swept & can & tried, "unreachable": ~swept & ~can}
     total = max(float(weights.sum()), float(np.finfo(float).tiny))
     shares = {name: float(weights[mask].sum()) / total for name, mask in parts.items()}
-    return shares | {"area": float(weights.sum()), "reach": reach, "not_inspected": max(0.0, 1.0 - sum(shares.values()))}
+    return shares | {
+        "area": float(weights.sum()),
+        "reach": reach,
+        "not_inspected": max(0.0, 1.0 - sum(shares.values())),
+    }
 
 
 def _inside(scene: Scene, points: FloatArray) -> BoolArray:
@@ -182,9 +189,7 @@ def _inside(scene: Scene, points: FloatArray) -> BoolArray:
     return np.asarray(((points >= np.array(region.low)) & (points <= np.array(region.high))).all(axis=1))
 
 
-def _near(
-    points: FloatArray, normals: FloatArray, touched: FloatArray, up: FloatArray, reach: float
-) -> BoolArray:
+def _near(points: FloatArray, normals: FloatArray, touched: FloatArray, up: FloatArray, reach: float) -> BoolArray:
     """(N,) True where a touched place (M, 3) lies within reach, on the same side of the body."""
     from scipy.spatial import cKDTree
 

@@ -59,7 +59,9 @@ class Obstacles:
         self._stem(what, path, approach)
 
     def _stem(self, what: str, centers: FloatArray, approach: FloatArray) -> None:
-        count = max(2, 1 + int(np.ceil(self.stem_length / (STEM_SPACING * self.tip_radius) - STEM_START / STEM_SPACING)))
+        count = max(
+            2, 1 + int(np.ceil(self.stem_length / (STEM_SPACING * self.tip_radius) - STEM_START / STEM_SPACING))
+        )
         back = np.linspace(STEM_START * self.tip_radius, self.stem_length, count)
         if self.stem_length <= back[0]:
             return

@@ -14,7 +14,6 @@ from planners.paths.sound import FIELD, PRESSED, resampled
 from planners.paths.travel import MOST_SINKING, gap, sunk, way_between
 
 
-
 @dataclass(frozen=True, eq=False)
 class Limits:
     """What a move must keep to.

@@ -21,6 +21,8 @@ from planners.paths.sound import resampled, sound_parts
 BACK_OFF_DISTANCE = 0.5
 # How far a ball may sink into the base on its way through free space, in tip radii
 MOST_SINKING = 0.05
+# A way that is planned keeps 0.02 free of that limit even between the places that are looked at (0.25^2 / 8 = 0.008)
+FREE_SINKING, FREE_SPACING = 0.02, 0.25
 # Of the grid on which ways round the body are looked for, in tip radii; and its most nodes along an axis
 GRID_SPACING, MOST_GRID_NODES = 0.75, 40
 ROOM = 4.0
@@ -38,9 +40,12 @@ def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
     return np.stack([before.path[-1] - lift * before.approach[-1], after.path[0] - lift * after.approach[0]])
 
 
-def sunk(path: FloatArray, base: Base, tip_radius: float) -> float:
-    """How deep a ball on a polyline (K, 3) sinks into the base at the deepest, m; 0 where it stays free."""
-    return max(0.0, -float(base.foot(dense(path, 0.5 * tip_radius), tip_radius).height.min()))
+def sunk(path: FloatArray, base: Base, tip_radius: float, spacing: float = 0.5) -> float:
+    """How deep a ball on a polyline (K, 3) sinks into the base at the deepest, m; 0 where it stays free.
+
+    It is looked at every `spacing` tip radii: round an edge it may sink spacing^2 / 8 of them deeper between.
+    """
+    return max(0.0, -float(base.foot(dense(path, spacing * tip_radius), tip_radius).height.min()))
 
 
 def dense(path: FloatArray, spacing: float) -> FloatArray:
@@ -124,7 +129,7 @@ class Ways:
 
     def free(self, path: FloatArray) -> bool:
         """True if a ball on the polyline (K, 3) stays out of the body."""
-        return sunk(path, self.base, self.tip_radius) <= MOST_SINKING * self.tip_radius
+        return sunk(path, self.base, self.tip_radius, FREE_SPACING) <= FREE_SINKING * self.tip_radius
 
     @cached_property
     def carrier(self) -> Carrier:
