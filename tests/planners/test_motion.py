@@ -84,7 +84,8 @@ def test_the_way_out_of_an_inner_corner_leads_sideways() -> None:
 
 def test_a_refused_move_costs_nothing() -> None:
     def plan() -> Plan:
-        yield from (FLOOR, UNDERSIDE, FLOOR)
+        for move in (FLOOR, UNDERSIDE, FLOOR):
+            assert len((yield move)) == 0
         return Outcome("done")
 
     spent = Spent(0.07)
