@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from triangles import Mesh, dome, grid_faces, height_field, together, tube, walls, welded, write_ply
+from triangles import Mesh, dome, extruded, grid_faces, height_field, together, tube, walls, welded, write_ply
 
 from mapping.arrays import FloatArray
 
@@ -26,6 +26,7 @@ def main() -> None:
     make_bump_of_revolution()
     make_step()
     make_mug()
+    make_l_bracket()
 
 
 TILT = np.radians(45.0)
@@ -189,6 +190,57 @@ def bump_truth(bump: Sizes) -> dict[str, object]:
     place = [MUG["radius"] * np.cos(bump["angle"]), MUG["radius"] * np.sin(bump["angle"]), bump["z"]]
     width = 2 * np.sqrt(bump["height"] * (2 * bump["radius"] - bump["height"]))
     return {"kind": "bump", "axis": np.array([place]), "height": bump["height"], "width": width}
+
+
+BRACKET: Sizes = {"long": 0.060, "tall": 0.050, "thick": 0.006, "deep": 0.040}
+BRACKET_WIRE = 0.5e-3
+# Ends of the wires on the upper face of the foot and on the inner face of the wall, each with its outward normal
+BRACKET_WIRES: tuple[Sizes, ...] = (
+    {"ends": np.array([[0.020, 0.006, 0.008], [0.048, 0.006, 0.030]]), "up": np.array([0.0, 1.0, 0.0])},
+    {"ends": np.array([[0.006, 0.016, 0.008], [0.006, 0.042, 0.028]]), "up": np.array([1.0, 0.0, 0.0])},
+)
+BRACKET_BUMP: Sizes = {"place": np.array([0.030, 0.0, 0.020]), "height": 0.6e-3, "radius": 2.0e-3}
+
+
+def make_l_bracket() -> None:
+    """An L-bracket with an inner corner, alone, and with a wire on either inner flat and a bump on the underside."""
+    thick = BRACKET["thick"]
+    x = np.concatenate([np.linspace(0.0, thick, 3), np.linspace(thick, BRACKET["long"], 15)[1:]])
+    y = np.concatenate([np.linspace(0.0, thick, 3), np.linspace(thick, BRACKET["tall"], 12)[1:]])
+    middle_x, middle_y = 0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1])
+    solid = (middle_x < thick)[:, None] | (middle_y < thick)[None, :]
+    bracket = extruded(x, y, np.linspace(0.0, BRACKET["deep"], 11), solid)
+    write_mesh("l_bracket", bracket)
+    wires = [laid_wire(each["ends"], each["up"], BRACKET_WIRE / 2) for each in BRACKET_WIRES]
+    write_mesh("l_bracket_with_details", together(bracket, *wires, bump_below(BRACKET_BUMP)))
+    size = BRACKET_WIRE
+    ridges = [
+        {
+            "kind": "ridge",
+            "axis": e["ends"],
+            "height": size,
+            "width": size,
+            "length": np.linalg.norm(np.ptp(e["ends"], 0)),
+        }
+        for e in BRACKET_WIRES
+    ]
+    width = 2 * np.sqrt(BRACKET_BUMP["height"] * (2 * BRACKET_BUMP["radius"] - BRACKET_BUMP["height"]))
+    bump = {"kind": "bump", "axis": BRACKET_BUMP["place"][None], "height": BRACKET_BUMP["height"], "width": width}
+    write_truth("l_bracket", [*ridges, bump])
+
+
+def laid_wire(ends: FloatArray, up: FloatArray, radius: float) -> Mesh:
+    """A straight wire, cut square at both ends, that lies on a flat of normal `up` (3,) between two places of it."""
+    path = ends[0] + np.linspace(0.0, 1.0, 15)[:, None] * (ends[1] - ends[0]) + radius * up
+    return tube(path, np.tile(up, (len(path), 1)), radius, 2 * np.pi * np.arange(64) / 64)
+
+
+def bump_below(bump: Sizes) -> Mesh:
+    """A cap of a sphere on a flat whose normal is -y; it continues 0.3 mm into the body."""
+    radius, height = bump["radius"], bump["height"]
+    polar = np.linspace(0.0, np.arccos(1.0 - (height + 0.3e-3) / radius), 13)[1:]
+    vertices, faces = dome(radius * np.sin(polar), height - radius * (1.0 - np.cos(polar)), height, sides=36)
+    return vertices @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) + bump["place"], faces
 
 
 def tilted(points: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mapping.arrays import FloatArray, IntArray
+from mapping.arrays import BoolArray, FloatArray, IntArray
 
 Mesh = tuple[FloatArray, IntArray]
 
@@ -71,6 +71,32 @@ def walls(lines: FloatArray, pair: FloatArray) -> tuple[FloatArray, FloatArray]:
     inside = lines[(lines >= low) & (lines <= high)]
     parts = [lines[lines <= low], inside, lines[lines >= high]]
     return np.concatenate(parts), np.repeat([0.0, 1.0, 0.0], [len(part) for part in parts])
+
+
+def extruded(x: FloatArray, y: FloatArray, z: FloatArray, solid: BoolArray) -> Mesh:
+    """The closed body over those cells of the grid x by y that are solid (len(x) - 1, len(y) - 1), from z[0] to z[-1].
+
+    Every grid line cuts the surface, so that neighbouring sides share their vertices.
+    """
+    vertices = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
+    number = np.arange(len(vertices)).reshape(len(x), len(y), len(z))
+    ring = np.pad(solid, 1)
+    quads = []
+    for i, j in np.argwhere(solid):
+        a, b, c, d = number[i, j], number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]
+        quads += [[a[0], d[0], c[0], b[0]], [a[-1], b[-1], c[-1], d[-1]]]
+        beside = (
+            (ring[i + 1, j], a, b),
+            (ring[i + 2, j + 1], b, c),
+            (ring[i + 1, j + 2], c, d),
+            (ring[i, j + 1], d, a),
+        )
+        for filled, p, q in beside:
+            quads += [] if filled else np.stack([p[:-1], q[:-1], q[1:], p[1:]], axis=1).tolist()
+    corners = np.array(quads)
+    used, index = np.unique(corners, return_inverse=True)
+    a, b, c, d = index.reshape(corners.shape).T
+    return vertices[used], np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
 
 
 def welded(vertices: FloatArray, faces: IntArray) -> Mesh:

@@ -9,7 +9,13 @@ if TYPE_CHECKING:
     from planners.drive import drive as drive, dry_run as dry_run
     from planners.errors import PlannerError as PlannerError
     from planners.explore.explore import Explore as Explore
-    from planners.plan import Outcome as Outcome, Plan as Plan
+    from planners.plan import (
+        Outcome as Outcome,
+        Parted as Parted,
+        Plan as Plan,
+        Refused as Refused,
+        executed as executed,
+    )
     from planners.survey.survey import Survey as Survey
 
 _PUBLIC = {
@@ -17,7 +23,7 @@ _PUBLIC = {
     "drive": ("drive", "dry_run"),
     "errors": ("PlannerError",),
     "explore.explore": ("Explore",),
-    "plan": ("Outcome", "Plan"),
+    "plan": ("Outcome", "Parted", "Plan", "Refused", "executed"),
     "survey.survey": ("Survey",),
 }
 doorway(__name__, _PUBLIC)

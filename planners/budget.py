@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Generator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hw import Move
 from mapping import Trace
-from planners.plan import Outcome, Plan
+from planners.plan import Outcome, Plan, executed
 
 
 @dataclass
@@ -43,5 +44,17 @@ def within(plan: Plan, spent: Spent, seconds: float, metres: float = np.inf) -> 
         if spent.seconds + move.duration > seconds or spent.metres + move.length > metres:
             plan.close()
             return Outcome("budget", f"{spent.seconds:.1f} s and {spent.metres:.3f} m of finger path spent")
-        spent.count(move)
-        trace = yield move
+        trace = yield from _charged(move, spent)
+
+
+def _charged(move: Move, spent: Spent) -> Generator[Move, Trace, Trace]:
+    """Yield a move; what of it was carried out is charged, a refused move is not."""
+    before = replace(spent)
+    spent.count(move)
+    trace = yield move
+    done = executed(move, trace)
+    if done != (move,):
+        spent.seconds, spent.metres, spent._end = before.seconds, before.metres, before._end
+        for part in done:
+            spent.count(part)
+    return trace

@@ -7,7 +7,7 @@ from itertools import islice
 
 from hw import FingerError, Move
 from mapping import Trace, TraceError
-from planners.plan import Outcome, Plan
+from planners.plan import Outcome, Plan, Refused
 
 # After so many refusals in a row the finger is taken for lost, and the plan for one that cannot be carried out
 MOST_REFUSALS, FORBIDDEN = 5, 100
@@ -21,12 +21,13 @@ def drive(
     *,
     check: Check | None = None,
     note: Callable[[str], None] | None = None,
+    refused_move: Callable[[Move, str], None] | None = None,
     empty: Trace | None = None,
 ) -> tuple[list[tuple[Move, Trace]], Outcome]:
     """Carry the plan out; every executed move with what it felt, and why the plan ended.
 
     A move that the check forbids, that the finger refuses, or whose readings are unusable gives nothing: the plan
-    is sent an empty trace in its place and decides what to do without it. The drive gives up if too many in a row
+    is sent a planners.Refused in its place and decides what to do without it. The drive gives up if too many in a row
     fail.
 
     Args:
@@ -35,6 +36,7 @@ def drive(
         check: what is wrong with a move after the last executed one (None before the first), or None if nothing
             is (planners.paths.limits.Limits.violation).
         note: told about every move that gave nothing for one of these reasons.
+        refused_move: told the move itself and the reason, besides.
         empty: a trace without samples, to go on with where even the first move fails; without it that ends the plan.
     """
     record: list[tuple[Move, Trace]] = []
@@ -52,12 +54,14 @@ def drive(
                 except (FingerError, TraceError) as error:
                     reason, refused = str(error), refused + 1
             if trace is None:
+                if refused_move:
+                    refused_move(move, reason or "")
                 if note:
                     note(f"{move.purpose} not executed: {reason}" if forbidden else f"{move.purpose} failed: {reason}")
                 if refused >= MOST_REFUSALS or forbidden >= FORBIDDEN or (not record and empty is None):
                     plan.close()
                     return record, Outcome("finger refuses", f"{_moves(max(refused, forbidden))} refused: {reason}")
-                trace = empty if empty is not None else record[-1][1].select(slice(0, 0))
+                trace = Refused.because(reason or "", (empty if empty is not None else record[-1][1]).tip_radius)
             else:
                 record.append((move, trace))
             move = plan.send(trace)

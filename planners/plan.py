@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import dataclass, field
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any
+
+import numpy as np
 
 from hw import Move
 from mapping import Trace
@@ -23,6 +25,46 @@ class Outcome:
     reason: str
     detail: str = ""
     value: Any = field(default=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Refused(Trace):
+    """What a plan is sent for a move that was not made: no samples, and why.
+
+    Args:
+        reason: one sentence.
+    """
+
+    reason: str = ""
+
+    @classmethod
+    def because(cls, reason: str, tip_radius: float) -> Refused:
+        """Refused for a reason, by a finger with that tip radius (m)."""
+        return cls(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip_radius, reason=reason)
+
+
+@dataclass(frozen=True, eq=False)
+class Parted(Trace):
+    """What a plan is sent for a sweep that was made in parts: the samples of all of them.
+
+    Args:
+        moves: the parts that were made.
+    """
+
+    moves: tuple[Move, ...] = ()
+
+    @classmethod
+    def of(cls, traces: Sequence[Trace], moves: Sequence[Move]) -> Parted:
+        """The traces of some parts, joined."""
+        whole = Trace.concatenate(traces)
+        return cls(**{each.name: getattr(whole, each.name) for each in fields(Trace)}, moves=tuple(moves))
+
+
+def executed(move: Move, answer: Trace) -> tuple[Move, ...]:
+    """What was carried out of a move, by the trace that the plan was sent for it."""
+    if isinstance(answer, Parted):
+        return answer.moves
+    return () if isinstance(answer, Refused) else (move,)
 
 
 Plan = Generator[Move, Trace, Outcome]

@@ -107,6 +107,7 @@ def _result(work: Work) -> Analysis:
         time_curve=work.time_curve,
         tip_counts=tip_counts(work.features, trace.tip_radius),
         inspected=work.inspected,
+        account=work.account,
     )
 
 

@@ -15,6 +15,7 @@ from explore3d import __version__
 from explore3d.analysis.inspected import Inspected, base_reach
 from explore3d.analysis.result import TipCount
 from explore3d.analysis.stages import Stages
+from explore3d.analysis.surface_account import SurfaceAccount
 from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature
 from explore3d.log import Log, stop_of
@@ -90,6 +91,7 @@ class Work:
     features: tuple[Feature, ...] = ()
     estimate: Estimate | None = None
     curvature: Curvature | None = None
+    account: SurfaceAccount | None = None
     time_curve: tuple[tuple[float, float], ...] = ()
     asked: dict[str, bool] = field(default_factory=dict)
 
@@ -291,14 +293,16 @@ def curvature_taken(work: Work, share: Share) -> None:
 def inspected(work: Work, share: Share) -> None:
     """Which places are free of features, and above which height."""
     work.inspected = Inspected.of(work.laid, work.base, work.detections, work.smallest_feature)
+    work.account = SurfaceAccount.of_log(work.log, work.base, work.scene)
 
 
 def modelled(work: Work, share: Share) -> None:
     """The features anchored on the base."""
+    surface = {} if work.account is None else {"surface": work.account.record()}
     work.model = ObjectModel.attach(
         work.base,
         in_model_frame(work.features, work.base),
-        provenance=_provenance(work) | {"inspection": work.inspected.record()},
+        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface,
         inspected=work.inspected.height,
         reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
     )

@@ -12,6 +12,7 @@ from mapping.model import ObjectModel
 
 if TYPE_CHECKING:
     from explore3d.analysis.inspected import Inspected
+    from explore3d.analysis.surface_account import SurfaceAccount
     from explore3d.analysis.truth import Comparison, TrueFeature
     from explore3d.log import Stop
     from explore3d.scene import Scene
@@ -60,6 +61,7 @@ class Analysis:
         stopped: why the exploration ended early, None if it did not.
         go_on: the command that goes on with it, "" if there is none.
         folder: where it was written, None if it was not.
+        account: which part of the surface was swept, and what became of the rest; None without a scene.
     """
 
     title: str
@@ -82,3 +84,4 @@ class Analysis:
     stopped: Stop | None = None
     go_on: str = ""
     folder: Path | None = None
+    account: SurfaceAccount | None = None

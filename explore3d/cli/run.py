@@ -46,7 +46,8 @@ def run(
             scene, out, progress=progress, force=force or (), arm=arm, resume=resume, overwrite=overwrite
         )
     show(analysis, out, json)
-    if analysis.stopped is not None and analysis.stopped.incomplete:
+    short = analysis.account is not None and analysis.account.short
+    if short or (analysis.stopped is not None and analysis.stopped.incomplete):
         raise typer.Exit(INCOMPLETE)
 
 

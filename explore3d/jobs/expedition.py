@@ -177,7 +177,8 @@ class Explorer:
         if base is None:
             return plan
         space = self.workspace
-        return routed(plan, Ways(base, self.tip_radius, space.low, space.high, space.max_speed))
+        ways = Ways(base, self.tip_radius, space.low, space.high, space.max_speed)
+        return routed(plan, ways, self.limits(base).violation)
 
     def carry_out(
         self, plan: Plan, base: Base | None, execute: Execute, event: Event = unheard, seconds: float = np.inf
@@ -191,11 +192,16 @@ class Explorer:
             seconds: finger time that the plan may take.
         """
         spent = Spent(self.workspace.max_speed)
+
+        def refused(move: Move, why: str) -> None:
+            what = f"{move.purpose} not executed: {why}"
+            event("refused", {"what": what, "purpose": move.purpose, "path": move.path.tolist()})
+
         _, outcome = drive(
             self.prepared(plan, base, spent, seconds),
             execute,
             check=self.limits(base).violation,
-            note=lambda text: event("refused", {"what": text}),
+            refused_move=refused,
             empty=self.nothing,
         )
         return outcome, spent.seconds

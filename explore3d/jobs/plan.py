@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from explore3d import count_text, length_text, seconds_text
+from explore3d.analysis import SurfaceAccount
 from explore3d.jobs.expedition import Explorer, explorer
 from explore3d.jobs.run import scene_digest, scene_finger
 from explore3d.jobs.session import Job, Session
@@ -16,7 +17,7 @@ from explore3d.pictures import plan_picture
 from explore3d.scene import load_scene
 from hw import Move
 from hw.simulated import SimulatedFinger
-from mapping import Surface
+from mapping import Surface, Trace
 from mapping.base import Base
 from planners import Spent, drive, dry_run
 from planners.explore import Discover
@@ -35,6 +36,7 @@ class DryRun:
         covered: share of the surface that the sweeps inspect; None if the time budget ends before the survey.
         reach: distance from a sweep up to which the smallest feature is seen, m; None likewise.
         violations: (number of the move, what limit it breaks).
+        account: what of the surface the sweeps would sweep; None if the time budget ends before the survey.
         assumed: what had to be assumed of the object, and what the plan falls short of; a sentence or "".
         subject: digest of the scene (explore3d.jobs.run.scene_digest).
     """
@@ -48,6 +50,7 @@ class DryRun:
     covered: float | None
     reach: float | None
     violations: tuple[tuple[int, str], ...]
+    account: SurfaceAccount | None = None
     assumed: str = ""
     subject: str = ""
 
@@ -62,6 +65,7 @@ class DryRun:
             "covered": self.covered,
             "reach": self.reach,
             "violations": [{"move": number, "what": what} for number, what in self.violations],
+            "surface": None if self.account is None else self.account.record(),
         }
 
     def lines(self) -> list[str]:
@@ -76,7 +80,9 @@ class DryRun:
             within = [f"{100 * self.covered:.1f} % of the surface lies within {length_text(self.reach)} of a sweep"]
         broken = [f"move {number}: {what}" for number, what in self.violations]
         assumed = [self.assumed] if self.assumed else []
-        return [*assumed, first, *within, *(broken or ["no move breaks a limit"])]
+        account = [] if self.account is None else [self.account.sentence()]
+        warning = [self.account.warning()] if self.account is not None and self.account.short else []
+        return [*warning, *assumed, first, *within, *account, *(broken or ["no move breaks a limit"])]
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""
@@ -93,26 +99,36 @@ def plan_scene(path: Path | str) -> DryRun:
     with scene_finger(scene) as finger:
         planned = explorer(scene, finger.workspace)
     first, base, assumed = _to_know_the_base(planned)
-    before, budget = Spent(planned.workspace.max_speed), planned.time_budget
+    spent, budget = Spent(planned.workspace.max_speed), planned.time_budget
     for move in first:
-        before.count(move)
-    then, survey = list[Move](), None
-    if before.seconds < budget:
-        exploring = planned.explore(base=base, time_budget=budget - before.seconds).plan()
-        exploring = planned.prepared(exploring, base, Spent(before.travel_speed), np.inf)
-        then, outcome = dry_run(exploring, planned.nothing)
-        survey = outcome.value.survey
-    moves, limits = [*first, *then], planned.limits(base)
-    lasts: list[Move | None] = [None, *moves]
-    checked = enumerate(zip(moves, lasts, strict=False), 1)
-    violations = [(number, what) for number, (move, last) in checked if (what := limits.violation(move, last))]
-    spent = Spent(before.travel_speed)
-    for move in moves:
         spent.count(move)
+    moves, violations, limits = list(first), list[tuple[int, str]](), planned.limits(base)
+
+    def check(move: Move, last: Move | None) -> str | None:
+        """What the run would refuse is refused here too: it is neither charged nor counted as covered."""
+        moves.append(move)
+        what = limits.violation(move, last)
+        violations.extend([(len(moves), what)] if what else [])
+        return what
+
+    def made(move: Move) -> Trace:
+        spent.count(move)
+        return planned.nothing
+
+    survey = None
+    if spent.seconds < budget:
+        exploring = planned.explore(base=base, time_budget=budget - spent.seconds).plan()
+        exploring = planned.prepared(exploring, base, Spent(spent.travel_speed), np.inf)
+        _, outcome = drive(exploring, made, check=check, empty=planned.nothing)
+        survey = outcome.value.survey
     if survey is None:
         short = "the time budget ends before the survey does: raise explore.time_budget or survey.smallest_feature"
         assumed = f"{assumed}; {short}" if assumed else short
     covered, reach = (None, None) if survey is None else (survey.fraction, survey.reach)
+    broken = {number - 1: what for number, what in violations}
+    sound = [move for number, move in enumerate(moves) if number not in broken]
+    refused = [(moves[number], what) for number, what in broken.items()]
+    account = None if survey is None else SurfaceAccount.of_plan(sound, refused, base, scene)
     return DryRun(
         base,
         scene.tip.radius,
@@ -123,6 +139,7 @@ def plan_scene(path: Path | str) -> DryRun:
         covered,
         reach,
         tuple(violations),
+        account,
         assumed,
         scene_digest(scene),
     )

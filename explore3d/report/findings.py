@@ -37,6 +37,7 @@ def summary(analysis: Analysis) -> list[str]:
     features = analysis.model.features
     finer = sum(feature.curvature_feature for feature in features)
     lines = [f"{count_text(len(features), 'feature')} found{swept_part(analysis)}"]
+    account = analysis.account
     if features:
         lines[0] += f", {finer} of them finer than the tip of {length_text(analysis.trace.tip_radius)}"
     lines = [*(f"read as: {line}" for line in analysis.model.provenance.get("read_as", [])), *lines]
@@ -48,10 +49,12 @@ def summary(analysis: Analysis) -> list[str]:
         else []
     )
     return [
+        *([account.warning()] if account is not None and account.short else []),
         *lines,
         *(feature_line(feature) for feature in features[:MOST_LISTED_FEATURES]),
         *more,
         limit_sentence(analysis),
+        *([account.sentence()] if account is not None else []),
     ]
 
 

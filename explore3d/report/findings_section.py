@@ -65,6 +65,10 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
         content.append(paragraph("Ranges are central 90 % intervals. ", limit_sentence(analysis)))
     if analysis.inspected is not None and not is_profile(analysis):
         content.append(paragraph(analysis.inspected.sentence()))
+    if analysis.account is not None:
+        warning = analysis.account.warning()
+        content.extend([element("p", warning, class_="warning")] if warning else [])
+        content.append(paragraph(analysis.account.sentence()))
     if analysis.ended:
         content.append(paragraph(f"Why the exploration ended: {analysis.ended.rstrip('.')}."))
     picture = "profile" if is_profile(analysis) else "object"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import InitVar, dataclass, field
+from functools import cached_property
 from types import TracebackType
 from typing import Any
 
@@ -10,8 +11,10 @@ import numpy as np
 
 from hw import FingerError, Move, Workspace
 from hw.simulated.noise_source import NoiseSource
+from hw.simulated.obstacles import Obstacles, pressed_from, stopped_or_landed
 from mapping import BoolArray, FloatArray, Surface, Trace
 from mapping.geometry.contact import BallContact, Contacts
+from mapping.geometry.mesh import NearestPoint
 
 # The simulated finger's top speed unless it is given, in tip radii per second: no machine's, only a bound for plans
 TOP_SPEED_RADII = 25.0
@@ -23,7 +26,13 @@ class SimulatedFinger:
 
     At each sample of a sweep the ball comes from `stroke` outside of the commanded path along the approach
     direction and stops at the first contact; where it meets nothing within `stroke` beyond the path there
-    is no contact, and no sample. The noise of the k-th sweep depends on `seed` and k alone, so a run that
+    is no contact, and no sample. Contact is continuous: a wall beside the way, over which the ball cannot ride within
+    the sensor's field, stops it, and so does anything in the way of ball or stem between and during moves. That is a
+    fault as on a machine: nothing of the move is felt, and the finger draws back the way that it came. A ball that
+    runs off an edge is in no contact until it has come down, at the largest speed.
+
+    On the way between two moves the finger backs off half a tip radius against its approach, goes straight, and comes
+    down again. The noise of the k-th sweep depends on `seed` and k alone, so a run that
     is resumed feels what the uninterrupted run would have felt.
 
     Args:
@@ -38,6 +47,8 @@ class SimulatedFinger:
         margin: how far the workspace reaches beyond the body's bounding box, m; None for 6 tip radii.
         stroke: travel of the finger to either side of the commanded path, m; None for 2 tip radii.
         field_angle: contacts further than this from the approach axis are not felt, rad (paper: 75 degrees).
+        stem_radius, stem_length: of the straight stem behind the ball that may run into the body, m; None for half
+            a tip radius and six.
     """
 
     object: Surface
@@ -55,12 +66,14 @@ class SimulatedFinger:
     margin: InitVar[float | None] = None
     stroke: float | None = None
     field_angle: float = float(np.radians(75.0))
+    stem_radius: float | None = None
+    stem_length: float | None = None
     _ball: BallContact = field(init=False, repr=False)
     _workspace: Workspace = field(init=False, repr=False)
     _noise: NoiseSource = field(init=False, repr=False)
     _clock: float = field(init=False, default=0.0)
     _sweeps: int = field(init=False, default=0)
-    _position: FloatArray | None = field(init=False, default=None)
+    _last: Move | None = field(init=False, default=None)
 
     def __post_init__(self, margin: float | None) -> None:
         self._require_positive("tip_radius", "rate", "correlation_length", "max_force")
@@ -102,10 +115,19 @@ class SimulatedFinger:
 
         Raises:
             FingerError: the move leaves the workspace, or is faster or harder than allowed.
+            StoppedError: ball or stem ran into the body.
         """
         self._refuse_what_exceeds(move)
+        if self._last is not None:
+            self._obstacles.pass_between(self._last, move)
+        if move.purpose != "sweep":
+            self._obstacles.pass_along(move)
+            self._passed(move)
+            return self._empty()
+        path, approach, times, spacing = sampled(move, self.rate)
+        felt, keep = self._pressed(path, approach)
         start = self._passed(move)
-        return self._sweep(move, start) if move.purpose == "sweep" else self._empty()
+        return self._sweep(path, times, spacing, felt, keep, start)
 
     def skip(self, move: Move) -> None:
         """Take a move for made: what an earlier session felt is not felt again, but time and noise go on from it."""
@@ -114,11 +136,11 @@ class SimulatedFinger:
 
     def _passed(self, move: Move) -> float:
         """Advance the clock over a move; when it begins, s."""
-        gap = 0.0 if self._position is None else float(np.linalg.norm(move.path[0] - self._position))
+        gap = 0.0 if self._last is None else float(np.linalg.norm(move.path[0] - self._last.path[-1]))
         # a plan that does not command the way between two sweeps still pays for it
         self._clock += gap / self._workspace.max_speed
         start, self._clock = self._clock, self._clock + move.duration
-        self._position = move.path[-1]
+        self._last = move
         return start
 
     def _refuse_what_exceeds(self, move: Move) -> None:
@@ -136,10 +158,10 @@ class SimulatedFinger:
         if move.force > self.max_force:
             raise FingerError(f"the {move.purpose} asks for {move.force} N; at most {self.max_force} N are possible")
 
-    def _sweep(self, move: Move, start: float) -> Trace:
+    def _sweep(
+        self, path: FloatArray, times: FloatArray, spacing: float, felt: Contacts, keep: BoolArray, start: float
+    ) -> Trace:
         self._sweeps += 1
-        path, approach, times, spacing = sampled(move, self.rate)
-        felt, keep = self._pressed(path, approach)
         rng = np.random.default_rng((self.seed, self._sweeps))
         centers = (felt.centers + self._noise.of_centers(rng, len(path), spacing))[keep]
         normals = contacts = None
@@ -150,11 +172,24 @@ class SimulatedFinger:
         return Trace(start + times[keep], centers, sweep, self.tip_radius, normals, contacts)
 
     def _pressed(self, path: FloatArray, approach: FloatArray) -> tuple[Contacts, BoolArray]:
+        """Where the ball rests at every sample of a sweep, and which samples are felt. Raises StoppedError."""
         stroke = 2.0 * self.tip_radius if self.stroke is None else self.stroke
-        felt = self._ball.first_contact(path - stroke * approach, approach)
+        felt, over = pressed_from(self._ball, path, approach, stroke)
         against = -(felt.normals * approach).sum(axis=1)
-        keep = (felt.count > 0) & (felt.distance <= 2.0 * stroke) & (against >= np.cos(self.field_angle))
+        touching = (felt.count > 0) & (over >= -stroke)
+        keep = touching & (against >= np.cos(self.field_angle))
+        fall = self._workspace.max_speed / self.rate
+        keep &= stopped_or_landed(path, touching, over, self.tip_radius, self.field_angle, fall)
+        ridden = path - np.where(touching & (over > 0), over, 0.0)[:, None] * approach
+        self._obstacles.stem_along(ridden, approach)
         return felt, np.asarray(keep)
+
+    @cached_property
+    def _obstacles(self) -> Obstacles:
+        """What ball and stem may run into: the true body."""
+        radius = 0.5 * self.tip_radius if self.stem_radius is None else self.stem_radius
+        length = 6.0 * self.tip_radius if self.stem_length is None else self.stem_length
+        return Obstacles(NearestPoint(self.object), self.tip_radius, radius, length)
 
     def _empty(self) -> Trace:
         return Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), self.tip_radius)

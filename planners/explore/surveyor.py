@@ -9,7 +9,7 @@ import numpy as np
 from mapping import FloatArray, Trace
 from mapping.detection import Coverage, detect
 from mapping.instrument import StatedNoise
-from planners import Outcome, Plan
+from planners import Outcome, Plan, executed
 from planners.explore.found import Found
 from planners.survey import Survey
 
@@ -77,12 +77,16 @@ class Surveyor:
         for move in moves:
             trace = yield move
             self.count.made += 1
-            self.paths.append(move.path + self.survey.tip_radius * move.approach)
+            done = executed(move, trace)
+            self.paths.extend(self.survey.touched(part) for part in done)
+            if not done:
+                self.found.left_out.append("a survey sweep was not carried out")
+                continue
             if len(trace) == 0:
                 self.found.left_out.append("a survey sweep felt no contact")
                 continue
             waiting.append(trace)
-            felt += move.length
+            felt += sum(part.length for part in done)
             if self.found.noise is not None or felt >= FIRST_NOISE_PATH * self.survey.tip_radius:
                 self._detect(waiting)
         if waiting:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from planners.paths.carrier import Carrier as Carrier
     from planners.paths.isolines import Isoline as Isoline, isolines as isolines
     from planners.paths.limits import Limits as Limits
     from planners.paths.pressed_path import (
@@ -13,13 +14,18 @@ if TYPE_CHECKING:
         thinned as thinned,
         touched_points as touched_points,
     )
+    from planners.paths.reach import reachable as reachable
+    from planners.paths.sound import resampled as resampled, sound_parts as sound_parts
     from planners.paths.strokes import Strokes as Strokes, tangential as tangential, to_and_fro as to_and_fro
     from planners.paths.travel import Ways as Ways, routed as routed
 
 _PUBLIC = {
+    "carrier": ("Carrier",),
     "isolines": ("Isoline", "isolines"),
     "limits": ("Limits",),
     "pressed_path": ("PRESS", "pressed_sweep", "thinned", "touched_points"),
+    "reach": ("reachable",),
+    "sound": ("resampled", "sound_parts"),
     "strokes": ("Strokes", "tangential", "to_and_fro"),
     "travel": ("Ways", "routed"),
 }

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from hw import Move, Workspace
+from mapping import FloatArray
 from mapping.base import Base
-from planners.paths.travel import MOST_SINKING, gap, sunk
-
-# The sensor's field about its axis (paper, section 4)
-FIELD = float(np.radians(75.0))
-# How far the commanded path of a sweep may sink into the base, in tip radii: further in it crosses a wall
-PRESSED = 0.5
+from planners.paths.carrier import Carrier
+from planners.paths.sound import FIELD, PRESSED, resampled
+from planners.paths.travel import MOST_SINKING, gap, sunk, way_between
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,16 +89,20 @@ class Limits:
         return f"the way through free space sinks {1e3 * deepest:.3f} mm into the body"
 
     def _stem(self, move: Move, base: Base) -> str | None:
-        if self.stem_length <= 0:
-            return None
-        back = np.linspace(1.5 * self.tip_radius, self.stem_length, 6)
-        stem = (move.path[:, None, :] - back[None, :, None] * move.approach[:, None, :]).reshape(-1, 3)
-        clearance = float(base.foot(stem, self.stem_radius).height.min())
-        return f"the stem behind the ball sinks {-1e3 * clearance:.3f} mm into the body" if clearance < 0 else None
+        path, approach = move.path, move.approach
+        if len(path) > 1:
+            path, approach = resampled(path, approach, 0.5 * self.tip_radius)
+        return self._stem_sinks("the stem behind the ball", path, approach, base)
+
+    def _stem_sinks(self, what: str, path: FloatArray, approach: FloatArray, base: Base) -> str | None:
+        carrier = Carrier(base, self.tip_radius, self.stem_radius, self.stem_length)
+        clearance = float(carrier.clearance(path, approach).min())
+        return f"{what} sinks {-1e3 * clearance:.3f} mm into the body" if clearance < 0 else None
 
     def _way(self, before: Move, move: Move, base: Base) -> str | None:
-        """The ball on its way from the end of one move to the beginning of the next."""
+        """Ball and stem on their way from the end of one move to the beginning of the next."""
         deepest = sunk(gap(before, move, self.tip_radius), base, self.tip_radius)
-        if deepest <= MOST_SINKING * self.tip_radius:
-            return None
-        return f"the way from the move before sinks {1e3 * deepest:.3f} mm into the body"
+        if deepest > MOST_SINKING * self.tip_radius:
+            return f"the way from the move before sinks {1e3 * deepest:.3f} mm into the body"
+        way = way_between(before, move, self.tip_radius)
+        return self._stem_sinks("on the way from the move before the stem", *way, base)

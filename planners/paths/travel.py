@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,17 +10,28 @@ from typing import Any
 import numpy as np
 
 from hw import Move
-from mapping import FloatArray, Trace
+from mapping import FloatArray, IntArray, Trace
 from mapping.base import Base
-from planners import Outcome, Plan
+from mapping.detection import face_samples
+from planners import Outcome, Parted, Plan, Refused
+from planners.paths.carrier import Carrier
+from planners.paths.sound import resampled, sound_parts
 
 # How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)
 BACK_OFF_DISTANCE = 0.5
 # How far a ball may sink into the base on its way through free space, in tip radii
 MOST_SINKING = 0.05
+# A way that is planned keeps 0.02 free of that limit even between the places that are looked at (0.25^2 / 8 = 0.008)
+FREE_SINKING, FREE_SPACING = 0.02, 0.25
 # Of the grid on which ways round the body are looked for, in tip radii; and its most nodes along an axis
 GRID_SPACING, MOST_GRID_NODES = 0.75, 40
 ROOM = 4.0
+# How far out of a narrow place a straight way is looked for, in tip radii
+OUT_DISTANCE = 6.0
+# Places off the surface where the grid is too coarse: how high over contact, in tip radii; how many of each at most;
+# and how many neighbours of each are tried
+NEAR_LIFTS = (0.1, 0.4)
+MOST_NEAR_PLACES, NEAR_NEIGHBOURS = 2000, 10
 
 
 def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
@@ -28,9 +40,12 @@ def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
     return np.stack([before.path[-1] - lift * before.approach[-1], after.path[0] - lift * after.approach[0]])
 
 
-def sunk(path: FloatArray, base: Base, tip_radius: float) -> float:
-    """How deep a ball on a polyline (K, 3) sinks into the base at the deepest, m; 0 where it stays free."""
-    return max(0.0, -float(base.foot(dense(path, 0.5 * tip_radius), tip_radius).height.min()))
+def sunk(path: FloatArray, base: Base, tip_radius: float, spacing: float = 0.5) -> float:
+    """How deep a ball on a polyline (K, 3) sinks into the base at the deepest, m; 0 where it stays free.
+
+    It is looked at every `spacing` tip radii: round an edge it may sink spacing^2 / 8 of them deeper between.
+    """
+    return max(0.0, -float(base.foot(dense(path, spacing * tip_radius), tip_radius).height.min()))
 
 
 def dense(path: FloatArray, spacing: float) -> FloatArray:
@@ -42,20 +57,53 @@ def dense(path: FloatArray, spacing: float) -> FloatArray:
     return np.column_stack([np.interp(s, along, path[:, k]) for k in range(3)])
 
 
-def routed(plan: Plan, ways: Ways) -> Plan:
-    """The plan with a travel move put before every move that cannot be reached straight from the one before it."""
-    trace: Trace | None = None
+def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = None) -> Plan:
+    """The plan with travel put before every move that cannot be reached straight, and sweeps split where they offend.
+
+    What was made is learnt from what the driver sends back: after a planners.Refused the finger still stands where
+    the last executed move ended. The plan is sent a planners.Parted for a sweep that was made in parts.
+
+    Args:
+        check: what is wrong with a move, wherever it begins, or None; only a sweep with something wrong is split.
+    """
+    answer: Trace | None = None
     before: Move | None = None
     while True:
         try:
-            move = next(plan) if trace is None else plan.send(trace)
+            move = next(plan) if answer is None else plan.send(answer)
         except StopIteration as end:
             return end.value if isinstance(end.value, Outcome) else Outcome("done")
-        way = None if before is None else ways.round(before, move)
-        if way is not None:
-            yield way
-        trace = yield move
-        before = move
+        parts = [move]
+        if check is not None and move.purpose == "sweep" and check(move):
+            parts = sound_parts(move, ways.carrier) or [move]
+        felt, made = [], []
+        for part in parts:
+            answer, before = yield from _reached(part, before, ways)
+            if not isinstance(answer, Refused):
+                felt.append(answer)
+                made.append(part)
+        if made and parts != [move]:
+            answer = Parted.of(felt, made)
+
+
+def _reached(move: Move, before: Move | None, ways: Ways) -> Generator[Move, Trace, tuple[Trace, Move | None]]:
+    """Make a move after the travel to it; what it felt, and the last move that was executed."""
+    way = None if before is None else ways.round(before, move)
+    if way is not None:
+        answer = yield way
+        if isinstance(answer, Refused):
+            return answer, before
+        before = way
+    answer = yield move
+    if isinstance(answer, Refused):
+        return answer, before
+    return answer, move
+
+
+def way_between(before: Move, after: Move, tip_radius: float) -> tuple[FloatArray, FloatArray]:
+    """The straight way between two moves: centres (K, 3), m, and the approach (K, 3) that turns evenly along it."""
+    ends = np.stack([before.approach[-1], after.approach[0]])
+    return resampled(gap(before, after, tip_radius), ends, 0.5 * tip_radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +115,10 @@ class Ways:
         tip_radius: m.
         low, high: (3,) corners of where the tip's centre may go, m.
         speed: of travel, m/s.
+
+    The ways are the shortest over a roadmap of free space: a grid where there is room, and places off the surface
+    where the ball fits but the grid is too coarse (Kavraki et al., Probabilistic roadmaps, 1996, with places that
+    are not drawn at random).
     """
 
     base: Base
@@ -77,32 +129,46 @@ class Ways:
 
     def free(self, path: FloatArray) -> bool:
         """True if a ball on the polyline (K, 3) stays out of the body."""
-        return sunk(path, self.base, self.tip_radius) <= MOST_SINKING * self.tip_radius
+        return sunk(path, self.base, self.tip_radius, FREE_SPACING) <= FREE_SINKING * self.tip_radius
+
+    @cached_property
+    def carrier(self) -> Carrier:
+        """The stem behind the ball."""
+        return Carrier.of(self.base, self.tip_radius)
 
     def round(self, before: Move, after: Move) -> Move | None:
         """The travel between two moves; None where the straight way is free, or where no way was found."""
         straight = gap(before, after, self.tip_radius)
-        if self.free(straight):
+        stems = self.carrier.clearance(*way_between(before, after, self.tip_radius)).min()
+        if self.free(straight) and stems >= 0:
             return None
         first = self._out(straight[0], -before.approach[-1])
         last = self._out(straight[1], -after.approach[0])
-        if first is None or last is None:
-            return None
         between = self._between(first[-1], last[-1])
         if between is None:
             return None
-        path = self._shortened(np.concatenate([first, between, last[::-1]]))
-        return Move(path, -self.base.foot(path, self.tip_radius).normals, speed=self.speed, purpose="travel")
+        path = dense(self._shortened(np.concatenate([first, between, last[::-1]])), self.tip_radius)
+        wanted = -self.base.foot(path, self.tip_radius).normals
+        wanted[0], wanted[-1] = before.approach[-1], after.approach[0]
+        approach = self.carrier.turned(path, wanted, np.pi)
+        return Move(path, approach, speed=self.speed, purpose="travel")
 
-    def _out(self, start: FloatArray, away: FloatArray) -> FloatArray | None:
-        """Straight away from the body until there is room: (2, 3), or None."""
-        steps = start + np.linspace(0.0, 6.0 * self.tip_radius, 25)[:, None] * away
-        inside = ((steps >= self.low) & (steps <= self.high)).all(axis=1)
-        height = self.base.foot(steps, self.tip_radius).height
-        roomy = np.flatnonzero((height >= self._room) & inside)
-        if not len(roomy) or height[: roomy[0] + 1].min() < -MOST_SINKING * self.tip_radius:
-            return None
-        return np.stack([start, steps[roomy[0]]])
+    def _out(self, start: FloatArray, away: FloatArray) -> FloatArray:
+        """Where there is room, by the shortest straight way, that along the approach first: (2, 3); (1, 3) if none is.
+
+        In an inner corner the way along one wall's normal stays beside the other wall: the way out is sideways.
+        """
+        along = np.linspace(0.0, OUT_DISTANCE * self.tip_radius, 25)
+        for directions in (away[None], self.carrier.lattice):
+            steps = start + along[:, None] * directions[:, None, :]
+            inside = ((steps >= self.low) & (steps <= self.high)).all(axis=2)
+            height = self.base.foot(steps.reshape(-1, 3), self.tip_radius).height.reshape(inside.shape)
+            roomy = (height >= self._room) & inside
+            sinks = np.minimum.accumulate(height, axis=1) < -MOST_SINKING * self.tip_radius
+            step = np.where((roomy & ~sinks).any(axis=1), (roomy & ~sinks).argmax(axis=1), len(along))
+            if step.min() < len(along):
+                return np.stack([start, steps[step.argmin(), step.min()]])
+        return start[None]
 
     @property
     def _room(self) -> float:
@@ -138,8 +204,39 @@ class Ways:
                 rows.append(number[here][both])
                 columns.append(number[there][both])
         points, a, b = nodes[free], np.concatenate(rows), np.concatenate(columns)
+        near = self._near_surface(points)
+        points, a, b = np.concatenate([points, near[0]]), np.append(a, near[1]), np.append(b, near[2])
         lengths = np.linalg.norm(points[a] - points[b], axis=1)
         return points, coo_matrix((lengths, (a, b)), shape=(len(points), len(points))).tocsr()
+
+    def _near_surface(self, grid: FloatArray) -> tuple[FloatArray, IntArray, IntArray]:
+        """Free places (M, 3) off the surface that the grid's nodes (N, 3) are too coarse for, and the ways to others.
+
+        The ways are pairs of numbers, the grid's nodes being counted first.
+        """
+        from scipy.spatial import cKDTree
+
+        surface = self.base.surface
+        spacing = max(self.tip_radius, float(np.sqrt(surface.face_areas.sum() / MOST_NEAR_PLACES)))
+        on, face = face_samples(surface, spacing)
+        places = [on + (1.0 + lift) * self.tip_radius * surface.face_normals[face] for lift in NEAR_LIFTS]
+        near = np.concatenate(places)
+        inside = ((near >= self.low) & (near <= self.high)).all(axis=1)
+        height = self.base.foot(near, self.tip_radius).height
+        # where there is room the grid has nodes of its own
+        near = near[inside & (height > 0.0) & (height < self._room)]
+        points = np.concatenate([grid, near])
+        if not len(near):
+            return near, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        count = min(NEAR_NEIGHBOURS + 1, len(points))
+        _, other = cKDTree(points).query(near, k=count)
+        a = np.repeat(np.arange(len(near)) + len(grid), count)
+        b = other.reshape(-1)
+        a, b = a[a != b], b[a != b]
+        share = np.linspace(0.0, 1.0, 9)[1:-1, None, None]
+        height = self.base.foot(((1 - share) * points[a] + share * points[b]).reshape(-1, 3), self.tip_radius).height
+        free = height.reshape(len(share), -1).min(axis=0) >= 0.0
+        return near, a[free], b[free]
 
     def _between(self, start: FloatArray, stop: FloatArray) -> FloatArray | None:
         """Nodes (K, 3) of the shortest way over the grid, or None."""

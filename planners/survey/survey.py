@@ -12,8 +12,8 @@ from hw import Move
 from mapping import BoolArray, FloatArray, IntArray
 from mapping.base import Base
 from mapping.detection import Coverage, coverage
-from planners import Outcome, Plan, PlannerError
-from planners.paths import Isoline, isolines, pressed_sweep, thinned, touched_points
+from planners import Outcome, Plan, PlannerError, executed
+from planners.paths import Carrier, Isoline, isolines, pressed_sweep, sound_parts, thinned, touched_points
 from planners.survey.charts import crease_charts
 from planners.survey.level_field import LevelField, level_field
 from planners.survey.slices import Slices, slice_axes, slices_for
@@ -69,13 +69,17 @@ class Survey:
 
     def plan(self) -> Plan:
         """Yield every sweep; the outcome's value is the planned Coverage."""
-        touched = []
+        touched: list[FloatArray] = []
         for move in self.sweeps():
-            touched.append(move.path + (1.0 * self.tip_radius) * move.approach)
-            yield move
+            answer = yield move
+            touched.extend(self.touched(part) for part in executed(move, answer))
         done = self.covered(touched)
         detail = f"{100 * done.fraction:.1f} % of the surface lies within {1e3 * done.reach:.2f} mm of a sweep"
         return Outcome("done" if done.fraction > 0.99 else "not all reached", detail, done)
+
+    def touched(self, move: Move) -> FloatArray:
+        """(K, 3) places of the base that a sweep touches at its waypoints, m."""
+        return self.base.foot(move.path, self.tip_radius).points
 
     def covered(self, paths: list[FloatArray], pitch: float | None = None) -> Coverage:
         """Coverage of the region by touched paths (each (K, 3), m) that see strips as wide as the pitch."""
@@ -156,14 +160,12 @@ class Survey:
     def _pressed(self, line: Isoline) -> Iterator[Move]:
         points, normals = touched_points(line, self.base.surface)
         points, normals = thinned(points, normals, min(0.1 * self.tip_radius, 0.5 * self.pitch))
-        reachable = self._reachable(points, normals)
-        for run in _runs(reachable):
-            if len(run) > 1:
-                yield pressed_sweep(points[run], normals[run], self.tip_radius, self.speed, self.force)
+        sweep = pressed_sweep(points, normals, self.tip_radius, self.speed, self.force)
+        yield from sound_parts(sweep, self._carrier)
 
-    def _reachable(self, points: FloatArray, normals: FloatArray) -> BoolArray:
-        """(K,) False where the ball that touches here would be deep in another part of the body."""
-        return self.base.foot(points + self.tip_radius * normals, self.tip_radius).height > -0.3 * self.tip_radius
+    @cached_property
+    def _carrier(self) -> Carrier:
+        return Carrier.of(self.base, self.tip_radius)
 
     def _inside(self) -> BoolArray | None:
         if self.region is None:
@@ -201,11 +203,6 @@ def _begun_near(line: Isoline, here: FloatArray | None, overlap: float) -> Isoli
     if here is not None and np.linalg.norm(points[-1] - here) < np.linalg.norm(points[0] - here):
         return Isoline(points[::-1], faces[::-1])
     return line
-
-
-def _runs(mask: BoolArray) -> list[IntArray]:
-    index = np.flatnonzero(mask)
-    return np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(index) else []
 
 
 def _dense(path: FloatArray, spacing: float) -> FloatArray:

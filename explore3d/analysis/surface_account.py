@@ -1,0 +1,218 @@
+"""Surface account: which part of the surface was swept, refused, cannot be reached, or was not inspected."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from explore3d import count_text, length_text
+from explore3d.log import Log
+from explore3d.scene import Scene
+from mapping import BoolArray, FloatArray, Trace
+from mapping.base import Base, Cells
+from mapping.detection import face_samples
+from planners import Survey
+from planners.paths import Carrier, reachable, resampled
+
+# More of the reachable surface than this not swept: said first, and the command's exit status is not 0
+MOST_UNSWEPT = 0.05
+MOST_ACCOUNT_CELLS = 20_000
+# Places of the surface that are asked, at most about so many
+MOST_ACCOUNT_PLACES = 60_000
+# A sweep on the other side of a thin plate has not touched this one: opposite normals count as this many reaches apart
+OPPOSITE_APART = 1.0
+
+
+@dataclass(frozen=True)
+class SurfaceAccount:
+    """What became of the surface that was to be inspected; the four shares sum to 1.
+
+    Args:
+        area: m^2.
+        swept: share within `reach` of a place that a sweep touched.
+        refused: share that is reachable, was not swept, and lies within `reach` of a sweep that was refused.
+        unreachable: share that the ball with its stem cannot touch by any pose, and that was not swept.
+        not_inspected: share of the rest.
+        reach: distance from a sweep up to which the smallest feature asked for is seen, m.
+        swept_path, other_path: lengths of executed sweeps, and of other executed moves, m.
+        refused_path: length of refused sweeps, m.
+        moves: executed.
+        causes: (why, how many moves were refused for it), the most frequent first.
+    """
+
+    area: float
+    swept: float
+    refused: float
+    unreachable: float
+    not_inspected: float
+    reach: float
+    swept_path: float
+    other_path: float
+    refused_path: float
+    moves: int
+    causes: tuple[tuple[str, int], ...]
+
+    @classmethod
+    def of_log(cls, log: Log, base: Base, scene: Scene | None) -> SurfaceAccount | None:
+        """The account of a run by its log; None without a scene that says what to inspect, or without a surface."""
+        if scene is None or base.kind == "profile":
+            return None
+        made = [e.data for e in log.events if e.kind == "move"]
+        refused = [e.data for e in log.events if e.kind == "refused"]
+        lengths = {
+            name: sum(_length(d) for d in made if (d["purpose"] == "sweep") is (name == "sweep")) for name in _KINDS
+        }
+        paths = [np.asarray(d["path"]) for d in refused if d.get("purpose") == "sweep"]
+        account = _shares(base, scene, log_feet(log.trace, base), paths)
+        return cls(
+            **account,
+            swept_path=lengths["sweep"],
+            other_path=lengths["other"],
+            refused_path=sum(_length(d) for d in refused if d.get("purpose") == "sweep"),
+            moves=len(made),
+            causes=_causes([str(d["what"]) for d in refused]),
+        )
+
+    @classmethod
+    def of_plan(
+        cls, moves: Sequence[Any], refused: Sequence[tuple[Any, str]], base: Base, scene: Scene
+    ) -> SurfaceAccount | None:
+        """The account of planned moves, as if every sweep touched the bare body.
+
+        Args:
+            moves: hw.Move, those that break no limit.
+            refused: those that do, and why.
+        """
+        if base.kind == "profile":
+            return None
+        sweeps = [move for move in moves if move.purpose == "sweep"]
+        refusals = [move for move, _ in refused if move.purpose == "sweep"]
+        spacing = 0.2 * scene.tip.radius
+        dense = [resampled(m.path, m.approach, spacing)[0] if len(m.path) > 1 else m.path for m in sweeps]
+        feet = base.foot(np.concatenate(dense) if dense else np.zeros((0, 3)), scene.tip.radius)
+        return cls(
+            **_shares(base, scene, (feet.points, feet.normals), [move.path for move in refusals]),
+            swept_path=sum(move.length for move in sweeps),
+            other_path=sum(move.length for move in moves if move.purpose != "sweep"),
+            refused_path=sum(move.length for move in refusals),
+            moves=len(moves),
+            causes=_causes([why for _, why in refused]),
+        )
+
+    @property
+    def unswept(self) -> float:
+        """Share of the reachable surface that was not swept."""
+        reachable_share = 1.0 - self.unreachable
+        return (self.refused + self.not_inspected) / reachable_share if reachable_share > 0 else 0.0
+
+    @property
+    def short(self) -> bool:
+        """True if so much is missing that the run did not do what it was asked for."""
+        return self.unswept > MOST_UNSWEPT
+
+    def record(self) -> dict[str, Any]:
+        """JSON values, SI units."""
+        names = ["area", "swept", "refused", "unreachable", "not_inspected", "reach"]
+        names += ["swept_path", "other_path", "refused_path", "moves"]
+        causes = [{"why": why, "moves": count} for why, count in self.causes]
+        return {name: getattr(self, name) for name in names} | {"unswept": self.unswept, "causes": causes}
+
+    def warning(self) -> str:
+        """The first thing to say where too much is missing, else ""."""
+        if not self.short:
+            return ""
+        why = f", most often because {self.causes[0][0]}" if self.causes else ""
+        return f"NOT INSPECTED: {100 * self.unswept:.0f} % of the surface that the finger can reach was not swept{why}."
+
+    def sentence(self) -> str:
+        """The account in one or two sentences."""
+        refused = sum(count for _, count in self.causes)
+        sentence = (
+            f"Of the surface {100 * self.swept:.1f} % was swept ({length_text(self.swept_path)} of sweeps, which see "
+            f"{length_text(self.reach, 2)} to either side), {100 * self.refused:.1f} % refused, "
+            f"{100 * self.unreachable:.1f} % the finger cannot reach, {100 * self.not_inspected:.1f} % was not "
+            "inspected."
+        )
+        if refused:
+            told = "; ".join(f"{why} ({count})" for why, count in self.causes[:3])
+            sentence += f" {count_text(refused, 'move')} refused of {refused + self.moves}: {told}."
+        return sentence
+
+
+_KINDS = ("sweep", "other")
+
+
+def log_feet(trace: Trace, base: Base) -> tuple[FloatArray, FloatArray]:
+    """Places of the base that a trace touched, and the directions from there to the ball's centre, both (N, 3)."""
+    feet = base.foot(Cells.of(trace, MOST_ACCOUNT_CELLS).centers, trace.tip_radius)
+    return feet.points, feet.normals
+
+
+def _shares(
+    base: Base, scene: Scene, touched: tuple[FloatArray, FloatArray], refused: Sequence[FloatArray]
+) -> dict[str, float]:
+    """Area, reach, and the four shares."""
+    tip = scene.tip.radius
+    reach = 0.55 * Survey(base=base, tip_radius=tip, smallest=scene.survey.smallest_feature).pitch
+    surface = base.surface
+    spacing = max(reach / 3.0, float(np.sqrt(surface.face_areas.sum() / MOST_ACCOUNT_PLACES)))
+    points, owner = face_samples(surface, spacing)
+    weights = surface.face_areas[owner] / np.bincount(owner, minlength=len(surface.faces))[owner]
+    weights = weights * _inside(scene, points)
+    normals = surface.face_normals[owner]
+    swept = _near(points, normals, *touched, reach)
+    feet = base.foot(np.concatenate([*refused, np.zeros((0, 3))]), tip)
+    tried = _near(points, normals, feet.points, feet.normals, reach)
+    can = np.ones(len(points), dtype=bool)
+    rest = np.flatnonzero(~swept)
+    can[rest] = reachable(points[rest], normals[rest], Carrier.of(base, tip))
+    parts = {"swept": swept, "refused": ~swept & can & tried, "unreachable": ~swept & ~can}
+    total = max(float(weights.sum()), float(np.finfo(float).tiny))
+    shares = {name: float(weights[mask].sum()) / total for name, mask in parts.items()}
+    return shares | {
+        "area": float(weights.sum()),
+        "reach": reach,
+        "not_inspected": max(0.0, 1.0 - sum(shares.values())),
+    }
+
+
+def _inside(scene: Scene, points: FloatArray) -> BoolArray:
+    """(N,) True where a place lies in the region that was to be inspected."""
+    region = scene.model.region
+    if region is None or scene.model.mesh is None:
+        return np.ones(len(points), dtype=bool)
+    return np.asarray(((points >= np.array(region.low)) & (points <= np.array(region.high))).all(axis=1))
+
+
+def _near(points: FloatArray, normals: FloatArray, touched: FloatArray, up: FloatArray, reach: float) -> BoolArray:
+    """(N,) True where a touched place (M, 3) lies within reach, on the same side of the body."""
+    from scipy.spatial import cKDTree
+
+    if not len(touched):
+        return np.zeros(len(points), dtype=bool)
+    apart = 0.5 * OPPOSITE_APART * reach
+    tree = cKDTree(np.column_stack([touched, apart * up]))
+    distance, _ = tree.query(np.column_stack([points, apart * normals]), distance_upper_bound=reach)
+    return np.isfinite(distance)
+
+
+def _length(data: dict[str, Any]) -> float:
+    path = np.asarray(data.get("path", np.zeros((0, 3))), dtype=np.float64)
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) if len(path) > 1 else 0.0
+
+
+def _causes(reasons: Sequence[str]) -> tuple[tuple[str, int], ...]:
+    """Reasons that differ in their numbers alone are one; the first one's words stand for them."""
+    first: dict[str, str] = {}
+    counts: Counter[str] = Counter()
+    for reason in reasons:
+        plain = reason.partition(": ")[2] or reason
+        kind = re.sub(r"[-+]?[0-9.]+(e-?[0-9]+)?", "#", plain)
+        first.setdefault(kind, plain)
+        counts[kind] += 1
+    return tuple((first[kind], count) for kind, count in counts.most_common())

@@ -1,0 +1,99 @@
+"""Carrier: the straight stem behind the ball, and how an approach is turned so that it stays out of the body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.base import Base
+
+# Places along the stem's axis that are looked at; the first lies where a stem half as thick leaves the ball's shadow
+STEM_PLACES, STEM_START = 6, 1.5
+# Directions that an approach may be turned to: 162 points of a Fibonacci lattice lie about 16 degrees apart
+TURNED_DIRECTIONS = 162
+# How much turning between neighbouring waypoints costs against standing off the wanted direction
+TURNING_COST = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Carrier:
+    """A straight round stem along the finger's axis.
+
+    Args:
+        base: the body it must stay out of.
+        tip_radius: of the ball, m.
+        radius, length: of the stem, m, measured from the ball's centre.
+    """
+
+    base: Base
+    tip_radius: float
+    radius: float
+    length: float
+
+    @classmethod
+    def of(cls, base: Base, tip_radius: float) -> Carrier:
+        """A stem half as thick as the ball and three balls long."""
+        return cls(base, tip_radius, 0.5 * tip_radius, 6.0 * tip_radius)
+
+    def clearance(self, path: FloatArray, approach: FloatArray) -> FloatArray:
+        """(K,) distance of the stem's surface from the body at ball centres (K, 3) and approaches (K, 3), m."""
+        if self.length <= 0:
+            return np.full(len(path), np.inf)
+        back = np.linspace(STEM_START * self.tip_radius, self.length, STEM_PLACES)
+        stem = path[:, None, :] - back[None, :, None] * approach[:, None, :]
+        height = self.base.foot(stem.reshape(-1, 3), self.radius).height
+        return np.asarray(height.reshape(len(path), STEM_PLACES).min(axis=1))
+
+    def turned(self, path: FloatArray, approach: FloatArray, most: float) -> FloatArray:
+        """The approaches (K, 3), turned where the stem would touch the body, as little and as evenly as will do.
+
+        The course of least cost through the directions that are free at each waypoint (Viterbi); where none within
+        `most` rad of the wanted one is free, the wanted one stays.
+
+        Args:
+            path: (K, 3) centres of the ball, m.
+            approach: (K, 3) unit directions that are wanted.
+        """
+        offends = self.clearance(path, approach) < 0
+        if not offends.any():
+            return approach
+        lattice = np.broadcast_to(self.lattice, (len(path), *self.lattice.shape))
+        choices = np.concatenate([approach[:, None], lattice], axis=1)
+        angle = np.arccos(np.clip(np.einsum("kij,kj->ki", choices, approach), -1.0, 1.0))
+        allowed = (angle <= most) & offends[:, None]
+        where, which = np.nonzero(allowed)
+        free = self.clearance(path[where], choices[where, which]) >= 0
+        cost = np.full(angle.shape, np.inf)
+        cost[where[free], which[free]] = angle[where[free], which[free]] ** 2
+        stuck = ~np.isfinite(cost).any(axis=1)
+        cost[stuck | ~offends, 0] = 0.0
+        return np.asarray(choices[np.arange(len(path)), _course(cost, choices)])
+
+    @cached_property
+    def lattice(self) -> FloatArray:
+        """(M, 3) unit vectors spread evenly over the sphere."""
+        number = np.arange(TURNED_DIRECTIONS) + 0.5
+        z, turn = 1.0 - 2.0 * number / TURNED_DIRECTIONS, np.pi * (1.0 + np.sqrt(5.0)) * number
+        flat = np.sqrt(1.0 - z**2)
+        return np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])
+
+
+def _course(cost: FloatArray, choices: FloatArray) -> list[int]:
+    """Which choice (K,) at every waypoint, of the least sum of costs (K, M) and of squared turns between them."""
+    total, came = cost[0], []
+    for k in range(1, len(cost)):
+        into = np.flatnonzero(np.isfinite(cost[k]))
+        apart = np.arccos(np.clip(choices[k - 1] @ choices[k, into].T, -1.0, 1.0))
+        sums = total[:, None] + TURNING_COST * apart**2
+        step = np.zeros(len(total), dtype=np.int64)
+        step[into] = sums.argmin(axis=0)
+        total = np.full(len(total), np.inf)
+        total[into] = sums.min(axis=0) + cost[k, into]
+        came.append(step)
+    route = [int(total.argmin())]
+    for step in reversed(came):
+        route.append(int(step[route[-1]]))
+    return route[::-1]

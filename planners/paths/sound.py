@@ -1,0 +1,82 @@
+"""Sound: a sweep without the stretches that would run into another part of the body, its approach turned if need be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hw import Move
+from mapping import BoolArray, FloatArray, IntArray
+from mapping.base import Base
+from planners.paths.carrier import Carrier
+
+# The sensor's field about its axis (paper, section 4)
+FIELD = float(np.radians(75.0))
+# An approach is turned at most so far from the normal: over a wire a sixth of the tip's radius high the contact leaves
+# the base's normal by arccos(1 - 1/6) = 34 degrees, and must stay in the field of 75
+MOST_TURNED = float(np.radians(41.0))
+# How far a sweep's commanded path may sink into the base, in tip radii: further in it crosses a wall
+PRESSED = 0.5
+# Room between the ball and a wall beside its way, in tip radii: poses and meshes are not better known
+WALL_ROOM = 0.03
+# Waypoints are looked at so close together, and stretches shorter than that are not worth a sweep, in tip radii
+SOUND_SPACING, SHORTEST_PART = 0.2, 0.3
+# Lifted so far the ball has left what it is pressed against (its press is 0.02) but for that room, in tip radii
+LIFTED = 0.02 + WALL_ROOM
+
+
+def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
+    """The stretches of a sweep that ball and stem can make, in their order; the sweep itself if all of it is sound.
+
+    Args:
+        move: a sweep.
+        carrier: the stem, and the body that it and the ball must stay out of.
+    """
+    if len(move.path) < 2:
+        return [move] if ball_is_sound(move.path, move.approach, carrier.base, carrier.tip_radius).all() else []
+    path, approach = resampled(move.path, move.approach, SOUND_SPACING * carrier.tip_radius)
+    free = ball_is_sound(path, approach, carrier.base, carrier.tip_radius)
+    stems = carrier.clearance(path, approach) >= 0
+    if (free & stems).all():
+        return [move]
+    if not stems[free].all():
+        for run in runs(free):
+            approach[run] = carrier.turned(path[run], approach[run], MOST_TURNED)
+        free &= carrier.clearance(path, approach) >= 0
+    parts = (replace(move, path=path[run], approach=approach[run]) for run in runs(free) if len(run) > 1)
+    return [part for part in parts if part.length >= SHORTEST_PART * carrier.tip_radius]
+
+
+def ball_is_sound(path: FloatArray, approach: FloatArray, base: Base, tip_radius: float) -> BoolArray:
+    """(K,) True where a pressed ball would rest on what it is pressed against, and not be stopped by a wall.
+
+    The ball is lifted off by a little more than its press: if something is nearer then that is not within the
+    sensor's field about the approach, it is a wall beside the way.
+
+    Args:
+        path: (K, 3) commanded centres, m.
+        approach: (K, 3) unit directions of pressing.
+    """
+    deep = base.foot(path, tip_radius)
+    feet = base.foot(path - LIFTED * tip_radius * approach, tip_radius)
+    against = -np.einsum("ij,ij->i", feet.normals, approach)
+    return np.asarray((deep.height >= -PRESSED * tip_radius) & (feet.height > -tip_radius) & (against >= np.cos(FIELD)))
+
+
+def resampled(path: FloatArray, approach: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
+    """The polyline (K, 3) and its unit approaches (K, 3) with waypoints put between, at most `spacing` m apart."""
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    count = np.maximum(1, np.ceil(steps / spacing - 1e-9).astype(np.int64))
+    place = np.repeat(np.arange(len(steps)), count) + np.concatenate([np.arange(n) / n for n in count])
+    place = np.append(place, float(len(steps)))
+    number = np.arange(len(path))
+    path, approach = (np.column_stack([np.interp(place, number, v[:, k]) for k in range(3)]) for v in (path, approach))
+    length = np.linalg.norm(approach, axis=1, keepdims=True)
+    return path, np.divide(approach, length, out=np.tile([0.0, 0.0, -1.0], (len(path), 1)), where=length > 0)
+
+
+def runs(mask: BoolArray) -> list[IntArray]:
+    """Stretches of consecutive True."""
+    index = np.flatnonzero(mask)
+    return np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(index) else []

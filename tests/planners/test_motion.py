@@ -1,0 +1,132 @@
+"""Motion among a body with an inner corner: what was executed is known, sweeps are split, the finger finds its way."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from explore3d.scene.mesh_files import load_mesh
+from hw.errors import StoppedError
+from hw.move import Move
+from hw.simulated.finger import SimulatedFinger
+from mapping.arrays import FloatArray
+from mapping.base.base import Base
+from mapping.trace import Trace
+from planners.budget import Spent, within
+from planners.drive import drive
+from planners.paths.carrier import Carrier
+from planners.paths.limits import Limits
+from planners.paths.reach import reachable
+from planners.paths.sound import sound_parts
+from planners.paths.travel import Ways, routed
+from planners.plan import Outcome, Parted, Plan, Refused, executed
+
+R = 0.003
+MESHES = Path(__file__).resolve().parents[2] / "assets" / "meshes"
+BODY = load_mesh(MESHES / "l_bracket.ply", "m")
+BASE = Base(BODY)
+DOWN, LEFT = np.array([0.0, -1.0, 0.0]), np.array([-1.0, 0.0, 0.0])
+EMPTY = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), R)
+
+
+def sweep(start: list[float], stop: list[float], approach: FloatArray, purpose: str = "sweep") -> Move:
+    return Move(1e-3 * np.array([start, stop]), approach, purpose=purpose)
+
+
+FLOOR = sweep([40, 8.94, 20], [20, 8.94, 20], DOWN)
+INTO_WALL = sweep([40, 8.94, 20], [7, 8.94, 20], DOWN)
+UNDERSIDE = sweep([20, -2.94, 20], [40, -2.94, 20], -DOWN)
+
+
+def finger() -> SimulatedFinger:
+    return SimulatedFinger(object=BODY, tip_radius=R, rate=500.0)
+
+
+def driven(*moves: Move) -> tuple[list[Move], list[Trace], list[str]]:
+    answers: list[Trace] = []
+    complaints: list[str] = []
+
+    def plan() -> Plan:
+        for move in moves:
+            answers.append((yield move))
+        return Outcome("done")
+
+    touch = finger()
+    limits = Limits.of(touch.workspace, BASE, R)
+    ways = Ways(BASE, R, touch.workspace.low, touch.workspace.high, 0.07)
+    plan_to_drive = routed(plan(), ways, limits.violation)
+    record, _ = drive(plan_to_drive, touch.execute, check=limits.violation, note=complaints.append, empty=EMPTY)
+    return [move for move, _ in record], answers, complaints
+
+
+def test_a_refused_move_forbids_none_of_those_after_it() -> None:
+    inside = sweep([30, 3, 5], [30, 3, 35], DOWN)
+    made, answers, complaints = driven(FLOOR, inside, UNDERSIDE, FLOOR)
+    assert len(complaints) == 1
+    assert [isinstance(each, Refused) for each in answers] == [False, True, False, False]
+    assert [move.purpose for move in made] == ["sweep", "travel", "sweep", "travel", "sweep"]
+
+
+def test_a_sweep_into_a_wall_is_made_up_to_the_wall() -> None:
+    made, answers, complaints = driven(INTO_WALL)
+    assert not complaints and len(made) == 1
+    assert isinstance(answers[0], Parted) and executed(INTO_WALL, answers[0]) == tuple(made)
+    assert 9.0e-3 < made[0].path[-1, 0] < 9.8e-3 and len(answers[0]) > 400
+
+
+def test_the_way_out_of_an_inner_corner_leads_sideways() -> None:
+    corner = sweep([9.3, 8.94, 10], [9.3, 8.94, 30], DOWN)
+    made, _, complaints = driven(corner, UNDERSIDE)
+    assert not complaints and [move.purpose for move in made] == ["sweep", "travel", "sweep"]
+
+
+def test_a_refused_move_costs_nothing() -> None:
+    def plan() -> Plan:
+        for move in (FLOOR, UNDERSIDE, FLOOR):
+            assert len((yield move)) == 0
+        return Outcome("done")
+
+    spent = Spent(0.07)
+    answers = iter([EMPTY, Refused.because("a wall", R), EMPTY])
+    charged = within(plan(), spent, 100.0)
+    next(charged)
+    with pytest.raises(StopIteration):
+        while True:
+            charged.send(next(answers))
+    assert spent.metres == pytest.approx(0.02 + 0.02 + 0.02)  # two sweeps, and back to the first one's start
+
+
+def test_a_stem_that_would_touch_is_turned_away() -> None:
+    # along the foot, with the finger's axis leant over so that the stem would run into the wall
+    leant = np.array([0.8, -0.6, 0.0])
+    move = sweep([14, 8.94, 10], [14, 8.94, 30], leant)
+    carrier = Carrier.of(BASE, R)
+    assert carrier.clearance(move.path, move.approach).max() < 0
+    (part,) = sound_parts(move, carrier)
+    assert carrier.clearance(part.path, part.approach).min() >= 0
+    assert np.arccos(part.approach @ leant).max() <= np.radians(41.0) + 1e-9
+
+
+def test_what_lies_nearer_to_an_inner_corner_than_the_ball_is_unreachable() -> None:
+    x = 1e-3 * np.array([6.5, 8.0, 8.7, 9.1, 12.0, 50.0])
+    points = np.column_stack([x, np.full(6, 6e-3), np.full(6, 20e-3)])
+    can = reachable(points, np.tile(-DOWN, (6, 1)), Carrier.of(BASE, R))
+    assert can.tolist() == [False, False, False, True, True, True]
+
+
+def test_a_wall_stops_the_simulated_ball() -> None:
+    with pytest.raises(StoppedError, match="wall"):
+        finger().execute(INTO_WALL)
+
+
+@pytest.mark.parametrize("purpose", ["travel", "sweep"])
+def test_nothing_passes_through_the_body(purpose: str) -> None:
+    touch = finger()
+    touch.execute(FLOOR)
+    below = sweep([20, -2.94, 20], [21, -2.94, 20], -DOWN)
+    across = sweep([30, 12, 20], [30, -12, 20], DOWN, "travel")
+    with pytest.raises(StoppedError, match="runs into the body"):
+        touch.execute(across if purpose == "travel" else below)
+    assert len(touch.execute(FLOOR)) > 0  # it has drawn back
