@@ -72,9 +72,13 @@ def limit_sentence(analysis: Analysis) -> str:
 def swept_part(analysis: Analysis) -> str:
     """'' on the 21 % of the surface that was swept'' where the sweeps did not come near all of it, else ''."""
     inspected = analysis.inspected
-    if inspected is None or analysis.base.kind == "profile" or (share := 1.0 - inspected.untouched) > NEARLY_ALL:
+    if inspected is None or analysis.base.kind == "profile":
         return ""
-    return f" on the {100 * share:.0f} % of the surface that was swept"
+    # the account of a scene leaves out what no ball can reach
+    untouched = inspected.untouched if analysis.account is None else analysis.account.unswept
+    return (
+        "" if 1.0 - untouched > NEARLY_ALL else f" on the {100 * (1.0 - untouched):.0f} % of the surface that was swept"
+    )
 
 
 def feature_line(feature: Feature) -> str:

@@ -23,7 +23,7 @@ WALL_ROOM = 0.03
 # Waypoints are looked at so close together, and stretches shorter than that are not worth a sweep, in tip radii
 SOUND_SPACING, SHORTEST_PART = 0.2, 0.3
 # Lifted so far the ball has left what it is pressed against (its press is 0.02) but for that room, in tip radii
-LIFTED = 0.02 + WALL_ROOM
+LIFTED_PATH = 0.02 + WALL_ROOM
 
 
 def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
@@ -59,7 +59,7 @@ def ball_is_sound(path: FloatArray, approach: FloatArray, base: Base, tip_radius
         approach: (K, 3) unit directions of pressing.
     """
     deep = base.foot(path, tip_radius)
-    feet = base.foot(path - LIFTED * tip_radius * approach, tip_radius)
+    feet = base.foot(path - LIFTED_PATH * tip_radius * approach, tip_radius)
     against = -np.einsum("ij,ij->i", feet.normals, approach)
     return np.asarray((deep.height >= -PRESSED * tip_radius) & (feet.height > -tip_radius) & (against >= np.cos(FIELD)))
 

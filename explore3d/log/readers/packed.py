@@ -17,7 +17,7 @@ from explore3d import UserError
 from explore3d.log import Log
 
 MOST_UNPACKED = 8 * 2**30  # bytes: 2e8 rows of text; more is no recording of a finger but a bomb
-MOST_RATIO = 250  # unpacked to packed: numbers in text stay below 100, zeros reach 1000
+MOST_UNPACKING_RATIO = 250  # unpacked to packed: numbers in text stay below 100, zeros reach 1000
 ALWAYS_UNPACKED = 64 * 2**20  # bytes that anything may unpack to
 PIECE = 2**20  # bytes unpacked at a time
 
@@ -86,9 +86,9 @@ def check_sizes(path: Path, inside: Sequence[zipfile.ZipInfo]) -> None:
 
 
 def _bounded(path: Path, packed: int, unpacked: int) -> None:
-    if unpacked > MOST_UNPACKED or unpacked > max(ALWAYS_UNPACKED, MOST_RATIO * packed):
+    if unpacked > MOST_UNPACKED or unpacked > max(ALWAYS_UNPACKED, MOST_UNPACKING_RATIO * packed):
         raise UserError(
-            f"{path}: holds {unpacked:,} bytes or more in {packed:,}; a recording is at most {MOST_RATIO} times its "
+            f"{path}: holds {unpacked:,} bytes or more in {packed:,}; a recording is at most {MOST_UNPACKING_RATIO} times its "
             f"packed size and {MOST_UNPACKED:,} bytes; unpack it yourself if you trust it"
         )
 
