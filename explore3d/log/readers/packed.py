@@ -88,8 +88,8 @@ def check_sizes(path: Path, inside: Sequence[zipfile.ZipInfo]) -> None:
 def _bounded(path: Path, packed: int, unpacked: int) -> None:
     if unpacked > MOST_UNPACKED or unpacked > max(ALWAYS_UNPACKED, MOST_UNPACKING_RATIO * packed):
         raise UserError(
-            f"{path}: holds {unpacked:,} bytes or more in {packed:,}; a recording is at most {MOST_UNPACKING_RATIO} times its "
-            f"packed size and {MOST_UNPACKED:,} bytes; unpack it yourself if you trust it"
+            f"{path}: holds {unpacked:,} bytes or more in {packed:,}; a recording is at most "
+            f"{MOST_UNPACKING_RATIO} times its packed size and {MOST_UNPACKED:,} bytes; unpack it yourself if you trust it"
         )
 
 

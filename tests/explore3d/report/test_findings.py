@@ -18,7 +18,7 @@ def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
 
 
 def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.12e-3, untouched: float = 0.0) -> Any:
-    model, trace = SimpleNamespace(features=features), SimpleNamespace(tip_radius=0.01)
+    model, trace = SimpleNamespace(features=features, provenance={}), SimpleNamespace(tip_radius=0.01)
     detections = SimpleNamespace(detection_limit=limit, probability=0.95)
     return SimpleNamespace(
         model=model,
@@ -27,6 +27,9 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
         detections=detections,
         inspected=SimpleNamespace(untouched=untouched),
         base=SimpleNamespace(kind="mesh"),
+        account=None,
+        stopped=None,
+        go_on="",
     )
 
 
