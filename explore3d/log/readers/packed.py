@@ -89,7 +89,8 @@ def _bounded(path: Path, packed: int, unpacked: int) -> None:
     if unpacked > MOST_UNPACKED or unpacked > max(ALWAYS_UNPACKED, MOST_UNPACKING_RATIO * packed):
         raise UserError(
             f"{path}: holds {unpacked:,} bytes or more in {packed:,}; a recording is at most "
-            f"{MOST_UNPACKING_RATIO} times its packed size and {MOST_UNPACKED:,} bytes; unpack it yourself if you trust it"
+            f"{MOST_UNPACKING_RATIO} times its packed size and {MOST_UNPACKED:,} bytes; "
+            "unpack it yourself if you trust it"
         )
 
 
