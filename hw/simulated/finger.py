@@ -27,12 +27,12 @@ class SimulatedFinger:
     At each sample of a sweep the ball comes from `stroke` outside of the commanded path along the approach
     direction and stops at the first contact; where it meets nothing within `stroke` beyond the path there
     is no contact, and no sample. Contact is continuous: a wall beside the way, over which the ball cannot ride within
-    the sensor's field, stops it, and so does anything in the way of ball or stem between and during moves. That is a
+    the sensor's field, stops it, and so does anything in the way of ball or stem during a move. That is a
     fault as on a machine: nothing of the move is felt, and the finger draws back the way that it came. A ball that
     runs off an edge is in no contact until it has come down, at the largest speed.
 
-    On the way between two moves the finger backs off half a tip radius against its approach, goes straight, and comes
-    down again. The noise of the k-th sweep depends on `seed` and k alone, so a run that
+    The way between two moves that nobody commanded is taken for free and only its time counts: a plan that knows the
+    body commands its ways (planners.paths.routed). The noise of the k-th sweep depends on `seed` and k alone, so a run that
     is resumed feels what the uninterrupted run would have felt.
 
     Args:
@@ -118,8 +118,6 @@ class SimulatedFinger:
             StoppedError: ball or stem ran into the body.
         """
         self._refuse_what_exceeds(move)
-        if self._last is not None:
-            self._obstacles.pass_between(self._last, move)
         if move.purpose != "sweep":
             self._obstacles.pass_along(move)
             self._passed(move)

@@ -15,8 +15,6 @@ from mapping.geometry.mesh import NearestPoint
 YIELDS = 0.05
 # Samples along a way, and along the stem's axis behind the ball, in tip radii
 WAY_SPACING, STEM_SPACING, STEM_START = 0.25, 0.5, 1.5
-# How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)
-BACKED_OFF = 0.5
 # A rise over the commanded path by more than this is looked at again, for the ball may have come down on an overhang
 HIGH_RISE = 1.0
 
@@ -34,13 +32,6 @@ class Obstacles:
     tip_radius: float
     stem_radius: float
     stem_length: float
-
-    def pass_between(self, before: Move, after: Move) -> None:
-        """Back off, go straight, come down. Raises StoppedError where ball or stem run into the body."""
-        back = BACKED_OFF * self.tip_radius
-        off, on = before.approach[-1], after.approach[0]
-        ends = np.stack([before.path[-1] - back * off, after.path[0] - back * on])
-        self._pass("the way to the move", ends, np.stack([off, on]))
 
     def pass_along(self, move: Move) -> None:
         """Follow a move's path through free space. Raises StoppedError where ball or stem run into the body."""

@@ -161,7 +161,9 @@ class Survey:
         points, normals = touched_points(line, self.base.surface)
         points, normals = thinned(points, normals, min(0.1 * self.tip_radius, 0.5 * self.pitch))
         sweep = pressed_sweep(points, normals, self.tip_radius, self.speed, self.force)
-        yield from sound_parts(sweep, self._carrier)
+        # one by one: what is sent to a plan of sweeps must not reach a list
+        for part in sound_parts(sweep, self._carrier):  # noqa: UP028
+            yield part
 
     @cached_property
     def _carrier(self) -> Carrier:
