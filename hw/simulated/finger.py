@@ -32,8 +32,8 @@ class SimulatedFinger:
     runs off an edge is in no contact until it has come down, at the largest speed.
 
     The way between two moves that nobody commanded is taken for free and only its time counts: a plan that knows the
-    body commands its ways (planners.paths.routed). The noise of the k-th sweep depends on `seed` and k alone, so a run that
-    is resumed feels what the uninterrupted run would have felt.
+    body commands its ways (planners.paths.routed). The noise of the k-th sweep depends on `seed` and k alone, so a run
+    that is resumed feels what the uninterrupted run would have felt.
 
     Args:
         object: the true body, m.
