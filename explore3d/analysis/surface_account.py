@@ -43,6 +43,7 @@ class SurfaceAccount:
         refused_path: length of refused sweeps, m.
         moves: executed.
         causes: (why, how many moves were refused for it), the most frequent first.
+        shortest_ridge: m, where only lines of that length were asked for: then most of a surface need not be swept.
     """
 
     area: float
@@ -56,6 +57,7 @@ class SurfaceAccount:
     refused_path: float
     moves: int
     causes: tuple[tuple[str, int], ...]
+    shortest_ridge: float | None = None
 
     @classmethod
     def of_log(cls, log: Log, base: Base, scene: Scene | None) -> SurfaceAccount | None:
@@ -76,6 +78,7 @@ class SurfaceAccount:
             refused_path=sum(_length(d) for d in refused if d.get("purpose") == "sweep"),
             moves=len(made),
             causes=_causes([str(d["what"]) for d in refused]),
+            shortest_ridge=scene.survey.shortest_ridge,
         )
 
     @classmethod
@@ -102,6 +105,7 @@ class SurfaceAccount:
             refused_path=sum(move.length for move in refusals),
             moves=len(moves),
             causes=_causes([why for _, why in refused]),
+            shortest_ridge=scene.survey.shortest_ridge,
         )
 
     @property
@@ -113,7 +117,7 @@ class SurfaceAccount:
     @property
     def short(self) -> bool:
         """True if so much is missing that the run did not do what it was asked for."""
-        return self.unswept > MOST_UNSWEPT
+        return self.shortest_ridge is None and self.unswept > MOST_UNSWEPT
 
     def record(self) -> dict[str, Any]:
         """JSON values, SI units."""
@@ -138,6 +142,8 @@ class SurfaceAccount:
             f"{100 * self.unreachable:.1f} % the finger cannot reach, {100 * self.not_inspected:.1f} % was not "
             "inspected."
         )
+        if self.shortest_ridge is not None:
+            sentence += f" Only lines of {length_text(self.shortest_ridge, 2)} or longer were asked for."
         if refused:
             told = "; ".join(f"{why} ({count})" for why, count in self.causes[:3])
             sentence += f" {count_text(refused, 'move')} refused of {refused + self.moves}: {told}."
