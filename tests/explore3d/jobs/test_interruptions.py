@@ -144,6 +144,8 @@ def fill(older: Older, job: str, free: int, folder: Path) -> str:
         return check(explore3d(*older.words(job, out)), job, FULL, out, before)
 
 
+# slow: a signal that meets numba while it compiles a kernel the first time can be lost in its callback, or crash it
+@pytest.mark.slow
 @pytest.mark.parametrize(("job", "how"), [("run", "SIGINT"), ("merge", "SIGTERM"), ("run", "SIGKILL")])
 def test_a_job_that_a_signal_ends_leaves_the_older_session(older: Older, tmp_path: Path, job: str, how: str) -> None:
     assert interrupt(older, job, how, 0.3, tmp_path) in ("kept", "killed", "as it was")
