@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hw.link import Link as Link
     from hw.move import Move as Move
     from hw.patience import Patience as Patience
-    from hw.safety import SIGNALS as SIGNALS, StopOnSignal as StopOnSignal
+    from hw.safety import SIGNALS as SIGNALS, StopOnSignal as StopOnSignal, end_program as end_program
     from hw.simulated.finger import SimulatedFinger as SimulatedFinger
 
 _PUBLIC = {
@@ -28,7 +28,7 @@ _PUBLIC = {
     "link": ("Link",),
     "move": ("Move",),
     "patience": ("Patience",),
-    "safety": ("SIGNALS", "StopOnSignal"),
+    "safety": ("SIGNALS", "StopOnSignal", "end_program"),
     "simulated.finger": ("SimulatedFinger",),
 }
 doorway(__name__, _PUBLIC)

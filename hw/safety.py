@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
 import threading
 from collections.abc import Callable
@@ -9,14 +10,52 @@ from types import FrameType, TracebackType
 from typing import Any
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+# Packages that call back into Python from compiled code, where an exception is lost or ends the process
+_NOT_TO_BE_BROKEN_OFF = ("numba", "llvmlite")
+_AGAIN = 0.002  # s until a signal that met them is sent again: kernels may follow each other that closely
+
+
+def end_program(number: int, frame: FrameType | None) -> None:
+    """The handler of a signal that ends the program in order: every `with` block is left by an exception.
+
+    A compiler at work is not broken off, for it would lose the exception or crash; the same signal comes again until
+    the compiler is done (a kernel takes some seconds, once).
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C.
+        SystemExit: another signal, with 128 + its number.
+    """
+    if _is_compiling(frame):
+        again = threading.Timer(_AGAIN, _send, (number,))
+        again.daemon = True
+        again.start()
+        return
+    if number == signal.SIGINT:
+        raise KeyboardInterrupt
+    raise SystemExit(128 + number)
+
+
+def _send(number: int) -> None:
+    if hasattr(signal, "pthread_kill"):  # wakes the main thread where it waits, too
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        _thread.interrupt_main(number)
+
+
+def _is_compiling(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_globals.get("__name__", "").partition(".")[0] in _NOT_TO_BE_BROKEN_OFF:
+            return True
+        frame = frame.f_back
+    return False
 
 
 class StopOnSignal:
     """While entered, Ctrl-C and SIGTERM stop the machine first and end the program after.
 
-    The first signal calls `stop` at once, in the handler, and then raises KeyboardInterrupt (Ctrl-C) or
-    SystemExit, so that every `with` block ends in order. After `ignore()` further ones do nothing: the
-    retreat is not interrupted. Outside of the main thread nothing is installed.
+    The first signal calls `stop` at once, in the handler; then the program ends in order (`end_program`), so that
+    every `with` block is left. After `ignore()` further ones do nothing: the retreat is not interrupted. Outside of the
+    main thread nothing is installed.
 
     Args:
         stop: halts the machine; must not raise and must not wait.
@@ -25,6 +64,7 @@ class StopOnSignal:
     def __init__(self, stop: Callable[[str], None]) -> None:
         self._stop = stop
         self._before: dict[int, Any] = {}
+        self._stopped = False
         self._ignoring = False
 
     def __enter__(self) -> StopOnSignal:
@@ -46,7 +86,7 @@ class StopOnSignal:
     def _strike(self, number: int, frame: FrameType | None) -> None:
         if self._ignoring:
             return
-        self._stop(f"stopped by {signal.Signals(number).name}")
-        if number == signal.SIGINT:
-            raise KeyboardInterrupt
-        raise SystemExit(128 + number)
+        if not self._stopped:  # the same signal may come again, see end_program
+            self._stopped = True
+            self._stop(f"stopped by {signal.Signals(number).name}")
+        end_program(number, frame)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from types import FrameType
 from typing import Annotated
 
 import typer
@@ -22,7 +21,7 @@ from explore3d.cli.merge import merge
 from explore3d.cli.options import INCOMPLETE
 from explore3d.cli.run import plan, run
 from explore3d.cli.stability import stability
-from hw import SIGNALS, FingerError, MoveError
+from hw import SIGNALS, FingerError, MoveError, end_program
 from mapping import MappingError
 from planners import PlannerError
 
@@ -61,8 +60,8 @@ def main() -> None:
     Exit status: 0 done; 2 refused or not possible, nothing was recorded; 3 ended early, what was recorded is kept;
     130 and 143 (128 and the signal's number) by Ctrl-C and SIGTERM, and what was recorded is kept, too.
     """
-    for number in set(SIGNALS) - {signal.SIGINT}:
-        signal.signal(number, _leave)
+    for number in SIGNALS:
+        signal.signal(number, end_program)
     # Our matrices are small: more threads of linear algebra only wait for each other, for minutes on a busy machine.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
@@ -78,10 +77,6 @@ def main() -> None:
     except KeyboardInterrupt:
         print("explore3d: interrupted (Ctrl-C)", file=sys.stderr)
         sys.exit(130)
-
-
-def _leave(number: int, frame: FrameType | None) -> None:
-    raise SystemExit(128 + number)
 
 
 if __name__ == "__main__":

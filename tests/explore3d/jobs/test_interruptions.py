@@ -101,7 +101,7 @@ def check(ended: Ended, job: str, how: str, out: Path, before: dict[str, str]) -
     """What came of an interruption, in a word; fails unless nothing older was lost and the line is right."""
     said = f"{job} {how}: status {ended.status}: {ended.err}"
     assert "Traceback" not in ended.err, said
-    if ended.status == 0:
+    if ended.status == 0 or "\nreport: " in ended.out:  # the signal may meet a program that is only tidying up
         return "finished"
     after = digests(out)
     assert {name: after.get(name) for name in before} == before, said
@@ -144,11 +144,14 @@ def fill(older: Older, job: str, free: int, folder: Path) -> str:
         return check(explore3d(*older.words(job, out)), job, FULL, out, before)
 
 
-# slow: a signal that meets numba while it compiles a kernel the first time can be lost in its callback, or crash it
-@pytest.mark.slow
 @pytest.mark.parametrize(("job", "how"), [("run", "SIGINT"), ("merge", "SIGTERM"), ("run", "SIGKILL")])
 def test_a_job_that_a_signal_ends_leaves_the_older_session(older: Older, tmp_path: Path, job: str, how: str) -> None:
-    assert interrupt(older, job, how, 0.3, tmp_path) in ("kept", "killed", "as it was")
+    for attempt in range(4):
+        (tmp_path / str(attempt)).mkdir()
+        came = interrupt(older, job, how, 0.3 / 2**attempt, tmp_path / str(attempt))
+        if came != "finished":
+            break
+    assert came in ("kept", "killed", "as it was")
 
 
 @pytest.mark.parametrize("free", [60_000, 2_000_000])

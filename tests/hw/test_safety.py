@@ -1,0 +1,44 @@
+"""A signal ends the program in order, also where it meets a compiler that calls back into Python."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+# Signals at random moments of compiling: an exception thrown there at once is lost in 8 of 60, or ends the process
+COMPILES = """
+import random, signal, sys, time
+from hw import end_program
+number = getattr(signal, sys.argv[1])
+signal.signal(number, end_program)
+signal.signal(signal.SIGALRM, lambda _, frame: end_program(number, frame))
+import numba, numpy
+chance, came = random.Random(1), 0
+for power in range(24):
+    @numba.njit(cache=False)
+    def kernel(values, power=power):
+        total = 0.0
+        for value in numpy.sort(values):
+            total += value**power
+        return total
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.3 * chance.random())
+        kernel(numpy.arange(9.0))
+        time.sleep(0.4)
+    except (KeyboardInterrupt, SystemExit):
+        came += 1
+print(came, "came")
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there is no timer that sends signals")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_that_meets_a_compiler_is_neither_lost_nor_deadly(name: str) -> None:
+    command = [sys.executable, "-c", COMPILES, name]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100)
+    assert (ended.returncode, ended.stdout) == (0, "24 came\n"), ended.stderr
