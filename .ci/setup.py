@@ -31,6 +31,8 @@ def main(extras: list[str]) -> None:
     quiet = {**os.environ, "PYTHONWARNINGS": "ignore", "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
     subprocess.run([*pip(), "install", "--quiet", "--editable", project], cwd=ROOT, env=quiet, check=True)
     system_libraries.provide(PYTHON, VENV / "lib" / "explore3d-syslibs")
+    print("setup: compiling, so that the first run is as quick as the second (a minute or two)", flush=True)
+    subprocess.run([str(PYTHON), "-m", "explore3d", "doctor", "--compile", "--json"], cwd=ROOT, env=quiet, check=True)
 
 
 def make_environment() -> None:

@@ -1,4 +1,11 @@
-"""The application: scenes, logs, runs, reports, command line."""
+"""The application: scenes, logs, runs, reports, command line; and the front door of the whole.
+
+import explore3d
+
+analysis = explore3d.run("scene.toml", "out/wire")
+model = explore3d.load("out/wire")
+model["ridge-1"].height
+"""
 
 from typing import TYPE_CHECKING
 
@@ -13,13 +20,14 @@ if TYPE_CHECKING:
         UnitError as UnitError,
         UserError as UserError,
     )
+    from explore3d.jobs.analyze import analyze as analyze
+    from explore3d.jobs.load import load as load
+    from explore3d.jobs.merge import merge as merge
+    from explore3d.jobs.run import run as run
+    from explore3d.scene.scene import Scene as Scene, load_scene as load_scene
     from explore3d.units import (
         UNITS as UNITS,
-        UNKNOWN_TEXT as UNKNOWN_TEXT,
         count_text as count_text,
-        interval_text as interval_text,
-        length_text as length_text,
-        length_unit as length_unit,
         parse_angle as parse_angle,
         parse_force as parse_force,
         parse_length as parse_length,
@@ -34,13 +42,14 @@ __version__ = "0.2.0"
 
 _PUBLIC = {
     "errors": ("FolderError", "MeshFileError", "PointCloudError", "SceneError", "UnitError", "UserError"),
+    "jobs.analyze": ("analyze",),
+    "jobs.load": ("load",),
+    "jobs.merge": ("merge",),
+    "jobs.run": ("run",),
+    "scene.scene": ("Scene", "load_scene"),
     "units": (
         "UNITS",
-        "UNKNOWN_TEXT",
         "count_text",
-        "interval_text",
-        "length_text",
-        "length_unit",
         "parse_angle",
         "parse_force",
         "parse_length",

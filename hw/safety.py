@@ -39,7 +39,7 @@ def _send(number: int) -> None:
     if hasattr(signal, "pthread_kill"):  # wakes the main thread where it waits, too
         signal.pthread_kill(threading.main_thread().ident or 0, number)
     else:
-        _thread.interrupt_main(number)
+        _thread.interrupt_main(signal.Signals(number))
 
 
 def _is_compiling(frame: FrameType | None) -> bool:

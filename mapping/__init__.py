@@ -37,12 +37,15 @@ if TYPE_CHECKING:
     from mapping.estimate.envelope.estimate import Estimate as Estimate
     from mapping.feature import (
         KINDS as KINDS,
+        UNKNOWN_TEXT as UNKNOWN_TEXT,
         Anchor as Anchor,
         Details as Details,
         Feature as Feature,
         Interval as Interval,
         LeftOut as LeftOut,
         Support as Support,
+        length_text as length_text,
+        length_unit as length_unit,
     )
     from mapping.geometry.contact.first_contact import BallContact as BallContact
     from mapping.geometry.contact.interference_points import interference_points as interference_points
@@ -85,7 +88,18 @@ _PUBLIC = {
     ),
     "estimate.envelope.envelope": ("estimate_surface",),
     "estimate.envelope.estimate": ("Estimate",),
-    "feature": ("Anchor", "Details", "Feature", "Interval", "KINDS", "LeftOut", "Support"),
+    "feature": (
+        "Anchor",
+        "Details",
+        "Feature",
+        "Interval",
+        "KINDS",
+        "LeftOut",
+        "Support",
+        "UNKNOWN_TEXT",
+        "length_text",
+        "length_unit",
+    ),
     "geometry.contact.first_contact": ("BallContact",),
     "geometry.contact.interference_points": ("interference_points",),
     "geometry.contact.parallel_surface": ("ParallelSurface", "parallel_surface"),

@@ -20,11 +20,49 @@ KINDS = ("bump", "ridge", "pit", "groove", "step", "convex edge", "concave corne
 SUBSTANTIAL = 0.5 * math.log(10.0)
 
 
+LENGTH_UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
+UNKNOWN_TEXT = "–"
+
+
+def length_unit(size: float) -> tuple[float, str]:
+    """The unit (in metres, name) in which a length reads between 0.1 and 1000; metres from 1 m on."""
+    for factor, name in LENGTH_UNITS:
+        if abs(size) >= (1.0 if name == "m" else 0.1 * factor):
+            return factor, name
+    return LENGTH_UNITS[-1] if size else LENGTH_UNITS[1]
+
+
+def length_text(value: float, digits: int = 3) -> str:
+    """A length such as "0.65 mm", to so many significant digits."""
+    if not math.isfinite(value):
+        return UNKNOWN_TEXT
+    factor, name = length_unit(value)
+    return f"{_rounded(value / factor, digits)} {name}"
+
+
+def _unit(name: str) -> tuple[float, str]:
+    units = {"um": 1e-6} | {known: factor for factor, known in LENGTH_UNITS}
+    if name not in units:
+        raise ValueError(f"{name!r} is not a unit of length that a value is written in; possible: {', '.join(units)}")
+    return units[name], name
+
+
+def _rounded(value: float, digits: int) -> str:
+    if value == 0.0:
+        return "0"
+    places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    text = f"{value:.{places}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
 @dataclass(frozen=True)
 class Interval:
     """A value with its central 90 % interval: 5 %, 50 % and 95 % quantiles (SI units).
 
     `censored` is True where the data only bound the value from below ("at least low").
+
+    As a number it is its median: `interval > 1e-3` compares that, and so does sorting; `interval.low > 1e-3` asks for
+    95 % certainty. As text it reads "0.65 mm (0.64 to 0.66)"; `f"{interval:um}"` chooses the unit.
     """
 
     median: float
@@ -42,6 +80,50 @@ class Interval:
     def normal(cls, mean: float, sd: float) -> Interval:
         """The interval of a Gaussian; 1.6449 is its 95 % quantile."""
         return cls(float(mean), float(mean - 1.6448536 * sd), float(mean + 1.6448536 * sd))
+
+    def text(self, unit: str = "") -> tuple[str, str]:
+        """The median with its unit, and the 90 % range ("0.64 to 0.66", or ""); censored ones read "at least".
+
+        Args:
+            unit: of length; "": the one that fits.
+
+        Raises:
+            ValueError: not a unit of length.
+        """
+        if not math.isfinite(self.median):
+            return UNKNOWN_TEXT, ""
+        factor, name = _unit(unit) if unit else length_unit(self.median)
+        if self.censored:
+            return f"at least {_rounded(self.low / factor, 3)} {name}", ""
+        spread = self.high - self.low
+        if not math.isfinite(spread) or spread <= 0.0:
+            return f"{_rounded(self.median / factor, 3)} {name}", ""
+        # Two digits of the half width: what is beyond is noise.
+        places = max(0, 1 - math.floor(math.log10(0.5 * spread / factor)))
+        low, median, high = (f"{value / factor:.{places}f}" for value in (self.low, self.median, self.high))
+        return f"{median} {name}", f"{low} to {high}"
+
+    def __format__(self, unit: str) -> str:
+        median, span = self.text(unit)
+        return f"{median} ({span})" if span else median
+
+    def __str__(self) -> str:
+        return format(self, "")
+
+    def __float__(self) -> float:
+        return self.median
+
+    def __lt__(self, other: Interval | float) -> bool:
+        return self.median < float(other)
+
+    def __le__(self, other: Interval | float) -> bool:
+        return self.median <= float(other)
+
+    def __gt__(self, other: Interval | float) -> bool:
+        return self.median > float(other)
+
+    def __ge__(self, other: Interval | float) -> bool:
+        return self.median >= float(other)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +208,7 @@ class Details:
         return cls(**found)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Feature:
     """One fine surface feature on the base.
 
@@ -169,6 +251,11 @@ class Feature:
     junction: bool = False
     faint: bool = False
     details: Details = Details()
+
+    def __repr__(self) -> str:
+        sizes = (("height", self.height), ("width", self.width), ("length", self.length))
+        text = ", ".join(f"{name} {size}" for name, size in sizes if name == "height" or size.high > 0.0)
+        return f"<{self.id or self.kind}: {text}>"
 
     @property
     def closed(self) -> bool:

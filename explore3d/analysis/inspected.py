@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import length_text
-from mapping import FloatArray, Surface, Trace
+from mapping import FloatArray, Surface, Trace, length_text
 from mapping.base import Base, Cells, LaidTrace
 from mapping.detection import Detections, found_heights
 from mapping.estimate.envelope import Estimate

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import count_text, length_text
+from explore3d import count_text
 from explore3d.log import Log
 from explore3d.scene import Scene
-from mapping import BoolArray, FloatArray, Trace
+from mapping import BoolArray, FloatArray, Trace, length_text
 from mapping.base import Base, Cells
 from mapping.detection import face_samples
 from planners import Survey

@@ -5,16 +5,22 @@ from __future__ import annotations
 import os
 import platform
 import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
 import mapping
 from explore3d.cli.options import Json
+from explore3d.scene import example
 from mapping.geometry.mesh import open3d
 
+# This example finds its base, follows a ridge and measures it: all kernels but those of inertia and of walls
+COMPILES = "unknown_plate"
 STATES = ("ok", "missing", "note")
 
 
@@ -136,7 +142,22 @@ def _failure(load: Callable[[], object]) -> str:
     return ""
 
 
-def doctor(json: Json = False) -> None:
+def compile_kernels(quiet: bool) -> None:
+    """Explore an example in a folder of its own, which is thrown away; what was compiled stays in numba's cache."""
+    from explore3d.cli.progress import shown
+    from explore3d.jobs import run
+
+    with tempfile.TemporaryDirectory(prefix="explore3d-") as folder, shown(quiet) as progress:
+        run(example(COMPILES).scene, Path(folder) / "out", progress=progress)
+
+
+def doctor(
+    compile: Annotated[
+        bool,
+        typer.Option("--compile", help="Compile all kernels now (a minute or two), so that the first run is quick."),
+    ] = False,
+    json: Json = False,
+) -> None:
     """Check the installation and the serial ports; say what is missing and what it is needed for.
 
     The exit status is 1 if something is missing that the program cannot do without.
@@ -150,6 +171,8 @@ def doctor(json: Json = False) -> None:
         remedy = f" -> {check.remedy}" if check.remedy else ""
         return f"{check.state:<8}{check.subject:<16}{check.found} ({check.needed_for}){remedy}"
 
+    if compile:
+        compile_kernels(quiet=json)
     checks = examine()
     print(dumps([asdict(check) for check in checks]) if json else "\n".join(line(check) for check in checks))
     if any(check.state == "missing" for check in checks):

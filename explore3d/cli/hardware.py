@@ -34,7 +34,7 @@ def emulate(
 ) -> None:
     """Emulate a Grbl machine with a round tip on a pseudo-terminal, until interrupted.
 
-    Example: explore3d emulate grbl --mesh assets/meshes/wire_on_tile.ply --tip-radius "5 mm" --sensor optoforce
+    Example: explore3d emulate grbl --mesh wire/wire_on_plate.ply --tip-radius "5 mm" --sensor optoforce
     """
     import time
     from contextlib import suppress

@@ -27,7 +27,7 @@ def run(
 ) -> None:
     """Explore the scene with its finger; write the log, the annotated model and the report.
 
-    Example: explore3d run assets/scenes/wire_on_plate.toml --out out/wire
+    Example: explore3d run wire/scene.toml --out out/wire
     """
     from explore3d.jobs import needs_arming
     from explore3d.scene import load_scene
@@ -59,7 +59,7 @@ def plan(
 ) -> None:
     """Show the planned sweeps, their length, time and limit violations; nothing is moved.
 
-    Example: explore3d plan assets/scenes/mug.toml --out out/mug-plan
+    Example: explore3d plan wire/scene.toml --out out/plan
     """
     from explore3d.jobs import plan_scene, show_plan
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import count_text, length_text, seconds_text
+from explore3d import count_text, seconds_text
 from explore3d.analysis import SurfaceAccount
 from explore3d.jobs.expedition import Explorer, explorer
 from explore3d.jobs.run import scene_digest, scene_finger
@@ -17,7 +17,7 @@ from explore3d.pictures import plan_picture
 from explore3d.scene import load_scene
 from hw import Move
 from hw.simulated import SimulatedFinger
-from mapping import Surface, Trace
+from mapping import Surface, Trace, length_text
 from mapping.base import Base
 from planners import Spent, drive, dry_run
 from planners.explore import Discover

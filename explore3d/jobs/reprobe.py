@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from explore3d import UserError, __version__, count_text, length_text
+from explore3d import UserError, __version__, count_text
 from explore3d.jobs.run import cause, scene_finger
 from explore3d.log import LOG, Log, LogWriter, read_log
 from explore3d.scene import load_scene
 from hw import Move
-from mapping import BoolArray, FloatArray, Trace
+from mapping import BoolArray, FloatArray, Trace, length_text
 
 # Samples this close to the place, in tip radii, were taken of it
 SAME_PLACE_REACH = 5e-3

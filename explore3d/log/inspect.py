@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import UserError, length_text
+from explore3d import UserError
 from explore3d.log.format import LOG
 from explore3d.log.readers import read_recording, reader_of
 from explore3d.log.record import Log
 from explore3d.log.table_columns import EVEN, advances, counts
 from explore3d.log.table_order import sentinels
 from explore3d.log.text import TableText, read_text
-from mapping import FloatArray
+from mapping import FloatArray, length_text
 
 SAMPLE_GAP = 5.0  # usual steps: a longer one within a sweep is a gap, samples were lost or left out there
 MOST_LISTED_COLUMNS = 16  # columns that are listed one by one

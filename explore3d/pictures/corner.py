@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import length_unit
 from explore3d.pictures.figure import BAND, ESTIMATED, INK, new_figure, png, styled
-from mapping import Feature, FloatArray, Posterior
+from mapping import Feature, FloatArray, Posterior, length_unit
 
 HISTOGRAM_BINS = 24
 # Shares of the draws inside the drawn contours.

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import length_unit
 from explore3d.analysis import Comparison
 from explore3d.pictures.figure import ESTIMATED, INK, MUTED, TRUTH, new_figure, png, styled
+from mapping import length_unit
 
 QUANTITIES = ("height", "width", "length")
 

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import length_text, length_unit
 from explore3d.pictures.figure import BAND, ESTIMATED, INK, TRUTH, new_figure, png, styled
-from mapping import Feature, FloatArray
+from mapping import Feature, FloatArray, length_text, length_unit
 from mapping.geometry.mesh import arclengths
 
 EXTENTS_PER_ROW = 2

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import length_text
 from explore3d.pictures.camera import Camera
 from explore3d.pictures.figure import DPI, INK, new_figure, png, styled
 from explore3d.pictures.raycast import Body, Picture, render
 from explore3d.pictures.sweep_paths import SweepPath, densified
-from mapping import Feature, FloatArray, Surface
+from mapping import Feature, FloatArray, Surface, length_text
 from mapping.model import KIND_COLOURS, OTHER_COLOUR, drawn_at_least, feature_mesh
 
 # Width of a picture of one panel, and of each of two, pixels; and the most that a panel is high for its width.

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import count_text, length_text, seconds_text
+from explore3d import count_text, seconds_text
 from explore3d.pictures.figure import ESTIMATED, INK, MUTED, png, styled
 from explore3d.pictures.object import (
     PICTURE_BASE_COLOUR,
@@ -21,7 +21,7 @@ from explore3d.pictures.object import (
 from explore3d.pictures.raycast import Body, Picture, render
 from explore3d.pictures.sweep_paths import densified
 from hw import Move
-from mapping import FloatArray
+from mapping import FloatArray, length_text
 from mapping.base import Base
 
 AIR = np.array([0.72, 0.76, 0.80])

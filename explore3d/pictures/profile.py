@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import length_text, length_unit
 from explore3d.pictures.figure import ESTIMATED, INK, MUTED, TRACED, new_figure, png, styled
-from mapping import Feature, FloatArray, Trace
+from mapping import Feature, FloatArray, Trace, length_text, length_unit
 from mapping.base import Base
 
 

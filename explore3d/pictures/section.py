@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import length_unit
 from explore3d.pictures.cross_section import CrossSection
 from explore3d.pictures.figure import BAND, ESTIMATED, INK, MUTED, TRACED, TRUTH, new_figure, png, styled
-from mapping import FloatArray
+from mapping import FloatArray, length_unit
 
 SECTIONS_PER_ROW = 3
 # Dots beyond so many hide each other.

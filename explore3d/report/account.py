@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 
-from explore3d import length_text, seconds_text
+from explore3d import seconds_text
 from explore3d.analysis import Analysis, forecast
 from explore3d.report.markup import Html, Row, element, paragraph, section, table
 from explore3d.report.pictures import Pictures
-from mapping import LeftOut
+from mapping import LeftOut, length_text
 
 
 def what_was_left_out(analysis: Analysis, pictures: Pictures) -> Html:

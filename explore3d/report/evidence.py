@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import isfinite
 
-from explore3d import UNKNOWN_TEXT, length_text
 from explore3d.analysis import Analysis, Comparison
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.report.pictures import Pictures, shown_features
+from mapping import UNKNOWN_TEXT, length_text
 
 BADGES = {"found": "good", "missed": "bad", "invented": "bad"}
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import isfinite
 from pathlib import Path
 
-from explore3d import count_text, interval_text, length_text
+from explore3d import count_text
 from explore3d.analysis import Analysis
-from mapping import Feature, Interval
+from mapping import Feature, length_text
 
 # Share of the surface from which on it counts as all of it: it is printed in whole per cent
 NEARLY_ALL = 0.995
@@ -84,10 +84,5 @@ def swept_part(analysis: Analysis) -> str:
 def feature_line(feature: Feature) -> str:
     """A feature's name and its sizes with their intervals, in one line."""
     sizes = [("height", feature.height), ("width", feature.width), ("length", feature.length)]
-    known = [f"{name} {_text(interval)}" for name, interval in sizes if interval.median or interval.censored]
+    known = [f"{name} {interval}" for name, interval in sizes if interval.median or interval.censored]
     return f"  {feature.id}: {', '.join(known)}"
-
-
-def _text(interval: Interval) -> str:
-    median, spread = interval_text(interval)
-    return f"{median} ({spread})" if spread else median

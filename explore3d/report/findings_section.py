@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from explore3d import UNKNOWN_TEXT, count_text, interval_text, length_text
+from explore3d import count_text
 from explore3d.analysis import Analysis
 from explore3d.report.findings import limit_sentence, stop_lines, swept_part
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.report.pictures import Pictures, is_profile
-from mapping import Feature, Interval
+from mapping import UNKNOWN_TEXT, Feature, Interval, length_text
 from mapping.geometry.mesh import arclengths
 
 
@@ -142,7 +142,7 @@ def _posterior(feature: Feature) -> Html:
 def _with_range(interval: Interval) -> Html:
     if not interval.high and not interval.low:
         return Html(UNKNOWN_TEXT)  # the kind has no such size: a step has no width
-    median, span = interval_text(interval)
+    median, span = interval.text()
     return Html(element("span", median) + (element("small", span) if span else ""))
 
 
@@ -167,7 +167,7 @@ def _sizes(feature: Feature) -> list[tuple[str, str]]:
 def _described(interval: Interval) -> str:
     if interval.median < 0:
         interval = Interval(-interval.median, -interval.high, -interval.low, interval.censored)
-    median, span = interval_text(interval)
+    median, span = interval.text()
     return f"{median} ({span})" if span else median
 
 

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import interval_text, length_unit
 from explore3d.pictures import ESTIMATED, INK, TRACED, SweepPath, profile_line, view_directions
 from explore3d.report.markup import Html, element
-from mapping import Feature, FloatArray, Surface, Trace
+from mapping import Feature, FloatArray, Surface, Trace, length_unit
 from mapping.base import Base
 from mapping.geometry.mesh import open3d
 from mapping.model import KIND_COLOURS, OTHER_COLOUR, drawn_at_least, feature_mesh
@@ -108,7 +107,7 @@ def hover_text(feature: Feature) -> str:
     """What a feature's label says: name, sizes with intervals, evidence."""
     lines = [f"<b>{feature.id}</b>"]
     for name in ("height", "width", "length"):
-        median, span = interval_text(getattr(feature, name))
+        median, span = getattr(feature, name).text()
         if getattr(feature, name).median:
             lines.append(f"{name} {median}" + (f" ({span})" if span else ""))
     finer = "finer than the tip" if feature.curvature_feature else "gentler than the tip"

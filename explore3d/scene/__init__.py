@@ -5,7 +5,15 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from explore3d.scene.begin import FINGER_KINDS as FINGER_KINDS, begin_scene as begin_scene
     from explore3d.scene.complaint import complaint as complaint
+    from explore3d.scene.examples import (
+        SCENE_FILE as SCENE_FILE,
+        Example as Example,
+        copy_example as copy_example,
+        example as example,
+        examples as examples,
+    )
     from explore3d.scene.machine import EMULATOR as EMULATOR, MachineTable as MachineTable, SensorTable as SensorTable
     from explore3d.scene.mesh_files import load_mesh as load_mesh
     from explore3d.scene.scene import Scene as Scene, load_scene as load_scene, parse_scene as parse_scene
@@ -14,7 +22,9 @@ if TYPE_CHECKING:
     from explore3d.scene.values import Length as Length, LengthUnit as LengthUnit, Point as Point, Table as Table
 
 _PUBLIC = {
+    "begin": ("FINGER_KINDS", "begin_scene"),
     "complaint": ("complaint",),
+    "examples": ("Example", "SCENE_FILE", "copy_example", "example", "examples"),
     "machine": ("EMULATOR", "MachineTable", "SensorTable"),
     "mesh_files": ("load_mesh",),
     "scene": ("Scene", "load_scene", "parse_scene"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -18,6 +18,7 @@ from mapping.base import Base, anchor
 from mapping.geometry.mesh import write_whole
 from mapping.model.glb import glb_bytes
 from mapping.model.json_record import MODEL_SCHEMA, Record, feature_record, left_out_record, plain, read_feature
+from mapping.model.table import dataframe, html_table
 
 __all__ = ["LeftOut", "ObjectModel"]
 
@@ -26,9 +27,9 @@ __all__ = ["LeftOut", "ObjectModel"]
 FIELDS = ("reach", "sigma", "inspected")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ObjectModel:
-    """A body: its base, and what the finger found on it.
+    """A body: its base, and what the finger found on it. `model["ridge-1"]` is the feature of that id.
 
     Args:
         base: the global model.
@@ -66,6 +67,36 @@ class ObjectModel:
             name = f"{feature.kind.replace(' ', '-')}-{number[feature.kind]}"
             attached.append(replace(feature, id=name, anchor=anchor(feature.axis, base.surface)))
         return cls(base, tuple(attached), **about)
+
+    def __repr__(self) -> str:
+        names = ", ".join(feature.id for feature in self.features) or "no features"
+        return f"<ObjectModel: {self.base.kind} base of {len(self.base.surface.faces)} faces; {names}>"
+
+    def _repr_html_(self) -> str:
+        return html_table(self.features)
+
+    def __getitem__(self, name: str) -> Feature:
+        for feature in self.features:
+            if feature.id == name:
+                return feature
+        raise KeyError(f"no feature {name!r}; possible: {', '.join(each.id for each in self.features) or 'none'}")
+
+    def __iter__(self) -> Iterator[Feature]:
+        return iter(self.features)
+
+    def __len__(self) -> int:
+        return len(self.features)
+
+    def __bool__(self) -> bool:
+        return True
+
+    def to_dataframe(self) -> Any:
+        """A pandas.DataFrame with a row for each feature (SI units): id, kind, place, sizes with their 90 % limits.
+
+        Raises:
+            ModelError: pandas is not installed.
+        """
+        return dataframe(self.features)
 
     def save(self, folder: Path | str) -> Path:
         """Write model.npz (arrays), model.glb (for viewers) and, last, model.json; returns its path.

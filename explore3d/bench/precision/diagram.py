@@ -6,9 +6,9 @@ import io
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from explore3d import length_text
 from explore3d.bench.precision.work_precision import Point, Stage
 from explore3d.pictures import DPI, ESTIMATED, MUTED, TRUTH, new_figure, styled
+from mapping import length_text
 
 CURVE_COLOURS = (ESTIMATED, "#1d4e89", TRUTH, "#b7791f", "#6b46c1", MUTED, "#0e7490", "#9d174d")
 MARKERS = "osD^vP*X"

@@ -5,7 +5,8 @@ import pytest
 
 from explore3d.pictures.camera import Camera
 from explore3d.pictures.sweep_paths import sweep_paths
-from explore3d.units import count_text, interval_text, length_text, seconds_text
+from explore3d.units import count_text, seconds_text
+from mapping import length_text
 from mapping.base.base import Base
 from mapping.feature import Interval
 from mapping.surface import Surface
@@ -80,9 +81,9 @@ def test_lengths_are_told_in_the_unit_that_fits() -> None:
 
 
 def test_an_interval_has_no_more_digits_than_are_known() -> None:
-    assert interval_text(Interval(6.513e-4, 6.463e-4, 6.561e-4)) == ("0.6513 mm", "0.6463 to 0.6561")
-    assert interval_text(Interval(6.5e-4, 3.1e-4, 8.2e-4)) == ("0.65 mm", "0.31 to 0.82")
-    assert interval_text(Interval(0.05, 0.0498, np.inf, censored=True)) == ("at least 49.8 mm", "")
+    assert Interval(6.513e-4, 6.463e-4, 6.561e-4).text() == ("0.6513 mm", "0.6463 to 0.6561")
+    assert Interval(6.5e-4, 3.1e-4, 8.2e-4).text() == ("0.65 mm", "0.31 to 0.82")
+    assert Interval(0.05, 0.0498, np.inf, censored=True).text() == ("at least 49.8 mm", "")
 
 
 def test_durations_and_counts_read_as_speech() -> None:

@@ -1,0 +1,64 @@
+"""A model's features as a table: rows of values for programs, or text for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+from mapping import Feature, ModelError
+
+SIZES = ("height", "width", "length")
+
+
+def rows(features: Sequence[Feature]) -> list[dict[str, Any]]:
+    """One row a feature, SI units: its place is the middle of its axis, the limits of its sizes hold 90 %."""
+    return [_row(feature) for feature in features]
+
+
+def _row(feature: Feature) -> dict[str, Any]:
+    middle = feature.axis[len(feature.axis) // 2]
+    row: dict[str, Any] = {"id": feature.id, "kind": feature.kind}
+    row |= {name: float(value) for name, value in zip("xyz", middle, strict=True)}
+    for name in SIZES:
+        size = getattr(feature, name)
+        row |= {
+            name: size.median,
+            f"{name}_low": size.low,
+            f"{name}_high": size.high,
+            f"{name}_censored": size.censored,
+        }
+    support = feature.evidence
+    return row | {
+        "position_sd": float(feature.position_sd),
+        "snr": float(support.snr),
+        "crossings": support.crossings,
+        "log_odds": support.log_odds,
+        "finer_than_the_tip": feature.curvature_feature,
+        "face": None if feature.anchor is None else feature.anchor.face,
+    }
+
+
+def dataframe(features: Sequence[Feature]) -> Any:
+    """`rows` as a pandas.DataFrame.
+
+    Raises:
+        ModelError: pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise ModelError("a data frame needs pandas, which is not installed: pip install explore3d[pandas]") from error
+    return pd.DataFrame(rows(features))
+
+
+def html_table(features: Sequence[Feature]) -> str:
+    """The features as an HTML table, for notebooks."""
+    head = "".join(f"<th>{name}</th>" for name in ("feature", *SIZES, "notes"))
+    body = "".join(
+        f"<tr><td>{escape(each.id)}</td>"
+        + "".join(f"<td>{escape(str(getattr(each, name)))}</td>" for name in SIZES)
+        + f"<td>{escape('; '.join(each.notes))}</td></tr>"
+        for each in features
+    )
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

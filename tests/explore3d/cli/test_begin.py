@@ -1,0 +1,95 @@
+"""Beginning in an empty folder: examples, and a scene for somebody's own mesh."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from explore3d.cli.main import main
+from explore3d.jobs import plan_scene
+from explore3d.scene import begin_scene, copy_example, examples, load_scene
+
+MESHES = Path(__file__).parents[3] / "assets" / "meshes"
+
+
+def explore3d_main(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    monkeypatch.setattr(sys, "argv", ["explore3d", *map(str, arguments)])
+    try:
+        main()
+    except SystemExit as end:
+        return int(end.code or 0)
+    return 0
+
+
+def test_the_examples_are_listed_with_their_titles(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert explore3d_main(monkeypatch, "examples") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "wire_on_plate       A 0.65 mm wire on a tilted plate" in lines
+    assert explore3d_main(monkeypatch, "examples", "--json") == 0
+    assert [each["name"] for each in json.loads(capsys.readouterr().out)] == [line.split()[0] for line in lines[:-1]]
+    assert explore3d_main(monkeypatch, "examples", "nonsense") == 2
+    assert "example 'nonsense': there is none of that name; possible: " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", examples())
+def test_a_copied_example_says_what_the_original_says(name: str, tmp_path: Path) -> None:
+    written = copy_example(name, tmp_path / "mine")
+    copy, original = load_scene(written[0]), load_scene(examples()[name].scene)
+    assert copy.title == original.title and copy.truth == original.truth
+    mine, theirs = copy.object_surface(), original.object_surface()
+    assert (mine.vertices == theirs.vertices).all() and (mine.faces == theirs.faces).all()
+    assert {path.parent for path in written} == {tmp_path / "mine"}
+
+
+def test_nothing_is_written_over(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "wire_on_plate.ply").write_text("mine")
+    assert explore3d_main(monkeypatch, "init", tmp_path, "--example", "wire_on_plate") == 2
+    assert "wire_on_plate.ply: is there already" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["wire_on_plate.ply"]
+
+
+@pytest.mark.parametrize("finger", ["simulated", "grbl"])
+def test_a_scene_for_an_own_mesh_can_be_planned(finger: str, tmp_path: Path) -> None:
+    path = begin_scene(tmp_path / "mine", MESHES / "tile.ply", "m", "5 mm", finger)
+    scene = load_scene(path)
+    assert scene.finger.kind == finger and scene.tip.radius == 5e-3
+    assert (tmp_path / "mine" / "tile.ply").read_bytes() == (MESHES / "tile.ply").read_bytes()
+    assert plan_scene(path).moves
+
+
+def test_a_port_of_ones_own_has_no_simulated_object(tmp_path: Path) -> None:
+    scene = load_scene(begin_scene(tmp_path, MESHES / "tile.ply", "m", "5 mm", "grbl", "/dev/ttyUSB7"))
+    assert scene.finger.object is None and scene.finger.machine is not None
+    assert scene.finger.machine.port == "/dev/ttyUSB7"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--mesh", "absent.ply", "--units", "mm", "--tip-radius", "5 mm"], "model.mesh: "),
+        (["--mesh", MESHES / "tile.ply", "--units", "furlong", "--tip-radius", "5 mm"], "model.units: "),
+        (["--mesh", MESHES / "tile.ply", "--units", "m", "--tip-radius", "5"], "unit missing"),
+        (["--mesh", MESHES / "tile.ply", "--units", "m", "--tip-radius", "5 mm", "--finger", "toe"], "no such finger"),
+        (["--mesh", MESHES / "tile.ply", "--example", "mug"], "one of them"),
+        (["--example", "nonsense"], "there is none of that name"),
+        ([], "--mesh FILE or --example NAME is missing"),
+    ],
+)
+def test_what_a_scene_cannot_begin_from_is_said_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    options: list[object],
+    message: str,
+) -> None:
+    assert explore3d_main(monkeypatch, "init", tmp_path / "mine", *options) == 2
+    error = capsys.readouterr().err
+    assert message in error and len(error.splitlines()) == 1
+    assert not (tmp_path / "mine").exists()
