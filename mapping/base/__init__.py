@@ -16,7 +16,7 @@ if TYPE_CHECKING:
         touched_part as touched_part,
     )
     from mapping.base.fit import fit_base as fit_base
-    from mapping.base.height_profile import SweepHeights as SweepHeights
+    from mapping.base.height_profile import UNEVEN as UNEVEN, SweepHeights as SweepHeights
     from mapping.base.laid_trace import LaidSweep as LaidSweep, LaidTrace as LaidTrace
     from mapping.base.pose import Pose as Pose, estimate_pose as estimate_pose
     from mapping.base.projection import onto_base as onto_base
@@ -28,7 +28,7 @@ _PUBLIC = {
     "cells": ("Cells",),
     "extent": ("BASE_TRIANGLE_SIZE", "over_base", "refined", "rolled_off", "touched_part"),
     "fit": ("fit_base",),
-    "height_profile": ("SweepHeights",),
+    "height_profile": ("UNEVEN", "SweepHeights"),
     "laid_trace": ("LaidSweep", "LaidTrace"),
     "pose": ("Pose", "estimate_pose"),
     "projection": ("onto_base",),
