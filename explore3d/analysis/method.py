@@ -24,6 +24,7 @@ from mapping import Feature, LeftOut, Trace
 from mapping.assembly import assemble, why_none_sought
 from mapping.base import Base, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import Detections, detect
+from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
 from mapping.estimate.envelope import estimate_surface
 from mapping.geometry.curvature import principal_curvatures
 from mapping.inference import refine_all
@@ -75,6 +76,8 @@ class Work:
         base: the global model.
         detections: crossings, noise, detection limit.
         features: as they are known by now.
+        sound: the trace under sound sweep numbers; None for a log that was searched while it was read.
+        path: what became of the recorded path.
         asked: whether a stage was asked for, by its name.
     """
 
@@ -92,6 +95,8 @@ class Work:
     estimate: Estimate | None = None
     curvature: Curvature | None = None
     account: SurfaceAccount | None = None
+    sound: SoundSweeps | None = None
+    path: PathLedger | None = None
     time_curve: tuple[tuple[float, float], ...] = ()
     asked: dict[str, bool] = field(default_factory=dict)
 
@@ -182,6 +187,15 @@ def kept_over_base(work: Work, share: Share) -> None:
             work.trace = work.trace.select(inside)
 
 
+def made_sound(work: Work, share: Share) -> None:
+    """Sweeps that turn under one number, cut; what was searched while it was read has been thinned out."""
+    if work.log.detections:
+        return
+    work.sound = sound_sweeps(work.laid, work.base)
+    if work.sound.cuts:
+        work.laid = work.trace = work.sound.trace
+
+
 def why_no_contact_algorithms(work: Work) -> str | None:
     """Algorithms 1 and 2 of the paper are a part of the detection."""
     if work.log.detections:
@@ -200,6 +214,8 @@ def why_no_detection(work: Work) -> str | None:
 def detected(work: Work, share: Share) -> None:
     """Crossings of single sweeps."""
     work.detections = detect(work.laid, work.base, **work.settings.detection)
+    if work.sound is not None:
+        work.path = path_ledger(work.sound, work.detections, len(work.log.trace) - len(work.laid))
 
 
 def why_no_lines(work: Work) -> str:
@@ -299,10 +315,11 @@ def inspected(work: Work, share: Share) -> None:
 def modelled(work: Work, share: Share) -> None:
     """The features anchored on the base."""
     surface = {} if work.account is None else {"surface": work.account.record()}
+    path = {} if work.path is None else {"path": work.path.record()}
     work.model = ObjectModel.attach(
         work.base,
         in_model_frame(work.features, work.base),
-        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface,
+        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface | path,
         inspected=work.inspected.height,
         reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
     )

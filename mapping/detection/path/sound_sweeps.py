@@ -106,7 +106,8 @@ def _cuts(part: Trace, base: Base, step: float, reach: float, reasons: Counter[s
         path = rolled_out(piece, base, step, max(reach, step), SHARP_TURN)
         if path is None:
             continue
-        corners = _corners(path)
+        # round a plate's border, or round a wire's end: a circuit has corners, and is one sweep
+        corners = [] if _is_circuit(path, 0, len(path.plane) - 1) else _corners(path)
         bends = _bends(path, corners)
         reasons.update({"turn": len(corners)} if corners else {})
         reasons.update({"beside itself": len(bends)} if bends else {})
@@ -175,7 +176,7 @@ def _bends(path: RolledOut, corners: list[int]) -> list[int]:
         if end - begin < 3 * span + 2:
             continue
         direction = path.directions(begin, end)
-        if np.ptp(direction) <= WIDEST_RANGE or _is_arc(direction) or _is_circuit(path, begin, end, direction):
+        if np.ptp(direction) <= WIDEST_RANGE or _is_arc(direction) or _is_circuit(path, begin, end):
             continue
         here = 0
         while (window := _beyond(direction, here)) is not None:
@@ -186,29 +187,44 @@ def _bends(path: RolledOut, corners: list[int]) -> list[int]:
 
 
 def _beyond(direction: FloatArray, here: int) -> tuple[int, int] | None:
-    """The places between which directions that began `here` leave half of WIDEST_RANGE, and all; None if never."""
+    """The places between which directions that began `here` leave half of the allowed range, and all; None if never.
+
+    That is WIDEST_RANGE, and half a turn of a path that turns steadily: a half-circle nowhere comes beside itself.
+    """
     size = 64
     while True:
         part = direction[here : here + size]
         turned = np.maximum.accumulate(np.maximum.accumulate(part) - np.minimum.accumulate(part))
-        if turned[-1] > WIDEST_RANGE:
-            first, last = np.searchsorted(turned, [WIDEST_RANGE / 2, WIDEST_RANGE])
+        ended = here + size >= len(direction)
+        if turned[-1] > np.pi or (ended and turned[-1] > WIDEST_RANGE):
+            half_round = part[: int(np.searchsorted(turned, np.pi, side="right"))]
+            widest = np.pi if _is_steady(half_round) else WIDEST_RANGE
+            if turned[-1] <= widest:
+                return None
+            first, last = np.searchsorted(turned, [widest / 2, widest])
             return here + max(int(first), 1), here + max(int(last), int(first), 1)
-        if here + size >= len(direction):
+        if ended:
             return None
         size *= 2
 
 
+def _is_steady(direction: FloatArray) -> bool:
+    steady = np.linspace(direction[0], direction[-1], len(direction))
+    return bool(np.abs(direction - steady).max() < EVEN_TURN)
+
+
 def _is_arc(direction: FloatArray) -> bool:
     """True of directions that turn steadily by at most once round and a quarter."""
-    steady = np.linspace(direction[0], direction[-1], len(direction))
-    return bool(abs(direction[-1] - direction[0]) <= ONCE_ROUND[1] and np.abs(direction - steady).max() < EVEN_TURN)
+    return bool(abs(direction[-1] - direction[0]) <= ONCE_ROUND[1]) and _is_steady(direction)
 
 
-def _is_circuit(path: RolledOut, begin: int, end: int, direction: FloatArray) -> bool:
-    """True of a path that goes round something once and comes back to where it began."""
+def _is_circuit(path: RolledOut, begin: int, end: int) -> bool:
+    """True of a path that goes round something once, always one way, and comes back to where it began."""
+    if end - begin < 8 * path.span:  # a smaller one has no inside
+        return False
+    direction = path.directions(begin, end)
     round_ = float(direction[-1] - direction[0])
-    if end - begin < 8 * path.span or not ONCE_ROUND[0] <= abs(round_) <= ONCE_ROUND[1]:  # a smaller one has no inside
+    if not ONCE_ROUND[0] <= abs(round_) <= ONCE_ROUND[1]:
         return False
     forth = np.sign(round_) * direction
     if (np.maximum.accumulate(forth) - forth).max() > EVEN_TURN:
