@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         DetectionError as DetectionError,
         EmptyWindowError as EmptyWindowError,
         EnvelopeError as EnvelopeError,
+        FormError as FormError,
         MappingError as MappingError,
         ModelError as ModelError,
         NoiseError as NoiseError,
@@ -73,6 +74,7 @@ _PUBLIC = {
     "errors": (
         "CalibrationError",
         "ContactError",
+        "FormError",
         "CurvatureError",
         "DetectionError",
         "EmptyWindowError",

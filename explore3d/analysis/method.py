@@ -6,12 +6,12 @@ The order of the stages stands in build_model.py.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from explore3d import __version__
+from explore3d import UserError, __version__, length_text
 from explore3d.analysis.inspected import Inspected, base_reach
 from explore3d.analysis.result import TipCount
 from explore3d.analysis.stages import Stages
@@ -22,7 +22,7 @@ from explore3d.log import Log, stop_of
 from explore3d.scene import AnalysisSettings, Scene
 from mapping import Feature, LeftOut, Trace
 from mapping.assembly import assemble, why_none_sought
-from mapping.base import Base, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
+from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import Detections, detect
 from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
 from mapping.estimate.envelope import estimate_surface
@@ -40,6 +40,9 @@ OTHER_TIP = 2.5
 BELIEVED = 1.25
 # Less noise than this many tip radii is rounding: nothing to smooth away
 NOISE_FREE = 2e-8
+
+# What is left out where a base took for form what may be a feature
+ABSORBED = "part of the form"
 
 # Told the share of a stage that is done, 0 to 1
 Share = Callable[[float], None]
@@ -103,6 +106,8 @@ class Work:
     def __post_init__(self) -> None:
         self.trace = self.log.trace
         self.settings = AnalysisSettings.of(self.scene)
+        if self.log.tip_sd is not None:
+            self.settings = replace(self.settings, tip_sd=self.log.tip_sd)
         if self.given is not None:
             self.base = self.given
 
@@ -141,13 +146,27 @@ class Work:
 
 def why_no_fit(work: Work) -> str:
     """A base that was found by feeling is fitted again, a given one is not."""
+    if work.given is not None and work.log.form != Form():
+        raise UserError("form and mask say how a base is fitted, but the global model of this log is given")
     return "" if work.given is None or _was_found(work.given) else "the global model was given"
 
 
 def fitted(work: Work, share: Share) -> None:
     """The base; one that was found by feeling is known better by all that was felt since."""
     again = work.given is not None and _was_found(work.given)
-    work.base = refined(work.base, work.trace) if again else fit_base(work.trace)
+    work.base = refined(work.base, work.trace) if again else fit_base(work.trace, form=work.log.form)
+    for bend in work.base.parameters.get("absorbed", ()):
+        work.stages.left_out.append(LeftOut(ABSORBED, absorbed_sentence(bend)))
+
+
+def absorbed_sentence(bend: dict[str, Any]) -> str:
+    """What an automatic base took for form although it stands alone."""
+    kind, sense = ("hollow", "deep") if bend["height"] < 0 else ("hump", "high")
+    place = ", ".join(f"{1e3 * value:.4g}" for value in bend["place"])
+    return (
+        f"a {kind} {length_text(abs(bend['height']), 2)} {sense} and {length_text(bend['width'], 2)} wide at ({place}) "
+        "mm was taken for the base's own form; if it is a feature, say --form line, arc or poly:2, or --mask it"
+    )
 
 
 def _was_found(base: Base) -> bool:
@@ -365,6 +384,9 @@ def _provenance(work: Work) -> dict[str, Any]:
         "software": f"explore3d {__version__}",
         "scene": work.scene.title if work.scene else None,
         "tip_radius": log.trace.tip_radius,
+        "tip_sd": work.settings.tip_sd,
+        "tip_sd_assumed": log.tip_sd_assumed,
+        "form": asdict(log.form),
         "seed": work.settings.seed,
         "log_sha256": log.sha256,
         "samples": len(log.trace),

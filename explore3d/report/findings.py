@@ -6,7 +6,7 @@ from math import isfinite
 from pathlib import Path
 
 from explore3d import count_text, interval_text, length_text
-from explore3d.analysis import Analysis
+from explore3d.analysis import ABSORBED, Analysis
 from mapping import Feature, Interval
 from mapping.detection.path import PathLedger
 
@@ -62,8 +62,31 @@ def summary(analysis: Analysis) -> list[str]:
         *(feature_line(feature) for feature in features[:MOST_LISTED_FEATURES]),
         *more,
         limit_sentence(analysis),
-        *path_warning(analysis),
+        *warnings(analysis),
         *([account.sentence()] if account is not None else []),
+    ]
+
+
+def warnings(analysis: Analysis) -> list[str]:
+    """What a reader must know before believing the rest, a sentence each."""
+    return [*path_warning(analysis), *form_warnings(analysis)]
+
+
+def form_warnings(analysis: Analysis) -> list[str]:
+    """What was taken for form, and what was assumed of the tip."""
+    absorbed = [f"{each.reason[0].upper()}{each.reason[1:]}." for each in analysis.left_out if each.stage == ABSORBED]
+    return [*absorbed, *tip_sentence(analysis)]
+
+
+def tip_sentence(analysis: Analysis) -> list[str]:
+    """What was assumed of the tip, if its doubt was not stated."""
+    provenance, radius = analysis.model.provenance, analysis.trace.tip_radius
+    if not provenance.get("tip_sd_assumed"):
+        return []
+    sd = float(provenance["tip_sd"])
+    return [
+        f"The tip's radius is taken for {length_text(radius)} ± {length_text(sd, 2)} ({100 * sd / radius:.2g} %, "
+        "assumed: nobody stated it, --tip-sd does). Widths and heights carry that doubt."
     ]
 
 
