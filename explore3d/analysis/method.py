@@ -41,7 +41,7 @@ BELIEVED = 1.25
 # Less noise than this many tip radii is rounding: nothing to smooth away
 NOISE_FREE = 2e-8
 
-# What is left out where a base took for form what may be a feature
+# What is left out where what may be a feature is none: taken for form, or too wide
 ABSORBED = "part of the form"
 
 # Told the share of a stage that is done, 0 to 1
@@ -156,17 +156,19 @@ def fitted(work: Work, share: Share) -> None:
     again = work.given is not None and _was_found(work.given)
     work.base = refined(work.base, work.trace) if again else fit_base(work.trace, form=work.log.form)
     for bend in work.base.parameters.get("absorbed", ()):
-        work.stages.left_out.append(LeftOut(ABSORBED, absorbed_sentence(bend)))
+        end = "was taken for the base's own form; if it is a feature, say --form line, arc or poly:2, or --mask it"
+        work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))
+    for bend in work.base.parameters.get("left standing", ()):
+        end = "stands off the base and is wider than fine features are: only its edges are sought"
+        work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))
 
 
-def absorbed_sentence(bend: dict[str, Any]) -> str:
-    """What an automatic base took for form although it stands alone."""
+def _described(bend: dict[str, Any]) -> str:
+    """What stands alone in a profile: depth, width, place."""
     kind, sense = ("hollow", "deep") if bend["height"] < 0 else ("hump", "high")
     place = ", ".join(f"{1e3 * value:.4g}" for value in bend["place"])
-    return (
-        f"a {kind} {length_text(abs(bend['height']), 2)} {sense} and {length_text(bend['width'], 2)} wide at ({place}) "
-        "mm was taken for the base's own form; if it is a feature, say --form line, arc or poly:2, or --mask it"
-    )
+    height, width = length_text(abs(bend["height"]), 2), length_text(bend["width"], 2)
+    return f"a {kind} {height} {sense} and {width} wide at ({place}) mm"
 
 
 def _was_found(base: Base) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,7 +11,10 @@ from mapping import FloatArray, Surface, Trace
 from mapping.base import robust_fit, robust_scale
 from mapping.base.profiles.form import AUTO, Form, form_line
 from mapping.base.profiles.frame import ProfileFrame
-from mapping.base.profiles.isolated import isolated_bends
+from mapping.base.profiles.isolated import Bend, isolated_bends, isolated_rest
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 # A base bends over no less than this many tip radii: shorter details are features.
 SHORTEST_BEND = 8.0
@@ -36,7 +39,8 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
 
     Returns:
         The ribbon and what was fitted: degree, number of pieces and their length, m, or the form; "absorbed": what
-        stands alone and was taken for form by "auto", if anything: height, width (m) and place ([x, y, z], m) of each.
+        stands alone and was taken for form by "auto", and "left standing": what "auto" left although it is wider than
+        fine features are, if anything: height, width (m) and place ([x, y, z], m) of each.
 
     Raises:
         FormError: a form that does not fit this profile.
@@ -67,12 +71,18 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
     ribbon = _ribbon(trace.tip_radius, frame, places, curve(places), curve.derivative()(places))
     fitted: dict[str, Any] = {"degree": float(degree), "pieces": float(pieces), "piece_length": (stop - start) / pieces}
     bends = isolated_bends(x, z, curve(x), scale) if pieces > 1 else []
-    absorbed = [
+    rest = isolated_rest(x, z, curve(x), scale, SHORTEST_BEND * trace.tip_radius)
+    return ribbon, fitted | _listed("absorbed", bends, frame, curve) | _listed("left standing", rest, frame, curve)
+
+
+def _listed(name: str, bends: list[Bend], frame: ProfileFrame, curve: BSpline) -> dict[str, Any]:
+    """Height, width and place [x, y, z] of each on the line of centres, m; nothing where there is none."""
+    listed = [
         {"height": bend.height, "width": bend.width}
         | {"place": (frame.origin + bend.place * frame.along + float(curve(bend.place)) * frame.outward).tolist()}
         for bend in bends
     ]
-    return ribbon, fitted | ({"absorbed": absorbed} if absorbed else {})
+    return {name: listed} if listed else {}
 
 
 def _roughness(z: FloatArray) -> float:

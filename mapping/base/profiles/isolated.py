@@ -36,16 +36,32 @@ def isolated_bends(x: FloatArray, z: FloatArray, line: FloatArray, noise: float)
     floor = max(noise, np.finfo(float).tiny)
     rough = max(robust_scale(robust_fit(design, line, floor).residual), floor)
     fit = robust_fit(design, line, rough)
-    usual = max(robust_scale(fit.residual), floor)
-    parabola = design @ fit.coefficients
+    return _alone(x, fit.residual, z - design @ fit.coefficients, max(robust_scale(fit.residual), floor))
+
+
+def isolated_rest(x: FloatArray, z: FloatArray, line: FloatArray, noise: float, narrowest: float) -> list[Bend]:
+    """Where a profile stands alone off the line that was fitted to it; the highest first.
+
+    Args:
+        x, z: (N,) the profile, in the order of x, m.
+        line: (N,) the line that was fitted to it, m.
+        noise: scatter of the profile from place to place, m.
+        narrowest: width at half height above which a stretch counts, m.
+    """
+    usual = max(robust_scale(z - line), noise, np.finfo(float).tiny)
+    return [bend for bend in _alone(x, z - line, z - line, usual) if bend.width > narrowest]
+
+
+def _alone(x: FloatArray, told: FloatArray, off: FloatArray, usual: float) -> list[Bend]:
+    """Stretches in which what is told leaves its usual scatter, measured in what is off, the highest first."""
     found = []
     for sign in (-1.0, 1.0):
-        out = np.concatenate([[False], sign * fit.residual > ALONE_SDS * usual, [False]])
+        out = np.concatenate([[False], sign * told > ALONE_SDS * usual, [False]])
         edges = np.flatnonzero(np.diff(out.astype(int)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
             inside = begin > 0 and end < len(x)  # what goes on beyond the profile's end is no detail
             if inside and float(x[end] - x[begin]) < LONGEST_BEND_SHARE * float(x[-1] - x[0]):
-                found.append(_measured(x, z - parabola, begin, end, sign))
+                found.append(_measured(x, off, begin, end, sign))
     chosen: list[Bend] = []
     for bend in sorted(found, key=lambda bend: -abs(bend.height)):
         # a line that follows a scratch swings beside it
