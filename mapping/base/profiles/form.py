@@ -150,9 +150,11 @@ def _arc(x: FloatArray, z: FloatArray, scale: float, places: FloatArray) -> Floa
         return np.asarray(z0 + 2 * c / (q + np.sqrt(np.maximum(q**2 - 2 * curvature * c, 1e-6))))
 
     floor = max(scale, 1e-9 * size)
-    best = least_squares(
-        lambda theta: (height(theta * size, u) - z) / floor, parabola / size, loss="soft_l1", x_scale="jac", xtol=1e-14
-    )
+
+    def residual(theta: FloatArray) -> FloatArray:
+        return (height(theta * size, u) - z) / floor
+
+    best = least_squares(residual, parabola / size, loss="soft_l1", x_scale="jac", xtol=1e-14)
     return height(best.x * size, (places - middle) / half)
 
 
