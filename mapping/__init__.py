@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.arrays import BoolArray as BoolArray, FloatArray as FloatArray, IntArray as IntArray
+    from mapping.arrays import (
+        BoolArray as BoolArray,
+        ComplexArray as ComplexArray,
+        FloatArray as FloatArray,
+        IntArray as IntArray,
+    )
     from mapping.assembly.assemble import assemble as assemble
     from mapping.base.base import Base as Base
     from mapping.base.fit import fit_base as fit_base
@@ -22,6 +27,7 @@ if TYPE_CHECKING:
         DetectionError as DetectionError,
         EmptyWindowError as EmptyWindowError,
         EnvelopeError as EnvelopeError,
+        FormError as FormError,
         MappingError as MappingError,
         ModelError as ModelError,
         NoiseError as NoiseError,
@@ -62,7 +68,7 @@ if TYPE_CHECKING:
     from mapping.trace import Trace as Trace
 
 _PUBLIC = {
-    "arrays": ("BoolArray", "FloatArray", "IntArray"),
+    "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
     "assembly.assemble": ("assemble",),
     "base.base": ("Base",),
     "base.fit": ("fit_base",),
@@ -71,6 +77,7 @@ _PUBLIC = {
     "errors": (
         "CalibrationError",
         "ContactError",
+        "FormError",
         "CurvatureError",
         "DetectionError",
         "EmptyWindowError",

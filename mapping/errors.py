@@ -21,6 +21,10 @@ class ContactError(MappingError):
     """A contact query with an impossible ball, start or direction."""
 
 
+class FormError(MappingError):
+    """A form of a base that there is not, or that does not fit the trace."""
+
+
 class SamplerError(MappingError):
     """emcee did not take the state it was given."""
 

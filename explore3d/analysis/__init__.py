@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from explore3d.analysis.arviz_export import arviz_export as arviz_export
     from explore3d.analysis.build_model import build_model as build_model
     from explore3d.analysis.forecast import Forecast as Forecast, forecast as forecast, worst_errors as worst_errors
+    from explore3d.analysis.method import ABSORBED as ABSORBED
     from explore3d.analysis.result import Analysis as Analysis
     from explore3d.analysis.savings import without_needless_dynamics as without_needless_dynamics
     from explore3d.analysis.stages import Progress as Progress, Stages as Stages, silent as silent
@@ -18,6 +19,7 @@ _PUBLIC = {
     "arviz_export": ("arviz_export",),
     "build_model": ("build_model",),
     "forecast": ("Forecast", "forecast", "worst_errors"),
+    "method": ("ABSORBED",),
     "result": ("Analysis",),
     "savings": ("without_needless_dynamics",),
     "stages": ("Progress", "Stages", "silent"),

@@ -16,6 +16,7 @@ from explore3d.analysis.method import (
     fitted,
     inspected,
     kept_over_base,
+    made_sound,
     modelled,
     placed,
     refined_all,
@@ -53,6 +54,7 @@ METHOD = (
     MethodStage("base fit", why_no_fit, fitted),
     MethodStage("pose", why_no_pose, placed, possible=lambda work: work.scene is not None and work.base.kind == "mesh"),
     MethodStage("", None, kept_over_base),
+    MethodStage("", None, made_sound),
     MethodStage("algorithms 1 and 2", why_no_contact_algorithms, None, possible=_never),
     MethodStage("detection", why_no_detection, detected),
     MethodStage("grammar", why_no_lines, assembled),
@@ -108,6 +110,7 @@ def _result(work: Work) -> Analysis:
         tip_counts=tip_counts(work.features, trace.tip_radius),
         inspected=work.inspected,
         account=work.account,
+        path=work.path,
     )
 
 

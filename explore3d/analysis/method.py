@@ -6,12 +6,12 @@ The order of the stages stands in build_model.py.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from explore3d import __version__
+from explore3d import UserError, __version__
 from explore3d.analysis.inspected import Inspected, base_reach
 from explore3d.analysis.result import TipCount
 from explore3d.analysis.stages import Stages
@@ -20,10 +20,11 @@ from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature
 from explore3d.log import Log, stop_of
 from explore3d.scene import AnalysisSettings, Scene
-from mapping import Feature, LeftOut, Trace
+from mapping import Feature, LeftOut, Trace, length_text
 from mapping.assembly import assemble, why_none_sought
-from mapping.base import Base, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
+from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import Detections, detect
+from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
 from mapping.estimate.envelope import estimate_surface
 from mapping.geometry.curvature import principal_curvatures
 from mapping.inference import refine_all
@@ -39,6 +40,9 @@ OTHER_TIP = 2.5
 BELIEVED = 1.25
 # Less noise than this many tip radii is rounding: nothing to smooth away
 NOISE_FREE = 2e-8
+
+# What is left out where what may be a feature is none: taken for form, or too wide
+ABSORBED = "part of the form"
 
 # Told the share of a stage that is done, 0 to 1
 Share = Callable[[float], None]
@@ -75,6 +79,8 @@ class Work:
         base: the global model.
         detections: crossings, noise, detection limit.
         features: as they are known by now.
+        sound: the trace under sound sweep numbers; None for a log that was searched while it was read.
+        path: what became of the recorded path.
         asked: whether a stage was asked for, by its name.
     """
 
@@ -92,12 +98,16 @@ class Work:
     estimate: Estimate | None = None
     curvature: Curvature | None = None
     account: SurfaceAccount | None = None
+    sound: SoundSweeps | None = None
+    path: PathLedger | None = None
     time_curve: tuple[tuple[float, float], ...] = ()
     asked: dict[str, bool] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.trace = self.log.trace
         self.settings = AnalysisSettings.of(self.scene)
+        if self.log.tip_sd is not None:
+            self.settings = replace(self.settings, tip_sd=self.log.tip_sd)
         if self.given is not None:
             self.base = self.given
 
@@ -136,13 +146,29 @@ class Work:
 
 def why_no_fit(work: Work) -> str:
     """A base that was found by feeling is fitted again, a given one is not."""
+    if work.given is not None and work.log.form != Form():
+        raise UserError("form and mask say how a base is fitted, but the global model of this log is given")
     return "" if work.given is None or _was_found(work.given) else "the global model was given"
 
 
 def fitted(work: Work, share: Share) -> None:
     """The base; one that was found by feeling is known better by all that was felt since."""
     again = work.given is not None and _was_found(work.given)
-    work.base = refined(work.base, work.trace) if again else fit_base(work.trace)
+    work.base = refined(work.base, work.trace) if again else fit_base(work.trace, form=work.log.form)
+    for bend in work.base.parameters.get("absorbed", ()):
+        end = "was taken for the base's own form; if it is a feature, say --form line, arc or poly:2, or --mask it"
+        work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))
+    for bend in work.base.parameters.get("left standing", ()):
+        end = "stands off the base and is wider than fine features are: only its edges are sought"
+        work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))
+
+
+def _described(bend: dict[str, Any]) -> str:
+    """What stands alone in a profile: depth, width, place."""
+    kind, sense = ("hollow", "deep") if bend["height"] < 0 else ("hump", "high")
+    place = ", ".join(f"{1e3 * value:.4g}" for value in bend["place"])
+    height, width = length_text(abs(bend["height"]), 2), length_text(bend["width"], 2)
+    return f"a {kind} {height} {sense} and {width} wide at ({place}) mm"
 
 
 def _was_found(base: Base) -> bool:
@@ -182,6 +208,15 @@ def kept_over_base(work: Work, share: Share) -> None:
             work.trace = work.trace.select(inside)
 
 
+def made_sound(work: Work, share: Share) -> None:
+    """Sweeps that turn under one number, cut; what was searched while it was read has been thinned out."""
+    if work.log.detections:
+        return
+    work.sound = sound_sweeps(work.laid, work.base)
+    if work.sound.cuts:
+        work.laid = work.trace = work.sound.trace
+
+
 def why_no_contact_algorithms(work: Work) -> str | None:
     """Algorithms 1 and 2 of the paper are a part of the detection."""
     if work.log.detections:
@@ -200,6 +235,8 @@ def why_no_detection(work: Work) -> str | None:
 def detected(work: Work, share: Share) -> None:
     """Crossings of single sweeps."""
     work.detections = detect(work.laid, work.base, **work.settings.detection)
+    if work.sound is not None:
+        work.path = path_ledger(work.sound, work.detections, len(work.log.trace) - len(work.laid))
 
 
 def why_no_lines(work: Work) -> str:
@@ -299,10 +336,11 @@ def inspected(work: Work, share: Share) -> None:
 def modelled(work: Work, share: Share) -> None:
     """The features anchored on the base."""
     surface = {} if work.account is None else {"surface": work.account.record()}
+    path = {} if work.path is None else {"path": work.path.record()}
     work.model = ObjectModel.attach(
         work.base,
         in_model_frame(work.features, work.base),
-        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface,
+        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface | path,
         inspected=work.inspected.height,
         reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
     )
@@ -348,6 +386,9 @@ def _provenance(work: Work) -> dict[str, Any]:
         "software": f"explore3d {__version__}",
         "scene": work.scene.title if work.scene else None,
         "tip_radius": log.trace.tip_radius,
+        "tip_sd": work.settings.tip_sd,
+        "tip_sd_assumed": log.tip_sd_assumed,
+        "form": asdict(log.form),
         "seed": work.settings.seed,
         "log_sha256": log.sha256,
         "samples": len(log.trace),

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from explore3d.log import Stop
     from explore3d.scene import Scene
     from mapping.detection import Detections
+    from mapping.detection.path import PathLedger
     from mapping.estimate.envelope import Estimate
     from mapping.geometry.curvature import Curvature
 
@@ -62,6 +63,7 @@ class Analysis:
         go_on: the command that goes on with it, "" if there is none.
         folder: where it was written, None if it was not.
         account: which part of the surface was swept, and what became of the rest; None without a scene.
+        path: what became of the path that was recorded; None for a log that was searched while it was read.
     """
 
     title: str
@@ -85,3 +87,4 @@ class Analysis:
     go_on: str = ""
     folder: Path | None = None
     account: SurfaceAccount | None = None
+    path: PathLedger | None = None

@@ -18,6 +18,25 @@ def analyze(
     tip_radius: Annotated[
         str | None, typer.Option(help='Radius of the fingertip, "2 um"; logs of ours state it, tables do not.')
     ] = None,
+    tip_sd: Annotated[
+        str | None,
+        typer.Option(
+            help='Standard deviation of that radius, "20 nm"; 1 % of it is assumed for tables, "0 m" is exact.'
+        ),
+    ] = None,
+    form: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FORM",
+            help="Shape of a fitted base: auto, line, arc, poly:N, gaussian:WAVELENGTH (gaussian:0.8mm), none.",
+        ),
+    ] = None,
+    mask: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FROM..TO", help="Stretch in x that the base is not fitted to (1.2mm..1.4mm); may be repeated."
+        ),
+    ] = None,
     units: Annotated[str | None, typer.Option(help="Unit of a table's coordinates, for example mm.")] = None,
     columns: Annotated[
         str | None, typer.Option(help='Which column of a table is what: "x=X, z=Y", or by number "x=1, z=2".')
@@ -47,6 +66,9 @@ def analyze(
             logs,
             out,
             tip_radius=tip_radius,
+            tip_sd=tip_sd,
+            form=form,
+            mask=mask,
             model=model,
             model_units=model_units,
             progress=progress,

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from explore3d import parse_length
+from explore3d import UserError, parse_length
 from explore3d.analysis import Analysis, Progress, Stages, build_model, silent
 from explore3d.jobs.conclude import conclude
 from explore3d.jobs.session import Job, Session
@@ -40,7 +40,8 @@ def analyze(
         progress: told the stage and the share of it that is done.
         force: stages to run although the recording does not need them.
         overwrite: replace, once this one is complete, a session of another recording in that folder.
-        table: units, columns, frame, jump, reference of a table (explore3d.log.table.read_table).
+        table: tip_sd, form, mask (explore3d.log.load_logs); units, columns, frame, jump, reference of a table
+            (explore3d.log.table.read_table).
 
     Raises:
         UserError: input that cannot be used, named by file and field.
@@ -84,9 +85,15 @@ def _command(
     words += [] if tip_radius is None else ["--tip-radius", str(tip_radius)]
     words += [] if model is None else ["--model", str(model), "--model-units", model_units]
     words += [part for name in ("units", "columns") if table.get(name) for part in (f"--{name}", str(table[name]))]
+    words += [part for name in ("tip_sd", "form") if table.get(name) for part in (_option(name), str(table[name]))]
+    words += [part for mask in table.get("mask") or () for part in ("--mask", mask)]
     origin = (table.get("frame") or {}).get("origin")
     words += [] if origin is None else ["--frame", ", ".join(map(str, origin))]
     return shlex.join([*words, *(part for name in force for part in ("--force", name))])
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def _analyze(
@@ -102,6 +109,9 @@ def _analyze(
     if len(paths) == 1 and (large := large_log(paths[0])) is not None:
         from explore3d.jobs.streaming import analyze_stream
 
+        unused = [name for name in ("tip_sd", "form", "mask") if table.get(name) is not None]
+        if unused:
+            raise UserError(f"{large}: is too large to be loaded at once; {', '.join(unused)} cannot be set for it yet")
         given = None if model is None else Base(load_mesh(model, model_units))
         radius = None if tip_radius is None else parse_length(tip_radius)
         return analyze_stream(large, session, base=given, tip_radius=radius, progress=progress, force=force)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from explore3d import UserError, count_text
 from mapping import Surface, SurfaceError, Trace
-from mapping.base import Base
+from mapping.base import Base, Form
 
 if TYPE_CHECKING:
     from mapping.detection import Detections
@@ -47,6 +47,9 @@ class Log:
         sha256: of the file's bytes (of several files: of their digests joined by newlines).
         sources: paths of the files.
         detections: of a log that was searched while it streamed by; `trace` is then what is left of it.
+        tip_sd: standard deviation of the tip's radius, m; None: the scene says it.
+        tip_sd_assumed: True if nobody stated it.
+        form: what the base is, where it is fitted.
     """
 
     trace: Trace
@@ -58,6 +61,9 @@ class Log:
     sha256: str = ""
     sources: tuple[str, ...] = ()
     detections: Detections | None = None
+    tip_sd: float | None = None
+    tip_sd_assumed: bool = False
+    form: Form = Form()  # noqa: RUF009
 
 
 def merge(logs: Sequence[Log]) -> Log:
@@ -93,6 +99,9 @@ def merge(logs: Sequence[Log]) -> Log:
         recovered="; ".join(f"{_name(log)}: {log.recovered}" for log in logs if log.recovered),
         sha256=hashlib.sha256("\n".join(log.sha256 for log in logs).encode()).hexdigest(),
         sources=tuple(source for log in logs for source in log.sources),
+        tip_sd=max((log.tip_sd for log in logs if log.tip_sd is not None), default=None),
+        tip_sd_assumed=any(log.tip_sd_assumed for log in logs),
+        form=next((log.form for log in logs if log.form != Form()), Form()),
     )
 
 

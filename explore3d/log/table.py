@@ -25,8 +25,11 @@ from explore3d.log.table_order import Order, clipped, cloud_order, profile_order
 from explore3d.log.table_settings import TableSettings, load_settings
 from explore3d.log.text import LEAST_ROWS, TableText, length_factor, read_text
 from mapping import BoolArray, FloatArray, IntArray, Trace, TraceError
+from mapping.base import Form
 
 NO_MARK = frozenset(("0", "false", "no", "f", "n", "invalid", "bad", "fail", ""))
+# Relative doubt of a tip's radius that nobody stated: what makers give for styli and balls
+TIP_DOUBT = 0.01
 CLOCK = re.compile(r"(?:(?P<h>\d+):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:[.,]\d*)?)")
 
 Columns = dict[str, FloatArray]
@@ -123,6 +126,9 @@ def table_log(text: TableText, settings: TableSettings, sidecar: Path | None) ->
         recovered="; ".join([words for words, _ in dropped] + ["the last line was incomplete"] * text.cut),
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         sources=(str(path),),
+        tip_sd=TIP_DOUBT * settings.tip_radius if settings.tip_sd is None else settings.tip_sd,
+        tip_sd_assumed=settings.tip_sd is None,
+        form=Form.read(settings.form, settings.mask),
     )
 
 

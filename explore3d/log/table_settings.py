@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, mo
 
 from explore3d import UserError
 from explore3d.log.table_columns import Role
-from explore3d.scene import Length, LengthUnit, Point, Table, complaint
+from explore3d.scene import Extent, Length, LengthUnit, Point, Table, complaint
 
 Row = tuple[float, float, float]
 
@@ -50,6 +50,10 @@ class TableSettings(Table):
         frame: pose of the table's frame in the object's.
         jump: distance between consecutive samples beyond which a new sweep begins, m; None: ten median steps.
         reference: the point of the ball that the coordinates give, its "centre" or its "bottom" (centre - r z).
+        tip_sd: standard deviation of that radius, m; None: not known, TIP_DOUBT of the radius is assumed.
+        form: what the base of the table is, where it is fitted: "auto", "line", "arc", "poly:N",
+            "gaussian:WAVELENGTH" or "none".
+        mask: stretches in x that the base is not fitted to, "1.2mm..1.4mm".
         decimal: sign of the numbers, where the file leaves it open ("1,234"); None: found.
     """
 
@@ -59,6 +63,9 @@ class TableSettings(Table):
     frame: TableFrame = TableFrame()
     jump: Length | None = None
     reference: Literal["centre", "bottom"] = "centre"
+    tip_sd: Extent | None = None
+    form: str = "auto"
+    mask: tuple[str, ...] = ()
     decimal: Literal[".", ","] | None = None
 
     @model_validator(mode="before")

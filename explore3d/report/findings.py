@@ -6,11 +6,19 @@ from math import isfinite
 from pathlib import Path
 
 from explore3d import count_text
-from explore3d.analysis import Analysis
+from explore3d.analysis import ABSORBED, Analysis
 from mapping import Feature, length_text
+from mapping.detection.path import PathLedger
 
 # Share of the surface from which on it counts as all of it: it is printed in whole per cent
 NEARLY_ALL = 0.995
+# One and several of each reason for which a sweep is cut
+CUT_NAMES = {
+    "turn": ("turn", "turns"),
+    "jump": ("jump", "jumps"),
+    "beside itself": ("place where it would come beside itself", "places where it would come beside itself"),
+    "number given again": ("number that was given again", "numbers that were given again"),
+}
 MOST_LISTED_FEATURES = 20  # features that are listed one by one; the report has them all
 
 
@@ -54,8 +62,52 @@ def summary(analysis: Analysis) -> list[str]:
         *(feature_line(feature) for feature in features[:MOST_LISTED_FEATURES]),
         *more,
         limit_sentence(analysis),
+        *warnings(analysis),
         *([account.sentence()] if account is not None else []),
     ]
+
+
+def warnings(analysis: Analysis) -> list[str]:
+    """What a reader must know before believing the rest, a sentence each."""
+    return [*path_warning(analysis), *form_warnings(analysis)]
+
+
+def form_warnings(analysis: Analysis) -> list[str]:
+    """What was taken for form, and what was assumed of the tip."""
+    absorbed = [f"{each.reason[0].upper()}{each.reason[1:]}." for each in analysis.left_out if each.stage == ABSORBED]
+    return [*absorbed, *tip_sentence(analysis)]
+
+
+def tip_sentence(analysis: Analysis) -> list[str]:
+    """What was assumed of the tip, if its doubt was not stated."""
+    provenance, radius = analysis.model.provenance, analysis.trace.tip_radius
+    if not provenance.get("tip_sd_assumed"):
+        return []
+    sd = float(provenance["tip_sd"])
+    return [
+        f"The tip's radius is taken for {length_text(radius)} ± {length_text(sd, 2)} ({100 * sd / radius:.2g} %, "
+        "assumed: nobody stated it, --tip-sd does). Widths and heights carry that doubt."
+    ]
+
+
+def path_warning(analysis: Analysis) -> list[str]:
+    """What became of the recorded path, where more of it was left out than goes without saying."""
+    return [path_sentence(analysis.path)] if analysis.path is not None and analysis.path.is_short else []
+
+
+def path_sentence(path: PathLedger) -> str:
+    """What became of the recorded path."""
+    sentence = (
+        f"{length_text(path.inspected, 3)} of {length_text(path.recorded, 3)} of path recorded were inspected "
+        f"({100 * (1 - path.shortfall):.1f} %)."
+    )
+    if path.left_out:
+        parts = [f"{length_text(length, 2)} ({reason})" for reason, length in path.left_out]
+        sentence += f" Left out: {', '.join(parts)}."
+    if path.cuts:
+        names = [count_text(number, *CUT_NAMES[reason]) for reason, number in path.cuts]
+        sentence += f" Sweeps were cut at {', '.join(names)}."
+    return sentence
 
 
 def limit_sentence(analysis: Analysis) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from explore3d import count_text
 from explore3d.analysis import Analysis
-from explore3d.report.findings import limit_sentence, stop_lines, swept_part
+from explore3d.report.findings import form_warnings, limit_sentence, path_sentence, path_warning, stop_lines, swept_part
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.report.pictures import Pictures, is_profile
 from mapping import UNKNOWN_TEXT, Feature, Interval, length_text
@@ -69,6 +69,10 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
         warning = analysis.account.warning()
         content.extend([element("p", warning, class_="warning")] if warning else [])
         content.append(paragraph(analysis.account.sentence()))
+    content.extend(element("p", each, class_="warning") for each in form_warnings(analysis))
+    if analysis.path is not None:
+        kind = "warning" if path_warning(analysis) else ""
+        content.append(element("p", path_sentence(analysis.path), class_=kind))
     if analysis.ended:
         content.append(paragraph(f"Why the exploration ended: {analysis.ended.rstrip('.')}."))
     picture = "profile" if is_profile(analysis) else "object"

@@ -19,7 +19,13 @@ if TYPE_CHECKING:
     from explore3d.scene.scene import Scene as Scene, load_scene as load_scene, parse_scene as parse_scene
     from explore3d.scene.settings import AnalysisSettings as AnalysisSettings
     from explore3d.scene.to_toml import scene_text as scene_text
-    from explore3d.scene.values import Length as Length, LengthUnit as LengthUnit, Point as Point, Table as Table
+    from explore3d.scene.values import (
+        Extent as Extent,
+        Length as Length,
+        LengthUnit as LengthUnit,
+        Point as Point,
+        Table as Table,
+    )
 
 _PUBLIC = {
     "begin": ("FINGER_KINDS", "begin_scene"),
@@ -30,6 +36,6 @@ _PUBLIC = {
     "scene": ("Scene", "load_scene", "parse_scene"),
     "settings": ("AnalysisSettings",),
     "to_toml": ("scene_text",),
-    "values": ("Length", "LengthUnit", "Point", "Table"),
+    "values": ("Extent", "Length", "LengthUnit", "Point", "Table"),
 }
 doorway(__name__, _PUBLIC)

@@ -16,11 +16,17 @@ if TYPE_CHECKING:
         touched_part as touched_part,
     )
     from mapping.base.fit import fit_base as fit_base
-    from mapping.base.height_profile import SweepHeights as SweepHeights
+    from mapping.base.height_profile import UNEVEN as UNEVEN, SweepHeights as SweepHeights
     from mapping.base.laid_trace import LaidSweep as LaidSweep, LaidTrace as LaidTrace
     from mapping.base.pose import Pose as Pose, estimate_pose as estimate_pose
+    from mapping.base.profiles import Form as Form
     from mapping.base.projection import onto_base as onto_base
-    from mapping.base.robust import MAD_TO_SD as MAD_TO_SD, robust_scale as robust_scale
+    from mapping.base.robust import (
+        MAD_TO_SD as MAD_TO_SD,
+        RobustFit as RobustFit,
+        robust_fit as robust_fit,
+        robust_scale as robust_scale,
+    )
 
 _PUBLIC = {
     "anchor": ("anchor", "tangent_frame"),
@@ -28,10 +34,11 @@ _PUBLIC = {
     "cells": ("Cells",),
     "extent": ("BASE_TRIANGLE_SIZE", "over_base", "refined", "rolled_off", "touched_part"),
     "fit": ("fit_base",),
-    "height_profile": ("SweepHeights",),
+    "height_profile": ("UNEVEN", "SweepHeights"),
     "laid_trace": ("LaidSweep", "LaidTrace"),
     "pose": ("Pose", "estimate_pose"),
+    "profiles": ("Form",),
     "projection": ("onto_base",),
-    "robust": ("MAD_TO_SD", "robust_scale"),
+    "robust": ("MAD_TO_SD", "RobustFit", "robust_fit", "robust_scale"),
 }
 doorway(__name__, _PUBLIC)

@@ -8,11 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from mapping import FloatArray, Trace, TraceError
+from mapping import FloatArray, FormError, Trace, TraceError
 from mapping.base.base import Base
 from mapping.base.polyhedron import polyhedron
-from mapping.base.profile import fit_profile, profile_frame
-from mapping.base.quadrics import FAMILIES, Cloud, Family, Fitted, sheet
+from mapping.base.profiles import AUTO, Form, fit_profile, profile_frame
+from mapping.base.quadrics import FAMILIES, Cloud, Family, Fitted, cylinder, plane, sheet, sphere
 from mapping.base.robust import FEATURE_RESIDUAL_SDS, robust_scale
 from mapping.base.star import star
 from mapping.base.tube import tube
@@ -29,7 +29,11 @@ FREE: tuple[Family, ...] = (
 EXPLAINED, EXACTLY = 5.0, 1.0
 
 
-def fit_base(trace: Trace, spacing: float | None = None) -> Base:
+# Families that a form admits over an area
+AREAL_FORMS: dict[str, tuple[Family, ...]] = {"auto": FAMILIES, "line": (plane,), "arc": (cylinder, sphere)}
+
+
+def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO) -> Base:
     """The smooth body that explains most of a trace; details shorter than about eight tip radii are left out.
 
     A trace along one line gives a profile. Otherwise every family is fitted to the ball centres by robust
@@ -45,19 +49,28 @@ def fit_base(trace: Trace, spacing: float | None = None) -> Base:
         trace: ball centres in contact.
         spacing: longest side of the mesh's triangles, m, for bases that sweeps are planned on; None: as long as the
             shape allows.
+        form: of a profile; over an area "auto", "line" (a plane) or "arc" (a cylinder or a sphere).
 
     Raises:
+        FormError: a form that is not possible over an area, or not for this profile.
         TraceError: fewer than three samples, or all samples in one place.
     """
     if len(trace) < 3 or not np.ptp(trace.centers, axis=0).any():
         raise TraceError(f"a base needs at least three samples in different places; found {len(trace)} samples")
     frame = profile_frame(trace)
     if frame is not None:
-        surface, parameters = fit_profile(trace, frame)
+        surface, parameters = fit_profile(trace, frame, form)
         return Base(surface, "profile", dict(parameters))
-    cloud = Cloud.of(trace, MOST_BASE_CELLS)
-    fits = _fits(FAMILIES, cloud)
-    if all(_missed(fit, cloud) > EXPLAINED for fit in fits):
+    if form.kind not in AREAL_FORMS:
+        raise FormError(
+            f"form {form.kind!r} is for profiles along one line, and this trace covers an area; possible: "
+            f"{', '.join(AREAL_FORMS)}"
+        )
+    cloud = Cloud.of(trace.select(form.unmasked(trace)) if form.masks else trace, MOST_BASE_CELLS)
+    fits = _fits(AREAL_FORMS[form.kind], cloud)
+    if not fits:
+        raise FormError(f"form {form.kind!r}: none of its bodies can be fitted to this trace; possible: auto, line")
+    if form.kind == "auto" and all(_missed(fit, cloud) > EXPLAINED for fit in fits):
         fits += _last_resort((polyhedron,), cloud)
         if all(_missed(fit, cloud) > EXACTLY for fit in fits):
             fits += _last_resort(FREE, cloud)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mapping import FloatArray, IntArray, Surface, Trace
 from mapping.base.cells import Cells
-from mapping.base.profile import SHORTEST_BEND
+from mapping.base.profiles import SHORTEST_BEND
 from mapping.base.robust import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_fit, robust_scale
 
 # Upward part of the mean direction from a round body's middle of what was felt inside it, without contact normals

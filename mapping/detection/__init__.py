@@ -12,17 +12,25 @@ if TYPE_CHECKING:
         found_heights as found_heights,
     )
     from mapping.detection.crossing import Crossing as Crossing
-    from mapping.detection.detect import Detections as Detections, detect as detect
+    from mapping.detection.detect import (
+        SHORTEST_SWEEP_SAMPLES as SHORTEST_SWEEP_SAMPLES,
+        Detections as Detections,
+        detect as detect,
+    )
+    from mapping.detection.matched_filter import LADDER as LADDER
     from mapping.detection.paper_algorithms import (
         along_chord as along_chord,
         curvature_features as curvature_features,
         curvature_profile as curvature_profile,
     )
+    from mapping.detection.quiet_noise import smallest_crest as smallest_crest
 
 _PUBLIC = {
     "coverage": ("Coverage", "coverage", "face_samples", "found_heights"),
     "crossing": ("Crossing",),
-    "detect": ("Detections", "detect"),
+    "detect": ("SHORTEST_SWEEP_SAMPLES", "Detections", "detect"),
+    "matched_filter": ("LADDER",),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
+    "quiet_noise": ("smallest_crest",),
 }
 doorway(__name__, _PUBLIC)

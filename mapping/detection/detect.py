@@ -9,11 +9,11 @@ import numpy as np
 
 from mapping import DetectionError, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
-from mapping.detection.candidates import find_disturbances
+from mapping.detection.candidates import LARGEST_SHARE, find_disturbances
 from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import Crossing
 from mapping.detection.false_alarms import threshold_for
-from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, smallest_half_width
+from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, Bank, smallest_half_width
 from mapping.detection.paper_algorithms import along_chord, curvature_features
 from mapping.detection.quiet_noise import SMALLEST_CREST_SNR, background, first_noise, floored, raw_stretches
 from mapping.instrument import Noise, StatedNoise
@@ -28,6 +28,8 @@ PROBABILITY = 0.95
 UNRESOLVED = 2.5
 # Distances between samples that differ by no more than this factor are as good as equal.
 ALIKE = 1.15
+# A sweep of fewer samples has no level, slope and noise of its own, and half a crest.
+SHORTEST_SWEEP_SAMPLES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,7 @@ class Detections:
         threshold: signal-to-noise ratio above which a crossing is reported.
         inspected_length: length of path inspected, m.
         left_out: sentences naming what could not be inspected, and why.
+        inspected_sweeps: (number, length in m) of each sweep that was looked at: of what is long enough for a filter.
     """
 
     crossings: tuple[Crossing, ...]
@@ -53,6 +56,7 @@ class Detections:
     threshold: float
     inspected_length: float
     left_out: tuple[str, ...] = ()
+    inspected_sweeps: tuple[tuple[int, float], ...] = ()
 
     @classmethod
     def together(cls, parts: Sequence[Detections]) -> Detections:
@@ -63,6 +67,7 @@ class Detections:
             crossings=tuple(crossing for part in parts for crossing in part.crossings),
             inspected_length=sum(part.inspected_length for part in parts),
             left_out=tuple(reason for part in parts for reason in part.left_out),
+            inspected_sweeps=tuple(each for part in parts for each in part.inspected_sweeps),
         )
 
 
@@ -136,7 +141,17 @@ def detect(
     usual = max(lengths, key=lambda spacing: lengths[spacing])
     threshold, length = thresholds[usual], sum(lengths.values())
     limit = max(behind.banks[usual].detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
-    return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out)
+    each = _inspected(profiles, behind.banks)
+    return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out, each)
+
+
+def _inspected(profiles: list[SweepHeights], banks: dict[float, Bank]) -> tuple[tuple[int, float], ...]:
+    """Length of each sweep's profiles that some filter fits into, m."""
+    lengths: dict[int, float] = {}
+    for profile in profiles:
+        fits = banks[profile.spacing].filters[0].half_width <= LARGEST_SHARE * profile.length
+        lengths[profile.sweep] = lengths.get(profile.sweep, 0.0) + (profile.length if fits else 0.0)
+    return tuple(lengths.items())
 
 
 def _resolved(crossings: list[Crossing], resolution: float) -> tuple[list[Crossing], tuple[str, ...]]:
@@ -154,7 +169,7 @@ def _usable(laid: LaidTrace) -> tuple[list[LaidSweep], tuple[str, ...]]:
     usable, left_out = [], []
     for sweep in laid.laid_sweeps:
         count, s = len(sweep.trace), sweep.arclength
-        if count >= 8 and s[-1] > 0:
+        if count >= SHORTEST_SWEEP_SAMPLES and s[-1] > 0:
             usable.append(sweep)
         else:
             length = s[-1] if len(s) else 0

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import BoolArray, FloatArray
-from mapping.base import Base, LaidSweep, SweepHeights
+from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights
 from mapping.detection.candidates import quiet_bins
 from mapping.detection.matched_filter import Bank, build_bank, filter_sd, smallest_half_width
 from mapping.instrument import Blocks, Noise, NoiseFit, StatedNoise, estimate_noise, fit_noise, perturbed, relative_sd
@@ -66,10 +66,31 @@ def raw_stretches(usable: Sequence[LaidSweep]) -> list[Stretch]:
     share = max(64, RAW_SAMPLES // len(usable))
     stretches = []
     for sweep in usable:
-        begin = max(0, (len(sweep.trace) - share) // 2)
-        cut = slice(begin, begin + share)
+        cut = _middle(len(sweep.trace), share)
         stretches.append(Stretch(sweep.number, sweep.feet(cut).height, sweep.arclength[cut]))
     return stretches
+
+
+def smallest_crest(laid: LaidTrace, step: float) -> float:
+    """Half-width of the smallest crest that the noise of a trace lets see, m, whatever numbers its sweeps bear.
+
+    Args:
+        laid: the trace on its base.
+        step: usual distance of its samples, m.
+    """
+    share = max(64, RAW_SAMPLES // len(laid.laid_sweeps))
+    stretches = []
+    for sweep in laid.laid_sweeps:
+        height = sweep.feet(_middle(len(sweep.trace), share)).height
+        # arclengths go by the sweeps' numbers, which may be wrong
+        stretches.append(Stretch(sweep.number, height, step * np.arange(float(len(height)))))
+    noise = first_noise(stretches, step, laid.tip_radius)
+    return smallest_half_width(noise, step, 1.0, laid.tip_radius, SMALLEST_CREST_SNR)
+
+
+def _middle(count: int, share: int) -> slice:
+    begin = max(0, (count - share) // 2)
+    return slice(begin, begin + share)
 
 
 def first_noise(stretches: Sequence[Stretch], spacing: float, tip_radius: float) -> Noise:

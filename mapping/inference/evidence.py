@@ -38,5 +38,5 @@ def better_profile(cap: PosteriorProblem, around: Surroundings, rng: np.random.G
     """
     bell = spot_problem(cap.feature, around, bell=True)
     if around.tip_sd > 0.0:
-        bell = with_free_tip(bell, around.tip_sd)
+        bell = with_free_tip(bell, around.tip_sd, around.base.kind != "mesh")
     return bell if log_evidence(bell, rng) > log_evidence(cap.under(around.noise), rng) else None

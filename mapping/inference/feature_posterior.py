@@ -170,7 +170,9 @@ def pose_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
     else:
         possible = ", ".join(SAMPLED_KINDS)
         raise MappingError(f"no posterior for a {feature.kind!r}: closed-form traces exist for {possible}")
-    return with_free_tip(problem, around.tip_sd) if around.tip_sd > 0.0 else problem
+    if not around.tip_sd > 0.0:
+        return problem
+    return with_free_tip(problem, around.tip_sd, base_was_felt=around.base.kind != "mesh")
 
 
 def solve_problem(

@@ -27,10 +27,13 @@ class FreeTipShape:
     Args:
         felt: the shape as the nominal tip feels it.
         tip: prior of the radius, m.
+        base_was_felt: True over a base that was fitted to the trace: it lies where any tip would have felt it, and
+            says nothing of the radius.
     """
 
     felt: Any
     tip: Normal
+    base_was_felt: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -54,8 +57,9 @@ class FreeTipShape:
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights over the trace of a tip of nominal radius on the bare base, m."""
-        return np.concatenate([self._with_tip(float(row[-1])).templates(row[None, :-1]) + row[-1] - self.tip.mean
-                               for row in theta])  # fmt: skip
+        higher = np.zeros(len(theta)) if self.base_was_felt else theta[:, -1] - self.tip.mean
+        return np.concatenate([self._with_tip(float(row[-1])).templates(row[None, :-1]) + offset
+                               for row, offset in zip(theta, higher, strict=True)])  # fmt: skip
 
     def _with_tip(self, radius: float) -> Shape:
         # A copy keeps what the shape has cached of its window, which does not depend on the tip.
@@ -64,12 +68,12 @@ class FreeTipShape:
         return other
 
 
-def with_free_tip(problem: PosteriorProblem, sd: float) -> PosteriorProblem:
+def with_free_tip(problem: PosteriorProblem, sd: float, base_was_felt: bool = False) -> PosteriorProblem:
     """The problem with the tip's radius as a parameter: Gaussian about the nominal one, sd in m."""
     felt: Any = problem.target.shape
     prior = Normal(felt.tip_radius, sd, SMALLEST_TIP_SHARE * felt.tip_radius)
     nominal = np.full((len(problem.beginnings), 1), felt.tip_radius)
-    target = replace(problem.target, shape=FreeTipShape(felt, prior))
+    target = replace(problem.target, shape=FreeTipShape(felt, prior, base_was_felt))
     return replace(problem, target=target, beginnings=np.hstack([problem.beginnings, nominal]))
 
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from explore3d.report.findings import summary
+from mapping.detection.path import PathLedger
 from mapping.feature import Interval
 
 
@@ -28,6 +29,8 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
         inspected=SimpleNamespace(untouched=untouched),
         base=SimpleNamespace(kind="mesh"),
         account=None,
+        path=None,
+        left_out=(),
         stopped=None,
         go_on="",
     )
@@ -74,3 +77,20 @@ def test_a_long_list_is_cut_and_says_so() -> None:
     lines = summary(analysis(*(feature(f"bump-{k}", False, Interval(0.0, 0.0, 0.0)) for k in range(23))))
     assert len(lines) == 23
     assert lines[-2] == "  and 3 more, see the report"
+
+
+def test_a_path_that_was_left_out_is_said_from_two_per_cent_on() -> None:
+    found = analysis()
+    found.path = PathLedger(0.216, 0.2, (("gaps", 0.016),), (("turn", 16),))
+    assert summary(found)[-1] == (
+        "200 mm of 216 mm of path recorded were inspected (92.6 %). Left out: 16 mm (gaps). "
+        "Sweeps were cut at 16 turns."
+    )
+    found.path = PathLedger(0.216, 0.215, (("gaps", 0.001),))
+    assert not any("path recorded" in line for line in summary(found))
+
+
+def test_a_doubt_of_the_tip_that_was_assumed_is_said() -> None:
+    found = analysis()
+    found.model.provenance = {"tip_sd_assumed": True, "tip_sd": 1e-4}
+    assert summary(found)[-1].startswith("The tip's radius is taken for 10 mm ± 0.1 mm (1 %, assumed")

@@ -2,76 +2,87 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mapping import FloatArray, Surface, Trace
-from mapping.base.robust import RobustFit, robust_fit, robust_scale
+from mapping.base import robust_fit, robust_scale
+from mapping.base.profiles.form import AUTO, Form, form_line
+from mapping.base.profiles.frame import ProfileFrame
+from mapping.base.profiles.isolated import Bend, isolated_bends, isolated_rest
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 # A base bends over no less than this many tip radii: shorter details are features.
 SHORTEST_BEND = 8.0
 # Pieces that are tried; the evidence chooses.
 PIECES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 PROFILE_CELLS = 480
+# A piece of a cubic needs so many places between masked stretches
+CELLS_PER_PIECE = 4
 
 
-@dataclass(frozen=True, eq=False)
-class ProfileFrame:
-    """The plane of a profile: `origin` (3,), unit rows `along`, `lateral`, `outward`."""
-
-    origin: FloatArray
-    along: FloatArray
-    lateral: FloatArray
-    outward: FloatArray
-
-
-def profile_frame(trace: Trace) -> ProfileFrame | None:
-    """The frame of a trace that runs along one line, or None if it covers an area or turns back on itself."""
-    origin = trace.centers.mean(axis=0)
-    offset = trace.centers - origin
-    _, values, axes = np.linalg.svd(offset[:: max(1, len(offset) // 20000)], full_matrices=False)
-    if values[0] == 0.0:
-        return None
-    along = axes[0] * (1.0 if axes[0][np.abs(axes[0]).argmax()] > 0 else -1.0)
-    hint = np.array([0.0, 0.0, 1.0]) if trace.normals is None else trace.normals.mean(axis=0)
-    outward = hint - (hint @ along) * along
-    if np.linalg.norm(outward) < 1e-6:
-        outward = axes[1]
-    outward = outward / np.linalg.norm(outward)
-    lateral = np.cross(outward, along)
-    extent = float(np.ptp(offset @ along))
-    if float(np.ptp(offset @ lateral)) > min(trace.tip_radius, 0.2 * extent):
-        return None
-    if float(np.ptp(offset @ outward)) > extent:
-        return None
-    return ProfileFrame(origin, along, lateral, outward)
-
-
-def fit_profile(trace: Trace, frame: ProfileFrame) -> tuple[Surface, dict[str, float]]:
+def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[Surface, dict[str, Any]]:
     """A ribbon under the smooth part of a profile.
 
     Splines of growing freedom (a line, a parabola, cubics) are fitted to the centres by robust least
     squares and the one with the best truncated evidence is taken; the ribbon is its parallel curve one tip
     radius inward.
 
+    Args:
+        trace: along one line.
+        frame: of it.
+        form: "auto", or what the base is instead of a spline; stretches that are masked do not count.
+
     Returns:
-        The ribbon and what was fitted: degree, number of pieces and their length, m.
+        The ribbon and what was fitted: degree, number of pieces and their length, m, or the form; "absorbed": what
+        stands alone and was taken for form by "auto", and "left standing": what "auto" left although it is wider than
+        fine features are, if anything: height, width (m) and place ([x, y, z], m) of each.
+
+    Raises:
+        FormError: a form that does not fit this profile.
     """
     offset = trace.centers - frame.origin
     along = offset @ frame.along
     start, stop = float(along.min()), float(along.max())
-    x, z = _cell_medians(along, offset @ frame.outward)
+    keep = form.unmasked(trace)
+    x, z = _cell_medians(along[keep], offset[keep] @ frame.outward)
     scale = _roughness(z)
+    if form.kind != "auto":
+        # the filter needs more places than cells
+        places, line = form_line(x, z, form, scale, (start, stop))
+        slope = np.gradient(line, places, edge_order=2)
+        return _ribbon(trace.tip_radius, frame, places, line, slope), {"form": asdict(form)}
     limit = (stop - start) / (SHORTEST_BEND * trace.tip_radius)
     choices = [(1, 1), (2, 1), *((3, n) for n in PIECES if n == 1 or (n <= limit and 10 * n <= len(x)))]
     fits = []
     for degree, pieces in choices[: max(1, len(x) - 2)]:
         knots = np.concatenate([[start] * degree, np.linspace(start, stop, pieces + 1), [stop] * degree])
+        if form.masks and np.histogram(x, knots[degree : len(knots) - degree])[0].min() < CELLS_PER_PIECE:
+            continue
         fits.append((robust_fit(_design(x, knots, degree), z, scale), knots, degree, pieces))
     best, knots, degree, pieces = min(fits, key=lambda choice: choice[0].cost)
-    ribbon = _ribbon(trace.tip_radius, frame, np.linspace(start, stop, 64 * pieces + 1), best, knots, degree)
-    return ribbon, {"degree": float(degree), "pieces": float(pieces), "piece_length": (stop - start) / pieces}
+    from scipy.interpolate import BSpline
+
+    curve, places = BSpline(knots, best.coefficients, degree), np.linspace(start, stop, 64 * pieces + 1)
+    ribbon = _ribbon(trace.tip_radius, frame, places, curve(places), curve.derivative()(places))
+    fitted: dict[str, Any] = {"degree": float(degree), "pieces": float(pieces), "piece_length": (stop - start) / pieces}
+    bends = isolated_bends(x, z, curve(x), scale) if pieces > 1 else []
+    rest = isolated_rest(x, z, curve(x), scale, SHORTEST_BEND * trace.tip_radius)
+    return ribbon, fitted | _listed("absorbed", bends, frame, curve) | _listed("left standing", rest, frame, curve)
+
+
+def _listed(name: str, bends: list[Bend], frame: ProfileFrame, curve: BSpline) -> dict[str, Any]:
+    """Height, width and place [x, y, z] of each on the line of centres, m; nothing where there is none."""
+    listed = [
+        {"height": bend.height, "width": bend.width}
+        | {"place": (frame.origin + bend.place * frame.along + float(curve(bend.place)) * frame.outward).tolist()}
+        for bend in bends
+    ]
+    return {name: listed} if listed else {}
 
 
 def _roughness(z: FloatArray) -> float:
@@ -102,14 +113,8 @@ def _cell_medians(x: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]
     return np.asarray(mean_x), z[middle]
 
 
-def _ribbon(
-    tip_radius: float, frame: ProfileFrame, x: FloatArray, fit: RobustFit, knots: FloatArray, degree: int
-) -> Surface:
-    """The strip of triangles under the spline of centres, one tip radius inward, two radii longer at its ends."""
-    from scipy.interpolate import BSpline
-
-    curve = BSpline(knots, fit.coefficients, degree)
-    z, slope = curve(x), curve.derivative()(x)
+def _ribbon(tip_radius: float, frame: ProfileFrame, x: FloatArray, z: FloatArray, slope: FloatArray) -> Surface:
+    """The strip of triangles under a line of centres, one tip radius inward, two radii longer at its ends."""
     overhang = 2.0 * tip_radius
     x = np.concatenate([[x[0] - overhang], x, [x[-1] + overhang]])
     z = np.concatenate([[z[0] - overhang * slope[0]], z, [z[-1] + overhang * slope[-1]]])

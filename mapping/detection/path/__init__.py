@@ -1,0 +1,15 @@
+"""The ledger of the path: sweeps that can be inspected, whatever their numbers, and what became of every metre."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.detection.path.ledger import PathLedger as PathLedger, path_ledger as path_ledger
+    from mapping.detection.path.sound_sweeps import SoundSweeps as SoundSweeps, sound_sweeps as sound_sweeps
+
+_PUBLIC = {
+    "ledger": ("PathLedger", "path_ledger"),
+    "sound_sweeps": ("SoundSweeps", "sound_sweeps"),
+}
+doorway(__name__, _PUBLIC)
