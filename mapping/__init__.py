@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from mapping.estimate.envelope.envelope import estimate_surface as estimate_surface
     from mapping.estimate.envelope.estimate import Estimate as Estimate
     from mapping.feature import (
-        KINDS as KINDS,
         Anchor as Anchor,
         Details as Details,
         Feature as Feature,
@@ -53,6 +52,7 @@ if TYPE_CHECKING:
     from mapping.geometry.curvature.curvature import Curvature as Curvature
     from mapping.geometry.curvature.principal_curvatures import principal_curvatures as principal_curvatures
     from mapping.inference.feature_posterior import refine as refine, sample_posterior as sample_posterior
+    from mapping.inference.kinds.kind import KINDS as KINDS
     from mapping.model.object_model import ObjectModel as ObjectModel
     from mapping.posterior import Posterior as Posterior
     from mapping.surface import Surface as Surface
@@ -85,13 +85,14 @@ _PUBLIC = {
     ),
     "estimate.envelope.envelope": ("estimate_surface",),
     "estimate.envelope.estimate": ("Estimate",),
-    "feature": ("Anchor", "Details", "Feature", "Interval", "KINDS", "LeftOut", "Support"),
+    "feature": ("Anchor", "Details", "Feature", "Interval", "LeftOut", "Support"),
     "geometry.contact.first_contact": ("BallContact",),
     "geometry.contact.interference_points": ("interference_points",),
     "geometry.contact.parallel_surface": ("ParallelSurface", "parallel_surface"),
     "geometry.curvature.curvature": ("Curvature",),
     "geometry.curvature.principal_curvatures": ("principal_curvatures",),
     "inference.feature_posterior": ("refine", "sample_posterior"),
+    "inference.kinds.kind": ("KINDS",),
     "model.object_model": ("ObjectModel",),
     "posterior": ("Posterior",),
     "surface": ("Surface",),

@@ -14,6 +14,7 @@ from mapping.assembly.points import body_width
 from mapping.base import Base
 from mapping.detection import Detections
 from mapping.geometry.mesh import arclengths, distances
+from mapping.inference.kinds import kind_made_of
 
 # Places to a half-width of the narrowest section looked for.
 PLACES_PER_HALF_WIDTH = 2.5
@@ -104,7 +105,7 @@ def _feature(line: FaintLine, inspection: Inspection, base: Base, detections: De
     feet = base.foot(axis + tip_radius * line.normal, tip_radius)
     seen = all(end.seen for end in ends)
     return Feature(
-        kind="ridge" if line.height > 0 else "groove",
+        kind=kind_made_of("convex" if line.height > 0 else "concave", line=True).name,
         axis=feet.points,
         normals=feet.normals,
         height=Interval.normal(line.height, line.height_sd),

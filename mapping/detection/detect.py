@@ -11,7 +11,7 @@ from mapping import DetectionError, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
 from mapping.detection.candidates import find_disturbances
 from mapping.detection.cap_fit import Disturbance
-from mapping.detection.crossing import Crossing
+from mapping.detection.crossing import STEP_CROSSINGS, Crossing
 from mapping.detection.false_alarms import threshold_for
 from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, smallest_half_width
 from mapping.detection.paper_algorithms import along_chord, curvature_features
@@ -262,7 +262,7 @@ def _crossing(
     # definition 1 on the trace (theory section 3): k > 1/r on the body is k_t > 1/(2 r); a dip between two rims
     # is a kink, sharper than any curvature
     sharp = found.curvature > 1 / (2 * tip) if found.height > 0 else found.curvature < -1 / (2 * tip)
-    if kind.startswith("step"):
+    if kind in STEP_CROSSINGS:
         sharp = bool(abs(found.curvature) > 1 / (2 * tip))
     return Crossing(
         sweep=profile.sweep,
