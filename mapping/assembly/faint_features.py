@@ -39,7 +39,6 @@ def with_faint_lines(
         return features
     half_width, spacing = _scales(detections, trace.tip_radius)
     inspection = inspect(trace, base, detections.noise, spacing)
-    normals = base.foot(inspection.points, trace.tip_radius).normals
     weak = [f for f in features if _is_weak(f, detections)]
     # what one place alone shows is not faint
     masked = np.abs(inspection.height) > PLAIN_PLACE_SDS * inspection.sd
@@ -50,7 +49,7 @@ def with_faint_lines(
             masked[near] |= distances(inspection.points[near], feature.axis) < reach
     alarms = false_alarms_per_metre * detections.inspected_length
     inflation = _inflation(inspection, detections, len(trace), half_width)
-    lines = faint_lines(inspection, normals, masked, half_width, inflation, alarms)
+    lines = faint_lines(inspection, inspection.normals, masked, half_width, inflation, alarms)
     for line in lines:
         ridge = _feature(line, inspection, base, detections, trace.tip_radius)
         features = [f for f in features if f not in weak or distances(f.axis, ridge.axis).max() > 2 * line.half_width]

@@ -25,9 +25,9 @@ def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height
         laid.append(len(np.asarray(centers)))
         return foot(self, centers, tip_radius)
 
-    def counted_heights(number, trace, s, base, spacing, feet=None):
+    def counted_heights(number, trace, s, base, spacing, *kept):
         profiles[number, spacing] += 1
-        return heights(number, trace, s, base, spacing, feet)
+        return heights(number, trace, s, base, spacing, *kept)
 
     monkeypatch.setattr(Base, "foot", counted_foot)
     monkeypatch.setattr(laid_trace, "height_profiles", counted_heights)
