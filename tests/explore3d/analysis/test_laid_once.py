@@ -32,7 +32,7 @@ def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height
     monkeypatch.setattr(Base, "foot", counted_foot)
     monkeypatch.setattr(laid_trace, "height_profiles", counted_heights)
     places = np.linspace(-30e-3, 30e-3, 10)
-    trace = sweeps(wire(), white=0.1e-3, places=places, spacing=2.5e-6, half=20e-3)
+    trace = sweeps(wire(), white=0.1e-3, places=places, spacing=5e-6, half=20e-3)
     axis = np.array([[-50e-3, 0.0, 0.0], [50e-3, 0.0, 0.0]])
     monkeypatch.setattr(Work, "truth", (TrueFeature("ridge", axis, DIAMETER, DIAMETER, 0.1),))
     analysis = build_model(Log(trace), None, plate(), Stages())

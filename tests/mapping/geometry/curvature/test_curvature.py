@@ -76,7 +76,12 @@ def bump(count: int, noise: float = 0.0) -> tuple[Surface, np.ndarray, np.ndarra
 
 @pytest.mark.parametrize(
     ("noise", "median", "p95", "wrong"),
-    [(0.0, 3e-6, 3e-4, 0.0), (1e-4, 7e-4, 2e-3, 2e-3), (1e-3, 3e-3, 1.7e-2, 4e-3), (1e-2, 2e-2, 0.11, 0.02)],
+    [
+        (0.0, 3e-6, 3e-4, 0.0),
+        pytest.param(1e-4, 7e-4, 2e-3, 2e-3, marks=pytest.mark.slow),
+        pytest.param(1e-3, 3e-3, 1.7e-2, 4e-3, marks=pytest.mark.slow),
+        (1e-2, 2e-2, 0.11, 0.02),
+    ],
 )
 def test_one_method_is_as_exact_at_every_noise_as_the_best_of_many(noise, median, p95, wrong):
     surface, k1, k2, inside = bump(100, noise)
