@@ -128,8 +128,7 @@ def refined(base: Base, trace: Trace) -> Base:
     keep = near & ~_beyond(base, feet)
     if not keep.any():
         return base
-    tested = {name: base.parameters[name] for name in ("missed",) if name in base.parameters}
-    return part_of(replace(again, parameters=again.parameters | tested), keep)
+    return part_of(replace(again, missed=base.missed), keep)
 
 
 def _bare(base: Base, empty: FloatArray, tip_radius: float) -> FloatArray:

@@ -77,17 +77,18 @@ class LaidSweep:
         """
         found = np.empty((len(first), 3)), np.empty((len(first), 3)), np.empty(len(first))
         known = np.zeros(len(first), dtype=bool)
-        if self._feet is not None and len(first):
+        kept = self._feet
+        if kept is not None and len(first):
             used, runs, counts = slice(first[0], stop), first - first[0], np.diff(np.append(first, stop))
-            up = np.repeat(self._feet.normals[first], counts, axis=0)
-            turn = np.abs(self._feet.normals[used] - up).max(axis=1)
-            off = np.abs(((self._feet.points[used] - np.repeat(self._feet.points[first], counts, axis=0)) * up).sum(1))
+            up = np.repeat(kept.normals[first], counts, axis=0)
+            turn = np.abs(kept.normals[used] - up).max(axis=1)
+            off = np.abs(((kept.points[used] - np.repeat(kept.points[first], counts, axis=0)) * up).sum(1))
             flat = self._laid[used] & (turn < ONE_PLANE) & (off < ONE_PLANE * self.trace.tip_radius)
             known = np.logical_and.reduceat(flat, runs)
-        if known.any():
+        if kept is not None and known.any():
             own = np.flatnonzero(np.repeat(known, counts)) + first[0]
             starts, share = np.cumsum([0, *counts[known][:-1]]), counts[known]
-            for place, values in zip(found, (self._feet.points, self._feet.normals, self._feet.height), strict=True):
+            for place, values in zip(found, (kept.points, kept.normals, kept.height), strict=True):
                 place[known] = np.add.reduceat(values[own], starts) / (share if values.ndim == 1 else share[:, None])
         if not known.all():
             feet = self.base.foot(centers[~known], self.trace.tip_radius)
@@ -213,7 +214,7 @@ class LaidTrace(Trace):
             share = np.einsum("ij,ij->i", centers - known[near], leg) / np.maximum(square, np.finfo(float).tiny)
             between = (share > 0.0) & (share < 1.0) & (square < (LONGEST_KNOWN_GAP * self.tip_radius) ** 2)
             found[between] += share[between, None] * (up[beside] - up[near])[between]
-        far = distance > LONGEST_KNOWN_GAP * self.tip_radius
+        far = np.asarray(distance) > LONGEST_KNOWN_GAP * self.tip_radius
         if far.any():
             found[far] = self.base.foot(centers[far], self.tip_radius).normals
         return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
@@ -236,11 +237,11 @@ class LaidTrace(Trace):
 
 def _empty(count: int) -> Feet:
     return Feet(
-        np.empty((count, 3)),
-        np.empty((count, 3)),
-        np.empty(count),
-        np.empty(count, dtype=np.int64),
-        np.empty((count, 3)),
+        np.zeros((count, 3)),
+        np.zeros((count, 3)),
+        np.zeros(count),
+        np.zeros(count, dtype=np.int64),
+        np.zeros((count, 3)),
     )
 
 

@@ -38,7 +38,7 @@ def torus(big: float, small: float, around: int, across: int) -> tuple[Surface, 
 
 
 def test_a_jet_knows_the_curvatures_of_a_torus_with_the_outward_sign():
-    surface, k2 = torus(1.0, 0.4, 200, 80)
+    surface, k2 = torus(1.0, 0.4, 140, 56)
     curvature = principal_curvatures(surface)
     assert curvature.valid.all()
     np.testing.assert_allclose(curvature.k1, 2.5, rtol=1e-3)
