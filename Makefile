@@ -30,10 +30,10 @@ $(DEMO)/report.html: $(SCENE) $(SOURCES) | setup
 	@$(BIN)/explore3d run $(SCENE) --out $(DEMO)
 
 test: setup-dev
-	@$(BIN)/python -m pytest -n 2
+	@$(BIN)/python -m pytest -n 2 --dist loadfile
 
 test-all: setup-dev
-	@$(BIN)/python -m pytest -n 2 -m "slow or not slow"
+	@$(BIN)/python -m pytest -n 2 --dist loadfile -m "slow or not slow"
 
 lint: setup-dev
 	@$(BIN)/ruff check .

@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from mapping.estimate.envelope.envelope import estimate_surface as estimate_surface
     from mapping.estimate.envelope.estimate import Estimate as Estimate
     from mapping.feature import (
-        KINDS as KINDS,
         UNKNOWN_TEXT as UNKNOWN_TEXT,
         Anchor as Anchor,
         Details as Details,
@@ -62,6 +61,7 @@ if TYPE_CHECKING:
     from mapping.geometry.curvature.curvature import Curvature as Curvature
     from mapping.geometry.curvature.principal_curvatures import principal_curvatures as principal_curvatures
     from mapping.inference.feature_posterior import refine as refine, sample_posterior as sample_posterior
+    from mapping.inference.kinds.kind import KINDS as KINDS
     from mapping.model.object_model import ObjectModel as ObjectModel
     from mapping.posterior import Posterior as Posterior
     from mapping.surface import Surface as Surface
@@ -100,7 +100,6 @@ _PUBLIC = {
         "Details",
         "Feature",
         "Interval",
-        "KINDS",
         "LeftOut",
         "Support",
         "UNKNOWN_TEXT",
@@ -113,6 +112,7 @@ _PUBLIC = {
     "geometry.curvature.curvature": ("Curvature",),
     "geometry.curvature.principal_curvatures": ("principal_curvatures",),
     "inference.feature_posterior": ("refine", "sample_posterior"),
+    "inference.kinds.kind": ("KINDS",),
     "model.object_model": ("ObjectModel",),
     "posterior": ("Posterior",),
     "surface": ("Surface",),

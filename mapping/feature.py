@@ -12,9 +12,6 @@ import numpy as np
 from mapping.arrays import FloatArray
 from mapping.posterior import Posterior
 
-KINDS = ("bump", "ridge", "pit", "groove", "step", "convex edge", "concave corner")
-
-
 # Log Bayes factor below which evidence is "barely worth mentioning" (Jeffreys, Theory of Probability, 1961, appendix
 # B): what was sought in many places has odds against it before.
 SUBSTANTIAL = 0.5 * math.log(10.0)
@@ -213,7 +210,7 @@ class Feature:
     """One fine surface feature on the base.
 
     Args:
-        kind: one of KINDS.
+        kind: name of its kind, one of `KINDS` (mapping/inference/kinds/kind.py).
         axis: (K, 3) points on the base surface under the crest, m; K = 1 for bumps and pits;
             first equals last for a closed ridge.
         normals: (K, 3) outward unit normals of the base at the axis.

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+from mapping.inference.kinds.kind import KINDS
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "extending.md"
 SECTIONS = {
@@ -19,6 +22,14 @@ SECTIONS = {
 def test_everything_that_people_add_has_an_example() -> None:
     assert list(SECTIONS) == ["A finger", "A planner", "A base family", "A kind of feature"]
     assert all(len(blocks) == 2 for blocks in SECTIONS.values())
+
+
+@pytest.fixture(autouse=True)
+def the_table_of_kinds_as_it_was() -> Iterator[None]:
+    before = dict(KINDS)
+    yield
+    KINDS.clear()
+    KINDS.update(before)
 
 
 @pytest.mark.parametrize("title", SECTIONS)

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray, Surface, Trace, length_text
-from mapping.base import Base, Cells, LaidTrace
+from mapping.base import Base, LaidTrace
 from mapping.detection import Detections, found_heights
 from mapping.estimate.envelope import Estimate
 from mapping.estimate.sweeps import EXTRAPOLATED, pitch
 
-MOST_INSPECTED_CELLS = 20_000
+# Places that tell which of the surface was touched
+MOST_SURFACE_CELLS = 20_000
 # Heights that the record states the inspected share for, in detection limits
 STATED = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
 
@@ -44,10 +45,7 @@ class Inspected:
         if base.kind == "profile":  # a strip as wide as one likes: all of it lies under the one sweep
             height = np.full(len(base.surface.faces), limit)
             return cls(height, base.surface.face_areas, limit, detections.probability, asked)
-        if len(trace) <= MOST_INSPECTED_CELLS:  # each sample is a cell
-            places = LaidTrace.of(trace, base).feet().points
-        else:
-            places = base.foot(Cells.of(trace, MOST_INSPECTED_CELLS).centers, trace.tip_radius).points
+        places, _ = LaidTrace.of(trace, base).touched(MOST_SURFACE_CELLS)
         if not np.isfinite(limit):
             places = places[:0]
         height = found_heights(base.surface, places, trace.tip_radius, limit)

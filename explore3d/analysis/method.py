@@ -330,7 +330,7 @@ def curvature_taken(work: Work, share: Share) -> None:
 def inspected(work: Work, share: Share) -> None:
     """Which places are free of features, and above which height."""
     work.inspected = Inspected.of(work.laid, work.base, work.detections, work.smallest_feature)
-    work.account = SurfaceAccount.of_log(work.log, work.base, work.scene)
+    work.account = SurfaceAccount.of_log(work.log, work.laid, work.base, work.scene)
 
 
 def modelled(work: Work, share: Share) -> None:

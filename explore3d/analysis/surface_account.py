@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 
 from explore3d import count_text
+from explore3d.analysis.inspected import MOST_SURFACE_CELLS
 from explore3d.log import Log
 from explore3d.scene import Scene
 from mapping import BoolArray, FloatArray, Trace, length_text
-from mapping.base import Base, Cells
+from mapping.base import Base, LaidTrace
 from mapping.detection import face_samples
 from planners import Survey
 from planners.paths import Carrier, reachable, resampled
 
 # More of the reachable surface than this not swept: said first, and the command's exit status is not 0
 MOST_UNSWEPT = 0.05
-MOST_ACCOUNT_CELLS = 20_000
 # Places of the surface that are asked, at most about so many
 MOST_ACCOUNT_PLACES = 60_000
 # A sweep on the other side of a thin plate has not touched this one: opposite normals count as this many reaches apart
@@ -60,8 +60,11 @@ class SurfaceAccount:
     shortest_ridge: float | None = None
 
     @classmethod
-    def of_log(cls, log: Log, base: Base, scene: Scene | None) -> SurfaceAccount | None:
-        """The account of a run by its log; None without a scene that says what to inspect, or without a surface."""
+    def of_log(cls, log: Log, trace: Trace, base: Base, scene: Scene | None) -> SurfaceAccount | None:
+        """The account of a run by its log, and by its trace over the base.
+
+        None without a scene that says what to inspect, or without a surface.
+        """
         if scene is None or base.kind == "profile":
             return None
         made = [e.data for e in log.events if e.kind == "move"]
@@ -70,7 +73,7 @@ class SurfaceAccount:
             name: sum(_length(d) for d in made if (d["purpose"] == "sweep") is (name == "sweep")) for name in _KINDS
         }
         paths = [np.asarray(d["path"]) for d in refused if d.get("purpose") == "sweep"]
-        account = _shares(base, scene, log_feet(log.trace, base), paths)
+        account = _shares(base, scene, LaidTrace.of(trace, base).touched(MOST_SURFACE_CELLS), paths)
         return cls(
             **account,
             swept_path=lengths["sweep"],
@@ -151,12 +154,6 @@ class SurfaceAccount:
 
 
 _KINDS = ("sweep", "other")
-
-
-def log_feet(trace: Trace, base: Base) -> tuple[FloatArray, FloatArray]:
-    """Places of the base that a trace touched, and the directions from there to the ball's centre, both (N, 3)."""
-    feet = base.foot(Cells.of(trace, MOST_ACCOUNT_CELLS).centers, trace.tip_radius)
-    return feet.points, feet.normals
 
 
 def _shares(

@@ -25,7 +25,7 @@ class TrueFeature:
     """A feature as the scene's author made it.
 
     Args:
-        kind: as in mapping.feature.KINDS.
+        kind: as in mapping.KINDS.
         axis: (K, 3) points under the crest, m; K = 1 for a bump or a pit.
         height: signed height over the base, m.
         width: full width, m; None if not given.

@@ -19,7 +19,7 @@ from mapping.geometry.templates import BumpOfRevolution
 from mapping.instrument import Noise
 
 # The paper's bump and tip (figure 3), in units of the bump's height; variance 0.01 is that of its section 4.1.
-BUMP, FIGURE_TIP_RADIUS = BumpOfRevolution(15.0), 1.0
+PAPER_BUMP, FIGURE_TIP_RADIUS = BumpOfRevolution(15.0), 1.0
 SIGMA = 0.1
 SECTION_SAMPLES = 6000
 EXTENT = 2.6
@@ -58,7 +58,7 @@ def write_figures(out: Path) -> list[Path]:
 @cache
 def section_trace(samples: int = SECTION_SAMPLES) -> Trace:
     """The ball's path over a section through the bump's axis, by exact contact with its mesh."""
-    mesh = BUMP.mesh(EXTENT + 2 * FIGURE_TIP_RADIUS, rings=1200, sectors=16)
+    mesh = PAPER_BUMP.mesh(EXTENT + 2 * FIGURE_TIP_RADIUS, rings=1200, sectors=16)
     x = np.linspace(-EXTENT, EXTENT, samples)
     above = np.column_stack([x, np.zeros(samples), np.full(samples, 4 * FIGURE_TIP_RADIUS)])
     centers = BallContact(mesh, FIGURE_TIP_RADIUS).first_contact(above, np.array([0.0, 0.0, -1.0])).centers
@@ -89,7 +89,7 @@ def folded_section() -> Any:
     """Figure 2: the parallel surface folds at caustic points; at the interference point the ball touches twice."""
     u = np.linspace(-EXTENT, EXTENT, 4001)
     x, z = _parallel(u)
-    caustics = np.column_stack(BUMP.parallel(BUMP.caustics(FIGURE_TIP_RADIUS), FIGURE_TIP_RADIUS))
+    caustics = np.column_stack(PAPER_BUMP.parallel(PAPER_BUMP.caustics(FIGURE_TIP_RADIUS), FIGURE_TIP_RADIUS))
     meeting = _meeting()
     trace = section_trace().centers
     figure = new_figure(7.2, 3.5)
@@ -120,12 +120,12 @@ def folded_section() -> Any:
 @cache
 def mesh_fold() -> tuple[ParallelSurface, FloatArray]:
     """The parallel surface of the bump's mesh, and the centres (M, 3) where a ball that slides over it leaps."""
-    mesh = BUMP.mesh(EXTENT + FIGURE_TIP_RADIUS, MESH_RINGS, MESH_SECTORS)
+    mesh = PAPER_BUMP.mesh(EXTENT + FIGURE_TIP_RADIUS, MESH_RINGS, MESH_SECTORS)
     u = np.hypot(*mesh.vertices[:, :2].T)
-    radial, axial = BUMP.normal(u)
+    radial, axial = PAPER_BUMP.normal(u)
     away = mesh.vertices[:, :2] / np.maximum(u, np.finfo(np.float64).tiny)[:, None]
     normals = np.column_stack([away * radial[:, None], axial])
-    folded = parallel_surface(mesh, FIGURE_TIP_RADIUS, normals, *BUMP.curvatures(u))
+    folded = parallel_surface(mesh, FIGURE_TIP_RADIUS, normals, *PAPER_BUMP.curvatures(u))
     ball, down, found = BallContact(mesh, FIGURE_TIP_RADIUS), np.array([0.0, 0.0, -1.0]), []
     for turn in np.pi * (np.arange(DIAMETERS) + 0.25) / DIAMETERS:
         along = np.array([np.cos(turn), np.sin(turn), 0.0])
@@ -139,7 +139,9 @@ def mesh_fold() -> tuple[ParallelSurface, FloatArray]:
 def folded_mesh() -> Any:
     """Figure 2 from a mesh alone: where its parallel surface folds, and where a sliding ball touches twice."""
     folded, met = mesh_fold()
-    rings = np.concatenate([BUMP.parallel(BUMP.caustics(FIGURE_TIP_RADIUS), FIGURE_TIP_RADIUS)[0], _meeting()[:1]])
+    rings = np.concatenate(
+        [PAPER_BUMP.parallel(PAPER_BUMP.caustics(FIGURE_TIP_RADIUS), FIGURE_TIP_RADIUS)[0], _meeting()[:1]]
+    )
     figure = new_figure(7.2, 4.3)
     above, section = figure.subplots(1, 2)
     for axes, across in ((above, False), (section, True)):
@@ -175,16 +177,16 @@ def curvature_features() -> Any:
     from matplotlib.ticker import NullLocator
 
     u = np.linspace(-1.5, 1.5, 3001)
-    k = BUMP.curvatures(np.abs(u))[0] * FIGURE_TIP_RADIUS
+    k = PAPER_BUMP.curvatures(np.abs(u))[0] * FIGURE_TIP_RADIUS
     figure = new_figure(7.2, 5.0)
     over, under = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.2))
-    over.fill_between(u, BUMP.height(u), -0.1, color=FAINT, lw=0)
-    over.plot(u, BUMP.height(u), color=INK)
+    over.fill_between(u, PAPER_BUMP.height(u), -0.1, color=FAINT, lw=0)
+    over.plot(u, PAPER_BUMP.height(u), color=INK)
     under.axhspan(-1, 1, color=FAINT, lw=0)
     under.plot(u, k, color=INK)
     for sign, color, name in ((1, ESTIMATED, "convex, k > 1/r"), (-1, TRACED, "concave, k < -1/r")):
         there = sign * k > 1
-        over.plot(u, np.where(there, BUMP.height(u), np.nan), color=color, lw=4)
+        over.plot(u, np.where(there, PAPER_BUMP.height(u), np.nan), color=color, lw=4)
         under.plot(u, np.where(there, k, np.nan), color=color, lw=3, label=f"curvature feature: {name}")
     over.set_title("Figure 3.  A bump is the sequence {-}{+}{-} of curvature features (a = 15, r = 1)")
     over.set_ylabel("height")
@@ -235,20 +237,20 @@ def noisy_trace() -> Any:
 
 def _parallel(u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The parallel surface's section through the axis, on both sides of it."""
-    radial, height = BUMP.parallel(np.abs(u), FIGURE_TIP_RADIUS)
+    radial, height = PAPER_BUMP.parallel(np.abs(u), FIGURE_TIP_RADIUS)
     return np.sign(u) * radial, height
 
 
 def _meeting() -> FloatArray:
     """Centre (x, z) of the ball at the interference point to the right of the bump."""
-    flank, _ = BUMP.interference(FIGURE_TIP_RADIUS) or (0.0, 0.0)
-    return np.array(BUMP.parallel(flank, FIGURE_TIP_RADIUS))
+    flank, _ = PAPER_BUMP.interference(FIGURE_TIP_RADIUS) or (0.0, 0.0)
+    return np.array(PAPER_BUMP.parallel(flank, FIGURE_TIP_RADIUS))
 
 
 def _body(axes: Any) -> None:
     u = np.linspace(-EXTENT - FIGURE_TIP_RADIUS, EXTENT + FIGURE_TIP_RADIUS, 4001)
-    axes.fill_between(u, BUMP.height(u), -1.0, color=FAINT, lw=0)
-    axes.plot(u, BUMP.height(u), color=INK, lw=1.0, label="body")
+    axes.fill_between(u, PAPER_BUMP.height(u), -1.0, color=FAINT, lw=0)
+    axes.plot(u, PAPER_BUMP.height(u), color=INK, lw=1.0, label="body")
 
 
 def _ball(axes: Any, center: FloatArray, color: str, label: str = "") -> None:

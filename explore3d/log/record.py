@@ -171,7 +171,7 @@ def base_event(base: Base) -> dict[str, Any]:
     """JSON values that `read_base` turns back into the same base, bit for bit."""
     return {
         "kind": base.kind,
-        "parameters": base.parameters,
+        "parameters": base.record(),
         "vertices": base.surface.vertices.tolist(),
         "faces": base.surface.faces.tolist(),
     }
@@ -187,7 +187,7 @@ def read_base(events: Sequence[Event]) -> Base | None:
         if event.kind == KIND:
             try:
                 surface = Surface(event.data["vertices"], event.data["faces"])
-                return Base(surface, event.data["kind"], event.data["parameters"])
-            except (KeyError, SurfaceError) as error:
+                return Base.read(surface, event.data["kind"], event.data["parameters"])
+            except (KeyError, TypeError, SurfaceError) as error:
                 raise UserError(f"the log's base event is not readable: {error}") from error
     return None

@@ -13,8 +13,7 @@ from mapping.detection import Crossing
 from mapping.estimate.envelope import Estimate
 from mapping.estimate.sweeps import BRIDGED
 from mapping.geometry.mesh import directions, middle, nearest_on
-from mapping.geometry.templates import step_height
-from mapping.inference.families import feature_trace
+from mapping.inference.kinds import kind_of
 
 # The section reaches so many half-widths of the disturbance to either side.
 SECTION_REACH = 2.4
@@ -88,7 +87,7 @@ def cross_section(
     sizes = [feature.height.median, feature.height.low, feature.height.high]
     curves = [_trace_of(feature, size, grid, points, normals, trace.tip_radius) for size in sizes]
     bins = _binned(x, feet.height[index])
-    if feature.kind == "step":
+    if kind_of(feature).sided:
         curves = _aligned(curves, np.interp(grid, x, feet.height[index]))
     sweep = int(trace.sweep[window[0]])
     return CrossSection(
@@ -182,13 +181,11 @@ def _trace_of(
     feature: Feature, height: float, x: FloatArray, points: FloatArray, normals: FloatArray, tip_radius: float
 ) -> FloatArray:
     """(N,) heights over the base's trace that the feature would leave if it were so high, m."""
-    if feature.kind == "step":
-        return step_height(x, abs(height), tip_radius)
     # The radius that the record may hold belongs to its median height.
     own = height == feature.height.median
     details = feature.details if own else replace(feature.details, radius=None)
     so_high = replace(feature, height=Interval(height, height, height), details=details)
-    return feature_trace(so_high, points, normals, tip_radius)
+    return kind_of(feature).profile(so_high, x, points, normals, tip_radius)
 
 
 def _aligned(curves: list[FloatArray], height: FloatArray) -> list[FloatArray]:

@@ -12,7 +12,8 @@ from explore3d.pictures.figure import DPI, INK, new_figure, png, styled
 from explore3d.pictures.raycast import Body, Picture, render
 from explore3d.pictures.sweep_paths import SweepPath, densified
 from mapping import Feature, FloatArray, Surface, length_text
-from mapping.model import KIND_COLOURS, OTHER_COLOUR, drawn_at_least, feature_mesh
+from mapping.inference.kinds import kind_of
+from mapping.model import drawn_at_least, feature_mesh
 
 # Width of a picture of one panel, and of each of two, pixels; and the most that a panel is high for its width.
 WIDTHS = {1: 1080, 2: 760}
@@ -91,7 +92,7 @@ def _scene(base: Surface, features: Sequence[Feature], camera: Camera, sweeps: S
     pixel = pixel_size(camera)
     bodies = [Body(base, PICTURE_BASE_COLOUR)]
     for feature in features:
-        colour = np.array(KIND_COLOURS.get(feature.kind, OTHER_COLOUR)[:3])
+        colour = np.array(kind_of(feature).colour[:3])
         bodies.append(Body(feature_mesh(drawn_at_least(feature, LEAST_FEATURE_PIXELS * SUPERSAMPLING * pixel)), colour))
     picture = render(bodies, camera)
     for path in sweeps:

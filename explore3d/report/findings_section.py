@@ -12,6 +12,7 @@ from explore3d.report.markup import Html, Row, badge, element, figure, paragraph
 from explore3d.report.pictures import Pictures, is_profile
 from mapping import UNKNOWN_TEXT, Feature, Interval, length_text
 from mapping.geometry.mesh import arclengths
+from mapping.inference.kinds import kind_named, kind_of
 
 
 def headline(analysis: Analysis) -> Html:
@@ -32,7 +33,7 @@ def found_sentence(analysis: Analysis) -> str:
     if not features:
         return f"Nothing was found that the base does not explain{swept_part(analysis)}. {limit_sentence(analysis)}"
     kinds = Counter(feature.kind for feature in features)
-    counts = [count_text(number, kind, _plural(kind)) for kind, number in kinds.items()]
+    counts = [count_text(number, kind, kind_named(kind).plural) for kind, number in kinds.items()]
     sentence = f"{_listed(counts)} {'was' if len(features) == 1 else 'were'} found."
     if len(features) == 1:
         sizes = [f"{_described(getattr(features[0], name))} {word}" for name, word in _sizes(features[0])]
@@ -164,8 +165,8 @@ def _caption(analysis: Analysis) -> str:
 
 def _sizes(feature: Feature) -> list[tuple[str, str]]:
     """Sizes worth a word in the first sentence."""
-    height = "deep" if feature.height.median < 0 else "high"
-    return [("height", height)] + ([("length", "long")] if arclengths(feature.axis)[-1] > 0 else [])
+    words = kind_of(feature).words.items()
+    return [(name, word) for name, word in words if name != "length" or arclengths(feature.axis)[-1] > 0]
 
 
 def _described(interval: Interval) -> str:
@@ -173,10 +174,6 @@ def _described(interval: Interval) -> str:
         interval = Interval(-interval.median, -interval.high, -interval.low, interval.censored)
     median, span = interval.text()
     return f"{median} ({span})" if span else median
-
-
-def _plural(kind: str) -> str:
-    return kind + "s"
 
 
 def _listed(parts: list[str]) -> str:

@@ -12,7 +12,8 @@ from explore3d.report.markup import Html, element
 from mapping import Feature, FloatArray, Surface, Trace, length_unit
 from mapping.base import Base
 from mapping.geometry.mesh import open3d
-from mapping.model import KIND_COLOURS, OTHER_COLOUR, drawn_at_least, feature_mesh
+from mapping.inference.kinds import kind_of
+from mapping.model import drawn_at_least, feature_mesh
 
 # More than this makes pages slow without showing more.
 MOST_FACES = 60_000
@@ -49,7 +50,7 @@ def object_view(base: Surface, features: Sequence[Feature], sweeps: Sequence[Swe
         )
     )
     for feature in features:
-        colour = "rgb" + str(tuple(round(255 * each) for each in KIND_COLOURS.get(feature.kind, OTHER_COLOUR)[:3]))
+        colour = "rgb" + str(tuple(round(255 * each) for each in kind_of(feature).colour[:3]))
         shape = feature_mesh(drawn_at_least(feature, LEAST_FEATURE_SHARE * base.size))
         parts.append(_mesh(shape, factor, feature.id, colour, hover_text(feature), opacity=1.0))
     axes = {"showbackground": False, "gridcolor": "#e4e7eb", "zeroline": False}

@@ -174,7 +174,7 @@ class Exploration(Table):
 class Truth(Table):
     """A feature that a simulated object really has: the report compares. Lengths in m, object frame."""
 
-    kind: Literal[KINDS]  # type: ignore[valid-type]
+    kind: Literal[tuple(KINDS)]  # type: ignore[valid-type]
     axis: Annotated[tuple[Point, ...], Field(min_length=1)]
     height: Signed
     width: Length | None = None

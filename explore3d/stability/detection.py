@@ -28,6 +28,7 @@ from mapping import (
 from mapping.base import Base
 from mapping.detection import Detections, detect
 from mapping.geometry.templates import groove_height, step_height
+from mapping.inference.kinds import kind_made_of, kind_of
 
 WHITE_NOISE = 0.2e-3
 
@@ -69,10 +70,14 @@ def _ridges(count: int, height: float, within: float) -> Callable[[Detections, t
 
     def right(_: Detections, found: tuple[Feature, ...]) -> bool:
         return len(found) == count and all(
-            each.kind == "ridge" and abs(each.height.median - height) <= within for each in found
+            _is_ridge(each) and abs(each.height.median - height) <= within for each in found
         )
 
     return right
+
+
+def _is_ridge(feature: Feature) -> bool:
+    return kind_of(feature) is kind_made_of("convex", line=True)
 
 
 def _nothing(_: Detections, found: tuple[Feature, ...]) -> bool:
@@ -87,7 +92,7 @@ def _near(*places: float) -> Callable[[Detections, tuple[Feature, ...]], bool]:
     """Every one of the wires at these y lies under some ridge, and nothing lies elsewhere, within 0.4 mm."""
 
     def right(_: Detections, found: tuple[Feature, ...]) -> bool:
-        if not found or any(each.kind != "ridge" for each in found):
+        if not found or not all(map(_is_ridge, found)):
             return False
         y = np.concatenate([each.axis[:, 1] for each in found])
         gaps = np.abs(y[:, None] - np.array(places))
@@ -98,7 +103,7 @@ def _near(*places: float) -> Callable[[Detections, tuple[Feature, ...]], bool]:
 
 def _faint(detections: Detections, found: tuple[Feature, ...]) -> bool:
     """No sweep sees the wire, and says so; what many sweeps agree on is the wire's height, within its interval."""
-    right = [f.kind == "ridge" and f.height.low <= DIAMETER <= f.height.high for f in found]
+    right = [_is_ridge(f) and f.height.low <= DIAMETER <= f.height.high for f in found]
     near = [np.abs(f.axis[:, 1]).max() < 0.3 * np.sqrt(2 * TIP_RADIUS * DIAMETER) for f in found]
     return detections.detection_limit > DIAMETER and len(found) <= 1 and all(right) and all(near)
 

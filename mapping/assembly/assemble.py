@@ -19,8 +19,8 @@ from mapping.assembly.steps import step_features
 from mapping.base import Base, LaidTrace
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances
+from mapping.inference.kinds import kind_made_of
 
-KINDS_BY_SIGN = {1: ("bump", "ridge"), -1: ("pit", "groove")}
 # A group of crossings that spreads over more than this many half-widths cannot be one round bump: sweeps further
 # than one half-width from its crest miss it.
 WIDEST_SPOT = 2.6
@@ -91,7 +91,7 @@ def _crests_and_steps(
     crossings: Sequence[Crossing], around: Around, scale: float
 ) -> tuple[list[Crossing], list[Crossing]]:
     """Crests and hollows, with places along those that a sweep ran along, and the steps that are not such runs."""
-    crests = [c for c in crossings if not c.kind.startswith("step")]
+    crests = [c for c in crossings if not c.is_step]
     wrong = [c for c in crests if is_plateau_end(c, around.inspection) or is_unseen(c, around.inspection)]
     crossings = [c for c in crossings if c not in wrong]
     crests = [c for c in crests if c not in wrong]
@@ -155,7 +155,12 @@ def _nearest(point: FloatArray, others: list[FloatArray]) -> float:
 
 def _name(crossing: Crossing) -> str:
     """What a crossing of a single profile is called."""
-    return "step" if crossing.kind.startswith("step") else KINDS_BY_SIGN[1 if crossing.height > 0 else -1][0]
+    return kind_made_of(_crossings_of(crossing), line=False).name
+
+
+def _crossings_of(crossing: Crossing) -> str:
+    """What a kind is made of (`Kind.made_of`) that such a crossing belongs to."""
+    return "step" if crossing.is_step else "convex" if crossing.height > 0 else "concave"
 
 
 def _strongest_first(features: Sequence[Feature]) -> tuple[Feature, ...]:
@@ -173,7 +178,7 @@ def _details(members: list[Crossing], around: Around) -> list[Feature]:
     if not members:
         return []
     highest = max(members, key=lambda c: abs(c.height))
-    spot_name, line_name = KINDS_BY_SIGN[1 if highest.height > 0 else -1]
+    spot_name, line_name = (kind_made_of(_crossings_of(highest), line=line).name for line in (False, True))
     half_width = float(np.sqrt(2 * around.tip_radius * abs(highest.height)))
     half_width = max(half_width, min(c.half_width for c in members if abs(c.height) > 0.7 * abs(highest.height)))
     points = np.array([c.point for c in members])

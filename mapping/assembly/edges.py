@@ -17,6 +17,7 @@ from mapping.assembly.inspection import Inspection
 from mapping.assembly.lines import Around
 from mapping.detection import Crossing
 from mapping.geometry.mesh import arclengths, nearest_on
+from mapping.inference.kinds import kind_made_of
 
 # A stretch is straight if it bends by less than this share of its rise, once its first part is left out, where the
 # ball rolls over the edge.
@@ -108,7 +109,7 @@ def _edge(group: list[Hinge], around: Around) -> tuple[Feature, FloatArray]:
     rise = around.tip_radius * float(np.tan(angle)) * (-1.0 if convex else 1.0)
     crossings = [h.crossing for h in group]
     edge = Feature(
-        kind="convex edge" if convex else "concave corner",
+        kind=kind_made_of("convex hinge" if convex else "concave hinge", line=True).name,
         axis=feet.points,
         normals=feet.normals,
         height=Interval.normal(rise, around.tip_radius * float(np.std(tangents)) / np.sqrt(len(group))),

@@ -14,6 +14,7 @@ from mapping.assembly.points import body_width
 from mapping.base import Base
 from mapping.detection import Detections
 from mapping.geometry.mesh import arclengths, distances
+from mapping.inference.kinds import kind_made_of
 
 # Places to a half-width of the narrowest section looked for.
 PLACES_PER_HALF_WIDTH = 2.5
@@ -38,7 +39,6 @@ def with_faint_lines(
         return features
     half_width, spacing = _scales(detections, trace.tip_radius)
     inspection = inspect(trace, base, detections.noise, spacing)
-    normals = base.foot(inspection.points, trace.tip_radius).normals
     weak = [f for f in features if _is_weak(f, detections)]
     # what one place alone shows is not faint
     masked = np.abs(inspection.height) > PLAIN_PLACE_SDS * inspection.sd
@@ -49,7 +49,7 @@ def with_faint_lines(
             masked[near] |= distances(inspection.points[near], feature.axis) < reach
     alarms = false_alarms_per_metre * detections.inspected_length
     inflation = _inflation(inspection, detections, len(trace), half_width)
-    lines = faint_lines(inspection, normals, masked, half_width, inflation, alarms)
+    lines = faint_lines(inspection, inspection.normals, masked, half_width, inflation, alarms)
     for line in lines:
         ridge = _feature(line, inspection, base, detections, trace.tip_radius)
         features = [f for f in features if f not in weak or distances(f.axis, ridge.axis).max() > 2 * line.half_width]
@@ -104,7 +104,7 @@ def _feature(line: FaintLine, inspection: Inspection, base: Base, detections: De
     feet = base.foot(axis + tip_radius * line.normal, tip_radius)
     seen = all(end.seen for end in ends)
     return Feature(
-        kind="ridge" if line.height > 0 else "groove",
+        kind=kind_made_of("convex" if line.height > 0 else "concave", line=True).name,
         axis=feet.points,
         normals=feet.normals,
         height=Interval.normal(line.height, line.height_sd),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -28,6 +28,7 @@ class Inspection:
         sd: (M,) standard deviation of each mean, m: a slow sweep has more samples to a place than a fast one.
         sweep: (M,) number of the sweep.
         spacing: distance between neighbouring places of a sweep, m.
+        normals: (M, 3) outward directions at the places; (0, 3) where they are not known.
     """
 
     points: FloatArray
@@ -35,6 +36,7 @@ class Inspection:
     sd: FloatArray
     sweep: IntArray
     spacing: float
+    normals: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @cached_property
     def _tree(self) -> Any:
@@ -109,20 +111,25 @@ class Inspection:
 
 def inspect(trace: Trace, base: Base, noise: Noise, spacing: float) -> Inspection:
     """Mean heights over stretches of the given length along every sweep of the trace."""
-    points, height, sweep, count = [], [], [], []
+    points, normals, height, sweep, count = [], [], [], [], []
     for own in LaidTrace.of(trace, base).laid_sweeps:
         if len(own.trace) < 2 or not own.arclength[-1] > 0:
             continue
         for profile in own.heights(spacing):
-            under = base.foot(profile.centers, trace.tip_radius).points if profile.feet is None else profile.feet
+            under, up = profile.feet, profile.normals
+            if under is None or up is None:
+                feet = base.foot(profile.centers, trace.tip_radius)
+                under, up = feet.points, feet.normals
             points.append(under)
+            normals.append(up)
             height.append(profile.height)
             sweep.append(np.full(len(profile.height), own.number))
             count.append(np.diff(profile.first))
     if not points:
         return Inspection(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), spacing)
     sd = _sd_of_means(noise, spacing, np.concatenate(count))
-    return Inspection(np.concatenate(points), np.concatenate(height), sd, np.concatenate(sweep), spacing)
+    found = np.concatenate(points), np.concatenate(height), sd, np.concatenate(sweep)
+    return Inspection(*found, spacing, np.concatenate(normals))
 
 
 def _sd_of_means(noise: Noise, spacing: float, count: IntArray) -> FloatArray:

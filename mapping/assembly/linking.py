@@ -57,11 +57,11 @@ def linked(a: Crossing, b: Crossing, inspection: Inspection, scale: float) -> bo
     low, high = sorted((abs(a.height), abs(b.height)))
     if low < HEIGHT_RATIO * high or a.normal @ b.normal < 0:
         return False
-    if a.kind.startswith("step") and uphill(a) @ uphill(b) < 0:
+    if a.is_step and uphill(a) @ uphill(b) < 0:
         return False
-    if a.kind.startswith("step") and low < 0.5 * high:
+    if a.is_step and low < 0.5 * high:
         return False
-    if a.kind.startswith("step"):
+    if a.is_step:
         return True
     return not inspection.denies(between(a.point, b.point, scale), np.sign(a.height) * low, FELT_REACH * scale)
 

@@ -75,7 +75,7 @@ class Run:
 
 def split_runs(crossings: Sequence[Crossing]) -> tuple[list[Run], list[Crossing]]:
     """Plateaus with both edges on one sweep, and the steps that have no partner."""
-    steps = [c for c in crossings if c.kind.startswith("step")]
+    steps = [c for c in crossings if c.is_step]
     runs, single = [], []
     while steps:
         first = steps.pop(0)

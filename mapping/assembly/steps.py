@@ -12,6 +12,7 @@ from mapping.assembly.lines import ONE_POINT, Around, mean_point, merged
 from mapping.assembly.linking import groups
 from mapping.detection import Crossing
 from mapping.geometry.mesh import arclengths, distances
+from mapping.inference.kinds import kind_made_of
 
 
 def step_features(
@@ -41,7 +42,7 @@ def _step(line: list[Crossing], around: Around) -> Feature:
     slack = 2 * around.inspection.pitch
     normals = around.base.foot(axis + around.tip_radius * line[0].normal, around.tip_radius).normals
     return Feature(
-        kind="step",
+        kind=kind_made_of("step", line=True).name,
         axis=axis,
         normals=normals,
         height=Interval.normal(height, sd),

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,6 +34,21 @@ class Feet:
     barycentric: FloatArray
 
 
+# A number, a flag, or rows of numbers
+FitValue = bool | float | list[float] | list[list[float]]
+
+
+class PoseRecord(TypedDict):
+    """A pose as JSON values, SI units: see `mapping.base.Pose`."""
+
+    rotation: list[list[float]]
+    translation: list[float]
+    center: list[float]
+    covariance: list[list[float]]
+    observable: int
+    scatter: float
+
+
 @dataclass(frozen=True, eq=False)
 class Base:
     """The body's known or fitted shape without its fine features.
@@ -41,18 +57,48 @@ class Base:
         surface: its mesh.
         kind: "mesh" if it was given, else the fitted family: "profile", "plane", "sphere", "cylinder",
             "quadric", "sheet", "polyhedron", "tube", "star body".
-        parameters: what the fit found (JSON values, SI), empty for a given mesh; "missed" (m) of a base that was
-            tested: by how much it missed sweeps that it was not fitted to.
+        parameters: what the fit found, by the family's own names (SI), empty for a given mesh.
+        missed: by how much a fitted base missed sweeps that it was not fitted to, m; None of one that was not tested.
+        pose: the motion from the given mesh to where the object stands; None of one that stands as given.
     """
 
     surface: Surface
     kind: str = "mesh"
-    parameters: dict[str, Any] = field(default_factory=dict)
+    parameters: dict[str, FitValue] = field(default_factory=dict)
+    missed: float | None = None
+    pose: PoseRecord | None = None
 
     @property
     def known(self) -> bool:
         """True of a given mesh and of a base that predicted further sweeps: what it does not explain is a feature."""
-        return self.kind == "mesh" or "missed" in self.parameters
+        return self.kind == "mesh" or self.missed is not None
+
+    def record(self) -> dict[str, Any]:
+        """JSON values of all but the surface and the kind: the "parameters" of model.json and of a log's base."""
+        missed = {} if self.missed is None else {"missed": self.missed}
+        return {**self.parameters, **missed, **({} if self.pose is None else {"pose": dict(self.pose)})}
+
+    @classmethod
+    def read(cls, surface: Surface, kind: str, record: Mapping[str, Any]) -> Base:
+        """The base of a surface and of what `record` gave.
+
+        Raises:
+            KeyError: a pose without one of its fields.
+            TypeError: "missed" or the pose of another type.
+        """
+        rest, pose = {name: record[name] for name in record if name not in ("missed", "pose")}, None
+        missed = None if record.get("missed") is None else float(record["missed"])
+        if record.get("pose") is not None:
+            whole = record["pose"]
+            pose = PoseRecord(
+                rotation=whole["rotation"],
+                translation=whole["translation"],
+                center=whole["center"],
+                covariance=whole["covariance"],
+                observable=int(whole["observable"]),
+                scatter=float(whole["scatter"]),
+            )
+        return cls(surface, kind, rest, missed, pose)
 
     @cached_property
     def nearest(self) -> NearestPoint:
@@ -64,9 +110,9 @@ class Base:
         """(F, 3, 3) mean normal of the faces on either side of the edge opposite to each corner of a face."""
         return self.nearest.edge_normals
 
-    def moved(self, rotation: FloatArray, translation: FloatArray, parameters: dict[str, Any]) -> Base:
-        """The base after a rigid motion, x to rotation @ x + translation, with other parameters."""
-        moved = Base(self.surface.moved(rotation, translation), self.kind, parameters)
+    def moved(self, rotation: FloatArray, translation: FloatArray, pose: PoseRecord) -> Base:
+        """The base after a rigid motion, x to rotation @ x + translation; `pose` is the whole one from its mesh."""
+        moved = replace(self, surface=self.surface.moved(rotation, translation), pose=pose)
         moved.__dict__["nearest"] = MovedNearestPoint(moved.surface, self.nearest, rotation, translation)
         return moved
 

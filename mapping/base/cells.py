@@ -17,25 +17,29 @@ class Cells:
         centers: (C, 3) mean ball centres in the order of time, m.
         sweep: (C,) sweep of each.
         normals: (C, 3) mean contact normals, or None.
+        cell: (N,) number of the cell of each sample.
     """
 
     centers: FloatArray
     sweep: IntArray
     normals: FloatArray | None
+    cell: IntArray
 
     @classmethod
     def of(cls, trace: Trace, most: int) -> Cells:
         """At most about `most` cells of equally many samples each; no cell spans two sweeps."""
-        group = np.arange(len(trace)) * most // max(len(trace), most)
+        group, order = np.arange(len(trace)) * most // max(len(trace), most), np.arange(len(trace))
         if (np.diff(trace.sweep) < 0).any():  # by sweep and, within each, by group
             order = np.argsort(trace.sweep, kind="stable")
             trace, group = trace.select(order), group[order]
         sweep = trace.sweep
         starts = np.flatnonzero((np.diff(sweep, prepend=sweep[:1] - 1) != 0) | (np.diff(group, prepend=-1) != 0))
-        counts = np.diff(np.append(starts, len(trace)))[:, None]
+        lengths = np.diff(np.append(starts, len(trace)))
+        cell, counts = np.empty(len(trace), dtype=np.int64), lengths[:, None]
+        cell[order] = np.repeat(np.arange(len(starts)), lengths)
         centers = np.add.reduceat(trace.centers, starts) / counts
         normals = None if trace.normals is None else np.add.reduceat(trace.normals, starts) / counts
-        return cls(centers, sweep[starts], normals)
+        return cls(centers, sweep[starts], normals, cell)
 
     def trace(self, tip_radius: float, keep: BoolArray) -> Trace:
         """Some of the cells as a trace of their own; their times count cells."""

@@ -14,6 +14,8 @@ from mapping.base.laid_trace import LaidTrace
 from mapping.base.robust import robust_scale
 
 MOST_EXTENT_CELLS = 4000
+# Stretches that are laid on the base to find where the trace leaves it
+MOST_BORDER_CELLS = 4000
 # So far from a place where the finger felt nothing, or rolled off, the body is taken to go on, in tip radii
 EDGE_REACH = 0.5
 # Cosine of the angle to the side from which a face is felt, at most
@@ -84,8 +86,22 @@ def rolled_off(height: FloatArray, sweep: IntArray, tip_radius: float) -> BoolAr
 
 
 def over_base(trace: Trace, base: Base) -> BoolArray:
-    """(N,) True where the ball's centre stands over the base, False where it stands beyond its border."""
-    return ~_beyond(base, LaidTrace.of(trace, base).feet())
+    """(N,) True where the ball's centre stands over the base, False where it stands beyond its border.
+
+    Of a trace of many samples the means of short stretches are laid on the base; its single samples only next to
+    stretches of the other sort.
+    """
+    laid = LaidTrace.of(trace, base)
+    if len(trace) <= MOST_BORDER_CELLS:
+        return ~_beyond(base, laid.feet())
+    cells = Cells.of(trace, MOST_BORDER_CELLS)
+    beyond = _beyond(base, base.foot(cells.centers, trace.tip_radius))
+    change = np.flatnonzero(np.diff(beyond, prepend=beyond[0]) | np.diff(cells.sweep, prepend=cells.sweep[0] - 1))
+    doubtful = np.zeros(len(beyond), dtype=bool)
+    doubtful[np.clip((change[:, None] + [-1, 0]).ravel(), 0, len(beyond) - 1)] = True
+    over, index = ~beyond[cells.cell], np.flatnonzero(doubtful[cells.cell])
+    over[index] = ~_beyond(base, laid.feet(index))
+    return over
 
 
 def _beyond(base: Base, feet: Feet) -> BoolArray:
@@ -112,8 +128,7 @@ def refined(base: Base, trace: Trace) -> Base:
     keep = near & ~_beyond(base, feet)
     if not keep.any():
         return base
-    tested = {name: base.parameters[name] for name in ("missed",) if name in base.parameters}
-    return part_of(replace(again, parameters=again.parameters | tested), keep)
+    return part_of(replace(again, missed=base.missed), keep)
 
 
 def _bare(base: Base, empty: FloatArray, tip_radius: float) -> FloatArray:

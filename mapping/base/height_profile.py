@@ -24,6 +24,11 @@ LONGEST_BIN_GAP, NARROW = 2, 0.03
 FEW_SAMPLES_PER_BIN = 4
 
 
+# Of mean centres (n, 3) of runs of samples that begin at (n,), the last one ending before a sample: points under them,
+# directions from there, heights
+Means = Callable[[FloatArray, IntArray, int], tuple[FloatArray, FloatArray, FloatArray]]
+
+
 @dataclass(frozen=True, eq=False)
 class SweepHeights:
     """Heights at equal steps of arclength along one sweep.
@@ -38,6 +43,7 @@ class SweepHeights:
         t: (n,) mean times, s.
         centers: (n, 3) mean ball centres, m.
         feet: (n, 3) points of the base under these, m; None where single samples were laid, not means.
+        normals: (n, 3) unit directions from there to the centres; None likewise.
     """
 
     sweep: int
@@ -49,6 +55,7 @@ class SweepHeights:
     t: FloatArray
     centers: FloatArray
     feet: FloatArray | None = None
+    normals: FloatArray | None = None
 
     @property
     def s(self) -> FloatArray:
@@ -61,26 +68,32 @@ class SweepHeights:
         return self.spacing * len(self.height)
 
 
-def arclength(trace: Trace, base: Base) -> FloatArray:
+def arclength(trace: Trace, base: Base, means: Means | None = None) -> FloatArray:
     """(N,) arclength along the base's trace under one sweep, m, free of the zigzag that noise adds.
 
     The length of the polyline through block means, with blocks so long that longer ones change it little, each
     lowered onto the base's own trace: foot points would stand still at an edge of the base and jump over a hollow.
+
+    Args:
+        trace: the samples of the sweep.
+        base: the global model.
+        means: gives where means of runs of samples stand, if that is known (see LaidSweep.feet_of_means).
     """
     count = len(trace)
     if count < 2:
         return np.zeros(count)
     size = max(1, count // LARGEST_FIRST_BLOCK_COUNT)
-    means = _block_means(trace.centers, size)
+    middle = _block_means(trace.centers, size)
     while count // (2 * size) >= 4:
-        longer = _block_means(means, 2)
-        if _length(means) <= (1 + LENGTH_TOLERANCE) * _length(longer):
+        longer = _block_means(middle, 2)
+        if _length(middle) <= (1 + LENGTH_TOLERANCE) * _length(longer):
             break
-        means, size = longer, 2 * size
-    if len(means) < 2:
-        means, size = trace.centers[[0, -1]], count - 1
-    feet = base.foot(means, trace.tip_radius)
-    lowered = feet.points + trace.tip_radius * feet.normals
+        middle, size = longer, 2 * size
+    if len(middle) < 2:
+        middle, size, means = trace.centers[[0, -1]], count - 1, None
+    laid = means or _laid_on(base, trace.tip_radius)
+    under, up, _ = laid(middle, size * np.arange(len(middle)), min(size * len(middle), count))
+    lowered = under + trace.tip_radius * up
     knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(lowered, axis=0), axis=1))])
     place, middles = _progress(trace, size, len(knots))
     inner = np.interp(place, middles, knots)
@@ -109,6 +122,7 @@ def height_profiles(
     base: Base,
     spacing: float,
     feet: Callable[[], Feet] | None = None,
+    means: Means | None = None,
 ) -> tuple[SweepHeights, ...]:
     """The sweep's heights in bins of the given width; more than one profile where contact was lost in between.
 
@@ -118,6 +132,7 @@ def height_profiles(
         base: the global model.
         spacing: width of the bins, m.
         feet: gives where the samples stand over the base, if that is kept somewhere.
+        means: gives where the bins' mean centres stand, likewise (see LaidSweep.feet_of_means).
     """
     # half a step off: evenly spaced samples would sit on the bins' borders, where rounding decides
     step = (s[-1] - s[0]) / max(len(s) - 1, 1)
@@ -127,13 +142,12 @@ def height_profiles(
     counts = np.diff(np.append(first, len(s)))
     centers = np.add.reduceat(trace.centers, first, axis=0) / counts[:, None]
     times = np.add.reduceat(trace.t, first) / counts
-    under = None
+    under = up = None
     if counts.mean() < FEW_SAMPLES_PER_BIN:
         laid = base.foot(trace.centers, trace.tip_radius) if feet is None else feet()
         height = np.add.reduceat(laid.height, first) / counts
     else:
-        laid = base.foot(centers, trace.tip_radius)
-        height, under = laid.height, laid.points
+        under, up, height = (means or _laid_on(base, trace.tip_radius))(centers, first, len(s))
     longest = max(LONGEST_BIN_GAP, int(NARROW * trace.tip_radius / spacing))
     cuts = np.flatnonzero(np.diff(occupied) > longest + 1) + 1
     profiles = []
@@ -156,21 +170,42 @@ def height_profiles(
                 edges,
                 np.interp(wanted, have, times[begin:end]),
                 middles,
-                None if under is None else _filled(under[begin:end], have - wanted[0], middles, base, trace.tip_radius),
+                *_filled(under, up, slice(begin, end), have - wanted[0], middles, base, trace.tip_radius),
             )
         )
     return tuple(profiles)
 
 
-def _filled(under: FloatArray, have: IntArray, centers: FloatArray, base: Base, tip_radius: float) -> FloatArray:
-    """(n, 3) feet of the bins' centres: those known of the bins `have`, and of the empty ones between."""
+def _laid_on(base: Base, tip_radius: float) -> Means:
+    """Means laid on the base, each of them."""
+
+    def laid(centers: FloatArray, first: IntArray, stop: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        feet = base.foot(centers, tip_radius)
+        return feet.points, feet.normals, feet.height
+
+    return laid
+
+
+def _filled(
+    under: FloatArray | None,
+    up: FloatArray | None,
+    own: slice,
+    have: IntArray,
+    centers: FloatArray,
+    base: Base,
+    tip_radius: float,
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """(n, 3) feet of the bins' centres and directions from there: those of the bins `have`, and of the empty ones."""
+    if under is None or up is None:
+        return None, None
     if len(have) == len(centers):
-        return under
-    points = np.empty_like(centers)
-    points[have] = under
+        return under[own], up[own]
+    points, normals = np.empty_like(centers), np.empty_like(centers)
+    points[have], normals[have] = under[own], up[own]
     empty = np.setdiff1d(np.arange(len(centers)), have)
-    points[empty] = base.foot(centers[empty], tip_radius).points
-    return points
+    between = base.foot(centers[empty], tip_radius)
+    points[empty], normals[empty] = between.points, between.normals
+    return points, normals
 
 
 def _block_means(points: FloatArray, size: int) -> FloatArray:

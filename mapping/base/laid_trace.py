@@ -9,7 +9,14 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Trace
 from mapping.base.base import Base, Feet
+from mapping.base.cells import Cells
 from mapping.base.height_profile import SweepHeights, arclength, height_profiles
+
+# Feet lie in one plane if their directions differ by no more, and their places by no more of a tip radius
+ONE_PLANE = 1e-9
+# Between centres this near to each other (tip radii) directions are interpolated: a chord of a circle of the tip's
+# radius then misses the direction by an eighth of its square, 1.3e-3 rad
+LONGEST_KNOWN_GAP = 0.1
 
 
 class LaidSweep:
@@ -32,14 +39,14 @@ class LaidSweep:
     def arclength(self) -> FloatArray:
         """(N,) along the base's trace under the sweep, m (see height_profile.arclength)."""
         if self._arclength is None:
-            self._arclength = arclength(self.trace, self.base)
+            self._arclength = arclength(self.trace, self.base, self.feet_of_means)
         return self._arclength
 
     def heights(self, spacing: float) -> tuple[SweepHeights, ...]:
         """Mean heights in bins of a width (m), one profile for each piece without a gap."""
         if spacing not in self._heights:
             self._heights[spacing] = height_profiles(
-                self.number, self.trace, self.arclength, self.base, spacing, self.feet
+                self.number, self.trace, self.arclength, self.base, spacing, self.feet, self.feet_of_means
             )
         return self._heights[spacing]
 
@@ -53,6 +60,63 @@ class LaidSweep:
             _put(self._feet, new, self.base.foot(self.trace.centers[new], self.trace.tip_radius))
             self._laid[new] = True
         return Feet(*(getattr(self._feet, each.name)[index] for each in fields(Feet)))
+
+    def feet_of_means(
+        self, centers: FloatArray, first: IntArray, stop: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Where the means (n, 3) of runs of samples stand: points (n, 3), directions (n, 3), heights (n,) as in `Feet`.
+
+        Where the feet of all samples of a run are known and lie in one plane, the mean stands at the mean of the feet:
+        only the other means are laid. (Another face that bends towards the path within the run could be nearer to the
+        mean alone, by the square of the run's length over its distance.)
+
+        Args:
+            centers: of the runs, m.
+            first: (n,) first sample of each.
+            stop: past the last sample of the last one.
+        """
+        found = np.empty((len(first), 3)), np.empty((len(first), 3)), np.empty(len(first))
+        known = np.zeros(len(first), dtype=bool)
+        kept = self._feet
+        if kept is not None and len(first):
+            used, runs, counts = slice(first[0], stop), first - first[0], np.diff(np.append(first, stop))
+            up = np.repeat(kept.normals[first], counts, axis=0)
+            turn = np.abs(kept.normals[used] - up).max(axis=1)
+            off = np.abs(((kept.points[used] - np.repeat(kept.points[first], counts, axis=0)) * up).sum(1))
+            flat = self._laid[used] & (turn < ONE_PLANE) & (off < ONE_PLANE * self.trace.tip_radius)
+            known = np.logical_and.reduceat(flat, runs)
+        if kept is not None and known.any():
+            own = np.flatnonzero(np.repeat(known, counts)) + first[0]
+            starts, share = np.cumsum([0, *counts[known][:-1]]), counts[known]
+            for place, values in zip(found, (kept.points, kept.normals, kept.height), strict=True):
+                place[known] = np.add.reduceat(values[own], starts) / (share if values.ndim == 1 else share[:, None])
+        if not known.all():
+            feet = self.base.foot(centers[~known], self.trace.tip_radius)
+            for place, values in zip(found, (feet.points, feet.normals, feet.height), strict=True):
+                place[~known] = values
+        return found
+
+    def touched(self) -> tuple[FloatArray, FloatArray]:
+        """Known points of the base under the sweep, and directions from there to the ball, both (M, 3)."""
+        if self._feet is not None and self._laid.all():
+            return self._feet.points, self._feet.normals
+        finest = min(self._heights, default=None)
+        bins = () if finest is None else self._heights[finest]
+        known = [(each.feet, each.normals) for each in bins if each.feet is not None and each.normals is not None]
+        if not known:
+            return np.zeros((0, 3)), np.zeros((0, 3))
+        return np.concatenate([points for points, _ in known]), np.concatenate([up for _, up in known])
+
+    def directions(self) -> tuple[FloatArray, FloatArray]:
+        """(M, 3) centres of which it is known what lies under them, in the order of time, and their directions."""
+        if self._feet is not None and self._laid.all():
+            return self.trace.centers, self._feet.normals
+        finest = min(self._heights, default=None)
+        bins = () if finest is None else self._heights[finest]
+        known = [(each.centers, each.normals) for each in bins if each.normals is not None]
+        if not known:
+            return np.zeros((0, 3)), np.zeros((0, 3))
+        return np.concatenate([centers for centers, _ in known]), np.concatenate([up for _, up in known])
 
     def take(self, feet: Feet, start: int) -> None:
         """Keep the feet of all samples, which were found elsewhere: they begin at `start` in `feet`."""
@@ -82,11 +146,30 @@ class LaidTrace(Trace):
         # index of the first sample of each sweep, and the count of all
         starts = np.cumsum([0, *(len(sweep.trace) for sweep in laid_sweeps)]).astype(np.int64)
         object.__setattr__(self, "_starts", starts)
+        object.__setattr__(self, "_touched", {})
 
     @classmethod
     def of(cls, trace: Trace, base: Base) -> LaidTrace:
         """The trace itself if it lies on this base already, else laid on it."""
         return trace if isinstance(trace, cls) and trace.base is base else cls(trace, base)
+
+    def touched(self, most: int) -> tuple[FloatArray, FloatArray]:
+        """Points of the base under the trace, and directions from there to the ball, both (M, 3).
+
+        Those of which it is known by now, thinned to about `most`; of sweeps without any, means of short stretches.
+        """
+        kept: dict[int, tuple[FloatArray, FloatArray]] = self.__dict__["_touched"]
+        if most not in kept:
+            parts = [(sweep, *sweep.touched()) for sweep in self.laid_sweeps]
+            rest = {sweep.number for sweep, points, _ in parts if not len(points)}
+            step = 1 + sum(len(points) for _, points, _ in parts) // most
+            points, up = [p[::step] for _, p, _ in parts], [n[::step] for _, _, n in parts]
+            if rest:
+                few = self.select(np.isin(self.sweep, list(rest)))
+                found = self.base.foot(Cells.of(few, most).centers, self.tip_radius)
+                points, up = [*points, found.points], [*up, found.normals]
+            kept[most] = np.concatenate([np.zeros((0, 3)), *points]), np.concatenate([np.zeros((0, 3)), *up])
+        return kept[most]
 
     def appended(self, trace: Trace) -> LaidTrace:
         """This one followed by further sweeps; what is known of the earlier ones stays known."""
@@ -110,6 +193,32 @@ class LaidTrace(Trace):
             start += len(sweep.trace)
         return kept
 
+    def directions(self, centers: FloatArray) -> FloatArray:
+        """(M, 3) unit directions from the base to centres on the sweeps, between those that are known, m.
+
+        A centre with nothing known within LONGEST_KNOWN_GAP of a tip radius is laid on the base.
+        """
+        from scipy.spatial import cKDTree
+
+        parts = [sweep.directions() for sweep in self.laid_sweeps]
+        known = np.concatenate([np.zeros((0, 3)), *(places for places, _ in parts)])
+        up = np.concatenate([np.zeros((0, 3)), *(normals for _, normals in parts)])
+        if len(known) < 2:
+            return self.base.foot(centers, self.tip_radius).normals
+        distance, near = cKDTree(known).query(centers)
+        found = up[near]
+        for step in (-1, 1):  # linearly towards the neighbour beyond which the centre does not lie
+            beside = np.clip(near + step, 0, len(known) - 1)
+            leg = known[beside] - known[near]
+            square = np.einsum("ij,ij->i", leg, leg)
+            share = np.einsum("ij,ij->i", centers - known[near], leg) / np.maximum(square, np.finfo(float).tiny)
+            between = (share > 0.0) & (share < 1.0) & (square < (LONGEST_KNOWN_GAP * self.tip_radius) ** 2)
+            found[between] += share[between, None] * (up[beside] - up[near])[between]
+        far = np.asarray(distance) > LONGEST_KNOWN_GAP * self.tip_radius
+        if far.any():
+            found[far] = self.base.foot(centers[far], self.tip_radius).normals
+        return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
     def feet(self, index: IntArray | None = None) -> Feet:
         """Where samples stand over the base: all, or those with these indices, which ascend."""
         if index is None:
@@ -128,11 +237,11 @@ class LaidTrace(Trace):
 
 def _empty(count: int) -> Feet:
     return Feet(
-        np.empty((count, 3)),
-        np.empty((count, 3)),
-        np.empty(count),
-        np.empty(count, dtype=np.int64),
-        np.empty((count, 3)),
+        np.zeros((count, 3)),
+        np.zeros((count, 3)),
+        np.zeros(count),
+        np.zeros(count, dtype=np.int64),
+        np.zeros((count, 3)),
     )
 
 

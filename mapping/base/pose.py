@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping import FloatArray, IntArray, Trace, TraceError
-from mapping.base.base import Base
+from mapping.base.base import Base, PoseRecord
 from mapping.base.cells import Cells
 from mapping.base.robust import BISQUARE, MAD_TO_SD
 
@@ -81,27 +80,32 @@ class Pose:
         return bool(np.linalg.norm(self.shift) <= shift and self.turn <= turn)
 
     def moved(self, base: Base) -> Base:
-        """The base where it really stands; its parameters keep the whole motion from the given mesh as "pose"."""
+        """The base where it really stands; it keeps the whole motion from the given mesh."""
         before = Pose.of(base)
         whole = self if before is None else self.after(before)
-        return base.moved(self.rotation, self.translation, base.parameters | {"pose": whole.record()})
+        return base.moved(self.rotation, self.translation, whole.record())
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> PoseRecord:
         """JSON values that `read` understands, SI units."""
-        arrays = {name: getattr(self, name).tolist() for name in ("rotation", "translation", "center", "covariance")}
-        return arrays | {"observable": self.observable, "scatter": self.scatter}
+        return PoseRecord(
+            rotation=self.rotation.tolist(),
+            translation=self.translation.tolist(),
+            center=self.center.tolist(),
+            covariance=self.covariance.tolist(),
+            observable=self.observable,
+            scatter=self.scatter,
+        )
 
     @classmethod
     def of(cls, base: Base) -> Pose | None:
         """The whole motion of a base that was moved, None of one that stands as given."""
-        record = base.parameters.get("pose")
-        return None if record is None else cls.read(record)
+        return None if base.pose is None else cls.read(base.pose)
 
     @classmethod
-    def read(cls, record: dict[str, Any]) -> Pose:
+    def read(cls, record: PoseRecord) -> Pose:
         """The pose of a record."""
-        names = ("rotation", "translation", "center", "covariance")
-        rotation, translation, center, covariance = (np.array(record[name], dtype=np.float64) for name in names)
+        arrays = record["rotation"], record["translation"], record["center"], record["covariance"]
+        rotation, translation, center, covariance = (np.array(array, dtype=np.float64) for array in arrays)
         return cls(rotation, translation, center, covariance, int(record["observable"]), float(record["scatter"]))
 
 

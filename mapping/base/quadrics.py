@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from mapping import FloatArray, IntArray, Surface, Trace
+from mapping.base.base import FitValue
 from mapping.base.cells import Cells
 from mapping.base.profiles import SHORTEST_BEND
 from mapping.base.robust import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_fit, robust_scale
@@ -110,7 +110,7 @@ class Fitted:
     """
 
     kind: str
-    parameters: dict[str, Any]
+    parameters: dict[str, FitValue]
     residual: FloatArray
     freedom: int
     mesh: Callable[[Cloud, float | None], Surface]

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from mapping import FloatArray
 
+STEP_CROSSINGS = ("step up", "step down")
+
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
@@ -43,3 +45,8 @@ class Crossing:
     curvature_feature: bool
     start: int
     stop: int
+
+    @property
+    def is_step(self) -> bool:
+        """True where the sweep went from one level to another, up or down."""
+        return self.kind in STEP_CROSSINGS

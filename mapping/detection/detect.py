@@ -11,11 +11,18 @@ from mapping import DetectionError, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
 from mapping.detection.candidates import LARGEST_SHARE, find_disturbances
 from mapping.detection.cap_fit import Disturbance
-from mapping.detection.crossing import Crossing
+from mapping.detection.crossing import STEP_CROSSINGS, Crossing
 from mapping.detection.false_alarms import threshold_for
 from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, Bank, smallest_half_width
 from mapping.detection.paper_algorithms import along_chord, curvature_features
-from mapping.detection.quiet_noise import SMALLEST_CREST_SNR, background, first_noise, floored, raw_stretches
+from mapping.detection.quiet_noise import (
+    RAW_SAMPLES,
+    SMALLEST_CREST_SNR,
+    background,
+    first_noise,
+    floored,
+    raw_stretches,
+)
 from mapping.instrument import Noise, StatedNoise
 
 # Half-width of the widest disturbance that counts as fine, in tip radii.
@@ -110,7 +117,10 @@ def detect(
     if base is None:
         base = fit_base(trace)
     tip = trace.tip_radius
-    usable, left_out = _usable(LaidTrace.of(trace, base))
+    laid = LaidTrace.of(trace, base)
+    if noise is None and len(trace) <= RAW_SAMPLES:
+        laid.feet()  # the noise is read from nearly all of them: whatever else is read follows from that
+    usable, left_out = _usable(laid)
     if not usable:
         return Detections((), noise or Noise(0.0), algorithm, np.inf, PROBABILITY, np.inf, 0.0, left_out)
     raw = float(np.median([_step(sweep) for sweep in usable]))
@@ -277,7 +287,7 @@ def _crossing(
     # definition 1 on the trace (theory section 3): k > 1/r on the body is k_t > 1/(2 r); a dip between two rims
     # is a kink, sharper than any curvature
     sharp = found.curvature > 1 / (2 * tip) if found.height > 0 else found.curvature < -1 / (2 * tip)
-    if kind.startswith("step"):
+    if kind in STEP_CROSSINGS:
         sharp = bool(abs(found.curvature) > 1 / (2 * tip))
     return Crossing(
         sweep=profile.sweep,

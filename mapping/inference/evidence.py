@@ -1,13 +1,14 @@
 """Evidence: the marginal likelihood of the trace under one family of shapes, its parameters integrated out.
 
-By it a bump's section is chosen: a cap, or a bell with a skirt.
+By it a section is chosen: of a bump a cap, or a bell with a skirt.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from mapping.inference.families import PosteriorProblem, Surroundings, spot_problem, with_free_tip
+from mapping.inference.families import PosteriorProblem, Surroundings, with_free_tip
+from mapping.inference.kinds import kind_of
 from mapping.inference.likelihood import LogPosterior
 from mapping.inference.sampler import find_optima, importance_sample, laplace
 
@@ -28,15 +29,18 @@ def log_evidence_of_nothing(target: LogPosterior) -> float:
     return float(target.likelihood.log_density(bare)[0])
 
 
-def better_profile(cap: PosteriorProblem, around: Surroundings, rng: np.random.Generator) -> PosteriorProblem | None:
-    """The problem of a bell if it has more evidence than a cap under the noise of the trace, else None.
+def better_section(first: PosteriorProblem, around: Surroundings, rng: np.random.Generator) -> PosteriorProblem | None:
+    """The alternative of a kind that has more evidence than its first family under the noise of the trace, else None.
 
     Args:
-        cap: the posed problem of a bump that no cap fits within that noise.
+        first: the posed problem of a feature that the first family does not fit within that noise.
         around: what it was posed in.
         rng: randomness of the importance sampling.
     """
-    bell = spot_problem(cap.feature, around, bell=True)
-    if around.tip_sd > 0.0:
-        bell = with_free_tip(bell, around.tip_sd, around.base.kind != "mesh")
-    return bell if log_evidence(bell, rng) > log_evidence(cap.under(around.noise), rng) else None
+    best: tuple[float, PosteriorProblem] | None = None
+    for posed in kind_of(first.feature).alternatives(first.feature, around):
+        other = with_free_tip(posed, around.tip_sd, around.base.kind != "mesh") if around.tip_sd > 0.0 else posed
+        evidence = log_evidence(other, rng)
+        if best is None or evidence > best[0]:
+            best = evidence, other
+    return best[1] if best is not None and best[0] > log_evidence(first.under(around.noise), rng) else None

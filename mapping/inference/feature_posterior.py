@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import EmptyWindowError, Feature, FloatArray, MappingError, Posterior, Trace
+from mapping import EmptyWindowError, Feature, FloatArray, Posterior, Trace
 from mapping.base import Base, fit_base
-from mapping.inference.evidence import better_profile, log_evidence_of_nothing
-from mapping.inference.families import PosteriorProblem, Surroundings, curve_problem, spot_problem, with_free_tip
+from mapping.inference.evidence import better_section, log_evidence_of_nothing
+from mapping.inference.families import PosteriorProblem, Surroundings, with_free_tip
+from mapping.inference.kinds import kind_of
 from mapping.inference.model_error import account_for_misfit
 from mapping.inference.sampler import (
     TRUSTED_K_HAT,
@@ -27,8 +28,6 @@ from mapping.inference.summary import describe
 from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise
 
-# Kinds that have a closed-form trace here; the others are reported as detected.
-SAMPLED_KINDS = ("bump", "ridge", "pit", "groove", "step")
 KEPT_DRAWS = 1000
 
 
@@ -94,10 +93,10 @@ def refine(
 ) -> Feature:
     """The feature with posterior, intervals and axis from the draws; arguments as for `sample_posterior`.
 
-    Kinds without a closed form ("convex edge", "concave corner") come back as they are, with a note; so does, with no
+    Kinds without a closed form (edges) come back as they are, with a note; so does, with no
     evidence, a feature without any sample near it.
     """
-    if feature.kind not in SAMPLED_KINDS:
+    if not kind_of(feature).sampled:
         note = f"no posterior: a {feature.kind} has no closed-form trace"
         return replace(feature, notes=(*feature.notes, note))
     base = base or _fitted(trace)
@@ -131,11 +130,10 @@ def solve(
     noise = (noise or noise_of_trace(trace, base)).rounded(trace.resolution)
     around = Surroundings(trace, base, noise, others, tip_sd)
     solution = solve_problem(pose_problem(feature, around), rng, confirm=confirm)
-    if feature.kind != "bump" or solution.problem.misfit == 0.0:
+    if solution.problem.misfit == 0.0:
         return solution
-
-    bell = better_profile(solution.problem, around, rng)
-    return solution if bell is None else solve_problem(bell, rng, confirm=confirm)
+    better = better_section(solution.problem, around, rng)
+    return solution if better is None else solve_problem(better, rng, confirm=confirm)
 
 
 def settle(feature: Feature, around: Surroundings) -> Feature:
@@ -143,7 +141,7 @@ def settle(feature: Feature, around: Surroundings) -> Feature:
 
     Kinds without a closed form, and features without a sample near them, come back as they are.
     """
-    if feature.kind not in SAMPLED_KINDS:
+    if not kind_of(feature).sampled:
         return feature
     around = replace(around, noise=around.noise.rounded(around.trace.resolution))
     try:
@@ -162,17 +160,14 @@ def odds_against_nothing(solution: Solution) -> float:
 
 
 def pose_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
-    """The posterior density of a feature of any kind that has a closed form."""
-    if feature.kind in ("bump", "pit"):
-        problem = spot_problem(feature, around)
-    elif feature.kind in ("ridge", "groove", "step"):
-        problem = curve_problem(feature, around)
-    else:
-        possible = ", ".join(SAMPLED_KINDS)
-        raise MappingError(f"no posterior for a {feature.kind!r}: closed-form traces exist for {possible}")
-    if not around.tip_sd > 0.0:
-        return problem
-    return with_free_tip(problem, around.tip_sd, base_was_felt=around.base.kind != "mesh")
+    """The posterior density of a feature of any kind that has a closed form.
+
+    Raises:
+        MappingError: a kind without one.
+    """
+    problem = kind_of(feature).problem(feature, around)
+    base_was_felt = around.base.kind != "mesh"
+    return with_free_tip(problem, around.tip_sd, base_was_felt) if around.tip_sd > 0.0 else problem
 
 
 def solve_problem(

@@ -10,9 +10,10 @@ import numpy as np
 from mapping import Feature, Trace
 from mapping.base import Base
 from mapping.geometry.mesh import distances
-from mapping.inference.families import Surroundings, sizes_of
+from mapping.inference.families import Surroundings
 from mapping.inference.feature_posterior import refine, settle
 from mapping.inference.junctions import Meeting, brought_together, meetings
+from mapping.inference.kinds import sizes_of
 from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise
 

@@ -11,12 +11,12 @@ from mapping import Details, Feature, FloatArray, Interval
 from mapping.base import Base, onto_base
 from mapping.geometry.mesh import arclengths, nearest_on
 from mapping.inference.families import MEETING_REACH, touches
+from mapping.inference.kinds import kind_of
 from mapping.inference.summary import with_open_ends
 
 # A course is known no better than this share of the half-width; places that settle the meeting place
 LEAST_SD, MEETING_ROUNDS = 1e-3, 5
 NORMAL_QUANTILE_95 = 1.6448536
-LINES = ("ridge", "groove")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Meeting:
 def meetings(features: Sequence[Feature], half_widths: Sequence[float]) -> list[Meeting]:
     """The places at which ridges and grooves that were detected as one detail end on one another."""
     found: list[Meeting] = []
-    lines = [k for k, feature in enumerate(features) if feature.kind in LINES and feature.junction]
+    lines = [k for k, feature in enumerate(features) if feature.junction and kind_of(feature).has_ends]
     for number in lines:
         feature, half_width = features[number], half_widths[number]
         for end in () if feature.closed else (0, -1):

@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from mapping import Feature, MappingError
-from mapping.inference.families import BrokenRidgeShape, PosteriorProblem, RidgeShape, Surroundings, bump_shape, spot_at
+from mapping.inference.families import BrokenRidgeShape, PosteriorProblem, RidgeShape, Surroundings, spot_at
+from mapping.inference.kinds import bump_shape
 from mapping.inference.likelihood import LogPosterior
 from mapping.inference.sampler import find_optima
 

@@ -10,18 +10,8 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Interval, Posterior
 from mapping.base import Base, onto_base
-from mapping.geometry.templates import rim_height, width_of_cap
-from mapping.inference.families import (
-    BellShape,
-    BumpShape,
-    GrooveShape,
-    PitShape,
-    PosteriorProblem,
-    RidgeShape,
-    StepShape,
-    width_at_half_height,
-    with_nominal_tip,
-)
+from mapping.inference.families import PosteriorProblem, with_nominal_tip
+from mapping.inference.kinds import LineShape, PointShape, kind_of
 
 # Draws that lengths of curves are measured on, and points of the reported axis.
 FEW_DRAWS = 400
@@ -31,15 +21,11 @@ AXIS_POINTS = 64
 def describe(problem: PosteriorProblem, posterior: Posterior, base: Base) -> Feature:
     """The detected feature with axis, intervals and standard deviation from the draws of its posterior."""
     full, problem = posterior, with_nominal_tip(problem)
-    shape = problem.target.shape
+    shape: Any = problem.target.shape
     # What is described is the feature: the draws of a free tip's radius, in the last column, are left out.
     posterior = replace(full, samples=full.samples[:, : len(shape.names)])
-    if isinstance(shape, BumpShape | BellShape | PitShape):
-        feature = _describe_spot(problem, shape, posterior, base)
-    elif isinstance(shape, RidgeShape | GrooveShape | StepShape):
-        feature = _describe_curve(problem, shape, posterior, base)
-    else:
-        raise TypeError(f"no description for the shape {type(shape).__name__}")
+    described = _describe_line if kind_of(problem.feature).line else _describe_point
+    feature = described(problem, shape, posterior, base)
     notes = tuple(note for note in (*feature.notes, *_warnings(posterior)) if note)
     return replace(feature, posterior=full, notes=tuple(dict.fromkeys(notes)))
 
@@ -50,40 +36,37 @@ def _warnings(posterior: Posterior) -> tuple[str, ...]:
     return (f"posterior: {posterior.status}: {posterior.reason}",)
 
 
-def _describe_spot(
-    problem: PosteriorProblem, shape: BumpShape | BellShape | PitShape, posterior: Posterior, base: Base
-) -> Feature:
+def _describe_point(problem: PosteriorProblem, shape: PointShape, posterior: Posterior, base: Base) -> Feature:
     draws = posterior.samples
     place = np.zeros((1, 2))
     place[0, : shape.free] = np.median(draws[:, : shape.free], axis=0)
     point = shape.spot.lifted(place, np.zeros(1))
     axis, normals = onto_base(point, shape.spot.normal[None], base, shape.tip_radius)
     sd = float(np.sqrt((draws[:, : shape.free].std(axis=0) ** 2).mean()))
-    height, width, radius, note = _section(problem, shape, draws)
-    notes = [note] if note else []
+    section = kind_of(problem.feature).section(problem.feature, shape, draws)
+    notes = [section.note] if section.note else []
     if shape.free == 1:
         notes.append("seen by a single sweep: the position across it is not known")
     return replace(
         problem.feature,
         axis=axis,
         normals=normals,
-        height=height,
-        width=width,
+        height=section.height,
+        width=section.width,
         length=Interval(0.0, 0.0, 0.0),
         position_sd=sd,
         notes=(*problem.feature.notes, *notes),
-        details=replace(problem.feature.details, **radius),
+        details=replace(problem.feature.details, **section.details),
     )
 
 
-def _describe_curve(
-    problem: PosteriorProblem, shape: RidgeShape | GrooveShape | StepShape, posterior: Posterior, base: Base
-) -> Feature:
+def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Posterior, base: Base) -> Feature:
     draws, chart, modes = posterior.samples, shape.chart, shape.modes
-    has_ends = not chart.closed and not isinstance(shape, StepShape)
+    has_ends = not chart.closed and kind_of(problem.feature).has_ends
     low, high = float(chart.s[0]), float(chart.s[-1])
     if has_ends:
-        low, high = float(np.median(draws[:, -4])), float(np.median(draws[:, -3]))
+        ends = _ends(problem)
+        low, high = (float(np.median(draws[:, column])) for column in ends)
     count = AXIS_POINTS if (chart.closed or len(chart.s) > 8 or modes.degree > 1) else 2
     s = np.linspace(low, high, count)
     points, laterals, normals, bend = chart.at(s)
@@ -93,63 +76,41 @@ def _describe_curve(
     axis, normals = onto_base(points, normals, base, shape.tip_radius)
     if chart.closed:
         axis[-1], normals[-1] = axis[0], normals[0]
-    height, width, radius, note = _section(problem, shape, draws)
+    section = kind_of(problem.feature).section(problem.feature, shape, draws)
     length, notes = _length(problem, shape, draws, has_ends)
     # Along the axis: how well it is known across itself, and its two ends along itself (first, last).
     known: dict[str, Any] = {"axis_sd": courses.std(axis=0)}
     if has_ends:
-        spans = np.quantile(draws[:, -4:-2], [0.05, 0.95], axis=0) - [low, high]
+        spans = np.quantile(draws[:, ends], [0.05, 0.95], axis=0) - [low, high]
         known |= {"end_intervals": spans.T, "ends_seen": explored(problem, draws)}
     return replace(
         problem.feature,
         axis=axis,
         normals=normals,
-        height=height,
-        width=width,
+        height=section.height,
+        width=section.width,
         length=length,
         position_sd=float(np.sqrt(courses.var(axis=0).mean())),
-        notes=(*problem.feature.notes, *notes, *([note] if note else [])),
-        details=replace(problem.feature.details, **radius, **known),
+        notes=(*problem.feature.notes, *notes, *([section.note] if section.note else [])),
+        details=replace(problem.feature.details, **section.details, **known),
     )
 
 
-def _section(
-    problem: PosteriorProblem, shape: object, draws: FloatArray
-) -> tuple[Interval, Interval, dict[str, Any], str]:
-    """Height, width, details of the section and a remark."""
-    if isinstance(shape, StepShape):
-        sign = 1.0 if problem.feature.height.median >= 0.0 else -1.0
-        return Interval.from_draws(sign * draws[:, -1]), Interval(0.0, 0.0, 0.0), {}, ""
-    if isinstance(shape, BumpShape | RidgeShape):
-        radii = np.exp(draws[:, -1])
-        cap = Interval.from_draws(width_of_cap(draws[:, -2], radii))
-        return Interval.from_draws(draws[:, -2]), cap, {"radius": float(np.median(radii))}, ""
-    if isinstance(shape, BellShape):
-        scale, exponent = np.exp(draws[:, -2]), np.exp(draws[:, -1])
-        full = Interval.from_draws(width_at_half_height(scale, exponent))
-        bell = {"scale": float(np.median(scale)), "exponent": float(np.median(exponent))}
-        return Interval.from_draws(draws[:, -3]), full, bell, "its flank runs out in a skirt: width at half height"
-    width, depth = np.exp(draws[:, -2]), np.exp(draws[:, -1])
-    tip = shape.tip_radius  # type: ignore[attr-defined]
-    unhindered = -rim_height(0.5 * width, tip)
-    dips = np.minimum(unhindered, depth)
-    # Where the ball hangs between the rims the bottom is out of reach: the dip bounds the depth from below.
-    censored = bool(np.mean(depth > unhindered) > 0.05)
-    values = -dips if censored else -depth
-    low, median, high = np.quantile(values, [0.05, 0.5, 0.95])
-    note = "the ball does not reach the bottom: at least this deep" if censored else ""
-    return Interval(float(median), float(low), float(high), censored), Interval.from_draws(width), {}, note
+def _ends(problem: PosteriorProblem) -> list[int]:
+    """Columns of the places of the two ends."""
+    names = problem.target.shape.names
+    return [names.index("start"), names.index("end")]
 
 
 def _length(
-    problem: PosteriorProblem, shape: RidgeShape | GrooveShape | StepShape, draws: FloatArray, has_ends: bool
+    problem: PosteriorProblem, shape: LineShape, draws: FloatArray, has_ends: bool
 ) -> tuple[Interval, list[str]]:
     chart, modes = shape.chart, shape.modes
     some = draws[:: max(1, len(draws) // FEW_DRAWS)]
     lengths = np.empty(len(some))
     for i, theta in enumerate(some):
-        ends = (theta[-4], theta[-3]) if has_ends else (chart.s[0], chart.s[-1])
-        s = np.linspace(*ends, AXIS_POINTS if len(chart.s) > 8 or modes.degree > 1 else 2)
+        first, last = theta[_ends(problem)] if has_ends else chart.s[[0, -1]]
+        s = np.linspace(first, last, AXIS_POINTS if len(chart.s) > 8 or modes.degree > 1 else 2)
         points, laterals, _, _ = chart.at(s)
         course = points + modes.lateral(theta[None, : modes.count], s)[0][:, None] * laterals
         lengths[i] = np.linalg.norm(np.diff(course, axis=0), axis=1).sum()
@@ -157,7 +118,9 @@ def _length(
     if chart.closed:
         return interval, []
     if not has_ends:
-        return replace(interval, censored=True), ["the length of a step is what was explored of it: at least this"]
+        return replace(interval, censored=True), [
+            f"the length of a {problem.feature.kind} is what was explored of it: at least this"
+        ]
     seen = explored(problem, draws)
     return (interval, []) if all(seen) else (replace(interval, censored=True), [*with_open_ends((), seen)])
 
@@ -176,7 +139,7 @@ def explored(problem: PosteriorProblem, draws: FloatArray) -> tuple[bool, bool]:
     target = problem.target
     best = draws[int(np.argmax(target.log_density(draws)))]
     at_limit = np.tile(best, (3, 1))
-    columns = len(best) - 4, len(best) - 3
+    columns = _ends(problem)
     at_limit[1, columns[0]] = target.low[columns[0]]
     at_limit[2, columns[1]] = target.high[columns[1]]
     value = target.log_density(at_limit)

@@ -6,13 +6,11 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from mapping.model.feature_mesh import drawn_at_least as drawn_at_least, feature_mesh as feature_mesh
-    from mapping.model.glb import KIND_COLOURS as KIND_COLOURS, OTHER_COLOUR as OTHER_COLOUR
     from mapping.model.merging import merge_model as merge_model
     from mapping.model.object_model import ObjectModel as ObjectModel
 
 _PUBLIC = {
     "feature_mesh": ("drawn_at_least", "feature_mesh"),
-    "glb": ("KIND_COLOURS", "OTHER_COLOUR"),
     "merging": ("merge_model",),
     "object_model": ("ObjectModel",),
 }

@@ -10,11 +10,8 @@ from mapping import Feature, FloatArray, IntArray, Interval, Surface
 from mapping.base import tangent_frame
 from mapping.geometry.mesh import directions
 from mapping.inference.families import width_at_half_height
+from mapping.inference.kinds import RIBBON_LIFT, SECTION_CORNERS, kind_of
 
-# Corners of half a cross-section, and of a turn round a bump: smooth to the eye, light on disk.
-CORNERS = 17
-# A ribbon stands this part of its width above the base, lest viewers show it in stripes.
-RIBBON_LIFT = 0.02
 # A bell is drawn down to this share of its height.
 DRAWN_BELL_SHARE = 0.03
 
@@ -29,12 +26,8 @@ def feature_mesh(feature: Feature) -> Surface:
     height, width = _size(feature)
     if len(feature.axis) == 1:
         return _turned(feature, _meridian(feature, max(height, RIBBON_LIFT * width), width))
-    if feature.kind == "step":
-        return _sweep(feature, np.array([[0.0, 0.0], [0.0, height]]), closed=False)
-    if height < 0.0:
-        return _sweep(feature, width * np.array([[0.5, RIBBON_LIFT], [-0.5, RIBBON_LIFT]]), closed=False)
-    turn = np.linspace(0.0, np.pi, CORNERS)
-    return _sweep(feature, np.column_stack([0.5 * width * np.cos(turn), height * np.sin(turn)]), closed=True)
+    section, closed = kind_of(feature).outline(height, width)
+    return _sweep(feature, section, closed=closed)
 
 
 def drawn_at_least(feature: Feature, size: float) -> Feature:
@@ -60,20 +53,20 @@ def _meridian(feature: Feature, height: float, width: float) -> FloatArray:
     """(M, 2) distances from the axis of a point feature and heights, m, from the crest down to the base."""
     p = feature.details.exponent
     if p is not None and feature.height.median > 0.0:
-        share = np.linspace(0.0, 1.0, 2 * CORNERS)
+        share = np.linspace(0.0, 1.0, 2 * SECTION_CORNERS)
         # evenly spaced in the distance up to where the skirt is hardly higher than the base
         place = share * np.sqrt(p * np.expm1(-np.log(DRAWN_BELL_SHARE) / p))
         fall = (1.0 + place**2 / p) ** -p
         bell = np.column_stack([width / float(width_at_half_height(1.0, p)) * place, height * fall])
         return np.vstack([bell, [bell[-1, 0], 0.0]])
-    polar = np.linspace(0.0, 0.5 * np.pi, CORNERS // 2 + 1)
+    polar = np.linspace(0.0, 0.5 * np.pi, SECTION_CORNERS // 2 + 1)
     return np.column_stack([0.5 * width * np.sin(polar), height * np.cos(polar)])
 
 
 def _turned(feature: Feature, meridian: FloatArray) -> Surface:
     """The body of revolution of a meridian (M, 2) that begins on the axis, over the feature's point."""
     frame = tangent_frame(feature.normals[0], np.zeros(3))
-    around = np.linspace(0.0, 2.0 * np.pi, 2 * CORNERS)[:-1]
+    around = np.linspace(0.0, 2.0 * np.pi, 2 * SECTION_CORNERS)[:-1]
     radius, up = meridian[1:, :1], meridian[1:, 1:]
     local = np.stack(np.broadcast_arrays(radius * np.cos(around), radius * np.sin(around), up), axis=-1)
     points = np.concatenate([[[0.0, 0.0, meridian[0, 1]]], local.reshape(-1, 3)])

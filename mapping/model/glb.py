@@ -8,18 +8,11 @@ from typing import Any
 import numpy as np
 
 from mapping import Feature, FloatArray, Surface
+from mapping.inference.kinds import kind_of
 from mapping.model.feature_mesh import feature_mesh
 from mapping.model.json_record import MODEL_SCHEMA, feature_record
 
 GLB_BASE_COLOUR = (0.78, 0.80, 0.83, 1.0)
-KIND_COLOURS = {
-    "bump": (0.85, 0.37, 0.01, 1.0),
-    "ridge": (0.80, 0.16, 0.22, 1.0),
-    "pit": (0.20, 0.53, 0.74, 1.0),
-    "groove": (0.13, 0.37, 0.66, 1.0),
-    "step": (0.48, 0.31, 0.64, 1.0),
-}
-OTHER_COLOUR = (0.25, 0.25, 0.25, 1.0)
 # glTF allows no NaN in a vertex attribute: this stands for "not known".
 UNKNOWN_ATTRIBUTE = -1.0
 
@@ -47,7 +40,7 @@ def glb_bytes(
         # The central 90 % of a Gaussian is 2 * 1.645 standard deviations wide.
         spread = np.full(len(mesh.vertices), (feature.height.high - feature.height.low) / 3.29)
         touched = np.zeros(len(mesh.vertices))
-        _add(scene, feature.id, mesh, origin, KIND_COLOURS.get(feature.kind, OTHER_COLOUR), spread, touched)
+        _add(scene, feature.id, mesh, origin, kind_of(feature).colour, spread, touched)
     extras: dict[str, Any] = {feature.id: feature_record(feature) for feature in features}
     extras["base"] = {"schema": MODEL_SCHEMA, "units": "m"}
 

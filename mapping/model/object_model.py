@@ -124,11 +124,8 @@ class ObjectModel:
         file = Path(path) / "model.json" if Path(path).is_dir() else Path(path)
         record, arrays = _read(file)
         try:
-            base = Base(
-                Surface(arrays["base_vertices"], arrays["base_faces"]),
-                record["base"]["kind"],
-                record["base"]["parameters"],
-            )
+            surface = Surface(arrays["base_vertices"], arrays["base_faces"])
+            base = Base.read(surface, record["base"]["kind"], record["base"]["parameters"])
             return cls(
                 base,
                 tuple(read_feature(each, arrays.get(f"draws/{each.get('id')}")) for each in record["features"]),
@@ -153,7 +150,7 @@ class ObjectModel:
             "units": "m",
             "base": {
                 "kind": self.base.kind,
-                "parameters": plain(self.base.parameters, "base.parameters"),
+                "parameters": plain(self.base.record(), "base.parameters"),
                 "mesh": {"file": "model.glb", "node": "base"},
                 "arrays": "model.npz",
                 "vertices": len(surface.vertices),

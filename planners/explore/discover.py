@@ -84,7 +84,7 @@ class Discover:
             felt.traces.extend(fresh)
             base = self._fit(felt)
             if miss <= allowed:
-                tested = replace(base, parameters=base.parameters | {"missed": miss})
+                tested = replace(base, missed=miss)
                 return Outcome("done", f"a {base.kind} that missed the last sweeps by {1e3 * miss:.3f} mm", tested)
         return Outcome("done", f"a {base.kind} that still missed the last sweeps by {1e3 * miss:.3f} mm", base)
 

@@ -208,7 +208,7 @@ class Explore:
         for index, track in enumerate(found.tracks):
             for which, end in enumerate(track.ends):
                 done = found.slides.get((index, which), 0)
-                if end.reason == "end" and end.sd > self._enough(track) and done < MOST_SLIDES and track.kind != "step":
+                if end.reason == "end" and end.sd > self._enough(track) and done < MOST_SLIDES and not track.step:
                     seconds = 1.65 * track.half_width / self.speed
                     # n slides leave 1 / sqrt(n) of the uncertainty of one
                     left = float(np.sqrt((done + 1.0) / (done + 2.0)))

@@ -58,7 +58,7 @@ class AxisTrack:
     Args:
         points, normals: (K, 3) on the base, in order along the axis, ends included.
         sign: +1 for ridges, -1 for grooves.
-        kind: kind of its crossings ("convex", "concave" or "step").
+        step: True where it is the edge between two levels, not a crest or a hollow.
         height, height_sd: median |height| of its crossings, and its standard deviation, m.
         half_width: median half-width of the disturbance, m.
         ends: of the first and the last point; none if closed.
@@ -67,7 +67,7 @@ class AxisTrack:
     points: FloatArray
     normals: FloatArray
     sign: float
-    kind: str
+    step: bool
     height: float
     height_sd: float
     half_width: float
@@ -94,7 +94,7 @@ class AxisTrack:
         if self.sign * crossing.height < 0:
             # the skirts of a crest may show as shallow dips, and the rims of a groove as low crests
             return away < 1.5 * self.half_width and abs(crossing.height) < 0.3 * self.height + slack
-        if self.kind == "step":
+        if self.step:
             return away < 1.5 * self.half_width
         near = max(away - 2.0 * crossing.position_sd - 0.1 * self.half_width, 0.0)
         expected = self.height * (1.0 - min(near / (1.2 * self.half_width), 1.0) ** 2)

@@ -15,12 +15,12 @@ from planners.paths import Strokes, tangential
 
 # Cosine of the angle between two branches of one line, at most
 OPPOSITE = -0.4
-NAMES_BY_BRANCHES = ("bump", "end of a ridge", "ridge", "junction")
+NAMES_BY_BRANCHES = ("spot", "end of a line", "line", "junction")
 
 
 @dataclass(frozen=True, eq=False)
 class Circuit:
-    """Goes round a detection once and counts what it crosses: 0 bump, 1 end, 2 ridge, 3 or more junction.
+    """Goes round a detection once and counts what it crosses: 0 spot, 1 end, 2 line, 3 or more junction.
 
     Args:
         strokes, sense: how to touch and to feel.

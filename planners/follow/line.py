@@ -58,7 +58,7 @@ def joined(halves: list[tuple[Line, AxisEnd | None]], sign: float) -> AxisTrack:
         first_end = AxisEnd(crossings[0].point, np.inf, "lost", -_first_step(crossings))
     points = [c.point for c in crossings]
     normals = [c.normal for c in crossings]
-    kind = "step" if is_step(crossings[0]) else crossings[0].kind
+    step = is_step(crossings[0])
     height, sd = mean_height(crossings[1:-1] or crossings)
     half_width = float(np.median([c.half_width for c in crossings]))
     if last_end is None or first_end is None:
@@ -66,9 +66,9 @@ def joined(halves: list[tuple[Line, AxisEnd | None]], sign: float) -> AxisTrack:
             points, normals = points[:-1], normals[:-1]
         points.append(points[0])
         normals.append(normals[0])
-        return AxisTrack(np.array(points), np.array(normals), sign, kind, height, sd, half_width, ())
+        return AxisTrack(np.array(points), np.array(normals), sign, step, height, sd, half_width, ())
     ends = (first_end, last_end)
-    track = AxisTrack(np.array(points), np.array(normals), sign, kind, height, sd, half_width, ends)
+    track = AxisTrack(np.array(points), np.array(normals), sign, step, height, sd, half_width, ends)
     for index, tip in enumerate(ends):
         if tip.reason in ("end", "edge of the model"):
             track = track.with_end(index, tip)

@@ -18,7 +18,7 @@ SEEN_CHI_SQUARE_FALL = 25.0
 
 def is_step(crossing: Crossing) -> bool:
     """True for the kinds "step up" and "step down"."""
-    return crossing.kind.startswith("step")
+    return crossing.is_step
 
 
 def slender(crossing: Crossing, tip_radius: float) -> float:

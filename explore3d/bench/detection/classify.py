@@ -25,6 +25,7 @@ from mapping import Feature, FloatArray, Trace
 from mapping.assembly import assemble
 from mapping.base import Base
 from mapping.detection import detect
+from mapping.inference.kinds import kind_named
 from mapping.model import ObjectModel
 from planners.paths import Strokes
 
@@ -100,7 +101,7 @@ def _rightly_named(pair: Comparison) -> bool:
         return False
     if len(true.axis) == 1:
         return pair.axis_rms < MOST_AXIS_OFFSET
-    endless = true.kind in ("step", "convex edge", "concave corner")
+    endless = not kind_named(true.kind).has_ends
     return pair.axis_max < MOST_AXIS_OFFSET and (endless or abs(pair.length_error) < MOST_LENGTH_ERROR)
 
 
@@ -162,7 +163,7 @@ def following(true: TrueFeature, strokes: Strokes, rng: np.random.Generator) -> 
         along = (true.axis[leg + 1] - true.axis[leg]) / legs[leg]
         point = true.axis[leg] + (at - s[leg]) * along
         moves.append(strokes.line(point, np.cross([0.0, 0.0, 1.0], along), 2.2 * half, 2.2 * half))
-    if not _returns(true.axis) and true.kind in ("ridge", "groove"):
+    if not _returns(true.axis) and kind_named(true.kind).has_ends:
         for end, inner in ((true.axis[0], true.axis[1]), (true.axis[-1], true.axis[-2])):
             away = (end - inner) / np.linalg.norm(end - inner)
             moves.append(strokes.line(end, away, half, 2.0 * half))

@@ -18,20 +18,20 @@ from typing import Any
 
 import numpy as np
 
+from explore3d import UserError
 from explore3d.bench.scenes import SAMPLE_SPACING, simulate_noise
-from mapping import Feature, FloatArray, Interval, Support, Surface, Trace
+from mapping import KINDS, Feature, FloatArray, Interval, Support, Surface, Trace
 from mapping.base import Base
-from mapping.geometry.templates import chain_height, groove_height, rim_height, step_height, width_of_cap
+from mapping.geometry.templates import width_of_cap
 from mapping.inference import Solution, pose_problem, solve_problem
-from mapping.inference.families import PosteriorProblem, RidgeShape, Surroundings, rounding_of
+from mapping.inference.families import PosteriorProblem, Surroundings
+from mapping.inference.kinds import kind_named
 from mapping.inference.likelihood import Normal, Prior, Uniform
 from mapping.instrument import Noise
 
 TIP_RADIUS = 10e-3
-# Wire of the paper; the other features are of sizes that the same tip feels about as well.
-WIRE_DIAMETER = 0.65e-3
 CALIBRATED_NOISES = ("white", "ell 0.3 mm", "ell 1 mm", "ell 3 mm", "low white")
-CALIBRATED_KINDS = ("ridge", "bump", "groove", "pit", "step")
+CALIBRATED_KINDS = tuple(name for name in KINDS if kind_named(name).typical is not None)
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,9 @@ def run_case(case: Case) -> Row:
     feature, paths = nominal(case.kind)
     blank = _blank(case.kind)
     truth = np.array([float(prior.draw(rng, 1)[0]) for prior in blank.target.shape.priors])
-    heights = _true_heights(case.kind, blank, truth, np.concatenate(paths))
+    feet = np.concatenate(paths)
+    up = np.tile([0.0, 0.0, 1.0], (len(feet), 1))
+    heights = kind_named(case.kind).heights(blank.target.shape, truth, feet, up)
     trace = record(paths, heights + simulate_noise(noise, paths, rng))
     believed = noise if case.assumed == "true" else Noise(noise.sd)
     problem = _with_priors(pose_problem(feature, Surroundings(trace, plate(), believed)))
@@ -93,9 +95,10 @@ def _blank(kind: str) -> PosteriorProblem:
 
 def nominal(kind: str) -> tuple[Feature, list[FloatArray]]:
     """The feature as a detector would report it, and the sweeps over it: crossings, and slides off both ends."""
-    height = {"ridge": WIRE_DIAMETER, "bump": WIRE_DIAMETER, "groove": -0.05e-3, "pit": -0.1e-3, "step": 0.3e-3}[kind]
-    width = {"ridge": WIRE_DIAMETER, "bump": WIRE_DIAMETER, "groove": 2e-3, "pit": 3e-3, "step": 0.0}[kind]
-    point = kind in ("bump", "pit")
+    found = kind_named(kind)
+    if found.typical is None:
+        raise UserError(f"no calibration of a {kind!r}; possible: {', '.join(CALIBRATED_KINDS)}")
+    (height, width), point = found.typical, not found.line
     axis = np.zeros((1, 3)) if point else np.array([[-12e-3, 0.0, 0.0], [12e-3, 0.0, 0.0]])
     zero = Interval(0.0, 0.0, 0.0)
     feature = Feature(
@@ -159,44 +162,6 @@ def _with_priors(problem: PosteriorProblem) -> PosteriorProblem:
     }
     priors = tuple(named[name](float(start)) for name, start in zip(shape.names, shape.start, strict=True))
     return replace(problem, target=replace(problem.target, shape=replace(shape, priors=priors)))
-
-
-def _true_heights(kind: str, problem: PosteriorProblem, truth: FloatArray, feet: FloatArray) -> FloatArray:
-    """(N,) heights of the true feature over raw foot points on the plate, from the closed forms, not binned."""
-    shape: Any = problem.target.shape
-    up = np.tile([0.0, 0.0, 1.0], (len(feet), 1))
-    if kind == "ridge":
-        assert isinstance(shape, RidgeShape)
-        return _ridge_heights(shape, truth, feet, up)
-    if kind in ("bump", "pit"):
-        place = np.zeros(2)
-        place[: shape.free] = truth[: shape.free]
-        center = shape.spot.point + place @ shape.spot.axes
-        if kind == "pit":
-            rim = 0.5 * np.exp(truth[-2]) - np.linalg.norm(feet - center, axis=1)
-            return rim_height(rim, TIP_RADIUS, np.exp(truth[-1]))
-        radius = float(np.exp(truth[-1]))
-        return chain_height(feet, up, center + np.array([0.0, 0.0, truth[-2] - radius]), radius, TIP_RADIUS)
-    s, lateral, _ = shape.chart.coordinates(feet)
-    x = lateral - shape.modes.lateral(truth[None, : shape.modes.count], s)[0]
-    if kind == "step":
-        return step_height(shape.high_side * x, truth[-1], TIP_RADIUS)
-    inside = np.minimum(s - truth[-4], truth[-3] - s)
-    across = groove_height(x, np.exp(truth[-2]), TIP_RADIUS, np.exp(truth[-1]))
-    return np.maximum(across, rim_height(inside, TIP_RADIUS, np.exp(truth[-1])))
-
-
-def _ridge_heights(shape: RidgeShape, truth: FloatArray, feet: FloatArray, up: FloatArray) -> FloatArray:
-    """(N,) heights of one ridge over raw foot points: the compiled form, over points instead of bins."""
-    from mapping.geometry.templates import chain_heights
-
-    radius = np.exp(truth[-1:])
-    chain = shape.chains(truth[None], truth[-2:-1] - radius)
-    whole = np.zeros(len(feet), dtype=np.int64), np.full(len(feet), chain.shape[1] - 1, dtype=np.int64)
-    out = np.empty((1, len(feet)))
-    point = np.full(len(feet), 1e-15)
-    chain_heights(feet, up, np.zeros_like(up), point, *whole, chain, radius, rounding_of(truth[-5:-4]), TIP_RADIUS, out)
-    return np.asarray(out[0])
 
 
 def _places(solution: Solution, truth: FloatArray) -> dict[str, float]:

@@ -22,6 +22,7 @@ from explore3d.bench.posterior.calibration import plate, record, straight_path
 from mapping import Feature, FloatArray, Interval, Support
 from mapping.inference import as_broken, as_bump, log_evidence, log_evidence_of_nothing, pose_problem
 from mapping.inference.families import BrokenRidgeShape, BumpShape, PosteriorProblem, Surroundings
+from mapping.inference.kinds import kind_named
 from mapping.instrument import Noise
 
 # So low that most of what the priors hold is not plain to see.
@@ -59,7 +60,7 @@ def hypotheses(pair: str) -> tuple[PosteriorProblem, PosteriorProblem | None]:
 
 
 def _feature(kind: str, height: float, half: float) -> Feature:
-    axis = np.zeros((1, 3)) if kind == "bump" else np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
+    axis = np.zeros((1, 3)) if not kind_named(kind).line else np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
     sizes = Interval.normal(height, 0.1 * height), Interval(height, 0.5 * height, 2.0 * height)
     length = Interval.normal(2.0 * half, half)
     return Feature(kind, axis, np.tile([0.0, 0.0, 1.0], (len(axis), 1)), *sizes, length, Support(5.0, 4), True, 0.2e-3)

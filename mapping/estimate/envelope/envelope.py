@@ -113,11 +113,10 @@ def _step(points: Estimate, apart: float) -> float:
 
 
 def _directions(trace: Trace, base: Base | None, outward: ArrayLike | None) -> FloatArray | Directions:
-    """Directions away from the body: over a base those of any centre, so that block means are laid on it, no sample."""
+    """Directions away from the body: over a base those of any centre, between what is known of the trace on it."""
     if outward is not None or base is None:
         return _outward(trace, base, outward)
-    over, tip_radius = base, trace.tip_radius
-    return lambda centers: over.foot(centers, tip_radius).normals
+    return LaidTrace.of(trace, base).directions
 
 
 def _outward(trace: Trace, base: Base | None, outward: ArrayLike | None) -> FloatArray:

@@ -5,36 +5,43 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.inference.families.bell import BellShape as BellShape, width_at_half_height as width_at_half_height
+    from mapping.inference.families.bell import (
+        BellShape as BellShape,
+        bell_shape as bell_shape,
+        width_at_half_height as width_at_half_height,
+    )
     from mapping.inference.families.broken_ridge import BrokenRidgeShape as BrokenRidgeShape
-    from mapping.inference.families.bump import BumpShape as BumpShape, spot_at as spot_at
-    from mapping.inference.families.curves import curve_problem as curve_problem
-    from mapping.inference.families.feature_trace import feature_trace as feature_trace
+    from mapping.inference.families.bump import BumpShape as BumpShape, Spot as Spot, spot_at as spot_at
     from mapping.inference.families.free_tip import with_free_tip as with_free_tip, with_nominal_tip as with_nominal_tip
     from mapping.inference.families.hollow import GrooveShape as GrooveShape, PitShape as PitShape
     from mapping.inference.families.problem import (
         MEETING_REACH as MEETING_REACH,
         MODEL_FLOOR as MODEL_FLOOR,
         PosteriorProblem as PosteriorProblem,
+        Sizes as Sizes,
         Surroundings as Surroundings,
-        sizes_of as sizes_of,
         touches as touches,
+        window_for as window_for,
     )
     from mapping.inference.families.ridge import RidgeShape as RidgeShape, rounding_of as rounding_of
-    from mapping.inference.families.spots import bump_shape as bump_shape, spot_problem as spot_problem
     from mapping.inference.families.step import StepShape as StepShape
 
 _PUBLIC = {
-    "bell": ("BellShape", "width_at_half_height"),
+    "bell": ("BellShape", "bell_shape", "width_at_half_height"),
     "broken_ridge": ("BrokenRidgeShape",),
-    "bump": ("BumpShape", "spot_at"),
-    "curves": ("curve_problem",),
-    "feature_trace": ("feature_trace",),
+    "bump": ("BumpShape", "Spot", "spot_at"),
     "free_tip": ("with_free_tip", "with_nominal_tip"),
     "hollow": ("GrooveShape", "PitShape"),
-    "problem": ("MEETING_REACH", "MODEL_FLOOR", "PosteriorProblem", "Surroundings", "sizes_of", "touches"),
+    "problem": (
+        "MEETING_REACH",
+        "MODEL_FLOOR",
+        "PosteriorProblem",
+        "Sizes",
+        "Surroundings",
+        "touches",
+        "window_for",
+    ),
     "ridge": ("RidgeShape", "rounding_of"),
-    "spots": ("bump_shape", "spot_problem"),
     "step": ("StepShape",),
 }
 doorway(__name__, _PUBLIC)

@@ -14,10 +14,10 @@ from mapping.inference.likelihood import Normal, Prior, Shape
 
 # A tip is at least this share of its nominal radius.
 SMALLEST_TIP_SHARE = 0.1
-# A prior is narrow up to this share of the radius. Over the radii of 2 sd of such a one, heights go with the radius as a
-# parabola to the third order of that share, 1e-3 of a feature's height; only where a footprint begins, in a strip that
-# shrinks with the share, is it not smooth (tests/mapping/inference/families/test_free_tip.py compares).
-NARROW = 0.05
+# A prior is narrow up to this share of the radius. Over the radii of 2 sd of such a one, heights go with the radius as
+# a parabola to the third order of that share, 1e-3 of a height; only where a footprint begins, in a strip that shrinks
+# with the share, are they not smooth (tests/mapping/inference/families/test_free_tip.py compares).
+NARROW_PRIOR = 0.05
 NODE_SDS = 2.0
 
 
@@ -63,12 +63,12 @@ class FreeTipShape:
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights over the trace of a tip of nominal radius on the bare base, m.
 
-        Up to NARROW the shape is evaluated at three radii, all rows at once, and a parabola through them gives each
+        Up to NARROW_PRIOR the shape is evaluated at three radii, all rows at once, and a parabola through them gives each
         row its own; a wider prior needs every row's own radius.
         """
         off = theta[:, -1:] - self.tip.mean
         higher = np.zeros_like(off) if self.base_was_felt else off
-        if self.tip.sd > NARROW * self.tip.mean:
+        if self.tip.sd > NARROW_PRIOR * self.tip.mean:
             rows = [self._with_tip(float(row[-1])).templates(row[None, :-1]) for row in theta]
             return np.concatenate(rows) + higher
         node = NODE_SDS * self.tip.sd

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
+from typing import Self
 
 from mapping import Feature, FloatArray, Trace
 from mapping.base import Base
 from mapping.geometry.mesh import distances
-from mapping.geometry.templates import contact_half_width, radius_of_cap
-from mapping.inference.families.feature_trace import feature_trace
 from mapping.inference.likelihood import (
     Likelihood,
     LogPosterior,
@@ -98,6 +95,24 @@ class PosteriorProblem:
     beginnings: FloatArray
     misfit: float = 0.0
 
+    @classmethod
+    def posed(
+        cls,
+        feature: Feature,
+        sizes: Sizes,
+        shape: Shape,
+        window: Window,
+        around: Surroundings,
+        beginnings: FloatArray,
+        beside: FloatArray | None,
+    ) -> Self:
+        """With the noise of the surroundings, and the heights (n,) that neighbours leave beside the feature, m."""
+        vague = 3.0 * max(sizes.height, around.noise.sd)
+        bend = 0.0 if around.base.kind == "mesh" else 0.3 * sizes.height
+        nuisance = Nuisance(vague, vague, bend)
+        likelihood = _likelihood(window, around.noise, nuisance, sizes.height, None)
+        return cls(feature, sizes, LogPosterior(shape, likelihood, beside), around.noise, nuisance, beginnings)
+
     @property
     def window(self) -> Window:
         return self.target.likelihood.window
@@ -106,28 +121,6 @@ class PosteriorProblem:
         """The same problem under another noise, or with more variance for some bins."""
         likelihood = _likelihood(self.window, noise, self.nuisance, self.sizes.height, inflation)
         return replace(self, noise=noise, target=self.target.with_likelihood(likelihood))
-
-
-def sizes_of(feature: Feature, tip_radius: float) -> Sizes:
-    """Preliminary sizes from a feature's intervals, kept to what a ball of the tip's radius can feel."""
-    height = max(abs(feature.height.median), 1e-9 * tip_radius)
-    sd = max(abs(feature.height.high - feature.height.low) / 3.29, 1e-3 * height)
-    width = feature.width.median if feature.width.median > 0.0 else height
-    if feature.kind in ("groove", "pit"):
-        seen = np.sqrt(height * max(2.0 * tip_radius - height, 0.0))
-        half = max(0.5 * width, float(seen))
-        return Sizes(height, sd, half, half, _position_sd(feature, half))
-    if feature.kind == "step":
-        half = float(contact_half_width(min(height, tip_radius), 0.0, tip_radius))
-        return Sizes(height, sd, 0.0, half, _position_sd(feature, half))
-    radius = max(radius_of_cap(height, width), 0.5 * height)
-    half = float(contact_half_width(height, radius, tip_radius))
-    return Sizes(height, sd, radius, half, _position_sd(feature, half))
-
-
-def _position_sd(feature: Feature, half_width: float) -> float:
-    sd = feature.position_sd
-    return float(sd) if np.isfinite(sd) and sd > 0.0 else 0.1 * half_width
 
 
 def window_for(crest: FloatArray, sizes: Sizes, around: Surroundings) -> Window:
@@ -142,23 +135,6 @@ def window_for(crest: FloatArray, sizes: Sizes, around: Surroundings) -> Window:
         coarser = min(width * len(window) / most, sizes.half_width / 8.0)
         window = bin_samples(samples, coarser, around.noise.sd, smooth_over)
     return window
-
-
-def pose(
-    feature: Feature, sizes: Sizes, shape: Shape, window: Window, around: Surroundings, beginnings: FloatArray
-) -> PosteriorProblem:
-    """Join a shape, its window and the noise to a posterior density."""
-    vague = 3.0 * max(sizes.height, around.noise.sd)
-    bend = 0.0 if around.base.kind == "mesh" else 0.3 * sizes.height
-    nuisance = Nuisance(vague, vague, bend)
-    likelihood = _likelihood(window, around.noise, nuisance, sizes.height, None)
-    beside = None
-    near = [other for other in around.others if other is not feature]
-    if near:
-        traces = [feature_trace(other, window.feet, window.normals, around.trace.tip_radius) for other in near]
-        highest, lowest = np.max(traces, axis=0), np.min(traces, axis=0)
-        beside = np.where(highest > 0.0, highest, lowest)
-    return PosteriorProblem(feature, sizes, LogPosterior(shape, likelihood, beside), around.noise, nuisance, beginnings)
 
 
 def _likelihood(

@@ -25,14 +25,14 @@ def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height
         laid.append(len(np.asarray(centers)))
         return foot(self, centers, tip_radius)
 
-    def counted_heights(number, trace, s, base, spacing, feet=None):
+    def counted_heights(number, trace, s, base, spacing, *kept):
         profiles[number, spacing] += 1
-        return heights(number, trace, s, base, spacing, feet)
+        return heights(number, trace, s, base, spacing, *kept)
 
     monkeypatch.setattr(Base, "foot", counted_foot)
     monkeypatch.setattr(laid_trace, "height_profiles", counted_heights)
     places = np.linspace(-30e-3, 30e-3, 10)
-    trace = sweeps(wire(), white=0.1e-3, places=places, spacing=2.5e-6, half=20e-3)
+    trace = sweeps(wire(), white=0.1e-3, places=places, spacing=5e-6, half=20e-3)
     axis = np.array([[-50e-3, 0.0, 0.0], [50e-3, 0.0, 0.0]])
     monkeypatch.setattr(Work, "truth", (TrueFeature("ridge", axis, DIAMETER, DIAMETER, 0.1),))
     analysis = build_model(Log(trace), None, plate(), Stages())

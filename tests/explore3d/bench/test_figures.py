@@ -34,9 +34,9 @@ def test_the_same_figure_is_drawn_every_time(written):
 
 def test_the_traced_section_follows_the_parallel_surface_outside_the_interference_points(written):
     trace = figures.section_trace()
-    flank, plain = figures.BUMP.interference(figures.FIGURE_TIP_RADIUS)
+    flank, plain = figures.PAPER_BUMP.interference(figures.FIGURE_TIP_RADIUS)
     u = np.r_[np.linspace(0, flank, 400), np.linspace(plain, 2.0, 400)]
-    x, z = figures.BUMP.parallel(u, figures.FIGURE_TIP_RADIUS)
+    x, z = figures.PAPER_BUMP.parallel(u, figures.FIGURE_TIP_RADIUS)
     expected = np.interp(np.abs(trace.centers[:, 0]), x, z)
     assert np.abs(trace.centers[:, 2] - expected)[np.abs(trace.centers[:, 0]) < 1.9].max() < 1e-4
 
@@ -44,7 +44,7 @@ def test_the_traced_section_follows_the_parallel_surface_outside_the_interferenc
 def test_the_mesh_folds_and_the_ball_leaps_where_the_closed_forms_say(written):
     folded, met = figures.mesh_fold()
     r = figures.FIGURE_TIP_RADIUS
-    rings = figures.BUMP.parallel(figures.BUMP.caustics(r), r)[0]
+    rings = figures.PAPER_BUMP.parallel(figures.PAPER_BUMP.caustics(r), r)[0]
     found = np.hypot(*folded.caustics[:, :2].T)
     assert np.abs(found[:, None] - rings).min(axis=1).max() < 0.02
     assert len(met) == 2 * figures.DIAMETERS

@@ -88,14 +88,14 @@ def test_an_object_three_millimetres_off_its_mesh_is_explored_where_it_stands(tm
     model = f'mesh = "{ASSETS}/meshes/tile.ply"\npose = "estimate"'
     analysis = run(write_scene(tmp_path, model, object, true.onto(AXIS)), tmp_path / "out")
     the_wire_is_found(analysis)
-    pose = Pose.read(analysis.base.parameters["pose"])
+    pose = Pose.of(analysis.base)
     tile = load_mesh(ASSETS / "meshes" / "tile.ply", "m").vertices
     off = (pose.onto(tile) - true.onto(tile)) @ true.rotation[:, 2]
     assert np.abs(off).max() < 2e-5
     ridge = analysis.model.features[0]
     assert np.abs(pose.onto(ridge.extra["axis_in_model_frame"]) - ridge.axis).max() < 1e-12
     logged = read_base(read_log(tmp_path / "out" / "log.mcap").events)
-    assert logged is not None and "pose" in logged.parameters
+    assert logged is not None and logged.pose is not None
     again = analyze(tmp_path / "out", tmp_path / "again")
     assert [f.axis.tolist() for f in again.model.features] == [f.axis.tolist() for f in analysis.model.features]
 

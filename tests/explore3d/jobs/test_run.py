@@ -104,6 +104,7 @@ def test_the_error_falls_with_finger_time_down_to_the_finished_model(wire: tuple
     assert errors[-1] < 0.2 * max(errors)
 
 
+@pytest.mark.slow
 def test_analysing_the_log_of_a_run_gives_the_model_of_the_run(wire: tuple[Path, Analysis], tmp_path: Path) -> None:
     out, _ = wire
     analyze(out / "log.mcap", tmp_path / "again")

@@ -72,7 +72,7 @@ def test_what_is_left_out_has_the_documented_default() -> None:
         ("seed = 1", "seed = -1", "seed: should be greater than or equal to 0; found -1"),
         ('units = "m"', 'units = "mmm"', "model.units: unknown unit of length 'mmm'; did you mean 'mm'?"),
         ("scene/1", "scene/2", "schema: should be 'explore3d/scene/1'; found 'explore3d/scene/2'"),
-        ('kind = "ridge"', 'kind = "rigde"', "truth[0].kind: should be 'bump', 'ridge'"),
+        ('kind = "ridge"', 'kind = "rigde"', "truth[0].kind: should be 'ridge', 'bump'"),
         ("[tip]", "[tip", "not valid TOML: "),
     ],
 )

@@ -63,7 +63,9 @@ def _die(name: str) -> None:
     os._exit(1)
 
 
-@pytest.mark.parametrize("group", ["closed forms", "contact", "detection: unit of 1000 m"])
+@pytest.mark.parametrize(
+    "group", ["closed forms", pytest.param("contact", marks=pytest.mark.slow), "detection: unit of 1000 m"]
+)
 def test_no_quick_case_fails(group):
     for name, case in table.cases().items():
         if name.startswith(group):

@@ -106,7 +106,7 @@ def test_a_step_is_one_step():
     assert len(step.axis) >= 10
 
 
-@pytest.mark.parametrize("pitch", [1e-3, 2e-3, 4e-3])
+@pytest.mark.parametrize("pitch", [pytest.param(1e-3, marks=pytest.mark.slow), 2e-3, 4e-3])
 def test_an_arc_that_a_raster_runs_along_is_one_ridge(pitch):
     turn = np.linspace(0.2, 0.2 + 0.9 * np.pi, 40)
     arc = np.column_stack([0.015 * np.cos(turn), 0.015 * np.sin(turn), 0 * turn + RADIUS])

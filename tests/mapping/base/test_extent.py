@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mapping.base.base import Base
-from mapping.base.extent import touched_part
+from mapping.base.extent import over_base, touched_part
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -36,3 +36,19 @@ def test_a_pressed_sweep_that_met_nothing_leaves_a_hole() -> None:
 def test_a_place_clear_of_the_body_or_beside_a_steep_flank_leaves_none() -> None:
     assert abs(left([0.003, 0.006, 1.5 * TIP, 0.0, 0.0, 1.0]) - 0.01) < 1e-9
     assert abs(left([0.003, 0.006, 0.5 * TIP, 1.0, 0.0, 0.0]) - 0.01) < 1e-9
+
+
+def test_a_long_trace_leaves_the_base_where_its_single_samples_do() -> None:
+    side = 0.02
+    plate = Base(
+        Surface([[-side, -side, 0], [side, -side, 0], [side, side, 0], [-side, side, 0]], [[0, 1, 2], [0, 2, 3]])
+    )
+    along = np.tile(np.linspace(-0.026, 0.026, 8000), 5)
+    across = np.repeat(np.linspace(-0.015, 0.015, 5), 8000)
+    beyond = np.maximum(np.abs(along) - side, 0.0)  # it rolls off both edges
+    centers = np.column_stack([along, across, np.sqrt(TIP**2 - beyond**2)])
+    trace = Trace(1e-3 * np.arange(len(along)), centers, np.repeat(np.arange(5), 8000), TIP)
+    few = [over_base(part, plate) for _, part in trace.select(np.arange(len(trace)) % 16 == 0).sweeps()]
+    over = over_base(trace, plate)
+    assert np.array_equal(over[::16], np.concatenate(few))
+    assert np.array_equal(over, beyond < TIP * np.sin(np.radians(5.0)))

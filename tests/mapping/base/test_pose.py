@@ -125,7 +125,7 @@ def test_poses_compose_and_survive_their_record() -> None:
     assert np.allclose(two.after(one).onto(points), two.onto(one.onto(points)), atol=1e-15)
     assert np.allclose(one.back(one.onto(points)), points, atol=1e-15)
     twice = two.moved(one.moved(base))
-    whole = Pose.read(twice.parameters["pose"])
+    whole = Pose.of(twice)
     assert np.allclose(whole.onto(base.surface.vertices), twice.surface.vertices, atol=1e-15)
     assert one.turn == pytest.approx(np.radians(1.0)) and not one.within(3e-3, np.radians(0.5))
 

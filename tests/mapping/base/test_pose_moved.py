@@ -8,9 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from explore3d.bench.scenes.bodies import blob, sphere_mesh
 from mapping.base.base import Base
+from mapping.base.pose import Pose
 from mapping.surface import Surface
 
 TIP = 0.01
+
+STANDS = Pose(np.eye(3), np.zeros(3), np.zeros(3), np.eye(6)).record()
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +21,7 @@ def bases() -> tuple[Base, Base]:
     unit, faces = sphere_mesh(3)
     base = Base(Surface(blob(unit), faces))
     rotation = Rotation.from_rotvec([0.3, -0.7, 0.2]).as_matrix()
-    moved = base.moved(rotation, np.array([0.02, -0.01, 0.05]), {"pose": "known"})
+    moved = base.moved(rotation, np.array([0.02, -0.01, 0.05]), STANDS)
     return moved, Base(Surface(moved.surface.vertices, moved.surface.faces))
 
 
@@ -39,4 +42,4 @@ def test_what_is_known_of_the_shape_agrees_with_that_of_a_new_surface(bases: tup
         np.testing.assert_allclose(getattr(moved.surface, name), getattr(built.surface, name), atol=1e-12)
     np.testing.assert_array_equal(moved.surface.neighbours, built.surface.neighbours)
     np.testing.assert_allclose(moved.edge_normals, built.edge_normals, atol=1e-12)
-    assert moved.parameters == {"pose": "known"}
+    assert moved.pose == STANDS and Base.read(moved.surface, moved.kind, moved.record()).pose == STANDS

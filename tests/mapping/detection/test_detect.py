@@ -137,7 +137,7 @@ def test_where_samples_are_scarce_the_noise_they_leave_is_no_feature():
     assert found <= 24
 
 
-@pytest.mark.parametrize("drift", [0, 2])
+@pytest.mark.parametrize("drift", [0, pytest.param(2, marks=pytest.mark.slow)])
 def test_false_alarms_come_as_often_as_asked(drift):
     noise, spacing, samples, rate = Noise(2e-4), 1e-4, 16.7, 1.0
     bank = build_bank(noise, spacing, samples, 1.4e-3, 0.02, drift)

@@ -26,15 +26,22 @@ from mapping.base.base import Base
 from mapping.base.projection import onto_base
 from mapping.feature import Details
 from mapping.geometry.templates.shapes import cap_height, groove_height, rim_height, step_height
-from mapping.inference.feature_posterior import refine, sample_posterior, solve
+from mapping.inference.feature_posterior import Solution, refine, sample_posterior, solve
 from mapping.inference.sampler.psis import resample
+from mapping.inference.summary import describe
 from mapping.instrument.noise import Noise
 from mapping.surface import Surface
 
 
-def test_a_wire_is_found_with_its_ends_height_and_direction():
+@pytest.fixture(scope="module")
+def solved_wire() -> Solution:
+    """The wire's posterior by both ways, which takes seconds: shared by those that look at it."""
     trace = record(CROSSINGS + SLIDES, wire(ENDS))
-    found = refine(GUESS, trace, np.random.default_rng(0), base=plate(), noise=WHITE)
+    return solve(GUESS, trace, np.random.default_rng(0), base=plate(), noise=WHITE)
+
+
+def test_a_wire_is_found_with_its_ends_height_and_direction(solved_wire):
+    found = describe(solved_wire.problem, solved_wire.posterior, plate())
     assert found.posterior.status == "converged"
     order = found.axis[[0, -1]] if found.axis[0, 0] < 0 else found.axis[[-1, 0]]
     np.testing.assert_allclose(order, ENDS, atol=0.12e-3)
@@ -43,10 +50,8 @@ def test_a_wire_is_found_with_its_ends_height_and_direction():
     assert found.position_sd < 30e-6
 
 
-def test_importance_sampling_and_emcee_agree():
-    trace = record(CROSSINGS + SLIDES, wire(ENDS))
-    solution = solve(GUESS, trace, np.random.default_rng(0), base=plate(), noise=WHITE)
-    fast, chain = solution.importance, solution.posterior.samples
+def test_importance_sampling_and_emcee_agree(solved_wire):
+    fast, chain = solved_wire.importance, solved_wire.posterior.samples
     mean = fast.weights @ fast.draws
     sd = np.sqrt(fast.weights @ (fast.draws - mean) ** 2)
     assert fast.k_hat < 0.7

@@ -7,7 +7,7 @@ import pytest
 
 from mapping.feature import Details, Feature, Interval, Support
 from mapping.inference.families.bell import width_at_half_height
-from mapping.inference.families.feature_trace import feature_trace
+from mapping.inference.kinds.kind import feature_trace
 from mapping.model.feature_mesh import drawn_at_least, feature_mesh
 
 HEIGHT, SCALE, EXPONENT = 0.5e-3, 1e-3, 1.0

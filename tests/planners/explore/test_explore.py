@@ -111,7 +111,7 @@ def test_a_wire_swept_lengthwise_by_the_survey_is_found_all_the_same() -> None:
     axis = np.linspace([0.02, 0.03, 0.0], [0.06, 0.03, 0.0], 5)
     found, _, _ = explore(with_tubes(axis))
     assert len(found.tracks) == 1
-    assert found.tracks[0].kind == "convex"
+    assert not found.tracks[0].step and found.tracks[0].sign > 0
     assert found.tracks[0].length == pytest.approx(0.04, abs=5e-4)
 
 
@@ -290,7 +290,7 @@ def test_an_end_moved_back_takes_the_points_beyond_it_along() -> None:
     points = np.linspace([0.0, 0.0, 0.0], [0.05, 0.0, 0.0], 6)
     ways = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     ends = tuple(AxisEnd(point, 1e-4, "end", way) for point, way in zip(points[[0, -1]], ways, strict=True))
-    track = AxisTrack(points, np.tile([0.0, 0.0, 1.0], (6, 1)), 1.0, "convex", WIRE, 1e-5, 3.6e-3, ends)
+    track = AxisTrack(points, np.tile([0.0, 0.0, 1.0], (6, 1)), 1.0, False, WIRE, 1e-5, 3.6e-3, ends)
     for index, way in enumerate(ways):
         moved = replace(ends[index], point=ends[index].point - 0.013 * way)
         shorter = track.with_end(index, moved)

@@ -38,7 +38,7 @@ def torus(big: float, small: float, around: int, across: int) -> tuple[Surface, 
 
 
 def test_a_jet_knows_the_curvatures_of_a_torus_with_the_outward_sign():
-    surface, k2 = torus(1.0, 0.4, 200, 80)
+    surface, k2 = torus(1.0, 0.4, 140, 56)
     curvature = principal_curvatures(surface)
     assert curvature.valid.all()
     np.testing.assert_allclose(curvature.k1, 2.5, rtol=1e-3)
@@ -76,7 +76,12 @@ def bump(count: int, noise: float = 0.0) -> tuple[Surface, np.ndarray, np.ndarra
 
 @pytest.mark.parametrize(
     ("noise", "median", "p95", "wrong"),
-    [(0.0, 3e-6, 3e-4, 0.0), (1e-4, 7e-4, 2e-3, 2e-3), (1e-3, 3e-3, 1.7e-2, 4e-3), (1e-2, 2e-2, 0.11, 0.02)],
+    [
+        (0.0, 3e-6, 3e-4, 0.0),
+        pytest.param(1e-4, 7e-4, 2e-3, 2e-3, marks=pytest.mark.slow),
+        pytest.param(1e-3, 3e-3, 1.7e-2, 4e-3, marks=pytest.mark.slow),
+        (1e-2, 2e-2, 0.11, 0.02),
+    ],
 )
 def test_one_method_is_as_exact_at_every_noise_as_the_best_of_many(noise, median, p95, wrong):
     surface, k1, k2, inside = bump(100, noise)

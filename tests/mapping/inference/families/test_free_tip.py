@@ -19,7 +19,7 @@ def test_the_heights_of_other_tips_are_those_of_each_row_s_own(share: float, mon
     theta = np.repeat(problem.beginnings[:1], 9, axis=0)
     theta[:, -1] = TIP * (1.0 + share * np.linspace(-2.5, 2.5, 9))
     quick = shape.templates(theta)
-    monkeypatch.setattr(free_tip, "NARROW", 0.0)
+    monkeypatch.setattr(free_tip, "NARROW_PRIOR", 0.0)
     exact = shape.templates(theta)
     changes = exact - exact[4]
     assert np.abs(changes).max() > 0.1 * share * D  # the radius does change what is felt

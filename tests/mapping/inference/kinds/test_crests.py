@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mapping.feature import Feature, Interval, Support
-from mapping.inference.families.feature_trace import feature_trace
+from mapping.inference.kinds.kind import feature_trace
 
 TIP, BODY = 0.01, 0.02
 

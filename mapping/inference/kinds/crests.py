@@ -1,0 +1,49 @@
+"""Crests: what bumps and ridges have in common, a round section that stands on the base."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from mapping import Feature, FloatArray, Interval
+from mapping.geometry.templates import chain_height, contact_half_width, radius_of_cap, width_of_cap
+from mapping.inference.kinds.kind import Kind, Section
+from mapping.inference.likelihood import Shape
+
+# A crest disturbs the trace up to its half-width over a flat base, and hardly further over a hollow one
+CREST_TRACE_REACH = 1.5
+
+
+class Crest(Kind):
+    """Capsules: the last two parameters are the height and the log radius of the section."""
+
+    def trace(self, feature: Feature, feet: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
+        """(N,) heights of a chain of capsules, m; see `Kind.trace`."""
+        height, width = feature.height.median, max(feature.width.median, 1e-12)
+        if height <= 0.0:
+            return np.zeros(len(feet))
+        known = feature.details.radius
+        radius = float(radius_of_cap(height, width) if known is None else known)
+        # a low and wide one is a part of a large ball, which on a bent base comes out again elsewhere
+        near = axis_distance(feet, feature.axis) < CREST_TRACE_REACH * contact_half_width(height, radius, tip_radius)
+        crest = feature.axis + (height - radius) * feature.normals
+        over = np.minimum(chain_height(feet, normals, crest, radius, tip_radius), height)
+        return np.where(near, over, 0.0)
+
+    def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
+        """Height and width of a round section, and its radius."""
+        radii = np.exp(draws[:, -1])
+        cap = Interval.from_draws(width_of_cap(draws[:, -2], radii))
+        return Section(Interval.from_draws(draws[:, -2]), cap, {"radius": float(np.median(radii))})
+
+
+def axis_distance(points: FloatArray, axis: FloatArray) -> FloatArray:
+    """(N,) distances of points from a polyline (K, 3), m."""
+    best = np.linalg.norm(points - axis[0], axis=1)
+    for start, end in itertools.pairwise(axis):
+        leg = end - start
+        square = max(float(leg @ leg), np.finfo(float).tiny)
+        share = np.clip((points - start) @ leg / square, 0.0, 1.0)
+        best = np.minimum(best, np.linalg.norm(points - start - share[:, None] * leg, axis=1))
+    return np.asarray(best)

@@ -1,0 +1,47 @@
+"""Groove: a hollow line with upright walls."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.geometry.templates import groove_height, rim_height
+from mapping.inference.families import GrooveShape, Sizes
+from mapping.inference.kinds.hollows import Hollow
+from mapping.inference.kinds.lines import LineKind, Parameters, Traced
+from mapping.inference.kinds.posing import hollow_priors
+
+
+class Groove(Hollow, LineKind):
+    """Grooves with a flat bottom: course, places of the ends, log width, log depth."""
+
+    def shape(self, traced: Traced) -> GrooveShape:
+        sizes, tip = traced.sizes, traced.tip_radius
+        guess = float(np.log(2.0 * sizes.radius)), float(np.log(2.0 * sizes.height))
+        whole = traced.laterals + traced.ends + Parameters(hollow_priors(sizes, tip), guess, (0.02, 0.05))
+        return GrooveShape(traced.window, traced.chart, traced.modes, tip, *whole.arrays)
+
+    def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
+        return (float(np.log(sizes.height)),)
+
+    def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
+        s, lateral, _ = shape.chart.coordinates(feet)
+        x = lateral - shape.modes.lateral(truth[None, : shape.modes.count], s)[0]
+        inside = np.minimum(s - truth[-4], truth[-3] - s)
+        across = groove_height(x, np.exp(truth[-2]), shape.tip_radius, np.exp(truth[-1]))
+        return np.maximum(across, rim_height(inside, shape.tip_radius, np.exp(truth[-1])))
+
+
+GROOVE = Groove(
+    name="groove",
+    plural="grooves",
+    sign=-1,
+    line=True,
+    has_ends=True,
+    made_of="concave",
+    words={"height": "deep", "length": "long"},
+    colour=(0.13, 0.37, 0.66, 1.0),
+    typical=(-0.05e-3, 2e-3),
+)

@@ -1,0 +1,251 @@
+"""The posteriors of features along a curve of the base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from mapping import Feature, FloatArray
+from mapping.inference.curves import HIGHEST_DEGREE, Chart, CurveModes, chart_along, normals_along, smooth_on_base
+from mapping.inference.families import MEETING_REACH, PosteriorProblem, Sizes, Surroundings, touches, window_for
+from mapping.inference.kinds.kind import Kind, sizes_of
+from mapping.inference.kinds.posing import pose
+from mapping.inference.likelihood import Normal, Prior, Shape, Uniform, Window
+from mapping.inference.sampler import find_optima
+
+# Chords of the chart may sag by this share of the feature's height.
+SAG = 0.005
+MOST_LEGS = 300
+HIGHEST_MODE = 8
+# After so many degrees in a row that are no better than a lower one, no higher one is tried.
+FUTILE_DEGREES = 2
+
+
+class LineShape(Shape, Protocol):
+    """A shape along a chart: its first parameters are the lateral modes of its course."""
+
+    @property
+    def chart(self) -> Chart: ...
+
+    @property
+    def modes(self) -> CurveModes: ...
+
+    @property
+    def tip_radius(self) -> float: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """Some parameters of a shape: priors, first guess, and small but visible changes."""
+
+    priors: tuple[Prior, ...] = ()
+    start: tuple[float, ...] = ()
+    step: tuple[float, ...] = ()
+
+    def __add__(self, other: Parameters) -> Parameters:
+        return Parameters(self.priors + other.priors, self.start + other.start, self.step + other.step)
+
+    @property
+    def arrays(self) -> tuple[tuple[Prior, ...], FloatArray, FloatArray]:
+        """Priors, start (P,) and step (P,), as a shape takes them."""
+        return self.priors, np.array(self.start), np.array(self.step)
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """What a line's shape is made from.
+
+    Args:
+        window: the bins.
+        chart: the reference curve on the base.
+        modes: lateral course of the axis over the chart.
+        sizes: preliminary ones.
+        tip_radius: m.
+        laterals: the parameters of the course.
+        ends: the places of the two ends along the chart; none of a closed line, or of a kind without ends.
+    """
+
+    window: Window
+    chart: Chart
+    modes: CurveModes
+    sizes: Sizes
+    tip_radius: float
+    laterals: Parameters
+    ends: Parameters
+
+
+class LineKind(Kind):
+    """A kind along a curve: it gives the shape, and what the first guess of its last parameter may be instead."""
+
+    @property
+    def sampled(self) -> bool:
+        return True
+
+    def shape(self, traced: Traced) -> LineShape:
+        """The family of shapes along a chart; those that have ends name them "start" and "end", beside each other."""
+        raise NotImplementedError(f"{type(self).__name__} gives no shape")
+
+    def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
+        """Further values of the last parameter, from which the search for the optimum begins as well."""
+        return ()
+
+    def problem(self, feature: Feature, around: Surroundings) -> PosteriorProblem:
+        """Pose the posterior.
+
+        The trace decides how freely the axis bends over the base (BIC): few crossings cannot tell a gentle bend from
+        their own scatter, and one that a neighbour displaced fits bends that are not there.
+        """
+        tip = around.trace.tip_radius
+        sizes = sizes_of(feature, tip)
+        axis, normals, crossings = _axis_of(feature, sizes, around)
+        course = self._chart(axis, normals, sizes, crossings, HIGHEST_DEGREE, around)
+        window = window_for(_crest(course, tip, sizes), sizes, around)
+
+        def posed(most: int, least: int = 1) -> tuple[PosteriorProblem, int]:
+            line, degree = smooth_on_base(
+                axis, normals, sizes.position_sd, most, least, around.base, tip, sizes.half_width
+            )
+            chart = self._chart(line, normals_along(line, axis, normals), sizes, crossings, degree, around)
+            ends = chart.coordinates(axis[[0, -1]])[0]
+            modes = _modes(chart, ends, degree, crossings, sizes)
+            laterals, along = _laterals(modes, crossings, sizes), Parameters()
+            if self.has_ends and not chart.closed:
+                along = _ends(ends, _end_limits(axis, chart, ends, feature, sizes, around), sizes)
+            shape = self.shape(Traced(window, chart, modes, sizes, tip, laterals, along))
+            return pose(feature, sizes, shape, window, around, self._beginnings(shape, sizes)), degree
+
+        best, asked = first = posed(HIGHEST_DEGREE)
+        if len(axis) < 3:
+            return best
+        least, costs = _cost(best), list[float]()
+        for degree in range(1, HIGHEST_DEGREE + 1):
+            other, reached = first if degree == asked else posed(degree, degree)
+            if reached < degree:
+                break
+            costs.append(least if other is best else _cost(other))
+            best, least = (other, costs[-1]) if costs[-1] < least else (best, least)
+            if len(costs) > FUTILE_DEGREES and min(costs[-FUTILE_DEGREES:]) >= min(costs[:-FUTILE_DEGREES]):
+                break
+        return best
+
+    def _chart(
+        self,
+        line: FloatArray,
+        lift: FloatArray,
+        sizes: Sizes,
+        crossings: int,
+        degree: int,
+        around: Surroundings,
+    ) -> Chart:
+        """The chart along the line, extended to where the ends may be, its legs as long as its curvature allows."""
+        length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+        extension = max(6.0 * sizes.half_width, 1.5 * length / max(crossings - 1, 1)) if self.has_ends else 0.0
+        tip = around.trace.tip_radius
+
+        def build(spacing: float) -> Chart:
+            return chart_along(line, lift, around.base, tip, spacing, extension, sizes.half_width)
+
+        trial = build((length + 2.0 * extension) / 64.0)
+        turn = np.linalg.norm(np.diff(trial.tangents, axis=0), axis=1).max(initial=0.0)
+        curvature = turn / (trial.length / max(len(trial.s) - 1, 1))
+        if curvature * trial.length < 1e-6 and degree == 1:
+            return build(length + extension)
+        spacing = float(np.sqrt(8.0 * SAG * sizes.height / max(curvature, 1e-12)))
+        return build(min(max(spacing, trial.length / MOST_LEGS), trial.length / 16.0))
+
+    def _beginnings(self, shape: LineShape, sizes: Sizes) -> FloatArray:
+        """Starts that differ in the section, and in the ends."""
+        starts = [shape.start]
+        for value in self.other_starts(sizes):
+            section = shape.start.copy()
+            section[-1] = value
+            starts.append(section)
+        if self.has_ends and not shape.chart.closed:
+            first = shape.names.index("start")
+            for out in (-0.5, 0.5, 1.0):
+                moved = shape.start.copy()
+                moved[first : first + 2] += out * sizes.half_width * np.array([-1.0, 1.0])
+                starts.append(moved)
+        return np.array(starts)
+
+
+def _cost(problem: PosteriorProblem) -> float:
+    """Half the Bayesian information criterion (Schwarz, Annals of Statistics 6, 1978) at the detection's optimum."""
+    best = find_optima(problem.target, problem.beginnings[:1])[0]
+    fit = float(problem.target.likelihood.log_density(problem.target.templates(best[None]))[0])
+    return 0.5 * len(best) * float(np.log(len(problem.window))) - fit
+
+
+def _axis_of(feature: Feature, sizes: Sizes, around: Surroundings) -> tuple[FloatArray, FloatArray, int]:
+    """Axis, normals and number of crossings; a single crossing gets a short axis across its sweep."""
+    axis, normals = np.asarray(feature.axis), np.asarray(feature.normals)
+    if len(axis) > 1 and np.ptp(axis, axis=0).max() > 0.0:
+        return axis, normals, max(feature.evidence.crossings, 2 if len(axis) == 2 else len(axis))
+    window = window_for(axis[:1] + around.trace.tip_radius * normals[:1], sizes, around)
+    nearest = int(np.argmin(np.linalg.norm(window.feet - axis[0], axis=1)))
+    across = np.cross(normals[0], window.tangents[nearest])
+    half = 0.5 * sizes.half_width * across / max(float(np.linalg.norm(across)), np.finfo(float).tiny)
+    return np.stack([axis[0] - half, axis[0] + half]), np.repeat(normals[:1], 2, axis=0), 1
+
+
+def _modes(chart: Chart, ends: FloatArray, degree: int, crossings: int, sizes: Sizes) -> CurveModes:
+    if chart.closed:
+        # Offsets of a ring whose coordinates have a degree have harmonics one higher: an ellipse differs from a
+        # circle by the second.
+        highest = max(0, min(degree + 1, (crossings - 1) // 2, HIGHEST_MODE))
+        return CurveModes(highest, 0.5 * chart.length, 0.5 * chart.length, True)
+    reach = max(0.5 * abs(float(ends[1] - ends[0])), 0.5 * sizes.half_width)
+    highest = min(max(degree, 1), max(crossings - 1, 1), HIGHEST_MODE)
+    return CurveModes(highest, float(ends.mean()), reach, False)
+
+
+def _crest(chart: Chart, tip_radius: float, sizes: Sizes) -> FloatArray:
+    """Points along the chart one tip radius above the base, close enough together to measure distances from."""
+    count = max(2, int(np.ceil(chart.length / (0.25 * sizes.half_width))) + 1)
+    points, _, normals, _ = chart.at(np.linspace(chart.s[0], chart.s[-1], count))
+    return np.asarray(points + tip_radius * normals)
+
+
+def _end_limits(
+    axis: FloatArray, chart: Chart, ends: FloatArray, feature: Feature, sizes: Sizes, around: Surroundings
+) -> list[tuple[float, float]]:
+    """Places between which the beginning and the end of an open line lie, m along the chart."""
+    low, high = float(chart.s[0]), float(chart.s[-1])
+    middle = min(max(float(ends.mean()), low + 1e-3 * (high - low)), high - 1e-3 * (high - low))
+    limits = []
+    for k, (least, most) in zip(np.argsort(ends), ((low, middle), (middle, high)), strict=True):
+        tip = axis[[0, -1][k]]
+        if any(touches(tip, other, sizes.half_width) for other in around.others if other is not feature):
+            reach = MEETING_REACH * sizes.half_width
+            at = float(np.clip(ends[k], least + 0.1 * reach, most - 0.1 * reach))
+            least, most = max(least, at - reach), min(most, at + reach)
+        limits.append((least, most))
+    return limits
+
+
+def _ends(places: FloatArray, limits: list[tuple[float, float]], sizes: Sizes) -> Parameters:
+    """Parameters of the two ends: where they were detected (2,), anywhere within their limits, m along the chart."""
+    return Parameters(
+        tuple(Uniform(*limit) for limit in limits),
+        (float(places.min()), float(places.max())),
+        (0.1 * sizes.half_width,) * 2,
+    )
+
+
+def _laterals(modes: CurveModes, crossings: int, sizes: Sizes) -> Parameters:
+    """Parameters of the course: within 1.5 half widths of where it was detected; the heading of a single crossing may
+    be anything to 60 degrees."""
+    bound = 1.5 * sizes.half_width
+    priors: list[Prior] = []
+    for name in modes.names:
+        if name == "offset":
+            priors.append(Uniform(-bound, bound))
+        elif name == "heading":
+            limit = 1.7 if crossings < 2 else max(2.0 * bound / modes.reach, 0.1)
+            priors.append(Uniform(-limit, limit))
+        else:
+            priors.append(Normal(0.0, 0.5 * sizes.half_width))
+    step = tuple(float(each) for each in 0.02 * sizes.half_width * modes.scale)
+    return Parameters(tuple(priors), (0.0,) * modes.count, step)

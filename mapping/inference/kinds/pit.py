@@ -1,0 +1,48 @@
+"""Pit: a round hollow with an upright wall."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.geometry.templates import rim_height
+from mapping.inference.families import PitShape, Sizes
+from mapping.inference.kinds.hollows import Hollow
+from mapping.inference.kinds.points import PointKind, Seen
+from mapping.inference.kinds.posing import hollow_priors, place_prior
+
+
+class Pit(Hollow, PointKind):
+    """Pits about a spot: log width and log depth equally probable over wide ranges."""
+
+    def shape(self, seen: Seen) -> PitShape:
+        sizes, free = seen.sizes, seen.free
+        place = place_prior(sizes)
+        width, depth = hollow_priors(sizes, seen.tip_radius)
+        start = np.array([0.0] * free + [np.log(2.0 * sizes.radius), np.log(2.0 * sizes.height)])
+        step = np.array([0.02 * sizes.half_width] * free + [0.02, 0.05])
+        return PitShape(seen.window, seen.spot, seen.tip_radius, free, (*(place,) * free, width, depth), start, step)
+
+    def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
+        return (float(np.log(sizes.height)),)
+
+    def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
+        place = np.zeros(2)
+        place[: shape.free] = truth[: shape.free]
+        center = shape.spot.point + place @ shape.spot.axes
+        rim = 0.5 * np.exp(truth[-2]) - np.linalg.norm(feet - center, axis=1)
+        return rim_height(rim, shape.tip_radius, np.exp(truth[-1]))
+
+
+PIT = Pit(
+    name="pit",
+    plural="pits",
+    sign=-1,
+    line=False,
+    made_of="concave",
+    words={"height": "deep"},
+    colour=(0.20, 0.53, 0.74, 1.0),
+    typical=(-0.1e-3, 3e-3),
+)

@@ -1,0 +1,87 @@
+"""The posteriors of features about a point of the base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from mapping import Feature, FloatArray
+from mapping.inference.families import PosteriorProblem, Sizes, Spot, Surroundings, spot_at, window_for
+from mapping.inference.kinds.kind import Kind, sizes_of
+from mapping.inference.kinds.posing import pose
+from mapping.inference.likelihood import Shape, Window
+
+# A position across the sweeps is asked for only if they spread over this share of the disturbance.
+SPREAD = 0.1
+
+
+class PointShape(Shape, Protocol):
+    """A shape about a spot: its first `free` parameters are its place in the tangent plane."""
+
+    @property
+    def spot(self) -> Spot: ...
+
+    @property
+    def free(self) -> int: ...
+
+    @property
+    def tip_radius(self) -> float: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a point feature's shape is made from: window, spot, preliminary sizes, tip radius (m), free coordinates."""
+
+    window: Window
+    spot: Spot
+    sizes: Sizes
+    tip_radius: float
+    free: int
+
+
+def seen_about(feature: Feature, around: Surroundings) -> Seen:
+    """The window about a feature's point, and whether the sweeps tell where across them it lies."""
+    tip = around.trace.tip_radius
+    sizes = sizes_of(feature, tip)
+    point, normal = feature.axis[:1], feature.normals[:1]
+    window = window_for(point + tip * normal, sizes, around)
+    middle = int(np.argmin(np.linalg.norm(window.feet - point, axis=1)))
+    spot = spot_at(point[0], normal[0], window.tangents[middle], around.base, tip, sizes.half_width)
+    free = 2 if np.ptp((window.feet - spot.point) @ spot.axes[1]) > SPREAD * sizes.half_width else 1
+    return Seen(window, spot, sizes, tip, free)
+
+
+class PointKind(Kind):
+    """A kind about a point: it gives the shape, and what the first guess of its last parameter may be instead."""
+
+    @property
+    def sampled(self) -> bool:
+        return True
+
+    def shape(self, seen: Seen) -> PointShape:
+        """The family of shapes about a spot."""
+        raise NotImplementedError(f"{type(self).__name__} gives no shape")
+
+    def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
+        """Further values of the last parameter, from which the search for the optimum begins as well."""
+        return ()
+
+    def problem(self, feature: Feature, around: Surroundings) -> PosteriorProblem:
+        seen = seen_about(feature, around)
+        shape = self.shape(seen)
+        return pose(feature, seen.sizes, shape, seen.window, around, self._beginnings(shape, seen.sizes))
+
+    def _beginnings(self, shape: PointShape, sizes: Sizes) -> FloatArray:
+        """Starts that differ in place and in what the first guess knows least."""
+        starts = [shape.start]
+        for shift in (-0.5, 0.5):
+            moved = shape.start.copy()
+            moved[0] += shift * sizes.half_width
+            starts.append(moved)
+        for value in self.other_starts(sizes):
+            other = shape.start.copy()
+            other[-1] = value
+            starts.append(other)
+        return np.array(starts)

@@ -1,0 +1,54 @@
+"""Posing: shape, window, noise and neighbours joined to a posterior density; priors that several kinds share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapping import Feature, FloatArray
+from mapping.inference.families import PosteriorProblem, Sizes, Surroundings
+from mapping.inference.kinds.kind import feature_trace
+from mapping.inference.likelihood import Prior, Shape, StudentT, Uniform, Window
+
+# Prior of log radius: a ball lying on the base (a = H/2) unless the data say otherwise, with heavy tails.
+RADIUS_SCALE = 1.0
+
+
+def pose(
+    feature: Feature, sizes: Sizes, shape: Shape, window: Window, around: Surroundings, beginnings: FloatArray
+) -> PosteriorProblem:
+    """Join a shape, its window and the noise to a posterior density beside the feature's neighbours."""
+    beside = None
+    near = [other for other in around.others if other is not feature]
+    if near:
+        traces = [feature_trace(other, window.feet, window.normals, around.trace.tip_radius) for other in near]
+        highest, lowest = np.max(traces, axis=0), np.min(traces, axis=0)
+        beside = np.where(highest > 0.0, highest, lowest)
+    return PosteriorProblem.posed(feature, sizes, shape, window, around, beginnings, beside)
+
+
+def place_prior(sizes: Sizes) -> Prior:
+    """Anywhere within 1.5 half widths of where it was detected."""
+    return Uniform(-1.5 * sizes.half_width, 1.5 * sizes.half_width)
+
+
+def height_prior(sizes: Sizes) -> Prior:
+    """Equally probable from nothing to several times what was detected."""
+    return Uniform(0.0, max(4.0 * sizes.height, sizes.height + 10.0 * sizes.height_sd))
+
+
+def radius_prior(sizes: Sizes, tip: float) -> Prior:
+    """Log radius: about a round wire or ball lying on the base, a = H/2.
+
+    Under a much larger tip only radius + tip counts, and the data hardly determine the radius: the prior does, within
+    a factor of e or so. Its tails are heavy: a gentle cap of a thousand times that radius is found where the trace
+    shows it.
+    """
+    guess = float(np.log(0.5 * sizes.height))
+    return StudentT(guess, RADIUS_SCALE, 4.0, guess - 7.0, float(np.log(1e4 * max(tip, sizes.height, sizes.radius))))
+
+
+def hollow_priors(sizes: Sizes, tip: float) -> tuple[Prior, Prior]:
+    """Log width and log depth of a groove or pit; the ball does not feel the bottom of a deep one."""
+    width = np.log(2.0 * sizes.radius)
+    depth = np.log(sizes.height)
+    return Uniform(width - 2.0, width + 2.0), Uniform(depth - 1.5, float(max(np.log(tip), depth + 2.0)))
