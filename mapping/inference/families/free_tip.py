@@ -63,8 +63,8 @@ class FreeTipShape:
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights over the trace of a tip of nominal radius on the bare base, m.
 
-        Up to NARROW_PRIOR the shape is evaluated at three radii, all rows at once, and a parabola through them gives each
-        row its own; a wider prior needs every row's own radius.
+        Up to NARROW_PRIOR the shape is evaluated at three radii, all rows at once, and a parabola through them gives
+        each row its own; a wider prior needs every row's own radius.
         """
         off = theta[:, -1:] - self.tip.mean
         higher = np.zeros_like(off) if self.base_was_felt else off
