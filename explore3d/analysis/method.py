@@ -357,5 +357,6 @@ def _provenance(work: Work) -> dict[str, Any]:
         "read_as": log.metadata.get("read_as", []),
         "noise": {"white": noise.white, "correlated": noise.correlated, "length": noise.length},
         "detection_limit": work.detections.detection_limit,
+        "remarks": list(work.detections.remarks),
         "false_alarms_per_metre": work.settings.false_alarms_per_metre,
     }

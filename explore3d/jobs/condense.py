@@ -101,6 +101,7 @@ def joined(parts: list[Condensed]) -> Condensed:
         detection_limit=max(each.detection_limit for each in found),
         inspected_length=sum(each.inspected_length for each in found),
         left_out=tuple(sentence for part in parts for sentence in part.detections.left_out),
+        remarks=tuple(dict.fromkeys(remark for each in found for remark in each.remarks)),
     )
     trace = Trace.concatenate([part.trace for part in parts])
     return Condensed(trace, together, sum(part.samples for part in parts))

@@ -54,6 +54,7 @@ def summary(analysis: Analysis) -> list[str]:
         *(feature_line(feature) for feature in features[:MOST_LISTED_FEATURES]),
         *more,
         limit_sentence(analysis),
+        *(f"Note: {remark}." for remark in analysis.detections.remarks),
         *([account.sentence()] if account is not None else []),
     ]
 

@@ -12,6 +12,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
 from mapping.detection.cap_fit import Disturbance, fit_cap
+from mapping.detection.empirical_null import NullScale
 from mapping.detection.matched_filter import Bank
 from mapping.instrument import Noise
 
@@ -36,7 +37,12 @@ SCARCE = 0.1
 
 
 def find_disturbances(
-    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float
+    profile: SweepHeights,
+    bank: Bank,
+    noise: Noise,
+    threshold: float,
+    tip_radius: float,
+    null: NullScale | None = None,
 ) -> tuple[Disturbance, ...]:
     """Every disturbance above the threshold, the strongest first.
 
@@ -46,13 +52,16 @@ def find_disturbances(
         noise: of single samples.
         threshold: smallest signal-to-noise ratio.
         tip_radius: m.
+        null: how far the outputs scatter where nothing is, against the noise; None: as the noise says.
     """
     found: list[Disturbance] = []
-    for height, begin, end, crest, snr in _stretches(profile, bank, noise, threshold, tip_radius):
+    for height, begin, end, crest, snr in _stretches(profile, bank, noise, threshold, tip_radius, null):
         for low, high in _crests(height, begin, end, crest, profile, noise, tip_radius):
             beside = (low > begin, high < end)
             sign = float(np.sign(crest))
             new = fit_cap(height, (low, high), sign, profile, noise, bank.drift, tip_radius, beside)
+            if null is not None:
+                new = new.at_scale(null.at(new.half_width, (new.place - profile.start) / profile.spacing))
             if not any(beside) and new.snr < snr:
                 new = replace(new, snr=snr)
             certain = abs(new.height) >= MEASURED * threshold * new.height_sd
@@ -71,7 +80,7 @@ def quiet_bins(profile: SweepHeights, bank: Bank, noise: Noise, threshold: float
 
 
 def _stretches(
-    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float
+    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float, null: NullScale | None = None
 ) -> Iterator[tuple[FloatArray, int, int, float, float]]:
     """(heights, first bin, past-last bin, crest, signal-to-noise) of each stretch.
 
@@ -79,7 +88,7 @@ def _stretches(
     are strong enough to hide others, and looks again, until nothing new exceeds the threshold.
     """
     height = profile.height.copy()
-    certainty = _certainties(profile, bank)
+    certainty = _certainties(profile, bank, null)
     weak: list[tuple[int, float]] = []
     changed = True
     for _ in range(MOST_DISTURBANCE_ROUNDS):
@@ -99,6 +108,20 @@ def _stretches(
             height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
 
 
+def without_features(
+    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float, null: NullScale
+) -> tuple[FloatArray, FloatArray]:
+    """Heights (n,), m, of a profile with what is certainly a feature taken out, and weights (n,), 0 there."""
+    height, quiet = profile.height.copy(), np.ones(len(profile.height))
+    for _, begin, end, _, snr in _stretches(profile, bank, noise, threshold, tip_radius, null):
+        if snr >= HIDING * threshold:
+            height[begin:end] = np.interp(
+                np.arange(begin, end), [begin - 1, end], _shoulders(height, begin, end, bank.drift > 0)
+            )
+            quiet[begin:end] = 0.0
+    return height, quiet
+
+
 def _scarcity(profile: SweepHeights, bank: Bank) -> FloatArray:
     """(n,) share by which the noise's variance in a bin exceeds the average for want of samples; 0 if none does."""
     counts = np.maximum(np.diff(profile.first), 1)
@@ -107,15 +130,23 @@ def _scarcity(profile: SweepHeights, bank: Bank) -> FloatArray:
     return np.asarray(share * (bank.samples / counts - 1.0))
 
 
-def _certainties(profile: SweepHeights, bank: Bank) -> Callable[[int], FloatArray | None]:
-    """Of the k-th filter, when asked: expected over actual sd of what it sees in each bin (n,), at most 1.
+def _certainties(profile: SweepHeights, bank: Bank, null: NullScale | None) -> Callable[[int], FloatArray | None]:
+    """Of the k-th filter, when asked: expected over actual sd of what it sees in each bin (n,).
 
     None where it is 1 throughout.
     """
     scarcity = _scarcity(profile, bank)
-    if scarcity.max(initial=0.0) <= SCARCE:
+    scarce = scarcity.max(initial=0.0) > SCARCE
+    if not scarce and null is None:
         return lambda _: None
-    return cache(lambda k: _certainty(scarcity, int(bank.filters[k].half_width / bank.spacing)))
+
+    def certainty(k: int) -> FloatArray | None:
+        share = _certainty(scarcity, int(bank.filters[k].half_width / bank.spacing)) if scarce else None
+        if null is None:
+            return share
+        return np.asarray((1.0 if share is None else share) / null.along(k))
+
+    return cache(certainty)
 
 
 def _certainty(scarcity: FloatArray, bins: int) -> FloatArray | None:
@@ -135,10 +166,10 @@ def _candidates(
             continue
         crest, sd = f.heights(height)
         snr = np.abs(crest) / sd
-        if snr.max() <= threshold:
-            continue
         if (share := certainty(k)) is not None:
             snr *= share[: len(crest) * f.coarse : f.coarse]
+        if snr.max() <= threshold:
+            continue
         snr[np.abs(crest) > PHYSICAL * f.half_width**2 / (2 * tip_radius)] = 0.0
         around = np.concatenate([[-1.0], snr, [-1.0]])
         peaks = np.flatnonzero((snr > threshold) & (snr >= around[:-2]) & (snr > around[2:]))

@@ -9,11 +9,12 @@ import numpy as np
 
 from mapping import DetectionError, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
-from mapping.detection.candidates import find_disturbances
+from mapping.detection.candidates import find_disturbances, without_features
 from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import Crossing
+from mapping.detection.empirical_null import NullScale, null_scales, typical_scale
 from mapping.detection.false_alarms import threshold_for
-from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, smallest_half_width
+from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, Bank, smallest_half_width
 from mapping.detection.paper_algorithms import along_chord, curvature_features
 from mapping.detection.quiet_noise import SMALLEST_CREST_SNR, background, first_noise, floored, raw_stretches
 from mapping.instrument import Noise, StatedNoise
@@ -43,6 +44,7 @@ class Detections:
         threshold: signal-to-noise ratio above which a crossing is reported.
         inspected_length: length of path inspected, m.
         left_out: sentences naming what could not be inspected, and why.
+        remarks: sentences naming what of the stated promises had to be changed, from what to what, and why.
     """
 
     crossings: tuple[Crossing, ...]
@@ -53,6 +55,7 @@ class Detections:
     threshold: float
     inspected_length: float
     left_out: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @classmethod
     def together(cls, parts: Sequence[Detections]) -> Detections:
@@ -63,6 +66,7 @@ class Detections:
             crossings=tuple(crossing for part in parts for crossing in part.crossings),
             inspected_length=sum(part.inspected_length for part in parts),
             left_out=tuple(reason for part in parts for reason in part.left_out),
+            remarks=tuple(dict.fromkeys(remark for part in parts for remark in part.remarks)),
         )
 
 
@@ -119,10 +123,12 @@ def detect(
         spacing: threshold_for(bank, false_alarms_per_metre, behind.uncertainties[spacing])
         for spacing, bank in behind.banks.items()
     }
+    # a noise that is given is the caller's word; one that was fitted is held against the outputs themselves
+    nulls = [None] * len(profiles) if noise else _nulls(profiles, behind.banks, level, thresholds, tip)
     crossings = []
-    for profile in profiles:
+    for profile, null in zip(profiles, nulls, strict=True):
         bank, threshold = behind.banks[profile.spacing], thresholds[profile.spacing]
-        disturbances = find_disturbances(profile, bank, level, threshold, tip)
+        disturbances = find_disturbances(profile, bank, level, threshold, tip, null)
         if base.kind == "profile":
             disturbances = tuple(d for d in disturbances if _stands_out(d, profile, level, tip))
         for disturbance in sorted(disturbances, key=lambda d: d.place):
@@ -135,8 +141,42 @@ def detect(
     # what is stated of the whole trace holds for the sweeps that make most of it
     usual = max(lengths, key=lambda spacing: lengths[spacing])
     threshold, length = thresholds[usual], sum(lengths.values())
-    limit = max(behind.banks[usual].detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
-    return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out)
+    bank, remarks = behind.banks[usual], tuple[str, ...]()
+    told = [
+        null for profile, null in zip(profiles, nulls, strict=True) if profile.spacing == usual and null is not None
+    ]
+    if told:
+        bank = bank.scaled(typical_scale(told))
+        remarks = (_raised(bank, behind.banks[usual], threshold, tip),)
+    limit = max(bank.detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
+    return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out, remarks)
+
+
+def _nulls(
+    profiles: list[SweepHeights], banks: dict[float, Bank], noise: Noise, thresholds: dict[float, float], tip: float
+) -> list[NullScale | None]:
+    """Of every profile, the scale of the filters' outputs where nothing is; what is certainly a feature apart."""
+    scales: list[NullScale | None] = [None] * len(profiles)
+    for spacing, bank in banks.items():
+        numbers = [i for i, profile in enumerate(profiles) if profile.spacing == spacing]
+        group = [profiles[i] for i in numbers]
+        threshold = thresholds[spacing]
+        first = null_scales(group, [p.height for p in group], [np.ones(len(p.height)) for p in group], bank, threshold)
+        plain = [without_features(p, bank, noise, threshold, tip, null) for p, null in zip(group, first, strict=True)]
+        if any((quiet == 0).any() for _, quiet in plain):
+            first = null_scales(group, [height for height, _ in plain], [quiet for _, quiet in plain], bank, threshold)
+        for i, null in zip(numbers, first, strict=True):
+            scales[i] = None if null.as_fitted else null
+    return scales
+
+
+def _raised(measured: Bank, fitted: Bank, threshold: float, tip: float) -> str:
+    before, after = (1e3 * bank.detection_limit(threshold, tip) for bank in (fitted, measured))
+    return (
+        "the noise is not the same everywhere, or of no simple law: where nothing is, the filters' outputs scatter "
+        f"otherwise than the fitted noise says; crests are weighed by what was measured, and the typical limit is "
+        f"{after:.3g} mm instead of {before:.3g} mm"
+    )
 
 
 def _resolved(crossings: list[Crossing], resolution: float) -> tuple[list[Crossing], tuple[str, ...]]:
