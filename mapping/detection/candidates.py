@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -32,19 +32,37 @@ LARGEST_SHARE = 0.6
 # A disturbance weaker than this many thresholds hides no other: its residual is its own side lobes.
 HIDING = 1.5
 MOST_DISTURBANCE_ROUNDS = 50
+# Thresholds above which a stretch is no noise whatever the law. What is weaker is left in the measurement of the
+# noise: a law wrong by a factor of two or three makes many of these, and a median hardly sees a few features.
+CLEAR = 3.0
 # Samples are scarce where the noise's variance is raised by more than this share: less is the binning's own.
 SCARCE = 0.1
 
 
-def find_disturbances(
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """What a search of one profile came to.
+
+    Args:
+        disturbances: above the threshold, the strongest first.
+        height: (n,) m, of the profile with what is clearly no noise taken out.
+        quiet: (n,) False where that was.
+    """
+
+    disturbances: tuple[Disturbance, ...]
+    height: FloatArray
+    quiet: BoolArray
+
+
+def search(
     profile: SweepHeights,
     bank: Bank,
     noise: Noise,
     threshold: float,
     tip_radius: float,
     null: NullScale | None = None,
-) -> tuple[Disturbance, ...]:
-    """Every disturbance above the threshold, the strongest first.
+) -> Searched:
+    """Every disturbance above the threshold, and what is left of the profile without them.
 
     Args:
         profile: heights along one sweep.
@@ -55,7 +73,9 @@ def find_disturbances(
         null: how far the outputs scatter where nothing is, against the noise; None: as the noise says.
     """
     found: list[Disturbance] = []
+    stretches = []
     for height, begin, end, crest, snr in _stretches(profile, bank, noise, threshold, tip_radius, null):
+        stretches.append((begin, end, snr >= CLEAR * threshold))
         for low, high in _crests(height, begin, end, crest, profile, noise, tip_radius):
             beside = (low > begin, high < end)
             sign = float(np.sign(crest))
@@ -67,7 +87,29 @@ def find_disturbances(
             certain = abs(new.height) >= MEASURED * threshold * new.height_sd
             if certain and new.snr >= threshold and not _side_lobe(new, found, bank.drift > 0):
                 found.append(new)
-    return tuple(found)
+    quiet = _unclear(stretches, len(profile.height))
+    return Searched(tuple(found), _without(profile.height, quiet, bank.drift > 0), quiet)
+
+
+def _unclear(stretches: list[tuple[int, int, bool]], count: int) -> BoolArray:
+    """(count,) False in the stretches (begin, end, clear) that are clear, and in the skirts and side lobes of these."""
+    quiet = np.ones(count, dtype=bool)
+    for begin, end, clear in sorted(stretches, key=lambda each: not each[2]):
+        if clear or not quiet[max(0, 2 * begin - end) : 2 * end - begin].all():
+            quiet[begin:end] = False
+    return quiet
+
+
+def _without(height: FloatArray, quiet: BoolArray, drift: bool) -> FloatArray:
+    """Heights (n,) with every run that is not quiet brought down to its shoulders."""
+    if quiet.all():
+        return height
+    height = height.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], quiet, [True]])))
+    for begin, end in edges.reshape(-1, 2):
+        shoulders = _shoulders(height, begin, end, drift)
+        height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
+    return height
 
 
 def quiet_bins(profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float) -> BoolArray:
@@ -106,20 +148,6 @@ def _stretches(
             shoulders = _shoulders(height, begin, end, bank.drift > 0)
             changed = True
             height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
-
-
-def without_features(
-    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float, null: NullScale
-) -> tuple[FloatArray, FloatArray]:
-    """Heights (n,), m, of a profile with what is certainly a feature taken out, and weights (n,), 0 there."""
-    height, quiet = profile.height.copy(), np.ones(len(profile.height))
-    for _, begin, end, _, snr in _stretches(profile, bank, noise, threshold, tip_radius, null):
-        if snr >= HIDING * threshold:
-            height[begin:end] = np.interp(
-                np.arange(begin, end), [begin - 1, end], _shoulders(height, begin, end, bank.drift > 0)
-            )
-            quiet[begin:end] = 0.0
-    return height, quiet
 
 
 def _scarcity(profile: SweepHeights, bank: Bank) -> FloatArray:

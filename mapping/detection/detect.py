@@ -9,14 +9,21 @@ import numpy as np
 
 from mapping import DetectionError, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
-from mapping.detection.candidates import find_disturbances, without_features
+from mapping.detection.candidates import Searched, search
 from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import Crossing
 from mapping.detection.empirical_null import NullScale, null_scales, typical_scale
 from mapping.detection.false_alarms import threshold_for
 from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, Bank, smallest_half_width
 from mapping.detection.paper_algorithms import along_chord, curvature_features
-from mapping.detection.quiet_noise import SMALLEST_CREST_SNR, background, first_noise, floored, raw_stretches
+from mapping.detection.quiet_noise import (
+    CONTACT_ROUNDING,
+    SMALLEST_CREST_SNR,
+    background,
+    first_noise,
+    floored,
+    raw_stretches,
+)
 from mapping.instrument import Noise, StatedNoise
 
 # Half-width of the widest disturbance that counts as fine, in tip radii.
@@ -29,6 +36,8 @@ PROBABILITY = 0.95
 UNRESOLVED = 2.5
 # Distances between samples that differ by no more than this factor are as good as equal.
 ALIKE = 1.15
+# Rounds in which the scale of the quiet path and what is no quiet path settle: noise ten times as fitted takes six.
+NULL_ROUNDS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,12 +132,15 @@ def detect(
         spacing: threshold_for(bank, false_alarms_per_metre, behind.uncertainties[spacing])
         for spacing, bank in behind.banks.items()
     }
-    # a noise that is given is the caller's word; one that was fitted is held against the outputs themselves
-    nulls = [None] * len(profiles) if noise else _nulls(profiles, behind.banks, level, thresholds, tip)
+    found: list[Searched] = [search(p, behind.banks[p.spacing], level, thresholds[p.spacing], tip) for p in profiles]
+    nulls: list[NullScale | None] = [None] * len(profiles)
+    if (
+        noise is None and level.white > CONTACT_ROUNDING * tip
+    ):  # one that is given is the caller's word; one that was fitted is held against the quiet path
+        found, nulls = _weighed(profiles, found, behind.banks, level, thresholds, tip)
     crossings = []
-    for profile, null in zip(profiles, nulls, strict=True):
-        bank, threshold = behind.banks[profile.spacing], thresholds[profile.spacing]
-        disturbances = find_disturbances(profile, bank, level, threshold, tip, null)
+    for profile, each in zip(profiles, found, strict=True):
+        disturbances = each.disturbances
         if base.kind == "profile":
             disturbances = tuple(d for d in disturbances if _stands_out(d, profile, level, tip))
         for disturbance in sorted(disturbances, key=lambda d: d.place):
@@ -152,22 +164,33 @@ def detect(
     return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out, remarks)
 
 
-def _nulls(
-    profiles: list[SweepHeights], banks: dict[float, Bank], noise: Noise, thresholds: dict[float, float], tip: float
-) -> list[NullScale | None]:
-    """Of every profile, the scale of the filters' outputs where nothing is; what is certainly a feature apart."""
-    scales: list[NullScale | None] = [None] * len(profiles)
+def _weighed(
+    profiles: list[SweepHeights],
+    found: list[Searched],
+    banks: dict[float, Bank],
+    noise: Noise,
+    thresholds: dict[float, float],
+    tip: float,
+) -> tuple[list[Searched], list[NullScale | None]]:
+    """What is found under the scale of the quiet path, and that scale; None where it is the fitted one.
+
+    What is found is left out of the scale, and the scale decides what is found: from the fitted scale upwards, until
+    nothing changes. The least scale that explains what it calls quiet is the answer: features never enter it.
+    """
+    nulls: list[NullScale | None] = [None] * len(profiles)
     for spacing, bank in banks.items():
         numbers = [i for i, profile in enumerate(profiles) if profile.spacing == spacing]
-        group = [profiles[i] for i in numbers]
-        threshold = thresholds[spacing]
-        first = null_scales(group, [p.height for p in group], [np.ones(len(p.height)) for p in group], bank, threshold)
-        plain = [without_features(p, bank, noise, threshold, tip, null) for p, null in zip(group, first, strict=True)]
-        if any((quiet == 0).any() for _, quiet in plain):
-            first = null_scales(group, [height for height, _ in plain], [quiet for _, quiet in plain], bank, threshold)
-        for i, null in zip(numbers, first, strict=True):
-            scales[i] = None if null.as_fitted else null
-    return scales
+        group, threshold = [profiles[i] for i in numbers], thresholds[spacing]
+        for _ in range(NULL_ROUNDS):
+            now = [found[i] for i in numbers]
+            scales = null_scales(group, [each.height for each in now], [each.quiet for each in now], bank, threshold)
+            if all(scale.as_fitted for scale in scales):
+                break
+            for i, scale in zip(numbers, scales, strict=True):
+                nulls[i], found[i] = scale, search(profiles[i], bank, noise, threshold, tip, scale)
+            if all(np.array_equal(each.quiet, found[i].quiet) for i, each in zip(numbers, now, strict=True)):
+                break
+    return found, nulls
 
 
 def _raised(measured: Bank, fitted: Bank, threshold: float, tip: float) -> str:
