@@ -198,8 +198,14 @@ def why_no_detection(work: Work) -> str | None:
 
 
 def detected(work: Work, share: Share) -> None:
-    """Crossings of single sweeps."""
+    """Crossings of single sweeps; samples that cannot have been felt count no more for anything that follows."""
     work.detections = detect(work.laid, work.base, **work.settings.detection)
+    if work.detections.unfelt:
+        keep = np.ones(len(work.trace), dtype=bool)
+        keep[list(work.detections.unfelt)] = False
+        work.trace, work.laid = work.trace.select(keep), work.laid.within(keep)
+        found = detect(work.laid, work.base, **work.settings.detection)
+        work.detections = replace(found, left_out=(*work.detections.left_out, *found.left_out))
 
 
 def why_no_lines(work: Work) -> str:

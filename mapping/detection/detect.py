@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import DetectionError, FloatArray, IntArray, Trace
+from mapping import BoolArray, DetectionError, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
 from mapping.detection.candidates import Searched, search
 from mapping.detection.cap_fit import Disturbance
@@ -15,6 +15,7 @@ from mapping.detection.crossing import Crossing
 from mapping.detection.empirical_null import NullScale, null_scales, typical_scale
 from mapping.detection.false_alarms import threshold_for
 from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, Bank, smallest_half_width
+from mapping.detection.outliers import outliers
 from mapping.detection.paper_algorithms import along_chord, curvature_features
 from mapping.detection.quiet_noise import (
     CONTACT_ROUNDING,
@@ -54,6 +55,7 @@ class Detections:
         inspected_length: length of path inspected, m.
         left_out: sentences naming what could not be inspected, and why.
         remarks: sentences naming what of the stated promises had to be changed, from what to what, and why.
+        unfelt: indices of the trace's samples that no ball on any surface can give; they were left out.
     """
 
     crossings: tuple[Crossing, ...]
@@ -65,6 +67,7 @@ class Detections:
     inspected_length: float
     left_out: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    unfelt: tuple[int, ...] = ()
 
     @classmethod
     def together(cls, parts: Sequence[Detections]) -> Detections:
@@ -118,14 +121,28 @@ def detect(
     if base is None:
         base = fit_base(trace)
     tip = trace.tip_radius
-    usable, left_out = _usable(LaidTrace.of(trace, base))
+    laid = LaidTrace.of(trace, base)
+    usable, left_out = _usable(laid)
     if not usable:
         return Detections((), noise or Noise(0.0), algorithm, np.inf, PROBABILITY, np.inf, 0.0, left_out)
     raw = float(np.median([_step(sweep) for sweep in usable]))
     stretches = [] if noise else raw_stretches(usable)
     first = floored(noise, tip) if noise else first_noise(stretches, raw, tip)
     widest = LARGEST * tip if largest is None else largest
-    profiles = _profiles(usable, first, tip)
+    of_sweeps = _profiles(usable, first, tip)
+    keep, unfelt = _felt(laid, dict(zip(map(id, usable), of_sweeps, strict=True)))
+    if unfelt:
+        felt = detect(
+            trace.select(keep),
+            base,
+            algorithm=algorithm,
+            false_alarms_per_metre=false_alarms_per_metre,
+            noise=noise,
+            stated=stated,
+            largest=largest,
+        )
+        return _in_all(felt, keep, laid, unfelt)
+    profiles = [profile for each in of_sweeps for profile in each]
     behind = background(profiles, base, noise, stretches, first, tip, widest, stated)
     level = behind.noise
     thresholds = {
@@ -202,6 +219,47 @@ def _raised(measured: Bank, fitted: Bank, threshold: float, tip: float) -> str:
     )
 
 
+def _felt(laid: LaidTrace, profiles: dict[int, tuple[SweepHeights, ...]]) -> tuple[BoolArray, tuple[str, ...]]:
+    """(N,) False for samples of the trace that cannot have been felt, and a sentence that counts them if there are.
+
+    Args:
+        laid: the trace.
+        profiles: of the sweeps that are long enough, by the sweep's identity: numbers may come twice.
+    """
+    found = {
+        id(sweep): outliers(sweep, profiles[id(sweep)], laid.tip_radius, laid.resolution)
+        for sweep in laid.laid_sweeps
+        if id(sweep) in profiles
+    }
+    each = [found[id(s)].keep if id(s) in found else np.ones(len(s.trace), dtype=bool) for s in laid.laid_sweeps]
+    keep = np.concatenate(each)
+    if keep.all():
+        return keep, ()
+    runs, stuck = (sum(getattr(one, name) for one in found.values()) for name in ("impossible", "stuck"))
+    kinds = [f"{runs} runs that bend sharper than the ball can"] * (runs > 0)
+    kinds += [f"{stuck} runs of readings that do not change"] * (stuck > 0)
+    return keep, (f"{int((~keep).sum())} samples were not felt and are left out: {', '.join(kinds)}",)
+
+
+def _in_all(felt: Detections, keep: BoolArray, laid: LaidTrace, reasons: tuple[str, ...]) -> Detections:
+    """What was detected in the samples to keep (N,), with the places of crossings among all samples."""
+    all_samples, kept = np.arange(len(keep)), np.flatnonzero(keep)
+    own: dict[int, IntArray] = {}
+    begin = 0
+    for sweep in laid.laid_sweeps:
+        end = begin + len(sweep.trace)
+        own[sweep.number] = all_samples[begin:end][keep[begin:end]] - begin
+        begin = end
+    crossings = []
+    for c in felt.crossings:
+        inside = own[c.sweep]
+        stop = int(inside[min(c.stop, len(inside)) - 1]) + 1
+        crossings.append(replace(c, start=int(inside[min(c.start, len(inside) - 1)]), stop=stop))
+    again = tuple(int(kept[i]) for i in felt.unfelt)
+    unfelt = tuple(sorted((*np.flatnonzero(~keep).tolist(), *again)))
+    return replace(felt, crossings=tuple(crossings), left_out=(*reasons, *felt.left_out), unfelt=unfelt)
+
+
 def _resolved(crossings: list[Crossing], resolution: float) -> tuple[list[Crossing], tuple[str, ...]]:
     """Without those that the rounding of the positions can make, which no model of noise describes."""
     kept = [c for c in crossings if abs(c.height) > UNRESOLVED * resolution]
@@ -231,15 +289,15 @@ def _step(sweep: LaidSweep) -> float:
     return float(s[-1] / (len(s) - 1))
 
 
-def _profiles(usable: list[LaidSweep], noise: Noise, tip: float) -> list[SweepHeights]:
-    """Profiles of every sweep in bins that the smallest visible crest spans FILTER_BINS_PER_HALF_WIDTH times."""
+def _profiles(usable: list[LaidSweep], noise: Noise, tip: float) -> list[tuple[SweepHeights, ...]]:
+    """Of every sweep, its profiles in bins that the smallest visible crest spans FILTER_BINS_PER_HALF_WIDTH times."""
     spacings = np.empty(len(usable))
     for alike in _alike(np.array([_step(sweep) for sweep in usable])):
         raw = float(np.median([_step(usable[i]) for i in alike]))
         smallest = smallest_half_width(noise, raw, 1.0, tip, SMALLEST_CREST_SNR)
         spacings[alike] = raw * max(1, int(smallest / (FILTER_BINS_PER_HALF_WIDTH * raw)))
     each = zip(usable, spacings.tolist(), strict=True)
-    return [profile for sweep, spacing in each for profile in sweep.heights(spacing)]
+    return [sweep.heights(spacing) for sweep, spacing in each]
 
 
 def _alike(steps: FloatArray) -> list[IntArray]:
