@@ -12,7 +12,7 @@ from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
 from mapping.detection.candidates import Searched, search
 from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import Crossing
-from mapping.detection.empirical_null import NullScale, null_scales, typical_scale
+from mapping.detection.empirical_null import NullScale, effective_noise, null_scales, typical_scale
 from mapping.detection.false_alarms import threshold_for
 from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, Bank, smallest_half_width
 from mapping.detection.outliers import outliers
@@ -47,7 +47,7 @@ class Detections:
 
     Args:
         crossings: one for every place where a sweep passed over something, in the order of the trace.
-        noise: of the trace's samples.
+        noise: of the trace's samples; where its law is not simple, the one under which crests scatter as measured.
         algorithm: number of the paper's algorithm (figure 4) that decided `curvature_feature`.
         detection_limit: smallest height of a sharp crest that a sweep across it detects with `probability`, m.
         probability: 0.95.
@@ -175,7 +175,7 @@ def detect(
         null for profile, null in zip(profiles, nulls, strict=True) if profile.spacing == usual and null is not None
     ]
     if told:
-        bank = bank.scaled(typical_scale(told))
+        bank, level = bank.scaled(typical_scale(told)), effective_noise(bank, told)
         remarks = (_raised(bank, behind.banks[usual], threshold, tip),)
     limit = max(bank.detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
     return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out, remarks)

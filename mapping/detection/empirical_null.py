@@ -23,6 +23,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
 from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, Bank
+from mapping.instrument import Noise
 
 # The variance of unit outputs is read from their median absolute value, 0.6745 standard deviations, which what is no
 # noise in less than half of a cell shifts little.
@@ -49,6 +50,8 @@ LEVEL_GAIN = 12.0
 LEVEL_VARIANCES, LEVEL_LENGTHS, ASKED_SWEEPS = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0), (2.0, 4.0, 8.0, 16.0, 32.0), 24
 # Filters between one that is measured and the next: neighbours on the ladder see nearly the same.
 STRIDE = 3
+# Correlation lengths among which that of the effective noise is chosen: a quarter of an octave apart or less.
+CORRELATION_LENGTHS = 40
 # Share of a filter's width from which features may have been taken out: its output loses that share of its variance.
 MISSING = 0.1
 
@@ -152,6 +155,37 @@ def typical_scale(scales: Sequence[NullScale]) -> FloatArray:
     """(F,) for each filter, the median over all cells of all profiles."""
     levels = [each.pooled[:, None] * each.own * np.sqrt(np.median(each.local)) for each in scales]
     return np.asarray(np.median(np.concatenate(levels, axis=1), axis=1))
+
+
+def effective_noise(bank: Bank, scales: Sequence[NullScale]) -> Noise:
+    """White and correlated noise under which the filters' outputs scatter as measured, for all who need one law.
+
+    The variance of a filter's output is linear in the variances of both parts: for each correlation length of a
+    ladder, the least relative errors over the filters and over the white level of single samples.
+    """
+    from scipy.optimize import nnls
+
+    numbers = range(0, len(bank.filters), STRIDE)
+    measured = [np.mean([np.mean(scale.along(k) ** 2) for scale in scales]) for k in numbers]
+    target = np.array([bank.filters[k].sd ** 2 * m for k, m in zip(numbers, measured, strict=True)])
+    level = float(np.mean([scale.local.mean() for scale in scales])) * bank.noise.white**2
+    white = np.array([_output_variance(bank, k, Noise(1.0)) for k in numbers])
+    best, noise = np.inf, bank.noise
+    for length in np.geomspace(2 * bank.spacing, bank.filters[-1].half_width, CORRELATION_LENGTHS):
+        correlated = [_output_variance(bank, k, Noise(0.0, 1.0, float(length))) for k in numbers]
+        shapes = np.column_stack([white, correlated]) / target[:, None]
+        # the level of single samples weighs as much as one filter
+        levels, misfit = nnls(np.vstack([shapes, [1 / level, 0.0]]), np.ones(len(shapes) + 1))
+        if misfit < best:
+            best, noise = misfit, Noise(*np.sqrt(levels), float(length))
+    return noise
+
+
+def _output_variance(bank: Bank, k: int, noise: Noise) -> float:
+    """Variance of what the weights of the k-th filter make of another noise, m^2."""
+    f = bank.filters[k]
+    covariance = noise.block_covariances(len(f.weights), f.coarse * bank.spacing, f.coarse * bank.samples)
+    return float(f.weights @ np.convolve(f.weights, np.concatenate([covariance[:0:-1], covariance]), mode="valid"))
 
 
 def _between(values: FloatArray, measured: Sequence[int]) -> FloatArray:
