@@ -23,7 +23,7 @@ from explore3d.scene import AnalysisSettings, Scene
 from mapping import Feature, LeftOut, Trace
 from mapping.assembly import assemble, why_none_sought
 from mapping.base import Base, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
-from mapping.detection import Detections, detect
+from mapping.detection import Detections, detect, recovered
 from mapping.estimate.envelope import estimate_surface
 from mapping.geometry.curvature import principal_curvatures
 from mapping.inference import refine_all
@@ -208,6 +208,19 @@ def detected(work: Work, share: Share) -> None:
         work.detections = replace(found, left_out=(*work.detections.left_out, *found.left_out))
 
 
+def why_no_injection(work: Work) -> str:
+    """Where the noise is as the fitted law says, the computed limit is the measured one, to within a few per cent."""
+    if work.log.detections:
+        return "the log was detected in while it was read"
+    return "" if work.detections.remarks or work.detections.left_out else "the noise is as the fitted law says"
+
+
+def limit_measured(work: Work, share: Share) -> None:
+    """The detection limit, by crests that are put into the log's own quiet path."""
+    rng = np.random.default_rng(work.settings.seed)
+    work.detections = recovered(work.detections, work.laid, rng, share, **work.settings.detection)
+
+
 def why_no_lines(work: Work) -> str:
     """Why a trace without a single crossing cannot, or need not, hold what only many sweeps together show."""
     asked, limit = work.smallest_feature, work.detections.detection_limit
@@ -363,6 +376,7 @@ def _provenance(work: Work) -> dict[str, Any]:
         "read_as": log.metadata.get("read_as", []),
         "noise": {"white": noise.white, "correlated": noise.correlated, "length": noise.length},
         "detection_limit": work.detections.detection_limit,
-        "remarks": list(work.detections.remarks),
+        "limit_measured": {"injected": work.detections.injected, "recovered": work.detections.recovered},
+        "warnings": list(work.detections.remarks),
         "false_alarms_per_metre": work.settings.false_alarms_per_metre,
     }

@@ -18,11 +18,13 @@ if TYPE_CHECKING:
         curvature_features as curvature_features,
         curvature_profile as curvature_profile,
     )
+    from mapping.detection.recovery import recovered as recovered
 
 _PUBLIC = {
     "coverage": ("Coverage", "coverage", "face_samples", "found_heights"),
     "crossing": ("Crossing",),
     "detect": ("Detections", "detect"),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
+    "recovery": ("recovered",),
 }
 doorway(__name__, _PUBLIC)

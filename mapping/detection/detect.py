@@ -56,6 +56,8 @@ class Detections:
         left_out: sentences naming what could not be inspected, and why.
         remarks: sentences naming what of the stated promises had to be changed, from what to what, and why.
         unfelt: indices of the trace's samples that no ball on any surface can give; they were left out.
+        injected, recovered: crests of the limit's height that were put into the quiet path, and found (see recovery);
+            0 where the limit is computed.
     """
 
     crossings: tuple[Crossing, ...]
@@ -68,6 +70,8 @@ class Detections:
     left_out: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     unfelt: tuple[int, ...] = ()
+    injected: int = 0
+    recovered: int = 0
 
     @classmethod
     def together(cls, parts: Sequence[Detections]) -> Detections:
