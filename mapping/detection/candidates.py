@@ -45,13 +45,13 @@ class Searched:
 
     Args:
         disturbances: above the threshold, the strongest first.
-        height: (n,) m, of the profile with what is clearly no noise taken out.
-        quiet: (n,) False where that was.
+        quiet: (n,) False where something exceeds the threshold.
+        unclear: (n,) False where something is clearly no noise.
     """
 
     disturbances: tuple[Disturbance, ...]
-    height: FloatArray
     quiet: BoolArray
+    unclear: BoolArray
 
 
 def search(
@@ -87,8 +87,10 @@ def search(
             certain = abs(new.height) >= MEASURED * threshold * new.height_sd
             if certain and new.snr >= threshold and not _side_lobe(new, found, bank.drift > 0):
                 found.append(new)
-    quiet = _unclear(stretches, len(profile.height))
-    return Searched(tuple(found), _without(profile.height, quiet, bank.drift > 0), quiet)
+    quiet = np.ones(len(profile.height), dtype=bool)
+    for begin, end, _ in stretches:
+        quiet[begin:end] = False
+    return Searched(tuple(found), quiet, _unclear(stretches, len(quiet)))
 
 
 def _unclear(stretches: list[tuple[int, int, bool]], count: int) -> BoolArray:
@@ -100,7 +102,7 @@ def _unclear(stretches: list[tuple[int, int, bool]], count: int) -> BoolArray:
     return quiet
 
 
-def _without(height: FloatArray, quiet: BoolArray, drift: bool) -> FloatArray:
+def without(height: FloatArray, quiet: BoolArray, drift: bool) -> FloatArray:
     """Heights (n,) with every run that is not quiet brought down to its shoulders."""
     if quiet.all():
         return height

@@ -9,7 +9,7 @@ import numpy as np
 
 from mapping import BoolArray, DetectionError, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
-from mapping.detection.candidates import Searched, search
+from mapping.detection.candidates import Searched, search, without
 from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import Crossing
 from mapping.detection.empirical_null import NullScale, effective_noise, null_scales, typical_scale
@@ -37,6 +37,8 @@ PROBABILITY = 0.95
 UNRESOLVED = 2.5
 # Distances between samples that differ by no more than this factor are as good as equal.
 ALIKE = 1.15
+# Share of the path that may be taken by what exceeds the threshold without being clear, before the law is doubted.
+MOST_WEAK = 0.2
 # Rounds in which the scale of the quiet path and what is no quiet path settle: noise ten times as fitted takes six.
 NULL_ROUNDS = 8
 
@@ -202,14 +204,20 @@ def _weighed(
     for spacing, bank in banks.items():
         numbers = [i for i, profile in enumerate(profiles) if profile.spacing == spacing]
         group, threshold = [profiles[i] for i in numbers], thresholds[spacing]
+        # weak features are no reason to doubt the law where the path beside them, most of it, is as fitted
+        masks = [found[i].quiet for i in numbers]
+        weak = sum(int((found[i].unclear & ~found[i].quiet).sum()) for i in numbers)
+        if weak > MOST_WEAK * sum(len(mask) for mask in masks):
+            masks = [found[i].unclear for i in numbers]
         for _ in range(NULL_ROUNDS):
-            now = [found[i] for i in numbers]
-            scales = null_scales(group, [each.height for each in now], [each.quiet for each in now], bank, threshold)
+            heights = [without(p.height, mask, bank.drift > 0) for p, mask in zip(group, masks, strict=True)]
+            scales = null_scales(group, heights, masks, bank, threshold)
             if all(scale.as_fitted for scale in scales):
                 break
             for i, scale in zip(numbers, scales, strict=True):
                 nulls[i], found[i] = scale, search(profiles[i], bank, noise, threshold, tip, scale)
-            if all(np.array_equal(each.quiet, found[i].quiet) for i, each in zip(numbers, now, strict=True)):
+            before, masks = masks, [found[i].unclear for i in numbers]
+            if all(np.array_equal(one, other) for one, other in zip(before, masks, strict=True)):
                 break
     return found, nulls
 

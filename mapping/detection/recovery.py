@@ -19,10 +19,12 @@ from mapping.detection.detect import Detections, detect
 # Crests put in at once, and the fewest that say anything: with twenty, one in three hundred logs in which half are
 # found would pass for one in which 95 % are.
 INJECTED, FEWEST_INJECTED = 60, 20
-# Half-widths of a crest between one and the next, and between a crest and what is no quiet path.
-APART, ASIDE = 8.0, 2.0
-# Factor by which the height rises while too few are found, and how often.
-RISE, RISES = 1.15, 8
+# Half-widths of a crest between one and the next, so that they change the noise little (a twelfth of the path), and
+# between a crest and what is no quiet path.
+APART, ASIDE = 24.0, 2.0
+# Factors by which the height rises while too few are found, or far too few, and how often.
+RISE, STEEP_RISE, RISES = 1.12, 1.4, 8
+FAR_TOO_FEW = 0.75
 # Probability with which a true limit would be taken for a false one.
 DOUBT = 0.05
 
@@ -42,28 +44,32 @@ def recovered(
     height, tip = detections.detection_limit, laid.tip_radius
     if not np.isfinite(height) or height <= 0:
         return detections
-    probability = detections.probability
+    probability, found, injected = detections.probability, 0, 0
     for rise in range(RISES + 1):
         share(rise / (RISES + 1))
         half_width = float(np.sqrt(2 * tip * height))
         places = _places(detections, laid, half_width, rng)
+        if len(places) < FEWEST_INJECTED and injected:
+            break
         if len(places) < FEWEST_INJECTED:
             short = f"the limit is computed, not measured: the quiet path has room for {len(places)} crests only"
             return replace(detections, left_out=(*detections.left_out, short))
         found = _count_found(
             detect(_with_crests(laid, places, height), laid.base, **settings), laid, places, half_width
         )
-        if found >= _fewest(len(places), probability):
+        injected = len(places)
+        if found >= _fewest(injected, probability):
             break
-        height *= RISE
+        height *= RISE if found > FAR_TOO_FEW * len(places) else STEEP_RISE
     remarks = detections.remarks
     if height > detections.detection_limit:
+        enough = "" if found >= _fewest(injected, probability) else "at least "
         remarks = (
             *remarks,
-            f"the detection limit was raised from {1e3 * detections.detection_limit:.2g} mm, as computed, to "
-            f"{1e3 * height:.2g} mm, at which crests put into this log are found",
+            f"the detection limit was raised from {1e3 * detections.detection_limit:.2g} mm, as computed, to {enough}"
+            f"{1e3 * height:.2g} mm: {found} of the last {injected} crests that were put into this log were found",
         )
-    return replace(detections, detection_limit=height, recovered=found, injected=len(places), remarks=remarks)
+    return replace(detections, detection_limit=height, recovered=found, injected=injected, remarks=remarks)
 
 
 def _fewest(count: int, probability: float) -> int:
@@ -86,7 +92,7 @@ def _places(
             if c.sweep == sweep.number:
                 low, high = s[min(c.start, len(s) - 1)], s[min(c.stop, len(s)) - 1]
                 quiet[(s > low - ASIDE * half_width) & (s < high + ASIDE * half_width)] = False
-        candidates = np.arange(s[0] + rng.uniform(ASIDE, APART) * half_width, s[-1], APART * half_width)
+        candidates = np.arange(s[0] + rng.uniform(ASIDE, 0.5 * APART) * half_width, s[-1], APART * half_width)
         places += [(number, float(p)) for p in candidates if _clear(s, quiet, p, ASIDE * half_width)]
     if len(places) > INJECTED:
         places = [places[i] for i in np.sort(rng.choice(len(places), INJECTED, replace=False))]
