@@ -53,7 +53,7 @@ STRIDE = 3
 # Correlation lengths among which that of the effective noise is chosen: a quarter of an octave apart or less.
 CORRELATION_LENGTHS = 40
 # Share of a filter's width from which features may have been taken out: its output loses that share of its variance.
-MISSING = 0.1
+MISSING_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,7 +308,7 @@ def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank
     if not (local == 1.0).all():
         z /= _seen(local, bins)[places]
     if not quiet.all():
-        z[_running_mean(1.0 - quiet, max(1, int(bins)))[places] > MISSING] = np.nan
+        z[_running_mean(1.0 - quiet, max(1, int(bins)))[places] > MISSING_SHARE] = np.nan
     return np.asarray(z)
 
 

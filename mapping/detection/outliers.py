@@ -31,7 +31,7 @@ LEVEL_SAMPLES = 256
 FOOT = 0.25
 # Share of the usual step between readings below which a reading counts as the one before, and how many such in a row
 # are a reading that is stuck: by chance (0.008)^8.
-SAME, STUCK = 0.01, 8
+UNCHANGED, STUCK = 0.01, 8
 MEDIAN_OF_UNIT_NORMAL = 0.6744897501960817
 
 
@@ -149,7 +149,7 @@ def _stuck(height: FloatArray, level: FloatArray, resolution: float) -> tuple[Bo
     stuck = np.zeros(len(height), dtype=bool)
     if resolution > 0:
         return stuck, 0
-    same = np.concatenate([[False], np.abs(np.diff(height)) < SAME * level[1:], [False]])
+    same = np.concatenate([[False], np.abs(np.diff(height)) < UNCHANGED * level[1:], [False]])
     edges = np.flatnonzero(np.diff(same.astype(np.int8)))
     runs = [(first + 1, last + 1) for first, last in edges.reshape(-1, 2) if last - first >= STUCK]
     for first, last in runs:

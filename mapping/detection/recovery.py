@@ -26,7 +26,7 @@ APART, ASIDE = 24.0, 2.0
 RISE, STEEP_RISE, RISES = 1.12, 1.4, 8
 FAR_TOO_FEW = 0.75
 # Probability with which a true limit would be taken for a false one.
-DOUBT = 0.05
+WRONGLY_RAISED = 0.05
 
 
 def recovered(
@@ -73,10 +73,10 @@ def recovered(
 
 
 def _fewest(count: int, probability: float) -> int:
-    """The fewest of so many that are found with probability 1 - DOUBT if each is with this probability."""
+    """The fewest of so many that are found with probability 1 - WRONGLY_RAISED if each is with this probability."""
     from scipy.stats import binom
 
-    return int(binom.ppf(DOUBT, count, probability))
+    return int(binom.ppf(WRONGLY_RAISED, count, probability))
 
 
 def _places(
