@@ -177,7 +177,8 @@ def effective_noise(bank: Bank, scales: Sequence[NullScale]) -> Noise:
         # the level of single samples weighs as much as one filter
         levels, misfit = nnls(np.vstack([shapes, [1 / level, 0.0]]), np.ones(len(shapes) + 1))
         if misfit < best:
-            best, noise = misfit, Noise(*np.sqrt(levels), float(length))
+            white_sd, correlated_sd = np.sqrt(levels).tolist()
+            best, noise = misfit, Noise(white_sd, correlated_sd, float(length))
     return noise
 
 
@@ -308,7 +309,7 @@ def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank
     if not (local == 1.0).all():
         z /= _seen(local, bins)[places]
     if not quiet.all():
-        z[_running_mean(1.0 - quiet, max(1, int(bins)))[places] > MISSING_SHARE] = np.nan
+        z[_running_mean((~quiet).astype(np.float64), max(1, int(bins)))[places] > MISSING_SHARE] = np.nan
     return np.asarray(z)
 
 
