@@ -23,7 +23,7 @@ from explore3d.scene import AnalysisSettings, Scene
 from mapping import Feature, LeftOut, Trace, length_text
 from mapping.assembly import assemble, why_none_sought
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
-from mapping.detection import Detections, detect
+from mapping.detection import Detections, detect, recovered
 from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
 from mapping.estimate.envelope import estimate_surface
 from mapping.geometry.curvature import principal_curvatures
@@ -233,10 +233,29 @@ def why_no_detection(work: Work) -> str | None:
 
 
 def detected(work: Work, share: Share) -> None:
-    """Crossings of single sweeps."""
+    """Crossings of single sweeps; samples that cannot have been felt count no more for anything that follows."""
     work.detections = detect(work.laid, work.base, **work.settings.detection)
+    if work.detections.unfelt:
+        keep = np.ones(len(work.trace), dtype=bool)
+        keep[list(work.detections.unfelt)] = False
+        work.trace, work.laid = work.trace.select(keep), work.laid.within(keep)
+        found = detect(work.laid, work.base, **work.settings.detection)
+        work.detections = replace(found, left_out=(*work.detections.left_out, *found.left_out))
     if work.sound is not None:
         work.path = path_ledger(work.sound, work.detections, len(work.log.trace) - len(work.laid))
+
+
+def why_no_injection(work: Work) -> str:
+    """Where the noise is as the fitted law says, the computed limit is the measured one, to within a few per cent."""
+    if work.log.detections:
+        return "the log was detected in while it was read"
+    return "" if work.detections.remarks or work.detections.left_out else "the noise is as the fitted law says"
+
+
+def limit_measured(work: Work, share: Share) -> None:
+    """The detection limit, by crests that are put into the log's own quiet path."""
+    rng = np.random.default_rng(work.settings.seed)
+    work.detections = recovered(work.detections, work.laid, rng, share, **work.settings.detection)
 
 
 def why_no_lines(work: Work) -> str:
@@ -398,5 +417,7 @@ def _provenance(work: Work) -> dict[str, Any]:
         "read_as": log.metadata.get("read_as", []),
         "noise": {"white": noise.white, "correlated": noise.correlated, "length": noise.length},
         "detection_limit": work.detections.detection_limit,
+        "limit_measured": {"injected": work.detections.injected, "recovered": work.detections.recovered},
+        "warnings": list(work.detections.remarks),
         "false_alarms_per_metre": work.settings.false_alarms_per_metre,
     }

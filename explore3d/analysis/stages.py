@@ -16,6 +16,7 @@ OPTIONAL_STAGES = (
     "base fit",
     "pose",
     "algorithms 1 and 2",
+    "injected crests",
     "grammar",
     "posterior",
     "long chain",

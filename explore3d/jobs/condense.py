@@ -101,6 +101,7 @@ def joined(parts: list[Condensed]) -> Condensed:
         detection_limit=max(each.detection_limit for each in found),
         inspected_length=sum(each.inspected_length for each in found),
         left_out=tuple(sentence for part in parts for sentence in part.detections.left_out),
+        remarks=tuple(dict.fromkeys(remark for each in found for remark in each.remarks)),
     )
     trace = Trace.concatenate([part.trace for part in parts])
     return Condensed(trace, together, sum(part.samples for part in parts))
@@ -109,6 +110,7 @@ def joined(parts: list[Condensed]) -> Condensed:
 def _condensed(trace: Trace, base: Base, every: int, settings: dict[str, Any]) -> Condensed:
     found = detect(trace, base, **settings)
     keep, begins = _kept(trace, found.crossings, every), {}
+    keep[list(found.unfelt)] = False
     bounds = np.flatnonzero(np.diff(trace.sweep, prepend=trace.sweep[0] - 1))
     for begin in bounds:
         begins[int(trace.sweep[begin])] = int(begin)
@@ -119,7 +121,7 @@ def _condensed(trace: Trace, base: Base, every: int, settings: dict[str, Any]) -
         own = np.searchsorted(index, [first, first + crossing.start, first + crossing.stop])
         return replace(crossing, start=int(own[1] - own[0]), stop=int(own[2] - own[0]))
 
-    placed = replace(found, crossings=tuple(place(crossing) for crossing in found.crossings))
+    placed = replace(found, crossings=tuple(place(crossing) for crossing in found.crossings), unfelt=())
     return Condensed(trace.select(index), placed, len(trace))
 
 
@@ -171,6 +173,7 @@ def _load(file: Path, key: str) -> Condensed | None:
     crossings = tuple(
         Crossing(**(each | {name: np.array(each[name]) for name in vectors})) for each in record.pop("crossings")
     )
-    noise, left_out = Noise(**record.pop("noise")), tuple(record.pop("left_out"))
-    detections = Detections(crossings=crossings, noise=noise, left_out=left_out, **record)
+    noise = Noise(**record.pop("noise"))
+    sentences = {name: tuple(record.pop(name, ())) for name in ("left_out", "remarks", "unfelt")}
+    detections = Detections(crossings=crossings, noise=noise, **sentences, **record)
     return Condensed(trace, detections, samples, events, **log)

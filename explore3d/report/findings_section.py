@@ -7,7 +7,15 @@ from collections.abc import Sequence
 
 from explore3d import count_text
 from explore3d.analysis import Analysis
-from explore3d.report.findings import form_warnings, limit_sentence, path_sentence, path_warning, stop_lines, swept_part
+from explore3d.report.findings import (
+    form_warnings,
+    limit_sentence,
+    path_sentence,
+    path_warning,
+    stop_lines,
+    swept_part,
+    warning_lines,
+)
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.report.pictures import Pictures, is_profile
 from mapping import UNKNOWN_TEXT, Feature, Interval, length_text
@@ -58,6 +66,7 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
     """Counts, the table of features, and the views."""
     features = analysis.model.features
     content: list[str] = [_counts(analysis)]
+    content.extend(element("p", warning, class_="warning") for warning in warning_lines(analysis))
     if features:
         head = ("feature", "height", "width", "length", "place", "evidence", "kind of detail", "posterior")
         shared = _shared_notes(features)

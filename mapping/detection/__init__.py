@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         curvature_profile as curvature_profile,
     )
     from mapping.detection.quiet_noise import smallest_crest as smallest_crest
+    from mapping.detection.recovery import recovered as recovered
 
 _PUBLIC = {
     "coverage": ("Coverage", "coverage", "face_samples", "found_heights"),
@@ -32,5 +33,6 @@ _PUBLIC = {
     "matched_filter": ("LADDER",),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
     "quiet_noise": ("smallest_crest",),
+    "recovery": ("recovered",),
 }
 doorway(__name__, _PUBLIC)

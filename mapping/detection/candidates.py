@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
 from mapping.detection.cap_fit import Disturbance, fit_cap
+from mapping.detection.empirical_null import NullScale
 from mapping.detection.matched_filter import Bank
 from mapping.instrument import Noise
 
@@ -31,14 +32,37 @@ LARGEST_SHARE = 0.6
 # A disturbance weaker than this many thresholds hides no other: its residual is its own side lobes.
 HIDING = 1.5
 MOST_DISTURBANCE_ROUNDS = 50
+# Thresholds above which a stretch is no noise whatever the law. What is weaker is left in the measurement of the
+# noise: a law wrong by a factor of two or three makes many of these, and a median hardly sees a few features.
+CLEAR = 3.0
 # Samples are scarce where the noise's variance is raised by more than this share: less is the binning's own.
 SCARCE = 0.1
 
 
-def find_disturbances(
-    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float
-) -> tuple[Disturbance, ...]:
-    """Every disturbance above the threshold, the strongest first.
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """What a search of one profile came to.
+
+    Args:
+        disturbances: above the threshold, the strongest first.
+        quiet: (n,) False where something exceeds the threshold.
+        unclear: (n,) False where something is clearly no noise.
+    """
+
+    disturbances: tuple[Disturbance, ...]
+    quiet: BoolArray
+    unclear: BoolArray
+
+
+def search(
+    profile: SweepHeights,
+    bank: Bank,
+    noise: Noise,
+    threshold: float,
+    tip_radius: float,
+    null: NullScale | None = None,
+) -> Searched:
+    """Every disturbance above the threshold, and what is left of the profile without them.
 
     Args:
         profile: heights along one sweep.
@@ -46,19 +70,48 @@ def find_disturbances(
         noise: of single samples.
         threshold: smallest signal-to-noise ratio.
         tip_radius: m.
+        null: how far the outputs scatter where nothing is, against the noise; None: as the noise says.
     """
     found: list[Disturbance] = []
-    for height, begin, end, crest, snr in _stretches(profile, bank, noise, threshold, tip_radius):
+    stretches = []
+    for height, begin, end, crest, snr in _stretches(profile, bank, noise, threshold, tip_radius, null):
+        stretches.append((begin, end, snr >= CLEAR * threshold))
         for low, high in _crests(height, begin, end, crest, profile, noise, tip_radius):
             beside = (low > begin, high < end)
             sign = float(np.sign(crest))
             new = fit_cap(height, (low, high), sign, profile, noise, bank.drift, tip_radius, beside)
+            if null is not None:
+                new = new.at_scale(null.at(new.half_width, (new.place - profile.start) / profile.spacing))
             if not any(beside) and new.snr < snr:
                 new = replace(new, snr=snr)
             certain = abs(new.height) >= MEASURED * threshold * new.height_sd
             if certain and new.snr >= threshold and not _side_lobe(new, found, bank.drift > 0):
                 found.append(new)
-    return tuple(found)
+    quiet = np.ones(len(profile.height), dtype=bool)
+    for begin, end, _ in stretches:
+        quiet[begin:end] = False
+    return Searched(tuple(found), quiet, _unclear(stretches, len(quiet)))
+
+
+def _unclear(stretches: list[tuple[int, int, bool]], count: int) -> BoolArray:
+    """(count,) False in the stretches (begin, end, clear) that are clear, and in the skirts and side lobes of these."""
+    quiet = np.ones(count, dtype=bool)
+    for begin, end, clear in sorted(stretches, key=lambda each: not each[2]):
+        if clear or not quiet[max(0, 2 * begin - end) : 2 * end - begin].all():
+            quiet[begin:end] = False
+    return quiet
+
+
+def without(height: FloatArray, quiet: BoolArray, drift: bool) -> FloatArray:
+    """Heights (n,) with every run that is not quiet brought down to its shoulders."""
+    if quiet.all():
+        return height
+    height = height.copy()
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], quiet, [True]])))
+    for begin, end in edges.reshape(-1, 2):
+        shoulders = _shoulders(height, begin, end, drift)
+        height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
+    return height
 
 
 def quiet_bins(profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float) -> BoolArray:
@@ -71,7 +124,7 @@ def quiet_bins(profile: SweepHeights, bank: Bank, noise: Noise, threshold: float
 
 
 def _stretches(
-    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float
+    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float, null: NullScale | None = None
 ) -> Iterator[tuple[FloatArray, int, int, float, float]]:
     """(heights, first bin, past-last bin, crest, signal-to-noise) of each stretch.
 
@@ -79,7 +132,7 @@ def _stretches(
     are strong enough to hide others, and looks again, until nothing new exceeds the threshold.
     """
     height = profile.height.copy()
-    certainty = _certainties(profile, bank)
+    certainty = _certainties(profile, bank, null)
     weak: list[tuple[int, float]] = []
     changed = True
     for _ in range(MOST_DISTURBANCE_ROUNDS):
@@ -107,15 +160,23 @@ def _scarcity(profile: SweepHeights, bank: Bank) -> FloatArray:
     return np.asarray(share * (bank.samples / counts - 1.0))
 
 
-def _certainties(profile: SweepHeights, bank: Bank) -> Callable[[int], FloatArray | None]:
-    """Of the k-th filter, when asked: expected over actual sd of what it sees in each bin (n,), at most 1.
+def _certainties(profile: SweepHeights, bank: Bank, null: NullScale | None) -> Callable[[int], FloatArray | None]:
+    """Of the k-th filter, when asked: expected over actual sd of what it sees in each bin (n,).
 
     None where it is 1 throughout.
     """
     scarcity = _scarcity(profile, bank)
-    if scarcity.max(initial=0.0) <= SCARCE:
+    scarce = scarcity.max(initial=0.0) > SCARCE
+    if not scarce and null is None:
         return lambda _: None
-    return cache(lambda k: _certainty(scarcity, int(bank.filters[k].half_width / bank.spacing)))
+
+    def certainty(k: int) -> FloatArray | None:
+        share = _certainty(scarcity, int(bank.filters[k].half_width / bank.spacing)) if scarce else None
+        if null is None:
+            return share
+        return np.asarray((1.0 if share is None else share) / null.along(k))
+
+    return cache(certainty)
 
 
 def _certainty(scarcity: FloatArray, bins: int) -> FloatArray | None:
@@ -135,10 +196,10 @@ def _candidates(
             continue
         crest, sd = f.heights(height)
         snr = np.abs(crest) / sd
-        if snr.max() <= threshold:
-            continue
         if (share := certainty(k)) is not None:
             snr *= share[: len(crest) * f.coarse : f.coarse]
+        if snr.max() <= threshold:
+            continue
         snr[np.abs(crest) > PHYSICAL * f.half_width**2 / (2 * tip_radius)] = 0.0
         around = np.concatenate([[-1.0], snr, [-1.0]])
         peaks = np.flatnonzero((snr > threshold) & (snr >= around[:-2]) & (snr > around[2:]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -188,3 +188,7 @@ class Disturbance:
     flat: float
     curvature: float
     snr: float
+
+    def at_scale(self, scale: float) -> Disturbance:
+        """The same where the noise is that many times what it was taken for."""
+        return replace(self, height_sd=scale * self.height_sd, place_sd=scale * self.place_sd, snr=self.snr / scale)

@@ -7,15 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import DetectionError, FloatArray, IntArray, Trace
+from mapping import BoolArray, DetectionError, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
-from mapping.detection.candidates import LARGEST_SHARE, find_disturbances
+from mapping.detection.candidates import LARGEST_SHARE, Searched, search, without
 from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import STEP_CROSSINGS, Crossing
+from mapping.detection.empirical_null import NullScale, effective_noise, null_scales, typical_scale
 from mapping.detection.false_alarms import threshold_for
 from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, Bank, smallest_half_width
+from mapping.detection.outliers import outliers
 from mapping.detection.paper_algorithms import along_chord, curvature_features
 from mapping.detection.quiet_noise import (
+    CONTACT_ROUNDING,
     RAW_SAMPLES,
     SMALLEST_CREST_SNR,
     background,
@@ -37,6 +40,10 @@ UNRESOLVED = 2.5
 ALIKE = 1.15
 # A sweep of fewer samples has no level, slope and noise of its own, and half a crest.
 SHORTEST_SWEEP_SAMPLES = 8
+# Share of the path that may be taken by what exceeds the threshold without being clear, before the law is doubted.
+MOST_WEAK = 0.2
+# Rounds in which the scale of the quiet path and what is no quiet path settle: noise ten times as fitted takes six.
+NULL_ROUNDS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +52,7 @@ class Detections:
 
     Args:
         crossings: one for every place where a sweep passed over something, in the order of the trace.
-        noise: of the trace's samples.
+        noise: of the trace's samples; where its law is not simple, the one under which crests scatter as measured.
         algorithm: number of the paper's algorithm (figure 4) that decided `curvature_feature`.
         detection_limit: smallest height of a sharp crest that a sweep across it detects with `probability`, m.
         probability: 0.95.
@@ -53,6 +60,10 @@ class Detections:
         inspected_length: length of path inspected, m.
         left_out: sentences naming what could not be inspected, and why.
         inspected_sweeps: (number, length in m) of each sweep that was looked at: of what is long enough for a filter.
+        remarks: sentences naming what of the stated promises had to be changed, from what to what, and why.
+        unfelt: indices of the trace's samples that no ball on any surface can give; they were left out.
+        injected, recovered: crests of the limit's height that were put into the quiet path, and found (see recovery);
+            0 where the limit is computed.
     """
 
     crossings: tuple[Crossing, ...]
@@ -64,6 +75,10 @@ class Detections:
     inspected_length: float
     left_out: tuple[str, ...] = ()
     inspected_sweeps: tuple[tuple[int, float], ...] = ()
+    remarks: tuple[str, ...] = ()
+    unfelt: tuple[int, ...] = ()
+    injected: int = 0
+    recovered: int = 0
 
     @classmethod
     def together(cls, parts: Sequence[Detections]) -> Detections:
@@ -75,6 +90,7 @@ class Detections:
             inspected_length=sum(part.inspected_length for part in parts),
             left_out=tuple(reason for part in parts for reason in part.left_out),
             inspected_sweeps=tuple(each for part in parts for each in part.inspected_sweeps),
+            remarks=tuple(dict.fromkeys(remark for part in parts for remark in part.remarks)),
         )
 
 
@@ -127,17 +143,35 @@ def detect(
     stretches = [] if noise else raw_stretches(usable)
     first = floored(noise, tip) if noise else first_noise(stretches, raw, tip)
     widest = LARGEST * tip if largest is None else largest
-    profiles = _profiles(usable, first, tip)
+    of_sweeps = _profiles(usable, first, tip)
+    keep, unfelt = _felt(laid, dict(zip(map(id, usable), of_sweeps, strict=True)))
+    if unfelt:
+        felt = detect(
+            trace.select(keep),
+            base,
+            algorithm=algorithm,
+            false_alarms_per_metre=false_alarms_per_metre,
+            noise=noise,
+            stated=stated,
+            largest=largest,
+        )
+        return _in_all(felt, keep, laid, unfelt)
+    profiles = [profile for each in of_sweeps for profile in each]
     behind = background(profiles, base, noise, stretches, first, tip, widest, stated)
     level = behind.noise
     thresholds = {
         spacing: threshold_for(bank, false_alarms_per_metre, behind.uncertainties[spacing])
         for spacing, bank in behind.banks.items()
     }
+    found: list[Searched] = [search(p, behind.banks[p.spacing], level, thresholds[p.spacing], tip) for p in profiles]
+    nulls: list[NullScale | None] = [None] * len(profiles)
+    if (
+        noise is None and level.white > CONTACT_ROUNDING * tip
+    ):  # one that is given is the caller's word; one that was fitted is held against the quiet path
+        found, nulls = _weighed(profiles, found, behind.banks, level, thresholds, tip)
     crossings = []
-    for profile in profiles:
-        bank, threshold = behind.banks[profile.spacing], thresholds[profile.spacing]
-        disturbances = find_disturbances(profile, bank, level, threshold, tip)
+    for profile, each in zip(profiles, found, strict=True):
+        disturbances = each.disturbances
         if base.kind == "profile":
             disturbances = tuple(d for d in disturbances if _stands_out(d, profile, level, tip))
         for disturbance in sorted(disturbances, key=lambda d: d.place):
@@ -150,9 +184,18 @@ def detect(
     # what is stated of the whole trace holds for the sweeps that make most of it
     usual = max(lengths, key=lambda spacing: lengths[spacing])
     threshold, length = thresholds[usual], sum(lengths.values())
-    limit = max(behind.banks[usual].detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
+    bank, remarks = behind.banks[usual], tuple[str, ...]()
+    told = [
+        null for profile, null in zip(profiles, nulls, strict=True) if profile.spacing == usual and null is not None
+    ]
+    if told:
+        bank, level = bank.scaled(typical_scale(told)), effective_noise(bank, told)
+        remarks = (_raised(bank, behind.banks[usual], threshold, tip),)
+    limit = max(bank.detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
     each = _inspected(profiles, behind.banks)
-    return Detections(tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out, each)
+    return Detections(
+        tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out, each, remarks
+    )
 
 
 def _inspected(profiles: list[SweepHeights], banks: dict[float, Bank]) -> tuple[tuple[int, float], ...]:
@@ -162,6 +205,91 @@ def _inspected(profiles: list[SweepHeights], banks: dict[float, Bank]) -> tuple[
         fits = banks[profile.spacing].filters[0].half_width <= LARGEST_SHARE * profile.length
         lengths[profile.sweep] = lengths.get(profile.sweep, 0.0) + (profile.length if fits else 0.0)
     return tuple(lengths.items())
+
+
+def _weighed(
+    profiles: list[SweepHeights],
+    found: list[Searched],
+    banks: dict[float, Bank],
+    noise: Noise,
+    thresholds: dict[float, float],
+    tip: float,
+) -> tuple[list[Searched], list[NullScale | None]]:
+    """What is found under the scale of the quiet path, and that scale; None where it is the fitted one.
+
+    What is found is left out of the scale, and the scale decides what is found: from the fitted scale upwards, until
+    nothing changes. The least scale that explains what it calls quiet is the answer: features never enter it.
+    """
+    nulls: list[NullScale | None] = [None] * len(profiles)
+    for spacing, bank in banks.items():
+        numbers = [i for i, profile in enumerate(profiles) if profile.spacing == spacing]
+        group, threshold = [profiles[i] for i in numbers], thresholds[spacing]
+        # weak features are no reason to doubt the law where the path beside them, most of it, is as fitted
+        masks = [found[i].quiet for i in numbers]
+        weak = sum(int((found[i].unclear & ~found[i].quiet).sum()) for i in numbers)
+        if weak > MOST_WEAK * sum(len(mask) for mask in masks):
+            masks = [found[i].unclear for i in numbers]
+        for _ in range(NULL_ROUNDS):
+            heights = [without(p.height, mask, bank.drift > 0) for p, mask in zip(group, masks, strict=True)]
+            scales = null_scales(group, heights, masks, bank, threshold)
+            if all(scale.as_fitted for scale in scales):
+                break
+            for i, scale in zip(numbers, scales, strict=True):
+                nulls[i], found[i] = scale, search(profiles[i], bank, noise, threshold, tip, scale)
+            before, masks = masks, [found[i].unclear for i in numbers]
+            if all(np.array_equal(one, other) for one, other in zip(before, masks, strict=True)):
+                break
+    return found, nulls
+
+
+def _raised(measured: Bank, fitted: Bank, threshold: float, tip: float) -> str:
+    before, after = (1e3 * bank.detection_limit(threshold, tip) for bank in (fitted, measured))
+    return (
+        "the noise is not the same everywhere, or of no simple law: where nothing is, the filters' outputs scatter "
+        f"otherwise than the fitted noise says; crests are weighed by what was measured, and the typical limit is "
+        f"{after:.3g} mm instead of {before:.3g} mm"
+    )
+
+
+def _felt(laid: LaidTrace, profiles: dict[int, tuple[SweepHeights, ...]]) -> tuple[BoolArray, tuple[str, ...]]:
+    """(N,) False for samples of the trace that cannot have been felt, and a sentence that counts them if there are.
+
+    Args:
+        laid: the trace.
+        profiles: of the sweeps that are long enough, by the sweep's identity: numbers may come twice.
+    """
+    found = {
+        id(sweep): outliers(sweep, profiles[id(sweep)], laid.tip_radius, laid.resolution)
+        for sweep in laid.laid_sweeps
+        if id(sweep) in profiles
+    }
+    each = [found[id(s)].keep if id(s) in found else np.ones(len(s.trace), dtype=bool) for s in laid.laid_sweeps]
+    keep = np.concatenate(each)
+    if keep.all():
+        return keep, ()
+    runs, stuck = (sum(getattr(one, name) for one in found.values()) for name in ("impossible", "stuck"))
+    kinds = [f"{runs} runs that bend sharper than the ball can"] * (runs > 0)
+    kinds += [f"{stuck} runs of readings that do not change"] * (stuck > 0)
+    return keep, (f"{int((~keep).sum())} samples were not felt and are left out: {', '.join(kinds)}",)
+
+
+def _in_all(felt: Detections, keep: BoolArray, laid: LaidTrace, reasons: tuple[str, ...]) -> Detections:
+    """What was detected in the samples to keep (N,), with the places of crossings among all samples."""
+    all_samples, kept = np.arange(len(keep)), np.flatnonzero(keep)
+    own: dict[int, IntArray] = {}
+    begin = 0
+    for sweep in laid.laid_sweeps:
+        end = begin + len(sweep.trace)
+        own[sweep.number] = all_samples[begin:end][keep[begin:end]] - begin
+        begin = end
+    crossings = []
+    for c in felt.crossings:
+        inside = own[c.sweep]
+        stop = int(inside[min(c.stop, len(inside)) - 1]) + 1
+        crossings.append(replace(c, start=int(inside[min(c.start, len(inside) - 1)]), stop=stop))
+    again = tuple(int(kept[i]) for i in felt.unfelt)
+    unfelt = tuple(sorted((*np.flatnonzero(~keep).tolist(), *again)))
+    return replace(felt, crossings=tuple(crossings), left_out=(*reasons, *felt.left_out), unfelt=unfelt)
 
 
 def _resolved(crossings: list[Crossing], resolution: float) -> tuple[list[Crossing], tuple[str, ...]]:
@@ -193,15 +321,15 @@ def _step(sweep: LaidSweep) -> float:
     return float(s[-1] / (len(s) - 1))
 
 
-def _profiles(usable: list[LaidSweep], noise: Noise, tip: float) -> list[SweepHeights]:
-    """Profiles of every sweep in bins that the smallest visible crest spans FILTER_BINS_PER_HALF_WIDTH times."""
+def _profiles(usable: list[LaidSweep], noise: Noise, tip: float) -> list[tuple[SweepHeights, ...]]:
+    """Of every sweep, its profiles in bins that the smallest visible crest spans FILTER_BINS_PER_HALF_WIDTH times."""
     spacings = np.empty(len(usable))
     for alike in _alike(np.array([_step(sweep) for sweep in usable])):
         raw = float(np.median([_step(usable[i]) for i in alike]))
         smallest = smallest_half_width(noise, raw, 1.0, tip, SMALLEST_CREST_SNR)
         spacings[alike] = raw * max(1, int(smallest / (FILTER_BINS_PER_HALF_WIDTH * raw)))
     each = zip(usable, spacings.tolist(), strict=True)
-    return [profile for sweep, spacing in each for profile in sweep.heights(spacing)]
+    return [sweep.heights(spacing) for sweep, spacing in each]
 
 
 def _alike(steps: FloatArray) -> list[IntArray]:

@@ -68,6 +68,13 @@ class Bank:
     noise: Noise
     drift: int = 0
 
+    def scaled(self, scale: FloatArray) -> Bank:
+        """The bank where the outputs of each filter (F,) scatter so many times as much as the noise says."""
+        filters = (
+            replace(f, sd=f.sd * each, edge_sd=f.edge_sd * each) for f, each in zip(self.filters, scale, strict=True)
+        )
+        return replace(self, filters=tuple(filters))
+
     def detection_limit(self, threshold: float, tip_radius: float) -> float:
         """Smallest height of a sharp crest under this tip that is detected with 95 % probability, m.
 

@@ -20,7 +20,7 @@ def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
 
 def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.12e-3, untouched: float = 0.0) -> Any:
     model, trace = SimpleNamespace(features=features, provenance={}), SimpleNamespace(tip_radius=0.01)
-    detections = SimpleNamespace(detection_limit=limit, probability=0.95)
+    detections = SimpleNamespace(detection_limit=limit, probability=0.95, remarks=(), injected=0, recovered=0)
     return SimpleNamespace(
         model=model,
         trace=trace,

@@ -11,7 +11,7 @@ import pytest
 
 from mapping.base.base import Base
 from mapping.base.height_profile import SweepHeights, height_profiles
-from mapping.detection.candidates import find_disturbances
+from mapping.detection.candidates import search
 from mapping.detection.detect import Detections, detect
 from mapping.detection.false_alarms import _intensity, false_alarm_rate, threshold_for
 from mapping.detection.matched_filter import build_bank, filter_sd
@@ -132,7 +132,9 @@ def test_where_samples_are_scarce_the_noise_they_leave_is_no_feature():
     samples[3000:5000] = 3.0
     bank = build_bank(Noise(2e-4), 1e-4, float(samples.mean()), 1.4e-3, 0.02)
     threshold, rng = threshold_for(bank, 1.0), np.random.default_rng(8)
-    found = sum(len(find_disturbances(bare_profile(samples, rng), bank, bank.noise, threshold, TIP)) for _ in range(12))
+    found = sum(
+        len(search(bare_profile(samples, rng), bank, bank.noise, threshold, TIP).disturbances) for _ in range(12)
+    )
     # 99.9 % of a Poisson number with mean 12
     assert found <= 24
 
@@ -146,7 +148,7 @@ def test_false_alarms_come_as_often_as_asked(drift):
     rng = np.random.default_rng(7)
     metres, found = 80, 0
     for _ in range(metres):
-        found += len(find_disturbances(bare_profile(np.full(10_000, samples), rng), bank, noise, threshold, TIP))
+        found += len(search(bare_profile(np.full(10_000, samples), rng), bank, noise, threshold, TIP).disturbances)
     # 99 % of a Poisson number with mean 80
     assert 57 <= found <= 104
 

@@ -1,0 +1,402 @@
+"""Empirical null: how far the filters' outputs scatter where nothing is, against what the fitted noise says.
+
+A fitted law of noise is one law for all sweeps and places. Real noise changes its level from sweep to sweep and along
+a sweep, has a colour that no simple law has, drifts and is rough. Whatever it is, it shows on the quiet path: in the
+differences of neighbouring bins, which tell the local level, and in the outputs of the matched filters themselves,
+which under the fitted law have unit variance. What sampling alone would do is shrunk away, so that noise as fitted
+costs nothing. (Efron, Large-scale simultaneous hypothesis testing: the choice of a null hypothesis, JASA 99, 2004;
+cells along the path are the reference windows of CFAR, Rohling 1983; shrinkage: Efron and Morris, JASA 70, 1975.)
+
+The quiet path is what is not clearly a feature under the scale known so far, which grows from the fitted one: clear
+features never enter the scale, and noise that was taken for such does so step by step, until nothing changes.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mapping import BoolArray, FloatArray
+from mapping.base import SweepHeights
+from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, Bank
+from mapping.instrument import Noise
+
+# The variance of unit outputs is read from their median absolute value, 0.6745 standard deviations, which what is no
+# noise in less than half of a cell shifts little.
+MEDIAN_OF_UNIT_NORMAL = 0.6744897501960817
+# Variance of the logarithm of that variance in a cell of one half-width; simulated with white and correlated noise and
+# with and without a drift: 2.6 to 4.5, the largest for white noise.
+LOG_VARIANCE_PER_WIDTH = 4.2
+# The same of differences of neighbouring bins, for one bin: 5.4 if they were independent; simulated: 6.6 in white
+# noise, less in correlated noise.
+LOG_VARIANCE_PER_BIN = 6.6
+# Bins in a cell of the local level: three half-widths of the narrowest filter, which sees the level's mean over two.
+LEVEL_BINS = 3 * FILTER_BINS_PER_HALF_WIDTH
+# Half-widths in a cell: the fewest over which the median's own bias stays below 0.03 in the logarithm of the variance.
+CELL_WIDTHS = 12.0
+# A sweep that is shorter than this many half-widths of a filter says nothing of its own about that filter's level.
+LEAST_SWEEP_WIDTHS = 2 * CELL_WIDTHS
+# Standard deviations of chi-square by which levels must differ more than sampling makes them: at nine degrees of
+# freedom one in five hundred logs of one level has that; it is asked some ten times a log, of filters that see alike
+CLEAR_EXCESS = 4.0
+# Twice the log-likelihood that a level of its own by sweep and along the sweeps must bring.
+LEVEL_GAIN = 12.0
+# Variances of the logarithm of the variance, and lengths in cells, among which the likeliest are chosen; and sweeps
+# that are asked, evenly chosen.
+LEVEL_VARIANCES, LEVEL_LENGTHS, ASKED_SWEEPS = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0), (2.0, 4.0, 8.0, 16.0, 32.0), 24
+# Filters between one that is measured and the next: neighbours on the ladder see nearly the same.
+STRIDE = 3
+# Correlation lengths among which that of the effective noise is chosen: a quarter of an octave apart or less.
+CORRELATION_LENGTHS = 40
+# Share of a filter's width from which features may have been taken out: its output loses that share of its variance.
+MISSING_SHARE = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class NullScale:
+    """Measured over fitted standard deviation of the filters' outputs along one profile.
+
+    Args:
+        pooled: (F,) for each filter of the bank, over all sweeps.
+        own: (F, C) by which this profile's cells differ from that.
+        local: (n,) variance of the bins over the fitted one.
+        spacing: width of a profile bin, m.
+        widths: (F,) half-widths of the filters, m.
+    """
+
+    pooled: FloatArray
+    own: FloatArray
+    local: FloatArray
+    spacing: float
+    widths: FloatArray
+
+    @property
+    def as_fitted(self) -> bool:
+        """True if the outputs scatter as the fitted noise says, everywhere."""
+        return bool((self.pooled == 1.0).all() and (self.own == 1.0).all() and (self.local == 1.0).all())
+
+    @cached_property
+    def _middles(self) -> FloatArray:
+        cells = self.own.shape[1]
+        return np.asarray((np.arange(cells) + 0.5) * len(self.local) / cells)
+
+    def along(self, k: int) -> FloatArray:
+        """(n,) of the k-th filter in each bin."""
+        own = np.full(len(self.local), self.pooled[k] * self.own[k, 0])
+        if self.own.shape[1] > 1:
+            own = self.pooled[k] * np.exp(np.interp(np.arange(len(own)), self._middles, np.log(self.own[k])))
+        return np.asarray(own * _seen(self.local, self.widths[k] / self.spacing))
+
+    def at(self, half_width: float, place: float) -> float:
+        """Of the filter nearest to a half-width, m, at a bin."""
+        k = int(np.abs(np.log(self.widths / half_width)).argmin())
+        return float(np.interp(place, np.arange(len(self.local)), self.along(k)))
+
+
+def null_scales(
+    profiles: Sequence[SweepHeights],
+    heights: Sequence[FloatArray],
+    quiet: Sequence[BoolArray],
+    bank: Bank,
+    threshold: float,
+) -> list[NullScale]:
+    """The scale of each profile.
+
+    Args:
+        profiles: with bins of the bank's width.
+        heights: (n,) of each, m, without what exceeds the threshold.
+        quiet: (n,) of each: False where something was taken out.
+        bank: filters for the fitted noise.
+        threshold: signal-to-noise ratio at which the scale must serve.
+
+    Method:
+        log variance of an output in cell c of sweep j = a_k + level_j(s) + b_j + w_jc: the level from differences of
+        bins, a Gaussian process along the sweeps; the rest, of the filter's own outputs, shrunk by the share of its
+        variance that sampling does not explain (empirical Bayes, moments); a_k is zero unless the outputs contradict
+        that (Schwarz 1978).
+    """
+    widths = np.array([f.half_width for f in bank.filters])
+    local = _local_levels(heights, quiet, bank)
+    pooled = np.ones(len(widths))
+    own = [np.ones((len(widths), _cells(p, widths[0]))) for p in profiles]
+    inherited, doubt = [np.zeros(each.shape[1]) for each in own], 1.0
+    measured = [*range(0, len(widths), STRIDE)]
+    for k in measured:
+        outputs = [_outputs(h, q, v, bank, k) for h, q, v in zip(heights, quiet, local, strict=True)]
+        together = np.concatenate([each[np.isfinite(each)] for each in outputs])
+        length = len(together) * bank.filters[k].coarse * bank.spacing
+        if length < CELL_WIDTHS * widths[k]:
+            pooled[k:] = pooled[k - STRIDE] if k else 1.0
+            for each in own:
+                each[k:] = each[[k - STRIDE]] if k else 1.0
+            break
+        told = [_cell_levels(z, len(i), bank, k) for z, i in zip(outputs, inherited, strict=True)]
+        if all(p.length >= LEAST_SWEEP_WIDTHS * widths[k] for p in profiles):
+            inherited, variance = _deviations(told)
+            doubt = _doubt(0.5 * np.sqrt(variance), threshold)
+        level = 2 * np.log(max(float(np.median(together)), 1e-12) / MEDIAN_OF_UNIT_NORMAL)
+        error = LOG_VARIANCE_PER_WIDTH * widths[k] / length + _spread(inherited)
+        pooled[k] = _likely_scale(level, error, length / widths[k], len(measured))
+        if not any(deviation.any() for deviation in inherited):
+            # one level everywhere: the fitted one is not undercut, for many a law has lighter middles than tails
+            pooled[k] = max(1.0, pooled[k])
+        for each, deviation in zip(own, inherited, strict=True):
+            each[k] = np.exp(0.5 * deviation) * doubt
+    pooled = _between(pooled, measured)
+    own = [_between(each, measured) for each in own]
+    return [NullScale(pooled, each, v, bank.spacing, widths) for each, v in zip(own, local, strict=True)]
+
+
+def typical_scale(scales: Sequence[NullScale]) -> FloatArray:
+    """(F,) for each filter, the median over all cells of all profiles."""
+    levels = [each.pooled[:, None] * each.own * np.sqrt(np.median(each.local)) for each in scales]
+    return np.asarray(np.median(np.concatenate(levels, axis=1), axis=1))
+
+
+def effective_noise(bank: Bank, scales: Sequence[NullScale]) -> Noise:
+    """White and correlated noise under which the filters' outputs scatter as measured, for all who need one law.
+
+    The variance of a filter's output is linear in the variances of both parts: for each correlation length of a
+    ladder, the least relative errors over the filters and over the white level of single samples.
+    """
+    from scipy.optimize import nnls
+
+    numbers = range(0, len(bank.filters), STRIDE)
+    measured = [np.mean([np.mean(scale.along(k) ** 2) for scale in scales]) for k in numbers]
+    target = np.array([bank.filters[k].sd ** 2 * m for k, m in zip(numbers, measured, strict=True)])
+    level = float(np.mean([scale.local.mean() for scale in scales])) * bank.noise.white**2
+    white = np.array([_output_variance(bank, k, Noise(1.0)) for k in numbers])
+    best, noise = np.inf, bank.noise
+    for length in np.geomspace(2 * bank.spacing, bank.filters[-1].half_width, CORRELATION_LENGTHS):
+        correlated = [_output_variance(bank, k, Noise(0.0, 1.0, float(length))) for k in numbers]
+        shapes = np.column_stack([white, correlated]) / target[:, None]
+        # the level of single samples weighs as much as one filter
+        levels, misfit = nnls(np.vstack([shapes, [1 / level, 0.0]]), np.ones(len(shapes) + 1))
+        if misfit < best:
+            white_sd, correlated_sd = np.sqrt(levels).tolist()
+            best, noise = misfit, Noise(white_sd, correlated_sd, float(length))
+    return noise
+
+
+def _output_variance(bank: Bank, k: int, noise: Noise) -> float:
+    """Variance of what the weights of the k-th filter make of another noise, m^2."""
+    f = bank.filters[k]
+    covariance = noise.block_covariances(len(f.weights), f.coarse * bank.spacing, f.coarse * bank.samples)
+    return float(f.weights @ np.convolve(f.weights, np.concatenate([covariance[:0:-1], covariance]), mode="valid"))
+
+
+def _between(values: FloatArray, measured: Sequence[int]) -> FloatArray:
+    """(F, ...) values of all filters from those of the measured ones, by the logarithm; the last one's beyond."""
+    out = values.copy()
+    for low, high in itertools.pairwise(measured):
+        for k in range(low + 1, high):
+            share = (k - low) / (high - low)
+            out[k] = values[low] ** (1 - share) * values[high] ** share
+    out[measured[-1] :] = values[measured[-1]]
+    return out
+
+
+def _cells(profile: SweepHeights, width: float) -> int:
+    """Cells of a profile for its narrowest filter."""
+    return max(1, int(profile.length / (CELL_WIDTHS * width)))
+
+
+def _running_mean(values: FloatArray, bins: int) -> FloatArray:
+    """Mean over 2 bins + 1 values, shorter at the ends."""
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    index = np.arange(len(values))
+    low, high = np.maximum(index - bins, 0), np.minimum(index + bins + 1, len(values))
+    return np.asarray((sums[high] - sums[low]) / (high - low))
+
+
+def _seen(local: FloatArray, bins: float) -> FloatArray:
+    """(n,) by which the sd of a filter of so many bins' half-width differs where bins have these variances (n,)."""
+    if (local == local[0]).all():
+        return np.full(len(local), np.sqrt(local[0]))
+    return np.sqrt(_running_mean(local, max(1, int(0.5 * bins))))
+
+
+def _local_levels(heights: Sequence[FloatArray], quiet: Sequence[BoolArray], bank: Bank) -> list[FloatArray]:
+    """(n,) of each profile: variance of the bins over the fitted one, by differences of neighbouring quiet bins."""
+    lags = bank.noise.block_covariances(2, bank.spacing, bank.samples)
+    sd = float(np.sqrt(max(2 * (lags[0] - lags[1]), np.finfo(float).tiny)))
+    told = [_difference_levels(h, q, sd) for h, q in zip(heights, quiet, strict=True)]
+    ones = [np.ones(len(h)) for h in heights]
+    y = np.concatenate([each for each, _ in told])
+    v = np.concatenate([each for _, each in told])
+    known = np.isfinite(v)
+    if known.sum() < 3:
+        return ones
+    centre = float(np.average(y[known], weights=1 / v[known]))
+    told = [(np.where(np.isfinite(v), y - centre, 0.0), v) for y, v in told]
+    prior = _level_prior(told)
+    if prior is None:
+        return ones
+    return [np.exp(centre + _smoothed(y, v, prior, len(h))) for (y, v), h in zip(told, heights, strict=True)]
+
+
+def _difference_levels(height: FloatArray, quiet: BoolArray, sd: float) -> tuple[FloatArray, FloatArray]:
+    """(C,) logarithm of the variance in each cell, and its sampling variance, infinite where nothing is known."""
+    step = np.where(quiet[1:] & quiet[:-1], np.abs(np.diff(height)) / sd, np.nan)
+    cells = max(1, len(step) // LEVEL_BINS)
+    edges = np.linspace(0, len(step), cells + 1).astype(np.int64)
+    y, v = np.zeros(cells), np.full(cells, np.inf)
+    for c in range(cells):
+        part = step[edges[c] : edges[c + 1]]
+        part = part[np.isfinite(part)]
+        if len(part) >= FILTER_BINS_PER_HALF_WIDTH:
+            y[c] = 2 * np.log(max(float(np.median(part)), 1e-12) / MEDIAN_OF_UNIT_NORMAL)
+            v[c] = LOG_VARIANCE_PER_BIN / len(part)
+    return y, v
+
+
+def _covariance(cells: int, prior: tuple[float, float, float]) -> FloatArray:
+    """(C, C) of the level's logarithm between cells of one sweep: variance by sweep, along it, its length in cells."""
+    lag = np.abs(np.subtract.outer(np.arange(cells), np.arange(cells)))
+    return np.asarray(prior[0] + prior[1] * np.exp(-lag / prior[2]))
+
+
+def _level_prior(told: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[float, float, float] | None:
+    """Variances by sweep and along the sweeps and length in cells that are likeliest; None if none is needed."""
+    chosen = [told[i] for i in np.unique(np.linspace(0, len(told) - 1, ASKED_SWEEPS).astype(np.int64))]
+    of_sweep = [(float(y @ (1 / v)), float(np.sum(1 / v))) for y, v in told if np.isfinite(v).any()]
+    excess = _excess(np.array([a / w for a, w in of_sweep]), np.array([1 / w for _, w in of_sweep]))
+    y, v = np.concatenate([y for y, _ in told]), np.concatenate([v for _, v in told])
+    if excess == 0.0 and _excess(y[np.isfinite(v)], v[np.isfinite(v)]) == 0.0:
+        return None
+    best, prior, nothing = -np.inf, None, sum(_log_likelihood(y, v, None) for y, v in chosen)
+    for by_sweep in LEVEL_VARIANCES:
+        for along in LEVEL_VARIANCES:
+            for length in LEVEL_LENGTHS if along else LEVEL_LENGTHS[:1]:
+                each = (by_sweep, along, length)
+                value = sum(_log_likelihood(y, v, each) for y, v in chosen)
+                if value > best:
+                    best, prior = value, each
+    return prior if 2 * (best - nothing) > LEVEL_GAIN else None
+
+
+def _log_likelihood(y: FloatArray, v: FloatArray, prior: tuple[float, float, float] | None) -> float:
+    known = np.isfinite(v)
+    covariance = np.diag(v[known])
+    if prior is not None:
+        covariance = covariance + _covariance(len(y), prior)[np.ix_(known, known)]
+    root = np.linalg.cholesky(covariance)
+    return float(-0.5 * np.sum(np.linalg.solve(root, y[known]) ** 2) - np.log(np.diag(root)).sum())
+
+
+def _smoothed(y: FloatArray, v: FloatArray, prior: tuple[float, float, float], count: int) -> FloatArray:
+    """(count,) expected logarithm of the variance in each bin, given those of the cells."""
+    known = np.isfinite(v)
+    covariance = _covariance(len(y), prior)
+    if not known.any():
+        return np.zeros(count)
+    inner = covariance[np.ix_(known, known)] + np.diag(v[known])
+    mean = covariance[:, known] @ np.linalg.solve(inner, y[known])
+    return np.interp(np.arange(count), (np.arange(len(y)) + 0.5) * count / len(y), mean)
+
+
+def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank, k: int) -> FloatArray:
+    """Absolute outputs of a filter over their sd, one a coarse bin; NaN where what it sees is not all quiet path."""
+    f = bank.filters[k]
+    if len(height) < 2 * f.coarse:
+        return np.full(0, np.nan)
+    crest, sd = f.heights(height)
+    z, bins, places = np.abs(crest) / sd, f.half_width / bank.spacing, slice(None, len(crest) * f.coarse, f.coarse)
+    if not (local == 1.0).all():
+        z /= _seen(local, bins)[places]
+    if not quiet.all():
+        z[_running_mean((~quiet).astype(np.float64), max(1, int(bins)))[places] > MISSING_SHARE] = np.nan
+    return np.asarray(z)
+
+
+def _cell_levels(z: FloatArray, cells: int, bank: Bank, k: int) -> tuple[FloatArray, FloatArray]:
+    """(cells,) logarithm of the variance in each cell, NaN where unknown, and its sampling variance."""
+    edges = np.linspace(0, len(z), cells + 1).astype(np.int64)
+    level, variance = np.full(cells, np.nan), np.full(cells, np.inf)
+    step = bank.filters[k].coarse * bank.spacing
+    for c in range(cells):
+        part = z[edges[c] : edges[c + 1]]
+        part = part[np.isfinite(part)]
+        width = len(part) * step / bank.filters[k].half_width
+        if width >= 1.0:
+            level[c] = 2 * np.log(max(float(np.median(part)), 1e-12) / MEDIAN_OF_UNIT_NORMAL)
+            variance[c] = LOG_VARIANCE_PER_WIDTH / width
+    return level, variance
+
+
+def _deviations(told: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[list[FloatArray], float]:
+    """(cells,) of each sweep: the shrunk deviation of the logarithm of the variance from that of all, and its variance.
+
+    Args:
+        told: of each sweep (cells,) logarithms of the variance, and their sampling variances.
+    """
+    sweeps, errors = [], []
+    for y, v in told:
+        known = np.isfinite(y)
+        weight = np.where(known, 1 / v, 0.0)
+        sweeps.append(float(weight @ np.where(known, y, 0.0) / weight.sum()) if known.any() else np.nan)
+        errors.append(1 / weight.sum() if known.any() else np.inf)
+    b, eb = np.array(sweeps), np.array(errors)
+    known = np.isfinite(b)
+    if not known.any():
+        return [np.zeros(len(y)) for y, _ in told], 0.0
+    rest = [y - each for (y, _), each in zip(told, b, strict=True)]
+    cells = np.concatenate([r[np.isfinite(r)] for r in rest])
+    sampled = np.concatenate([v[np.isfinite(r)] for r, (_, v) in zip(rest, told, strict=True)])
+    within = _excess(cells, sampled)
+    # the mean of a sweep's cells scatters with them
+    eb = eb + within / np.array([max(1, int(np.isfinite(y).sum())) for y, _ in told])
+    centre = float(np.average(b[known], weights=1 / eb[known]))
+    between = _excess(b[known] - centre, eb[known])
+    out = []
+    for r, (_, v), each, error in zip(rest, told, b, eb, strict=True):
+        sweep = 0.0 if not np.isfinite(each) else (each - centre) * between / (between + error)
+        out.append(sweep + np.where(np.isfinite(r), np.nan_to_num(r) * within / (within + np.minimum(v, 1e12)), 0.0))
+    usual, of_sweep = float(np.median(sampled)), float(np.median(eb[known]))
+    variance = within * usual / (within + usual) if within else 0.0
+    return out, variance + (between * of_sweep / (between + of_sweep) if between else 0.0)
+
+
+def _doubt(sd: float, threshold: float) -> float:
+    """Factor on a scale whose logarithm is known to `sd`, so that noise exceeds the threshold as often as it should.
+
+    The tail of a normal variable of uncertain level, averaged over the level (Gauss-Hermite), against the normal tail.
+    """
+    if sd == 0.0:
+        return 1.0
+    from scipy.special import ndtr, ndtri
+
+    nodes, weights = np.polynomial.hermite_e.hermegauss(40)
+    tail = float(weights @ ndtr(-threshold * np.exp(-sd * nodes)) / weights.sum())
+    return float(max(1.0, threshold / -ndtri(tail)))
+
+
+def _excess(values: FloatArray, errors: FloatArray) -> float:
+    """Variance of values beyond what their errors explain; zero unless chi-square is CLEAR_EXCESS sds high."""
+    if len(values) < 3:
+        return 0.0
+    weight = 1 / errors
+    q = float(weight @ values**2)
+    count = len(values) - 1
+    if q < count + CLEAR_EXCESS * np.sqrt(2 * count):
+        return 0.0
+    return (q - count) / float(weight.sum() - weight @ weight / weight.sum())
+
+
+def _spread(deviations: Sequence[FloatArray]) -> float:
+    """Variance of the mean of all cells' deviations."""
+    every = np.concatenate(list(deviations))
+    return float(np.var(every) / len(every))
+
+
+def _likely_scale(level: float, variance: float, count: float, filters: int) -> float:
+    """exp(level / 2) if a scale of its own is likelier than the fitted one, else 1.
+
+    Schwarz' criterion with the odds of choosing one of so many filters (Chen and Chen, Biometrika 95, 2008).
+    """
+    penalty = np.log(max(count, 2.0)) + 2.0 * np.log(filters)
+    return float(np.exp(0.5 * level)) if level**2 / variance > penalty else 1.0

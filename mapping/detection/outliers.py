@@ -1,0 +1,157 @@
+"""Outliers: runs of readings that no ball on any surface can give, and readings that do not change.
+
+The centre of a ball of radius r that touches from outside traces the upper envelope of spheres of that radius about
+the points of the body: along any path its second derivative is at least -1/r (a dilation; the trace of a crest is as
+wide as the ball makes it, and the same goes for the brim of a dip). Bursts, spikes, sentinels and lost contact begin
+and end with a bend that is sharper, in whichever direction they go. What bends sharper than that, by far more than
+the noise does, was not felt. (Serra, Image Analysis and Mathematical Morphology, 1982; theory section 3.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import BoolArray, FloatArray
+from mapping.base import LaidSweep, SweepHeights
+
+# Blocks in which the bend is looked for, in samples: a run between two of them loses less than half of its bend.
+BLOCKS = (1, 3, 9, 27, 81)
+# Longest run that is recognised, in tip radii: a crest so wide needs only a thousandth of the radius of height.
+LONGEST_RUN = 0.2
+# Bends of the trace, in those of the ball, that the body's own curvature and the sampling allow.
+ALLOWED_BEND = 3.0
+# Standard deviations beyond that: at 5 kHz a Gaussian law has one such sample in 10^6 hours.
+OUT = 7.0
+# Samples over which the level of the noise is taken; a burst must not fill half of them.
+LEVEL_SAMPLES = 256
+# Share of a run's height at which it begins and ends.
+FOOT = 0.25
+# Share of the usual step between readings below which a reading counts as the one before, and how many such in a row
+# are a reading that is stuck: by chance (0.008)^8.
+UNCHANGED, STUCK = 0.01, 8
+MEDIAN_OF_UNIT_NORMAL = 0.6744897501960817
+
+
+@dataclass(frozen=True, eq=False)
+class Outliers:
+    """Samples of one sweep that were not felt.
+
+    Args:
+        keep: (N,) False for these.
+        impossible: number of runs that bend sharper than the ball.
+        stuck: number of runs in which the reading did not change.
+    """
+
+    keep: BoolArray
+    impossible: int
+    stuck: int
+
+
+def outliers(sweep: LaidSweep, profiles: Sequence[SweepHeights], tip_radius: float, resolution: float) -> Outliers:
+    """Runs of a sweep that cannot have been felt.
+
+    Args:
+        sweep: its samples on their base.
+        profiles: of this sweep.
+        tip_radius: m.
+        resolution: step of rounded positions, m; 0 if they are not rounded.
+    """
+    keep = np.ones(len(sweep.trace), dtype=bool)
+    impossible = stuck = 0
+    for profile in profiles:
+        begin, end = int(profile.first[0]), int(profile.first[-1])
+        if end - begin < LEVEL_SAMPLES:
+            continue
+        height = _sample_heights(sweep, profile, begin, end)
+        level = _level(np.diff(height), resolution)
+        if level is None:
+            continue
+        step = profile.length / (end - begin)
+        off, runs = _impossible(height, level, step, tip_radius)
+        same, more = _stuck(height, level, resolution)
+        keep[begin:end] = ~(off | same)
+        impossible, stuck = impossible + runs, stuck + more
+    return Outliers(keep, impossible, stuck)
+
+
+def _sample_heights(sweep: LaidSweep, profile: SweepHeights, begin: int, end: int) -> FloatArray:
+    """(N,) heights of the samples over the base, m: where only bins were laid, along the normals under these."""
+    if profile.feet is None:
+        return sweep.feet(slice(begin, end)).height
+    normal = profile.centers - profile.feet
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+    bins = np.repeat(np.arange(len(profile.height)), np.diff(profile.first))
+    away = np.einsum("ij,ij->i", sweep.trace.centers[begin:end] - profile.centers[bins], normal[bins])
+    return np.asarray(profile.height[bins] + away)
+
+
+def _level(differences: FloatArray, resolution: float) -> FloatArray | None:
+    """(N,) sd of the differences of neighbouring samples around each; None where they do not scatter at all."""
+    cells = max(1, len(differences) // LEVEL_SAMPLES)
+    whole = len(differences) // cells * cells
+    levels = np.median(np.abs(differences[:whole]).reshape(cells, -1), axis=1) / MEDIAN_OF_UNIT_NORMAL
+    usual = float(np.median(levels))
+    if usual <= resolution:
+        return None
+    levels = np.maximum(levels, 0.2 * usual)
+    middles = (np.arange(cells) + 0.5) * whole / cells
+    return np.asarray(np.interp(np.arange(len(differences) + 1), middles, levels))
+
+
+def _impossible(height: FloatArray, level: FloatArray, step: float, tip_radius: float) -> tuple[BoolArray, int]:
+    """(N,) True in runs that bend sharper than the ball, and their number."""
+    off = np.zeros(len(height), dtype=bool)
+    sums = np.concatenate([[0.0], np.cumsum(height)])
+    runs = 0
+    for size in BLOCKS:
+        if size * step > LONGEST_RUN * tip_radius or len(height) < 8 * size:
+            break
+        means = (sums[size:] - sums[:-size]) / size
+        # of the block that begins at sample i + size, against those right before and behind
+        bend = (2 * means[size:-size] - means[: -2 * size] - means[2 * size :]) / level[size : 1 - 2 * size]
+        # a few thousand tell the scatter as well as all of them
+        every = max(1, size // 2, len(bend) // 2000)
+        sd = max(float(np.median(np.abs(bend[::every]))) / MEDIAN_OF_UNIT_NORMAL, np.finfo(float).tiny)
+        allowed = ALLOWED_BEND * (size * step) ** 2 / tip_radius
+        excess = bend / sd
+        if excess.max() <= OUT:
+            continue
+        excess -= allowed / (sd * level[size : 1 - 2 * size])
+        for at in np.flatnonzero((excess > OUT) & (excess >= np.roll(excess, 1)) & (excess > np.roll(excess, -1))):
+            low, high = _run(height, int(at) + size, size)
+            if high - low <= LONGEST_RUN * tip_radius / step and not off[low:high].all():
+                runs += not off[low:high].any()
+                off[low:high] = True
+    return off, runs
+
+
+def _run(height: FloatArray, begin: int, size: int) -> tuple[int, int]:
+    """First and past-last sample of the run around a bend at the block of so many samples that begins there."""
+    low, high = max(0, begin - 6 * size), min(len(height), begin + 7 * size)
+    rest = height[low:high] - np.median(height[low:high])
+    near = slice(max(0, begin - low - size), begin - low + 2 * size)
+    sums = np.concatenate([[0.0], np.cumsum(rest)])
+    half = max(1, size // 2)
+    count = len(rest) - half + 1
+    smooth = (sums[half:] - sums[:-half]) / half  # of the half block that begins at each sample
+    top = near.start + int(np.abs(smooth[near]).argmax())
+    inside = np.sign(smooth[top]) * smooth > FOOT * abs(smooth[top])
+    first = top - int(np.argmin(inside[top::-1])) + 1 if not inside[: top + 1].all() else 0
+    last = top + int(np.argmin(inside[top:])) if not inside[top:].all() else count
+    return low + first, min(low + last - 1 + half, len(height))
+
+
+def _stuck(height: FloatArray, level: FloatArray, resolution: float) -> tuple[BoolArray, int]:
+    """(N,) True where the reading did not change, and the number of such runs; rounded readings may repeat."""
+    stuck = np.zeros(len(height), dtype=bool)
+    if resolution > 0:
+        return stuck, 0
+    same = np.concatenate([[False], np.abs(np.diff(height)) < UNCHANGED * level[1:], [False]])
+    edges = np.flatnonzero(np.diff(same.astype(np.int8)))
+    runs = [(first + 1, last + 1) for first, last in edges.reshape(-1, 2) if last - first >= STUCK]
+    for first, last in runs:
+        stuck[first:last] = True
+    return stuck, len(runs)

@@ -1,0 +1,67 @@
+"""The empirical null: noise as fitted costs nothing; noise that is not the same everywhere is weighed as measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from mapping.arrays import FloatArray
+from mapping.base.base import Base
+from mapping.detection.detect import Detections, detect
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+TIP, STEP, LENGTH, SWEEPS, WHITE = 10e-3, 20e-6, 0.1, 10, 0.05e-3
+S = np.arange(int(LENGTH / STEP)) * STEP
+PLATE = Base(Surface([[-0.2, -0.2, 0], [0.2, -0.2, 0], [0.2, 0.2, 0], [-0.2, 0.2, 0]], [[0, 1, 2], [0, 2, 3]]))
+WIRE = 0.1e-3
+
+
+def white(rng: np.random.Generator) -> FloatArray:
+    return WHITE * rng.standard_normal((SWEEPS, len(S)))
+
+
+def level_by_sweep(rng: np.random.Generator) -> FloatArray:
+    return np.exp(0.5 * rng.standard_normal((SWEEPS, 1))) * white(rng)
+
+
+def one_over_f(rng: np.random.Generator) -> FloatArray:
+    f = np.fft.rfftfreq(4 * len(S))
+    f[0] = f[1]
+    spectrum = (rng.standard_normal((SWEEPS, len(f))) + 1j * rng.standard_normal((SWEEPS, len(f)))) * f**-0.5
+    heights = np.fft.irfft(spectrum, axis=1)[:, : len(S)]
+    return np.asarray(WHITE * heights / heights.std())
+
+
+def found(law: Callable[[np.random.Generator], FloatArray], seed: int, height: float = 0.0) -> Detections:
+    """What is detected at one false alarm a metre on a metre of plate, a wire of that height across every sweep."""
+    z = law(np.random.default_rng([11, seed]))
+    if height:
+        reach, ball = np.sqrt(2 * TIP * height), TIP + 0.5 * height
+        x = np.clip(S - 0.6 * LENGTH, -reach, reach)
+        z = z + np.maximum(0.5 * height - TIP + np.sqrt(ball**2 - x**2), 0.0) * (np.abs(S - 0.6 * LENGTH) < reach)
+    y = np.repeat(np.linspace(-0.04, 0.04, SWEEPS), len(S))
+    centers = np.column_stack([np.tile(S - 0.5 * LENGTH, SWEEPS), y, TIP + z.ravel()])
+    trace = Trace(np.arange(len(y)) * 2e-4, centers, np.repeat(np.arange(SWEEPS), len(S)), TIP)
+    return detect(trace, PLATE, false_alarms_per_metre=1.0)
+
+
+def test_white_noise_needs_no_scale_of_its_own_and_nothing_is_said() -> None:
+    assert found(white, 0).remarks == ()
+
+
+@pytest.mark.parametrize("law", [level_by_sweep, one_over_f])
+def test_noise_of_another_law_gives_no_more_than_thrice_the_false_alarms_asked_for_and_is_told(
+    law: Callable[[np.random.Generator], FloatArray],
+) -> None:
+    # ten and twenty a metre when the fitted law is taken at its word
+    runs = [found(law, seed) for seed in range(2)]
+    assert sum(len(run.crossings) for run in runs) <= 3 * sum(run.inspected_length for run in runs)
+    assert all("scatter otherwise than the fitted noise says" in run.remarks[0] for run in runs)
+
+
+def test_a_wire_that_stands_out_is_still_found_where_the_level_differs_by_sweep() -> None:
+    crossings = [c for c in found(level_by_sweep, 3, WIRE).crossings if abs(c.point[0] - 0.1 * LENGTH) < 1.5e-3]
+    assert len({c.sweep for c in crossings}) >= 9

@@ -1,0 +1,68 @@
+"""Outliers: what no ball on any surface can give is left out and listed; what a ball can give never is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mapping.arrays import FloatArray
+from mapping.base.base import Base
+from mapping.detection.detect import Detections, detect
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+TIP, STEP, LENGTH, SWEEPS, WHITE = 10e-3, 20e-6, 0.1, 4, 0.05e-3
+S = np.arange(int(LENGTH / STEP)) * STEP
+PLATE = Base(Surface([[-0.2, -0.2, 0], [0.2, -0.2, 0], [0.2, 0.2, 0], [-0.2, 0.2, 0]], [[0, 1, 2], [0, 2, 3]]))
+BURST = slice(2000, 2030)
+
+
+def sweeps(seed: int, shape: FloatArray) -> FloatArray:
+    """(SWEEPS, N) heights with white noise; the shape (N,) in the second sweep."""
+    heights = WHITE * np.random.default_rng([12, seed]).standard_normal((SWEEPS, len(S)))
+    heights[1] += shape
+    return heights
+
+
+def found(heights: FloatArray) -> Detections:
+    y = np.repeat(np.linspace(-0.04, 0.04, SWEEPS), len(S))
+    centers = np.column_stack([np.tile(S - 0.5 * LENGTH, SWEEPS), y, TIP + heights.ravel()])
+    return detect(Trace(np.arange(len(y)) * 2e-4, centers, np.repeat(np.arange(SWEEPS), len(S)), TIP), PLATE)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_burst_is_left_out_where_it_is_and_listed(sign: float) -> None:
+    burst = np.zeros(len(S))
+    burst[BURST] = sign * 0.3e-3
+    result = found(sweeps(0, burst))
+    assert result.crossings == ()
+    inside = np.arange(len(S))[BURST] + len(S)
+    assert len(np.setdiff1d(inside, result.unfelt)) <= 4
+    # a block of 27 samples sees it first, and reaches as far beyond
+    assert len(np.setdiff1d(result.unfelt, inside)) <= 27
+    assert any("bend sharper than the ball" in sentence for sentence in result.left_out)
+
+
+def test_readings_that_do_not_change_are_left_out_and_listed() -> None:
+    heights = sweeps(1, np.zeros(len(S)))
+    heights[1, 3000:3040] = heights[1, 3000]
+    result = found(heights)
+    assert set(range(len(S) + 3001, len(S) + 3040)) <= set(result.unfelt)
+    assert any("do not change" in sentence for sentence in result.left_out)
+
+
+@pytest.mark.parametrize("height", [0.3e-3, 2e-3])
+def test_crests_and_notches_of_a_ball_are_not_left_out(height: float) -> None:
+    # two sharp crests side by side: between them the trace bends up as sharply as can be
+    half_width = np.sqrt(2 * TIP * height)
+    arcs = [height - (S - place) ** 2 / (2 * TIP) for place in (0.05, 0.05 + 0.8 * half_width)]
+    result = found(sweeps(2, np.maximum(np.max(arcs, axis=0), 0.0)))
+    assert result.unfelt == ()
+    assert {c.sweep for c in result.crossings} == {1}
+
+
+def test_places_of_crossings_count_all_samples() -> None:
+    crest = np.maximum(0.3e-3 - (S - 0.08) ** 2 / (2 * TIP), 0.0)
+    crest[BURST] += 0.4e-3
+    (crossing,) = found(sweeps(3, crest)).crossings
+    assert abs(0.5 * (crossing.start + crossing.stop) * STEP - 0.08) < 0.3e-3

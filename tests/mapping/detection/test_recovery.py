@@ -1,0 +1,49 @@
+"""Recovery: the limit that is printed is that at which crests put into the log are found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapping.arrays import FloatArray
+from mapping.base.base import Base
+from mapping.base.laid_trace import LaidTrace
+from mapping.detection.detect import detect
+from mapping.detection.recovery import recovered
+from mapping.surface import Surface
+from mapping.trace import Trace
+
+TIP, STEP, LENGTH, SWEEPS, WHITE = 10e-3, 20e-6, 0.1, 10, 0.05e-3
+S = np.arange(int(LENGTH / STEP)) * STEP
+PLATE = Base(Surface([[-0.2, -0.2, 0], [0.2, -0.2, 0], [0.2, 0.2, 0], [-0.2, 0.2, 0]], [[0, 1, 2], [0, 2, 3]]))
+
+
+def laid(levels: FloatArray, sweeps: int = SWEEPS) -> LaidTrace:
+    heights = levels[:sweeps, None] * WHITE * np.random.default_rng(13).standard_normal((sweeps, len(S)))
+    y = np.repeat(np.linspace(-0.04, 0.04, sweeps), len(S))
+    centers = np.column_stack([np.tile(S - 0.5 * LENGTH, sweeps), y, TIP + heights.ravel()])
+    return LaidTrace.of(Trace(np.arange(len(y)) * 2e-4, centers, np.repeat(np.arange(sweeps), len(S)), TIP), PLATE)
+
+
+def test_in_white_noise_the_computed_limit_is_the_measured_one() -> None:
+    trace = laid(np.ones(SWEEPS))
+    computed = detect(trace, PLATE)
+    measured = recovered(computed, trace, np.random.default_rng(0))
+    assert measured.injected >= 20
+    assert measured.recovered >= 0.85 * measured.injected
+    assert measured.detection_limit <= 1.13 * computed.detection_limit
+
+
+def test_where_the_level_differs_by_sweep_the_limit_is_raised_and_that_is_told() -> None:
+    trace = laid(np.exp(0.7 * np.random.default_rng(14).standard_normal(SWEEPS)))
+    computed = detect(trace, PLATE)
+    measured = recovered(computed, trace, np.random.default_rng(0))
+    assert measured.detection_limit > 1.3 * computed.detection_limit
+    assert measured.recovered >= 0.85 * measured.injected
+    assert "limit was raised" in measured.remarks[-1]
+
+
+def test_too_short_a_log_says_that_nothing_was_measured() -> None:
+    trace = laid(np.ones(SWEEPS), sweeps=1)
+    measured = recovered(detect(trace, PLATE), trace, np.random.default_rng(0))
+    assert measured.injected == 0
+    assert "computed, not measured" in measured.left_out[-1]
