@@ -234,6 +234,7 @@ def why_no_detection(work: Work) -> str | None:
 
 def detected(work: Work, share: Share) -> None:
     """Crossings of single sweeps; samples that cannot have been felt count no more for anything that follows."""
+    beyond = len(work.log.trace) - len(work.laid)
     work.detections = detect(work.laid, work.base, **work.settings.detection)
     if work.detections.unfelt:
         keep = np.ones(len(work.trace), dtype=bool)
@@ -242,7 +243,7 @@ def detected(work: Work, share: Share) -> None:
         found = detect(work.laid, work.base, **work.settings.detection)
         work.detections = replace(found, left_out=(*work.detections.left_out, *found.left_out))
     if work.sound is not None:
-        work.path = path_ledger(work.sound, work.detections, len(work.log.trace) - len(work.laid))
+        work.path = path_ledger(work.sound, work.detections, beyond)
 
 
 def why_no_injection(work: Work) -> str:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         Detections as Detections,
         detect as detect,
     )
-    from mapping.detection.matched_filter import LADDER as LADDER
+    from mapping.detection.filters.matched_filter import LADDER as LADDER
     from mapping.detection.paper_algorithms import (
         along_chord as along_chord,
         curvature_features as curvature_features,
@@ -30,7 +30,7 @@ _PUBLIC = {
     "coverage": ("Coverage", "coverage", "face_samples", "found_heights"),
     "crossing": ("Crossing",),
     "detect": ("SHORTEST_SWEEP_SAMPLES", "Detections", "detect"),
-    "matched_filter": ("LADDER",),
+    "filters.matched_filter": ("LADDER",),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
     "quiet_noise": ("smallest_crest",),
     "recovery": ("recovered",),

@@ -13,7 +13,7 @@ from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
 from mapping.detection.cap_fit import Disturbance, fit_cap
 from mapping.detection.empirical_null import NullScale
-from mapping.detection.matched_filter import Bank
+from mapping.detection.filters import Bank
 from mapping.instrument import Noise
 
 # A stretch reaches as far as the smoothed height exceeds this share of the crest, or 2.5 standard deviations.

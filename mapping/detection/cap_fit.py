@@ -40,7 +40,7 @@ class _Whitened:
         self, place: FloatArray, half_width: FloatArray, flat: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Gain in twice the log-likelihood, height and its information for caps (C,), by least squares."""
-        from mapping.detection.cap_kernels import caps
+        from mapping.detection.filters import caps
 
         seen = caps(self.x[0], self.step, len(self.x), place, half_width, flat * half_width) @ self.root.T
         information = np.maximum(np.einsum("ij,ij->i", seen, seen), np.finfo(float).tiny)

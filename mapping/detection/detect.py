@@ -13,8 +13,7 @@ from mapping.detection.candidates import LARGEST_SHARE, Searched, search, withou
 from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import STEP_CROSSINGS, Crossing
 from mapping.detection.empirical_null import NullScale, effective_noise, null_scales, typical_scale
-from mapping.detection.false_alarms import threshold_for
-from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, Bank, smallest_half_width
+from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH, Bank, smallest_half_width, threshold_for
 from mapping.detection.outliers import outliers
 from mapping.detection.paper_algorithms import along_chord, curvature_features
 from mapping.detection.quiet_noise import (

@@ -22,7 +22,7 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
-from mapping.detection.matched_filter import FILTER_BINS_PER_HALF_WIDTH, Bank
+from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH, Bank
 from mapping.instrument import Noise
 
 # The variance of unit outputs is read from their median absolute value, 0.6745 standard deviations, which what is no

@@ -15,7 +15,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights
 from mapping.detection.candidates import quiet_bins
-from mapping.detection.matched_filter import Bank, build_bank, filter_sd, smallest_half_width
+from mapping.detection.filters import Bank, build_bank, filter_sd, smallest_half_width
 from mapping.instrument import Blocks, Noise, NoiseFit, StatedNoise, estimate_noise, fit_noise, perturbed, relative_sd
 
 # Rounding of contact geometry, in tip radii: the noise is never taken to be smaller.

@@ -13,8 +13,8 @@ from mapping.base.base import Base
 from mapping.base.height_profile import SweepHeights, height_profiles
 from mapping.detection.candidates import search
 from mapping.detection.detect import Detections, detect
-from mapping.detection.false_alarms import _intensity, false_alarm_rate, threshold_for
-from mapping.detection.matched_filter import build_bank, filter_sd
+from mapping.detection.filters.false_alarms import _intensity, false_alarm_rate, threshold_for
+from mapping.detection.filters.matched_filter import build_bank, filter_sd
 from mapping.errors import DetectionError
 from mapping.geometry.templates.shapes import cap_height, groove_height, step_height
 from mapping.instrument.noise import Noise

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mapping.detection.toeplitz_kernels import leading_solutions
+from mapping.detection.filters.toeplitz_kernels import leading_solutions
 from mapping.instrument.fit import Blocks, fit_noise, relative_sd
 from mapping.instrument.noise import Noise, estimate_noise
 from mapping.instrument.noise_kernels import block_likelihood

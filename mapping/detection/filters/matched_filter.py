@@ -38,7 +38,7 @@ class MatchedFilter:
 
     def heights(self, profile: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Estimated height of a cap centred at each coarse bin of a profile (n,), and its standard deviation."""
-        from mapping.detection.filter_kernels import filtered
+        from mapping.detection.filters.filter_kernels import filtered
 
         whole = len(profile) // self.coarse * self.coarse
         bins = profile[:whole].reshape(-1, self.coarse).sum(axis=1) / self.coarse if self.coarse > 1 else profile
@@ -154,7 +154,7 @@ def smallest_half_width(noise: Noise, spacing: float, samples: float, tip_radius
 
 def cap_bins(positions: FloatArray, half_width: float, spacing: float) -> FloatArray:
     """Means of a cap of unit height over bins whose middles (n,) are `spacing` apart, m; its crest is at 0."""
-    from mapping.detection.cap_kernels import caps
+    from mapping.detection.filters.cap_kernels import caps
 
     crest = np.zeros(1)
     return np.asarray(caps(positions[0], spacing, len(positions), crest, np.array([half_width]), crest)[0])
@@ -212,7 +212,7 @@ def best_linear(
     Returns:
         (n + 1 - smallest, n) weights, zero beyond k, and (n + 1 - smallest,) standard deviations.
     """
-    from mapping.detection.toeplitz_kernels import leading_solutions
+    from mapping.detection.filters.toeplitz_kernels import leading_solutions
 
     columns = np.column_stack([template, nuisance])
     solved = leading_solutions(covariance, columns, len(template) if smallest is None else smallest)

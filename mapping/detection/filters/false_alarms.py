@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from mapping import FloatArray, IntArray
-from mapping.detection.matched_filter import (
+from mapping.detection.filters.matched_filter import (
     LADDER,
     Bank,
     MatchedFilter,

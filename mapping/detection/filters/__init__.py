@@ -1,0 +1,31 @@
+"""Matched filters: templates of every width, whitened, and the threshold that an asked rate of false alarms needs."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.detection.filters.cap_kernels import caps as caps
+    from mapping.detection.filters.false_alarms import threshold_for as threshold_for
+    from mapping.detection.filters.matched_filter import (
+        FILTER_BINS_PER_HALF_WIDTH as FILTER_BINS_PER_HALF_WIDTH,
+        LADDER as LADDER,
+        Bank as Bank,
+        build_bank as build_bank,
+        filter_sd as filter_sd,
+        smallest_half_width as smallest_half_width,
+    )
+
+_PUBLIC = {
+    "cap_kernels": ("caps",),
+    "false_alarms": ("threshold_for",),
+    "matched_filter": (
+        "Bank",
+        "FILTER_BINS_PER_HALF_WIDTH",
+        "LADDER",
+        "build_bank",
+        "filter_sd",
+        "smallest_half_width",
+    ),
+}
+doorway(__name__, _PUBLIC)
