@@ -13,19 +13,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from explore3d import UserError, __version__, seconds_text
+from explore3d import UserError, __version__, length_text, seconds_text
 from explore3d.analysis import Analysis, Progress, Stages, silent, without_needless_dynamics
 from explore3d.jobs.conclude import conclude
 from explore3d.jobs.expedition import SurveyWatch, explorer, known_base
 from explore3d.jobs.resume import BROKEN_OFF, Replay
 from explore3d.jobs.session import Job, Session
 from explore3d.log import EXPLORATION, OUTCOME, Log, read_base, read_log, stop_of
-from explore3d.scene import Scene, load_scene
-from hw import Finger, Move, open_finger
-from hw.simulated import Dynamics
+from explore3d.scene import FingerNoise, GivenFingerTable, Scene, load_scene
+from hw import Finger, Move
 from mapping import Trace
 from planners import Outcome
 
+# Two statements of one tip's radius may differ by rounding
+SAME_RADIUS = 1e-6
 # A shell's exit status of a program that a signal ended is this and the signal's number
 SIGNAL_EXIT = 128
 
@@ -39,6 +40,7 @@ def run(
     arm: bool = False,
     resume: bool = False,
     overwrite: bool = False,
+    finger: Finger | None = None,
 ) -> Analysis:
     """Explore, log, and build the annotated model.
 
@@ -53,6 +55,8 @@ def run(
         arm: let a real machine move; without it every move is refused.
         resume: go on from the log of a session that was broken off in that folder.
         overwrite: replace, once this one is complete, a session of another scene in that folder.
+        finger: explore with this one, not with the one that the scene names; whether it may move is its own affair.
+            The session's scene says `kind = "given"`, and keeps what it states of the noise.
 
     Raises:
         UserError: a scene or folder that cannot be used.
@@ -62,7 +66,10 @@ def run(
     with stages.stage("setting up"):
         scene = scene if isinstance(scene, Scene) else load_scene(scene)
         known_base(scene)  # a mesh that cannot be used is refused before a folder is made
-        finger = scene_finger(without_needless_dynamics(scene, stages), arm)
+        if finger is None:
+            finger = scene_finger(without_needless_dynamics(scene, stages), arm)
+        else:
+            scene = _with_given(scene, finger)
     words = [part for name in force for part in ("--force", name)] + ["--arm"] * arm
     again = shlex.join(["explore3d", "run", str(scene.path), "--out", str(out), *words])
     go_on = f"{again} --resume"
@@ -80,6 +87,17 @@ def run(
             error.add_note(session.stopped)
             raise
     return replace(analysis, folder=session.place)
+
+
+def _with_given(scene: Scene, finger: Finger) -> Scene:
+    """The scene of a finger that was handed in. Raises UserError: its tip is another than the scene's."""
+    if abs(finger.tip_radius - scene.tip.radius) > SAME_RADIUS * scene.tip.radius:
+        raise UserError(
+            f"{scene.path}: tip.radius is {length_text(scene.tip.radius)}, the finger that was handed in has "
+            f"{length_text(finger.tip_radius)}"
+        )
+    noise = FingerNoise(**scene.finger.noise.model_dump(include=set(FingerNoise.model_fields)))
+    return scene.with_finger(GivenFingerTable(noise=noise))
 
 
 def scene_digest(scene: Scene) -> str:
@@ -102,28 +120,7 @@ def cause(error: BaseException) -> str:
 
 def scene_finger(scene: Scene, arm: bool = False) -> Finger:
     """The finger that the scene names; entering it connects. Raises SceneError, FingerError."""
-    table = scene.finger
-    if table.machine is not None:
-        from explore3d.jobs.machine_finger import machine_finger
-
-        return machine_finger(scene, arm)
-    noise, inert = table.noise, {}
-    if table.dynamics is not None:
-        inert = {"dynamics": Dynamics(**table.dynamics.model_dump())}
-    return open_finger(
-        "dynamic" if inert else table.kind,
-        **inert,
-        object=scene.object_surface(),
-        tip_radius=scene.tip.radius,
-        rate=table.rate,
-        contact_data=table.contact_data,
-        white=noise.white,
-        correlated=noise.correlated,
-        correlation_length=noise.correlation_length,
-        angle=noise.angle,
-        contact=noise.contact,
-        seed=scene.seed,
-    )
+    return scene.open_finger(arm)
 
 
 def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, replay: Replay | None = None) -> Log:

@@ -22,6 +22,8 @@ POLL = 0.05
 # With no sign of life for so long the controller is taken for lost, s
 LONGEST_CONTROLLER_SILENCE = 1.5
 
+# A report that did not come within this time was lost, s: ten times what asking takes over the slowest links
+ASKED_IN_VAIN = 0.5
 # An idle machine that answers so many requests and still not the line before them has lost the line or its answer:
 # Grbl answers in order, and a line is parsed within 10 ms
 UNANSWERED = 6
@@ -82,7 +84,7 @@ class GrblController:
         self.alarm: str | None = None
         self.stop_reason: str | None = None
         self.reports: deque[Report] = deque(maxlen=KEPT_REPORTS)
-        self._asked: float | None = None
+        self._asked: deque[float] = deque()  # when, for every report that has not come yet
         self._news = threading.Condition()
         self._answers: deque[str] = deque()
         self._feedback: list[str] = []
@@ -201,9 +203,15 @@ class GrblController:
         return self.reports[-1].status
 
     def _request(self) -> None:
-        """Ask for a report; its round trip counts from the first asking that is not answered yet."""
-        if self._asked is None:
-            self._asked = time.monotonic()
+        """Ask for a report; its round trip counts from the first asking that is not answered yet.
+
+        An asking that was lost would make all reports after it look late: it is forgotten.
+        """
+        now = time.monotonic()
+        with self._news:
+            while self._asked and now - self._asked[0] > ASKED_IN_VAIN:
+                self._asked.popleft()
+            self._asked.append(now)
         self.link.write(protocol.STATUS)
 
     def _fresh(self, since: float) -> bool:
@@ -497,10 +505,9 @@ class GrblController:
 
     def _sort(self, now: float, line: str) -> None:
         if line.startswith("<"):
-            status = protocol.parse_status(line)
+            status, round_trip = protocol.parse_status(line), now - self._asked.popleft() if self._asked else 0.0
             if status is not None and self._is_plausible(status):
-                asked, self._asked = self._asked, None
-                self.reports.append(Report(now, status, 0.0 if asked is None else now - asked))
+                self.reports.append(Report(now, status, round_trip))
                 if status.offset is not None:
                     self._hear_offset(status.offset * self.settings.report_scale)
         elif line == "ok" or line.startswith("error:"):

@@ -31,7 +31,8 @@ PERIOD_SPAN = 5.0
 class ForceSensor:
     """Common to all sensors; a device adds its framing, `decode` and `start`.
 
-    Forces are those on the tip, N, in the axes of the machine that carries it.
+    Forces are those on the tip, N. `force` and `timed` give them in the axes of the machine that carries the sensor,
+    `zero` and `recorded` in its own; `turned` (3, 3) turns its axes into the machine's.
 
     Args:
         port: device name or pyserial URL.
@@ -51,6 +52,7 @@ class ForceSensor:
         self.rate, self.bits = rate, bits
         self.tick = 1.0 / rate if tick is None else tick
         self.zero, self.drift = np.zeros(3), np.zeros(3)
+        self.turned = np.eye(3)
         self._samples: deque[tuple[float, int, float, float, float]] = deque(maxlen=KEPT_SAMPLES)
         self._limit = np.inf
         self._halt: Callable[[str], None] = _nothing
@@ -131,7 +133,8 @@ class ForceSensor:
 
     def force(self) -> FloatArray:
         """(3,) newest force, N."""
-        return np.array(self._samples[-1][2:]) - self.zero if self._samples else np.zeros(3)
+        newest = np.array(self._samples[-1][2:]) - self.zero if self._samples else np.zeros(3)
+        return np.asarray(self.turned @ newest)
 
     def wait(self, done: Callable[[], bool], within: float) -> bool:
         """Wait for samples until `done`; False if that took too long."""
@@ -180,7 +183,7 @@ class ForceSensor:
             return np.zeros(0), np.zeros((0, 3))
         clock = SensorClock.estimate(ticks.astype(float), arrivals, self.tick)
         recent = arrivals >= since
-        return clock.times(ticks[recent].astype(float)), forces[recent] - self.zero
+        return clock.times(ticks[recent].astype(float)), (forces[recent] - self.zero) @ self.turned.T
 
     def _hear(self, now: float, frames: list[bytes]) -> None:
         good, taken_back = [], 0
