@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from itertools import takewhile
+from itertools import islice, takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +41,8 @@ OFFSET_CHANGED = (
     "position and run again"
 )
 
+# The link's round trip is the median of so many
+RECENT_REPORTS = 15
 # Reports that are kept: ten seconds of asking as fast as a port can answer
 KEPT_REPORTS = 50_000
 
@@ -317,6 +319,17 @@ class GrblController:
                     self._sent.popleft()
                 if answer != "ok":
                     raise FingerError(f"{self.link.port}: a jog was refused: {protocol.describe(answer)}")
+
+    def cancel_now(self) -> None:
+        """Throw away what is queued of jogs, from any thread, and wait for nothing; the link may be gone."""
+        with suppress(LinkError):
+            self.link.write(protocol.JOG_CANCEL)
+
+    @property
+    def round_trip(self) -> float:
+        """What asking where the machine is has taken lately, s; 0 before it was asked."""
+        recent = list(islice(reversed(self.reports), RECENT_REPORTS))
+        return float(np.median([report.round_trip for report in recent])) if recent else 0.0
 
     def cancel_jog(self, within: float = 2.0) -> None:
         """Stop jogging, forget what is queued, wait until the machine stands."""

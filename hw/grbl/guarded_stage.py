@@ -27,6 +27,9 @@ LONGEST_STANDSTILL = 5.0
 BLIND_SHARE = 0.5
 # Slower than this no sensor is worth a sweep, m/s: refused with the reason
 CRAWL = 1e-4
+# The body is approached in steps of this share of what the tip may run on; the next one is sent when QUEUED_STEPS of them
+# are left. So a host that hears of the touch late lets the tip run on by 2.5 steps, 0.6 of what it may, at most
+STEP_SHARE, QUEUED_STEPS = 0.25, 1.5
 # A probe is closed, or open, if so many reports say so: one may be garbled, a contact may bounce
 TOLD = 2
 # The tip is free when a step of this length, m, changes the force by less than a touch
@@ -90,8 +93,12 @@ class GuardedStage:
             low, high = np.round(1e3 * self.bounds, 3).tolist()
             raise FingerError(f"the {what} leads to machine position {where} mm; possible are {low} to {high} mm")
 
-    def probe(self, target: FloatArray, speed: float) -> tuple[FloatArray, bool]:
-        """Towards the target until contact: (latched position, True), or (target, False) if nothing is met."""
+    def probe(self, target: FloatArray, speed: float, force: float = np.inf) -> tuple[FloatArray, bool]:
+        """Towards the target until contact: (latched position, True), or (target, False) if nothing is met.
+
+        Args:
+            force: that the touch should not exceed, N, as far as the tip's stiffness tells, however late the host is.
+        """
         self.check(target, "probing")
         here = self.position() if self.sensor is not None else self._resting()
         way = float(np.linalg.norm(target - here))
@@ -104,7 +111,7 @@ class GuardedStage:
             if bound < STANDING:
                 raise self._not_felt(target)
         speed = min(speed, self.guarded_speed)
-        where, hit = self._peck(here, target, speed) if self.sensor is None else self._feel(target, speed, self.sensor)
+        where, hit = self._peck(here, target, speed) if self.sensor is None else self._feel(target, speed, self.sensor, force)
         if not hit and bound < way:
             raise self._not_felt(where)
         return where, hit
@@ -229,24 +236,32 @@ class GuardedStage:
         self.controller.jog(self.frame.to_machine(target), self.guarded_speed)
         self.controller.wait_idle(LONGEST_STANDSTILL)
 
-    def _feel(self, target: FloatArray, speed: float, sensor: ForceSensor) -> tuple[FloatArray, bool]:
-        """Jog until the sensor feels contact; where the machine then came to rest."""
+    def _feel(
+        self, target: FloatArray, speed: float, sensor: ForceSensor, force: float
+    ) -> tuple[FloatArray, bool]:
+        """Jog until the sensor feels contact; where the machine then came to rest.
+
+        The thread that reads the sensor cancels the jog: over a slow link the host hears where the machine is only
+        after it went on for as long.
+        """
         start = self.position()
         way = float(np.linalg.norm(target - start))
         # a late host makes the machine stand: never is more queued than may be run on into the body
-        step = max(0.25 * self.over_travel, STANDING)
+        most = self.over_travel if self.stiffness == 0 else min(self.over_travel, force / self.stiffness)
+        step = max(STEP_SHARE * most, STANDING)
         count = int(np.ceil(way / step))
         hit = False
-        for number in range(1, count + 1):
-            here = start + (target - start) * (number / count)
-            made = time.monotonic()
-            self.controller.jog(self.frame.to_machine(here), speed)
-            hit = self._felt_before(here, 1.5 * way / count, made, sensor)
-            if hit:
-                break
-        if not hit:
-            self.controller.wait_idle(LONGEST_STANDSTILL)
-            hit = self._touches(sensor)
+        with sensor.touching(self.touch_force, self.controller.cancel_now):
+            for number in range(1, count + 1):
+                here = start + (target - start) * (number / count)
+                made = time.monotonic()
+                self.controller.jog(self.frame.to_machine(here), speed)
+                hit = self._felt_before(here, QUEUED_STEPS * way / count, made, sensor)
+                if hit:
+                    break
+            if not hit:
+                self.controller.wait_idle(LONGEST_STANDSTILL)
+                hit = self._touches(sensor)
         self.controller.cancel_jog()
         return self.position(), hit
 
@@ -264,6 +279,8 @@ class GuardedStage:
                 return True
             if np.linalg.norm(self.position() - here) <= near:
                 return False
+            if self._touches(sensor):  # felt, and the jog cancelled, while the position was asked for
+                return True
             if patience.over():
                 raise LinkError("the machine does not follow; is it held, or its door open?")
 
