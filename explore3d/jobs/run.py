@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from explore3d import UserError, __version__, length_text, seconds_text
+from explore3d import UserError, __version__, count_text, length_text, seconds_text
 from explore3d.analysis import Analysis, Progress, Stages, silent, without_needless_dynamics
 from explore3d.jobs.conclude import conclude
 from explore3d.jobs.expedition import SurveyWatch, explorer, known_base
@@ -27,6 +27,8 @@ from planners import Outcome
 
 # Two statements of one tip's radius may differ by rounding
 SAME_RADIUS = 1e-6
+# Kind of event: a sweep that the finger ended before its end, and why
+CUT_SHORT = "cut short"
 # A shell's exit status of a program that a signal ended is this and the signal's number
 SIGNAL_EXIT = 128
 
@@ -140,9 +142,15 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
             log.event("resumed", {"samples": replay.samples})
             touch = replay.before(finger.execute, getattr(finger, "skip", None), log.write)
 
+        cut_short: list[str] = []
+
         def execute(move: Move) -> Trace:
             trace = touch(move)
             log.write(move, trace)
+            told = finger.info.get("cut_short", []) if move.purpose == "sweep" else []
+            if len(told) > len(cut_short):
+                cut_short[:] = told
+                log.event(CUT_SHORT, {"sweep": int(trace.sweep[-1]) if len(trace) else None, "reason": told[-1]})
             if replay is not None and replay.live:
                 session.settle()  # everything that the earlier log holds is in this one
             if len(trace):
@@ -164,7 +172,7 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
         if replay is not None:
             replay.rest(log.write)
         # what the connection counted and learnt of its clocks on the way
-        log.event(OUTCOME, _ended(outcome, watch, scene) | {"finger": finger.info})
+        log.event(OUTCOME, _ended(outcome, watch, scene, cut_short) | {"finger": finger.info})
         if not log.samples:
             raise UserError(f"{session.folder}: nothing was felt: {outcome.detail or outcome.reason}")
         session.settle()
@@ -172,12 +180,14 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
         return log.recorded()
 
 
-def _ended(outcome: Outcome, watch: SurveyWatch, scene: Scene) -> dict[str, Any]:
-    """Why an exploration ended, as an event of its log."""
+def _ended(outcome: Outcome, watch: SurveyWatch, scene: Scene, cut_short: Collection[str]) -> dict[str, Any]:
+    """Why an exploration ended, as an event of its log; a sweep that ended before its end leaves it incomplete."""
     why = outcome.detail or outcome.reason
     if outcome.reason == "budget":
         why = f"the time budget of {seconds_text(scene.explore.time_budget)} was used up"
-    finished = watch.surveyed and outcome.reason != "finger refuses"
+    finished = watch.surveyed and outcome.reason != "finger refuses" and not cut_short
+    if cut_short:
+        why = f"{count_text(len(cut_short), 'sweep')} cut short: {[*cut_short][-1]}"
     return {
         "reason": outcome.reason,
         "detail": outcome.detail,

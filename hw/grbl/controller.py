@@ -41,6 +41,8 @@ OFFSET_CHANGED = (
     "position and run again"
 )
 
+# After a reset the controller greets within so many s; a greeting that was garbled is not waited for longer
+RESTARTING = 1.0
 # The link's round trip is the median of so many
 RECENT_REPORTS = 15
 # Reports that are kept: ten seconds of asking as fast as a port can answer
@@ -495,7 +497,7 @@ class GrblController:
         self._restart_expected = True
         self.link.write(protocol.RESET)
         with self._news:
-            self._news.wait_for(lambda: self._restarts > before, timeout=within)
+            self._news.wait_for(lambda: self._restarts > before, timeout=RESTARTING)
         status = self.status()
         self._restart_expected = False
         self._restarts, self.stop_reason = before, self.distrust

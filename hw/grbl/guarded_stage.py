@@ -30,6 +30,8 @@ CRAWL = 1e-4
 # The body is approached in steps of this share of what the tip may run on; the next one is sent when QUEUED_STEPS of them
 # are left. So a host that hears of the touch late lets the tip run on by 2.5 steps, 0.6 of what it may, at most
 STEP_SHARE, QUEUED_STEPS = 0.25, 1.5
+# A lift is queued for so long ahead, s, besides two round trips: a busy host asks twice in it
+LIFT_AHEAD = 0.02
 # A probe is closed, or open, if so many reports say so: one may be garbled, a contact may bounce
 TOLD = 2
 # The tip is free when a step of this length, m, changes the force by less than a touch
@@ -353,21 +355,38 @@ class GuardedStage:
         sensor = self.sensor if self.sensor is not None and self.sensor.fault is None else None
         most = self.touch_force + (0.0 if sensor is None else float(np.linalg.norm(sensor.force())))
         self.controller.wait_idle(LONGEST_STANDSTILL)  # an operator's hold: no jog is taken before it is let go
-        self.controller.jog(self.frame.to_machine(target), self.guarded_speed)
         opened, met = False, 0
-        while True:
-            status = self.controller.status()
-            if sensor is not None:
-                met = TOLD if np.linalg.norm(sensor.force()) > most else 0
-            elif self.sensor is None:
-                opened = opened or not status.probe_closed
-                met = met + 1 if opened and status.probe_closed else 0
-            if met >= TOLD:
-                self.controller.cancel_jog()
-                raise StoppedError("something was met while the tip was lifted off; free it by hand")
-            if status.state != "Jog":
-                break
+        for here in self._pieces(target):
+            self.controller.jog(self.frame.to_machine(here), self.guarded_speed)
+            left = 0.0 if np.array_equal(here, target) else self._run_out
+            while True:
+                status = self.controller.status()
+                if sensor is not None:
+                    met = TOLD if np.linalg.norm(sensor.force()) > most else 0
+                elif self.sensor is None:
+                    opened = opened or not status.probe_closed
+                    met = met + 1 if opened and status.probe_closed else 0
+                if met >= TOLD:
+                    self.controller.cancel_jog()
+                    raise StoppedError("something was met while the tip was lifted off; free it by hand")
+                place = self.frame.to_object(self.controller.machine_position(status))
+                if status.state != "Jog" or (left and np.linalg.norm(place - here) <= left):
+                    break
         self.controller.wait_idle(LONGEST_STANDSTILL)
+
+    def _pieces(self, target: FloatArray) -> Iterator[FloatArray]:
+        """Ends of the jogs to a target: short ones, for what is queued runs out when the cable is pulled."""
+        start = self.position()
+        count = int(np.ceil(np.linalg.norm(target - start) / self._run_out))
+        for number in range(1, count):
+            yield start + (target - start) * (number / count)
+        yield target
+
+    @property
+    def _run_out(self) -> float:
+        """What may be queued of a lift, m: what lasts as long as asking where the machine is, and its stop."""
+        lasts = LIFT_AHEAD + 2.0 * self.controller.round_trip
+        return max(self.guarded_speed * lasts + self.guarded_speed**2 / (2.0 * self._acceleration), STANDING)
 
     def _within(self, target: FloatArray) -> FloatArray:
         machine = np.clip(self.frame.to_machine(target), self.bounds[0], self.bounds[1])

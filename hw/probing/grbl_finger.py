@@ -25,6 +25,8 @@ RECONNECT = 5.0
 DEAD_SHARE = 0.8
 # How long the user has to touch the probe, s
 TOUCH_BY_HAND = 60.0
+# A machine that does not answer for so long when the tip is to be lifted is left as it is, s: ten askings
+LAST_LOOK = 0.5
 # The probe is looked at so often meanwhile, s: a hand's touch lasts longer
 LOOK = 0.02
 
@@ -175,7 +177,13 @@ class GrblFinger:
             return
         self._left = True
         try:
-            if controller.stop_reason is not None or controller.status().state not in ("Idle", "Alarm"):
+            state = controller.status(within=LAST_LOOK).state
+        except LinkError as error:
+            controller.halt("leaving")  # all that can be done for a machine that does not answer
+            self._lost = f"{self._lost or error}; it does not answer, so that the tip could not be lifted off"
+            return
+        try:
+            if controller.stop_reason is not None or state not in ("Idle", "Alarm"):
                 controller.halt("leaving")
                 if not controller.clear():
                     return  # the position is lost: any motion could do harm
@@ -218,7 +226,7 @@ class GrblFinger:
             "resolution": controller.settings.resolution,
             "firmware": controller.version,
             "doubts": controller.doubts,
-            "cut_short": self._cut_short,
+            "cut_short": list(self._cut_short),
             "settings": {f"${code}": value for code, value in controller.settings.values.items()},
             "origin": self.frame.origin.tolist(),
             "rotation": self.frame.rotation.tolist(),
