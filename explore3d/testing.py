@@ -29,7 +29,7 @@ from mapping import FloatArray, Trace
 # A finger gives up this soon after its device failed, and lets go this soon when it is left, s
 LONGEST_ENDING = 5.0
 # An undisturbed sweep of the rig ends in this time, s
-LONGEST_SWEEP = 60.0
+LONGEST_UNDISTURBED = 60.0
 # The true force may exceed the finger's own limit by this share: braking, one late sample
 FORCE_SLACK = 1.1
 # So long after the finger was left nothing may move any more, s; and what is no motion, m
@@ -73,7 +73,7 @@ class Rig:
     faults: Mapping[str, Callable[[], None]] = field(default_factory=dict)
 
 
-T = TypeVar("T")
+R = TypeVar("R")
 
 
 class NonconformityError(AssertionError):
@@ -194,7 +194,7 @@ def _ends_well(rig: Rig, fault: str, share: float, anew: Callable[[], AbstractCo
         finger.execute(other.sweep)
         lasts = time.monotonic() - begun
     finger, most = rig.open(), lasts + LONGEST_ENDING
-    _aside(finger.__enter__, LONGEST_SWEEP, "connecting")
+    _aside(finger.__enter__, LONGEST_UNDISTURBED, "connecting")
     kept: list[Trace] = []
     if hasattr(finger, "notice"):
         finger.notice = kept.append
@@ -220,9 +220,9 @@ def _ends_well(rig: Rig, fault: str, share: float, anew: Callable[[], AbstractCo
 # what they share
 
 
-def _aside(what: Callable[[], T], within: float, name: str) -> T:
+def _aside(what: Callable[[], R], within: float, name: str) -> R:
     """Carry out what may hang in a thread of its own, so that a hang is found and told."""
-    ended: list[T] = []
+    ended: list[R] = []
     failed: list[BaseException] = []
 
     def carry_out() -> None:

@@ -79,7 +79,7 @@ class KlipperFinger:
         if (move.path < space.low).any() or (move.path > space.high).any():
             raise FingerError(f"the move leaves {space.low.tolist()} to {space.high.tolist()} m")
         if not straight_down or move.speed > space.max_speed or move.force > space.max_force:
-            raise FingerError(f"the probe goes straight down, at most at {space.max_speed} m/s with {space.max_force} N")
+            raise FingerError(f"it goes straight down, at most at {space.max_speed} m/s with {space.max_force} N")
         try:
             felt = self._carry_out(move)
         except FingerError as error:
@@ -106,7 +106,7 @@ class KlipperFinger:
                 self._stop(f"{self.table.url}: PROBE reports {height!r}, the head stands elsewhere: check the probe")
             contact = np.append(point[:2], 1e-3 * height - self.table.origin[2])
             felt.append((time.monotonic() - (self._begun or 0.0), contact))
-            self._go(contact + [0.0, 0.0, self.table.clearance])
+            self._go(contact + np.array([0.0, 0.0, self.table.clearance]))
         return felt
 
     def _go(self, point: np.ndarray) -> None:
@@ -133,7 +133,8 @@ class KlipperFinger:
             with urlopen(Request(url, method=method), timeout=self.patience) as answer:
                 return json.load(answer)["result"]
         except HTTPError as error:  # what Klipper itself says: shut down, not homed, no trigger on the probe
-            raise StoppedError(f"{self.table.url}: {' '.join(error.read().decode(errors='replace').split())}") from error
+            said = " ".join(error.read().decode(errors="replace").split())
+            raise StoppedError(f"{self.table.url}: {said}") from error
         except (OSError, ValueError, KeyError) as error:
             try:
                 self._stop(f"{self.table.url}: no answer ({error}); check network and printer, home it, run again")

@@ -1,4 +1,4 @@
-"""A printer that is none: as much of Moonraker's HTTP API as the finger uses, over a printer that moves in real time."""
+"""A printer that is none: as much of Moonraker's HTTP API as the finger uses; it moves in real time."""
 
 from __future__ import annotations
 
@@ -102,7 +102,9 @@ class FakePrinter:
             surface = self.height(x, y)
             if z <= surface:
                 raise RuntimeError("Probe triggered prior to movement")
-            self.move(np.array([x, y, max(surface, self.low[2])]), 1e-3 * float(line.split("PROBE_SPEED=")[1].split()[0]))
+            self.move(
+                np.array([x, y, max(surface, self.low[2])]), 1e-3 * float(line.split("PROBE_SPEED=")[1].split()[0])
+            )
             if surface < self.low[2]:
                 raise RuntimeError("No trigger on probe after full movement")
             self.last = 1e3 * surface

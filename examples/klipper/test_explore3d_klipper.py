@@ -14,8 +14,8 @@ from explore3d.testing import CASES, Rig, check
 from hw import Move
 
 sys.path.insert(0, str(Path(__file__).parent))
-from explore3d_klipper import KlipperFinger, KlipperTable  # noqa: E402
-from fake_moonraker import FakePrinter  # noqa: E402
+from explore3d_klipper import KlipperFinger, KlipperTable
+from fake_moonraker import FakePrinter
 
 ORIGIN, TIP = np.array([0.1, 0.1, 0.02]), 5e-3
 

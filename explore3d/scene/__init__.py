@@ -8,10 +8,10 @@ if TYPE_CHECKING:
     from explore3d.scene.complaint import complaint as complaint
     from explore3d.scene.finger import (
         FINGER_GROUP as FINGER_GROUP,
+        SENSOR_GROUP as SENSOR_GROUP,
         FingerNoise as FingerNoise,
         FingerTable as FingerTable,
         GivenFingerTable as GivenFingerTable,
-        SENSOR_GROUP as SENSOR_GROUP,
         SensorTable as SensorTable,
         Setting as Setting,
     )

@@ -191,7 +191,7 @@ def _of_an_earlier_log(tables: dict[str, Any]) -> dict[str, Any]:
         return {key: value for key, value in table.items() if key not in defaults or value != defaults[key]}
 
     tables = without(tables, ONCE_WRITTEN)
-    inner = {"noise": ONCE_WRITTEN_NOISE}
+    inner: dict[str, dict[str, Any]] = {"noise": dict(ONCE_WRITTEN_NOISE)}
     sensor = tables.get("sensor")
     if isinstance(sensor, dict):
         used = "baudrate" if sensor.get("kind") == "line" else "counts_per_newton"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -53,7 +53,7 @@ class SimulatedFingerTable(FingerTable):
     def finger(self, setting: Setting) -> Finger:
         """A rigid ball on the exact surface, or one with inertia."""
         noise = self.noise
-        settings = {
+        settings: dict[str, Any] = {
             "object": setting.mesh(self.object, self.units),
             "tip_radius": setting.tip_radius,
             "rate": self.rate,

@@ -41,6 +41,8 @@ OFFSET_CHANGED = (
     "position and run again"
 )
 
+# A printer's firmware names itself within so many s
+NAMING = 1.0
 # After a reset the controller greets within so many s; a greeting that was garbled is not waited for longer
 RESTARTING = 1.0
 # The link's round trip is the median of so many
@@ -138,10 +140,30 @@ class GrblController:
                     raise
                 if patience.left < 0.5 * self.wake:  # a native USB port that waits to be asked
                     self.link.raise_lines()
+        if other := self._other_firmware():
+            raise FingerError(
+                f"{self.link.port}: this is {other}, which gives no Grbl status reports; possible: Grbl 1.1, grblHAL, "
+                "FluidNC; a printer under Klipper: examples/klipper"
+            )
         raise LinkError(
             f"{self.link.port}: no answer to a status request within {self.wake:g} s; "
             "is it a Grbl controller, powered, and is the baud rate right?"
         )
+
+    def _other_firmware(self) -> str:
+        """What a firmware that knows no `?` calls itself, asked as printers are (M115); "" if it is silent."""
+        with self._news:
+            self._feedback = []
+        with suppress(LinkError):
+            self.link.write(b"\nM115\n")
+        with self._news:
+            self._news.wait_for(lambda: bool(protocol.firmware_name(self._feedback)), timeout=NAMING)
+            return protocol.firmware_name(self._feedback)
+
+    @property
+    def firmware(self) -> str:
+        """Grbl, grblHAL or FluidNC, with its version, as it says itself."""
+        return protocol.firmware_name([self.version]) or "a firmware of the Grbl family that does not say which"
 
     def set_up(self) -> None:
         """Millimetres, absolute, feed per minute; read the work offset."""

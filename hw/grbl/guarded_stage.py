@@ -27,8 +27,8 @@ LONGEST_STANDSTILL = 5.0
 BLIND_SHARE = 0.5
 # Slower than this no sensor is worth a sweep, m/s: refused with the reason
 CRAWL = 1e-4
-# The body is approached in steps of this share of what the tip may run on; the next one is sent when QUEUED_STEPS of them
-# are left. So a host that hears of the touch late lets the tip run on by 2.5 steps, 0.6 of what it may, at most
+# The body is approached in steps of this share of what the tip may run on; the next one is sent when QUEUED_STEPS of
+# them are left. So a host that hears of the touch late lets the tip run on by 2.5 steps, 0.6 of what it may, at most
 STEP_SHARE, QUEUED_STEPS = 0.25, 1.5
 # A lift is queued for so long ahead, s, besides two round trips: a busy host asks twice in it
 LIFT_AHEAD = 0.02
@@ -113,7 +113,9 @@ class GuardedStage:
             if bound < STANDING:
                 raise self._not_felt(target)
         speed = min(speed, self.guarded_speed)
-        where, hit = self._peck(here, target, speed) if self.sensor is None else self._feel(target, speed, self.sensor, force)
+        where, hit = (
+            self._peck(here, target, speed) if self.sensor is None else self._feel(target, speed, self.sensor, force)
+        )
         if not hit and bound < way:
             raise self._not_felt(where)
         return where, hit
@@ -238,9 +240,7 @@ class GuardedStage:
         self.controller.jog(self.frame.to_machine(target), self.guarded_speed)
         self.controller.wait_idle(LONGEST_STANDSTILL)
 
-    def _feel(
-        self, target: FloatArray, speed: float, sensor: ForceSensor, force: float
-    ) -> tuple[FloatArray, bool]:
+    def _feel(self, target: FloatArray, speed: float, sensor: ForceSensor, force: float) -> tuple[FloatArray, bool]:
         """Jog until the sensor feels contact; where the machine then came to rest.
 
         The thread that reads the sensor cancels the jog: over a slow link the host hears where the machine is only

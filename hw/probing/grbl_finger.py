@@ -133,7 +133,10 @@ class GrblFinger:
             low, high = self.limits
             bounds = np.stack([np.fmax(bounds[0], low), np.fmin(bounds[1], high)])
         if not np.isfinite(bounds).all():
-            raise FingerError(f"{self.port}: the controller does not state its travel ($130 to $132); give limits")
+            raise FingerError(
+                f"{self.port}: {controller.firmware} does not state its travel ($130 to $132; FluidNC keeps it in its "
+                "configuration file); give low and high in [finger.machine]"
+            )
         sensor = None if self.slide is None else self.slide.sensor
         speed = self._speed_of(controller)
         over_travel = self.over_travel
@@ -270,6 +273,13 @@ class GrblFinger:
             return False
         self._lost = None
         return True
+
+    def forecast(self, move: Move) -> float:
+        """About how long a move will take, s: a sweep's pecks, or its path at its speed."""
+        stage = self.stage
+        if self.peck is None or move.purpose != "sweep":
+            return move.duration
+        return self.peck.seconds(stage, move)
 
     def measured_delay(self) -> tuple[float, float]:
         """Delay of the force sensor behind the stage and its standard error, s, where the last sweep ended.

@@ -1,4 +1,4 @@
-"""Slides of 4 mm over a plate with a wire across it or without, over links of some latency; what they cost and are worth.
+"""Slides of 4 mm over a plate, over links of some latency: what they cost and are worth.
 
 Run by itself it prints one line a case: python tests/support/slow_link.py
 """
