@@ -13,7 +13,7 @@ if TYPE_CHECKING:
         NotFeltError as NotFeltError,
         StoppedError as StoppedError,
     )
-    from hw.finger import Finger as Finger, Workspace as Workspace, open_finger as open_finger
+    from hw.finger import Finger as Finger, Workspace as Workspace
     from hw.framing import Frames as Frames, Framing as Framing, Lines as Lines
     from hw.link import Link as Link
     from hw.move import Move as Move
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "errors": ("FingerError", "GcodeError", "LinkError", "MoveError", "NotFeltError", "StoppedError"),
-    "finger": ("Finger", "Workspace", "open_finger"),
+    "finger": ("Finger", "Workspace"),
     "framing": ("Frames", "Framing", "Lines"),
     "link": ("Link",),
     "move": ("Move",),

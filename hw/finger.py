@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 from types import TracebackType
 from typing import Any, Protocol, runtime_checkable
 
-from hw.errors import FingerError
 from hw.move import Move
 from mapping import FloatArray, Trace
 
@@ -54,26 +52,3 @@ class Finger(Protocol):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
     ) -> None: ...
-
-
-FINGERS: dict[str, str] = {
-    "simulated": "hw.simulated.finger:SimulatedFinger",
-    "dynamic": "hw.simulated.dynamic_finger:DynamicFinger",
-    "grbl": "hw.probing.grbl_finger:GrblFinger",
-}
-
-
-def open_finger(kind: str = "simulated", **settings: Any) -> Finger:
-    """The finger of that kind, made from its own settings (fields of its class).
-
-    Raises:
-        FingerError: an unknown kind, or settings that the kind does not have.
-    """
-    if kind not in FINGERS:
-        raise FingerError(f"unknown finger {kind!r}; possible: {', '.join(sorted(FINGERS))}")
-    module, name = FINGERS[kind].split(":")
-    try:
-        finger: Finger = getattr(import_module(module), name)(**settings)
-    except TypeError as error:
-        raise FingerError(f"finger {kind!r}: {error}") from error
-    return finger

@@ -41,7 +41,7 @@ from explore3d.analysis.savings import with_savings
 from explore3d.analysis.stages import Stages
 from explore3d.analysis.truth import compare
 from explore3d.log import Log, stop_of
-from explore3d.scene import Scene
+from explore3d.scene import Scene, SimulatedFingerTable
 from mapping.base import Base
 
 
@@ -91,7 +91,7 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
 def _result(work: Work) -> Analysis:
     """What the stages led to, and what they cost."""
     log, scene, trace, truth, stages = work.log, work.scene, work.trace, work.truth, work.stages
-    simulated = scene is not None and scene.finger.kind == "simulated"
+    simulated = scene is not None and isinstance(scene.finger, SimulatedFingerTable)
     model = replace(work.model, left_out=tuple(stages.left_out), timings=dict(stages.timings))
     return Analysis(
         title=(scene.title if scene else "") or ", ".join(Path(source).name for source in log.sources),

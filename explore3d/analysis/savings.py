@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from explore3d import seconds_text
+from explore3d.scene import SimulatedFingerTable
 from hw.simulated import Dynamics
 from mapping import LeftOut
 from mapping.geometry.templates import kink_angle
@@ -57,15 +58,15 @@ def without_needless_dynamics(scene: Scene, stages: Stages) -> Scene:
 
     The kink phi is that of the tallest true feature; a scene that names none keeps its dynamics.
     """
-    table, tallest = scene.finger.dynamics, max((abs(true.height) for true in scene.truth), default=0.0)
-    if table is None:
+    finger, tallest = scene.finger, max((abs(true.height) for true in scene.truth), default=0.0)
+    if not isinstance(finger, SimulatedFingerTable) or finger.dynamics is None:
         stages.needed("dynamics", "the contact is rigid: the scene gives no stiffness", possible=False)
         return scene
 
-    noise = scene.finger.noise
+    noise = finger.noise
     sigma, kink = math.hypot(noise.white, noise.correlated), float(kink_angle(tallest, tallest / 2, scene.tip.radius))
-    stiff = tallest > 0 and not Dynamics(**table.model_dump()).needed(scene.sweep_speed, kink, sigma)
+    stiff = tallest > 0 and not Dynamics(**finger.dynamics.model_dump()).needed(scene.sweep_speed, kink, sigma)
     why_not = "the tip follows the rigid trace within the noise: lambda > 10 v tan(phi) / sigma" if stiff else ""
     if stages.needed("dynamics", why_not):
         return scene
-    return scene.model_copy(update={"finger": scene.finger.model_copy(update={"dynamics": None})})
+    return scene.with_finger(finger.model_copy(update={"dynamics": None}))

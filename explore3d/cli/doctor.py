@@ -7,6 +7,7 @@ import platform
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +18,7 @@ import typer
 import mapping
 from explore3d.cli.options import Json
 from explore3d.scene import example
+from hw import FingerError
 from mapping.geometry.mesh import open3d
 
 # This example finds its base, follows a ridge and measures it: all kernels but those of inertia and of walls
@@ -151,18 +153,45 @@ def compile_kernels(quiet: bool) -> None:
         run(example(COMPILES).scene, Path(folder) / "out", progress=progress)
 
 
+def controller(port: str, baudrate: int) -> list[Check]:
+    """What stands on a port: opened, asked, and let go of; nothing moves, DTR and RTS are left alone."""
+    from hw.grbl import GrblController
+
+    needed_for = "a finger of kind grbl"
+    machine = GrblController(port, baudrate=baudrate)
+    try:
+        machine.open()
+    except FingerError as error:
+        return [Check(port, "missing", " ".join(str(error).split()), needed_for)]
+    with closing(machine):
+        settings = machine.settings
+        low, high = 1e3 * settings.bounds
+        place = machine.alarm or "idle"
+        told = [
+            Check(port, "ok", f"{machine.firmware}, {place}, {1e3 * machine.round_trip:.0f} ms to ask", needed_for),
+            Check("travel", "ok", f"{low.round(3).tolist()} to {high.round(3).tolist()} mm", "the limits of all moves"),
+            Check("speed", "ok", f"{(1e3 * settings.max_rate).round(1).tolist()} mm/s", "the limits of all moves"),
+            Check("resolution", "ok", f"{1e6 * settings.resolution:.1f} um", "what can be seen at all"),
+        ]
+        return told + [Check("doubt", "note", doubt, needed_for) for doubt in machine.doubts]
+
+
 def doctor(
     compile: Annotated[
         bool,
         typer.Option("--compile", help="Compile all kernels now (a minute or two), so that the first run is quick."),
     ] = False,
     json: Json = False,
+    port: Annotated[
+        str | None, typer.Option(help="Ask the controller on this serial port, too; nothing is moved.")
+    ] = None,
+    baudrate: Annotated[int, typer.Option(help="Of that port.", min=1)] = 115200,
 ) -> None:
     """Check the installation and the serial ports; say what is missing and what it is needed for.
 
     The exit status is 1 if something is missing that the program cannot do without.
 
-    Example: explore3d doctor
+    Example: explore3d doctor --port /dev/ttyUSB0
     """
     from dataclasses import asdict
     from json import dumps
@@ -173,7 +202,7 @@ def doctor(
 
     if compile:
         compile_kernels(quiet=json)
-    checks = examine()
+    checks = examine() + ([] if port is None else controller(port, baudrate))
     print(dumps([asdict(check) for check in checks]) if json else "\n".join(line(check) for check in checks))
     if any(check.state == "missing" for check in checks):
         raise typer.Exit(1)

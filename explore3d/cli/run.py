@@ -29,10 +29,9 @@ def run(
 
     Example: explore3d run wire/scene.toml --out out/wire
     """
-    from explore3d.jobs import needs_arming
     from explore3d.scene import load_scene
 
-    if not arm and needs_arming(load_scene(scene)):
+    if not arm and load_scene(scene).finger.is_real:
         plan(scene, out, json, overwrite)
         if not json:
             print("dry run: connected and checked, nothing was moved; add --arm to explore with the real machine")

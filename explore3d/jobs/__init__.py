@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from explore3d.jobs.emulate import Emulation as Emulation, serve as serve
     from explore3d.jobs.expedition import Explored as Explored, Explorer as Explorer, explorer as explorer
     from explore3d.jobs.load import load as load
-    from explore3d.jobs.machine_finger import needs_arming as needs_arming
+    from explore3d.jobs.machine_finger import GrblFingerTable as GrblFingerTable
     from explore3d.jobs.merge import merge as merge
     from explore3d.jobs.plan import plan_scene as plan_scene, show_plan as show_plan
     from explore3d.jobs.reprobe import reprobe as reprobe
@@ -28,7 +28,7 @@ _PUBLIC = {
     "emulate": ("Emulation", "serve"),
     "expedition": ("Explored", "Explorer", "explorer"),
     "load": ("load",),
-    "machine_finger": ("needs_arming",),
+    "machine_finger": ("GrblFingerTable",),
     "merge": ("merge",),
     "plan": ("plan_scene", "show_plan"),
     "reprobe": ("reprobe",),

@@ -31,6 +31,7 @@ class Emulation:
         tip_radius: m.
         origin, turn: where the object stands on the machine, m, and how it is turned (rotation vector, rad).
         sensor: "optoforce", "line", or None for a touch probe alone.
+        sensor_turn: rotation vector that turns the sensor's axes into the machine's, rad.
         stiffness: of the tip, N/m.
         counts_per_newton: of the OptoForce.
         force_noise: N; repeatability: of the probe, m; seed: of both.
@@ -45,6 +46,7 @@ class Emulation:
     origin: Vector = (-0.15, -0.15, -0.05)
     turn: Vector = (0.0, 0.0, 0.0)
     sensor: str | None = None
+    sensor_turn: Vector = (0.0, 0.0, 0.0)
     stiffness: float = 1e4
     counts_per_newton: float = 400.0
     force_noise: float = 0.003
@@ -80,9 +82,13 @@ class Emulation:
         stage.motion.position = np.array([*middle[:2], min(0.0, above + self.tip_radius)])
         if self.sensor is None:
             return [stage]
-        if self.sensor == "optoforce":
-            return [stage, OptoForceEmulator(stage, self.counts_per_newton, noise=self.force_noise, seed=self.seed)]
-        return [stage, LineSensorEmulator(stage, noise=self.force_noise, seed=self.seed)]
+        sensor: ForceEmulator = (
+            OptoForceEmulator(stage, self.counts_per_newton, noise=self.force_noise, seed=self.seed)
+            if self.sensor == "optoforce"
+            else LineSensorEmulator(stage, noise=self.force_noise, seed=self.seed)
+        )
+        sensor.turned = StageFrame.of(turn=self.sensor_turn).rotation
+        return [stage, sensor]
 
 
 def serve(emulation: Emulation, folder: Path) -> PtyServer:

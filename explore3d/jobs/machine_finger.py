@@ -1,65 +1,107 @@
-"""The finger of a scene that is a real machine, or an emulated one started beside the run."""
+"""The finger of a scene that is a real machine of the Grbl family, or an emulated one started beside the run."""
 
 from __future__ import annotations
 
 import sys
 from contextlib import AbstractContextManager, nullcontext
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import SerializeAsAny, model_validator
 
 from explore3d import SceneError
 from explore3d.jobs.emulate import Emulation, EmulatorProcess
-from explore3d.scene import EMULATOR, MachineTable, Scene, SensorTable
-from hw import Finger, open_finger
+from explore3d.scene import EMULATOR, FingerTable, LengthUnit, MachineTable, SensorTable, Setting
+from hw import Finger
 from hw.grbl import StageFrame
-from hw.probing import Peck, Slide
-from hw.sensors import ForceSensor, LineSensor, OptoForce
-from mapping import Surface
+from hw.probing import GrblFinger, Peck, Slide
 
 
-def needs_arming(scene: Scene) -> bool:
-    """True if the scene's finger is a real machine: without --arm nothing of it may move."""
-    return scene.finger.machine is not None and scene.finger.machine.port != EMULATOR
+class GrblFingerTable(FingerTable):
+    """A machine of the Grbl family, described in `machine`, its force sensor in `sensor`; one that is emulated touches
+    the mesh `object`.
+    """
 
+    kind: Literal["grbl"] = "grbl"
+    object: Path | None = None
+    units: LengthUnit = "m"
+    machine: MachineTable
+    sensor: SerializeAsAny[SensorTable | None] = None
 
-def machine_finger(scene: Scene, armed: bool) -> Finger:
-    """The finger, not yet connected: entering it opens its ports. Raises SceneError, FingerError."""
-    machine, sensor = scene.finger.machine, scene.finger.sensor
-    assert machine is not None
-    if (machine.low is None) != (machine.high is None):
-        raise SceneError(f"{scene.path}: finger.machine: give both low and high, or neither")
-    beside: AbstractContextManager[Any] = nullcontext()
-    ports = [machine.port, "" if sensor is None else sensor.port]
-    if not needs_arming(scene):
-        beside = process = EmulatorProcess(emulation(scene))
-        ports = process.ports
-    return open_finger(
-        "grbl",
-        port=ports[0],
-        tip_radius=scene.tip.radius,
-        frame=StageFrame.of(machine.origin, machine.turn),
-        peck=_peck(machine, scene.tip.radius) if machine.touch == "peck" else None,
-        slide=_slide(sensor, ports[1], scene.tip.radius) if machine.touch == "slide" and sensor else None,
-        armed=armed or not needs_arming(scene),
-        travel_speed=machine.travel_speed,
-        over_travel=machine.over_travel,
-        max_force=machine.max_force,
-        limits=None if machine.low is None else np.array([machine.low, machine.high]),
-        unlock=machine.unlock,
-        home=machine.home,
-        baudrate=machine.baudrate,
-        beside=beside,
-        position_known=machine.position_known or not needs_arming(scene),  # an emulator is where it says
-        surface=_expected(scene),
-        beyond=machine.beyond,
-        ask=_ask if needs_arming(scene) and machine.check_probe else None,
-    )
+    @model_validator(mode="after")
+    def _has_what_it_needs(self) -> GrblFingerTable:
+        if self.machine.touch == "slide" and self.sensor is None:
+            raise ValueError("sliding needs a force sensor: give the table finger.sensor")
+        if (self.machine.low is None) != (self.machine.high is None):
+            raise ValueError("machine: give both low and high, or neither")
+        if not self.is_real and self.object is None:
+            raise ValueError("object is missing: the mesh that the emulated machine touches")
+        if not self.is_real and self.sensor is not None and not self.sensor.emulated:
+            raise ValueError(f"sensor: the kind {self.sensor.kind} cannot be emulated; give machine.port a real one")
+        return self
 
+    @property
+    def is_real(self) -> bool:
+        """False where its port is the emulator."""
+        return self.machine.port != EMULATOR
 
-def _expected(scene: Scene) -> Surface | None:
-    """Where the body is, as far as it is known to more than a guess: the model's mesh, at the pose that it has."""
-    return scene.base_surface() if scene.model.pose == "given" else None
+    @property
+    def touched(self) -> tuple[Path, str] | None:
+        """Mesh and unit of what the emulated machine touches."""
+        return None if self.object is None else (self.object, self.units)
+
+    def finger(self, setting: Setting) -> Finger:
+        """It pecks, or slides; an emulated one brings its emulator along."""
+        machine, sensor, radius = self.machine, self.sensor, setting.tip_radius
+        beside: AbstractContextManager[Any] = nullcontext()
+        port, sensor_port = machine.port, None
+        if not self.is_real:
+            beside = process = EmulatorProcess(self.emulation(setting))
+            port, sensor_port = process.ports
+        return GrblFinger(
+            port=port,
+            tip_radius=radius,
+            frame=StageFrame.of(machine.origin, machine.turn),
+            peck=_peck(machine, radius) if machine.touch == "peck" else None,
+            slide=_slide(sensor, sensor_port, radius) if machine.touch == "slide" and sensor else None,
+            armed=setting.armed or not self.is_real,
+            travel_speed=machine.travel_speed,
+            over_travel=machine.over_travel,
+            max_force=machine.max_force,
+            limits=None if machine.low is None else np.array([machine.low, machine.high]),
+            unlock=machine.unlock,
+            home=machine.home,
+            baudrate=machine.baudrate,
+            beside=beside,
+            position_known=machine.position_known or not self.is_real,  # an emulator is where it says
+            surface=setting.model(),
+            beyond=machine.beyond,
+            ask=_ask if self.is_real and machine.check_probe else None,
+        )
+
+    def emulation(self, setting: Setting) -> Emulation:
+        """What its emulator must be like. Raises SceneError."""
+        machine, sensor = self.machine, self.sensor
+        if self.object is None:
+            raise SceneError(f"{setting.scene}: finger.object: an emulated machine needs a mesh to touch")
+        felt = machine.touch == "slide" and sensor is not None
+        told = {} if sensor is None else sensor.model_dump()
+        return Emulation(
+            mesh=self.object,
+            units=self.units,
+            tip_radius=setting.tip_radius,
+            origin=machine.origin,
+            turn=machine.turn,
+            sensor=told["kind"] if felt else None,
+            sensor_turn=told.get("turn", (0.0, 0.0, 0.0)),
+            stiffness=told.get("stiffness", 2e4),
+            counts_per_newton=told.get("counts_per_newton", (400.0,))[0],
+            force_noise=told.get("noise", 0.003),
+            repeatability=machine.repeatability,
+            pace=machine.pace,
+            seed=setting.seed,
+        )
 
 
 def _ask(what: str) -> None:
@@ -67,37 +109,13 @@ def _ask(what: str) -> None:
     print(what, file=sys.stderr, flush=True)
 
 
-def emulation(scene: Scene) -> Emulation:
-    """What the emulator of a scene must be like. Raises SceneError."""
-    machine, sensor = scene.finger.machine, scene.finger.sensor
-    if machine is None or scene.finger.object is None:
-        raise SceneError(f"{scene.path}: finger: an emulated machine needs finger.machine and finger.object")
-    return Emulation(
-        mesh=scene.finger.object,
-        units=scene.finger.units,
-        tip_radius=scene.tip.radius,
-        origin=machine.origin,
-        turn=machine.turn,
-        sensor=None if machine.touch == "peck" or sensor is None else sensor.kind,
-        stiffness=2e4 if sensor is None else sensor.stiffness,
-        counts_per_newton=400.0 if sensor is None else sensor.counts_per_newton[0],
-        force_noise=0.003 if sensor is None else sensor.noise,
-        repeatability=machine.repeatability,
-        pace=machine.pace,
-        seed=scene.seed,
-    )
-
-
 def _peck(machine: MachineTable, tip_radius: float) -> Peck:
     return Peck(machine.step, machine.clearance, machine.probe_speed, stroke=tip_radius)
 
 
-def _slide(sensor: SensorTable, port: str, tip_radius: float) -> Slide:
-    device: ForceSensor = (
-        OptoForce(port, sensor.counts_per_newton, rate=int(sensor.rate))
-        if sensor.kind == "optoforce"
-        else LineSensor(port, rate=sensor.rate, baudrate=sensor.baudrate)
-    )
+def _slide(sensor: SensorTable, emulated_port: str | None, tip_radius: float) -> Slide:
+    device = sensor.sensor(emulated_port)
+    device.turned = StageFrame.of(turn=sensor.turn).rotation
     return Slide(
         device,
         sensor.stiffness,

@@ -14,8 +14,9 @@ from explore3d.jobs.expedition import Explorer, explorer
 from explore3d.jobs.run import scene_digest, scene_finger
 from explore3d.jobs.session import Job, Session
 from explore3d.pictures import plan_picture
-from explore3d.scene import load_scene
-from hw import Move
+from explore3d.scene import Scene, load_scene
+from hw import Finger, Move
+from hw.probing import GrblFinger
 from hw.simulated import SimulatedFinger
 from mapping import Surface, Trace, length_text
 from mapping.base import Base
@@ -38,6 +39,7 @@ class DryRun:
         violations: (number of the move, what limit it breaks).
         account: what of the surface the sweeps would sweep; None if the time budget ends before the survey.
         assumed: what had to be assumed of the object, and what the plan falls short of; a sentence or "".
+        pecking: s that the moves will take by the finger's own forecast, where it touches point by point; else None.
         subject: digest of the scene (explore3d.jobs.run.scene_digest).
     """
 
@@ -53,6 +55,7 @@ class DryRun:
     account: SurfaceAccount | None = None
     assumed: str = ""
     subject: str = ""
+    pecking: float | None = None
 
     def record(self) -> dict[str, Any]:
         """The plan in JSON values: SI units."""
@@ -61,6 +64,7 @@ class DryRun:
             "moves": [{"purpose": move.purpose, "path": move.path.tolist()} for move in self.moves],
             "length": self.metres,
             "time": self.seconds,
+            "pecking_time": self.pecking,
             "speed": self.speed,
             "covered": self.covered,
             "reach": self.reach,
@@ -82,7 +86,8 @@ class DryRun:
         assumed = [self.assumed] if self.assumed else []
         account = [] if self.account is None else [self.account.sentence()]
         warning = [self.account.warning()] if self.account is not None and self.account.short else []
-        return [*warning, *assumed, first, *within, *account, *(broken or ["no move breaks a limit"])]
+        told = [] if self.pecking is None else [f"pecking takes it about {seconds_text(self.pecking)}, ways included"]
+        return [*warning, *assumed, first, *told, *within, *account, *(broken or ["no move breaks a limit"])]
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""
@@ -97,7 +102,12 @@ def plan_scene(path: Path | str) -> DryRun:
     """
     scene = load_scene(path)
     with scene_finger(scene) as finger:
-        planned = explorer(scene, finger.workspace)
+        return _planned(scene, finger)
+
+
+def _planned(scene: Scene, finger: Finger) -> DryRun:
+    """The plan, while the finger is connected: it knows how long its link and its limits make a move."""
+    planned = explorer(scene, finger.workspace)
     first, base, assumed = _to_know_the_base(planned)
     spent, budget = Spent(planned.workspace.max_speed), planned.time_budget
     for move in first:
@@ -142,6 +152,7 @@ def plan_scene(path: Path | str) -> DryRun:
         account,
         assumed,
         scene_digest(scene),
+        sum(map(finger.forecast, moves)) if isinstance(finger, GrblFinger) and finger.peck is not None else None,
     )
 
 

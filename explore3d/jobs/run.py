@@ -13,19 +13,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from explore3d import UserError, __version__, seconds_text
+from explore3d import UserError, __version__, count_text, seconds_text
 from explore3d.analysis import Analysis, Progress, Stages, silent, without_needless_dynamics
 from explore3d.jobs.conclude import conclude
 from explore3d.jobs.expedition import SurveyWatch, explorer, known_base
 from explore3d.jobs.resume import BROKEN_OFF, Replay
 from explore3d.jobs.session import Job, Session
 from explore3d.log import EXPLORATION, OUTCOME, Log, read_base, read_log, stop_of
-from explore3d.scene import Scene, load_scene
-from hw import Finger, Move, open_finger
-from hw.simulated import Dynamics
-from mapping import Trace
+from explore3d.scene import FingerNoise, GivenFingerTable, Scene, load_scene
+from hw import Finger, Move
+from mapping import Trace, length_text
 from planners import Outcome
 
+# Two statements of one tip's radius may differ by rounding
+SAME_RADIUS = 1e-6
+# Kind of event: a sweep that the finger ended before its end, and why
+CUT_SHORT = "cut short"
 # A shell's exit status of a program that a signal ended is this and the signal's number
 SIGNAL_EXIT = 128
 
@@ -39,6 +42,7 @@ def run(
     arm: bool = False,
     resume: bool = False,
     overwrite: bool = False,
+    finger: Finger | None = None,
 ) -> Analysis:
     """Explore, log, and build the annotated model.
 
@@ -53,6 +57,8 @@ def run(
         arm: let a real machine move; without it every move is refused.
         resume: go on from the log of a session that was broken off in that folder.
         overwrite: replace, once this one is complete, a session of another scene in that folder.
+        finger: explore with this one, not with the one that the scene names; whether it may move is its own affair.
+            The session's scene says `kind = "given"`, and keeps what it states of the noise.
 
     Raises:
         UserError: a scene or folder that cannot be used.
@@ -62,7 +68,10 @@ def run(
     with stages.stage("setting up"):
         scene = scene if isinstance(scene, Scene) else load_scene(scene)
         known_base(scene)  # a mesh that cannot be used is refused before a folder is made
-        finger = scene_finger(without_needless_dynamics(scene, stages), arm)
+        if finger is None:
+            finger = scene_finger(without_needless_dynamics(scene, stages), arm)
+        else:
+            scene = _with_given(scene, finger)
     words = [part for name in force for part in ("--force", name)] + ["--arm"] * arm
     again = shlex.join(["explore3d", "run", str(scene.path), "--out", str(out), *words])
     go_on = f"{again} --resume"
@@ -80,6 +89,17 @@ def run(
             error.add_note(session.stopped)
             raise
     return replace(analysis, folder=session.place)
+
+
+def _with_given(scene: Scene, finger: Finger) -> Scene:
+    """The scene of a finger that was handed in. Raises UserError: its tip is another than the scene's."""
+    if abs(finger.tip_radius - scene.tip.radius) > SAME_RADIUS * scene.tip.radius:
+        raise UserError(
+            f"{scene.path}: tip.radius is {length_text(scene.tip.radius)}, the finger that was handed in has "
+            f"{length_text(finger.tip_radius)}"
+        )
+    noise = FingerNoise(**scene.finger.noise.model_dump(include=set(FingerNoise.model_fields)))
+    return scene.with_finger(GivenFingerTable(noise=noise))
 
 
 def scene_digest(scene: Scene) -> str:
@@ -102,28 +122,7 @@ def cause(error: BaseException) -> str:
 
 def scene_finger(scene: Scene, arm: bool = False) -> Finger:
     """The finger that the scene names; entering it connects. Raises SceneError, FingerError."""
-    table = scene.finger
-    if table.machine is not None:
-        from explore3d.jobs.machine_finger import machine_finger
-
-        return machine_finger(scene, arm)
-    noise, inert = table.noise, {}
-    if table.dynamics is not None:
-        inert = {"dynamics": Dynamics(**table.dynamics.model_dump())}
-    return open_finger(
-        "dynamic" if inert else table.kind,
-        **inert,
-        object=scene.object_surface(),
-        tip_radius=scene.tip.radius,
-        rate=table.rate,
-        contact_data=table.contact_data,
-        white=noise.white,
-        correlated=noise.correlated,
-        correlation_length=noise.correlation_length,
-        angle=noise.angle,
-        contact=noise.contact,
-        seed=scene.seed,
-    )
+    return scene.open_finger(arm)
 
 
 def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, replay: Replay | None = None) -> Log:
@@ -143,9 +142,15 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
             log.event("resumed", {"samples": replay.samples})
             touch = replay.before(finger.execute, getattr(finger, "skip", None), log.write)
 
+        cut_short: list[str] = []
+
         def execute(move: Move) -> Trace:
             trace = touch(move)
             log.write(move, trace)
+            told = finger.info.get("cut_short", []) if move.purpose == "sweep" else []
+            if len(told) > len(cut_short):
+                cut_short[:] = told
+                log.event(CUT_SHORT, {"sweep": int(trace.sweep[-1]) if len(trace) else None, "reason": told[-1]})
             if replay is not None and replay.live:
                 session.settle()  # everything that the earlier log holds is in this one
             if len(trace):
@@ -167,7 +172,7 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
         if replay is not None:
             replay.rest(log.write)
         # what the connection counted and learnt of its clocks on the way
-        log.event(OUTCOME, _ended(outcome, watch, scene) | {"finger": finger.info})
+        log.event(OUTCOME, _ended(outcome, watch, scene, cut_short) | {"finger": finger.info})
         if not log.samples:
             raise UserError(f"{session.folder}: nothing was felt: {outcome.detail or outcome.reason}")
         session.settle()
@@ -175,12 +180,14 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
         return log.recorded()
 
 
-def _ended(outcome: Outcome, watch: SurveyWatch, scene: Scene) -> dict[str, Any]:
-    """Why an exploration ended, as an event of its log."""
+def _ended(outcome: Outcome, watch: SurveyWatch, scene: Scene, cut_short: Collection[str]) -> dict[str, Any]:
+    """Why an exploration ended, as an event of its log; a sweep that ended before its end leaves it incomplete."""
     why = outcome.detail or outcome.reason
     if outcome.reason == "budget":
         why = f"the time budget of {seconds_text(scene.explore.time_budget)} was used up"
-    finished = watch.surveyed and outcome.reason != "finger refuses"
+    finished = watch.surveyed and outcome.reason != "finger refuses" and not cut_short
+    if cut_short:
+        why = f"{count_text(len(cut_short), 'sweep')} cut short: {[*cut_short][-1]}"
     return {
         "reason": outcome.reason,
         "detail": outcome.detail,

@@ -14,28 +14,59 @@ if TYPE_CHECKING:
         example as example,
         examples as examples,
     )
-    from explore3d.scene.machine import EMULATOR as EMULATOR, MachineTable as MachineTable, SensorTable as SensorTable
+    from explore3d.scene.finger import (
+        FINGER_GROUP as FINGER_GROUP,
+        SENSOR_GROUP as SENSOR_GROUP,
+        FingerNoise as FingerNoise,
+        FingerTable as FingerTable,
+        GivenFingerTable as GivenFingerTable,
+        SensorTable as SensorTable,
+        Setting as Setting,
+    )
+    from explore3d.scene.machine import (
+        EMULATOR as EMULATOR,
+        LineSensorTable as LineSensorTable,
+        MachineTable as MachineTable,
+        OptoForceTable as OptoForceTable,
+    )
     from explore3d.scene.mesh_files import load_mesh as load_mesh
     from explore3d.scene.scene import Scene as Scene, load_scene as load_scene, parse_scene as parse_scene
     from explore3d.scene.settings import AnalysisSettings as AnalysisSettings
+    from explore3d.scene.simulated import SimulatedFingerTable as SimulatedFingerTable
     from explore3d.scene.to_toml import scene_text as scene_text
     from explore3d.scene.values import (
+        Angle as Angle,
+        Delay as Delay,
         Extent as Extent,
+        Force as Force,
         Length as Length,
         LengthUnit as LengthUnit,
         Point as Point,
+        Rate as Rate,
+        Speed as Speed,
         Table as Table,
+        Turn as Turn,
     )
 
 _PUBLIC = {
     "begin": ("FINGER_KINDS", "begin_scene"),
     "complaint": ("complaint",),
     "examples": ("Example", "SCENE_FILE", "copy_example", "example", "examples"),
-    "machine": ("EMULATOR", "MachineTable", "SensorTable"),
+    "finger": (
+        "FINGER_GROUP",
+        "SENSOR_GROUP",
+        "FingerNoise",
+        "FingerTable",
+        "GivenFingerTable",
+        "SensorTable",
+        "Setting",
+    ),
+    "machine": ("EMULATOR", "LineSensorTable", "MachineTable", "OptoForceTable"),
     "mesh_files": ("load_mesh",),
     "scene": ("Scene", "load_scene", "parse_scene"),
     "settings": ("AnalysisSettings",),
+    "simulated": ("SimulatedFingerTable",),
     "to_toml": ("scene_text",),
-    "values": ("Extent", "Length", "LengthUnit", "Point", "Table"),
+    "values": ("Angle", "Delay", "Extent", "Force", "Length", "LengthUnit", "Point", "Rate", "Speed", "Table", "Turn"),
 }
 doorway(__name__, _PUBLIC)

@@ -99,7 +99,8 @@ def begin_scene(
     copy = folder / mesh.name
     is_beside = copy.exists() and copy.samefile(mesh)
     refuse_to_replace([path] if is_beside else [path, copy])
-    parse_scene(text, mesh.parent / SCENE_FILE).base_surface()
+    # read where it will stand, with the mesh where it is: nothing is written that cannot be used
+    parse_scene(text.replace(values["mesh"], _quoted(mesh.resolve().as_posix())), path).base_surface()
     folder.mkdir(parents=True, exist_ok=True)
     if not is_beside:
         shutil.copyfile(mesh, copy)

@@ -8,11 +8,15 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 
-def complaint(error: ValidationError, root: type[BaseModel]) -> str:
-    """One line about the first mistake (unknown keys first: they explain missing ones), and how many more."""
+def complaint(error: ValidationError, root: type[BaseModel], name: str = "") -> str:
+    """One line about the first mistake (unknown keys first: they explain missing ones), and how many more.
+
+    Args:
+        name: of the table that `root` is the class of; "" for the whole file.
+    """
     mistakes = sorted(error.errors(), key=lambda mistake: mistake["type"] != "extra_forbidden")
     first = mistakes[0]
-    field = _field_name(first["loc"])
+    field = f"{name}.{_field_name(first['loc'])}".strip(".")
     others = len({_field_name(mistake["loc"]) for mistake in mistakes}) - 1
     more = f" (and {others} more)" if others else ""
     return f"{field}: {_reason(first, root)}{more}" if field else f"{_reason(first, root)}{more}"

@@ -1,12 +1,14 @@
-"""Tables of a scene whose finger is a real machine: [finger.machine] and [finger.sensor]."""
+"""Tables of a scene whose finger is a real machine: [finger.machine], and our sensors for [finger.sensor]."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from explore3d.scene.values import Delay, Extent, Force, Length, Point, Rate, Speed, Table, Turn
+from explore3d.scene.finger import SensorTable
+from explore3d.scene.values import Extent, Force, Length, Point, Rate, Speed, Table, Turn
+from hw.sensors import ForceSensor, LineSensor, OptoForce
 
 # The port that means: start the emulator beside the run
 EMULATOR = "emulator"
@@ -55,28 +57,46 @@ class MachineTable(Table):
     repeatability: Extent = 0.0
 
 
-class SensorTable(Table):
-    """A force sensor at the fingertip.
+class OptoForceTable(SensorTable):
+    """An OptoForce on its data acquisition unit.
 
     Args:
-        kind: "optoforce", or "line" for the line protocol of home-made sensors.
         port: its serial port; with an emulated machine it is emulated too, and none is given.
-        counts_per_newton: of an OptoForce, by its sensitivity sheet: one for each axis.
+        counts_per_newton: by its sensitivity sheet: one for each axis.
         rate: Hz.
-        stiffness: of the tip and what carries it, N/m.
-        period: of the control loop (s).
-        approach_speed: m/s.
-        delay: by how much the force is stamped later than the stage's position (s); see explore3d calibrate.
         noise: of the emulated sensor, each component (N); above 0: one without noise cannot be told from a frozen one.
     """
 
-    kind: Literal["optoforce", "line"] = "optoforce"
+    kind: Literal["optoforce"] = "optoforce"
     port: str = EMULATOR
-    baudrate: Annotated[int, Field(gt=0)] = 115200
     counts_per_newton: tuple[float, float, float] = (400.0, 400.0, 400.0)
     rate: Rate = 1000.0
-    stiffness: Annotated[float, Field(gt=0)] = 1e4
-    period: Delay = 0.01
-    approach_speed: Speed = 2e-3
-    delay: Delay = 0.0
     noise: Annotated[float, Field(ge=0)] = 0.003
+
+    emulated: ClassVar[bool] = True
+
+    def sensor(self, emulated_port: str | None) -> ForceSensor:
+        """On its own port, or its emulator's."""
+        return OptoForce(emulated_port or self.port, self.counts_per_newton, rate=int(self.rate))
+
+
+class LineSensorTable(SensorTable):
+    """A home-made sensor that speaks the line protocol.
+
+    Args:
+        port, baudrate: its serial port; with an emulated machine it is emulated too, and none is given.
+        rate: Hz, about.
+        noise: of the emulated sensor, each component (N).
+    """
+
+    kind: Literal["line"] = "line"
+    port: str = EMULATOR
+    baudrate: Annotated[int, Field(gt=0)] = 115200
+    rate: Rate = 1000.0
+    noise: Annotated[float, Field(ge=0)] = 0.003
+
+    emulated: ClassVar[bool] = True
+
+    def sensor(self, emulated_port: str | None) -> ForceSensor:
+        """On its own port, or its emulator's."""
+        return LineSensor(emulated_port or self.port, rate=self.rate, baudrate=self.baudrate)

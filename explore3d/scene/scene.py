@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import ConfigDict, Field, PrivateAttr, SerializeAsAny, ValidationError, model_validator
 
 from explore3d import MeshFileError, SceneError, UnitError
 from explore3d.scene.complaint import complaint
-from explore3d.scene.machine import EMULATOR, MachineTable, SensorTable
+from explore3d.scene.finger import FingerTable, Setting, finger_table
 from explore3d.scene.mesh_files import load_mesh
 from explore3d.scene.to_toml import scene_text
 from explore3d.scene.values import (
@@ -22,15 +22,13 @@ from explore3d.scene.values import (
     Length,
     LengthUnit,
     Point,
-    Rate,
     Signed,
     SweepSpeed,
     Table,
     Time,
 )
-from hw.simulated import TOP_SPEED_RADII, Dynamics
+from hw import Finger
 from mapping import KINDS, Surface
-from mapping.geometry.templates import kink_angle
 from mapping.instrument import Noise, StatedNoise
 from planners.survey import fastest_speed
 
@@ -88,62 +86,6 @@ class GlobalModel(Table):
         return self
 
 
-class FingerNoise(Table):
-    """Noise of the finger: of the centre (white, and correlated along the path), of what it feels.
-
-    The simulated finger has it; of any other it is what its data sheet states. The analysis takes the centre's for
-    known to a share `doubt`.
-    """
-
-    white: Extent = 0.0
-    correlated: Extent = 0.0
-    correlation_length: Length = 1e-3
-    angle: Angle = 0.0
-    contact: Extent = 0.0
-    doubt: Annotated[float, Field(gt=0)] = 0.1
-
-
-class DynamicsTable(Table):
-    """Inertia and stiffness of the simulated finger: mass (kg), stiffness (N/m), force gain (no unit, below 1)."""
-
-    mass: Annotated[float, Field(gt=0)] = 0.1
-    stiffness: Annotated[float, Field(gt=0)] = 1e5
-    gain: Annotated[float, Field(ge=0, lt=1)] = 0.5
-
-
-class FingerTable(Table):
-    """The finger.
-
-    The simulated one touches the mesh `object`, the truth, and samples at `rate` Hz; with `dynamics` it has inertia.
-    A machine of the Grbl family is described in [finger.machine], its force sensor in [finger.sensor]; an emulated
-    one touches `object`.
-    """
-
-    kind: Literal["simulated", "grbl"] = "simulated"
-    object: Path | None = None
-    units: LengthUnit = "m"
-    rate: Rate = 5000.0
-    contact_data: bool = False
-    noise: FingerNoise = FingerNoise()
-    dynamics: DynamicsTable | None = None
-    machine: MachineTable | None = None
-    sensor: SensorTable | None = None
-
-    @model_validator(mode="after")
-    def _has_what_its_kind_needs(self) -> FingerTable:
-        if self.kind == "grbl" and self.machine is None:
-            raise ValueError("a finger of kind grbl needs the table finger.machine; found none")
-        if self.kind == "simulated" and (self.machine is not None or self.sensor is not None):
-            raise ValueError("the tables finger.machine and finger.sensor are of kind grbl; the kind is simulated")
-        if self.kind == "grbl" and (self.dynamics is not None or self.contact_data):
-            raise ValueError("dynamics and contact_data are of the simulated finger; the kind is grbl")
-        if self.machine is not None and self.machine.touch == "slide" and self.sensor is None:
-            raise ValueError("sliding needs a force sensor: give the table finger.sensor")
-        if self.object is None and (self.machine is None or self.machine.port == EMULATOR):
-            raise ValueError(f"object is missing: the mesh that the {self.kind} finger touches")
-        return self
-
-
 class SurveyTable(Table):
     """Sweeps over the whole model: the least height to be found (m), the least span of a ridge (m), m/s, N.
 
@@ -191,7 +133,7 @@ class Scene(Table):
     seed: Annotated[int, Field(ge=0)] = 1
     tip: Tip
     model: GlobalModel
-    finger: FingerTable
+    finger: SerializeAsAny[FingerTable]
     survey: SurveyTable
     detection: Detection = Detection()
     explore: Exploration = Exploration()
@@ -227,31 +169,28 @@ class Scene(Table):
         """Speed of the sweeps, m/s: as given, or the fastest at which one still shows the smallest feature.
 
         That is bounded by the noise, whose white part averages less where samples lie further apart
-        (planners.survey.pace); by the finger's inertia, whose tip must follow the smallest feature's kinks within
-        the noise (hw.simulated.dynamics); and by what the simulated finger can do.
+        (planners.survey.pace); by what the simulated finger can do, and by its inertia, if it has any
+        (SimulatedFingerTable.follows).
 
         Raises:
             SceneError: "fastest" is asked for, and the finger's noise or what it can follow is not known.
         """
-        speed, finger = self.survey.speed, self.finger
+        speed, smallest, tip = self.survey.speed, self.survey.smallest_feature, self.tip.radius
         if speed != "fastest":
             return speed
-        if finger.kind != "simulated":
+        follows = self.finger.follows(tip, smallest)
+        if follows is None:
             raise SceneError(
                 f"{self._path}: survey.speed: the fastest speed that a machine can follow is not known; found kind "
-                f'"{finger.kind}", possible are a number as "20 mm/s", or the kind "simulated"'
+                f'"{self.finger.kind}", possible are a number as "20 mm/s", or the kind "simulated"'
             )
         if self.noise is None:
             raise SceneError(
                 f"{self._path}: survey.speed: the fastest speed follows from the noise, and finger.noise states none; "
                 'give white or correlated, or a number as "30 mm/s"'
             )
-        smallest, tip = self.survey.smallest_feature, self.tip.radius
-        limit = TOP_SPEED_RADII * tip
-        if finger.dynamics is not None:
-            kink = float(kink_angle(smallest, 0.5 * smallest, tip))
-            limit = min(limit, Dynamics(**finger.dynamics.model_dump()).fastest(kink, self.noise.noise.sd))
-        return fastest_speed(self.noise.noise, finger.rate, tip, smallest, limit / SPEED_RANGE, limit)
+        limit, rate = follows
+        return fastest_speed(self.noise.noise, rate, tip, smallest, limit / SPEED_RANGE, limit)
 
     def base_surface(self) -> Surface | None:
         """The global model's mesh in metres, None if only a region is known. Raises SceneError."""
@@ -259,11 +198,34 @@ class Scene(Table):
 
     def object_surface(self) -> Surface:
         """The mesh that the simulated finger touches, in metres. Raises SceneError."""
-        if self.finger.object is None:
+        if self.finger.touched is None:
             raise SceneError(
                 f"{self._path}: finger.object: no mesh to touch is given; a real finger touches the real thing"
             )
-        return self._surface("finger.object", self.finger.object, self.finger.units)
+        return self._surface("finger.object", *self.finger.touched)
+
+    def open_finger(self, armed: bool = False) -> Finger:
+        """The finger that the scene names; entering it connects. Raises SceneError, FingerError.
+
+        Args:
+            armed: a real machine may move.
+        """
+        return self.finger.finger(self.setting(armed))
+
+    def setting(self, armed: bool = False) -> Setting:
+        """What the finger is told of this scene."""
+        return Setting(
+            scene=self._path,
+            tip_radius=self.tip.radius,
+            seed=self.seed,
+            armed=armed,
+            model=lambda: self.base_surface() if self.model.pose == "given" else None,
+            mesh=lambda path, units: self._surface("finger.object", path, units),
+        )
+
+    def with_finger(self, finger: FingerTable) -> Scene:
+        """The same scene with another finger."""
+        return self.model_copy(update={"finger": finger})
 
     def _surface(self, field: str, mesh: Path, units: str) -> Surface:
         if mesh in self._meshes:
@@ -302,11 +264,16 @@ def parse_scene(text: str, path: Path | str, meshes: Mapping[str, Surface] | Non
     """
     path = Path(path)
     try:
-        scene = Scene.model_validate(_with_profile(tomllib.loads(text), path))
+        tables = _with_profile(tomllib.loads(text), path)
+        if isinstance(tables.get("finger"), dict):
+            tables |= {"finger": finger_table(tables["finger"])}
+        scene = Scene.model_validate(tables)
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{path}: not valid TOML: {error}") from error
     except ValidationError as error:
         raise SceneError(f"{path}: {complaint(error, Scene)}") from error
+    except SceneError as error:
+        raise error if str(error).startswith(f"{path}: ") else SceneError(f"{path}: {error}") from error
     scene = _with_absolute_paths(scene, path.resolve().parent)
     scene._path, scene._text = path, text
     scene._meshes = {(path.resolve().parent / name).resolve(): each for name, each in (meshes or {}).items()}
@@ -330,9 +297,8 @@ def _with_profile(tables: dict[str, Any], path: Path) -> dict[str, Any]:
 
 def _with_absolute_paths(scene: Scene, folder: Path) -> Scene:
     finger = scene.finger
-    if finger.object is not None:
-        finger = finger.model_copy(update={"object": (folder / finger.object).resolve()})
+    places = {name: (folder / value).resolve() for name, value in finger if isinstance(value, Path)}
     model = scene.model
     if model.mesh is not None:
         model = model.model_copy(update={"mesh": (folder / model.mesh).resolve()})
-    return scene.model_copy(update={"finger": finger, "model": model})
+    return scene.model_copy(update={"finger": finger.model_copy(update=places), "model": model})

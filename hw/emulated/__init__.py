@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from hw.emulated.pty_server import PtyServer as PtyServer
     from hw.emulated.stage import PROBE_FAULTS as PROBE_FAULTS
     from hw.emulated.touched_body import TouchedBody as TouchedBody
+    from hw.emulated.wire import Wire as Wire
 
 _PUBLIC = {
     "force": ("ForceEmulator", "LineSensorEmulator", "OptoForceEmulator", "SENSOR_FAULTS"),
@@ -22,5 +23,6 @@ _PUBLIC = {
     "stage": ("PROBE_FAULTS",),
     "pty_server": ("PtyServer",),
     "touched_body": ("TouchedBody",),
+    "wire": ("Wire",),
 }
 doorway(__name__, _PUBLIC)

@@ -48,6 +48,7 @@ class ForceEmulator:
         self._next = 0
         self._due: deque[tuple[float, bytes]] = deque()
         self.fault = ""
+        self.turned = np.eye(3)  # turns its axes into the machine's
         self._since: float | None = None  # the fault
         self._felt, self._index = np.zeros(3), 0
 
@@ -61,7 +62,7 @@ class ForceEmulator:
             self.stage.advance(t)
             force = self.stage.body.force(self.stage.position)
             self.strongest = max(self.strongest, float(np.linalg.norm(force)))
-            felt = force + self.noise * self._rng.standard_normal(3)
+            felt = force @ self.turned + self.noise * self._rng.standard_normal(3)
             self._due.append((t + self.latency, self._faulty_frame(t, felt)))
             self._next += 1
         while self._due and self._due[0][0] <= now:

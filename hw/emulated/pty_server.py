@@ -7,13 +7,14 @@ import select
 import threading
 import time
 import tty
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol
 
 from hw.emulated.faults import BYTE_FAULTS, Fault
+from hw.emulated.wire import Wire
 
 TICK = 0.001  # s
 
@@ -40,6 +41,7 @@ class PtyServer:
         pace: emulated seconds per second.
         links: names (symbolic links) under which the ports stay the same when one is unplugged and comes back.
         faults: what goes wrong, and when.
+        wires: what the line from a device, by its number, does to its bytes; the way to it is paced by the same rate.
     """
 
     def __init__(
@@ -49,7 +51,10 @@ class PtyServer:
         pace: float = 1.0,
         links: Sequence[Path | str] = (),
         faults: Sequence[Fault] = (),
+        wires: Mapping[int, Wire] | None = None,
     ) -> None:
+        self._from = dict(wires or {})
+        self._to = {index: Wire(wire.baudrate) for index, wire in self._from.items()}
         self.devices, self.pace = list(devices), pace
         self.faults = sorted(faults, key=lambda fault: fault.at)
         self._links = [Path(link) for link in links]
@@ -116,6 +121,9 @@ class PtyServer:
                     device.advance(wall * self.pace)
                 for master in readable:
                     self._hear(masters[master], wall)
+                for index, wire in self._to.items():
+                    if data := wire.arrived(wall):
+                        self.devices[index].receive(data, wall * self.pace)
                 for index, device in enumerate(self.devices):
                     self._speak(index, device, wall)
         except BaseException as error:  # shown to whoever asks why the device fell silent
@@ -131,7 +139,9 @@ class PtyServer:
             fault = self._spoil.get(index)
             if fault is not None and fault.incoming:
                 data = self._spoiled(index, data)
-            if self._quiet.get(index, 0.0) <= wall:
+            if index in self._to:
+                self._to[index].send(data, wall)
+            elif self._quiet.get(index, 0.0) <= wall:
                 self.devices[index].receive(data, wall * self.pace)
 
     def _speak(self, index: int, device: Device, wall: float) -> None:
@@ -140,6 +150,9 @@ class PtyServer:
             if port is None:
                 device.out.clear()
             return
+        if index in self._from:
+            self._from[index].send(bytes(device.out), wall)
+            device.out[:] = self._from[index].arrived(wall)
         if device.out:
             fault = self._spoil.get(index)
             if fault is not None and not fault.incoming:

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from itertools import takewhile
+from itertools import islice, takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,8 @@ POLL = 0.05
 # With no sign of life for so long the controller is taken for lost, s
 LONGEST_CONTROLLER_SILENCE = 1.5
 
+# A report that did not come within this time was lost, s: ten times what asking takes over the slowest links
+ASKED_IN_VAIN = 0.5
 # An idle machine that answers so many requests and still not the line before them has lost the line or its answer:
 # Grbl answers in order, and a line is parsed within 10 ms
 UNANSWERED = 6
@@ -39,6 +41,12 @@ OFFSET_CHANGED = (
     "position and run again"
 )
 
+# A printer's firmware names itself within so many s
+NAMING = 1.0
+# After a reset the controller greets within so many s; a greeting that was garbled is not waited for longer
+RESTARTING = 1.0
+# The link's round trip is the median of so many
+RECENT_REPORTS = 15
 # Reports that are kept: ten seconds of asking as fast as a port can answer
 KEPT_REPORTS = 50_000
 
@@ -82,7 +90,7 @@ class GrblController:
         self.alarm: str | None = None
         self.stop_reason: str | None = None
         self.reports: deque[Report] = deque(maxlen=KEPT_REPORTS)
-        self._asked: float | None = None
+        self._asked: deque[float] = deque()  # when, for every report that has not come yet
         self._news = threading.Condition()
         self._answers: deque[str] = deque()
         self._feedback: list[str] = []
@@ -132,10 +140,30 @@ class GrblController:
                     raise
                 if patience.left < 0.5 * self.wake:  # a native USB port that waits to be asked
                     self.link.raise_lines()
+        if other := self._other_firmware():
+            raise FingerError(
+                f"{self.link.port}: this is {other}, which gives no Grbl status reports; possible: Grbl 1.1, grblHAL, "
+                "FluidNC; a printer under Klipper: examples/klipper"
+            )
         raise LinkError(
             f"{self.link.port}: no answer to a status request within {self.wake:g} s; "
             "is it a Grbl controller, powered, and is the baud rate right?"
         )
+
+    def _other_firmware(self) -> str:
+        """What a firmware that knows no `?` calls itself, asked as printers are (M115); "" if it is silent."""
+        with self._news:
+            self._feedback = []
+        with suppress(LinkError):
+            self.link.write(b"\nM115\n")
+        with self._news:
+            self._news.wait_for(lambda: bool(protocol.firmware_name(self._feedback)), timeout=NAMING)
+            return protocol.firmware_name(self._feedback)
+
+    @property
+    def firmware(self) -> str:
+        """Grbl, grblHAL or FluidNC, with its version, as it says itself."""
+        return protocol.firmware_name([self.version]) or "a firmware of the Grbl family that does not say which"
 
     def set_up(self) -> None:
         """Millimetres, absolute, feed per minute; read the work offset."""
@@ -201,9 +229,15 @@ class GrblController:
         return self.reports[-1].status
 
     def _request(self) -> None:
-        """Ask for a report; its round trip counts from the first asking that is not answered yet."""
-        if self._asked is None:
-            self._asked = time.monotonic()
+        """Ask for a report; its round trip counts from the first asking that is not answered yet.
+
+        An asking that was lost would make all reports after it look late: it is forgotten.
+        """
+        now = time.monotonic()
+        with self._news:
+            while self._asked and now - self._asked[0] > ASKED_IN_VAIN:
+                self._asked.popleft()
+            self._asked.append(now)
         self.link.write(protocol.STATUS)
 
     def _fresh(self, since: float) -> bool:
@@ -309,6 +343,17 @@ class GrblController:
                     self._sent.popleft()
                 if answer != "ok":
                     raise FingerError(f"{self.link.port}: a jog was refused: {protocol.describe(answer)}")
+
+    def cancel_now(self) -> None:
+        """Throw away what is queued of jogs, from any thread, and wait for nothing; the link may be gone."""
+        with suppress(LinkError):
+            self.link.write(protocol.JOG_CANCEL)
+
+    @property
+    def round_trip(self) -> float:
+        """What asking where the machine is has taken lately, s; 0 before it was asked."""
+        recent = list(islice(reversed(self.reports), RECENT_REPORTS))
+        return float(np.median([report.round_trip for report in recent])) if recent else 0.0
 
     def cancel_jog(self, within: float = 2.0) -> None:
         """Stop jogging, forget what is queued, wait until the machine stands."""
@@ -474,7 +519,7 @@ class GrblController:
         self._restart_expected = True
         self.link.write(protocol.RESET)
         with self._news:
-            self._news.wait_for(lambda: self._restarts > before, timeout=within)
+            self._news.wait_for(lambda: self._restarts > before, timeout=RESTARTING)
         status = self.status()
         self._restart_expected = False
         self._restarts, self.stop_reason = before, self.distrust
@@ -497,10 +542,9 @@ class GrblController:
 
     def _sort(self, now: float, line: str) -> None:
         if line.startswith("<"):
-            status = protocol.parse_status(line)
+            status, round_trip = protocol.parse_status(line), now - self._asked.popleft() if self._asked else 0.0
             if status is not None and self._is_plausible(status):
-                asked, self._asked = self._asked, None
-                self.reports.append(Report(now, status, 0.0 if asked is None else now - asked))
+                self.reports.append(Report(now, status, round_trip))
                 if status.offset is not None:
                     self._hear_offset(status.offset * self.settings.report_scale)
         elif line == "ok" or line.startswith("error:"):

@@ -27,6 +27,11 @@ LONGEST_STANDSTILL = 5.0
 BLIND_SHARE = 0.5
 # Slower than this no sensor is worth a sweep, m/s: refused with the reason
 CRAWL = 1e-4
+# The body is approached in steps of this share of what the tip may run on; the next one is sent when QUEUED_STEPS of
+# them are left. So a host that hears of the touch late lets the tip run on by 2.5 steps, 0.6 of what it may, at most
+STEP_SHARE, QUEUED_STEPS = 0.25, 1.5
+# A lift is queued for so long ahead, s, besides two round trips: a busy host asks twice in it
+LIFT_AHEAD = 0.02
 # A probe is closed, or open, if so many reports say so: one may be garbled, a contact may bounce
 TOLD = 2
 # The tip is free when a step of this length, m, changes the force by less than a touch
@@ -90,8 +95,12 @@ class GuardedStage:
             low, high = np.round(1e3 * self.bounds, 3).tolist()
             raise FingerError(f"the {what} leads to machine position {where} mm; possible are {low} to {high} mm")
 
-    def probe(self, target: FloatArray, speed: float) -> tuple[FloatArray, bool]:
-        """Towards the target until contact: (latched position, True), or (target, False) if nothing is met."""
+    def probe(self, target: FloatArray, speed: float, force: float = np.inf) -> tuple[FloatArray, bool]:
+        """Towards the target until contact: (latched position, True), or (target, False) if nothing is met.
+
+        Args:
+            force: that the touch should not exceed, N, as far as the tip's stiffness tells, however late the host is.
+        """
         self.check(target, "probing")
         here = self.position() if self.sensor is not None else self._resting()
         way = float(np.linalg.norm(target - here))
@@ -104,7 +113,9 @@ class GuardedStage:
             if bound < STANDING:
                 raise self._not_felt(target)
         speed = min(speed, self.guarded_speed)
-        where, hit = self._peck(here, target, speed) if self.sensor is None else self._feel(target, speed, self.sensor)
+        where, hit = (
+            self._peck(here, target, speed) if self.sensor is None else self._feel(target, speed, self.sensor, force)
+        )
         if not hit and bound < way:
             raise self._not_felt(where)
         return where, hit
@@ -229,24 +240,30 @@ class GuardedStage:
         self.controller.jog(self.frame.to_machine(target), self.guarded_speed)
         self.controller.wait_idle(LONGEST_STANDSTILL)
 
-    def _feel(self, target: FloatArray, speed: float, sensor: ForceSensor) -> tuple[FloatArray, bool]:
-        """Jog until the sensor feels contact; where the machine then came to rest."""
+    def _feel(self, target: FloatArray, speed: float, sensor: ForceSensor, force: float) -> tuple[FloatArray, bool]:
+        """Jog until the sensor feels contact; where the machine then came to rest.
+
+        The thread that reads the sensor cancels the jog: over a slow link the host hears where the machine is only
+        after it went on for as long.
+        """
         start = self.position()
         way = float(np.linalg.norm(target - start))
         # a late host makes the machine stand: never is more queued than may be run on into the body
-        step = max(0.25 * self.over_travel, STANDING)
+        most = self.over_travel if self.stiffness == 0 else min(self.over_travel, force / self.stiffness)
+        step = max(STEP_SHARE * most, STANDING)
         count = int(np.ceil(way / step))
         hit = False
-        for number in range(1, count + 1):
-            here = start + (target - start) * (number / count)
-            made = time.monotonic()
-            self.controller.jog(self.frame.to_machine(here), speed)
-            hit = self._felt_before(here, 1.5 * way / count, made, sensor)
-            if hit:
-                break
-        if not hit:
-            self.controller.wait_idle(LONGEST_STANDSTILL)
-            hit = self._touches(sensor)
+        with sensor.touching(self.touch_force, self.controller.cancel_now):
+            for number in range(1, count + 1):
+                here = start + (target - start) * (number / count)
+                made = time.monotonic()
+                self.controller.jog(self.frame.to_machine(here), speed)
+                hit = self._felt_before(here, QUEUED_STEPS * way / count, made, sensor)
+                if hit:
+                    break
+            if not hit:
+                self.controller.wait_idle(LONGEST_STANDSTILL)
+                hit = self._touches(sensor)
         self.controller.cancel_jog()
         return self.position(), hit
 
@@ -264,6 +281,8 @@ class GuardedStage:
                 return True
             if np.linalg.norm(self.position() - here) <= near:
                 return False
+            if self._touches(sensor):  # felt, and the jog cancelled, while the position was asked for
+                return True
             if patience.over():
                 raise LinkError("the machine does not follow; is it held, or its door open?")
 
@@ -336,21 +355,38 @@ class GuardedStage:
         sensor = self.sensor if self.sensor is not None and self.sensor.fault is None else None
         most = self.touch_force + (0.0 if sensor is None else float(np.linalg.norm(sensor.force())))
         self.controller.wait_idle(LONGEST_STANDSTILL)  # an operator's hold: no jog is taken before it is let go
-        self.controller.jog(self.frame.to_machine(target), self.guarded_speed)
         opened, met = False, 0
-        while True:
-            status = self.controller.status()
-            if sensor is not None:
-                met = TOLD if np.linalg.norm(sensor.force()) > most else 0
-            elif self.sensor is None:
-                opened = opened or not status.probe_closed
-                met = met + 1 if opened and status.probe_closed else 0
-            if met >= TOLD:
-                self.controller.cancel_jog()
-                raise StoppedError("something was met while the tip was lifted off; free it by hand")
-            if status.state != "Jog":
-                break
+        for here in self._pieces(target):
+            self.controller.jog(self.frame.to_machine(here), self.guarded_speed)
+            left = 0.0 if np.array_equal(here, target) else self._run_out
+            while True:
+                status = self.controller.status()
+                if sensor is not None:
+                    met = TOLD if np.linalg.norm(sensor.force()) > most else 0
+                elif self.sensor is None:
+                    opened = opened or not status.probe_closed
+                    met = met + 1 if opened and status.probe_closed else 0
+                if met >= TOLD:
+                    self.controller.cancel_jog()
+                    raise StoppedError("something was met while the tip was lifted off; free it by hand")
+                place = self.frame.to_object(self.controller.machine_position(status))
+                if status.state != "Jog" or (left and np.linalg.norm(place - here) <= left):
+                    break
         self.controller.wait_idle(LONGEST_STANDSTILL)
+
+    def _pieces(self, target: FloatArray) -> Iterator[FloatArray]:
+        """Ends of the jogs to a target: short ones, for what is queued runs out when the cable is pulled."""
+        start = self.position()
+        count = int(np.ceil(np.linalg.norm(target - start) / self._run_out))
+        for number in range(1, count):
+            yield start + (target - start) * (number / count)
+        yield target
+
+    @property
+    def _run_out(self) -> float:
+        """What may be queued of a lift, m: what lasts as long as asking where the machine is, and its stop."""
+        lasts = LIFT_AHEAD + 2.0 * self.controller.round_trip
+        return max(self.guarded_speed * lasts + self.guarded_speed**2 / (2.0 * self._acceleration), STANDING)
 
     def _within(self, target: FloatArray) -> FloatArray:
         machine = np.clip(self.frame.to_machine(target), self.bounds[0], self.bounds[1])

@@ -238,6 +238,19 @@ def describe(line: str) -> str:
     return f"{line} ({table.get(number, unknown if number >= 0 else code.strip() or unknown)})"
 
 
+def firmware_name(lines: Iterable[str]) -> str:
+    """What a firmware calls itself in the answer to $I (Grbl, grblHAL, FluidNC) or M115 (Marlin and others); or ""."""
+    text = " ".join(lines)
+    if match := re.search(r"FIRMWARE_NAME:\s*(.+?)(?=\s+[A-Z_]+:|$)", text):
+        return match[1].strip()
+    if match := re.search(r"FluidNC v?([\w.-]+)", text):
+        return f"FluidNC {match[1]}"
+    if match := re.search(r"\[VER:([^:\]]+)", text):
+        hal = "HAL" in text.upper() or "[FIRMWARE:grblHAL]" in text
+        return f"{'grblHAL' if hal else 'Grbl'} {match[1].strip()}"
+    return ""
+
+
 def words(axes: FloatArray) -> str:
     """Axis words of a position or displacement in metres, as millimetres to the tenth of a micrometre."""
     return "".join(f"{axis}{value:.4f}" for axis, value in zip("XYZ", 1e3 * axes + 0.0, strict=True))

@@ -25,6 +25,8 @@ RECONNECT = 5.0
 DEAD_SHARE = 0.8
 # How long the user has to touch the probe, s
 TOUCH_BY_HAND = 60.0
+# A machine that does not answer for so long when the tip is to be lifted is left as it is, s: ten askings
+LAST_LOOK = 0.5
 # The probe is looked at so often meanwhile, s: a hand's touch lasts longer
 LOOK = 0.02
 
@@ -131,7 +133,10 @@ class GrblFinger:
             low, high = self.limits
             bounds = np.stack([np.fmax(bounds[0], low), np.fmin(bounds[1], high)])
         if not np.isfinite(bounds).all():
-            raise FingerError(f"{self.port}: the controller does not state its travel ($130 to $132); give limits")
+            raise FingerError(
+                f"{self.port}: {controller.firmware} does not state its travel ($130 to $132; FluidNC keeps it in its "
+                "configuration file); give low and high in [finger.machine]"
+            )
         sensor = None if self.slide is None else self.slide.sensor
         speed = self._speed_of(controller)
         over_travel = self.over_travel
@@ -175,7 +180,13 @@ class GrblFinger:
             return
         self._left = True
         try:
-            if controller.stop_reason is not None or controller.status().state not in ("Idle", "Alarm"):
+            state = controller.status(within=LAST_LOOK).state
+        except LinkError as error:
+            controller.halt("leaving")  # all that can be done for a machine that does not answer
+            self._lost = f"{self._lost or error}; it does not answer, so that the tip could not be lifted off"
+            return
+        try:
+            if controller.stop_reason is not None or state not in ("Idle", "Alarm"):
                 controller.halt("leaving")
                 if not controller.clear():
                     return  # the position is lost: any motion could do harm
@@ -218,7 +229,7 @@ class GrblFinger:
             "resolution": controller.settings.resolution,
             "firmware": controller.version,
             "doubts": controller.doubts,
-            "cut_short": self._cut_short,
+            "cut_short": list(self._cut_short),
             "settings": {f"${code}": value for code, value in controller.settings.values.items()},
             "origin": self.frame.origin.tolist(),
             "rotation": self.frame.rotation.tolist(),
@@ -262,6 +273,13 @@ class GrblFinger:
             return False
         self._lost = None
         return True
+
+    def forecast(self, move: Move) -> float:
+        """About how long a move will take, s: a sweep's pecks, or its path at its speed."""
+        stage = self.stage
+        if self.peck is None or move.purpose != "sweep":
+            return move.duration
+        return self.peck.seconds(stage, move)
 
     def measured_delay(self) -> tuple[float, float]:
         """Delay of the force sensor behind the stage and its standard error, s, where the last sweep ended.

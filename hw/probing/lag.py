@@ -36,15 +36,17 @@ class Lag:
         moment: sum of v h / s^2 of second differences along the normal; v speed of the stage, h rigid trace, s its
             residual.
         weight: sum of v^2 / s^2, 1/s^2.
+        expected: size of the lag, s: what asking for a report takes, if that is more than EXPECTED.
     """
 
     moment: float = 0.0
     weight: float = 0.0
+    expected: float = EXPECTED
 
     @property
     def seconds(self) -> float:
         """To be added to the delay with which the batches were fused, s."""
-        return self.moment / (self.weight + EXPECTED**-2)
+        return self.moment / (self.weight + self.expected**-2)
 
     def learn(self, times: FloatArray, positions: FloatArray, rigid: FloatArray, normals: FloatArray) -> None:
         """Learn from consecutive samples of one sweep.

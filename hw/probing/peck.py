@@ -37,6 +37,9 @@ FEWEST_PECKS = 24
 # 0.5 mm apart a smooth body bends by s^2 / R = 50 um. Two touches of one place agree to AGREE, m: four standard
 # deviations of the difference of two touches with a scatter of 3.5 um
 UNEXPECTED, AGREE = 5e-5, 2e-5
+# A peck asks the controller so often (two probes with two reports of the probe before, two of the place before and
+# after; a move), and a question takes this long at least, s: the status of 60 bytes at 115200 baud
+ASKINGS, LEAST_ASKING = 18, 0.005
 # A place is touched so often to find two touches that agree; so many places in a row may be left out for none
 MOST_TOUCHES, MOST_LEFT_OUT = 4, 3
 
@@ -56,6 +59,17 @@ class Peck:
     clearance: float
     speed: float
     stroke: float
+
+    def count(self, move: Move) -> int:
+        """How often a sweep is pecked at."""
+        return len(spaced(move, min(self.step, move.length / FEWEST_PECKS))[0])
+
+    def seconds(self, stage: GuardedStage, move: Move) -> float:
+        """About how long a sweep takes, s: up, on and down at their speeds, and what asking takes."""
+        guarded = stage.guarded_speed
+        on, down = np.hypot(self.step, self.clearance) / guarded, self.clearance / min(self.speed, guarded)
+        up = self.clearance / stage.speed
+        return self.count(move) * float(on + down + up + ASKINGS * max(stage.controller.round_trip, LEAST_ASKING))
 
     def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
         """The latched tip centre of each contact along the sweep, as it is made."""

@@ -30,13 +30,18 @@ LEAST_RATIO, MOST_RATIO = 0.4, 2.5
 AVERAGED, AT_REST = 0.02, 0.1
 
 
-def press_test(stage: GuardedStage, sensor: ForceSensor, inwards: FloatArray, stiffness: float) -> float:
-    """Press one small step further; the stiffness found, N/m. The tip stays pressed.
+def press_test(
+    stage: GuardedStage, sensor: ForceSensor, inwards: FloatArray, stiffness: float, wanted: float = np.inf
+) -> float:
+    """Press one small step further, or back where that would exceed `wanted`; the stiffness found, N/m.
+
+    The tip stays pressed.
 
     Args:
         stage: the tip stands in contact.
         inwards: (3,) unit direction into the body, object frame.
         stiffness: of the tip and what carries it, as stated, N/m.
+        wanted: force of the sweep that follows, N.
 
     Raises:
         StoppedError: the force does not rise, falls, or rises with another stiffness.
@@ -46,6 +51,8 @@ def press_test(stage: GuardedStage, sensor: ForceSensor, inwards: FloatArray, st
         step, min(LEAST_STEPS * stage.controller.settings.resolution, MOST_OF_LIMIT * stage.max_force / stiffness)
     )
     before, start = _mean_force(stage, sensor), stage.position()
+    pressed, more = float(np.linalg.norm(before)), step * stiffness
+    inwards = -inwards if pressed + more > wanted and pressed > more else inwards  # back, but not out of contact
     stage.creep(start + step * inwards)
     after, way = _mean_force(stage, sensor), float((stage.position() - start) @ inwards)
     change = after - before
@@ -53,7 +60,7 @@ def press_test(stage: GuardedStage, sensor: ForceSensor, inwards: FloatArray, st
     found = rise / max(way, 1e-9)
     if not LEAST_RATIO <= found / stiffness <= MOST_RATIO:
         reason = (
-            f"press test: {1e6 * way:.0f} um into the contact the force changed by {rise:+.2f} N, {1e-3 * found:.2f} "
+            f"press test: over {1e6 * way:.0f} um in contact the force changed by {rise:+.2f} N, {1e-3 * found:.2f} "
             f"N/mm; stated are {1e-3 * stiffness:.2f} N/mm. {_cause(found / stiffness)}"
         )
         stage.controller.halt(reason)

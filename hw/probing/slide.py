@@ -16,7 +16,7 @@ import numpy as np
 from hw import LinkError, Move, NotFeltError, Patience, StoppedError
 from hw.grbl import LONGEST_STANDSTILL, GuardedStage
 from hw.probing.fusion import known_at, positions_at, prompt, rigid_centers, smooth
-from hw.probing.lag import Lag
+from hw.probing.lag import EXPECTED, Lag
 from hw.probing.peck import Touched, spaced
 from hw.probing.press_test import press_test
 from hw.sensors import ForceSensor
@@ -24,6 +24,12 @@ from mapping import BoolArray, FloatArray
 
 # Jogs that may be under way or waiting when the next is made, in control periods
 QUEUED = 2
+# Over a slow link a jog lasts this share of a round trip: the force is heard of once in a round trip, and the machine
+# must neither stand for most of it, nor go on for long over what it has not felt. At 20 ms of latency and 115200 baud
+# (30 ms a round trip) 4 mm at 10 mm/s take 1.2 s; with jogs of 10 ms they took 1.7 s
+LINK_SHARE = 0.5
+# The touch at the beginning may have so many times the force of the sweep: 0.6 of it are run on by (STEP_SHARE)
+GENTLE = 1.5
 # Samples are handed on this often, s
 BATCH = 0.5
 # Share of the wanted force that may be missing, or too much, at full tangential speed; and the slowest pace
@@ -54,7 +60,7 @@ class Slide:
     Args:
         sensor: feels the force.
         stiffness: of the tip and all that carries it, N/m.
-        period: of the control loop, s.
+        period: of the control loop, s; longer over a slow link (LINK_SHARE).
         approach_speed: at which the body is approached, m/s.
         reach: how far beyond the commanded path to follow the body, m.
         gain: share of the force error that one period takes away; with the stage's delay of two to three
@@ -78,15 +84,16 @@ class Slide:
         """Samples in contact with their forces, about every BATCH seconds; what was felt before a stop as well."""
         self._tare(stage, move.duration + SWEEP_OVERHEAD)
         self.sensor.watch.steepest = self.stiffness * max(move.speed, stage.guarded_speed)
-        path, approach = spaced(move, move.speed * self.period)
-        _, hit = stage.probe(path[0] + self.reach * approach[0], self.approach_speed)
+        period = max(self.period, LINK_SHARE * stage.controller.round_trip)
+        path, approach = spaced(move, move.speed * period)
+        _, hit = stage.probe(path[0] + self.reach * approach[0], self.approach_speed, GENTLE * move.force)
         if not hit:
             return
-        press_test(stage, self.sensor, approach[0], self.stiffness)
+        press_test(stage, self.sensor, approach[0], self.stiffness, move.force)
         depth = float((stage.position() - path[0]) @ approach[0])
         last = told = time.monotonic()
         try:
-            for sliding in self._steer(stage, move, path, approach, depth):
+            for sliding in self._steer(stage, move, path, approach, depth, period):
                 if not sliding:
                     last = time.monotonic()  # what the tip feels while it settles is no sweep
                 elif time.monotonic() > told + BATCH:
@@ -126,9 +133,9 @@ class Slide:
             raise StoppedError(reason)
 
     def _steer(
-        self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, depth: float
+        self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, depth: float, period: float
     ) -> Iterator[bool]:
-        """Along the path, one jog a period; `depth` (m) behind it along the approach follows the force.
+        """Along the path, one jog a `period` (s); `depth` (m) behind it along the approach follows the force.
 
         Each period says whether the sweep has begun.
         """
@@ -154,8 +161,8 @@ class Slide:
             at = min(end, at + pace)
             wanted = self.gain * missing / self.stiffness
             # the slope of the body, learnt as it comes: else a ramp leaves a lasting error
-            trend = float(np.clip(trend + 0.03 * pace * wanted, *self._step_limits(stage)))
-            depth += float(np.clip(wanted + pace * trend, *self._step_limits(stage)))
+            trend = float(np.clip(trend + 0.03 * pace * wanted, *_step_limits(stage, period)))
+            depth += float(np.clip(wanted + pace * trend, *_step_limits(stage, period)))
             if depth > self.reach:
                 raise StoppedError("the tip went too deep behind the commanded path: the body ends, or is elsewhere")
             if depth > max(bounds[int(at)], bounds[int(np.ceil(at))]):
@@ -168,7 +175,7 @@ class Slide:
             way = float(np.linalg.norm(target - here))
             if way > 0:
                 stage.check(target, "sliding")
-                controller.jog(stage.frame.to_machine(target), max(way / self.period, 1e-4))
+                controller.jog(stage.frame.to_machine(target), max(way / period, 1e-4))
                 made = time.monotonic()
                 here, queued = target, [*queued[1:], way]
             yield not settling
@@ -195,10 +202,6 @@ class Slide:
         force = stage.frame.turn_to_object(self.sensor.force())
         return -float(force @ inwards)
 
-    def _step_limits(self, stage: GuardedStage) -> tuple[float, float]:
-        most = stage.guarded_speed * self.period
-        return -most, 0.5 * most
-
     def _fused(self, stage: GuardedStage, after: float, until: float = np.inf) -> Touched:
         """Samples in contact taken between these times, as far as the stage has reported where it was."""
         reports = smooth(prompt(stage.controller.reported(after - BEFORE)))
@@ -221,12 +224,19 @@ class Slide:
             sound &= times < until
             return sound & known_at(times - delay, stamps, places, normals, longest, step), centers
 
+        self.lag.expected = max(EXPECTED, stage.controller.round_trip)
         sound, centers = touching(self.delay)
         rigid = rigid_centers(centers[sound], forces[sound], self.stiffness)
         self.lag.learn(times[sound], centers[sound], rigid, normals[sound])
         sound, centers = touching(self.delay + self.lag.seconds)
         rigid = rigid_centers(centers[sound], forces[sound], self.stiffness)
         return Touched(times[sound], rigid, forces[sound])
+
+
+def _step_limits(stage: GuardedStage, period: float) -> tuple[float, float]:
+    """How far one jog may lead out of the body and into it, m."""
+    most = stage.guarded_speed * period
+    return -most, 0.5 * most
 
 
 def _between(rows: FloatArray, at: float) -> FloatArray:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from itertools import takewhile
 from types import TracebackType
 from typing import Any
@@ -31,7 +32,8 @@ PERIOD_SPAN = 5.0
 class ForceSensor:
     """Common to all sensors; a device adds its framing, `decode` and `start`.
 
-    Forces are those on the tip, N, in the axes of the machine that carries it.
+    Forces are those on the tip, N. `force` and `timed` give them in the axes of the machine that carries the sensor,
+    `zero` and `recorded` in its own; `turned` (3, 3) turns its axes into the machine's.
 
     Args:
         port: device name or pyserial URL.
@@ -51,6 +53,7 @@ class ForceSensor:
         self.rate, self.bits = rate, bits
         self.tick = 1.0 / rate if tick is None else tick
         self.zero, self.drift = np.zeros(3), np.zeros(3)
+        self.turned = np.eye(3)
         self._samples: deque[tuple[float, int, float, float, float]] = deque(maxlen=KEPT_SAMPLES)
         self._limit = np.inf
         self._halt: Callable[[str], None] = _nothing
@@ -58,6 +61,7 @@ class ForceSensor:
         self.faulty = 0
         self.fault: str | None = None
         self._struck = False
+        self._touch, self._touched = np.inf, _nothing_more
         self.watch = SampleWatch(bits)
         self._period = self.tick
         self._newest = -np.inf
@@ -74,6 +78,18 @@ class ForceSensor:
     def guard(self, limit: float, halt: Callable[[str], None]) -> None:
         """From now on call `halt`, in the reading thread, if a force exceeds `limit` (N) or is none (SampleWatch)."""
         self._limit, self._halt, self._struck = limit, halt, False
+
+    @contextmanager
+    def touching(self, force: float, touched: Callable[[], None]) -> Iterator[None]:
+        """While the block runs, call `touched` in the reading thread for samples above `force` (N).
+
+        Stopping there saves asking the machine where it is first, which takes as long as its link does.
+        """
+        self._touch, self._touched = force, touched
+        try:
+            yield
+        finally:
+            self._touch, self._touched = np.inf, _nothing_more
 
     def __enter__(self) -> ForceSensor:
         self.link.open()
@@ -131,7 +147,8 @@ class ForceSensor:
 
     def force(self) -> FloatArray:
         """(3,) newest force, N."""
-        return np.array(self._samples[-1][2:]) - self.zero if self._samples else np.zeros(3)
+        newest = np.array(self._samples[-1][2:]) - self.zero if self._samples else np.zeros(3)
+        return np.asarray(self.turned @ newest)
 
     def wait(self, done: Callable[[], bool], within: float) -> bool:
         """Wait for samples until `done`; False if that took too long."""
@@ -180,7 +197,7 @@ class ForceSensor:
             return np.zeros(0), np.zeros((0, 3))
         clock = SensorClock.estimate(ticks.astype(float), arrivals, self.tick)
         recent = arrivals >= since
-        return clock.times(ticks[recent].astype(float)), forces[recent] - self.zero
+        return clock.times(ticks[recent].astype(float)), (forces[recent] - self.zero) @ self.turned.T
 
     def _hear(self, now: float, frames: list[bytes]) -> None:
         good, taken_back = [], 0
@@ -200,12 +217,15 @@ class ForceSensor:
                 self._stamp(now, count)
             # what is no sample of the record may still be a force: it counts for the limit below
             good.append((sound, sample))
-        limit = self._limit
-        if np.isfinite(limit) and not self._struck:
+        limit, touch = self._limit, self._touch
+        if (np.isfinite(limit) and not self._struck) or touch < np.inf:
             zero = self.zero
             for _, (_, x, y, z) in good:
                 felt = ((x - zero[0]) ** 2 + (y - zero[1]) ** 2 + (z - zero[2]) ** 2) ** 0.5
-                if felt > limit:
+                if felt > touch:
+                    self._touched()
+                    touch = np.inf  # once for what came together
+                if felt > limit and not self._struck:
                     self._strike(
                         f"the force reached {felt:.2f} N, above the limit of {limit:g} N; check the path, run again"
                     )
@@ -232,6 +252,10 @@ class ForceSensor:
 
     def _on_lost(self) -> None:
         self._halt(f"the {self.name} was lost ({self.link.error})")
+
+
+def _nothing_more() -> None:
+    """A touch that nobody waits for."""
 
 
 def _nothing(reason: str) -> None:

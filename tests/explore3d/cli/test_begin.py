@@ -74,7 +74,7 @@ def test_a_port_of_ones_own_has_no_simulated_object(tmp_path: Path) -> None:
     ("options", "message"),
     [
         (["--mesh", "absent.ply", "--units", "mm", "--tip-radius", "5 mm"], "model.mesh: "),
-        (["--mesh", MESHES / "tile.ply", "--units", "furlong", "--tip-radius", "5 mm"], "model.units: "),
+        (["--mesh", MESHES / "tile.ply", "--units", "furlong", "--tip-radius", "5 mm"], "unknown unit of length"),
         (["--mesh", MESHES / "tile.ply", "--units", "m", "--tip-radius", "5"], "unit missing"),
         (["--mesh", MESHES / "tile.ply", "--units", "m", "--tip-radius", "5 mm", "--finger", "toe"], "no such finger"),
         (["--mesh", MESHES / "tile.ply", "--example", "mug"], "one of them"),

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
 import pytest
 
 from explore3d.cli import doctor
 from explore3d.cli.doctor import STATES, examine
+from explore3d.jobs.emulate import Emulation
+from hw.emulated.pty_server import PtyServer
 
 
 def by_subject(monkeypatch: pytest.MonkeyPatch, subject: str) -> doctor.Check:
@@ -95,3 +98,16 @@ def test_only_what_is_missing_fails_the_command(
         main()
     assert end.value.code == (1 if state == "missing" else 0)
     assert json.loads(capsys.readouterr().out)[0]["needed_for"] == "c"
+
+
+def test_it_asks_the_controller_on_a_port_and_moves_nothing(tmp_path: Path) -> None:
+    tile = Path(__file__).resolve().parents[3] / "assets" / "meshes" / "tile.ply"
+    (stage,) = Emulation(mesh=tile, tip_radius=5e-3, origin=(-0.15, -0.15, -0.06)).devices()
+    with PtyServer([stage]) as server:
+        port = server.ports[0]
+        checks = {check.subject: check for check in doctor.controller(port, 115200)}
+    assert checks[port].found.startswith("Grbl 1.1h.20190825, idle")
+    assert checks["travel"].found == "[-300.0, -300.0, -100.0] to [0.0, 0.0, 0.0] mm"
+    assert stage.motion.travelled == 0.0  # type: ignore[union-attr]
+    (gone,) = doctor.controller(str(tmp_path / "no port"), 115200)
+    assert gone.state == "missing" and "cannot open" in gone.found

@@ -19,12 +19,15 @@ from explore3d.analysis.build_model import build_model
 from explore3d.analysis.stages import Stages
 from explore3d.errors import SceneError
 from explore3d.jobs.expedition import explorer
-from explore3d.jobs.machine_finger import emulation
+from explore3d.jobs.machine_finger import GrblFingerTable
 from explore3d.jobs.run import scene_finger
 from explore3d.log.record import Log
 from explore3d.scene import scene as scene_file
+from explore3d.scene.finger import FingerTable, SensorTable
+from explore3d.scene.machine import LineSensorTable, OptoForceTable
 from explore3d.scene.scene import Scene, parse_scene
 from explore3d.scene.settings import AnalysisSettings
+from explore3d.scene.simulated import SimulatedFingerTable
 from explore3d.scene.to_toml import scene_text
 from explore3d.scene.values import is_informative
 from hw.errors import FingerError
@@ -56,6 +59,8 @@ SCENES = {
     "slid over by another": f"{PLAIN}{TILE}{REAL}{SLIDING.format('line')}",
     "slid over in emulation": f"{PLAIN}{TILE}{OBJECT}{EMULATED}{SLIDING.format('optoforce')}",
 }
+# What chooses by its key `kind`, and the classes that can be chosen
+KINDS = {FingerTable: (SimulatedFingerTable, GrblFingerTable), SensorTable: (OptoForceTable, LineSensorTable)}
 # When a link last heard something: no setting
 CLOCK = "heard"
 Key = tuple[str, ...]
@@ -68,7 +73,8 @@ def keys(table: type[BaseModel], before: Key = ()) -> Iterator[tuple[Key, FieldI
         inner = [c for c in (info.annotation, *get_args(info.annotation)) if isinstance(c, type)]
         tables = [c for c in inner if issubclass(c, BaseModel)]
         if tables:
-            yield from keys(tables[0], key)
+            for each in KINDS.get(tables[0], tables[:1]):
+                yield from keys(each, key)
         else:
             yield key, info
 
@@ -158,8 +164,10 @@ def told(thing: Any) -> Any:
 
 def configured(scene: Scene) -> Any:
     """What the jobs build from a scene before anything moves."""
-    machine = scene.finger.machine
-    emulated = emulation(scene) if machine is not None and machine.port == "emulator" else None
+    machine = scene.finger if isinstance(scene.finger, GrblFingerTable) else None
+    emulated = None
+    if machine is not None and not machine.is_real:
+        emulated = machine.emulation(scene.setting())
     space = Workspace(np.full(3, -1.0), np.ones(3), 0.125, 10.0)
     return told((scene_finger(scene), emulated, explorer(scene, space), AnalysisSettings.of(scene)))
 

@@ -67,7 +67,7 @@ def test_what_is_left_out_has_the_documented_default() -> None:
         ('radius = "10 mm"', "", "tip.radius: missing; it must be given"),
         ('white = "0.2 mm"', 'white = "-1 um"', "finger.noise.white: should be greater than or equal to 0"),
         ('rate = "5 kHz"', 'rate = "5 mm"', "finger.rate: 'mm' is a unit of length, not of rate"),
-        ('kind = "simulated"', 'kind = "robot"', "finger.kind: should be 'simulated' or 'grbl'; found 'robot'"),
+        ('kind = "simulated"', 'kind = "robot"', "finger.kind: unknown kind 'robot'; possible: given, grbl, simulated"),
         ("algorithm = 3", "algorithm = 5", "detection.algorithm: should be less than or equal to 4; found 5"),
         ("seed = 1", "seed = -1", "seed: should be greater than or equal to 0; found -1"),
         ('units = "m"', 'units = "mmm"', "model.units: unknown unit of length 'mmm'; did you mean 'mm'?"),

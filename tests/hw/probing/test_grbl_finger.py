@@ -6,9 +6,11 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+import tty
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
@@ -407,3 +409,36 @@ def test_a_signal_stops_the_machine_lifts_the_tip_and_ends_the_program(number: s
         still = stage.motion.travelled
         time.sleep(0.1)
         assert stage.motion.travelled == still
+
+
+@pytest.mark.parametrize(
+    ("lines", "name"),
+    [
+        (["[VER:1.1h.20190825:]", "[OPT:V,15,128]"], "Grbl 1.1h.20190825"),
+        (["[VER:1.1f.20240101:]", "[OPT:VNM,35,1024,3,0]", "[FIRMWARE:grblHAL]"], "grblHAL 1.1f.20240101"),
+        (["[VER:3.7 FluidNC v3.7.16:]", "[OPT:PHS]"], "FluidNC 3.7.16"),
+        (["FIRMWARE_NAME:Marlin 2.1.2 (Github) SOURCE_CODE_URL:github.com/MarlinFirmware"], "Marlin 2.1.2 (Github)"),
+        (["echo:busy: processing"], ""),
+    ],
+)
+def test_firmwares_are_told_apart_by_what_they_call_themselves(lines: list[str], name: str) -> None:
+    assert protocol.firmware_name(lines) == name
+
+
+def test_a_printers_firmware_is_refused_by_its_name() -> None:
+    """Marlin knows no `?`, and answers every line that it does not know with an echo and ok."""
+    host, slave = os.openpty()
+    tty.setraw(slave)
+
+    def answer() -> None:
+        rest = b""
+        with suppress(OSError):
+            while data := os.read(host, 256):
+                *said, rest = (rest + data).split(b"\n")
+                for line in said:
+                    named = b"FIRMWARE_NAME:Marlin 2.1.2 SOURCE_CODE_URL:github.com PROTOCOL_VERSION:1.0\nok\n"
+                    os.write(host, named if line == b"M115" else b'echo:Unknown command: "' + line + b'"\nok\n')
+
+    threading.Thread(target=answer, daemon=True).start()
+    with pytest.raises(FingerError, match=r"this is Marlin 2\.1\.2, which gives no Grbl status reports"):
+        GrblController(os.ttyname(slave), wake=0.5).open()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hw.errors import FingerError
-from hw.finger import Finger, open_finger
+from hw.finger import Finger
 from hw.move import Move
 from hw.simulated.finger import SimulatedFinger
 from hw.simulated.noise_source import NoiseSource, ornstein_uhlenbeck
@@ -115,13 +115,11 @@ def test_bad_settings_are_refused_by_name() -> None:
     with pytest.raises(FingerError, match="white"):
         SimulatedFinger(object=plate(), tip_radius=R, white=-1.0)
     with pytest.raises(FingerError, match="rate"):
-        open_finger("simulated", object=plate(), tip_radius=R, rate=0.0)
-    with pytest.raises(FingerError, match="colour"):
-        open_finger("simulated", object=plate(), tip_radius=R, colour="red")
+        SimulatedFinger(object=plate(), tip_radius=R, rate=0.0)
 
 
 def test_it_is_a_finger_and_forgets_nothing_in_its_info() -> None:
-    finger = open_finger("simulated", object=plate(), tip_radius=R, seed=5)
+    finger = SimulatedFinger(object=plate(), tip_radius=R, seed=5)
     assert isinstance(finger, Finger)
     assert finger.info["kind"] == "simulated" and finger.info["seed"] == 5
 
