@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Force, Json, Out, Overwrite
+from explore3d.cli.options import Force, Json, Out, Overwrite, Part, Pixel
 
 
 def analyze(
     logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="MCAP logs, session folders, CSV or TXT tables.")
+        list[Path], typer.Argument(metavar="LOG...", help="Logs, session folders, tables, points, maps (docs/log.md).")
     ],
     out: Out,
     tip_radius: Annotated[
@@ -22,6 +22,8 @@ def analyze(
     columns: Annotated[
         str | None, typer.Option(help='Which column of a table is what: "x=X, z=Y", or by number "x=1, z=2".')
     ] = None,
+    pixel: Pixel = None,
+    part: Part = None,
     frame: Annotated[
         str | None, typer.Option(metavar="X,Y,Z", help='Origin of a table in the object frame: "0 mm, 0 mm, 5 mm".')
     ] = None,
@@ -54,6 +56,8 @@ def analyze(
             overwrite=overwrite,
             units=units,
             columns=columns,
+            pixel=pixel,
+            part=part,
             frame=origin,
         )
     show(analysis, out, json)

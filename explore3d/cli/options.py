@@ -26,3 +26,10 @@ Force = Annotated[
         help="Run a stage that the report says was left out; may be repeated.",
     ),
 ]
+Pixel = Annotated[
+    str | None,
+    typer.Option(help='The file is a map of heights whose pixels are so far apart: "1 um", or "1 um, 2 um".'),
+]
+Part = Annotated[
+    str | None, typer.Option(help="Which one of several that a file holds: topic of a bag, sheet, channel, layer.")
+]

@@ -40,7 +40,8 @@ def analyze(
         progress: told the stage and the share of it that is done.
         force: stages to run although the recording does not need them.
         overwrite: replace, once this one is complete, a session of another recording in that folder.
-        table: units, columns, frame, jump, reference of a table (explore3d.log.table.read_table).
+        table: units, columns, frame, jump, reference, pixel of a table (explore3d.log.table.read_table); part: which
+            of several that a file holds.
 
     Raises:
         UserError: input that cannot be used, named by file and field.
@@ -83,7 +84,12 @@ def _command(
     words = ["explore3d", "analyze", *map(str, paths), "--out", str(out)]
     words += [] if tip_radius is None else ["--tip-radius", str(tip_radius)]
     words += [] if model is None else ["--model", str(model), "--model-units", model_units]
-    words += [part for name in ("units", "columns") if table.get(name) for part in (f"--{name}", str(table[name]))]
+    words += [
+        part
+        for name in ("units", "columns", "pixel", "part")
+        if table.get(name)
+        for part in (f"--{name}", str(table[name]))
+    ]
     origin = (table.get("frame") or {}).get("origin")
     words += [] if origin is None else ["--frame", ", ".join(map(str, origin))]
     return shlex.join([*words, *(part for name in force for part in ("--force", name))])
