@@ -62,8 +62,8 @@ def reader_of(path: Path) -> Reader:
     if not first and path.suffix != ".mcap":
         raise UserError(f"{path}: is empty")
     # a log of ours whose first bytes are destroyed is still one by its name
-    text = bool(first) and not any(byte < 9 or 13 < byte < 32 for byte in first)
-    if path.suffix == ".mcap" and not text and max(each.sniff(first) for each in readers()) <= 0.1:
+    text = first[:2] in (b"\xff\xfe", b"\xfe\xff") or not any(byte < 9 or 13 < byte < 32 for byte in first)
+    if path.suffix == ".mcap" and not (first and text) and max(each.sniff(first) for each in readers()) <= 0.1:
         return readers()[0]
     return max(readers(), key=lambda each: each.sniff(first))
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 _POSES = frozenset(("PoseStamped", "PoseWithCovarianceStamped", "Odometry"))
-_KINDS = _POSES | {"PointStamped", "TransformStamped", "PointCloud2", "TFMessage", "WrenchStamped"}
+_KINDS = _POSES | {"PointStamped", "TransformStamped", "PointCloud2", "TFMessage", "tfMessage", "WrenchStamped"}
 # sensor_msgs/PointField: number of a type -> type
 _FIELDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
@@ -51,7 +51,7 @@ def of_ros(topic: str, kind: str, message: Any, stamp: int) -> Iterator[Felt]:
         stamp: time of its recording, ns: for messages without a time of their own.
     """
     word = kind.rpartition("/")[2]
-    if word == "TFMessage":
+    if word in ("TFMessage", "tfMessage"):
         for each in message.transforms:
             t, frame = _stamp(each.header, stamp)
             yield Felt(f"{topic}:{each.child_frame_id}", frame, t, _vector(each.transform.translation))

@@ -97,8 +97,8 @@ def _sheets(path: Path) -> dict[str, tuple[str, int]]:
     """Each sheet as text with ";", and how many of its rows hold two numbers."""
     import openpyxl
 
-    book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-    try:
+    with path.open("rb") as file:
+        book = openpyxl.load_workbook(file, read_only=True, data_only=True)
         found = {}
         for sheet in book.worksheets[:MOST_SHEETS]:
             text = io.StringIO()
@@ -109,8 +109,6 @@ def _sheets(path: Path) -> dict[str, tuple[str, int]]:
                 writer.writerow([_cell(value) for value in row])
             found[sheet.title] = (text.getvalue(), numbers)
         return found
-    finally:
-        book.close()
 
 
 def _cell(value: object) -> object:

@@ -63,22 +63,26 @@ class PlotJugglerTable:
         text = read_text(path, given.decimal)
         if given.columns:
             return table_log(text, given, sidecar)
-        groups = _groups(text.names)
+        # the last part of a topic's name reads like a unit behind a slash
+        full = [
+            f"{name}/{unit}" if unit in set("xyz") else name for name, unit in zip(text.names, text.units, strict=True)
+        ]
+        groups = _groups(tuple(full))
         picked = {name: axes for name, axes in groups.items() if given.part is None or name.startswith(given.part)}
         if len(picked) != 1:
             raise UserError(
                 f"{path}: field part: expected one position; found {', '.join(picked or groups) or 'none'}; name one "
                 'with --part "/tip"'
             )
-        names = [""] * len(text.names)
+        names, units = [""] * len(full), ["" if unit in set("xyz") else unit for unit in text.units]
         for axis, index in next(iter(picked.values())).items():
             names[index] = axis
         clock = next((index for index, name in enumerate(text.names) if name.lower() in _TIMES), None)
         if clock is not None:
-            names[clock] = "t"
+            names[clock], units[clock] = "t", "s"
         said = (*text.said, f"the position is {next(iter(picked))}")
-        units = tuple("s" if index == clock else unit for index, unit in enumerate(text.units))
-        return table_log(replace(text, names=tuple(names), units=units, said=said, kind=self.name), given, sidecar)
+        text = replace(text, names=tuple(names), units=tuple(units), said=said, kind=self.name)
+        return table_log(text, given, sidecar)
 
 
 def _groups(names: tuple[str, ...]) -> dict[str, dict[str, int]]:
