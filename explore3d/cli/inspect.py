@@ -7,16 +7,14 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Json, Part, Pixel
+from explore3d.cli.options import Columns, Json, Part, Pixel, TipRadius, Units
 
 
 def inspect(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A log, a session folder, a table, a point list.")],
-    tip_radius: Annotated[str | None, typer.Option(help='Radius of the fingertip, "2 um", if known.')] = None,
-    units: Annotated[str | None, typer.Option(help="Unit of the coordinates, for example mm, if known.")] = None,
-    columns: Annotated[
-        str | None, typer.Option(help='Which column of a table is what: "x=X, z=Y", or by number "x=1, z=2".')
-    ] = None,
+    tip_radius: TipRadius = None,
+    units: Units = None,
+    columns: Columns = None,
     pixel: Pixel = None,
     part: Part = None,
     json: Json = False,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from explore3d.jobs.analyze import analyze as analyze
+    from explore3d.jobs.analyze import analyze as analyze, analyze_each as analyze_each
     from explore3d.jobs.calibrate import (
         Recording as Recording,
         as_json as as_json,
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from explore3d.jobs.run import cause as cause, run as run, scene_finger as scene_finger
 
 _PUBLIC = {
-    "analyze": ("analyze",),
+    "analyze": ("analyze", "analyze_each"),
     "calibrate": ("Recording", "as_json", "calibrate", "selftest", "write_profile"),
     "emulate": ("Emulation", "serve"),
     "expedition": ("Explored", "Explorer", "explorer"),
