@@ -62,7 +62,7 @@ def raster(rows: int, columns: int, seed: int = 31) -> Raster:
     off = along - 0.5 * x[-1]
     crest = np.maximum(0.0, 0.05 - off**2 / (2.0 * (RADIUS + 0.1)))
     z = RADIUS + crest + np.random.default_rng(seed).normal(0.0, 1e-3, len(along))
-    return Raster(rows, columns, np.column_stack([along, across, np.round(z, 9)]))
+    return Raster(rows, columns, np.column_stack([along, across, np.round(z, 6)]))
 
 
 @dataclass(frozen=True)

@@ -127,11 +127,17 @@ def numbers_log(
     return replace(log, trace=replace(log.trace, resolution=resolution * log.metadata["metres_per_unit"]["x"]))
 
 
+def few_digits(kinds: Sequence[Any]) -> list[str]:
+    """A word on columns that keep seven digits at most."""
+    short = any(np.dtype(kind).kind == "f" and np.dtype(kind).itemsize < 8 for kind in kinds)
+    return ["on the grid of 32-bit numbers, seven digits"] if short else []
+
+
 def map_or_numbers(path: Path, array: np.ndarray, settings: Mapping[str, Any], kind: str) -> Log:
     """The log of one array: of a map of heights if the settings say how far its pixels are apart, else of columns."""
     given, sidecar = load_settings(path, **settings)
     if given.pixel is None:
-        return numbers_log(path, *columns_of(path, array), settings, kind)
+        return numbers_log(path, *columns_of(path, array), settings, kind, few_digits([array.dtype]))
     if array.dtype.kind not in "fiub" or array.ndim != 2:
         raise UserError(f"{path}: field heights: expected rows of heights; found {array.dtype} of shape {array.shape}")
     return heights_log(path, np.asarray(array, dtype=np.float64), given.pixel, "", given, sidecar, kind=kind)

@@ -11,7 +11,7 @@ import numpy as np
 
 from explore3d import UserError
 from explore3d.log import Log
-from explore3d.log.readers.arrays import numbers_log
+from explore3d.log.readers.arrays import few_digits, numbers_log
 from explore3d.log.readers.optional import claimed
 from explore3d.log.readers.own import POINT, TIP
 
@@ -145,7 +145,8 @@ class StlPoints:
 
     def read(self, path: Path, settings: Mapping[str, Any]) -> Log:
         data = path.read_bytes()
-        if re.match(rb"\s*solid\b.*\s+facet normal", data[:LONGEST_HEADER], re.S):
+        words = bool(re.match(rb"\s*solid\b.*\s+facet normal", data[:LONGEST_HEADER], re.S))
+        if words:
             lines = re.findall(rb"(?m)^[ \t]*vertex[ \t]+([^\r\n]*)", data)
             if len(lines) % 3 or len(lines) // 3 != len(re.findall(rb"(?m)^[ \t]*endfacet", data)):
                 raise UserError(f"{path}: is an STL file whose facets have no three corners each; it is cut or damaged")
@@ -160,7 +161,8 @@ class StlPoints:
             corners = np.frombuffer(data, facet, count, 84)["corners"].astype(np.float64)
         if not (corners == corners[:, :1]).all():
             raise UserError(f"{path}: {_MESH}")
-        return numbers_log(path, ("x", "y", "z"), corners[:, 0], settings, "points of an STL file")
+        said = [] if words else few_digits(["<f4"])
+        return numbers_log(path, ("x", "y", "z"), corners[:, 0], settings, "points of an STL file", said)
 
 
 def _header(path: Path, data: bytes, end: bytes) -> tuple[str, bytes]:
@@ -201,7 +203,7 @@ def _cloud_log(
     else:
         points = np.frombuffer(body, dtype=list(zip(names, types, strict=True)), count=count)
         rows = np.column_stack([points[name].astype(np.float64) for name in names])
-    return numbers_log(path, tuple(names), rows, settings, kind)
+    return numbers_log(path, tuple(names), rows, settings, kind, [] if text else few_digits(types))
 
 
 def _parsed(path: Path, lines: list[bytes], columns: int) -> np.ndarray:
