@@ -41,10 +41,10 @@ SCENE_SCHEMA = "explore3d/scene/1"
 SPEED_RANGE = 30.0
 
 
-# In radii of the tip: a crest of 1e-5 shows over 1e-2 of them, which a survey's lines over one body cannot come near to;
+# In radii of the tip: a crest of 1e-5 shows over 1e-2 of them, too fine for a survey's lines over one body;
 # noise of ten radii hides the fingertip itself
 FINEST_FEATURE, COARSEST_FEATURE, MOST_NOISE = 1e-5, 1e3, 10.0
-# A body of more than 1e5 radii is no fingertip's to survey: 1e9 samples a radius apart; a tip of ten bodies feels no shape
+# A body of more than 1e5 radii is no fingertip's to survey; a tip of ten bodies feels no shape
 LARGEST_TIPS, LARGEST_TIP_SHARE = 1e5, 10.0
 
 
