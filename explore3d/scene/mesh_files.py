@@ -55,7 +55,8 @@ def _no_body(vertices: np.ndarray, faces: np.ndarray) -> str:
         return ""  # the surface itself says that
     size = float(np.ptp(vertices, axis=0).max())
     if not SMALLEST_BODY <= size <= LARGEST_BODY:
-        return f"the mesh is {size:.3g} m long; possible: {SMALLEST_BODY:g} to {LARGEST_BODY:g} m; is its unit the right one?"
+        possible = f"possible: {SMALLEST_BODY:g} to {LARGEST_BODY:g} m"
+        return f"the mesh is {size:.3g} m long; {possible}; is its unit the right one?"
     a, b, c = (vertices[faces[:, corner]] / size for corner in range(3))
     if not np.cross(b - a, c - a).any():
         return f"none of its {len(faces)} faces has an area"
