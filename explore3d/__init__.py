@@ -21,8 +21,7 @@ if TYPE_CHECKING:
         UserError as UserError,
     )
     from explore3d.jobs.analyze import analyze as analyze
-    from explore3d.jobs.load import load as load
-    from explore3d.jobs.merge import merge as merge
+    from explore3d.jobs.merge import load as load, merge as merge
     from explore3d.jobs.run import run as run
     from explore3d.scene.scene import Scene as Scene, load_scene as load_scene
     from explore3d.units import (
@@ -43,8 +42,7 @@ __version__ = "0.2.0"
 _PUBLIC = {
     "errors": ("FolderError", "MeshFileError", "PointCloudError", "SceneError", "UnitError", "UserError"),
     "jobs.analyze": ("analyze",),
-    "jobs.load": ("load",),
-    "jobs.merge": ("merge",),
+    "jobs.merge": ("load", "merge"),
     "jobs.run": ("run",),
     "scene.scene": ("Scene", "load_scene"),
     "units": (

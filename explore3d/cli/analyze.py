@@ -7,17 +7,15 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Force, Json, Out, Overwrite
+from explore3d.cli.options import Columns, Force, Frame, Json, Out, Overwrite, Part, Pixel, SameObject, TipRadius, Units
 
 
 def analyze(
     logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="MCAP logs, session folders, CSV or TXT tables.")
+        list[Path], typer.Argument(metavar="LOG...", help="Logs, session folders, tables, points, maps (docs/log.md).")
     ],
     out: Out,
-    tip_radius: Annotated[
-        str | None, typer.Option(help='Radius of the fingertip, "2 um"; logs of ours state it, tables do not.')
-    ] = None,
+    tip_radius: TipRadius = None,
     tip_sd: Annotated[
         str | None,
         typer.Option(
@@ -37,13 +35,12 @@ def analyze(
             metavar="FROM..TO", help="Stretch in x that the base is not fitted to (1.2mm..1.4mm); may be repeated."
         ),
     ] = None,
-    units: Annotated[str | None, typer.Option(help="Unit of a table's coordinates, for example mm.")] = None,
-    columns: Annotated[
-        str | None, typer.Option(help='Which column of a table is what: "x=X, z=Y", or by number "x=1, z=2".')
-    ] = None,
-    frame: Annotated[
-        str | None, typer.Option(metavar="X,Y,Z", help='Origin of a table in the object frame: "0 mm, 0 mm, 5 mm".')
-    ] = None,
+    units: Units = None,
+    columns: Columns = None,
+    pixel: Pixel = None,
+    part: Part = None,
+    frame: Frame = None,
+    same_object: SameObject = False,
     model: Annotated[
         Path | None, typer.Option(help="Mesh of the global model; else the log's own, else one is fitted.")
     ] = None,
@@ -57,14 +54,17 @@ def analyze(
     Example: explore3d analyze scan.csv --tip-radius "2 um" --units mm --out out/scan
     """
     from explore3d.cli.progress import shown
-    from explore3d.jobs import analyze as build
+    from explore3d.jobs import analyze_each
     from explore3d.report import show
 
     origin = None if frame is None else {"origin": [part.strip() for part in frame.split(",")]}
+    told: list[str] = []
     with shown(quiet=json) as progress:
-        analysis = build(
+        analyses = analyze_each(
             logs,
             out,
+            same_object=same_object,
+            tell=told.append,
             tip_radius=tip_radius,
             tip_sd=tip_sd,
             form=form,
@@ -76,6 +76,11 @@ def analyze(
             overwrite=overwrite,
             units=units,
             columns=columns,
+            pixel=pixel,
+            part=part,
             frame=origin,
         )
-    show(analysis, out, json)
+    if told and not json:
+        print(told[0])
+    for analysis in analyses:
+        show(analysis, out, json)

@@ -7,16 +7,16 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Json
+from explore3d.cli.options import Columns, Json, Part, Pixel, TipRadius, Units
 
 
 def inspect(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A log, a session folder, a table, a point list.")],
-    tip_radius: Annotated[str | None, typer.Option(help='Radius of the fingertip, "2 um", if known.')] = None,
-    units: Annotated[str | None, typer.Option(help="Unit of the coordinates, for example mm, if known.")] = None,
-    columns: Annotated[
-        str | None, typer.Option(help='Which column of a table is what: "x=X, z=Y", or by number "x=1, z=2".')
-    ] = None,
+    tip_radius: TipRadius = None,
+    units: Units = None,
+    columns: Columns = None,
+    pixel: Pixel = None,
+    part: Part = None,
     json: Json = False,
 ) -> None:
     """Say what a file is: columns, units, sweeps, extent, spacing, gaps, what is doubtful and how to settle it.
@@ -28,5 +28,5 @@ def inspect(
 
     from explore3d.log import inspect as look
 
-    found = look(file, tip_radius=tip_radius, units=units, columns=columns)
+    found = look(file, tip_radius=tip_radius, units=units, columns=columns, pixel=pixel, part=part)
     print(dumps(asdict(found), ensure_ascii=False, allow_nan=False) if json else "\n".join(found.lines()))

@@ -7,14 +7,20 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Out, Overwrite
+from explore3d.cli.options import Columns, Frame, Out, Overwrite, Part, Pixel, TipRadius, Units
 
 
 def merge(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="Folder or model.json of the known model.")],
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Later logs of the same object.")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Later recordings of it, as for analyze.")],
     out: Out,
     pose_sd: Annotated[str, typer.Option(help='Standard deviation of the pose between the logs, "0.1 mm".')] = "0 mm",
+    tip_radius: TipRadius = None,
+    units: Units = None,
+    columns: Columns = None,
+    pixel: Pixel = None,
+    part: Part = None,
+    frame: Frame = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Update a model's features by later logs instead of finding them anew; none is removed.
@@ -27,5 +33,17 @@ def merge(
     from explore3d.jobs import merge as join
     from explore3d.report import feature_line
 
-    merged = join(model, logs, out, parse_length(pose_sd), overwrite)
+    merged = join(
+        model,
+        logs,
+        out,
+        parse_length(pose_sd),
+        overwrite,
+        tip_radius=tip_radius,
+        units=units,
+        columns=columns,
+        pixel=pixel,
+        part=part,
+        frame=None if frame is None else {"origin": [each.strip() for each in frame.split(",")]},
+    )
     print("\n".join([*map(feature_line, merged.features), f"model: {out / 'model.json'}"]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from explore3d import UserError, parse_length
 from explore3d.analysis import Analysis, Progress, Stages, build_model, silent
 from explore3d.jobs.conclude import conclude
+from explore3d.jobs.objects import not_one_object
 from explore3d.jobs.session import Job, Session
 from explore3d.log import LOG, digest, large_log, load_logs, read_base
 from explore3d.scene import load_mesh, parse_scene
@@ -40,8 +41,8 @@ def analyze(
         progress: told the stage and the share of it that is done.
         force: stages to run although the recording does not need them.
         overwrite: replace, once this one is complete, a session of another recording in that folder.
-        table: tip_sd, form, mask (explore3d.log.load_logs); units, columns, frame, jump, reference of a table
-            (explore3d.log.table.read_table).
+        table: tip_sd, form, mask (explore3d.log.load_logs); units, columns, frame, jump, reference, pixel of a table
+            (explore3d.log.table.read_table); part: which of several that a file holds.
 
     Raises:
         UserError: input that cannot be used, named by file and field.
@@ -53,6 +54,50 @@ def analyze(
             found = _analyze(paths, session, tip_radius, model, model_units, progress, force, table)
         return replace(found, folder=session.folder)
     return _analyze(paths, None, tip_radius, model, model_units, progress, force, table)
+
+
+def analyze_each(
+    logs: Sequence[Path | str],
+    out: Path | str,
+    *,
+    same_object: bool = False,
+    tell: Callable[[str], None] = lambda line: None,
+    **settings: Any,
+) -> list[Analysis]:
+    """Analyse recordings as one object if that was said or their frames, extents and bases agree; else each alone.
+
+    Args:
+        logs: as for analyze.
+        out: folder for the results; where each is analysed alone, for a folder of each one's name.
+        same_object: they are sweeps over one object.
+        tell: is told in a line which of both it was.
+        settings: the others of analyze.
+
+    Raises:
+        UserError: as analyze.
+    """
+    paths = [Path(path) for path in logs]
+    if len(paths) == 1 or same_object:
+        return [analyze(paths, out, **settings)]
+    options = ("model", "model_units", "progress", "force", "overwrite")
+    read = {name: value for name, value in settings.items() if name not in options}
+    why = not_one_object([load_logs([path], **read) for path in paths])
+    if not why:
+        tell(f"{len(paths)} files are taken as one object, for their tips, extents and bases agree")
+        return [analyze(paths, out, **settings)]
+    tell(f"analysed each on its own, for they may be of several objects: {why}; --same-object joins them")
+    names = _names(paths)
+    return [analyze([path], Path(out) / name, **settings) for path, name in zip(paths, names, strict=True)]
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """A folder's name for each recording, no two alike."""
+    names: list[str] = []
+    for path in paths:
+        stem = path.resolve().parent.name if path.name == LOG else path.stem if path.is_file() else path.name
+        count = sum(name == stem or name.rpartition("-")[0] == stem for name in names)
+        names.append(f"{stem}-{count + 1}" if count else stem)
+    return names
 
 
 def results(paths: Sequence[Path | str], out: Path | str, job: Job, overwrite: bool) -> Session:
@@ -82,18 +127,19 @@ def _command(
     table: dict[str, Any],
 ) -> str:
     words = ["explore3d", "analyze", *map(str, paths), "--out", str(out)]
-    words += [] if tip_radius is None else ["--tip-radius", str(tip_radius)]
     words += [] if model is None else ["--model", str(model), "--model-units", model_units]
-    words += [part for name in ("units", "columns") if table.get(name) for part in (f"--{name}", str(table[name]))]
-    words += [part for name in ("tip_sd", "form") if table.get(name) for part in (_option(name), str(table[name]))]
-    words += [part for mask in table.get("mask") or () for part in ("--mask", mask)]
-    origin = (table.get("frame") or {}).get("origin")
-    words += [] if origin is None else ["--frame", ", ".join(map(str, origin))]
+    words += table_words(tip_radius, table)
     return shlex.join([*words, *(part for name in force for part in ("--force", name))])
 
 
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
+def table_words(tip_radius: str | float | None, table: dict[str, Any]) -> list[str]:
+    """The options of a command that say again how to read what does not say it."""
+    words = [] if tip_radius is None else ["--tip-radius", str(tip_radius)]
+    for name in ("units", "columns", "pixel", "part", "tip_sd", "form"):
+        words += [f"--{name.replace('_', '-')}", str(table[name])] if table.get(name) else []
+    words += [part for mask in table.get("mask") or () for part in ("--mask", mask)]
+    origin = (table.get("frame") or {}).get("origin")
+    return words if origin is None else [*words, "--frame", ", ".join(map(str, origin))]
 
 
 def _analyze(

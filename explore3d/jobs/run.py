@@ -26,7 +26,7 @@ from mapping import Trace, length_text
 from planners import Outcome
 
 # Two statements of one tip's radius may differ by rounding
-SAME_RADIUS = 1e-6
+GIVEN_RADIUS_SHARE = 1e-6
 # Kind of event: a sweep that the finger ended before its end, and why
 CUT_SHORT = "cut short"
 # A shell's exit status of a program that a signal ended is this and the signal's number
@@ -93,7 +93,7 @@ def run(
 
 def _with_given(scene: Scene, finger: Finger) -> Scene:
     """The scene of a finger that was handed in. Raises UserError: its tip is another than the scene's."""
-    if abs(finger.tip_radius - scene.tip.radius) > SAME_RADIUS * scene.tip.radius:
+    if abs(finger.tip_radius - scene.tip.radius) > GIVEN_RADIUS_SHARE * scene.tip.radius:
         raise UserError(
             f"{scene.path}: tip.radius is {length_text(scene.tip.radius)}, the finger that was handed in has "
             f"{length_text(finger.tip_radius)}"

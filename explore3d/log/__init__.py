@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         head as head,
         large_log as large_log,
     )
-    from explore3d.log.table import read_table as read_table, table_log as table_log
+    from explore3d.log.table import heights_log as heights_log, read_table as read_table, table_log as table_log
     from explore3d.log.table_settings import load_settings as load_settings
     from explore3d.log.writer import LogWriter as LogWriter, Recorder as Recorder
 
@@ -49,7 +49,7 @@ _PUBLIC = {
         "stop_of",
     ),
     "stream": ("LogStream", "count_samples", "head", "large_log"),
-    "table": ("read_table", "table_log"),
+    "table": ("heights_log", "read_table", "table_log"),
     "table_settings": ("load_settings",),
     "writer": ("LogWriter", "Recorder"),
 }

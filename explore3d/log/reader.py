@@ -33,6 +33,9 @@ class Reading:
     moves: int = 0
     samples: int = 0
     felt: list[NDArray[np.void]] = field(default_factory=list)
+    before: int = 0  # samples before those of the last move
+    announced: int = 0  # samples of the last move
+    last: float = 0.0  # time of the last sample, s
     promised: int = 0
     messages: int = 0
     missing: int = 0
@@ -133,9 +136,13 @@ def _batches(reading: Reading) -> Iterator[NDArray[np.void]]:
                     if batch is not None:
                         yield batch
     reading.damaged, reading.cut = damage.damaged, damage.cut
-    for batch in reading.felt:  # of a move whose end never came
-        reading.samples += len(batch)
-        yield batch
+    if reading.felt:  # of a move whose end never came, or whose samples did not all reach the disk
+        felt = np.concatenate(reading.felt)
+        rest = felt if reading.samples == reading.before else felt[felt["t"] > reading.last]
+        reading.felt = [rest]
+        reading.samples += len(rest)
+        if len(rest):
+            yield rest
     if none:
         why = "" if begins else "does not begin as an MCAP log does and "
         raise UserError(f"{reading.path}: {why}holds no intact message of an explore3d log; nothing can be recovered")
@@ -153,14 +160,22 @@ def _take_checked(topic: str, message: Any, reading: Reading) -> NDArray[np.void
 def _take(topic: str, message: Any, reading: Reading) -> NDArray[np.void] | None:
     """Note an event, or return the samples of a batch."""
     if not reading.start and topic != "/start":
+        if reading.tip_radius is None:
+            _seek_start(reading)
         _need_start(reading)
     reading.missing += max(0, message.sequence - reading.messages)
     reading.messages = message.sequence + 1
     if topic == log_format.TRACE_TOPIC:
         batch = point_cloud.decode(message.data)
         reading.samples += len(batch)
+        reading.last = float(batch["t"][-1]) if len(batch) else reading.last
+        if reading.samples >= reading.before + reading.announced:
+            reading.felt.clear()
         return batch
     if topic == log_format.FELT_TOPIC:
+        if reading.announced:  # the first since a move, to which what was felt before belongs
+            reading.felt.clear()
+            reading.announced, reading.before = 0, reading.samples
         reading.felt.append(point_cloud.decode(message.data))
         return None
     if topic in _TOPICS.values() and topic != log_format.PATH_TOPIC:
@@ -176,7 +191,10 @@ def note(topic: str, message: bytes, reading: Reading) -> None:
     elif topic == "/move":
         reading.promised = max(reading.promised, data["first"] + data["samples"])
         reading.moves += 1
-        reading.felt.clear()
+        reading.announced = data["samples"]
+        reading.before = reading.samples
+        if not reading.announced:
+            reading.felt.clear()
         _keep(reading, Event("move", data.pop("t"), data))
     elif topic == "/event":
         _keep(reading, Event(data["kind"], data["t"], data["data"]))
@@ -203,10 +221,27 @@ def _begin(data: dict[str, Any], reading: Reading) -> None:
     reading.start, reading.tip_radius = data, stated
 
 
+def _seek_start(reading: Reading) -> None:
+    """Take a /start from further on, where the first ones are destroyed."""
+    from mcap.records import Channel, Message
+
+    from explore3d.log.chunks import Damage, intact_chunks
+
+    topics = dict(_TOPICS)
+    with reading.path.open("rb") as file:
+        for records in intact_chunks(file, Damage()):
+            for record in records:
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                elif isinstance(record, Message) and topics.get(record.channel_id) == "/start":
+                    _begin(json.loads(record.data), reading)
+                    return
+
+
 def _need_start(reading: Reading) -> None:
     if reading.tip_radius is None:
         raise UserError(
-            f"{reading.path}: field tip_radius: the log's first message, which states it, is destroyed (or this is "
+            f"{reading.path}: field tip_radius: every message of the log that states it is destroyed (or this is "
             'no explore3d log); give it with --tip-radius, for example --tip-radius "10 mm"'
         )
 

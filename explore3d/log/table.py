@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from explore3d.log.table_columns import (
 from explore3d.log.table_order import Order, clipped, cloud_order, profile_order, sentinels
 from explore3d.log.table_settings import TableSettings, load_settings
 from explore3d.log.text import LEAST_ROWS, TableText, length_factor, read_text
-from mapping import BoolArray, FloatArray, IntArray, Trace, TraceError
+from mapping import BoolArray, FloatArray, IntArray, Trace, TraceError, length_text
 from mapping.base import Form
 
 NO_MARK = frozenset(("0", "false", "no", "f", "n", "invalid", "bad", "fail", ""))
@@ -45,6 +46,7 @@ def read_table(
     jump: str | float | None = None,
     reference: str | None = None,
     decimal: str | None = None,
+    pixel: str | float | Sequence[str | float] | None = None,
 ) -> Log:
     """Read a CSV or TXT table of positions of the tip.
 
@@ -63,6 +65,7 @@ def read_table(
         jump: a longer step begins a new sweep; None: ten median steps.
         reference: "centre" (default) or "bottom": the point of the ball that the coordinates give.
         decimal: "." or ",", where the file leaves open what "1,234" is.
+        pixel: "1 um" or ("1 um", "2 um"): the file is a map of heights, with these distances of columns and rows.
 
     Raises:
         UserError: one line naming the file and the field.
@@ -77,8 +80,47 @@ def read_table(
         jump=jump,
         reference=reference,
         decimal=decimal,
+        pixel=pixel,
     )
-    return table_log(read_text(path, settings.decimal), settings, sidecar)
+    text = read_text(path, settings.decimal)
+    if settings.pixel is not None:
+        return heights_log(path, text.rows, settings.pixel, "", settings, sidecar, said=text.said)
+    return table_log(text, settings, sidecar)
+
+
+def heights_log(
+    path: Path,
+    heights: FloatArray,
+    pixel: tuple[float, float],
+    unit: str,
+    settings: TableSettings,
+    sidecar: Path | None,
+    said: Sequence[str] = (),
+    kind: str = "a map of heights",
+) -> Log:
+    """The log of a map: each row is a sweep along x, the first at y = 0; one row is a profile.
+
+    Args:
+        heights: (rows, columns), in `unit`; NaN where none was measured.
+        pixel: distance of the columns and of the rows, m.
+        unit: that the file states for the heights; "": none, then the settings must.
+        said: what was recognised.
+
+    Raises:
+        UserError: one line naming the file and the field.
+    """
+    if heights.ndim != 2 or heights.shape[1] < 2:
+        raise UserError(f"{path}: field heights: expected rows of two heights or more; found shape {heights.shape}")
+    rows, columns = heights.shape
+    along, across = np.tile(np.arange(columns) * pixel[0], rows), np.repeat(np.arange(rows) * pixel[1], columns)
+    table = [along, across, heights.ravel(), np.repeat(np.arange(rows, dtype=np.float64), columns)]
+    names, units = ("x", "y", "z", "sweep"), ("m", "m", unit, "")
+    if rows == 1:
+        table, names, units = [along, heights[0]], ("x", "z"), ("m", unit)
+    size = f"a map of {columns} x {rows} heights at {length_text(pixel[0])} x {length_text(pixel[1])}"
+    text = TableText(path, names, units, np.column_stack(table), said=(size, *said), kind=kind)
+    asked = settings.units if isinstance(settings.units, str) else (settings.units or {}).get("z")
+    return table_log(text, settings.model_copy(update={"units": {"z": asked} if asked else None}), sidecar)
 
 
 def table_log(text: TableText, settings: TableSettings, sidecar: Path | None) -> Log:

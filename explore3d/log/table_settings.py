@@ -26,6 +26,15 @@ def _split_columns(value: object) -> object:
     return {role.strip(): int(c) if (c := column.strip()).isdecimal() else c for role, _, column in pairs}
 
 
+def _both_ways(value: object) -> object:
+    """Two distances from one, or from "1 um, 2 um"."""
+    if isinstance(value, str):
+        value = [part.strip() for part in value.split(",")]
+    if isinstance(value, list | tuple) and len(value) == 1:
+        return (value[0], value[0])
+    return (value, value) if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
 def _proper(rotation: tuple[Row, Row, Row]) -> tuple[Row, Row, Row]:
     matrix = np.array(rotation)
     if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) or np.linalg.det(matrix) < 0:
@@ -55,6 +64,8 @@ class TableSettings(Table):
             "gaussian:WAVELENGTH" or "none".
         mask: stretches in x that the base is not fitted to, "1.2mm..1.4mm".
         decimal: sign of the numbers, where the file leaves it open ("1,234"); None: found.
+        pixel: distance of the columns and of the rows of a map of heights, m; one for both or two.
+        part: which one of several the file holds: topic of a bag, sheet of a workbook, channel of an instrument.
     """
 
     units: LengthUnit | dict[Role, LengthUnit] | None = None
@@ -67,6 +78,8 @@ class TableSettings(Table):
     form: str = "auto"
     mask: tuple[str, ...] = ()
     decimal: Literal[".", ","] | None = None
+    pixel: Annotated[tuple[Length, Length] | None, BeforeValidator(_both_ways)] = None
+    part: str | None = None
 
     @model_validator(mode="before")
     @classmethod

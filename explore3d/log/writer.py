@@ -72,19 +72,19 @@ class LogWriter:
         self._mcap.start(profile="explore3d")
         self._register()
         notes = dict(metadata or {})
-        self._message(
-            "start",
-            {
-                "schema": log_format.VERSION,
-                "tip_radius": self._tip_radius,
-                "resolution": float(resolution),
-                "frame": log_format.FRAME,
-                "started": None if started is None else started.isoformat(),
-                "scene": scene_text,
-                "metadata": notes,
-            },
-        )
-        self._flush()
+        self._start = {
+            "schema": log_format.VERSION,
+            "tip_radius": self._tip_radius,
+            "resolution": float(resolution),
+            "frame": log_format.FRAME,
+            "started": None if started is None else started.isoformat(),
+            "scene": scene_text,
+            "metadata": notes,
+        }
+        # twice, and again at the end, each in a chunk of its own: no damage to one chunk takes the tip radius away
+        for _ in range(2):
+            self._message("start", self._start)
+            self._flush()
         # the same again where tools look for it; the reader trusts the message, which a checksum covers
         self._mcap.add_attachment(0, self._epoch, "scene.toml", "application/toml", scene_text.encode())
         texts = {key: value if isinstance(value, str) else _json(value) for key, value in notes.items()}
@@ -116,6 +116,10 @@ class LogWriter:
             self._t = float(trace.t[0])
         self._message("move", {"t": self._t, **_move_data(move), "first": self.samples, "samples": len(trace)})
         self._message("path", _poses(move, self._log_time(self._t)))
+        # moves and samples lie in chunks of their own: who asks for the plan alone fetches no samples
+        if len(trace):
+            with self._disk("write"):
+                self._mcap.flush()
         self._samples("trace", trace)
         self.samples += len(trace)
         if len(trace):
@@ -152,6 +156,8 @@ class LogWriter:
         if self._file.closed:
             return
         with self._disk("write"), self._file:
+            self._message("start", self._start)
+            self._mcap.flush()
             self._message("end", {"t": self._t, "samples": self.samples, "reason": reason})
             self._mcap.finish()
             self._flush(sync=True)

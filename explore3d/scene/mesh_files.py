@@ -9,6 +9,12 @@ import numpy as np
 from explore3d import MeshFileError, unit_factor
 from mapping import Surface, SurfaceError
 
+# Sides of the smallest and the largest body that a fingertip explores, m: the apex of a probe microscope's tip, and
+# what no unit but a wrong one gives
+SMALLEST_BODY, LARGEST_BODY = 1e-8, 1e3
+# Share of the edges between two faces that may be walked the same way by both: of a mesh whose faces are turned at
+# random it is a half, of one that has a side it is none but for a few seams
+MOST_TURNED_EDGES = 0.1
 FORMATS = ("glb", "gltf", "obj", "off", "ply", "stl")
 
 
@@ -24,7 +30,8 @@ def load_mesh(path: Path | str, units: str = "m") -> Surface:
         units: unit of length of the file's coordinates, for example "mm".
 
     Raises:
-        MeshFileError: no such file, not a mesh, no faces, or coordinates that are not finite.
+        MeshFileError: no such file, not a mesh, no faces, coordinates that are not finite, no area, no size that a
+            body can have, or faces that are turned inside and out.
         UnitError: an unknown unit.
     """
     factor = unit_factor(units)
@@ -34,10 +41,39 @@ def load_mesh(path: Path | str, units: str = "m") -> Surface:
         raise MeshFileError(
             f"{path}: the mesh is empty ({len(vertices)} vertices, {len(faces)} faces); at least one triangle is needed"
         )
+    if complaint := _no_body(vertices * factor, faces):
+        raise MeshFileError(f"{path}: {complaint}")
     try:
         return Surface(vertices * factor, faces)
     except SurfaceError as error:
         raise MeshFileError(f"{path}: {error}") from error
+
+
+def _no_body(vertices: np.ndarray, faces: np.ndarray) -> str:
+    """Why vertices (m) and faces can be no body's surface, "" if nothing speaks against it."""
+    if not np.isfinite(vertices).all() or faces.min() < 0 or faces.max() >= len(vertices):
+        return ""  # the surface itself says that
+    size = float(np.ptp(vertices, axis=0).max())
+    if not SMALLEST_BODY <= size <= LARGEST_BODY:
+        possible = f"possible: {SMALLEST_BODY:g} to {LARGEST_BODY:g} m"
+        return f"the mesh is {size:.3g} m long; {possible}; is its unit the right one?"
+    a, b, c = (vertices[faces[:, corner]] / size for corner in range(3))
+    if not np.cross(b - a, c - a).any():
+        return f"none of its {len(faces)} faces has an area"
+    ways = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+    edges = np.sort(ways, axis=1) @ np.array([len(vertices), 1])
+    forth = ways[:, 0] < ways[:, 1]
+    order = np.argsort(edges, kind="stable")
+    edges, forth = edges[order], forth[order]
+    first = np.flatnonzero(np.diff(edges, prepend=-1))
+    pairs = first[np.diff(np.append(first, len(edges))) == 2]
+    turned = int((forth[pairs] == forth[pairs + 1]).sum())
+    if turned > MOST_TURNED_EDGES * len(pairs):
+        return (
+            f"{turned} of the {len(pairs)} edges between its faces join an outer side to an inner one: the faces are "
+            "turned both ways; orient them alike in a mesh program"
+        )
+    return ""
 
 
 def _read(path: Path) -> tuple[np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import ConfigDict, Field, PrivateAttr, SerializeAsAny, ValidationError, model_validator
 
 from explore3d import MeshFileError, SceneError, UnitError
@@ -36,6 +37,13 @@ SCENE_SCHEMA = "explore3d/scene/1"
 # The slowest speed that is tried is this many times slower than the fastest: the height that white noise hides falls
 # with its power 2/5, four times over the range, and what is still hidden then is better felt by many fast sweeps
 SPEED_RANGE = 30.0
+
+
+# In radii of the tip: a crest of 1e-5 shows over 1e-2 of them, too fine for a survey's lines over one body;
+# noise of ten radii hides the fingertip itself
+FINEST_FEATURE, COARSEST_FEATURE, MOST_NOISE = 1e-5, 1e3, 10.0
+# A body of more than 1e5 radii is no fingertip's to survey; a tip of ten bodies feels no shape
+LARGEST_TIPS, LARGEST_TIP_SHARE = 1e5, 10.0
 
 
 class Tip(Table):
@@ -142,6 +150,23 @@ class Scene(Table):
     _text: str = PrivateAttr(default="")
     _meshes: Mapping[Path, Surface] = PrivateAttr(default_factory=dict)
 
+    @model_validator(mode="after")
+    def _within_reason(self) -> Scene:
+        """Lengths that no unit but a wrong one gives are refused before anything is planned from them."""
+        radius = self.tip.radius
+        bounds = {
+            "survey.smallest_feature": (self.survey.smallest_feature, FINEST_FEATURE, COARSEST_FEATURE),
+            "finger.noise.white": (self.finger.noise.white, 0.0, MOST_NOISE),
+            "finger.noise.correlated": (self.finger.noise.correlated, 0.0, MOST_NOISE),
+        }
+        for field, (value, least, most) in bounds.items():
+            if not least * radius <= value <= most * radius:
+                raise ValueError(
+                    f"{field} is {value:g} m, {value / radius:.3g} radii of the tip; possible: {least * radius:g} to "
+                    f"{most * radius:g} m"
+                )
+        return self
+
     @property
     def path(self) -> Path:
         """The file that the scene was read from."""
@@ -231,9 +256,16 @@ class Scene(Table):
         if mesh in self._meshes:
             return self._meshes[mesh]
         try:
-            return load_mesh(mesh, units)
+            surface = load_mesh(mesh, units)
         except (MeshFileError, UnitError) as error:
             raise SceneError(f"{self._path}: {field}: {error}") from error
+        size, radius = float(np.ptp(surface.vertices, axis=0).max()), self.tip.radius
+        if not size / LARGEST_TIPS <= radius <= LARGEST_TIP_SHARE * size:
+            raise SceneError(
+                f"{self._path}: tip.radius: {radius:g} m for a body of {size:g} m ({field}); possible: "
+                f"{size / LARGEST_TIPS:g} to {LARGEST_TIP_SHARE * size:g} m"
+            )
+        return surface
 
 
 def load_scene(path: Path | str) -> Scene:

@@ -11,10 +11,12 @@ import numpy as np
 
 from explore3d import UserError
 from explore3d.log import Log
-from explore3d.log.readers.arrays import numbers_log
+from explore3d.log.readers.arrays import few_digits, numbers_log
+from explore3d.log.readers.optional import claimed
 from explore3d.log.readers.own import POINT, TIP
 
-_UNSAID = ("the units", "the order of movement (taken as the order of the points)", TIP, POINT)
+ORDER = "the order of movement (taken as the order of the points)"
+_UNSAID = ("the units", ORDER, TIP, POINT)
 _PLY_TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
     "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
@@ -57,7 +59,7 @@ class PlyPoints:
 
 
 class PcdPoints:
-    """Points of the Point Cloud Library, in text or binary; compressed ones are refused."""
+    """Points of the Point Cloud Library, in text, binary, or binary compressed by LZF."""
 
     name = "points in a PCD file"
     unsaid: tuple[str, ...] = _UNSAID
@@ -78,11 +80,32 @@ class PcdPoints:
         plain = all(re.fullmatch(r"<(f[48]|[iu][1248])", each) for each in types) and len(names) == len(types)
         if not plain or any(each != "1" for each in said.get("COUNT", [])):
             raise UserError(f"{path}: is a PCD file whose fields are no plain numbers")
-        if form not in ("ascii", "binary"):
-            raise UserError(f"{path}: is a PCD file with {form!r} data; save it as ascii or binary")
-        return _cloud_log(
-            path, names, types, _whole(path, count), body, form == "ascii", settings, "points of a PCD file"
-        )
+        if form not in ("ascii", "binary", "binary_compressed"):
+            raise UserError(f"{path}: is a PCD file with {form!r} data; possible: ascii, binary, binary_compressed")
+        number, kind = _whole(path, count), "points of a PCD file"
+        if form == "binary_compressed":
+            columns = _unpacked_columns(path, body, types, number)
+            return numbers_log(path, tuple(names), columns, settings, kind)
+        return _cloud_log(path, names, types, number, body, form == "ascii", settings, kind)
+
+
+def _unpacked_columns(path: Path, body: bytes, types: list[str], count: int) -> np.ndarray:
+    """(N, C) numbers of a compressed PCD file: column after column in one block of LZF."""
+    from explore3d.log.readers.lzf_kernels import unpack_lzf
+
+    packed, size = (int.from_bytes(body[at : at + 4], "little") for at in (0, 4))
+    if packed > len(body) - 8 or size != count * sum(np.dtype(each).itemsize for each in types):
+        raise UserError(f"{path}: its header claims {packed} and {size} bytes for {count} points; it is cut or damaged")
+    claimed(path, "a PCD file", size)
+    out = np.empty(size, dtype=np.uint8)
+    if unpack_lzf(np.frombuffer(body, np.uint8, packed, 8), out) != size:
+        raise UserError(f"{path}: its compressed points are damaged")
+    columns, at = [], 0
+    for each in types:
+        kind = np.dtype(each)
+        columns.append(out[at : at + count * kind.itemsize].view(kind).astype(np.float64))
+        at += count * kind.itemsize
+    return np.column_stack(columns)
 
 
 class ObjPoints:
@@ -103,11 +126,11 @@ class ObjPoints:
         return _cloud_log(path, ["x", "y", "z"], ["f8"] * 3, len(lines), body, True, settings, "points of an OBJ file")
 
 
-class StlMesh:
-    """Never a recording: triangles have no order of movement."""
+class StlPoints:
+    """Points that a program could only write as triangles: three equal corners each; a true mesh is refused."""
 
-    name = "an STL mesh"
-    unsaid: tuple[str, ...] = ()
+    name = "an STL file"
+    unsaid: tuple[str, ...] = _UNSAID
 
     def sniff(self, first: bytes) -> float:
         if re.match(rb"\s*solid\b.*\s+facet normal", first, re.S):
@@ -121,7 +144,25 @@ class StlMesh:
         return 0.5 if whole and np.isfinite(normal).all() and float(np.abs(normal).max()) <= 1.001 else 0.0
 
     def read(self, path: Path, settings: Mapping[str, Any]) -> Log:
-        raise UserError(f"{path}: {_MESH}")
+        data = path.read_bytes()
+        words = bool(re.match(rb"\s*solid\b.*\s+facet normal", data[:LONGEST_HEADER], re.S))
+        if words:
+            lines = re.findall(rb"(?m)^[ \t]*vertex[ \t]+([^\r\n]*)", data)
+            if len(lines) % 3 or len(lines) // 3 != len(re.findall(rb"(?m)^[ \t]*endfacet", data)):
+                raise UserError(f"{path}: is an STL file whose facets have no three corners each; it is cut or damaged")
+            corners = _parsed(path, lines, 3).reshape(-1, 3, 3)
+        else:
+            count = int.from_bytes(data[80:84], "little")
+            if len(data) < 84 + 50 * count:
+                raise UserError(
+                    f"{path}: its header claims {count} facets, for which its {len(data)} bytes are too few; it is cut"
+                )
+            facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
+            corners = np.frombuffer(data, facet, count, 84)["corners"].astype(np.float64)
+        if not (corners == corners[:, :1]).all():
+            raise UserError(f"{path}: {_MESH}")
+        said = [] if words else few_digits(["<f4"])
+        return numbers_log(path, ("x", "y", "z"), corners[:, 0], settings, "points of an STL file", said)
 
 
 def _header(path: Path, data: bytes, end: bytes) -> tuple[str, bytes]:
@@ -156,13 +197,23 @@ def _cloud_log(
             f"{path}: its header claims {count} points, for which its {len(body)} bytes are too few; it is cut"
         )
     if text:
-        try:
-            rows = np.loadtxt(body.decode("latin-1").splitlines()[:count], ndmin=2, dtype=np.float64) if count else None
-        except ValueError as error:
-            raise UserError(f"{path}: {str(error).splitlines()[0]}") from error
-        if rows is None or rows.shape != (count, len(names)):
-            raise UserError(f"{path}: expected {count} points of {len(names)} numbers; found another number")
+        rows = _parsed(path, body.splitlines()[:count], len(names))
+        if len(rows) != count:
+            raise UserError(f"{path}: expected {count} points; found {len(rows)}; it is cut")
     else:
         points = np.frombuffer(body, dtype=list(zip(names, types, strict=True)), count=count)
         rows = np.column_stack([points[name].astype(np.float64) for name in names])
-    return numbers_log(path, tuple(names), rows, settings, kind)
+    return numbers_log(path, tuple(names), rows, settings, kind, [] if text else few_digits(types))
+
+
+def _parsed(path: Path, lines: list[bytes], columns: int) -> np.ndarray:
+    """(N, columns) numbers of lines of words."""
+    words = [line.split() for line in lines if line.strip()]
+    if any(len(line) != columns for line in words):
+        raise UserError(
+            f"{path}: expected {columns} numbers for each point; found another number; it is cut or damaged"
+        )
+    try:
+        return np.array(words, dtype=np.float64).reshape(-1, columns)
+    except ValueError as error:
+        raise UserError(f"{path}: {str(error).splitlines()[0]}") from error

@@ -39,19 +39,24 @@ class Gzip:
     def read(self, path: Path, settings: Mapping[str, Any]) -> Log:
         try:
             with gzip.open(path) as packed:
-                return _read_inside(path, path.name.removesuffix(".gz"), packed, self._read, settings)
+                return read_inside(path, path.name.removesuffix(".gz"), packed, self._read, settings)
         except (OSError, EOFError, zlib.error) as error:
             raise UserError(f"{path}: is a damaged gzip archive: {error}") from error
 
 
 class Zip:
-    """A ZIP archive with one recording; what else it holds must be a sidecar in TOML."""
+    """A ZIP archive with one recording; what else it holds must be a sidecar in TOML.
+
+    Args:
+        read: reads what is inside.
+        others: by a member's name, what reads the archive as a whole: a workbook, an X3P file.
+    """
 
     name = "a ZIP archive"
     unsaid: tuple[str, ...] = ()
 
-    def __init__(self, read: Read) -> None:
-        self._read = read
+    def __init__(self, read: Read, others: Mapping[str, Read]) -> None:
+        self._read, self._others = read, others
 
     def sniff(self, first: bytes) -> float:
         return 0.9 if first.startswith(b"PK\x03\x04") else 0.0
@@ -60,9 +65,10 @@ class Zip:
         try:
             with zipfile.ZipFile(path) as packed:
                 inside = packed.infolist()
-                if any(each.filename == "[Content_Types].xml" for each in inside):
-                    raise UserError(f"{path}: is a spreadsheet or an office document; export it as CSV")
                 check_sizes(path, inside)
+                for member, reader in self._others.items():
+                    if any(each.filename == member for each in inside):
+                        return reader(path, settings)
                 files = [each for each in inside if not each.is_dir() and not _beside(each.filename)]
                 if len(files) != 1:
                     names = ", ".join(each.filename for each in files[:5]) or "nothing"
@@ -70,7 +76,7 @@ class Zip:
                         f"{path}: expected one recording in the archive; found {names}; unpack it and name one"
                     )
                 with packed.open(files[0]) as member:
-                    return _read_inside(path, Path(files[0].filename).name, member, self._read, settings)
+                    return read_inside(path, Path(files[0].filename).name, member, self._read, settings)
         except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
             raise UserError(f"{path}: is a ZIP archive that cannot be read: {error}") from error
 
@@ -98,10 +104,20 @@ def _beside(name: str) -> bool:
     return name.startswith(("__MACOSX/", ".")) or name.endswith((".toml", ".DS_Store"))
 
 
-def _read_inside(
+def read_inside(
     path: Path, name: str, packed: IO[bytes] | gzip.GzipFile, read: Read, settings: Mapping[str, Any]
 ) -> Log:
-    """Unpack piece by piece into a folder of its own, that is gone afterwards, and read."""
+    """Unpack piece by piece into a folder of its own, that is gone afterwards, and read.
+
+    Args:
+        path: the archive.
+        name: of what is in it.
+        packed: gives its bytes.
+        read: the reader.
+
+    Raises:
+        UserError: more than a recording can be, or what the reader raises, naming the archive.
+    """
     with TemporaryDirectory(prefix="explore3d-") as folder:
         inner = Path(folder) / (name or "recording")
         size, outer = 0, path.stat().st_size

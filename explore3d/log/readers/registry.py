@@ -12,12 +12,20 @@ from typing import Any
 from explore3d import UserError
 from explore3d.log import LOG, Log
 from explore3d.log.readers.arrays import NpyArray, NpzArrays
-from explore3d.log.readers.clouds import ObjPoints, PcdPoints, PlyPoints, StlMesh
-from explore3d.log.readers.own import McapLog, TextTable
+from explore3d.log.readers.clouds import ObjPoints, PcdPoints, PlyPoints, StlPoints
+from explore3d.log.readers.instruments import InstrumentFile, X3pFile
+from explore3d.log.readers.lidar import LasPoints
+from explore3d.log.readers.own import McapLog, StylusText, TextTable
 from explore3d.log.readers.packed import Gzip, Zip
+from explore3d.log.readers.probing import BcncProbe, GrblProbes, LinuxCncProbes, RepRapHeights
 from explore3d.log.readers.reader import FIRST_BYTES, Reader
+from explore3d.log.readers.ros import OtherMcap, RosBag
+from explore3d.log.readers.tabular import ParquetTable, Workbook
+from explore3d.log.readers.trajectories import PlotJugglerTable, TumTrajectory
 
 GROUP = "explore3d.readers"
+# A member's name, and what reads the archive that holds it as one file
+ARCHIVES = {"[Content_Types].xml": Workbook().read, "main.xml": X3pFile().read}
 
 
 @cache
@@ -27,8 +35,10 @@ def readers() -> tuple[Reader, ...]:
     Raises:
         UserError: a reader of another package that cannot be loaded, named with its package.
     """
-    ours: list[Reader] = [McapLog(), NpyArray(), NpzArrays(), PlyPoints(), PcdPoints(), Gzip(read_recording)]
-    ours += [Zip(read_recording), ObjPoints(), StlMesh()]
+    ours: list[Reader] = [McapLog(), OtherMcap(), RosBag(), NpyArray(), NpzArrays(), ParquetTable(), PlyPoints()]
+    ours += [PcdPoints(), LasPoints(), InstrumentFile(), Gzip(read_recording), Zip(read_recording, ARCHIVES)]
+    ours += [ObjPoints(), StlPoints(), RepRapHeights(), GrblProbes(), BcncProbe(), LinuxCncProbes(), TumTrajectory()]
+    ours += [PlotJugglerTable(), StylusText()]
     for entry in entry_points(group=GROUP):
         try:
             made = entry.load()
@@ -52,8 +62,8 @@ def reader_of(path: Path) -> Reader:
     if not first and path.suffix != ".mcap":
         raise UserError(f"{path}: is empty")
     # a log of ours whose first bytes are destroyed is still one by its name
-    text = bool(first) and not any(byte < 9 or 13 < byte < 32 for byte in first)
-    if path.suffix == ".mcap" and not text and max(each.sniff(first) for each in readers()) <= 0.1:
+    text = first[:2] in (b"\xff\xfe", b"\xfe\xff") or not any(byte < 9 or 13 < byte < 32 for byte in first)
+    if path.suffix == ".mcap" and not (first and text) and max(each.sniff(first) for each in readers()) <= 0.1:
         return readers()[0]
     return max(readers(), key=lambda each: each.sniff(first))
 

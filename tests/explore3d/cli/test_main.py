@@ -147,18 +147,27 @@ def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatc
     from explore3d import jobs, report
 
     calls: list[tuple[tuple[object, ...], dict[str, object]]] = []
-    monkeypatch.setattr(jobs, "analyze", lambda *given, **options: calls.append((given, options)))
+    monkeypatch.setattr(jobs, "analyze_each", lambda *given, **options: calls.append((given, options)) or [])
     monkeypatch.setattr(report, "show", lambda *given: None)
     options = ["--tip-radius", "2 um", "--units", "mm", "--columns", "x=1, z=2", "--frame", "0 mm, 1 mm,5 mm"]
+    options += ["--pixel", "1 um", "--part", "/tip", "--same-object"]
+    options += ["--tip-sd", "20 nm", "--form", "line", "--mask", "1mm..2mm"]
     options += ["--model", "body.ply", "--model-units", "mm", "--force", "curvature"]
     assert explore3d_main(monkeypatch, "analyze", "a.csv", "b.mcap", "--out", tmp_path, *options) == 0
     ((given, named),) = calls
     assert given == ([Path("a.csv"), Path("b.mcap")], tmp_path)
     named.pop("progress")
+    named.pop("tell")
     assert named == {
         "tip_radius": "2 um",
         "units": "mm",
         "columns": "x=1, z=2",
+        "pixel": "1 um",
+        "part": "/tip",
+        "tip_sd": "20 nm",
+        "form": "line",
+        "mask": ["1mm..2mm"],
+        "same_object": True,
         "frame": {"origin": ["0 mm", "1 mm", "5 mm"]},
         "model": Path("body.ply"),
         "model_units": "mm",

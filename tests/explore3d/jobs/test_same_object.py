@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from explore3d.jobs.merge import unlike
+from explore3d import UserError
+from explore3d.jobs.analyze import analyze, analyze_each
+from explore3d.jobs.merge import merge
+from explore3d.jobs.objects import not_one_object, unlike
 from explore3d.log.record import KIND, Event, Log, base_event
 from mapping.base.base import Base
 from mapping.surface import Surface
@@ -48,3 +54,47 @@ def test_a_log_recorded_for_another_mesh_is_another_object() -> None:
 def test_a_doubtful_pose_leaves_room() -> None:
     moved = log_over(None, (0.0, 0.0, 2e-3))
     assert unlike(moved, plate()) and unlike(moved, plate(), pose_sd=1e-3) == ""
+
+
+def test_files_whose_tips_places_or_bases_differ_are_no_one_object() -> None:
+    assert not_one_object([log_over(plate()), log_over(plate())]) == ""
+    assert not_one_object([raster_over(0), raster_over(1)]) == ""
+    assert "lies in another place" in not_one_object([raster_over(0), raster_over(1, (0.2, 0.0, 0.0))])
+    assert "off the base" in not_one_object([raster_over(0), raster_over(1, (0.0, 0.0, 2e-3))])
+    thin = replace(raster_over(1).trace, tip_radius=1e-3)
+    assert "with a tip of 1 mm, not 5 mm" in not_one_object([raster_over(0), Log(thin)])
+
+
+def raster_over(seed: int, shift: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Log:
+    """Five sweeps over a plate without a mesh of its own."""
+    x = np.tile(np.linspace(-0.03, 0.03, 600), 5)
+    y, sweep = np.repeat(np.linspace(-0.02, 0.02, 5), 600), np.repeat(np.arange(5), 600)
+    z = R + np.random.default_rng(seed).normal(0.0, 1e-5, len(x))
+    return Log(Trace(1e-3 * np.arange(len(x)), np.column_stack([x, y, z]) + np.array(shift), sweep, R))
+
+
+def table(path: Path, log: Log) -> Path:
+    np.savetxt(path, log.trace.centers, delimiter=",", header="x [m],y [m],z [m]", fmt="%.9f")
+    return path
+
+
+def test_several_files_are_one_job_or_one_each_and_that_is_said(tmp_path: Path) -> None:
+    one, other = table(tmp_path / "a.csv", raster_over(0)), table(tmp_path / "b.csv", raster_over(1))
+    far = table(tmp_path / "far.csv", raster_over(2, (0.2, 0.0, 0.0)))
+    told: list[str] = []
+    assert len(analyze_each([one, other], tmp_path / "both", tip_radius=R, tell=told.append)) == 1
+    assert len(analyze_each([one, far], tmp_path / "each", tip_radius=R, tell=told.append)) == 2
+    assert len(analyze_each([one, far], tmp_path / "said", tip_radius=R, tell=told.append, same_object=True)) == 1
+    assert "taken as one object" in told[0] and "each on its own" in told[1] and "--same-object" in told[1]
+    assert len(told) == 2
+    assert (tmp_path / "both" / "report.html").is_file() and (tmp_path / "said" / "model.json").is_file()
+    assert {path.name for path in (tmp_path / "each").iterdir() if path.is_dir()} == {"a", "far"}
+
+
+def test_merge_takes_a_table_as_analyze_does(tmp_path: Path) -> None:
+    analyze(table(tmp_path / "a.csv", raster_over(0)), tmp_path / "model", tip_radius=R)
+    merged = merge(tmp_path / "model", [table(tmp_path / "b.csv", raster_over(1))], tmp_path / "both", tip_radius=R)
+    assert len(merged.provenance["merged_sha256"]) == 1
+    with pytest.raises(UserError, match="--tip-radius"):
+        merge(tmp_path / "model", [tmp_path / "b.csv"], tmp_path / "again")
+    assert not (tmp_path / "again").exists()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import json
 import os
 import signal
 import subprocess
@@ -184,10 +186,68 @@ def test_a_destroyed_stretch_costs_only_the_chunks_in_it(tmp_path: Path) -> None
         assert len(log.trace) < 2400
 
 
-def test_a_log_whose_beginning_is_destroyed_asks_for_the_tip_radius(tmp_path: Path) -> None:
+def test_a_log_survives_the_loss_of_any_one_chunk(tmp_path: Path) -> None:
+    path = write_log(tmp_path / "log.mcap", moves=4, count=300)
+    whole, ends = path.read_bytes(), [end for end, _ in chunk_ends(path)]
+    for end in ends:
+        damaged = bytearray(whole)
+        damaged[end - 20 : end] = bytes(20)
+        path.write_bytes(damaged)
+        log = read_log(path)
+        assert log.scene_text == "seed = 1\n" and log.trace.tip_radius == RADIUS
+        check_damaged(log, total=1200, worst=300)
+        assert sum(event.kind == "move" for event in log.events) >= 7
+    # both of the first two: the third stands at the end
+    damaged = bytearray(whole)
+    damaged[: ends[1]] = bytes(ends[1])
+    path.write_bytes(damaged)
+    assert len(read_log(path).trace) == 1200 and read_log(path).trace.tip_radius == RADIUS
+
+
+class Counted(io.BytesIO):
+    """A file that counts the bytes that are read of it, as requests for ranges would."""
+
+    fetched = 0
+
+    def read(self, size: int | None = -1) -> bytes:
+        data = super().read(size)
+        self.fetched += len(data)
+        return data
+
+
+def test_the_plan_of_a_long_log_is_had_for_kilobytes(tmp_path: Path) -> None:
+    from mcap.reader import SeekingReader
+
+    path = write_log(tmp_path / "log.mcap", moves=15, count=40_000)
+    with Counted(path.read_bytes()) as file:
+        reader = SeekingReader(file)
+        moves = [json.loads(message.data) for _, _, message in reader.iter_messages(topics=["/move", "/start"])]
+        count = file.fetched
+    print(f"{count} of {path.stat().st_size} bytes")
+    assert len(moves) == 33 and moves[0]["tip_radius"] == RADIUS
+    assert path.stat().st_size > 8e6 and count < 120e3
+
+
+@pytest.mark.parametrize("kept", ["the move alone", "the move and a part of its samples"])
+def test_what_was_felt_counts_where_the_samples_of_the_move_did_not_reach_the_disk(tmp_path: Path, kept: str) -> None:
+    path = tmp_path / "log.mcap"
+    with LogWriter(path, tip_radius=RADIUS) as log:
+        log.write(MOVE, trace_of(0, 100))
+        log.felt(trace_of(100, 60_000, 1))
+        before = path.stat().st_size
+        log.write(MOVE, trace_of(100, 60_000, 1))
+    ends = [end for end, _ in chunk_ends(path) if end > before]
+    path.write_bytes(path.read_bytes()[: ends[0 if kept == "the move alone" else 1]])
+    log = read_log(path)
+    assert_same_samples(log.trace, np.arange(60_100))
+    assert not log.complete and "broken off" in log.recovered
+
+
+def test_a_log_whose_every_start_is_destroyed_asks_for_the_tip_radius(tmp_path: Path) -> None:
     path = write_log(tmp_path / "log.mcap", moves=3, count=300)
-    damaged = bytearray(path.read_bytes())
-    damaged[200] ^= 0xFF
+    damaged, ends = bytearray(path.read_bytes()), [end for end, _ in chunk_ends(path)]
+    for end in (*ends[:2], *ends[-2:]):
+        damaged[end - 20 : end] = bytes(20)
     path.write_bytes(damaged)
     with pytest.raises(UserError, match=r"log\.mcap: field tip_radius.*--tip-radius"):
         read_log(path)
