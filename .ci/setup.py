@@ -32,7 +32,8 @@ def main(extras: list[str]) -> None:
     subprocess.run([*pip(), "install", "--quiet", "--editable", project], cwd=ROOT, env=quiet, check=True)
     system_libraries.provide(PYTHON, VENV / "lib" / "explore3d-syslibs")
     print("setup: compiling, so that the first run is as quick as the second (a minute or two)", flush=True)
-    subprocess.run([str(PYTHON), "-m", "explore3d", "doctor", "--compile", "--json"], cwd=ROOT, env=quiet, check=True)
+    compiling = [str(PYTHON), "-m", "explore3d", "doctor", "--compile", "--json"]
+    subprocess.run(compiling, cwd=ROOT, env=quiet, stdout=subprocess.DEVNULL, check=True)
 
 
 def make_environment() -> None:

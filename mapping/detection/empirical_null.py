@@ -161,7 +161,8 @@ def effective_noise(bank: Bank, scales: Sequence[NullScale]) -> Noise:
     """White and correlated noise under which the filters' outputs scatter as measured, for all who need one law.
 
     The variance of a filter's output is linear in the variances of both parts: for each correlation length of a
-    ladder, the least relative errors over the filters and over the white level of single samples.
+    ladder, the least relative errors over the filters and over the white level of single samples, each weighed by
+    how well a path of that length tells it: single bins tell the level, and a wide filter sees few places.
     """
     from scipy.optimize import nnls
 
@@ -170,12 +171,14 @@ def effective_noise(bank: Bank, scales: Sequence[NullScale]) -> Noise:
     target = np.array([bank.filters[k].sd ** 2 * m for k, m in zip(numbers, measured, strict=True)])
     level = float(np.mean([scale.local.mean() for scale in scales])) * bank.noise.white**2
     white = np.array([_output_variance(bank, k, Noise(1.0)) for k in numbers])
+    bins = sum(len(scale.local) for scale in scales)
+    seen = np.array([bins * bank.spacing / bank.filters[k].half_width for k in numbers]) / LOG_VARIANCE_PER_WIDTH
+    weights = np.sqrt(np.append(seen, bins / LOG_VARIANCE_PER_BIN))
     best, noise = np.inf, bank.noise
     for length in np.geomspace(2 * bank.spacing, bank.filters[-1].half_width, CORRELATION_LENGTHS):
         correlated = [_output_variance(bank, k, Noise(0.0, 1.0, float(length))) for k in numbers]
         shapes = np.column_stack([white, correlated]) / target[:, None]
-        # the level of single samples weighs as much as one filter
-        levels, misfit = nnls(np.vstack([shapes, [1 / level, 0.0]]), np.ones(len(shapes) + 1))
+        levels, misfit = nnls(np.vstack([shapes, [1 / level, 0.0]]) * weights[:, None], weights)
         if misfit < best:
             white_sd, correlated_sd = np.sqrt(levels).tolist()
             best, noise = misfit, Noise(white_sd, correlated_sd, float(length))
