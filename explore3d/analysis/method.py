@@ -155,12 +155,18 @@ def fitted(work: Work, share: Share) -> None:
     """The base; one that was found by feeling is known better by all that was felt since."""
     again = work.given is not None and _was_found(work.given)
     work.base = refined(work.base, work.trace) if again else fit_base(work.trace, form=work.log.form)
-    for bend in work.base.parameters.get("absorbed", ()):
+    for bend in _bends(work.base, "absorbed"):
         end = "was taken for the base's own form; if it is a feature, say --form line, arc or poly:2, or --mask it"
         work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))
-    for bend in work.base.parameters.get("left standing", ()):
+    for bend in _bends(work.base, "left standing"):
         end = "stands off the base and is wider than fine features are: only its edges are sought"
         work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))
+
+
+def _bends(base: Base, name: str) -> list[dict[str, Any]]:
+    """What stands alone in the profile that the base was fitted to, and was dealt with in this way."""
+    found = base.parameters.get(name, [])
+    return [bend for bend in found if isinstance(bend, dict)] if isinstance(found, list) else []
 
 
 def _described(bend: dict[str, Any]) -> str:

@@ -174,6 +174,8 @@ def _load(file: Path, key: str) -> Condensed | None:
         Crossing(**(each | {name: np.array(each[name]) for name in vectors})) for each in record.pop("crossings")
     )
     noise = Noise(**record.pop("noise"))
-    sentences = {name: tuple(record.pop(name, ())) for name in ("left_out", "remarks", "unfelt")}
-    detections = Detections(crossings=crossings, noise=noise, **sentences, **record)
+    for name in ("left_out", "remarks", "unfelt"):
+        record[name] = tuple(record.get(name, ()))
+    record["inspected_sweeps"] = tuple((number, length) for number, length in record.get("inspected_sweeps", ()))
+    detections = Detections(crossings=crossings, noise=noise, **record)
     return Condensed(trace, detections, samples, events, **log)

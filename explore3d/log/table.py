@@ -114,7 +114,8 @@ def heights_log(
     rows, columns = heights.shape
     along, across = np.tile(np.arange(columns) * pixel[0], rows), np.repeat(np.arange(rows) * pixel[1], columns)
     table = [along, across, heights.ravel(), np.repeat(np.arange(rows, dtype=np.float64), columns)]
-    names, units = ("x", "y", "z", "sweep"), ("m", "m", unit, "")
+    names: tuple[str, ...] = ("x", "y", "z", "sweep")
+    units: tuple[str, ...] = ("m", "m", unit, "")
     if rows == 1:
         table, names, units = [along, heights[0]], ("x", "z"), ("m", unit)
     size = f"a map of {columns} x {rows} heights at {length_text(pixel[0])} x {length_text(pixel[1])}"

@@ -35,7 +35,7 @@ class Feet:
 
 
 # A number, a flag, or rows of numbers
-FitValue = bool | float | list[float] | list[list[float]]
+FitValue = bool | float | list[float] | list[list[float]] | list[dict[str, Any]]
 
 
 class PoseRecord(TypedDict):

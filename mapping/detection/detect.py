@@ -191,9 +191,9 @@ def detect(
         bank, level = bank.scaled(typical_scale(told)), effective_noise(bank, told)
         remarks = (_raised(bank, behind.banks[usual], threshold, tip),)
     limit = max(bank.detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
-    each = _inspected(profiles, behind.banks)
+    of_each = _inspected(profiles, behind.banks)
     return Detections(
-        tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out, each, remarks
+        tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out, of_each, remarks
     )
 
 

@@ -17,7 +17,7 @@ def unpack_lzf(packed, out):  # type: ignore[no-untyped-def]
     Returns:
         How many bytes were unpacked; -1 if the bytes are no LZF, or do not fit.
     """
-    at, done = 0, 0
+    at, done = np.int64(0), np.int64(0)
     while at < len(packed):
         control = np.int64(packed[at])
         at += 1

@@ -75,8 +75,8 @@ class Zip:
                     raise UserError(
                         f"{path}: expected one recording in the archive; found {names}; unpack it and name one"
                     )
-                with packed.open(files[0]) as member:
-                    return read_inside(path, Path(files[0].filename).name, member, self._read, settings)
+                with packed.open(files[0]) as content:
+                    return read_inside(path, Path(files[0].filename).name, content, self._read, settings)
         except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
             raise UserError(f"{path}: is a ZIP archive that cannot be read: {error}") from error
 

@@ -152,7 +152,7 @@ def _arc(x: FloatArray, z: FloatArray, scale: float, places: FloatArray) -> Floa
     floor = max(scale, 1e-9 * size)
 
     def residual(theta: FloatArray) -> FloatArray:
-        return (height(theta * size, u) - z) / floor
+        return np.asarray((height(theta * size, u) - z) / floor)
 
     best = least_squares(residual, parabola / size, loss="soft_l1", x_scale="jac", xtol=1e-14)
     return height(best.x * size, (places - middle) / half)

@@ -104,7 +104,7 @@ def others(value: Any, info: FieldInfo) -> list[Any]:
         ]
     if isinstance(value, str):
         found = [choice for choice in allowed if choice != value]
-        return found or [str(MESHES / "flat.ply"), "mm", f"{value}/other"]
+        return found or [str(MESHES / "flat.ply"), "cm", f"{value}/other"]
     if allowed:
         return [[choice] for choice in allowed if [choice] != value]
     return [(1.1 * np.array(value) + 1e-4).tolist()]
