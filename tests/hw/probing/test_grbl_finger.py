@@ -40,6 +40,8 @@ FRAME = StageFrame.of((-0.15, -0.15, -0.05), (0.0, 0.0, 0.4))
 DOWN = np.array([0.0, 0.0, -1.0])
 PECK = Peck(step=1e-3, clearance=5e-4, speed=0.02, stroke=R)
 
+SLOW = pytest.mark.slow
+
 
 def tile_with_block(height: float = 8e-4) -> Surface:
     """A square of 60 mm with a flat block of 20 mm on its middle."""
@@ -234,13 +236,13 @@ def test_the_probe_is_checked_by_the_users_touch() -> None:
     assert len(asked) == 2
 
 
-def test_garbled_doubled_and_lost_reply_bytes_never_become_contacts() -> None:
-    for kind in ("lose", "double", "garble"):
-        with machine(pace=10.0) as (server, _), pecker(server) as finger:
-            server.faults.append(Fault(kind, at=0.0, rate=0.01, seed=3))
-            trace = finger.execute(across(x=0.004))
-        assert len(trace) > 0.9 * 24
-        assert np.abs(off_the_body(trace.centers)).max() < 2e-5
+@pytest.mark.parametrize("kind", ["garble", pytest.param("lose", marks=SLOW), pytest.param("double", marks=SLOW)])
+def test_garbled_doubled_and_lost_reply_bytes_never_become_contacts(kind: str) -> None:
+    with machine(pace=10.0) as (server, _), pecker(server) as finger:
+        server.faults.append(Fault(kind, at=0.0, rate=0.01, seed=3))
+        trace = finger.execute(across(x=0.004))
+    assert len(trace) > 0.9 * 24
+    assert np.abs(off_the_body(trace.centers)).max() < 2e-5
 
 
 def test_every_alarm_is_said_in_words_with_the_remedy() -> None:
