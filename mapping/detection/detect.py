@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import BoolArray, DetectionError, FloatArray, IntArray, Trace
+from mapping import BoolArray, DetectionError, FloatArray, IntArray, Trace, length_text
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
 from mapping.detection.candidates import LARGEST_SHARE, Searched, search, without
 from mapping.detection.cap_fit import Disturbance
@@ -167,7 +167,10 @@ def detect(
     if (
         noise is None and level.white > CONTACT_ROUNDING * tip
     ):  # one that is given is the caller's word; one that was fitted is held against the quiet path
-        found, nulls = _weighed(profiles, found, behind.banks, level, thresholds, tip)
+        weighed, nulls = _weighed(profiles, list(found), behind.banks, level, thresholds, tip)
+        # over a base that was fitted to one profile, small features and roughness are the same thing: what speaks
+        # against the law is said, and decides nothing (see _stands_out)
+        found = found if base.kind == "profile" else weighed
     crossings = []
     for profile, each in zip(profiles, found, strict=True):
         disturbances = each.disturbances
@@ -188,8 +191,10 @@ def detect(
         null for profile, null in zip(profiles, nulls, strict=True) if profile.spacing == usual and null is not None
     ]
     if told:
-        bank, level = bank.scaled(typical_scale(told)), effective_noise(bank, told)
-        remarks = (_raised(bank, behind.banks[usual], threshold, tip),)
+        scaled = bank.scaled(typical_scale(told))
+        remarks = (_raised(scaled, bank, threshold, tip, base),)
+        if base.kind != "profile":
+            bank, level = scaled, effective_noise(bank, told)
     limit = max(bank.detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
     of_each = _inspected(profiles, behind.banks)
     return Detections(
@@ -241,13 +246,15 @@ def _weighed(
     return found, nulls
 
 
-def _raised(measured: Bank, fitted: Bank, threshold: float, tip: float) -> str:
-    before, after = (1e3 * bank.detection_limit(threshold, tip) for bank in (fitted, measured))
-    return (
+def _raised(measured: Bank, fitted: Bank, threshold: float, tip: float, base: Base) -> str:
+    before, after = (length_text(bank.detection_limit(threshold, tip), 2) for bank in (fitted, measured))
+    said = (
         "the noise is not the same everywhere, or of no simple law: where nothing is, the filters' outputs scatter "
-        f"otherwise than the fitted noise says; crests are weighed by what was measured, and the typical limit is "
-        f"{after:.3g} mm instead of {before:.3g} mm"
+        "otherwise than the fitted noise says"
     )
+    if base.kind == "profile":
+        return f"{said}; one profile cannot tell roughness from small features, and crests below {after} may be either"
+    return f"{said}; crests are weighed by what was measured, and the typical limit is {after} instead of {before}"
 
 
 def _felt(laid: LaidTrace, profiles: dict[int, tuple[SweepHeights, ...]]) -> tuple[BoolArray, tuple[str, ...]]:
