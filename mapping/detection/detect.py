@@ -254,7 +254,8 @@ def _raised(measured: Bank, fitted: Bank, threshold: float, tip: float, base: Ba
     )
     if base.kind == "profile":
         return f"{said}; one profile cannot tell roughness from small features, and crests below {after} may be either"
-    return f"{said}; crests are weighed by what was measured, and the typical limit is {after} instead of {before}"
+    limit = f"is {after} instead of {before}" if after != before else f"stays {after}"
+    return f"{said}; crests are weighed by what was measured, and the typical limit {limit}"
 
 
 def _felt(laid: LaidTrace, profiles: dict[int, tuple[SweepHeights, ...]]) -> tuple[BoolArray, tuple[str, ...]]:
