@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from explore3d.errors import SceneError
+from explore3d.scene.finger import kinds
 from explore3d.scene.scene import load_scene, parse_scene
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -29,7 +30,9 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     for folder in (metadata.parent, KLIPPER):
         monkeypatch.syspath_prepend(str(folder))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, (metadata.parent, KLIPPER, ROOT))))
+    kinds.cache_clear()  # packages are looked up once
     yield tmp_path
+    kinds.cache_clear()
     sys.modules.pop("explore3d_klipper", None)
 
 
