@@ -39,13 +39,23 @@ class Carrier:
         return cls(base, tip_radius, 0.5 * tip_radius, 6.0 * tip_radius)
 
     def clearance(self, path: FloatArray, approach: FloatArray) -> FloatArray:
-        """(K,) distance of the stem's surface from the body at ball centres (K, 3) and approaches (K, 3), m."""
+        """(K,) distance of the stem's surface from the body at ball centres (K, 3) and approaches (K, 3), m.
+
+        No place is nearer to the body than the stem's middle by more than it lies from it: where that leaves a place
+        free, the body is not asked, and a free stem's distance is this bound from below. In the open the middle tells
+        all six.
+        """
         if self.length <= 0:
             return np.full(len(path), np.inf)
         back = np.linspace(STEM_START * self.tip_radius, self.length, STEM_PLACES)
         stem = path[:, None, :] - back[None, :, None] * approach[:, None, :]
-        height = self.base.foot(stem.reshape(-1, 3), self.radius).height
-        return np.asarray(height.reshape(len(path), STEM_PLACES).min(axis=1))
+        middle = STEM_PLACES // 2
+        known = self.base.foot(stem[:, middle], self.radius).height
+        height = known[:, None] - np.abs(back - back[middle])
+        ask = height < 0
+        ask[:, middle] = False
+        height[ask] = self.base.foot(stem[ask], self.radius).height
+        return np.asarray(height.min(axis=1))
 
     def turned(self, path: FloatArray, approach: FloatArray, most: float) -> FloatArray:
         """The approaches (K, 3), turned where the stem would touch the body, as little and as evenly as will do.
