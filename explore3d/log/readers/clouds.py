@@ -43,7 +43,7 @@ class PlyPoints:
         sizes = {words[index][1]: _whole(path, words[index][-1]) for index in elements if len(words[index]) == 3}
         if sizes.get("face") or sizes.get("tristrips"):
             raise UserError(f"{path}: {_MESH}")
-        if not elements or words[elements[0]][1] != "vertex":
+        if not elements or words[elements[0]][1] != "vertex" or "vertex" not in sizes:
             raise UserError(f"{path}: is a PLY file whose first element is not vertex")
         stop = elements[1] if len(elements) > 1 else len(words)
         fields = [line[1:] for line in words[elements[0] + 1 : stop] if line[:1] == ["property"]]

@@ -17,7 +17,7 @@ from explore3d.log import Log, inspect, load_logs
 from explore3d.log.readers import optional
 from mapping import Feature
 
-SMALL = raster(12, 90)
+SMALL, TINY = raster(12, 90), raster(6, 40)
 
 
 def written(name: str, log: Raster, path: Path) -> dict[str, Any]:
@@ -31,27 +31,30 @@ def test_there_are_more_than_forty_forms() -> None:
     assert len(FORMS) >= 55
 
 
-@pytest.mark.parametrize("suffix", ["", ".csv", ".mcap"])
+@pytest.mark.parametrize(("suffix", "felt"), [("", SMALL), (".csv", TINY), (".mcap", TINY)], ids=["", ".csv", ".mcap"])
 @pytest.mark.parametrize("name", FORMS)
-def test_a_form_is_read_as_what_it_holds_whatever_its_name(tmp_path: Path, name: str, suffix: str) -> None:
+def test_a_form_is_read_as_what_it_holds_whatever_its_name(
+    tmp_path: Path, name: str, suffix: str, felt: Raster
+) -> None:
     path = tmp_path / f"scan{suffix}"
-    settings = written(name, SMALL, path)
+    settings = written(name, felt, path)
     log = load_logs([path], **settings)
-    assert log.trace.centers == pytest.approx(1e-3 * SMALL.points, abs=1e-3 * FORMS[name].step + 1e-14)
-    assert np.array_equal(log.trace.sweep - log.trace.sweep[0], SMALL.sweep)
+    assert log.trace.centers == pytest.approx(1e-3 * felt.points, abs=1e-3 * FORMS[name].step + 1e-14)
+    assert np.array_equal(log.trace.sweep - log.trace.sweep[0], felt.sweep)
     assert log.trace.tip_radius == 1e-3 * RADIUS and log.sources == (str(path),)
-    assert name == "our MCAP" or f"{len(SMALL.points)} rows in 12 sweeps" in log.metadata["read_as"][0]
+    said = f"{len(felt.points)} rows in {felt.sweep[-1] + 1} sweeps"
+    assert name == "our MCAP" or said in log.metadata["read_as"][0]
     if "LAS" in name or "LAZ" in name:
         assert log.trace.resolution == pytest.approx(1e-3 * FORMS[name].step)
         assert "grid of" in log.metadata["read_as"][0]
     looked = inspect(path, **settings)
-    assert looked.samples == len(SMALL.points) and looked.doubtful == ()
+    assert looked.samples == len(felt.points) and looked.doubtful == ()
 
 
 @pytest.mark.parametrize("name", FORMS)
 def test_what_a_form_does_not_say_is_asked_for_in_one_line(tmp_path: Path, name: str) -> None:
     path = tmp_path / "scan"
-    settings = written(name, SMALL, path)
+    settings = written(name, TINY, path)
     for key in settings:
         if key == "tip_radius" and name in ("our MCAP", "stylus text"):
             continue
@@ -68,7 +71,7 @@ def test_twenty_damaged_files_end_in_one_line_or_in_points(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "scan"
-    settings = written(name, SMALL, path)
+    settings = written(name, TINY, path)
     whole = path.read_bytes()
     rng = np.random.default_rng(11)
     for number in range(20):
