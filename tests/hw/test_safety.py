@@ -37,7 +37,7 @@ print(came, "came")
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there is no timer that sends signals")
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("name", ["SIGINT", pytest.param("SIGTERM", marks=pytest.mark.slow)])
 def test_a_signal_that_meets_a_compiler_is_neither_lost_nor_deadly(name: str) -> None:
     command = [sys.executable, "-c", COMPILES, name]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100)

@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
+from in_process import explore3d_main
 
-from explore3d.cli.main import main
 from explore3d.jobs import plan_scene
 from explore3d.scene import begin_scene, copy_example, examples, load_scene
 
 MESHES = Path(__file__).parents[3] / "assets" / "meshes"
-
-
-def explore3d_main(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
-    monkeypatch.setattr(sys, "argv", ["explore3d", *map(str, arguments)])
-    try:
-        main()
-    except SystemExit as end:
-        return int(end.code or 0)
-    return 0
 
 
 def test_the_examples_are_listed_with_their_titles(

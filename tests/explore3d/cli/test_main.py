@@ -6,28 +6,18 @@ import itertools
 import json
 import math
 import re
-import sys
 from pathlib import Path
 
 import pytest
+from in_process import explore3d_main
 
 from explore3d import __version__
 from explore3d.cli.bench import bench
-from explore3d.cli.main import app, main
+from explore3d.cli.main import app
 
 SCENES = Path(__file__).parents[3] / "assets" / "scenes"
 COMMANDS = [command.callback.__name__ for command in app.registered_commands if command.callback]
 BENCHES = [command.callback.__name__ for command in bench.registered_commands if command.callback]
-
-
-def explore3d_main(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
-    """Call the program in this process; its exit status."""
-    monkeypatch.setattr(sys, "argv", ["explore3d", *map(str, arguments)])
-    try:
-        main()
-    except SystemExit as end:
-        return int(end.code or 0)
-    return 0
 
 
 def test_the_version_is_the_packages(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,27 +6,12 @@ import tomllib
 from pathlib import Path
 
 import pytest
-import trimesh
+from calibration_sphere import RADIUS, sphere_scene
 
 from explore3d.jobs.calibrate import calibrate, selftest, write_profile
 from explore3d.scene.scene import parse_scene
 from explore3d.scene.settings import AnalysisSettings
 
-SCENE = """
-schema = "explore3d/scene/1"
-[tip]
-radius = "10 mm"
-[model]
-mesh = "sphere.ply"
-units = "mm"
-[finger]
-object = "sphere.ply"
-units = "mm"
-{finger}
-[survey]
-smallest_feature = "1 mm"
-speed = "30 mm/s"
-"""
 SIMULATED = 'kind = "simulated"\n[finger.noise]\nwhite = "0.05 mm"\ncorrelated = "0.005 mm"'
 MACHINE = """kind = "grbl"
 [finger.machine]
@@ -37,18 +22,10 @@ clearance = "2 mm"
 probe_speed = "20 mm/s"
 pace = 20
 """
-RADIUS = 0.0125
-
-
-def scene(folder: Path, finger: str) -> Path:
-    trimesh.creation.icosphere(subdivisions=5, radius=1e3 * RADIUS).export(folder / "sphere.ply")
-    path = folder / "scene.toml"
-    path.write_text(SCENE.format(finger=finger))
-    return path
 
 
 def test_the_simulated_tip_is_found_within_its_interval_and_written_as_a_profile(tmp_path: Path) -> None:
-    profile = calibrate(scene(tmp_path, SIMULATED), RADIUS, (0.0, 0.0, 0.0), lines=6)
+    profile = calibrate(sphere_scene(tmp_path, SIMULATED), RADIUS, (0.0, 0.0, 0.0), lines=6)
     # the flat faces of the sphere's mesh lie up to 2 um inside it
     assert profile.tip.radius == pytest.approx(0.01, abs=3.0 * profile.tip.radius_sd + 2e-6)
     assert profile.tip.noise.white == pytest.approx(5e-5, rel=0.05)
@@ -67,11 +44,11 @@ def test_the_simulated_tip_is_found_within_its_interval_and_written_as_a_profile
 
 @pytest.mark.slow
 def test_an_emulated_machine_finds_its_tip_within_ten_micrometres(tmp_path: Path) -> None:
-    profile = calibrate(scene(tmp_path, MACHINE), RADIUS, (0.0, 0.0, 0.0), lines=3)
+    profile = calibrate(sphere_scene(tmp_path, MACHINE), RADIUS, (0.0, 0.0, 0.0), lines=3)
     assert abs(profile.tip.radius - 0.01) < 1e-5
 
 
 def test_the_self_test_pairs_the_range_of_radii_with_the_time(tmp_path: Path) -> None:
-    found = selftest(scene(tmp_path, SIMULATED), RADIUS, (0.0, 0.0, 0.0))
+    found = selftest(sphere_scene(tmp_path, SIMULATED), RADIUS, (0.0, 0.0, 0.0))
     assert 4 * found["sd"] < found["range"] < 12 * found["sd"]
     assert found["time"] > 0 and found["samples"] > 1000

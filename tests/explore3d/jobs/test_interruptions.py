@@ -9,17 +9,16 @@ import random
 import re
 import shutil
 import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-import trimesh
+from calibration_sphere import sphere_scene
+from in_process import explore3d_main
 from interrupting import Ended, bare_tile, digests, explore3d
 
-from explore3d.cli.main import main
 from explore3d.errors import UserError
 from explore3d.jobs.run import run
 from explore3d.log.reader import read_log
@@ -30,40 +29,39 @@ from mapping.trace import Trace
 
 SIGNALS = {"SIGINT": 130, "SIGTERM": 143, "SIGKILL": -9}
 FULL = "full disk"
-CALIBRATION = """
-schema = "explore3d/scene/1"
-[tip]
-radius = "10 mm"
-[model]
-mesh = "sphere.ply"
-units = "mm"
-[finger]
-object = "sphere.ply"
-units = "mm"
-rate = "1 kHz"
-[survey]
-smallest_feature = "1 mm"
-speed = "30 mm/s"
-"""
 # s after its first file: about how long each job takes on a machine with nothing else to do
 LASTS = {"run": 3.0, "analyze": 2.0, "merge": 1.0, "calibrate": 0.4}
 
 
 @dataclass(frozen=True)
 class Older:
-    """Complete older sessions, and what is needed to make them again."""
+    """Complete older sessions, each made when it is first asked for, and what is needed to make them again."""
 
     folder: Path
     scene: Path
+
+    def of(self, job: str) -> Path:
+        """The folder of a complete session of a job."""
+        made = self.folder / job
+        if not made.exists():
+            if job == "run":
+                run(self.scene, made)
+            elif job == "second":
+                run(bare_tile(self.folder, seed=5), made)
+            else:
+                words = self.words(job, made)
+                made.mkdir()
+                assert explore3d(*words).status == 0
+        return made
 
     def words(self, job: str, out: Path) -> list[object]:
         if job == "run":
             return ["run", self.scene, "--out", out]
         if job == "analyze":
-            return ["analyze", self.folder / "run" / "log.mcap", "--out", out]
+            return ["analyze", self.of("run") / "log.mcap", "--out", out]
         if job == "merge":
-            return ["merge", self.folder / "analyze", self.folder / "second" / "log.mcap", "--out", out]
-        sphere = self.folder / "sphere.toml"
+            return ["merge", self.of("analyze"), self.of("second") / "log.mcap", "--out", out]
+        sphere = sphere_scene(self.folder, 'rate = "1 kHz"', fineness=4)
         return ["calibrate", sphere, "--radius", "12.5 mm", "--lines", 60, "--out", out / "tip.toml"]
 
     def first_sign(self, job: str, out: Path) -> Path:
@@ -73,15 +71,7 @@ class Older:
 @pytest.fixture(scope="module")
 def older(tmp_path_factory: pytest.TempPathFactory) -> Older:
     folder = tmp_path_factory.mktemp("older")
-    made = Older(folder, bare_tile(folder))
-    trimesh.creation.icosphere(subdivisions=4, radius=12.5).export(folder / "sphere.ply")
-    (folder / "sphere.toml").write_text(CALIBRATION)
-    run(bare_tile(folder, seed=5), folder / "second")
-    run(made.scene, folder / "run")
-    for job in ("analyze", "merge", "calibrate"):
-        (folder / job).mkdir()
-        assert explore3d(*made.words(job, folder / job)).status == 0
-    return made
+    return Older(folder, bare_tile(folder))
 
 
 @contextmanager
@@ -126,7 +116,7 @@ def check(ended: Ended, job: str, how: str, out: Path, before: dict[str, str]) -
 def interrupt(older: Older, job: str, how: str, share: float, folder: Path) -> str:
     """End a job by a signal after a share of its time, over a copy of the older session."""
     out = folder / "out"
-    shutil.copytree(older.folder / job, out)
+    shutil.copytree(older.of(job), out)
     before = digests(out)
     words = older.words(job, out)
     ended = explore3d(*words, after=share * LASTS[job], how=how, when=older.first_sign(job, out))
@@ -137,14 +127,16 @@ def fill(older: Older, job: str, free: int, folder: Path) -> str:
     """Carry a job out over a copy of the older session, on a disk with so many bytes left."""
     with small_disk(folder) as disk:
         out = disk / "out"
-        shutil.copytree(older.folder / job, out)
+        shutil.copytree(older.of(job), out)
         before = digests(out)
         state = os.statvfs(disk)
         (disk / "filler").write_bytes(bytes(max(0, state.f_bavail * state.f_frsize - free)))
         return check(explore3d(*older.words(job, out)), job, FULL, out, before)
 
 
-@pytest.mark.parametrize(("job", "how"), [("run", "SIGINT"), ("merge", "SIGTERM"), ("run", "SIGKILL")])
+@pytest.mark.parametrize(
+    ("job", "how"), [("run", "SIGINT"), pytest.param("merge", "SIGTERM", marks=pytest.mark.slow), ("run", "SIGKILL")]
+)
 def test_a_job_that_a_signal_ends_leaves_the_older_session(older: Older, tmp_path: Path, job: str, how: str) -> None:
     for attempt in range(4):
         (tmp_path / str(attempt)).mkdir()
@@ -212,7 +204,7 @@ def test_a_time_budget_that_ends_the_survey_is_said_first_and_gone_on_with(older
     analysis = run(bare_tile(tmp_path), out, resume=True)
     assert analysis.stopped is None and state(out)["state"] == "complete"
     assert {path.name for path in out.glob("*.mcap")} == {"log.mcap"}
-    log, whole = read_log(out / "log.mcap"), read_log(older.folder / "run" / "log.mcap")
+    log, whole = read_log(out / "log.mcap"), read_log(older.of("run") / "log.mcap")
     assert (log.trace.centers == whole.trace.centers).all() and (log.trace.t == whole.trace.t).all()
 
 
@@ -235,10 +227,7 @@ def test_a_pulled_cable_is_said_first_with_status_3(
     job = importlib.import_module("explore3d.jobs.run")
     whole = job.scene_finger
     monkeypatch.setattr(job, "scene_finger", cut)
-    monkeypatch.setattr(sys, "argv", ["explore3d", "run", str(bare_tile(tmp_path)), "--out", str(tmp_path / "out")])
-    with pytest.raises(SystemExit) as end:
-        main()
-    assert end.value.code == 3
+    assert explore3d_main(monkeypatch, "run", bare_tile(tmp_path), "--out", tmp_path / "out") == 3
     first, warning, second, *_ = capsys.readouterr().out.splitlines()
     assert re.match(
         r"stopped after 3 of 14 sweeps: .*the cable was pulled; go on with: explore3d run .* --resume$", first
@@ -247,20 +236,20 @@ def test_a_pulled_cable_is_said_first_with_status_3(
     assert second.startswith("no features found on the ") and second.endswith(" % of the surface that was swept")
 
 
-@pytest.mark.parametrize("change", [lambda path: path.replace("seed = 4", "seed = 6")])
 def test_another_scene_needs_overwrite_and_is_refused_before_anything_moves(
-    older: Older, tmp_path: Path, change: Callable[[str], str]
+    older: Older, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    shutil.copytree(older.folder / "run", out)
+    shutil.copytree(older.of("run"), out)
     before = digests(out)
     other = tmp_path / "other.toml"
-    other.write_text(change(older.scene.read_text()))
-    for more in ([], ["--resume"]):
-        refused = explore3d("run", other, "--out", out, *more)
-        assert refused.status == 2 and "--overwrite" in refused.last and "exploration" not in refused.err
+    other.write_text(older.scene.read_text().replace("seed = 4", "seed = 6"))
+    (tmp_path / "second").mkdir()
+    shutil.copy(older.of("run") / "log.mcap", tmp_path / "second")
+    for words in (["run", other], ["run", other, "--resume"], ["analyze", tmp_path / "second"]):
+        assert explore3d_main(monkeypatch, *words, "--out", out) == 2
+        err = capsys.readouterr().err
+        assert "--overwrite" in err.splitlines()[-1] and "exploration" not in err
         assert digests(out) == before and not list(out.glob("unfinished-*"))
-    refused = explore3d("analyze", older.folder / "second", "--out", out)
-    assert refused.status == 2 and "--overwrite" in refused.last and digests(out) == before
     run(other, out, overwrite=True)
     assert "seed = 6" in (out / "scene.toml").read_text() and state(out)["state"] == "complete"

@@ -26,8 +26,8 @@ def holds(kind: str, phase: str, touch: str, seed: int = 0, model: bool = True) 
     ("kind", "touch", "why"),
     [
         ("frozen", "optoforce", "the same . value"),
-        ("nan", "line", "no number"),
-        ("sign", "optoforce", "jumped|pulls"),
+        pytest.param("nan", "line", "no number", marks=pytest.mark.slow),
+        pytest.param("sign", "optoforce", "jumped|pulls", marks=pytest.mark.slow),
         ("open", "peck", "nothing was felt|open again"),
         ("power cycle", "peck", "restarted"),
     ],

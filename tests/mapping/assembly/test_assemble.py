@@ -14,6 +14,7 @@ from mapping.trace import Trace
 
 TIP, RADIUS, SPACING = 0.01, 0.325e-3, 3e-5
 NORMAL = np.array([0.0, 0.0, 1.0])
+SLOW = pytest.mark.slow
 
 
 def plate() -> Base:
@@ -56,7 +57,7 @@ RIDGE = np.array([[-0.02, -0.025, RADIUS], [0.015, 0.03, RADIUS]])
     [
         (),
         (((-0.02, -0.025), (0.015, 0.03)),),
-        (((-0.03, -0.04), (0.025, 0.045)), ((0.01, -0.03), (-0.02, 0.03))),
+        pytest.param((((-0.03, -0.04), (0.025, 0.045)), ((0.01, -0.03), (-0.02, 0.03))), marks=SLOW),
         tuple(((x - 0.01, y + 0.006), (x + 0.01, y - 0.006)) for x, y in np.linspace(RIDGE[0, :2], RIDGE[1, :2], 12)),
     ],
     ids=["survey alone", "along the crest", "askew", "zigzag"],
@@ -106,7 +107,7 @@ def test_a_step_is_one_step():
     assert len(step.axis) >= 10
 
 
-@pytest.mark.parametrize("pitch", [pytest.param(1e-3, marks=pytest.mark.slow), 2e-3, 4e-3])
+@pytest.mark.parametrize("pitch", [pytest.param(1e-3, marks=SLOW), pytest.param(2e-3, marks=SLOW), 4e-3])
 def test_an_arc_that_a_raster_runs_along_is_one_ridge(pitch):
     turn = np.linspace(0.2, 0.2 + 0.9 * np.pi, 40)
     arc = np.column_stack([0.015 * np.cos(turn), 0.015 * np.sin(turn), 0 * turn + RADIUS])
@@ -117,7 +118,7 @@ def test_an_arc_that_a_raster_runs_along_is_one_ridge(pitch):
     assert ridge.length.median == pytest.approx(0.015 * 0.9 * np.pi, abs=1e-3 + 1.5 * pitch)
 
 
-@pytest.mark.parametrize("slope", [0.02, 0.1, 0.2])
+@pytest.mark.parametrize("slope", [pytest.param(0.02, marks=SLOW), 0.1, pytest.param(0.2, marks=SLOW)])
 def test_a_ridge_at_a_slant_to_a_raster_is_one_ridge_with_its_ends(slope):
     line = np.array([[-0.03, 0.3e-3, RADIUS], [0.03, 0.3e-3 + 0.06 * slope, RADIUS]])
     (ridge,) = features(ridges(line), pitch=2e-3)

@@ -110,7 +110,11 @@ def inspected(trace: Trace) -> tuple[PathLedger, tuple[Feature, ...]]:
     return path_ledger(sound, found), assemble(found, sound.trace, base)
 
 
-@pytest.mark.parametrize("of", (BUILT_ON, ALSO_BUILT_ON, *JUDGED_ON), ids=lambda of: f"seed {of.seed}")
+@pytest.mark.parametrize(
+    "of",
+    (BUILT_ON, ALSO_BUILT_ON, JUDGED_ON[0], *(pytest.param(of, marks=pytest.mark.slow) for of in JUDGED_ON[1:])),
+    ids=lambda of: f"seed {of.seed}",
+)
 @pytest.mark.parametrize("name", PATHS)
 def test_a_path_under_one_number_is_inspected_and_shows_what_it_shows_with_numbers(name: str, of: Drawn) -> None:
     places, number = PATHS[name](of)
