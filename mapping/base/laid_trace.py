@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import fields
 
 import numpy as np
@@ -12,10 +12,14 @@ from mapping.base.base import Base, Feet
 from mapping.base.cells import Cells
 from mapping.base.height_profile import SweepHeights, arclength, height_profiles
 
-# Feet lie in one plane if their directions differ by no more, and their places by no more of a tip radius
-ONE_PLANE = 1e-9
-# Between centres this near to each other (tip radii) directions are interpolated: a chord of a circle of the tip's
-# radius then misses the direction by an eighth of its square, 1.3e-3 rad
+# Feet whose directions differ by no more (rad), and whose places rise off the first one's plane by no more of their
+# distance, lie as in one plane: by a bend of t lateral noise of sd sigma changes single heights by t sigma / 2 at most,
+# one part in 200, which is 6 % of the sd of a mean of 150 samples; a path of length l bent by t misses its own mean by
+# t l / 24, 2 um in 5 mm. Where a hollow or a crease lies between, the means themselves are laid
+ONE_PLANE = 0.01
+# Between centres this near to each other (tip radii) directions are interpolated linearly. Where they turn fastest,
+# over an edge, the centre goes round it on a circle of the tip's radius: linear between two that are an angle a apart
+# they are at most a^2 / 8 off, 1.3e-3 rad for a tenth; a contact's angle is measured to 1 degree, 17e-3 rad
 LONGEST_KNOWN_GAP = 0.1
 
 
@@ -66,9 +70,9 @@ class LaidSweep:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the means (n, 3) of runs of samples stand: points (n, 3), directions (n, 3), heights (n,) as in `Feet`.
 
-        Where the feet of all samples of a run are known and lie in one plane, the mean stands at the mean of the feet:
-        only the other means are laid. (Another face that bends towards the path within the run could be nearer to the
-        mean alone, by the square of the run's length over its distance.)
+        Where the feet of all samples of a run are known and lie in one plane (to ONE_PLANE), the mean stands at the
+        mean of the feet: only the other means are laid. (Another face that bends towards the path within the run could
+        be nearer to the mean alone, by the square of the run's length over its distance.)
 
         Args:
             centers: of the runs, m.
@@ -82,8 +86,9 @@ class LaidSweep:
             used, runs, counts = slice(first[0], stop), first - first[0], np.diff(np.append(first, stop))
             up = np.repeat(kept.normals[first], counts, axis=0)
             turn = np.abs(kept.normals[used] - up).max(axis=1)
-            off = np.abs(((kept.points[used] - np.repeat(kept.points[first], counts, axis=0)) * up).sum(1))
-            flat = self._laid[used] & (turn < ONE_PLANE) & (off < ONE_PLANE * self.trace.tip_radius)
+            apart = kept.points[used] - np.repeat(kept.points[first], counts, axis=0)
+            flat = self._laid[used] & (turn < ONE_PLANE)
+            flat &= np.abs((apart * up).sum(1)) <= ONE_PLANE * np.linalg.norm(apart, axis=1)
             known = np.logical_and.reduceat(flat, runs)
         if kept is not None and known.any():
             own = np.flatnonzero(np.repeat(known, counts)) + first[0]
@@ -95,6 +100,10 @@ class LaidSweep:
             for place, values in zip(found, (feet.points, feet.normals, feet.height), strict=True):
                 place[~known] = values
         return found
+
+    def known_feet(self, part: slice) -> Feet | None:
+        """The feet of some samples in a row if all of them are known by now, else None: nothing is laid."""
+        return self.feet(part) if self._laid[part].all() else None
 
     def touched(self) -> tuple[FloatArray, FloatArray]:
         """Known points of the base under the sweep, and directions from there to the ball, both (M, 3)."""
@@ -118,11 +127,13 @@ class LaidSweep:
             return np.zeros((0, 3)), np.zeros((0, 3))
         return np.concatenate([centers for centers, _ in known]), np.concatenate([up for _, up in known])
 
-    def take(self, feet: Feet, start: int) -> None:
-        """Keep the feet of all samples, which were found elsewhere: they begin at `start` in `feet`."""
-        own = slice(start, start + len(self.trace))
-        self._feet = Feet(*(getattr(feet, each.name)[own] for each in fields(Feet)))
-        self._laid[:] = True
+    def kept(self) -> tuple[Feet, BoolArray]:
+        """Feet of all samples as far as they are known by now, and (N,) where they are: nothing is laid."""
+        return self._feet or _empty(len(self.trace)), self._laid
+
+    def take(self, feet: Feet, known: BoolArray) -> None:
+        """Keep the feet of those samples of which they are known from elsewhere."""
+        self._feet, self._laid = feet, known
 
 
 class LaidTrace(Trace):
@@ -185,13 +196,16 @@ class LaidTrace(Trace):
         return LaidTrace(self._view(keep), self.base, laid)
 
     def within(self, keep: BoolArray) -> LaidTrace:
-        """The samples that a mask picks, with their feet."""
-        kept = LaidTrace(self.select(keep), self.base)
-        feet, start = self.feet(np.flatnonzero(keep)), 0
-        for sweep in kept.laid_sweeps:
-            sweep.take(feet, start)
-            start += len(sweep.trace)
-        return kept
+        """The samples that a mask picks, with those of their feet that are known by now."""
+        picked = LaidTrace(self.select(keep), self.base)
+        kept = [sweep.kept() for sweep in self.laid_sweeps]
+        if kept:
+            feet, known = _joined([each for each, _ in kept]), np.concatenate([each for _, each in kept])
+            starts: IntArray = picked.__dict__["_starts"]
+            for sweep, start, stop in zip(picked.laid_sweeps, starts[:-1], starts[1:], strict=True):
+                own = np.flatnonzero(keep)[start:stop]
+                sweep.take(Feet(*(getattr(feet, each.name)[own] for each in fields(Feet))), known[own])
+        return picked
 
     def directions(self, centers: FloatArray) -> FloatArray:
         """(M, 3) unit directions from the base to centres on the sweeps, between those that are known, m.
@@ -230,9 +244,11 @@ class LaidTrace(Trace):
             for sweep, start, low, high in zip(self.laid_sweeps, starts[:-1], cuts[:-1], cuts[1:], strict=True)
             if high > low
         ]
-        if not parts:
-            return _empty(0)
-        return Feet(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Feet)))
+        return _joined(parts) if parts else _empty(0)
+
+
+def _joined(parts: Sequence[Feet]) -> Feet:
+    return Feet(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Feet)))
 
 
 def _empty(count: int) -> Feet:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import BoolArray, ComplexArray, FloatArray, IntArray, Trace
-from mapping.base import Base, robust_scale
+from mapping.base import Base, Feet, robust_scale
 
 # Blocks that the reach of a turn is cut into: a turn is placed to an eighth of it
 BLOCKS_PER_REACH = 8
@@ -110,7 +110,9 @@ def runs_straight(centers: FloatArray, reach: float, step: float, sharp: float, 
     return bool((advance > np.cos(0.5 * widest) * length).all() and even.all() and 2 * length.min() > length.max())
 
 
-def rolled_out(trace: Trace, base: Base, step: float, reach: float, sharp: float) -> RolledOut | None:
+def rolled_out(
+    trace: Trace, base: Base, step: float, reach: float, sharp: float, known: Feet | None = None
+) -> RolledOut | None:
     """Roll a sweep out into a plane; None if it hardly moves.
 
     Blocks and the reach are made longer until the scatter of the blocks leaves a turn by `sharp` certain. Independent
@@ -123,13 +125,19 @@ def rolled_out(trace: Trace, base: Base, step: float, reach: float, sharp: float
         step: distance of its samples, m.
         reach: length over which a direction is taken, at least, m.
         sharp: the turn to be judged, rad.
+        known: where the samples stand over the base, if that is known; else the blocks are laid on it.
     """
     size = max(1, int(reach / (BLOCKS_PER_REACH * step)))
     # medians bear readings that are thrown off for a moment
-    means = block_medians(trace.centers, size)
-    feet = base.foot(means, trace.tip_radius)
-    places, normals, height = feet.points + trace.tip_radius * feet.normals, feet.normals, feet.height
-    first = size * np.arange(len(means))
+    if known is None:
+        feet = base.foot(block_medians(trace.centers, size), trace.tip_radius)
+        places, normals, height = feet.points + trace.tip_radius * feet.normals, feet.normals, feet.height
+    else:
+        places = block_medians(known.points + trace.tip_radius * known.normals, size)
+        normals = block_medians(known.normals, size)
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        height = block_medians(known.height, size)
+    first = size * np.arange(len(places))
     span = max(1, round(reach / (size * step)))
     while True:
         moves = ~_waits(places, span, size * step)
@@ -143,9 +151,9 @@ def rolled_out(trace: Trace, base: Base, step: float, reach: float, sharp: float
 
 
 def block_medians(points: FloatArray, size: int) -> FloatArray:
-    """(K, 3) medians of whole blocks of so many of the points (N, 3)."""
+    """(K, 3) medians of whole blocks of so many of the points (N, 3); of values (N,) likewise (K,)."""
     count = len(points) // size
-    blocks = points[: count * size].reshape(count, size, 3)
+    blocks = points[: count * size].reshape(count, size, *points.shape[1:])
     return blocks[:, 0] if size == 1 else np.asarray(np.median(blocks, axis=1))
 
 

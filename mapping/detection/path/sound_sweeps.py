@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Trace
-from mapping.base import UNEVEN, Base, LaidTrace
+from mapping.base import UNEVEN, Base, LaidSweep, LaidTrace
 from mapping.detection import LADDER, smallest_crest
 from mapping.detection.path.rolled_out import RolledOut, rolled_out, runs_straight, usual_step
 
@@ -70,7 +70,7 @@ def sound_sweeps(trace: Trace, base: Base) -> SoundSweeps:
     reasons: Counter[str] = Counter()
     numbers, seen, following = [], set[int](), int(trace.sweep.max()) + 1
     for sweep, step in zip(laid.laid_sweeps, steps, strict=True):
-        cuts = _cuts(sweep.trace, base, step, reach, reasons)
+        cuts = _cuts(sweep, step, reach, reasons)
         number = sweep.number
         if number in seen:
             reasons["number given again"] += 1
@@ -91,8 +91,9 @@ def replace_sweeps(laid: LaidTrace, numbers: IntArray) -> LaidTrace:
     return LaidTrace(replace(plain, sweep=numbers), laid.base)
 
 
-def _cuts(part: Trace, base: Base, step: float, reach: float, reasons: Counter[str]) -> list[int]:
+def _cuts(sweep: LaidSweep, step: float, reach: float, reasons: Counter[str]) -> list[int]:
     """Samples, ascending, before which one run of samples is cut; counts what each cut is for."""
+    part, base = sweep.trace, sweep.base
     if not step > 0:
         return []
     jumps = _jumps(part, base, reach)
@@ -103,7 +104,7 @@ def _cuts(part: Trace, base: Base, step: float, reach: float, reasons: Counter[s
         piece = part.select(slice(begin, end)) if jumps else part
         if len(piece) < 3 or runs_straight(piece.centers, reach, step, SHARP_TURN, WIDEST_RANGE):
             continue
-        path = rolled_out(piece, base, step, max(reach, step), SHARP_TURN)
+        path = rolled_out(piece, base, step, max(reach, step), SHARP_TURN, sweep.known_feet(slice(begin, end)))
         if path is None:
             continue
         # round a plate's border, or round a wire's end: a circuit has corners, and is one sweep

@@ -78,7 +78,15 @@ class Chart:
 
 
 def chart_along(
-    axis: FloatArray, normals: FloatArray, base: Base, tip_radius: float, spacing: float, extension: float, reach: float
+    axis: FloatArray,
+    normals: FloatArray,
+    base: Base,
+    tip_radius: float,
+    spacing: float,
+    extension: float,
+    reach: float,
+    *,
+    bends: bool = True,
 ) -> Chart:
     """The chart along a polyline, its vertices put on the base, straight on by `extension` beyond both ends.
 
@@ -90,6 +98,7 @@ def chart_along(
         spacing: wanted distance of the chart's points, m.
         extension: length added at both ends of an open curve, m; less where the base ends.
         reach: lateral distance over which the bend of the base is measured, m.
+        bends: False for a trial of the course alone: the base is not asked how it bends across, and taken for flat.
 
     Raises:
         EmptyWindowError: the line does not lie over the base.
@@ -108,7 +117,8 @@ def chart_along(
     laterals = np.cross(up, tangents)
     laterals /= np.linalg.norm(laterals, axis=1, keepdims=True)
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    return Chart(s, points, tangents, laterals, up, _bend(points, laterals, up, base, tip_radius, reach), closed)
+    bend = _bend(points, laterals, up, base, tip_radius, reach) if bends else np.zeros(len(s))
+    return Chart(s, points, tangents, laterals, up, bend, closed)
 
 
 def _resampled(axis: FloatArray, normals: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:

@@ -144,10 +144,10 @@ class LineKind(Kind):
         extension = max(6.0 * sizes.half_width, 1.5 * length / max(crossings - 1, 1)) if self.has_ends else 0.0
         tip = around.trace.tip_radius
 
-        def build(spacing: float) -> Chart:
-            return chart_along(line, lift, around.base, tip, spacing, extension, sizes.half_width)
+        def build(spacing: float, bends: bool = True) -> Chart:
+            return chart_along(line, lift, around.base, tip, spacing, extension, sizes.half_width, bends=bends)
 
-        trial = build((length + 2.0 * extension) / 64.0)
+        trial = build((length + 2.0 * extension) / 64.0, bends=False)
         turn = np.linalg.norm(np.diff(trial.tangents, axis=0), axis=1).max(initial=0.0)
         curvature = turn / (trial.length / max(len(trial.s) - 1, 1))
         if curvature * trial.length < 1e-6 and degree == 1:
