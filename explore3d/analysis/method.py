@@ -21,7 +21,7 @@ from explore3d.analysis.truth import TrueFeature
 from explore3d.log import Log, stop_of
 from explore3d.scene import AnalysisSettings, Scene
 from mapping import Feature, LeftOut, Trace, length_text
-from mapping.assembly import assemble, why_none_sought
+from mapping.assembly import Inspections, assemble, why_none_sought
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import Detections, detect, recovered
 from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
@@ -79,6 +79,7 @@ class Work:
         base: the global model.
         detections: crossings, noise, detection limit.
         features: as they are known by now.
+        inspections: the heights of the trace that the features were assembled from.
         sound: the trace under sound sweep numbers; None for a log that was searched while it was read.
         path: what became of the recorded path.
         asked: whether a stage was asked for, by its name.
@@ -98,6 +99,7 @@ class Work:
     estimate: Estimate | None = None
     curvature: Curvature | None = None
     account: SurfaceAccount | None = None
+    inspections: Inspections | None = None
     sound: SoundSweeps | None = None
     path: PathLedger | None = None
     time_curve: tuple[tuple[float, float], ...] = ()
@@ -279,7 +281,10 @@ def why_no_lines(work: Work) -> str:
 def assembled(work: Work, share: Share) -> None:
     """Features from the crossings."""
     rate = work.settings.false_alarms_per_metre
-    work.features = assemble(work.detections, work.laid, work.base, false_alarms_per_metre=rate)
+    work.inspections = Inspections.of(work.laid, work.base, work.detections.noise)
+    work.features = assemble(
+        work.detections, work.laid, work.base, false_alarms_per_metre=rate, inspections=work.inspections
+    )
 
 
 def why_no_posterior(work: Work) -> str:
@@ -391,7 +396,7 @@ def why_no_time_curve(work: Work) -> str:
 
 def compared_in_time(work: Work, share: Share) -> None:
     """The worst error of an axis against the finger's time."""
-    work.time_curve = time_curve(work.detections, work.laid, work.model, work.truth, share)
+    work.time_curve = time_curve(work.detections, work.laid, work.model, work.truth, share, work.inspections)
 
 
 def tip_counts(features: tuple[Feature, ...], tip_radius: float) -> tuple[TipCount, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from explore3d.analysis.truth import AXIS_SAMPLES, Comparison, TrueFeature, compare
 from mapping import Trace
-from mapping.assembly import assemble, place_spacing
+from mapping.assembly import Inspections, assemble, place_spacing
 from mapping.base import LaidTrace
 from mapping.detection import Detections
 from mapping.geometry.mesh import nearest_on, resample
@@ -24,13 +24,14 @@ def time_curve(
     model: ObjectModel,
     truth: Sequence[TrueFeature],
     share: Callable[[float], None] = lambda _: None,
+    inspections: Inspections | None = None,
 ) -> tuple[tuple[float, float], ...]:
     """The worst error of place and extent over the true features, at moments of the exploration.
 
-    At each moment only what had been felt by then is used, and the features are those of the grammar, before
-    any posterior; the last point is the finished model. Nothing is laid on the base again: heights are those of the
-    whole trace's places, of the sweeps done by then. Lines that no single sweep shows are sought only if the finished
-    model has one.
+    At each moment only what had been felt by then is used, and the features are those of the grammar, before any
+    posterior; the last point is the finished model. Nothing is laid on the base again, and no height looked at again:
+    they are those of the whole trace's places, of the sweeps done by then. Lines that no single sweep shows are sought
+    only if the finished model has one.
 
     Args:
         detections: of the whole trace; each crossing knows its time.
@@ -38,11 +39,13 @@ def time_curve(
         model: the finished model.
         truth: the true features; moments at which one of them is not found yet are left out.
         share: told the share done.
+        inspections: the heights of the whole trace that the finished model was made of.
 
     Returns:
         (seconds of finger time, worst distance between a true axis and the found one in m), in the order of time.
     """
     laid = LaidTrace.of(trace, model.base)
+    inspections = inspections or Inspections.of(laid, model.base, detections.noise)
     spacing = place_spacing(detections.crossings, trace.tip_radius)
     faint = any(feature.faint for feature in model.features)
     begun = {sweep.number: float(sweep.trace.t[0]) for sweep in reversed(laid.laid_sweeps)}
@@ -51,10 +54,12 @@ def time_curve(
     curve = []
     for done, moment in enumerate(moments):
         # a sweep is finished before anyone can know what it found
-        felt = laid.of_sweeps({number for number, t in begun.items() if t <= moment})
+        numbers = {number for number, t in begun.items() if t <= moment}
+        felt = laid.of_sweeps(numbers)
         sweeps = {crossing.sweep for crossing in detections.crossings if crossing.t <= moment}
         seen = replace(detections, crossings=tuple(c for c in detections.crossings if c.sweep in sweeps))
-        features = assemble(seen, felt, model.base, spacing=spacing, faint=faint)
+        known = inspections.of_sweeps(numbers)
+        features = assemble(seen, felt, model.base, spacing=spacing, faint=faint, inspections=known)
         curve.append((float(felt.t[-1]), _worst(replace(model, features=features), truth, trace.tip_radius)))
         share((done + 1) / len(moments))
     curve.append((float(trace.t[-1]), _worst(model, truth, trace.tip_radius)))

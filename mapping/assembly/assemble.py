@@ -10,7 +10,7 @@ from mapping import Feature, FloatArray, Trace
 from mapping.assembly.edges import edge_features
 from mapping.assembly.faint_features import with_faint_lines
 from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
-from mapping.assembly.inspection import Inspection, inspect
+from mapping.assembly.inspection import Inspection, Inspections
 from mapping.assembly.lines import Around, line_features
 from mapping.assembly.linking import groups
 from mapping.assembly.points import outline, point_feature
@@ -37,6 +37,7 @@ def assemble(
     false_alarms_per_metre: float = 0.01,
     spacing: float | None = None,
     faint: bool = True,
+    inspections: Inspections | None = None,
 ) -> tuple[Feature, ...]:
     """Features of the base, the strongest evidence first, with preliminary intervals.
 
@@ -54,6 +55,7 @@ def assemble(
         false_alarms_per_metre: expected number of lines found in noise alone, 1/m of inspected path.
         spacing: distance between the places of a sweep whose heights are looked at, m; None: `place_spacing`.
         faint: False to leave out the search for lines too low for any one sweep.
+        inspections: the heights of this trace, if some may have been looked at already; it is not looked at again.
 
     Reference: paper definitions 2 and 3; theory section 5.
     """
@@ -61,9 +63,11 @@ def assemble(
     if len(np.unique(trace.sweep)) == 1:
         return _strongest_first([point_feature([c], _name(c), detections, trace.tip_radius) for c in crossings])
     laid = LaidTrace.of(trace, base)
-    features = _linked(detections, laid, spacing) if crossings else []
+    inspections = inspections or Inspections.of(laid, base, detections.noise)
+    spacing = place_spacing(crossings, trace.tip_radius) if spacing is None and crossings else spacing
+    features = [] if spacing is None or not crossings else _linked(detections, laid, inspections.at(spacing))
     if faint:
-        features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre)
+        features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre, inspections)
     return _strongest_first(features)
 
 
@@ -72,11 +76,10 @@ def place_spacing(crossings: Sequence[Crossing], tip_radius: float) -> float:
     return 0.2 * _scale(crossings, tip_radius)
 
 
-def _linked(detections: Detections, trace: LaidTrace, spacing: float | None) -> list[Feature]:
+def _linked(detections: Detections, trace: LaidTrace, inspection: Inspection) -> list[Feature]:
     """Features of the crossings that single sweeps detected."""
     tip, scale, base = trace.tip_radius, _scale(detections.crossings, trace.tip_radius), trace.base
-    spacing = place_spacing(detections.crossings, tip) if spacing is None else spacing
-    around = Around(inspect(trace, base, detections.noise, spacing), base, detections, tip)
+    around = Around(inspection, base, detections, tip)
     edges, crossings = edge_features(detections.crossings, around)
     crests, steps = _crests_and_steps(crossings, around, scale)
     certain, doubtful = _grouped(crests, around.inspection, scale)

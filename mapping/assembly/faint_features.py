@@ -8,7 +8,7 @@ import numpy as np
 
 from mapping import Feature, Interval, Support, Trace
 from mapping.assembly.faint_lines import FEWEST_AGREEING_SWEEPS, SECTIONS, FaintLine, faint_lines
-from mapping.assembly.inspection import Inspection, inspect
+from mapping.assembly.inspection import Inspection, Inspections
 from mapping.assembly.line_ends import line_end
 from mapping.assembly.points import body_width
 from mapping.base import Base
@@ -28,7 +28,12 @@ LEAST_SAMPLES, MOST_PLACES = 4.0, 150_000
 
 
 def with_faint_lines(
-    features: Sequence[Feature], detections: Detections, trace: Trace, base: Base, false_alarms_per_metre: float
+    features: Sequence[Feature],
+    detections: Detections,
+    trace: Trace,
+    base: Base,
+    false_alarms_per_metre: float,
+    inspections: Inspections | None = None,
 ) -> list[Feature]:
     """The features, and the lines that no single sweep showed; what is a weak part of such a line becomes the line.
 
@@ -38,7 +43,7 @@ def with_faint_lines(
     if why_none_sought(detections, trace, base):
         return features
     half_width, spacing = _scales(detections, trace.tip_radius)
-    inspection = inspect(trace, base, detections.noise, spacing)
+    inspection = (inspections or Inspections.of(trace, base, detections.noise)).at(spacing)
     weak = [f for f in features if _is_weak(f, detections)]
     # what one place alone shows is not faint
     masked = np.abs(inspection.height) > PLAIN_PLACE_SDS * inspection.sd

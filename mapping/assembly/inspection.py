@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -107,6 +108,28 @@ class Inspection:
     def inspected(self, point: FloatArray, reach: float) -> bool:
         """True if a sweep passed within `reach` of the point."""
         return bool(self._tree.query(point)[0] <= reach)
+
+    def of_sweeps(self, numbers: Collection[int]) -> Inspection:
+        """The places of the sweeps with these numbers."""
+        keep = np.isin(self.sweep, list(numbers))
+        normals = self.normals[keep] if len(self.normals) else self.normals
+        return Inspection(self.points[keep], self.height[keep], self.sd[keep], self.sweep[keep], self.spacing, normals)
+
+
+class Inspections:
+    """Heights at whatever spacing (m) `at` is asked for; each is looked at once, also for parts of the trace."""
+
+    def __init__(self, look: Callable[[float], Inspection]) -> None:
+        self.at = cache(look)
+
+    @classmethod
+    def of(cls, trace: Trace, base: Base, noise: Noise) -> Inspections:
+        """Those of all sweeps of a trace."""
+        return cls(lambda spacing: inspect(trace, base, noise, spacing))
+
+    def of_sweeps(self, numbers: Collection[int]) -> Inspections:
+        """Those of the sweeps with these numbers alone."""
+        return Inspections(lambda spacing: self.at(spacing).of_sweeps(numbers))
 
 
 def inspect(trace: Trace, base: Base, noise: Noise, spacing: float) -> Inspection:

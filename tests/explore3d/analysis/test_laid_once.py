@@ -13,13 +13,14 @@ from explore3d.analysis.stages import Stages
 from explore3d.analysis.truth import TrueFeature
 from explore3d.bench.scenes.plate_sweeps import DIAMETER, plate, sweeps, wire
 from explore3d.log.record import Log
+from mapping.assembly import inspection
 from mapping.base import laid_trace
 from mapping.base.base import Base
 
 
 def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height_twice(monkeypatch):
-    laid, profiles = [], Counter()
-    foot, heights = Base.foot, laid_trace.height_profiles
+    laid, profiles, inspected = [], Counter(), Counter()
+    foot, heights, looked = Base.foot, laid_trace.height_profiles, inspection.inspect
 
     def counted_foot(self, centers, tip_radius):
         laid.append(len(np.asarray(centers)))
@@ -29,6 +30,11 @@ def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height
         profiles[number, spacing] += 1
         return heights(number, trace, s, base, spacing, *kept)
 
+    def counted_look(trace, base, noise, spacing):
+        inspected[spacing] += 1
+        return looked(trace, base, noise, spacing)
+
+    monkeypatch.setattr(inspection, "inspect", counted_look)
     monkeypatch.setattr(Base, "foot", counted_foot)
     monkeypatch.setattr(laid_trace, "height_profiles", counted_heights)
     places = np.linspace(-30e-3, 30e-3, 10)
@@ -40,6 +46,6 @@ def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height
     assert ridge.height.median == pytest.approx(DIAMETER, rel=0.03)
     assert len(analysis.time_curve) > 1  # the curve looks at the features eight times over
     assert sum(laid) <= 1.05 * len(trace)
-    assert max(profiles.values()) == 1
+    assert max(profiles.values()) == 1 and max(inspected.values()) == 1
     # one width of bins for detection, one for lines of crossings, one for lines that no sweep shows
     assert len({spacing for _, spacing in profiles}) <= 3
