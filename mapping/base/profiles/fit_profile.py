@@ -21,7 +21,7 @@ SHORTEST_BEND = 8.0
 # Pieces that are tried; the evidence chooses.
 PIECES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 PROFILE_CELLS = 480
-# A piece of a cubic needs so many places between masked stretches
+# A piece of a cubic has four coefficients: with fewer places between masked stretches than that nothing determines it
 CELLS_PER_PIECE = 4
 
 

@@ -10,7 +10,10 @@ from mapping import FloatArray
 from mapping.base import robust_fit, robust_scale
 
 # A bend of a base stands alone if it leaves what the rest of the base bends about by so many of that scatter, over
-# less than this share of the length: form bends everywhere.
+# less than this share of the length: form bends everywhere. Simulated on 480 places, 1500 random forms each: forms
+# correlated over 1/40, 1/20 and 1/10 of the length leave their scatter by 6 somewhere in 0.3, 3 and 9 % of profiles
+# (which costs a note); lone bumps as wide at half height as a fifth of the length keep all of their height
+# beside the robust parabola, and as wide as a quarter 66 to 91 %: wider ones are the parabola's.
 ALONE_SDS, LONGEST_BEND_SHARE = 6.0, 0.25
 
 

@@ -17,7 +17,9 @@ from mapping.base import Base, Feet, robust_scale
 BLOCKS_PER_REACH = 8
 # Noise of a turn that the angle judged must stand out of, in standard deviations: one false turn in a million places
 CERTAIN_TURN_SDS = 5.0
-# A finger that advances by less than this share of the way that it usually goes waits, and has no direction
+# A finger that advances by less than this share of the way that it usually goes waits, and has no direction. Round a
+# corner of the angle a it advances by cos(a / 2): up to 151 degrees a corner is no waiting, and what turns further back
+# shows its turn before and after
 WAITS = 0.25
 # Distances over k samples grow by at least this factor when k doubles, where noise no longer makes them: 2 without
 # any, 1.41 if nothing but noise

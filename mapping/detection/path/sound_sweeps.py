@@ -20,16 +20,20 @@ from mapping.detection.path.rolled_out import RolledOut, rolled_out, runs_straig
 # A path that turns evenly by the angle a over the half-width w of a crest crosses it over w (1 + a^2 / 6). A turn is
 # felt where that is more than half a step between the filters' half-widths.
 SHARP_TURN = float(np.sqrt(6 * 0.5 * (LADDER - 1)))
-# A turn lasts if the direction over so many times the reach has turned as well: a finger that slips back does not turn
+# A turn lasts if the direction over so many times the reach has turned as well: a finger that slips back does not turn.
+# Twice is the least at which half of what is compared lies beyond the turn's own reach
 LASTING = 2
 # A sweep whose directions lie within 60 degrees of one direction advances along it with half its length at least: it
 # passes nothing twice and never runs beside itself.
 WIDEST_RANGE = 2 * np.pi / 3
 # An arc turns evenly: its direction stays within this of a steady turn, rad, half of what a sweep may turn to one side.
-# It comes beside itself after once round; a circuit overlaps by up to a quarter.
+# It comes beside itself after once round; a circuit begins and ends within a quarter of a turn of that. A sweep may
+# turn to one side by half of WIDEST_RANGE, and what swings about a steady turn by less than half of that keeps turning
+# to that side in every stretch that a sweep may span.
 EVEN_TURN, ONCE_ROUND = WIDEST_RANGE / 4, (1.5 * np.pi, 2.5 * np.pi)
-# A step between samples is a jump if longer than so many usual ones. Steps of noise alone (Maxwell's law) exceed five
-# medians once in 1e12; a finger's speed varies less.
+# A step between samples is a jump if longer than so many usual ones. Steps of noise alone (Maxwell's law, median 1.54
+# standard deviations) exceed five medians once in 1e12; a finger that starts, stops or rounds a corner goes more slowly
+# than usual, not five times as fast.
 JUMP_STEPS = 5.0
 # Samples on either side of a step that tell whether it leads elsewhere: the median of five bears two thrown off
 BESIDE_JUMP = 5

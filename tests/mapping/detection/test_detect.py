@@ -213,7 +213,7 @@ def test_a_real_stylus_profile_shows_its_bumps_and_no_pits(order):
 
 
 @needs_profile
-@pytest.mark.parametrize("order", ["reversed", "every other sample"])
+@pytest.mark.parametrize("order", ["every other sample", pytest.param("reversed", marks=pytest.mark.slow)])
 def test_places_on_a_real_stylus_profile_do_not_depend_on_how_it_was_sampled(order):
     one, other = real("as recorded"), real(order)
     certain = 1.1 * max(one.detection_limit, other.detection_limit)

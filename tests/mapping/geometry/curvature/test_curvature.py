@@ -80,7 +80,7 @@ def bump(count: int, noise: float = 0.0) -> tuple[Surface, np.ndarray, np.ndarra
         (0.0, 3e-6, 3e-4, 0.0),
         pytest.param(1e-4, 7e-4, 2e-3, 2e-3, marks=pytest.mark.slow),
         pytest.param(1e-3, 3e-3, 1.7e-2, 4e-3, marks=pytest.mark.slow),
-        (1e-2, 2e-2, 0.11, 0.02),
+        pytest.param(1e-2, 2e-2, 0.11, 0.02, marks=pytest.mark.slow),
     ],
 )
 def test_one_method_is_as_exact_at_every_noise_as_the_best_of_many(noise, median, p95, wrong):
