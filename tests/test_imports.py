@@ -78,7 +78,9 @@ def statements(node: ast.AST, when: str = "top") -> Iterator[tuple[ast.Import | 
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Import | ast.ImportFrom):
             yield child, when
-        elif isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+        elif isinstance(child, ast.expr):
+            continue  # no expression holds a statement
+        elif isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
             yield from statements(child, "function" if when == "top" else when)
         elif isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
             yield from statements(child, "typing")

@@ -180,7 +180,9 @@ def faulty(execute: Callable[[Move], Trace], broken: set[int], fault: str) -> Ca
     return wrapped
 
 
-@pytest.mark.parametrize("fault", ["refused", "no data", "cut short"])
+@pytest.mark.parametrize(
+    "fault", ["refused", *(pytest.param(f, marks=pytest.mark.slow) for f in ("no data", "cut short"))]
+)
 def test_faults_while_exploring_do_not_stop_it(fault: str) -> None:
     finger = SimulatedFinger(object=with_tubes(straight()), tip_radius=R, rate=1500.0, white=1e-4)
     plan = Explore(base=Base(PLATE), tip_radius=R, smallest=3e-4).plan()
