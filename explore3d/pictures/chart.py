@@ -282,7 +282,7 @@ class Panel:
             + (1.6 * self.font * (1 + self.y_name.count("\n")) if self.y_name else 0.0)
         )
         x_words = self.x_name.split("\n") if self.x_name else []
-        room_below = 1.7 * self.font + 1.35 * self.font * len(x_words)
+        room_below = 2.3 * self.font + 1.35 * self.font * len(x_words)
         room_above = 2.0 * self.font if self.title else 0.5 * self.font
         if self.margins is not None:
             room_left, room_above, room_below = self.margins

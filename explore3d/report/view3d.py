@@ -40,7 +40,9 @@ def object_view(base: Surface, features: Sequence[Feature], sweeps: Sequence[Swe
     for feature in features:
         shape = feature_mesh(drawn_at_least(feature, LEAST_FEATURE_SHARE * base.size))
         colour = tuple(round(float(each), 3) for each in kind_of(feature).colour[:3])
-        shown.append(_mesh(shape, "features", colour) | {"id": feature.id, "text": hover_text(feature)})
+        outward = feature.normals.mean(axis=0).tolist()
+        record = {"id": feature.id, "text": hover_text(feature), "outward": outward}
+        shown.append(_mesh(shape, "features", colour) | record)
     points = [path.points + LIFT_SHARE * base.size * path.normals for path in sweeps]
     lines = [_lines(points, "sweeps", SWEEP_COLOUR, SWEEP_WIDTH)]
     noticed = [part[first:last] for part, path in zip(points, sweeps, strict=True) for first, last in _noticed(path)]
@@ -52,7 +54,7 @@ def object_view(base: Surface, features: Sequence[Feature], sweeps: Sequence[Swe
         "box": [low.tolist(), high.tolist()],
         "unit": unit,
         "factor": 1.0 / factor,
-        "eye": _eye(sweeps).tolist(),
+        "eye": _eye(sweeps, features).tolist(),
         "meshes": shown,
         "lines": lines,
     }
@@ -180,7 +182,7 @@ def lighter(surface: Surface, most: int = MOST_FACES) -> Surface:
     return simpler
 
 
-def _eye(sweeps: Sequence[SweepPath]) -> FloatArray:
-    """(3,) direction from the object towards the camera."""
-    direction = view_directions(np.concatenate([np.zeros((0, 3)), *(path.normals for path in sweeps)]), ())[0]
+def _eye(sweeps: Sequence[SweepPath], features: Sequence[Feature]) -> FloatArray:
+    """(3,) direction from the object towards the camera: that of the first still picture."""
+    direction = view_directions(np.concatenate([np.zeros((0, 3)), *(path.normals for path in sweeps)]), features)[0]
     return np.asarray(direction / np.linalg.norm(direction))

@@ -1,7 +1,7 @@
 // The report's view of the object: a mesh, the sweeps and the features in WebGL2, to be turned by hand.
 // Nothing is fetched. The data are JSON in the element #view-data, arrays in base64:
 //   box: [low, high] of all that is shown; unit, factor: of the scale bar, units per metre; eye: direction of the camera
-//   meshes: [{layer, id, colour, low, span, points (uint16 x 3), faces (uint32 x 3), text}]
+//   meshes: [{layer, id, colour, low, span, points (uint16 x 3), faces (uint32 x 3), text, outward}]
 //   lines: [{layer, colour, width, low, span, points (uint16 x 3), starts}]
 "use strict";
 
@@ -83,6 +83,8 @@ function roundLength(most) {
 const FIELD = 0.5; // rad, the vertical field of view
 const MARGIN = 1.06; // of the first view around the object
 const STEEPEST = 0.499 * Math.PI;
+const FACING = 0.3; // cosine: what is turned away from the camera further than this is not seen well
+const ASIDE = 0.35; // rad: relief shows from a little aside
 const REACH = 6; // px beside a feature that still pick it
 
 // ---- the page ----
@@ -257,6 +259,7 @@ function show(root, data) {
   for (const [name, button] of rows) {
     button.addEventListener("click", () => {
       choose(name === chosen ? null : name, false);
+      if (chosen) turnTo(features.find((each) => each.id === chosen).outward);
       root.scrollIntoView({ block: "nearest" });
     });
   }
@@ -270,6 +273,14 @@ function show(root, data) {
   const turn = (dx, dy) => {
     camera.yaw -= dx;
     camera.pitch = Math.min(Math.max(camera.pitch + dy, -STEEPEST), STEEPEST);
+    redraw();
+  };
+  // What lies on the far side is turned to the front
+  const turnTo = (outward) => {
+    const size = Math.hypot(...outward), back = frame(camera.yaw, camera.pitch)[2];
+    if (!size || dot(outward, back) > FACING * size) return;
+    camera.yaw = Math.atan2(outward[1], outward[0]) + ASIDE;
+    camera.pitch = Math.min(Math.asin(outward[2] / size) + ASIDE, STEEPEST);
     redraw();
   };
   const shift = (dx, dy) => {
@@ -288,7 +299,9 @@ function show(root, data) {
   };
   const step = (by) => {
     const ids = features.map((each) => each.id);
-    if (ids.length) choose(ids[(ids.indexOf(chosen) + by + ids.length + (chosen || by > 0 ? 0 : 1)) % ids.length], true);
+    if (!ids.length) return;
+    choose(ids[(ids.indexOf(chosen) + by + ids.length + (chosen || by > 0 ? 0 : 1)) % ids.length], true);
+    turnTo(features.find((each) => each.id === chosen).outward);
   };
 
   const fingers = new Map();
