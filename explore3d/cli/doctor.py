@@ -53,8 +53,7 @@ REQUIRED_PACKAGES = {
     "libigl": ("igl", "curvature of meshes"),
     "emcee": ("emcee", "posterior distributions of a feature's size and place"),
     "trimesh": ("trimesh", "reading meshes, writing model.glb"),
-    "matplotlib": ("matplotlib", "the plots of the report"),
-    "plotly": ("plotly", "the interactive view in the report"),
+    "matplotlib": ("matplotlib", "the pictures of plans and of benches"),
     "mcap": ("mcap.writer", "logs"),
     "zstandard": ("zstandard", "compressed logs"),
     "pydantic": ("pydantic", "scenes"),
@@ -100,7 +99,7 @@ def _package(name: str, module: str, needed_for: str, absent: str) -> Check:
 
 
 def _open3d() -> Check:
-    needed_for = "pictures of the object, meshes from scattered points"
+    needed_for = "meshes from scattered points"
     reason = _failure(open3d)
     if reason:
         return Check("open3d", "missing", reason, needed_for, "make setup installs or unpacks what it lacks")

@@ -25,7 +25,11 @@ if TYPE_CHECKING:
     )
     from explore3d.pictures.object import object_picture as object_picture, view_directions as view_directions
     from explore3d.pictures.plan import plan_picture as plan_picture
-    from explore3d.pictures.profile import profile_line as profile_line, profile_picture as profile_picture
+    from explore3d.pictures.profile import (
+        profile_line as profile_line,
+        profile_picture as profile_picture,
+        thinned as thinned,
+    )
     from explore3d.pictures.section import section_picture as section_picture
     from explore3d.pictures.sweep_paths import SweepPath as SweepPath, sweep_paths as sweep_paths
 
@@ -38,7 +42,7 @@ _PUBLIC = {
     "figure": ("BAND", "DPI", "ESTIMATED", "FAINT", "INK", "MUTED", "TRACED", "TRUTH", "new_figure", "png", "styled"),
     "object": ("object_picture", "view_directions"),
     "plan": ("plan_picture",),
-    "profile": ("profile_line", "profile_picture"),
+    "profile": ("profile_line", "profile_picture", "thinned"),
     "section": ("section_picture",),
     "sweep_paths": ("SweepPath", "sweep_paths"),
 }

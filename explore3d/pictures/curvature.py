@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from explore3d.pictures.figure import png, styled
-from explore3d.pictures.object import SUPERSAMPLING, cameras_for, panels_for, view_directions
-from explore3d.pictures.raycast import Body, render
+from explore3d.pictures.chart import FONT_SIZE, drawing, image, pixels_png, text_at
+from explore3d.pictures.object import SUPERSAMPLING, cameras_for, pictured, shifted, view_directions
+from explore3d.pictures.render import Body, render
 from mapping import BoolArray, FloatArray, Surface
 
 if TYPE_CHECKING:
@@ -18,11 +18,18 @@ if TYPE_CHECKING:
 SIGNIFICANT = 3.0
 FLAT_COLOUR = np.array([0.93, 0.93, 0.93])
 NOT_VALID = np.array([0.75, 0.75, 0.75])
-CURVATURE_COLOURMAP = "RdBu_r"
+# ColorBrewer's RdBu from blue over white to red, evenly spaced: red and blue of equal weight, told apart by everybody
+# (Brewer, Hatchard and Harrower, ColorBrewer in print, 2003)
+BLUE_TO_RED = (
+    "053061", "2166ac", "4393c3", "92c5de", "d1e5f0", "f7f7f7", "fddbc7", "f4a582", "d6604d", "b2182b", "67001f",
+)  # fmt: skip
+BAR = (16.0, 220.0)  # width and height of the scale of colours, px
+BAR_ROOM = 90.0  # px
+CURVATURE_TITLE = 28.0  # px
 
 
 def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float) -> bytes:
-    """PNG of k1 and k2 in units of 1/r: red bulges out, blue bends in; pale where
+    """SVG of k1 and k2 in units of 1/r: red bulges out, blue bends in; pale where
     the value is within three standard deviations of zero, grey where none is valid.
 
     Args:
@@ -30,34 +37,47 @@ def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float)
         curvature: at its vertices.
         tip_radius: r, m.
     """
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
     areas = surface.face_areas[:, None]
     direction = view_directions(surface.face_normals * areas / areas.mean(), ())[0]
-    cameras = cameras_for(surface.vertices, [direction, direction])
+    camera = cameras_for(surface.vertices, [direction, direction])[0]
+    width, height = camera.width / SUPERSAMPLING, camera.height / SUPERSAMPLING
     scaled = [np.asarray(values) * tip_radius for values in (curvature.k1, curvature.k2)]
-    norm = Normalize(*_span(scaled, curvature.valid))
-    with styled():
-        figure, panels = panels_for(cameras, room=0.6)
-        for (axes, camera), values, name in zip(panels, scaled, ("larger, k₁", "smaller, k₂"), strict=True):
-            colours = colormaps[CURVATURE_COLOURMAP](norm(values))[:, :3]
-            colours[np.abs(values) < SIGNIFICANT * curvature.sd * tip_radius] = FLAT_COLOUR
-            colours[~curvature.valid] = NOT_VALID
-            axes.imshow(render([Body(surface, colours)], camera).reduced(SUPERSAMPLING), interpolation="none")
-            axes.set_title(f"Principal curvature, {name}", fontweight="bold")
-        bar = figure.colorbar(
-            ScalarMappable(norm, CURVATURE_COLOURMAP), ax=[axes for axes, _ in panels], shrink=0.75, aspect=28, pad=0.01
-        )
-        bar.set_label("curvature × tip radius")
-        bar.outline.set_visible(False)
-        return png(figure)
+    top = _span(scaled, curvature.valid)
+    content = ""
+    for left, values, name in zip((0.0, width), scaled, ("larger, k₁", "smaller, k₂"), strict=True):
+        colours = coloured(0.5 + 0.5 * values / top)
+        colours[np.abs(values) < SIGNIFICANT * curvature.sd * tip_radius] = FLAT_COLOUR
+        colours[~curvature.valid] = NOT_VALID
+        content += text_at(left + 4.0, 18.0, f"Principal curvature, {name}", size=1.1 * FONT_SIZE, bold=True)
+        content += shifted(pictured(render([Body(surface, colours)], camera)), left, CURVATURE_TITLE)
+    bar = min(BAR[1], height)
+    content += shifted(_bar(top, bar), 2.0 * width + 14.0, CURVATURE_TITLE + 0.5 * (height - bar))
+    return drawing(2.0 * width + BAR_ROOM, height + CURVATURE_TITLE + 10.0, content)
 
 
-def _span(values: list[FloatArray], valid: BoolArray) -> tuple[float, float]:
-    """A symmetric range that 99 % of the values fit in, at most twice the tip's own curvature."""
+def coloured(share: FloatArray) -> FloatArray:
+    """(N, 3) colours from blue (0) over white to red (1); what is not finite or beyond takes the nearest end."""
+    stops = np.array([[int(name[i : i + 2], 16) for i in (0, 2, 4)] for name in BLUE_TO_RED]) / 255.0
+    places = np.linspace(0.0, 1.0, len(stops))
+    return np.column_stack([np.interp(np.nan_to_num(share, nan=0.5), places, stops[:, i]) for i in range(3)])
+
+
+def _bar(top: float, height: float) -> str:
+    """The scale of colours, with its numbers."""
+    column = np.rint(255 * coloured(np.linspace(1.0, 0.0, 128))).astype(np.uint8)
+    parts = [image(pixels_png(column[:, None, :]), 0.0, 0.0, BAR[0], height)]
+    for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
+        words = f"{share * top:.2g}".replace("-", "−")
+        parts.append(text_at(BAR[0] + 5.0, 0.5 * height * (1.0 - share) + 4.0, words, size=0.92 * FONT_SIZE))
+    parts.append(
+        text_at(BAR[0] + 56.0, 0.5 * height, "curvature × tip radius", size=FONT_SIZE, anchor="middle", turned=-90.0)
+    )
+    return "".join(parts)
+
+
+def _span(values: list[FloatArray], valid: BoolArray) -> float:
+    """A range to either side of zero that 99 % of the values fit in, at most twice the tip's own curvature."""
     known = np.concatenate([each[valid] for each in values])
     known = known[np.isfinite(known)]
     top = min(2.0, float(np.quantile(np.abs(known), 0.99))) if len(known) else 1.0
-    return -max(top, 1e-9), max(top, 1e-9)
+    return max(top, 1e-9)

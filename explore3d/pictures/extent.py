@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from explore3d.pictures.figure import BAND, ESTIMATED, INK, TRUTH, new_figure, png, styled
+from explore3d.pictures.chart import DASHED, Panel, sheet
+from explore3d.pictures.figure import BAND, ESTIMATED, INK, TRUTH
 from mapping import Feature, FloatArray, length_text, length_unit
 from mapping.geometry.mesh import arclengths
 
 EXTENTS_PER_ROW = 2
+EXTENT_SIZE = (530.0, 250.0)  # of a panel, px
 NORMAL_QUANTILE_95 = 1.6448536
 
 
 def extent_picture(features: Sequence[Feature], truths: Sequence[FloatArray | None]) -> bytes | None:
-    """PNG with one panel for each feature along a curve: place along its chord, and across it, not to one scale.
+    """SVG with one panel for each feature along a curve: place along its chord, and across it, not to one scale.
 
     Args:
         features: those to show; bumps and pits have no extent and are left out.
@@ -26,18 +27,11 @@ def extent_picture(features: Sequence[Feature], truths: Sequence[FloatArray | No
     if not pairs:
         return None
     columns = min(EXTENTS_PER_ROW, len(pairs))
-    rows = -(-len(pairs) // columns)
-    with styled():
-        figure = new_figure(5.5 * columns, 2.6 * rows)
-        grid = np.atleast_1d(figure.subplots(rows, columns)).ravel()
-        for axes, (feature, true) in zip(grid, pairs, strict=False):
-            _panel(axes, feature, true)
-        for axes in grid[len(pairs) :]:
-            axes.set_visible(False)
-        return png(figure)
+    width, height = EXTENT_SIZE
+    return sheet([_panel(*each) for each in pairs], columns * width, height, columns, legend=True)
 
 
-def _panel(axes: Any, feature: Feature, true: FloatArray | None) -> None:
+def _panel(feature: Feature, true: FloatArray | None) -> Panel:
     """The axis in a plane: along the chord between its ends (a ring: its first diameter), and across."""
     along, across, origin = _plane(feature)
     x, y = (feature.axis - origin) @ along, (feature.axis - origin) @ across
@@ -53,31 +47,29 @@ def _panel(axes: Any, feature: Feature, true: FloatArray | None) -> None:
         spread.append((true - origin) @ across)
     y_factor, y_name = length_unit(float(np.max([np.abs(each).max() for each in spread])))
     band = np.concatenate([np.column_stack([x, y]) + side, (np.column_stack([x, y]) - side)[::-1]])
-    axes.fill(band[:, 0] / x_factor, band[:, 1] / y_factor, color=BAND, linewidth=0, label="axis, 90 %")
-    axes.plot(x / x_factor, y / y_factor, color=ESTIMATED, label="axis, median")
+    panel = Panel(f"{feature.id}: {_worst(feature, sd)}", f"along ({x_name})", f"across ({y_name})", y_ticks=5)
+    panel.area(band[:, 0] / x_factor, band[:, 1] / y_factor, BAND, name="axis, 90 %")
+    panel.line(x / x_factor, y / y_factor, ESTIMATED, name="axis, median")
     if true is not None:
         place = (true - origin) @ along, (true - origin) @ across
-        axes.plot(place[0] / x_factor, place[1] / y_factor, color=TRUTH, linestyle=(0, (4, 3)), label="truth")
+        panel.line(place[0] / x_factor, place[1] / y_factor, TRUTH, dash=DASHED, name="truth")
     for end, direction in ((0, -1.0), (-1, 1.0)):
-        _end(axes, feature, end, direction, (x[end] / x_factor, y[end] / y_factor), x_factor)
-    axes.set_title(f"{feature.id}: {_worst(feature, sd)}", fontweight="bold")
-    axes.set_xlabel(f"along ({x_name})")
-    axes.set_ylabel(f"across ({y_name})")
-    axes.legend(loc="best", fontsize=7, frameon=True, facecolor="white", edgecolor="none", framealpha=0.8)
+        _end(panel, feature, end, direction, (x[end] / x_factor, y[end] / y_factor), x_factor)
+    return panel
 
 
-def _end(axes: Any, feature: Feature, end: int, direction: float, place: tuple[float, float], factor: float) -> None:
+def _end(panel: Panel, feature: Feature, end: int, direction: float, place: tuple[float, float], factor: float) -> None:
     """A bar for an end that was seen; an arrow for one that goes on beyond what was explored."""
     intervals, seen = feature.details.end_intervals, feature.details.ends_seen
     if feature.closed:
         return
+    x, y = place
     if intervals is None or seen is None or not seen[end]:
-        axes.plot(*place, marker=">" if direction > 0 else "<", color=ESTIMATED, markersize=8, clip_on=False)
+        panel.marks([x], [y], ESTIMATED, ">" if direction > 0 else "<", size=10.0, clipped=False)
         return
-    low, high = (direction * value / factor for value in intervals[end])
-    low, high = min(low, high), max(low, high)
-    bar = [[max(-low, 0.0)], [max(high, 0.0)]]
-    axes.errorbar(*place, xerr=bar, color=INK, capsize=4, elinewidth=1.4, marker="o", markersize=3, zorder=5)
+    low, high = (x + direction * value / factor for value in intervals[end])
+    panel.bars([[min(low, x), max(high, x)]], [[y, y]], INK, width=1.8)
+    panel.marks([low, x, high], [y, y, y], INK, "o", size=4.0)
 
 
 def _plane(feature: Feature) -> tuple[FloatArray, FloatArray, FloatArray]:

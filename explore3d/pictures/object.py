@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from explore3d.pictures.camera import Camera
-from explore3d.pictures.figure import DPI, INK, new_figure, png, styled
-from explore3d.pictures.raycast import Body, Picture, render
+from explore3d.pictures.chart import drawing, image, number, pixels_png, stroke, text_at, text_width
+from explore3d.pictures.figure import INK
+from explore3d.pictures.render import Body, Picture, render
 from explore3d.pictures.sweep_paths import SweepPath, densified
 from mapping import Feature, FloatArray, Surface, length_text
 from mapping.inference.kinds import kind_of
@@ -24,22 +24,26 @@ QUIET = np.array([0.42, 0.52, 0.62])
 LOUD = np.array([0.93, 0.55, 0.13])
 # Features are drawn at least so many pixels wide, or nobody would see them.
 LEAST_FEATURE_PIXELS = 5.0
+# Size of the words in a picture, and how high a label is, px
+LABEL_SIZE = 13.0
+LABEL_HEIGHT = 18.0
 # A body whose outward directions cancel more than this is round: it needs two views.
 ROUND = 0.45
 
 
 def object_picture(base: Surface, features: Sequence[Feature], sweeps: Sequence[SweepPath]) -> bytes:
-    """PNG of the base with sweeps and features; two opposite views of a round body.
+    """SVG of the base with sweeps and features; two opposite views of a round body.
 
     What the sweeps noticed is drawn in orange.
     """
     normals = np.concatenate([np.zeros((0, 3)), *(path.normals for path in sweeps)])
     shown = _close_up(base, np.concatenate([np.zeros((0, 3)), *(path.points for path in sweeps)]))
-    with styled():
-        figure, panels = panels_for(cameras_for(shown, view_directions(normals, features)))
-        for axes, camera in panels:
-            _draw(axes, _scene(base, features, camera, sweeps), features)
-        return png(figure)
+    cameras = cameras_for(shown, view_directions(normals, features))
+    left, content = 0.0, ""
+    for camera in cameras:
+        content += shifted(_drawn(_scene(base, features, camera, sweeps), features), left)
+        left += camera.width / SUPERSAMPLING
+    return drawing(left, max(camera.height for camera in cameras) / SUPERSAMPLING, content)
 
 
 def pixel_size(camera: Camera) -> float:
@@ -53,14 +57,9 @@ def cameras_for(points: FloatArray, directions: Sequence[FloatArray]) -> list[Ca
     return [Camera.facing(points, each, width, round(TALLEST * width)) for each in directions]
 
 
-def panels_for(cameras: Sequence[Camera], room: float = 0.0) -> tuple[Any, list[tuple[Any, Camera]]]:
-    """A figure with one panel beside the other, each of its camera's shape, and `room` inches besides."""
-    tallest = max(camera.height for camera in cameras) / SUPERSAMPLING / DPI
-    figure = new_figure(sum(camera.width for camera in cameras) / SUPERSAMPLING / DPI, tallest + room)
-    panels = np.atleast_1d(figure.subplots(1, len(cameras)))
-    for axes in panels:
-        axes.set_axis_off()
-    return figure, list(zip(panels, cameras, strict=True))
+def shifted(content: str, left: float, top: float = 0.0) -> str:
+    """A part of a drawing, moved to the right and down, px."""
+    return f'<g transform="translate({number(left)} {number(top)})">{content}</g>'
 
 
 def view_directions(normals: FloatArray, features: Sequence[Feature]) -> list[FloatArray]:
@@ -106,10 +105,17 @@ def _scene(base: Surface, features: Sequence[Feature], camera: Camera, sweeps: S
     return picture
 
 
-def _draw(axes: Any, picture: Picture, features: Sequence[Feature]) -> None:
+def pictured(picture: Picture) -> str:
+    """The pixels as a part of a drawing."""
+    size = picture.camera.width / SUPERSAMPLING, picture.camera.height / SUPERSAMPLING
+    return image(pixels_png(picture.reduced(SUPERSAMPLING)), 0.0, 0.0, *size)
+
+
+def _drawn(picture: Picture, features: Sequence[Feature]) -> str:
     """The pixels with the features' names and a scale bar."""
-    pixels = picture.reduced(SUPERSAMPLING)
-    axes.imshow(np.clip(pixels, 0.0, 1.0), interpolation="none")
+    content = pictured(picture)
+    width, height = picture.camera.width / SUPERSAMPLING, picture.camera.height / SUPERSAMPLING
+    taken: list[tuple[float, float, float]] = []
     for feature in features:
         reference = feature.axis[len(feature.axis) // 2] if feature.anchor is None else feature.anchor.position
         # A wide bump hides its own foot: the label points at what stands out.
@@ -119,26 +125,51 @@ def _draw(axes: Any, picture: Picture, features: Sequence[Feature]) -> None:
         hidden = not (0 <= row < picture.depth.shape[0] and 0 <= column < picture.depth.shape[1])
         if hidden or depth[0] > 1.02 * picture.depth[row, column]:
             continue
-        axes.annotate(
-            f"{feature.id}  {length_text(feature.height.median)}",
-            place[0] / SUPERSAMPLING,
-            xytext=(22, 44),
-            textcoords="offset points",
-            fontsize=8.5,
-            color=INK,
-            arrowprops={"arrowstyle": "-", "color": INK, "linewidth": 0.6},
-            bbox={"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+        words = f"{feature.id}  {length_text(feature.height.median)}"
+        x, y = (place[0] / SUPERSAMPLING).tolist()
+        wide = text_width(words, LABEL_SIZE) + 6.0
+        left = min(max(x + 30.0, 2.0), width - wide - 2.0)
+        top = free_row(left, wide, min(max(y - 72.0, 2.0), height - LABEL_HEIGHT - 2.0), taken, height)
+        taken.append((left, wide, top))
+        content += stroke(f"M{number(x)} {number(y)}L{number(left)} {number(top + 0.5 * LABEL_HEIGHT)}", INK, 0.8)
+        content += (
+            f'<rect x="{number(left)}" y="{number(top)}" width="{number(wide)}" height="{LABEL_HEIGHT:g}" rx="3" '
+            'fill="#fff" opacity="0.85"/>'
         )
-    draw_scale_bar(axes, picture.camera)
+        content += text_at(left + 3.0, top + 13.0, words, size=LABEL_SIZE)
+    return content + _scale_bar(picture.camera)
 
 
-def draw_scale_bar(axes: Any, camera: Camera) -> None:
-    """A round length at the distance of the camera's target."""
+def free_row(
+    left: float, wide: float, wish: float, taken: Sequence[tuple[float, float, float]], height: float
+) -> float:
+    """Where a label may stand, px from the top: as near as possible to where it wants to, on no other label.
+
+    Args:
+        left, wide: of the label.
+        wish: its wanted top.
+        taken: (left, width, top) of the labels that stand already.
+        height: of the picture; a label that finds no free place keeps the one it wished for.
+    """
+    beside = [top for other, size, top in taken if other < left + wide and left < other + size]
+    for step in range(int(height / LABEL_HEIGHT)):
+        for top in (wish - step * LABEL_HEIGHT, wish + step * LABEL_HEIGHT):
+            if 0.0 <= top <= height - LABEL_HEIGHT and all(abs(top - other) >= LABEL_HEIGHT for other in beside):
+                return top
+    return wish
+
+
+def round_length(camera: Camera) -> tuple[float, float]:
+    """A round length at the distance of the camera's target, about a sixth of the picture wide: in m, and in px."""
     pixel = SUPERSAMPLING * pixel_size(camera)
-    height, width = camera.height / SUPERSAMPLING, camera.width / SUPERSAMPLING
-    wish = 0.16 * width * pixel
+    wish = 0.16 * camera.width / SUPERSAMPLING * pixel
     power = 10.0 ** np.floor(np.log10(wish))
     length = float(max(step for step in (1.0, 2.0, 5.0) if step * power <= wish) * power)
-    left, row = 0.03 * width, 0.965 * height
-    axes.plot([left, left + length / pixel], [row, row], color=INK, linewidth=2.0, solid_capstyle="butt")
-    axes.text(left, row - 0.012 * height, length_text(length), color=INK, fontsize=8.5, va="bottom")
+    return length, length / pixel
+
+
+def _scale_bar(camera: Camera) -> str:
+    length, wide = round_length(camera)
+    left, row = 0.03 * camera.width / SUPERSAMPLING, 0.965 * camera.height / SUPERSAMPLING
+    bar = stroke(f"M{number(left)} {number(row)}h{number(wide)}", INK, 3.0)
+    return bar + text_at(left, row - 7.0, length_text(length), size=LABEL_SIZE)

@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 
 from explore3d import count_text, seconds_text
-from explore3d.pictures.figure import ESTIMATED, INK, MUTED, png, styled
+from explore3d.pictures.camera import Camera
+from explore3d.pictures.figure import DPI, ESTIMATED, INK, MUTED, new_figure, png, styled
 from explore3d.pictures.object import (
     PICTURE_BASE_COLOUR,
     SUPERSAMPLING,
     cameras_for,
-    draw_scale_bar,
-    panels_for,
     pixel_size,
+    round_length,
     view_directions,
 )
-from explore3d.pictures.raycast import Body, Picture, render
+from explore3d.pictures.render import Body, Picture, render
 from explore3d.pictures.sweep_paths import densified
 from hw import Move
 from mapping import FloatArray, length_text
@@ -27,6 +27,7 @@ from mapping.base import Base
 AIR = np.array([0.72, 0.76, 0.80])
 WRONG = np.array([0.78, 0.16, 0.16])
 TIME_COLOURMAP = "viridis"
+TITLE_ROOM = 0.5  # inches
 
 
 def plan_picture(base: Base, moves: Sequence[Move], tip_radius: float, violations: Collection[int] = ()) -> bytes:
@@ -46,16 +47,34 @@ def plan_picture(base: Base, moves: Sequence[Move], tip_radius: float, violation
     corners = np.stack(np.meshgrid(*np.stack([shown.min(axis=0), shown.max(axis=0)]).T), axis=-1).reshape(-1, 3)
     times = np.concatenate([[0.0], np.cumsum([move.duration for move in moves])])
     with styled():
-        figure, panels = panels_for(cameras_for(corners, views), room=0.5)
+        figure, panels = _panels(cameras_for(corners, views))
         for axes, camera in panels:
             picture = render([Body(base.surface, PICTURE_BASE_COLOUR)], camera)
             for number, move in enumerate(moves):
                 share = times[number : number + 2] / (times[-1] or 1.0)
                 _draw(picture, move, base, tip_radius, number in violations, share)
             axes.imshow(picture.reduced(SUPERSAMPLING), interpolation="none")
-            draw_scale_bar(axes, camera)
+            _draw_scale_bar(axes, camera)
         _legend(figure, [axes for axes, _ in panels], moves, float(times[-1]), len(violations))
         return png(figure)
+
+
+def _panels(cameras: Sequence[Camera]) -> tuple[Any, list[tuple[Any, Camera]]]:
+    """A figure with one panel beside the other, each of its camera's shape, and some room above."""
+    tallest = max(camera.height for camera in cameras) / SUPERSAMPLING / DPI
+    figure = new_figure(sum(camera.width for camera in cameras) / SUPERSAMPLING / DPI, tallest + TITLE_ROOM)
+    panels = np.atleast_1d(figure.subplots(1, len(cameras)))
+    for axes in panels:
+        axes.set_axis_off()
+    return figure, list(zip(panels, cameras, strict=True))
+
+
+def _draw_scale_bar(axes: Any, camera: Camera) -> None:
+    length, wide = round_length(camera)
+    height, width = camera.height / SUPERSAMPLING, camera.width / SUPERSAMPLING
+    left, row = 0.03 * width, 0.965 * height
+    axes.plot([left, left + wide], [row, row], color=INK, linewidth=2.0, solid_capstyle="butt")
+    axes.text(left, row - 0.012 * height, length_text(length), color=INK, fontsize=8.5, va="bottom")
 
 
 def _draw(picture: Picture, move: Move, base: Base, tip_radius: float, wrong: bool, share: FloatArray) -> None:

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from explore3d.pictures.figure import ESTIMATED, INK, MUTED, TRACED, new_figure, png, styled
+from explore3d.pictures.chart import DASHED, Panel, sheet
+from explore3d.pictures.figure import ESTIMATED, INK, MUTED, TRACED
 from mapping import Feature, FloatArray, Trace, length_text, length_unit
 from mapping.base import Base
 
+PROFILE_WIDTH = 1060.0  # px
+PROFILE_HEIGHT = 300.0  # of each of its two panels, px
+# A profile is drawn by the lowest and highest sample of so many stretches: more than there are pixels
+DRAWN_STRETCHES = 2000
+
 
 def profile_picture(trace: Trace, base: Base, features: Sequence[Feature], limit: float) -> bytes:
-    """PNG of two panels over one abscissa.
+    """SVG of two panels over one abscissa.
 
     Args:
         trace: one profile.
@@ -29,19 +34,24 @@ def profile_picture(trace: Trace, base: Base, features: Sequence[Feature], limit
     floor = (feet.points - origin) @ up + trace.tip_radius
     order = np.argsort(x, kind="stable")
     x_factor, x_name = length_unit(float(np.abs(x).max()))
-    with styled():
-        figure = new_figure(11.0, 6.4)
-        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1, 1.7))
-        z_factor, z_name = length_unit(float(np.ptp(z)))
-        low = float(z.min())
-        upper.plot(x[order] / x_factor, (z[order] - low) / z_factor, color=TRACED, linewidth=0.8, label="trace")
-        upper.plot(x[order] / x_factor, (floor[order] - low) / z_factor, color=INK, linewidth=1.0, label="base, fitted")
-        upper.set_ylabel(f"height ({z_name})")
-        upper.set_title("The profile as it was recorded", fontweight="bold")
-        upper.legend(loc="best", ncols=2)
-        _heights(lower, x[order] / x_factor, feet.height[order], features, limit, (origin, heading, x_factor))
-        lower.set_xlabel(f"place along the profile ({x_name})")
-        return png(figure)
+    z_factor, z_name = length_unit(float(np.ptp(z)))
+    low = float(z.min())
+    upper = Panel("The profile as it was recorded", y_name=f"height ({z_name})", x_ticks=10)
+    upper.line(*thinned(x[order] / x_factor, (z[order] - low) / z_factor), TRACED, width=1.0, name="trace")
+    upper.line(*thinned(x[order] / x_factor, (floor[order] - low) / z_factor), INK, width=1.3, name="base, fitted")
+    lower = _heights(x[order] / x_factor, feet.height[order], features, limit, (origin, heading, x_factor))
+    lower.x_name = f"place along the profile ({x_name})"
+    return sheet([upper, lower], PROFILE_WIDTH, PROFILE_HEIGHT, legend=True)
+
+
+def thinned(x: FloatArray, y: FloatArray, stretches: int = DRAWN_STRETCHES) -> tuple[FloatArray, FloatArray]:
+    """The line through (N,) points in order, without those that no eye sees: of each stretch its lowest and highest."""
+    if len(x) <= 2 * stretches:
+        return x, y
+    firsts = np.linspace(0, len(x), stretches, endpoint=False).astype(int)
+    low, high = np.minimum.reduceat(y, firsts), np.maximum.reduceat(y, firsts)
+    middle = 0.5 * (x[firsts] + x[np.append(firsts[1:], len(x)) - 1])
+    return np.repeat(middle, 2), np.column_stack([low, high]).ravel()
 
 
 def profile_line(trace: Trace) -> tuple[FloatArray, FloatArray]:
@@ -55,42 +65,38 @@ def profile_line(trace: Trace) -> tuple[FloatArray, FloatArray]:
 
 
 def _heights(
-    axes: Any,
     x: FloatArray,
     height: FloatArray,
     features: Sequence[Feature],
     limit: float,
     line: tuple[FloatArray, FloatArray, float],
-) -> None:
+) -> Panel:
     origin, heading, x_factor = line
     factor, name = length_unit(float(np.abs(height).max()))
-    axes.plot(x, height / factor, color=TRACED, linewidth=0.6, label="height over the base")
+    low, high = float(height.min()) / factor, float(height.max()) / factor
+    panel = Panel(
+        "Height over the base, and what stands out of it",
+        y_name=f"height over the base ({name})",
+        x_ticks=10,
+        y_limits=(low - 0.05 * (high - low), high + 0.25 * (high - low)) if high > low else None,
+    )
+    panel.level(0.0, INK, width=0.8)
+    panel.line(*thinned(x, height / factor), TRACED, width=0.8, name="height over the base")
     places = np.array([(feature.axis[0] - origin) @ heading / x_factor for feature in features])
     crests = np.array([feature.height.median / factor for feature in features])
     finer = np.array([feature.curvature_feature for feature in features], dtype=bool)
-    for mask, face, label in ((finer, ESTIMATED, "finer than the tip"), (~finer, "white", "gentler than the tip")):
+    for mask, filled, label in ((finer, True, "finer than the tip"), (~finer, False, "gentler than the tip")):
         if mask.any():
-            axes.plot(
-                places[mask], crests[mask], "v", color=ESTIMATED, markerfacecolor=face, markersize=6, linestyle="none",
-                label=label,
-            )  # fmt: skip
+            panel.marks(places[mask], crests[mask], ESTIMATED, "v", filled=filled, name=label)
     if np.isfinite(limit):
-        axes.axhline(
-            limit / factor, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)),
-            label=f"detection limit of a sharp crest, {length_text(limit)}",
-        )  # fmt: skip
+        said = f"detection limit of a sharp crest, {length_text(limit)}"
+        panel.level(limit / factor, MUTED, width=1.2, dash=DASHED, name=said)
     named: list[float] = []
     for number in np.argsort(-np.abs(crests))[:8]:
         if any(abs(places[number] - place) < 0.05 * np.ptp(x) for place in named):
             continue  # its name would run into that of a higher one
         named.append(float(places[number]))
-        axes.annotate(
-            features[number].id, (places[number], crests[number]), xytext=(0, 7), textcoords="offset points",
-            ha="center", fontsize=7.5,
-        )  # fmt: skip
-    axes.axhline(0.0, color=INK, linewidth=0.6)
-    axes.set_ylabel(f"height over the base ({name})")
-    axes.set_title("Height over the base, and what stands out of it", fontweight="bold")
-    low, high = float(height.min()) / factor, float(height.max()) / factor
-    axes.set_ylim(low - 0.05 * (high - low), high + 0.25 * (high - low))
-    axes.legend(loc="upper left", ncols=4)
+        panel.words(
+            float(places[number]), float(crests[number]), features[number].id, dy=-9.0, anchor="middle", size=10.0
+        )
+    return panel

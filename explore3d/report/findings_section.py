@@ -88,7 +88,7 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
     picture = "profile" if is_profile(analysis) else "object"
     if picture in pictures.files:
         content.append(figure(pictures.files[picture], f"Picture of the {picture}", _caption(analysis)))
-    content.append(element("h2", "To look around"))
+    content.append(element("h2", "To look around", class_="to-look"))
     content.append(view)
     return section("What was found", "found", *content)
 
@@ -130,7 +130,8 @@ def _row(feature: Feature, analysis: Analysis, shared: Sequence[str]) -> Row:
         detail = badge("gentler than the tip", "plain")
     own = [note for note in feature.notes if note not in shared]
     notes = element("small", "; ".join(own), class_="note") if own else Html("")
-    name = Html(element("b", feature.id) + notes)
+    name = element("button", feature.id, type="button", class_="feature", data_feature=feature.id, aria_pressed="false")
+    name = Html(name + notes)
     return (name, *cells, length, _place(feature, analysis), Html(evidence), detail, _posterior(feature))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 from collections.abc import Iterable, Sequence
 from html import escape
 
@@ -47,11 +48,27 @@ def section(title: str, name: str, *content: str) -> Html:
     return element("section", element("h2", title), *content, id=name)
 
 
-def figure(png: bytes, description: str, caption: str) -> Html:
-    """A picture inside the page, with its caption."""
-    source = "data:image/png;base64," + base64.b64encode(png).decode("ascii")
-    image = Html(f'<img src="{source}" alt="{escape(description)}">')
+def figure(picture: bytes, description: str, caption: str) -> Html:
+    """A picture inside the page, PNG or SVG, with its caption."""
+    if picture.startswith(b"<svg"):
+        name = f'<svg role="img" aria-label="{escape(description)}"'
+        image = Html(picture.decode().replace("<svg", name, 1))
+    else:
+        source = "data:image/png;base64," + base64.b64encode(picture).decode("ascii")
+        image = Html(f'<img src="{source}" alt="{escape(description)}">')
     return element("figure", image, element("figcaption", caption))
+
+
+def script(code: str) -> Html:
+    """Code that the page runs; it holds no text from outside."""
+    return Html(f"<script>{code}</script>")
+
+
+def data_script(name: str, document: object) -> Html:
+    """Data for a script, as JSON in an element of that id: no text in it can end the element."""
+    written = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    escaped = written.replace("<", "\\u003c")
+    return Html(f'<script type="application/json" id="{escape(name)}">{escaped}</script>')
 
 
 def badge(content: str, kind: str) -> Html:

@@ -98,15 +98,32 @@ td small { display: block; color: var(--soft); font-size: .82rem; }
 .badge.plain { background: #eef1f4; color: #3e4c59; }
 .bar { display: inline-block; height: .7rem; background: #829ab1; border-radius: 2px; min-width: 1px; }
 figure { margin: 1rem 0; }
-figure img { max-width: 100%; height: auto; display: block; border: 1px solid var(--faint); border-radius: 8px; }
+figure > img, figure > svg { max-width: 100%; height: auto; display: block; border: 1px solid var(--faint);
+  border-radius: 8px; }
 figcaption { color: var(--soft); font-size: .9rem; margin-top: .45rem; max-width: 52rem; }
-.view { height: 600px; border: 1px solid var(--faint); border-radius: 8px; overflow: hidden; }
-.view.flat { height: 440px; }
+.view { border: 1px solid var(--faint); border-radius: 8px; overflow: hidden; }
+.view .stage { position: relative; height: 560px; } .view.flat .stage { height: 400px; }
+.view canvas { width: 100%; height: 100%; display: block; touch-action: none; cursor: grab; }
+.view canvas:focus-visible { outline: 2px solid #1d4e89; outline-offset: -2px; }
+.view .tools { display: flex; flex-wrap: wrap; gap: .3rem 1.1rem; align-items: center; padding: .4rem .8rem;
+  background: #f5f7fa; border-bottom: 1px solid var(--faint); font-size: .88rem; }
+.view .tools button { margin-left: auto; }
+.view .label { position: absolute; margin: 0; padding: .35rem .6rem; background: #fffffff0; border: 1px solid #9aa5b1;
+  pointer-events: none; font: inherit; font-size: .85rem; line-height: 1.4; white-space: pre; }
+.view .scale { position: absolute; left: 14px; bottom: 10px; border-bottom: 3px solid var(--ink); font-size: .82rem;
+  pointer-events: none; text-align: center; white-space: nowrap; }
+.hint { color: var(--soft); font-size: .85rem; }
+button { font: inherit; color: #1d4e89; background: none; border: 1px solid #b8c4d0; border-radius: 6px;
+  padding: .05rem .5rem; cursor: pointer; }
+td button.feature { border: 0; padding: 0; font-weight: 600; text-align: left; white-space: nowrap; }
+td button.feature:hover { text-decoration: underline; }
+tr.chosen td { background: #fff4cc; }
 nav { font-size: .92rem; margin-top: 1.1rem; } nav a { margin-right: 1.1rem; }
 a { color: #1d4e89; text-decoration: none; } a:hover { text-decoration: underline; }
 details { margin-top: .6rem; } summary { cursor: pointer; color: var(--soft); }
 pre { background: #f5f7fa; padding: .8rem; border-radius: 8px; overflow: auto; font-size: .82rem; }
 code { font-size: .9em; }
-@media (max-width: 640px) { h1 { font-size: 1.5rem; } main { padding: 1.4rem .9rem 3rem; } .view { height: 420px; } }
-@media print { .view { display: none; } section { break-inside: avoid; } .table { max-height: none; } }
+@media (max-width: 640px) { h1 { font-size: 1.5rem; } main { padding: 1.4rem .9rem 3rem; }
+  .view .stage { height: 380px; } }
+@media print { .view, .hint, .to-look { display: none; } section { break-inside: avoid; } .table { max-height: none; } }
 """

@@ -1,4 +1,4 @@
-"""Report: one page that opens without a network, and a PNG of each of its figures beside it."""
+"""Report: one page that opens without a network, and an SVG of each of its figures beside it."""
 
 from __future__ import annotations
 
@@ -13,21 +13,18 @@ from explore3d.report.findings_section import facts, headline, what_was_found
 from explore3d.report.markup import Html, element, text
 from explore3d.report.page import REPORT_CSS
 from explore3d.report.pictures import Pictures, draw_pictures, is_profile
-from explore3d.report.view3d import object_view, plotly_script, profile_view
+from explore3d.report.view3d import object_view, profile_view
 from mapping.geometry.mesh import write_whole
 
 REPORT = "report.html"
 PICTURES = "pictures"
 
 # Nothing may be fetched: everything that the page shows is inside it.
-REPORT_SECURITY_POLICY = (
-    "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; "
-    "script-src 'unsafe-inline' 'unsafe-eval'; font-src data:; worker-src blob:; connect-src data: blob:"
-)
+REPORT_SECURITY_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
 
 def write_report(analysis: Analysis, folder: Path | str, rendered: bool = False) -> Path:
-    """Write report.html and pictures/*.png into the folder; returns the page's path.
+    """Write report.html and pictures/*.svg into the folder; returns the page's path.
 
     The page's title is set when everything on it is drawn: a browser test can wait for it.
 
@@ -42,8 +39,8 @@ def write_report(analysis: Analysis, folder: Path | str, rendered: bool = False)
     pictures = draw_pictures(analysis, sweeps, rendered)
     page = report_page(analysis, pictures, sweeps)
     (place / PICTURES).mkdir(parents=True, exist_ok=True)
-    for name, png in pictures.files.items():
-        write_whole(place / PICTURES / f"{name}.png", png)
+    for name, picture in pictures.files.items():
+        write_whole(place / PICTURES / f"{name}.svg", picture)
     return write_whole(place / REPORT, page)
 
 
@@ -70,7 +67,7 @@ def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPa
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{REPORT_SECURITY_POLICY}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>explore3d: drawing</title><style>{REPORT_CSS}</style>{plotly_script()}</head>"
+        f"<title>explore3d: drawing</title><style>{REPORT_CSS}</style></head>"
         f"<body>{content}{_ready(analysis.title)}</body></html>\n"
     )
 

@@ -1,171 +1,188 @@
-"""Interactive views for the report: the model in 3D, or a profile, drawn by plotly inside the page."""
+"""Interactive views for the report: the model in 3D, or a profile, drawn by the page's own small scripts."""
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from explore3d.pictures import ESTIMATED, INK, TRACED, SweepPath, profile_line, view_directions
-from explore3d.report.markup import Html, element
+from explore3d.pictures import SweepPath, profile_line, thinned, view_directions
+from explore3d.report.markup import Html, data_script, element, script, text
 from mapping import Feature, FloatArray, Surface, Trace, length_unit
 from mapping.base import Base
-from mapping.geometry.mesh import open3d
 from mapping.inference.kinds import kind_of
 from mapping.model import drawn_at_least, feature_mesh
 
 # More than this makes pages slow without showing more.
 MOST_FACES = 60_000
+# A profile of more samples is drawn by the lowest and highest of this number of stretches: 0.3 MB of the page.
+PROFILE_STRETCHES = 20_000
 # Features are drawn at least this share of the base's size wide.
 LEAST_FEATURE_SHARE = 0.004
-VIEW = "view"
-# Diagonal of what is drawn, in units of the scene; the camera stands 1.7 of them off.
-SCENE_DIAGONAL = 1.4
-
-
-def plotly_script() -> Html:
-    """The library itself, for the page's head: nothing is fetched when the page opens."""
-    from plotly.offline import get_plotlyjs
-
-    return Html(f"<script>{get_plotlyjs()}</script>")
+# Sweeps are drawn this share of the base's size above it
+LIFT_SHARE = 1e-3
+VIEW_BASE_COLOUR = (0.9, 0.915, 0.935)
+SWEEP_COLOUR = (0.42, 0.52, 0.62)
+NOTICED_COLOUR = (0.93, 0.55, 0.13)
+SWEEP_WIDTH, NOTICED_WIDTH = 1.2, 2.4  # px
+LAYERS = {"base": "base", "sweeps": "sweeps", "noticed": "what a sweep noticed", "features": "features"}
+# Shares of a box that the places of a view are rounded to: 3 um of 0.2 m
+STEPS = 65535
 
 
 def object_view(base: Surface, features: Sequence[Feature], sweeps: Sequence[SweepPath]) -> Html:
-    """The base, the sweeps and the features, to be turned by hand; hover texts tell each feature's record."""
-    import plotly.graph_objects as plot
-
-    factor, unit = length_unit(0.3 * base.size)
-    parts: list[Any] = [_mesh(_lighter(base), factor, "base", "#f4f6f9", None, opacity=1.0)]
-    lines = _lines(sweeps, 1e-3 * base.size) / factor
-    parts.append(
-        plot.Scatter3d(
-            x=lines[:, 0],
-            y=lines[:, 1],
-            z=lines[:, 2],
-            mode="lines",
-            name="sweeps",
-            hoverinfo="skip",
-            line={"color": "#486581", "width": 3},
-        )
-    )
+    """The base, the sweeps and the features, to be turned by hand; a click on a feature tells its record."""
+    shown = [_mesh(lighter(base), "base", VIEW_BASE_COLOUR)]
     for feature in features:
-        colour = "rgb" + str(tuple(round(255 * each) for each in kind_of(feature).colour[:3]))
         shape = feature_mesh(drawn_at_least(feature, LEAST_FEATURE_SHARE * base.size))
-        parts.append(_mesh(shape, factor, feature.id, colour, hover_text(feature), opacity=1.0))
-    axes = {"showbackground": False, "gridcolor": "#e4e7eb", "zeroline": False}
-    drawing = plot.Figure(parts)
-    low, high = _box(parts)
-    ratio = SCENE_DIAGONAL * (high - low) / np.linalg.norm(high - low)
-    scene: dict[str, Any] = {"aspectmode": "manual", "aspectratio": dict(zip("xyz", map(float, ratio), strict=True))}
-    for axis, *ends in zip("xyz", map(float, low), map(float, high), strict=True):
-        scene[f"{axis}axis"] = axes | {"title": f"{axis} ({unit})", "range": ends}
-    drawing.update_layout(
-        scene=scene,
-        margin={"l": 0, "r": 0, "t": 0, "b": 0},
-        legend={"x": 0.01, "y": 0.99, "bgcolor": "rgba(255,255,255,0.8)"},
-        font={"family": "system-ui, sans-serif", "color": INK},
-    )
-    drawing.update_scenes(camera=_camera(sweeps))
-    return _inlined(drawing, "view")
+        colour = tuple(round(float(each), 3) for each in kind_of(feature).colour[:3])
+        outward = feature.normals.mean(axis=0).tolist()
+        record = {"id": feature.id, "text": hover_text(feature), "outward": outward}
+        shown.append(_mesh(shape, "features", colour) | record)
+    points = [path.points + LIFT_SHARE * base.size * path.normals for path in sweeps]
+    lines = [_lines(points, "sweeps", SWEEP_COLOUR, SWEEP_WIDTH)]
+    noticed = [part[first:last] for part, path in zip(points, sweeps, strict=True) for first, last in _noticed(path)]
+    lines.append(_lines(noticed, "noticed", NOTICED_COLOUR, NOTICED_WIDTH))
+    lines = [each for each in lines if each["starts"]]
+    low, high = _box([base.vertices, *points])
+    factor, unit = length_unit(0.3 * base.size)
+    data = {
+        "box": [low.tolist(), high.tolist()],
+        "unit": unit,
+        "factor": 1.0 / factor,
+        "eye": _eye(sweeps, features).tolist(),
+        "meshes": shown,
+        "lines": lines,
+    }
+    present = {each["layer"] for each in (*shown, *lines)}
+    boxes = [_layer(name, words) for name, words in LAYERS.items() if name in present]
+    keys = "Drag to turn, shift and drag to move, scroll to zoom, click a feature. Keys: arrows, + −, n and p for the "
+    return _view(boxes, "The object in 3D", keys + "next and previous feature, 0 for the whole.", data, "viewer.js")
 
 
 def profile_view(trace: Trace, base: Base, features: Sequence[Feature]) -> Html:
     """The height over the base along a profile, to be zoomed by hand, with the features marked."""
-    import plotly.graph_objects as plot
-
     height = base.foot(trace.centers, trace.tip_radius).height
     origin, heading = profile_line(trace)
-    x = (trace.centers - origin) @ heading
-    x_factor, x_unit = length_unit(float(np.abs(x).max()))
+    place = (trace.centers - origin) @ heading
+    order = np.argsort(place, kind="stable")
+    x_factor, x_unit = length_unit(float(np.abs(place).max()))
     factor, unit = length_unit(float(np.abs(height).max()))
-    marks = np.array([(each.axis[0] - origin) @ heading for each in features]) / x_factor
-    drawing = plot.Figure(
-        [
-            plot.Scatter(
-                x=x / x_factor, y=height / factor, mode="lines", name="height over the base",
-                line={"color": TRACED, "width": 1}, hoverinfo="skip",
-            ),
-            plot.Scatter(
-                x=marks, y=[each.height.median / factor for each in features], mode="markers", name="features",
-                marker={"color": ESTIMATED, "size": 8, "symbol": "triangle-down"},
-                text=[hover_text(each) for each in features], hovertemplate="%{text}<extra></extra>",
-            ),
-        ]
-    )  # fmt: skip
-    drawing.update_layout(
-        template="simple_white",
-        xaxis_title=f"place along the profile ({x_unit})",
-        yaxis_title=f"height over the base ({unit})",
-        margin={"l": 60, "r": 20, "t": 10, "b": 50},
-        legend={"orientation": "h", "x": 0.0, "y": 1.02, "yanchor": "bottom"},
-        font={"family": "system-ui, sans-serif", "color": INK},
+    x, y = thinned(place[order] / x_factor, height[order] / factor, PROFILE_STRETCHES)
+    data = {
+        "x": _packed(x, np.float32),
+        "y": _packed(y, np.float32),
+        "x_name": f"place along the profile ({x_unit})",
+        "y_name": f"height over the base ({unit})",
+        "features": [
+            {
+                "id": each.id,
+                "x": float((each.axis[0] - origin) @ heading) / x_factor,
+                "y": float(each.height.median) / factor,
+                "text": hover_text(each),
+            }
+            for each in features
+        ],
+    }
+    keys = (
+        "Scroll to zoom, drag to move, click a feature. Keys: arrows, + −, n and p for the next and previous feature, "
     )
-    return _inlined(drawing, "view flat")
+    return _view([], "The height along the profile", keys + "0 for the whole.", data, "profile.js")
 
 
-def hover_text(feature: Feature) -> str:
-    """What a feature's label says: name, sizes with intervals, evidence."""
-    lines = [f"<b>{feature.id}</b>"]
+def hover_text(feature: Feature) -> list[str]:
+    """What a feature's label says, in lines: name, sizes with intervals, evidence."""
+    lines = [feature.id]
     for name in ("height", "width", "length"):
         median, span = getattr(feature, name).text()
         if getattr(feature, name).median:
             lines.append(f"{name} {median}" + (f" ({span})" if span else ""))
     finer = "finer than the tip" if feature.curvature_feature else "gentler than the tip"
-    lines += [f"signal to noise {feature.evidence.snr:.0f}, crossings {feature.evidence.crossings}", finer]
-    return "<br>".join(lines)
+    return [*lines, f"signal to noise {feature.evidence.snr:.0f}, crossings {feature.evidence.crossings}", finer]
 
 
-def _inlined(drawing: Any, kind: str) -> Html:
-    written = drawing.to_html(
-        full_html=False, include_plotlyjs=False, div_id=VIEW, default_width="100%", default_height="100%",
-        config={"displaylogo": False, "responsive": True, "scrollZoom": kind == "view"},
-    )  # fmt: skip
-    return element("div", Html(written), class_=kind)
-
-
-def _mesh(surface: Surface, factor: float, name: str, colour: str, hover: str | None, opacity: float) -> Any:
-    import plotly.graph_objects as plot
-
-    points = (surface.vertices / factor).astype(np.float32)
-    i, j, k = surface.faces.T.astype(np.int32)
-    return plot.Mesh3d(
-        x=points[:, 0], y=points[:, 1], z=points[:, 2], i=i, j=j, k=k, name=name, color=colour, opacity=opacity,
-        hoverinfo="skip" if hover is None else "text", text=hover, showlegend=hover is not None, flatshading=True,
-        lighting={"ambient": 0.85, "diffuse": 0.35, "specular": 0.05, "roughness": 0.9},
-    )  # fmt: skip
-
-
-def _box(parts: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest (3,) of all that is drawn, and a little air: axes of one scale over it, however flat it is."""
-    points = np.concatenate([np.column_stack([part[axis] for axis in "xyz"]) for part in parts])
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
-    air = 0.02 * float((high - low).max())
-    return low - air, high + air
-
-
-def _lines(sweeps: Sequence[SweepPath], lift: float) -> FloatArray:
-    """(M, 3) points just above the base, NaN between sweeps."""
-    gap = np.full((1, 3), np.nan)
-    pieces = [np.vstack([path.points + lift * path.normals, gap]) for path in sweeps]
-    return np.concatenate([np.zeros((0, 3)), *pieces])
-
-
-def _lighter(surface: Surface) -> Surface:
-    """The surface with at most MOST_FACES faces."""
-    if len(surface.faces) <= MOST_FACES:
-        return surface
-
-    o3d = open3d()
-    origin = surface.bounds.mean(axis=0)
-    mesh = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector(surface.vertices - origin), o3d.utility.Vector3iVector(surface.faces)
+def _view(boxes: Sequence[Html], label: str, keys: str, data: dict[str, Any], code: str) -> Html:
+    """A canvas with its buttons, its data, and the script that draws them."""
+    tools = element("div", *boxes, element("button", "show all", type="button", class_="reset"), class_="tools")
+    canvas = element("canvas", tabindex="0", role="application", aria_label=f"{label}. {keys}")
+    flat = " flat" if code == "profile.js" else ""
+    stage = element(
+        "div",
+        canvas,
+        element("pre", class_="label", hidden="hidden", aria_live="polite"),
+        *([] if flat else [element("div", class_="scale")]),
+        class_="stage",
     )
-    simpler = mesh.simplify_quadric_decimation(MOST_FACES)
-    return Surface(np.asarray(simpler.vertices) + origin, np.asarray(simpler.triangles))
+    whole = element("div", tools, stage, id="view", class_=f"view{flat}")
+    program = Path(__file__).with_name(code).read_text(encoding="utf-8")
+    # the scripts are wrapped, so that their names are nobody else's
+    wrapped = script("{\n" + program + "}\n")
+    return Html(whole + element("p", keys, class_="hint") + data_script("view-data", data) + wrapped)
 
 
-def _camera(sweeps: Sequence[SweepPath]) -> dict[str, Any]:
-    direction = view_directions(np.concatenate([np.zeros((0, 3)), *(path.normals for path in sweeps)]), ())[0]
-    eye = 1.7 * direction / np.linalg.norm(direction)
-    return {"eye": dict(zip("xyz", map(float, eye), strict=True))}
+def _layer(name: str, words: str) -> Html:
+    box = Html(f'<input type="checkbox" checked data-layer="{name}"> ')
+    return element("label", Html(box + text(words)))
+
+
+def _packed(values: ArrayLike, kind: type[np.generic]) -> str:
+    """Numbers as they lie in memory, little-endian, in base64."""
+    array = np.ascontiguousarray(values, dtype=np.dtype(kind).newbyteorder("<"))
+    return base64.b64encode(array.tobytes()).decode("ascii")
+
+
+def _places(points: FloatArray) -> dict[str, Any]:
+    """Points (N, 3) as shares of their own box, in 16 bits."""
+    low, span = points.min(axis=0), np.ptp(points, axis=0)
+    shares = np.rint((points - low) / np.where(span > 0, span, 1.0) * STEPS)
+    return {"low": low.tolist(), "span": span.tolist(), "points": _packed(shares, np.uint16)}
+
+
+def _mesh(surface: Surface, layer: str, colour: Sequence[float]) -> dict[str, Any]:
+    record: dict[str, Any] = {"layer": layer, "colour": list(colour), "faces": _packed(surface.faces, np.uint32)}
+    return record | _places(surface.vertices)
+
+
+def _lines(paths: Sequence[FloatArray], layer: str, colour: Sequence[float], width: float) -> dict[str, Any]:
+    paths = [each for each in paths if len(each) > 1]
+    starts = np.cumsum([0, *(len(each) for each in paths)])[:-1].tolist()
+    record: dict[str, Any] = {"layer": layer, "colour": list(colour), "width": width, "starts": starts}
+    return record | (_places(np.concatenate(paths)) if paths else {})
+
+
+def _noticed(path: SweepPath) -> list[tuple[int, int]]:
+    """(first, past last) point of each stretch of a sweep that noticed something."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], path.noticed, [False]]).astype(np.int8)))
+    return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
+
+
+def _box(parts: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest (3,) of all that is drawn."""
+    return np.min([each.min(axis=0) for each in parts], axis=0), np.max([each.max(axis=0) for each in parts], axis=0)
+
+
+def lighter(surface: Surface, most: int = MOST_FACES) -> Surface:
+    """The surface with at most so many faces: vertices that share a cell of a grid become one, at their mean.
+
+    Reference: Rossignac and Borrel, Multi-resolution 3D approximations for rendering complex scenes, 1993.
+    """
+    simpler, cell = surface, float(np.sqrt(2.0 * surface.face_areas.sum() / most))
+    while len(simpler.faces) > most:
+        cells = np.floor((surface.vertices - surface.vertices.min(axis=0)) / cell).astype(np.int64)
+        _, owner, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+        owner = owner.ravel()
+        means = np.stack([np.bincount(owner, surface.vertices[:, i]) / count for i in range(3)], axis=1)
+        faces = owner[surface.faces]
+        kept = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+        simpler, cell = Surface(means, faces[kept]), 1.1 * cell
+    return simpler
+
+
+def _eye(sweeps: Sequence[SweepPath], features: Sequence[Feature]) -> FloatArray:
+    """(3,) direction from the object towards the camera: that of the first still picture."""
+    direction = view_directions(np.concatenate([np.zeros((0, 3)), *(path.normals for path in sweeps)]), features)[0]
+    return np.asarray(direction / np.linalg.norm(direction))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import fields
 
 import numpy as np
@@ -207,10 +207,11 @@ class LaidTrace(Trace):
                 sweep.take(Feet(*(getattr(feet, each.name)[own] for each in fields(Feet))), known[own])
         return picked
 
-    def directions(self, centers: FloatArray) -> FloatArray:
-        """(M, 3) unit directions from the base to centres on the sweeps, between those that are known, m.
+    def directions(self) -> Callable[[FloatArray], FloatArray]:
+        """What gives (M, 3) unit directions from the base to centres on the sweeps, m, between those that are known.
 
-        A centre with nothing known within LONGEST_KNOWN_GAP of a tip radius is laid on the base.
+        What is known now is laid out once; a centre with nothing known within LONGEST_KNOWN_GAP of a tip radius is laid
+        on the base.
         """
         from scipy.spatial import cKDTree
 
@@ -218,20 +219,25 @@ class LaidTrace(Trace):
         known = np.concatenate([np.zeros((0, 3)), *(places for places, _ in parts)])
         up = np.concatenate([np.zeros((0, 3)), *(normals for _, normals in parts)])
         if len(known) < 2:
-            return self.base.foot(centers, self.tip_radius).normals
-        distance, near = cKDTree(known).query(centers)
-        found = up[near]
-        for step in (-1, 1):  # linearly towards the neighbour beyond which the centre does not lie
-            beside = np.clip(near + step, 0, len(known) - 1)
-            leg = known[beside] - known[near]
-            square = np.einsum("ij,ij->i", leg, leg)
-            share = np.einsum("ij,ij->i", centers - known[near], leg) / np.maximum(square, np.finfo(float).tiny)
-            between = (share > 0.0) & (share < 1.0) & (square < (LONGEST_KNOWN_GAP * self.tip_radius) ** 2)
-            found[between] += share[between, None] * (up[beside] - up[near])[between]
-        far = np.asarray(distance) > LONGEST_KNOWN_GAP * self.tip_radius
-        if far.any():
-            found[far] = self.base.foot(centers[far], self.tip_radius).normals
-        return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+            return lambda centers: self.base.foot(centers, self.tip_radius).normals
+        tree = cKDTree(known)
+
+        def between_known(centers: FloatArray) -> FloatArray:
+            distance, near = tree.query(centers)
+            found = up[near]
+            for step in (-1, 1):  # linearly towards the neighbour beyond which the centre does not lie
+                beside = np.clip(near + step, 0, len(known) - 1)
+                leg = known[beside] - known[near]
+                square = np.einsum("ij,ij->i", leg, leg)
+                share = np.einsum("ij,ij->i", centers - known[near], leg) / np.maximum(square, np.finfo(float).tiny)
+                between = (share > 0.0) & (share < 1.0) & (square < (LONGEST_KNOWN_GAP * self.tip_radius) ** 2)
+                found[between] += share[between, None] * (up[beside] - up[near])[between]
+            far = np.asarray(distance) > LONGEST_KNOWN_GAP * self.tip_radius
+            if far.any():
+                found[far] = self.base.foot(centers[far], self.tip_radius).normals
+            return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
+        return between_known
 
     def feet(self, index: IntArray | None = None) -> Feet:
         """Where samples stand over the base: all, or those with these indices, which ascend."""

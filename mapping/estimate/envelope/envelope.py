@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from mapping.base import Base, LaidTrace
 from mapping.estimate.envelope.alpha_shape import alpha_estimate
 from mapping.estimate.envelope.bridging import bridged_faces, resting_points, split
 from mapping.estimate.envelope.estimate import Estimate
-from mapping.estimate.envelope.profile_envelope import penetration
+from mapping.estimate.envelope.profile_envelope import penetration_below
 from mapping.estimate.envelope.sweep_mesh import sweep_faces
 from mapping.estimate.sweeps import (
     BRIDGED,
@@ -95,14 +96,15 @@ def estimate_surface(
     points = _contacts(trace, method, away, slack)
     if smoothed is not None:
         points = _unsmoothed(points, smoothed)
-    possible = penetration(points.points, trace.centers, trace.tip_radius) <= slack
+    depth = penetration_below(trace.centers, trace.tip_radius)
+    possible = depth(points.points) <= slack
     if not possible.any():
         raise EnvelopeError("every contact lies inside another ball: the trace is no ball's path; give its noise")
     points = points.select(np.flatnonzero(possible))
     step = _step(points, pitch(trace.centers, trace.sweep)) if spacing is None else spacing
     # Thinned by their own distances, and by their balls': over a sharp edge many balls share one contact.
     points = points.select(thinned(points.points, points.sweep, step, _bounding(points)))
-    estimate = _meshed(points, trace, slack)
+    estimate = _meshed(points, trace.tip_radius, slack, depth)
     return estimate if smoothed is None else replace(estimate, sd=smoothed.sd)
 
 
@@ -116,7 +118,7 @@ def _directions(trace: Trace, base: Base | None, outward: ArrayLike | None) -> F
     """Directions away from the body: over a base those of any centre, between what is known of the trace on it."""
     if outward is not None or base is None:
         return _outward(trace, base, outward)
-    return LaidTrace.of(trace, base).directions
+    return LaidTrace.of(trace, base).directions()
 
 
 def _outward(trace: Trace, base: Base | None, outward: ArrayLike | None) -> FloatArray:
@@ -177,14 +179,13 @@ def _unsmoothed(points: Estimate, smoothed: Smoothed) -> Estimate:
     return replace(points, labels=labels, sample=np.where(own, smoothed.sample[points.sample], -1))
 
 
-def _meshed(points: Estimate, trace: Trace, slack: float) -> Estimate:
+def _meshed(points: Estimate, r: float, slack: float, depth: Callable[[FloatArray], FloatArray]) -> Estimate:
     """The points joined as their centres lie (those never coincide), with resting points in bridged faces."""
     if len(np.unique(points.sweep)) < 2:
         return points
     faces = sweep_faces(points.centers, points.sweep, points.normals, points.points)
     if len(faces) == 0:
         return points
-    r = trace.tip_radius
     flagged = bridged_faces(points.centers, points.normals, faces, r, points.across)
     # Faces at an opened interference point hold their bridged points already.
     chosen = np.flatnonzero(flagged & (points.sample[faces] >= 0).all(axis=1))
@@ -192,7 +193,7 @@ def _meshed(points: Estimate, trace: Trace, slack: float) -> Estimate:
     corners = points.centers[faces[chosen]]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
     # Samples between the three corners lower the balls' common boundary by up to this sagitta.
-    possible = penetration(resting, trace.centers, r) <= slack + longest**2 / (2 * r)
+    possible = depth(resting) <= slack + longest**2 / (2 * r)
     chosen, resting = chosen[possible], resting[possible]
     joined = points.with_resting(resting, faces[chosen])
     return replace(joined, surface=Surface(joined.points, split(faces, chosen, len(points.points))))

@@ -5,10 +5,17 @@ Penetration: how deep points lie inside balls where no body can be.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping import EnvelopeError, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 
 def envelope_heights(
@@ -64,13 +71,27 @@ def penetration(points: FloatArray, centers: FloatArray, tip_radius: float) -> F
     Positive inside a ball, where no body can be; negative outside all of them. Points of a profile (all y of
     one value) are judged by the profile's envelope in O(n), others by a k-d tree.
     """
-    if len(points) == 0:
-        return np.zeros(0)
-    if np.ptp(centers[:, 1]) == 0 and (points[:, 1] == centers[0, 1]).all() and (np.diff(centers[:, 0]) > 0).all():
-        return _below_profile(points, centers, tip_radius)
-    from scipy.spatial import cKDTree
+    return penetration_below(centers, tip_radius)(points)
 
-    return np.asarray(tip_radius - cKDTree(centers).query(points)[0])
+
+def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[FloatArray], FloatArray]:
+    """What gives the penetration of points (N, 3) below balls at `centers` (M, 3), m, laid out once."""
+    one_row = np.ptp(centers[:, 1]) == 0 and bool((np.diff(centers[:, 0]) > 0).all())
+
+    @cache
+    def tree() -> cKDTree:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(centers, balanced_tree=False)  # distances are the same, and it is built in half the time
+
+    def depth(points: FloatArray) -> FloatArray:
+        if len(points) == 0:
+            return np.zeros(0)
+        if one_row and (points[:, 1] == centers[0, 1]).all():
+            return _below_profile(points, centers, tip_radius)
+        return np.asarray(tip_radius - tree().query(points)[0])
+
+    return depth
 
 
 def _below_profile(points: FloatArray, centers: FloatArray, tip_radius: float) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,8 @@ from mapping.geometry.mesh.tree import TriangleTree
 
 # A barycentric coordinate below this counts as zero: the point lies on an edge or a vertex.
 ON_BORDER = 1e-9
+# More queries at once than this only cost memory: some 500 bytes each on the way
+QUERIES_AT_ONCE = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +59,11 @@ class NearestPoint:
         if len(query) == 0:
             empty = np.zeros((0, 3))
             return Nearest(empty, np.zeros(0), np.zeros(0), empty, np.zeros(0, dtype=np.int64), empty)
-        return self._answered(query)
+        firsts = range(0, len(query), QUERIES_AT_ONCE)
+        parts = [self._answered(query[first : first + QUERIES_AT_ONCE]) for first in firsts]
+        if len(parts) == 1:
+            return parts[0]
+        return Nearest(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Nearest)))
 
     def _answered(self, query: FloatArray) -> Nearest:
         face, closest = self._closest(query)

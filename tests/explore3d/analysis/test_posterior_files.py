@@ -44,4 +44,6 @@ def test_arviz_reads_the_saved_draws_bit_for_bit(tmp_path):
 
 def test_a_corner_plot_is_drawn_where_something_was_sampled():
     sampled, bare = model().features
-    assert corner_picture(sampled).startswith(b"\x89PNG") and corner_picture(bare) is None
+    drawing = corner_picture(sampled)
+    assert drawing.startswith(b"<svg") and corner_picture(bare) is None
+    assert all(name in drawing for name in (b">along<", b">height<", b">log radius<", b"400 draws, chain converged"))

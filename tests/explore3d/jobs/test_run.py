@@ -92,7 +92,7 @@ def test_the_output_folder_holds_scene_log_model_report_and_pictures(wire: tuple
     out, _ = wire
     files = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
     assert {"scene.toml", "log.mcap", "model.json", "model.glb", "report.html", "session.json"} <= files
-    assert any(name.startswith("pictures/") and name.endswith(".png") for name in files)
+    assert any(name.startswith("pictures/") and name.endswith(".svg") for name in files)
     assert "ridge-1" in (out / "report.html").read_text()
 
 

@@ -35,7 +35,7 @@ def test_everything_asked_for_is_in_view_and_fills_it() -> None:
 
 
 def test_a_picture_shows_the_nearer_body_and_hides_points_behind_it() -> None:
-    from explore3d.pictures.raycast import Body, render
+    from explore3d.pictures.render import Body, render
 
     red, blue = np.array([0.9, 0.0, 0.0]), np.array([0.0, 0.0, 0.9])
     small = Surface(0.3 * SQUARE.vertices + [0, 0, 0.5], SQUARE.faces)
@@ -52,7 +52,7 @@ def test_a_picture_shows_the_nearer_body_and_hides_points_behind_it() -> None:
 
 
 def test_a_picture_far_from_the_origin_is_the_same_picture() -> None:
-    from explore3d.pictures.raycast import Body, render
+    from explore3d.pictures.render import Body, render
 
     def drawn(shift: float) -> np.ndarray:
         body = Surface(SQUARE.vertices + shift, SQUARE.faces)

@@ -107,7 +107,7 @@ def test_directions_between_what_is_known_are_those_of_the_base():
     for sweep in laid.laid_sweeps:
         sweep.heights(2e-4)
     asked = 0.5 * (centers[100:-100:7] + centers[101:-99:7])
-    off = np.linalg.norm(laid.directions(asked) - half.foot(asked, TIP).normals, axis=1)
+    off = np.linalg.norm(laid.directions()(asked) - half.foot(asked, TIP).normals, axis=1)
     assert off.max() < 0.02  # a facet turns by 0.017
 
 
