@@ -203,6 +203,8 @@ class _Reading:
                 break
         if limit == first:
             limit = self._without_counts(lines, first, columns)
+        if not self.said and (above := [line.strip() for _, line in lines[:limit] if self._is_numbers(line)]):
+            self.said.append(f"numbers above the rows left out: {above[0][:30]!r}")
         start = lines[limit][0] if limit < len(lines) else len(self.data)
         return [line for _, line in lines[:limit]], start
 
@@ -242,6 +244,13 @@ class _Reading:
             return False
         values = [self._value(cell) for cell, number in zip(cells, self.dialect.numeric, strict=True) if number]
         return None not in values and sum(value == value for value in values) >= min(2, len(values))
+
+    def _is_numbers(self, line: str) -> bool:
+        """True for a line of nothing but numbers, two or more."""
+        if _blank_or_comment(line):
+            return False
+        values = [self._value(cell) for cell in split(line, self.dialect.delimiter)]
+        return len(values) >= 2 and all(value is not None and value == value for value in values)
 
     def _value(self, cell: str) -> float | None:
         """The number in a cell, NaN if it says that there is none, None if it is something else."""
