@@ -297,7 +297,7 @@ def load_scene(path: Path | str) -> Scene:
     if not path.is_file():
         raise SceneError(f"{path}: {'a folder, not a scene file' if path.is_dir() else 'no such scene file'}")
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # a BOM of some editors is no part of it
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(f"{path}: not a readable scene file ({error})") from error
     return parse_scene(text, path)

@@ -322,6 +322,14 @@ def test_a_million_rows_are_read_in_seconds(tmp_path: Path) -> None:
     assert time.process_time() - start < 5
 
 
+def test_a_byte_order_mark_is_no_part_of_a_table_or_its_sidecar(tmp_path: Path) -> None:
+    rows = "x,z\n" + "".join(f"{0.1 * k:.1f},{k % 3}\n" for k in range(20))
+    (tmp_path / "scan.csv.toml").write_bytes(b"\xef\xbb\xbfunits = 'mm'\ntip_radius = '2 um'\n")
+    path = table(tmp_path, b"\xef\xbb\xbf" + rows.encode())
+    log = read_table(path)
+    assert len(log.trace) == 20 and log.metadata["columns"] == {"x": "x", "z": "z"}
+
+
 # --- long tables ------------------------------------------------------------------------------------------
 
 
