@@ -1,16 +1,36 @@
 """`python -m explore3d` is the command `explore3d`."""
 
+import signal
 import sys
+
+from hw import SIGNALS, end_program
 
 
 def main() -> None:
-    """The command line; Ctrl-C while it is still being loaded ends it without a traceback, too."""
+    """The command line, as a process of its own.
+
+    A signal ends it with one line while it is still being loaded, too. Once all is said and written, signals do
+    nothing: what tidies up behind a finished program has nothing to lose, and its exit status stands.
+    """
+    for number in SIGNALS:
+        signal.signal(number, end_program)
     try:
-        from explore3d.cli import main as command
-    except KeyboardInterrupt:
-        print("explore3d: interrupted (Ctrl-C) before anything began", file=sys.stderr)
-        sys.exit(130)
-    command()
+        try:
+            from explore3d.cli import main as command
+        except KeyboardInterrupt:
+            _end_before_the_beginning("Ctrl-C", 128 + signal.SIGINT)
+        except SystemExit as error:
+            code = int(error.code or 0)
+            _end_before_the_beginning(signal.Signals(code - 128).name if code > 128 else f"status {code}", code)
+        command()
+    finally:
+        for number in SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+
+
+def _end_before_the_beginning(cause: str, status: int) -> None:
+    print(f"explore3d: interrupted ({cause}) before anything began", file=sys.stderr)
+    sys.exit(status)
 
 
 if __name__ == "__main__":

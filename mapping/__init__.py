@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         ComplexArray as ComplexArray,
         FloatArray as FloatArray,
         IntArray as IntArray,
+        ShortArray as ShortArray,
     )
     from mapping.assembly.assemble import assemble as assemble
     from mapping.base.base import Base as Base
@@ -68,7 +69,7 @@ if TYPE_CHECKING:
     from mapping.trace import Trace as Trace
 
 _PUBLIC = {
-    "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray"),
+    "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray", "ShortArray"),
     "assembly.assemble": ("assemble",),
     "base.base": ("Base",),
     "base.fit": ("fit_base",),

@@ -57,7 +57,10 @@ class Trace:
                 self._freeze(name, (count, 3), np.float64)
 
     def _freeze(self, name: str, shape: tuple[int, ...], dtype: type) -> None:
-        array: NDArray[Any] = np.array(getattr(self, name), dtype=dtype)
+        given = getattr(self, name)
+        # an array that nobody can write to any more needs no copy: one that is read-only, and no view of another
+        final = isinstance(given, np.ndarray) and given.base is None and not given.flags.writeable
+        array: NDArray[Any] = np.asarray(given, dtype=dtype) if final else np.array(given, dtype=dtype)
         if array.shape != shape:
             raise TraceError(f"trace field {name} must have shape {shape} to match centers; found {array.shape}")
         finite = np.isfinite(array)

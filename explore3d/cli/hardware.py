@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from explore3d import UserError
-from explore3d.cli.options import Json
+from explore3d.cli.options import Json, length, point
 from explore3d.cli.run import SceneFile
 
 Arm = Annotated[bool, typer.Option("--arm", help="Let a real machine move.")]
@@ -39,16 +39,17 @@ def emulate(
     import time
     from contextlib import suppress
 
-    from explore3d import parse_length
     from explore3d.jobs import Emulation, serve
 
     if device != "grbl" or sensor not in (None, "optoforce", "line"):
         raise UserError(f"cannot emulate {device!r} with sensor {sensor!r}; possible: grbl, optoforce or line sensor")
+    if not (stiffness > 0.0 and pace > 0.0):
+        raise UserError(f"--stiffness and --pace: should be greater than 0; found {stiffness:g} and {pace:g}")
     emulation = Emulation(
         mesh=mesh,
         units=units,
-        tip_radius=parse_length(tip_radius),
-        origin=_point(origin),
+        tip_radius=length("--tip-radius", tip_radius, positive=True),
+        origin=point("--origin", origin),
         sensor=sensor,
         stiffness=stiffness,
         pace=pace,
@@ -78,14 +79,14 @@ def calibrate(
 
     Example: explore3d calibrate scene.toml --radius "12.5 mm" --out tip.toml --arm
     """
-    from explore3d import parse_length
     from explore3d.jobs import Recording, as_json, calibrate as find
 
     words = ["explore3d", "calibrate", str(scene), "--radius", radius, "--center", center, "--out", str(out)]
     words += ["--lines", str(lines), "--radius-sd", radius_sd, *["--arm"] * arm]
-    sphere, doubt = parse_length(radius), parse_length(radius_sd)
+    sphere, doubt = length("--radius", radius, positive=True), length("--radius-sd", radius_sd)
+    place = point("--center", center)
     with Recording(out, shlex.join(words), resume) as kept:
-        profile = find(scene, sphere, _point(center), lines=lines, radius_sd=doubt, arm=arm, recording=kept)
+        profile = find(scene, sphere, place, lines=lines, radius_sd=doubt, arm=arm, recording=kept)
         kept.write(profile)
     print(as_json(profile.record()) if json else "\n".join([*profile.lines(), f"profile: {out}"]))
 
@@ -97,10 +98,9 @@ def selftest(
 
     Example: explore3d selftest scene.toml --radius "12.5 mm" --arm
     """
-    from explore3d import parse_length
     from explore3d.jobs import as_json, selftest as test
 
-    found = test(scene, parse_length(radius), _point(center), arm=arm)
+    found = test(scene, length("--radius", radius, positive=True), point("--center", center), arm=arm)
     words = f"range of radii {1e3 * found['range']:.4f} mm in {found['time']:.1f} s ({found['samples']:.0f} contacts)"
     print(as_json(found) if json else words)
 
@@ -118,14 +118,5 @@ def reprobe(
     """
     from explore3d.jobs import as_json, reprobe as touch
 
-    found = touch(folder, _point(at), touches=touches, arm=arm)
+    found = touch(folder, point("--at", at), touches=touches, arm=arm)
     print(as_json(found.record()) if json else "\n".join(found.lines()))
-
-
-def _point(text: str) -> tuple[float, float, float]:
-    from explore3d import parse_length
-
-    parts = [parse_length(part.strip()) for part in text.split(",")]
-    if len(parts) != 3:
-        raise UserError(f'expected three lengths, "0 mm, 0 mm, 5 mm"; found {text!r}')
-    return parts[0], parts[1], parts[2]

@@ -7,8 +7,11 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
-# What a disk that takes no more, or nothing at all, answers
-DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM)
+# What a disk that takes no more, or nothing at all, answers, and a path that leads nowhere
+DISK_ERRORS = (
+    errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOENT, errno.ENOTDIR, errno.EISDIR,
+    errno.EEXIST, errno.ENAMETOOLONG, errno.ELOOP,
+)  # fmt: skip
 
 
 class InterruptedJobError(RuntimeError):

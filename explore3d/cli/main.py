@@ -80,6 +80,11 @@ def main() -> None:
     except KeyboardInterrupt:
         print("explore3d: interrupted (Ctrl-C)", file=sys.stderr)
         sys.exit(130)
+    except SystemExit as end:
+        # by a signal before or after the command itself: typer passes such an end on without a word
+        if isinstance(end.code, int) and end.code > 128:
+            print(f"explore3d: interrupted ({signal.Signals(end.code - 128).name})", file=sys.stderr)
+        raise
 
 
 if __name__ == "__main__":

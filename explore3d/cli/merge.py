@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Columns, Frame, Out, Overwrite, Part, Pixel, TipRadius, Units
+from explore3d.cli.options import Columns, Frame, Out, Overwrite, Part, Pixel, TipRadius, Units, length
 
 
 def merge(
@@ -29,7 +29,6 @@ def merge(
 
     Example: explore3d merge out/wire out/second/log.mcap --out out/both
     """
-    from explore3d import parse_length
     from explore3d.jobs import merge as join
     from explore3d.report import feature_line
 
@@ -37,7 +36,7 @@ def merge(
         model,
         logs,
         out,
-        parse_length(pose_sd),
+        length("--pose-sd", pose_sd),
         overwrite,
         tip_radius=tip_radius,
         units=units,

@@ -7,6 +7,43 @@ from typing import Annotated
 
 import typer
 
+from explore3d import UnitError, UserError
+
+
+def length(option: str, text: str, *, positive: bool = False) -> float:
+    """Metres from an option's text.
+
+    Raises:
+        UserError: one line that names the option.
+    """
+    from explore3d import parse_length
+
+    try:
+        value = parse_length(text)
+    except UnitError as error:
+        raise UserError(f"{option}: {error}") from error
+    if value < 0.0 or (positive and value == 0.0):
+        raise UserError(f"{option}: should be {'greater than' if positive else 'at least'} 0; found {text!r}")
+    return value
+
+
+def point(option: str, text: str) -> tuple[float, float, float]:
+    """Three coordinates in metres from an option's text, "0 mm, 0 mm, 5 mm".
+
+    Raises:
+        UserError: one line that names the option.
+    """
+    from explore3d import parse_length
+
+    try:
+        parts = [parse_length(part.strip()) for part in text.split(",")]
+    except UnitError as error:
+        raise UserError(f"{option}: {error}") from error
+    if len(parts) != 3:
+        raise UserError(f'{option}: expected three lengths, "0 mm, 0 mm, 5 mm"; found {text!r}')
+    return parts[0], parts[1], parts[2]
+
+
 # Exit status of a job that moved and ended early: its results are of a part
 INCOMPLETE = 3
 

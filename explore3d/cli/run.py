@@ -60,6 +60,6 @@ def plan(
 
     Example: explore3d plan wire/scene.toml --out out/plan
     """
-    from explore3d.jobs import plan_scene, show_plan
+    from explore3d.jobs import show_plan
 
-    show_plan(plan_scene(scene), out, json, overwrite)
+    show_plan(scene, out, json, overwrite)

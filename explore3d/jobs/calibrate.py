@@ -92,6 +92,9 @@ def calibrate(
         CalibrationError: the contacts do not determine the tip.
     """
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
+    if not radius > 0.0:
+        raise UserError(f"radius of the reference sphere: should be greater than 0; found {radius:g} m")
+    scene.check_size("the reference sphere", 2.0 * radius)
     delay = None
     with scene_finger(scene, arm) as finger:
         begun = time.monotonic()
@@ -126,6 +129,7 @@ class Recording:
         self._source: Path | None = None
         self._begun: Path | None = None
         self._lock: IO[bytes] | None = None
+        self._made: list[Path] = []
 
     def __enter__(self) -> Recording:
         if self.profile.exists():
@@ -136,7 +140,9 @@ class Recording:
             if known != PROFILE:
                 raise UserError(f"{self.profile}: is in the way and no tip profile; choose another --out")
         try:
+            missing = [each for each in (self.profile.parent, *self.profile.parent.parents) if not each.exists()]
             self.profile.parent.mkdir(parents=True, exist_ok=True)
+            self._made = missing
             self._lock = self._draft.open("ab")
         except OSError as error:
             raise UserError(f"{self.profile}: cannot write the tip profile: {error.strerror}") from error
@@ -225,6 +231,9 @@ class Recording:
         if self._lock is not None:
             self._draft.unlink(missing_ok=True)
             self._lock.close()
+        for folder in self._made:  # the deepest first
+            with suppress(OSError):  # something lies in it: a recording, or a profile
+                folder.rmdir()
 
 
 def write_profile(profile: TipProfile, path: Path) -> None:

@@ -42,6 +42,11 @@ class GrblFingerTable(FingerTable):
         return self
 
     @property
+    def feels_normals(self) -> bool:
+        """Where a force sensor slides along: a touch probe tells places alone."""
+        return self.machine.touch == "slide"
+
+    @property
     def is_real(self) -> bool:
         """False where its port is the emulator."""
         return self.machine.port != EMULATOR

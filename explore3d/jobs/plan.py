@@ -40,7 +40,6 @@ class DryRun:
         account: what of the surface the sweeps would sweep; None if the time budget ends before the survey.
         assumed: what had to be assumed of the object, and what the plan falls short of; a sentence or "".
         pecking: s that the moves will take by the finger's own forecast, where it touches point by point; else None.
-        subject: digest of the scene (explore3d.jobs.run.scene_digest).
     """
 
     base: Base
@@ -54,7 +53,6 @@ class DryRun:
     violations: tuple[tuple[int, str], ...]
     account: SurfaceAccount | None = None
     assumed: str = ""
-    subject: str = ""
     pecking: float | None = None
 
     def record(self) -> dict[str, Any]:
@@ -151,7 +149,6 @@ def _planned(scene: Scene, finger: Finger) -> DryRun:
         tuple(violations),
         account,
         assumed,
-        scene_digest(scene),
         sum(map(finger.forecast, moves)) if isinstance(finger, GrblFinger) and finger.peck is not None else None,
     )
 
@@ -182,12 +179,20 @@ def imagined(discover: Discover) -> tuple[list[Move], Base]:
     return [move for move, _ in record], outcome.value
 
 
-def show_plan(plan: DryRun, out: Path | None, as_json: bool, overwrite: bool = False) -> None:
-    """Print the plan in words or as JSON; with a folder, write plan.json and plan.png into it."""
+def show_plan(path: Path | str, out: Path | None, as_json: bool, overwrite: bool = False) -> None:
+    """Plan, and print the plan in words or as JSON; with a folder, write plan.json and plan.png into it.
+
+    Raises:
+        SceneError: a scene that cannot be used.
+        FolderError: the folder cannot be used; said before anything is planned.
+    """
     import json
 
-    if out is not None:
-        with Session(out, Job("plan", plan.subject), overwrite=overwrite) as session:
+    if out is None:
+        plan = plan_scene(path)
+    else:
+        with Session(out, Job("plan", scene_digest(load_scene(path))), overwrite=overwrite) as session:
+            plan = plan_scene(path)
             session.write("plan.json", json.dumps(plan.record(), indent=1))
             session.write("plan.png", plan.picture())
     if as_json:

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from explore3d import UserError
 from explore3d.log.format import LOG
-from explore3d.log.readers import read_recording, reader_of
+from explore3d.log.readers import Reader, read_recording, reader_of
 from explore3d.log.record import Log
-from explore3d.log.table_columns import EVEN, advances, counts
+from explore3d.log.table import table_log
+from explore3d.log.table_columns import EVEN, POSITION, advances, counts, find_columns
 from explore3d.log.table_order import sentinels
-from explore3d.log.text import TableText, read_text
+from explore3d.log.text import TableText, read_pieces, read_text
 from mapping import FloatArray, length_text
 
+if TYPE_CHECKING:
+    from explore3d.log.table_settings import TableSettings
+
+TABLE = "a table of numbers"
+READ_WHOLE = 256 * 2**20  # bytes of a table that is held at once: 1.5e7 rows of two columns, in 1 GB
 SAMPLE_GAP = 5.0  # usual steps: a longer one within a sweep is a gap, samples were lost or left out there
 MOST_LISTED_COLUMNS = 16  # columns that are listed one by one
 
@@ -102,9 +108,11 @@ def inspect(path: Path | str, **settings: Any) -> Inspection:
     path = Path(path)
     file = path / LOG if path.is_dir() else path
     reader = reader_of(file)
-    columns = _columns(file, settings) if reader.name == "a table of numbers" else []
     doubts: list[str] = []
-    log, assumed = _read(path, settings, doubts)
+    if reader.name == TABLE and file.stat().st_size > READ_WHOLE:
+        return _in_pieces(file, reader, settings)
+    columns = _columns(file, settings) if reader.name == TABLE else []
+    log, assumed = _read(settings, doubts, lambda given: read_recording(path, given))
     # without a table and without a log there is nothing to tell
     if log is None and not columns:
         raise UserError(doubts[-1])
@@ -115,7 +123,87 @@ def inspect(path: Path | str, **settings: Any) -> Inspection:
     return found if log is None else _with_log(found, log, assumed)
 
 
-def _read(path: Path, settings: Mapping[str, Any], doubts: list[str]) -> tuple[Log | None, set[str]]:
+def _in_pieces(path: Path, reader: Reader, settings: Mapping[str, Any]) -> Inspection:
+    """A table that is too long to be held at once: columns, samples and extent of all, the rest of its first piece."""
+    given, _ = _settings(path, settings)
+    sums: list[_Column] = []
+    first: TableText | None = None
+    rows = 0
+    for text in read_pieces(path, given.decimal):
+        first = first or text
+        sums = sums or [_Column() for _ in text.names]
+        for index, column in enumerate(sums):
+            column.add(text, index)
+        rows += len(text.rows)
+    assert first is not None
+    columns = [column.record(first, index) for index, column in enumerate(sums)]
+    doubts: list[str] = []
+
+    def read(asked: Mapping[str, Any]) -> Log:
+        assert first is not None
+        return table_log(first, *_settings(path, asked))
+
+    log, assumed = _read(settings, doubts, read)
+    doubts = [each.removeprefix(f"{path}: ") for each in doubts]
+    doubts.append(
+        f"it is long and was looked at in pieces: how it is read, sweeps, spacing, gaps and repeats are those of its "
+        f"first {len(first.rows):,} rows"
+    )
+    found = Inspection(
+        str(path), reader.name, path.stat().st_size, columns, doubtful=tuple(doubts), unsaid=reader.unsaid
+    )
+    if log is None:
+        return replace(found, samples=rows)
+    roles, factors = find_columns(first, given.columns), log.metadata["metres_per_unit"]
+    extent = tuple(
+        factors[role] * (sums[roles[role]].greatest - sums[roles[role]].least) if role in roles else 0.0
+        for role in POSITION
+    )
+    return replace(_with_log(found, log, assumed), samples=rows, extent=extent)
+
+
+@dataclass
+class _Column:
+    """What the pieces of a column tell of it."""
+
+    least: float = np.inf
+    greatest: float = -np.inf
+    missing: int = 0
+    up: int = 0
+    down: int = 0
+    last: float = np.nan
+
+    def add(self, text: TableText, index: int) -> None:
+        """Take in a piece."""
+        values = text.rows[:, index]
+        finite = values[np.isfinite(values)]
+        self.missing += 0 if index in text.texts else len(values) - len(finite)
+        if len(finite):
+            steps = np.diff(finite, prepend=self.last)  # the first of all is compared with NaN: neither up nor down
+            self.up, self.down = self.up + int((steps > 0).sum()), self.down + int((steps < 0).sum())
+            self.least = min(self.least, float(finite.min()))
+            self.greatest = max(self.greatest, float(finite.max()))
+            self.last = float(finite[-1])
+
+    def record(self, text: TableText, index: int) -> dict[str, Any]:
+        """As _column gives it of a whole table."""
+        texts, some = text.texts.get(index), np.isfinite(self.last)
+        moves = self.up + self.down
+        habit = "goes up and down" if self.up and self.down else "advances" if moves else "constant"
+        habit += f" ({self.down / moves:.0%} of the steps down)" if self.up and self.down else ""
+        return {
+            "name": text.names[index],
+            "unit": text.units[index],
+            "least": self.least if some else None,
+            "greatest": self.greatest if some else None,
+            "missing": self.missing,
+            "is": f"text, such as {texts[0][:20]!r}" if texts else habit if some else "holds no number",
+        }
+
+
+def _read(
+    settings: Mapping[str, Any], doubts: list[str], read: Callable[[Mapping[str, Any]], Log]
+) -> tuple[Log | None, set[str]]:
     """The log, and what had to be assumed to read it; each refusal on the way is a doubt."""
     assumed: dict[str, Any] = {}
     for more in ({}, {"tip_radius": 1.0}, {"units": "m"}):
@@ -123,7 +211,7 @@ def _read(path: Path, settings: Mapping[str, Any], doubts: list[str]) -> tuple[L
             continue
         assumed |= more
         try:
-            return read_recording(path, dict(settings) | assumed), set(assumed)
+            return read(dict(settings) | assumed), set(assumed)
         except UserError as error:
             if str(error) not in doubts:
                 doubts.append(str(error))
@@ -158,10 +246,14 @@ def _with_log(found: Inspection, log: Log, assumed: set[str]) -> Inspection:
     )
 
 
-def _columns(path: Path, settings: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _settings(path: Path, settings: Mapping[str, Any]) -> tuple[TableSettings, Path | None]:
     from explore3d.log.table_settings import load_settings
 
-    given, _ = load_settings(path, **{key: value for key, value in settings.items() if value is not None})
+    return load_settings(path, **{key: value for key, value in settings.items() if value is not None})
+
+
+def _columns(path: Path, settings: Mapping[str, Any]) -> list[dict[str, Any]]:
+    given, _ = _settings(path, settings)
     try:
         text = read_text(path, given.decimal)
     except UserError:

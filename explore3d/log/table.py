@@ -143,14 +143,15 @@ def table_log(text: TableText, settings: TableSettings, sidecar: Path | None) ->
     said = list(text.said)
     rows = _with_texts(text, roles, said)
     good, dropped = _good_rows(text, rows, roles)
-    values = {role: rows[good, index] for role, index in roles.items()}
+    whole = bool(good.all())
+    values = {role: np.array(rows[:, index] if whole else rows[good, index]) for role, index in roles.items()}
     for role, factor in factors.items():
         values[role] *= factor
     if "t" in roles:
         factor, assumed = time_factor(text, roles, values["t"])
         values["t"] *= factor
         said += [assumed] * bool(assumed)
-    order = _order(values, settings.jump, text, None if text.blocks is None else text.blocks[good])
+    order = _order(values, settings.jump, text, None if text.blocks is None else text.blocks[good].astype(np.int64))
     values = {role: value[order.rows] for role, value in values.items()} if _moved(order) else values
     said += [order.said] * bool(order.said) + _doubts(text, roles, values, settings)
     trace = _trace(values, settings, text, order)
@@ -169,12 +170,17 @@ def table_log(text: TableText, settings: TableSettings, sidecar: Path | None) ->
         },
         complete=not text.cut,
         recovered="; ".join([words for words, _ in dropped] + ["the last line was incomplete"] * text.cut),
-        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        sha256=_digest(path),
         sources=(str(path),),
         tip_sd=TIP_DOUBT * settings.tip_radius if settings.tip_sd is None else settings.tip_sd,
         tip_sd_assumed=settings.tip_sd is None,
         form=Form.read(settings.form, settings.mask),
     )
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _read_as(
@@ -193,7 +199,7 @@ def _read_as(
             # the unit as it is written, where it is what was used
             unit = text.units[index] if length_factor(text.units[index]) else f"x {factors[role]:g} m"
         names.append(f"{role} = {label(text, index)} {unit}".rstrip())
-    sweeps = len(np.unique(trace.sweep))
+    sweeps = len(np.unique(trace.sweep[np.flatnonzero(np.diff(trace.sweep, prepend=trace.sweep[0] - 1))]))
     parts = [*names, f"{len(trace)} rows in {sweeps} sweep{'s' * (sweeps != 1)}", *(short for _, short in dropped)]
     return "; ".join([", ".join(parts), *said])
 
@@ -347,7 +353,8 @@ def _trace(values: Columns, settings: TableSettings, text: TableText, order: Ord
         raise UserError(f"{text.path}: field x: a profile needs x that advances; found {x[0]:g} m throughout")
     if settings.reference == "bottom":
         z = z + radius
-    table = np.column_stack([x, np.zeros_like(x) if profile else values["y"], z])
+    table = np.empty((len(x), 3))
+    table[:, 0], table[:, 1], table[:, 2] = x, 0.0 if profile else values["y"], z
     rotation, origin = np.array(settings.frame.rotation, dtype=np.float64), np.array(settings.frame.origin)
     moved = settings.frame != type(settings.frame)()
     vectors = {}
@@ -357,6 +364,8 @@ def _trace(values: Columns, settings: TableSettings, text: TableText, order: Ord
             vectors[field] = vector @ rotation.T + (origin if names[0] in LENGTH_ROLES else 0.0) if moved else vector
     t = values["t"] if "t" in values else np.arange(len(x), dtype=np.float64)
     centers = table @ rotation.T + origin if moved else table
+    for own in (t, centers, order.sweep):
+        own.setflags(write=False)  # so that they need not be copied
     try:
         return Trace(
             t, centers, order.sweep, radius, vectors.get("normals"), vectors.get("contacts"), vectors.get("force")

@@ -26,6 +26,12 @@ def find_columns(table: TableText, given: Mapping[Role, str | int]) -> dict[str,
         UserError: a column that the table does not have, or positions that cannot be told apart.
     """
     roles: dict[str, int] = {role: _index(table, role, column) for role, column in given.items()}
+    for role, column in roles.items():
+        if other := next((each for each in roles if roles[each] == column and each != role), None):
+            raise UserError(
+                f"{table.path}: field columns: {role} and {other} are both column {label(table, column)}; expected a "
+                "column of its own for each"
+            )
     positions_given = any(role in roles for role in POSITION)
     for role in ("t", "sweep", "valid", *(name for names in VECTORS.values() for name in names)):
         if role not in roles and (index := _named(table, role)) is not None and index not in roles.values():

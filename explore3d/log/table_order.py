@@ -14,6 +14,7 @@ _NINES = (999, 9999, 99999, 999999, 999.9, 9999.9, 999.99, 999.999)
 _INTEGERS = (32767, 32768, 65535, 2147483647, 2147483648, 4294967295)
 _HUGE = (1e10, 1e20, 1e30, 1e31, 1e36, 1e37, 1e38, 9.96921e36, 3.4028235e38)
 SENTINELS = np.sort([sign * value for value in (*_NINES, *_INTEGERS, *_HUGE) for sign in (-1, 1)])
+_KNOWN = frozenset(SENTINELS.tolist())
 OUTSIDE = 0.5  # of the range of the others: a sentinel of that kind stands off by more
 LONELY = 5.0  # ranges of the others: a value that repeats and is no known sentinel must stand off by more
 FEWEST = 7  # rows that show what is usual: fewer have no value far off all others
@@ -44,6 +45,8 @@ class Order:
 
 def sentinels(values: FloatArray) -> BoolArray:
     """(N,) mask of the numbers of one column that mean "none": far off all others, and known as such or repeated."""
+    if _plain(values):
+        return np.zeros(len(values), dtype=np.bool_)
     finite = np.isfinite(values)
     near = np.minimum(np.searchsorted(SENTINELS, values), len(SENTINELS) - 1)
     known = finite & ((SENTINELS[near] == values) | (np.abs(values) >= 1e30))
@@ -67,9 +70,24 @@ def sentinels(values: FloatArray) -> BoolArray:
     return found
 
 
+def _plain(values: FloatArray) -> bool:
+    """True if nothing can mean "none": all are numbers, and neither extreme is known as such or repeats.
+
+    Whatever stands far off all others is an extreme, so that most columns need no closer look.
+    """
+    if not len(values):
+        return True
+    for extreme in (float(values.min()), float(values.max())):
+        if not abs(extreme) < 1e30 or extreme in _KNOWN or np.count_nonzero(values == extreme) >= REPEATS:
+            return False
+    return True
+
+
 def clipped(values: FloatArray) -> str:
     """A word on an extreme that repeats as no other value does: the end of an instrument's range, perhaps."""
     if len(values) < 50:
+        return ""
+    if max(np.count_nonzero(values == extreme) for extreme in (values.min(), values.max())) < 5 * REPEATS:
         return ""
     unique, count = np.unique(values, return_counts=True)
     if len(unique) < len(values) // 4:
@@ -85,9 +103,9 @@ def profile_order(x: FloatArray) -> Order:
     count = len(x)
     steps = np.diff(x)
     rows, one = np.arange(count), np.zeros(count, dtype=np.int64)
-    length, path = float(np.ptp(x)), float(np.abs(steps).sum())
     if (steps >= 0).all() or (steps <= 0).all():
         return Order(rows, one)
+    length, path = float(np.ptp(x)), float(np.abs(steps).sum())
     if length > ADVANCE * path:
         back = int(min((steps > 0).sum(), (steps < 0).sum()))
         return Order(rows, one, f"x steps back {back} times")

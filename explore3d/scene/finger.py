@@ -90,6 +90,11 @@ class FingerTable(Table):
         return True
 
     @property
+    def feels_normals(self) -> bool:
+        """True if its traces hold contact normals, which the paper's algorithms 1 and 2 need."""
+        return True
+
+    @property
     def touched(self) -> tuple[Path, str] | None:
         """Mesh and unit of what it touches, where that is a file; the truth of a simulation."""
         return None

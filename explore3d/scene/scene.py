@@ -43,6 +43,7 @@ SPEED_RANGE = 30.0
 # noise of ten radii hides the fingertip itself
 FINEST_FEATURE, COARSEST_FEATURE, MOST_NOISE = 1e-5, 1e3, 10.0
 # A body of more than 1e5 radii is no fingertip's to survey; a tip of ten bodies feels no shape
+CONTACT_ALGORITHMS = (1, 2)  # of the paper's figure 4
 LARGEST_TIPS, LARGEST_TIP_SHARE = 1e5, 10.0
 
 
@@ -165,6 +166,11 @@ class Scene(Table):
                     f"{field} is {value:g} m, {value / radius:.3g} radii of the tip; possible: {least * radius:g} to "
                     f"{most * radius:g} m"
                 )
+        if self.detection.algorithm in CONTACT_ALGORITHMS and not self.finger.feels_normals:
+            raise ValueError(
+                f"detection.algorithm {self.detection.algorithm} needs contact normals, which this finger does not "
+                "tell; possible: 3 and 4, or a simulated finger with contact_data = true"
+            )
         return self
 
     @property
@@ -259,13 +265,25 @@ class Scene(Table):
             surface = load_mesh(mesh, units)
         except (MeshFileError, UnitError) as error:
             raise SceneError(f"{self._path}: {field}: {error}") from error
-        size, radius = float(np.ptp(surface.vertices, axis=0).max()), self.tip.radius
+        self.check_size(field, float(np.ptp(surface.vertices, axis=0).max()))
+        return surface
+
+    def check_size(self, field: str, size: float) -> None:
+        """Refuse a body that is out of all proportion to the tip: its unit, or the radius', is wrong.
+
+        Args:
+            field: what says the size, for the message.
+            size: greatest extent of the body, m.
+
+        Raises:
+            SceneError: the tip is too small or too large for it.
+        """
+        radius = self.tip.radius
         if not size / LARGEST_TIPS <= radius <= LARGEST_TIP_SHARE * size:
             raise SceneError(
                 f"{self._path}: tip.radius: {radius:g} m for a body of {size:g} m ({field}); possible: "
                 f"{size / LARGEST_TIPS:g} to {LARGEST_TIP_SHARE * size:g} m"
             )
-        return surface
 
 
 def load_scene(path: Path | str) -> Scene:
@@ -279,7 +297,7 @@ def load_scene(path: Path | str) -> Scene:
     if not path.is_file():
         raise SceneError(f"{path}: {'a folder, not a scene file' if path.is_dir() else 'no such scene file'}")
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # a BOM of some editors is no part of it
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(f"{path}: not a readable scene file ({error})") from error
     return parse_scene(text, path)

@@ -46,6 +46,11 @@ class SimulatedFingerTable(FingerTable):
         return False
 
     @property
+    def feels_normals(self) -> bool:
+        """With contact data alone."""
+        return self.contact_data
+
+    @property
     def touched(self) -> tuple[Path, str]:
         """Mesh and unit of the truth."""
         return self.object, self.units

@@ -62,6 +62,7 @@ def explore3d(*words: object, after: float | None = None, how: str = "SIGINT", w
     """
     command = [sys.executable, "-m", "explore3d", *map(str, words)]
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1", "OPENBLAS_NUM_THREADS": "1"}
+    environment["PYTHONFAULTHANDLER"] = "1"  # a crash says where
     process = subprocess.Popen(
         [sys.executable, "-c", HONEST, *command],
         stdout=subprocess.PIPE,

@@ -78,7 +78,7 @@ def instrument_log(path: Path, settings: Mapping[str, Any], known: tuple[str, st
             size = None if channel.physical_sizes or given.pixel is None else _sizes(points, given.pixel)
             surface = channel.topography() if size is None else channel.topography(physical_sizes=size)
             heights = np.ma.filled(np.ma.masked_invalid(surface.heights()), np.nan)
-            unit = surface.unit or ""
+            unit = _of_heights(path, surface.unit)
             along = surface.positions() if surface.dim == 1 else None
             pixels = None if surface.dim == 1 or surface.physical_sizes is None else surface.pixel_size
     said = [f"channel {channel.name!r}"]
@@ -119,15 +119,31 @@ def _sizes(points: tuple[int, ...], pixel: tuple[float, float]) -> tuple[float, 
     return tuple(count * step for count, step in zip(points, pixel, strict=False))
 
 
+def _of_heights(path: Path, unit: Any) -> str:
+    """The unit of a channel; a pair of the lateral one and another is no map of heights: volts, degrees.
+
+    Raises:
+        UserError: naming both.
+    """
+    if isinstance(unit, tuple):
+        raise UserError(
+            f"{path}: field part: expected a channel of heights; found one in {' and '.join(map(str, unit))}"
+        )
+    return str(unit or "")
+
+
 def _channel(path: Path, kind: str, channels: list[Any], part: str | None) -> Any:
     """The channel of heights that is asked for, or the only one."""
     heights = [each for each in channels if each.data_kind.value == "height"]
     named = [each for each in heights if part is None or each.name == part]
+    if part is not None and part.isdecimal() and 1 <= int(part) <= len(heights):  # names may repeat: trace and retrace
+        named = [heights[int(part) - 1]]
     if len(named) == 1:
         return named[0]
     names = ", ".join(repr(each.name) for each in heights[:8]) or "none"
     raise UserError(
-        f"{path}: field part: expected one channel of heights in {kind}; found {names}; name one with --part"
+        f"{path}: field part: expected one channel of heights in {kind}; found {names}; name one with --part, "
+        "or by its number from 1"
     )
 
 

@@ -92,9 +92,14 @@ def read_cells(data, start, delimiter, decimal, thousands, textual, rows, lines,
             if delimiter != 0:
                 at += 1  # the delimiter
                 look = at
-                while data[look] == BLANK or (data[look] == TAB and delimiter != TAB):
+                more = column >= columns and delimiter != TAB
+                while (
+                    data[look] == BLANK
+                    or (data[look] == TAB and delimiter != TAB)
+                    or (more and data[look] == delimiter)
+                ):
                     look += 1
-                # a delimiter at the end of the line makes no column, unless one is missing
+                # delimiters at the end of the line make no column, unless one is missing
                 ends = data[look] == NEWLINE or data[look] == RETURN or (column >= columns and _comment(data, look))
                 if ends and column >= columns:
                     at = look

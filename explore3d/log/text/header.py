@@ -17,7 +17,7 @@ NAMES = {
     "y": "y ypos posy yposition positiony yaxis axisy yachse ycoordinate coordinatey ycoord ytip tipy py ycenter "
     "ycentre",
     "z": "z height zpos posz zposition positionz zaxis axisz zachse zcoordinate coordinatez zcoord ztip tipz pz "
-    "totalprofile profile rawprofile topography elevation hoehe höhe hauteur altura zheight heightz zvalue "
+    "totalprofile profile rawprofile raw topography elevation hoehe höhe hauteur altura zheight heightz zvalue "
     "zcenter zcentre",
     "t": "t time timestamp elapsed elapsedtime zeit stamp datetime date seconds",
     "sweep": "sweep line track pass scan scanline trace sweepid linenumber lineno",

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log.text.decode import decoded
+from explore3d.log.text.decode import decoded, must_fit
 from explore3d.log.text.dialect import COMMENTS, MISSING, Dialect, find_dialect, split
 from explore3d.log.text.header import FEW, read_header, role_of
 from explore3d.log.text.spelling import length_factor
-from mapping import BoolArray, FloatArray, IntArray
+from mapping import BoolArray, FloatArray, IntArray, ShortArray
 
 SAMPLE_LINES = 80  # at the beginning, in the middle, at the end: what finds the dialect
 MOST_ODD = 1000  # cells a column, at first, that are no plain number: the rest is read again with room for all
@@ -53,7 +53,7 @@ class TableText:
     first_line: int = 1
     cut: bool = False
     texts: dict[int, list[str]] = field(default_factory=dict)
-    blocks: IntArray | None = None
+    blocks: ShortArray | None = None
     said: tuple[str, ...] = ()
     scale: str = ""
     kind: str = "a table"
@@ -70,10 +70,21 @@ def read_text(path: Path, decimal: str | None = None) -> TableText:
         UserError: no such file, empty, not text, no rows of numbers, a row that does not fit, or numbers that mean
             two things ("1,234": 1.234 or 1234).
     """
+    must_fit(path)
     data = decoded(path)
     whole = data.endswith(b"\n")
     if not whole:
         data += b"\n"
+    dialect = dialect_of(path, data, decimal)
+    return Reading(path, data, whole, dialect, decimal).table()
+
+
+def dialect_of(path: Path, data: bytes, decimal: str | None) -> Dialect:
+    """The dialect of a text.
+
+    Raises:
+        UserError: it holds no row of numbers.
+    """
     sample = _sample(data)
     dialect = find_dialect(sample, decimal)
     if dialect is None:
@@ -81,7 +92,7 @@ def read_text(path: Path, decimal: str | None = None) -> TableText:
         raise UserError(
             f"{path}: holds no line of two or more numbers; expected columns x, y, z or x, z; it begins {some[:40]!r}"
         )
-    return _Reading(path, data, whole, dialect, decimal).table()
+    return dialect
 
 
 def _sample(data: bytes) -> list[str]:
@@ -101,10 +112,13 @@ def _sample(data: bytes) -> list[str]:
     return [line for lines in kept for line in lines[:SAMPLE_LINES]]
 
 
-class _Reading:
+class Reading:
     """One text on its way to a table."""
 
-    def __init__(self, path: Path, data: bytes, whole: bool, dialect: Dialect, decimal: str | None) -> None:
+    def __init__(
+        self, path: Path, data: bytes, whole: bool, dialect: Dialect, decimal: str | None, lines_before: int = 0
+    ) -> None:
+        self.lines_before = lines_before  # in the file, before `data`
         self.path, self.data, self.whole, self.dialect, self.asked = path, data, whole, dialect, decimal
         self.said: list[str] = []
         self.cut = False
@@ -122,7 +136,7 @@ class _Reading:
         textual = [column for column in range(columns) if not self.dialect.numeric[column]]
         if not len(rows):
             raise UserError(f"{self.path}: holds no line of two or more numbers; expected columns x, y, z or x, z")
-        self.lines, self.before = lines, self.data.count(b"\n", 0, start)
+        self.lines, self.before = lines, self.lines_before + self.data.count(b"\n", 0, start)
         self._fill(rows, odd)
         self._unambiguous(marks)
         texts = {column: self._texts(spans[:, k]) for k, column in enumerate(textual)}
@@ -203,6 +217,8 @@ class _Reading:
                 break
         if limit == first:
             limit = self._without_counts(lines, first, columns)
+        if not self.said and (above := [line.strip() for _, line in lines[:limit] if self._is_numbers(line)]):
+            self.said.append(f"numbers above the rows left out: {above[0][:30]!r}")
         start = lines[limit][0] if limit < len(lines) else len(self.data)
         return [line for _, line in lines[:limit]], start
 
@@ -243,6 +259,13 @@ class _Reading:
         values = [self._value(cell) for cell, number in zip(cells, self.dialect.numeric, strict=True) if number]
         return None not in values and sum(value == value for value in values) >= min(2, len(values))
 
+    def _is_numbers(self, line: str) -> bool:
+        """True for a line of nothing but numbers, two or more."""
+        if _blank_or_comment(line):
+            return False
+        values = [self._value(cell) for cell in split(line, self.dialect.delimiter)]
+        return len(values) >= 2 and all(value is not None and value == value for value in values)
+
     def _value(self, cell: str) -> float | None:
         """The number in a cell, NaN if it says that there is none, None if it is something else."""
         cell = cell.strip().strip('"').strip()
@@ -258,7 +281,7 @@ class _Reading:
         except ValueError:
             return None
 
-    def _cells(self) -> tuple[FloatArray, IntArray, IntArray, IntArray, IntArray, IntArray, IntArray]:
+    def _cells(self) -> tuple[FloatArray, ShortArray, ShortArray, IntArray, IntArray, IntArray, IntArray]:
         from explore3d.log.text.cell_kernels import read_cells
 
         columns = len(self.dialect.numeric)
@@ -269,7 +292,7 @@ class _Reading:
         room = MOST_ODD
         while True:
             rows = np.empty((most, columns))
-            lines, blocks = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
+            lines, blocks = np.empty(most, dtype=np.int32), np.empty(most, dtype=np.int32)
             spans = np.empty((most if textual.any() else 0, int(textual.sum()), 2), dtype=np.int64)
             odd, strange = np.empty((room, 4), dtype=np.int64), np.empty((room, 4), dtype=np.int64)
             marks = np.zeros((columns, 4), dtype=np.int64)

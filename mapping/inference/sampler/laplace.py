@@ -12,6 +12,9 @@ from mapping.inference.likelihood import LogPosterior
 ITERATIONS = 60
 # Gain in chi-square of a step after which the optimum is known: a thirtieth of a standard deviation.
 SETTLED_CHI_SQUARE_GAIN = 1e-3
+# What differs by less of itself is equally good, and the first of them is taken: rounding (1e-13 of the chi-square of
+# thousands of bins) must not choose between steps, nor between optima.
+SAME_COST = 1e-9
 # Log density below the best optimum at which another one does not matter, and how many are kept.
 NEGLIGIBLE_LOG_DENSITY = 12.0
 MOST_MODES = 3
@@ -36,17 +39,28 @@ class Laplace:
 def find_optima(target: LogPosterior, starts: FloatArray) -> list[FloatArray]:
     """Distinct optima (P,) reached by Levenberg-Marquardt from the starts (M, P), best first.
 
+    Equally good ones (a crest that ends between either pair of sweeps, mirrored) come in the order of their starts.
     Optima that hold a negligible share of the probability, or lie within a fraction of a step of a better one, are
     left out; at most MOST_MODES are kept.
     """
     found = np.array([_descend(target, start) for start in starts])
     values = target.log_density(found)
     kept: list[FloatArray] = []
-    for i in np.argsort(-values, kind="stable"):
+    for i in _best_first(values):
         apart = [np.abs((found[i] - other) / target.shape.step).max() > 0.5 for other in kept]
         if values[i] > values.max() - NEGLIGIBLE_LOG_DENSITY and all(apart) and len(kept) < MOST_MODES:
             kept.append(found[i])
     return kept or [starts[0]]
+
+
+def _best_first(values: FloatArray) -> list[int]:
+    """Indices from the highest value on, those that only rounding tells apart in their own order."""
+    left, order = list(range(len(values))), []
+    while left:
+        best = max(values[left])
+        order.append(next(i for i in left if not values[i] < best - SAME_COST * max(1.0, abs(best))))
+        left.remove(order[-1])
+    return order
 
 
 def laplace(target: LogPosterior, optimum: FloatArray) -> Laplace:
@@ -67,6 +81,8 @@ def laplace(target: LogPosterior, optimum: FloatArray) -> Laplace:
 def _descend(target: LogPosterior, start: FloatArray) -> FloatArray:
     low, high, scale = target.low, target.high, target.shape.step
     theta = np.clip(start, low, high)
+    # Where the data say nothing the prior's width is the curvature: rounding is not divided by nothing there
+    prior = np.diag((scale / _widths(target)) ** 2)
     damping, (residual, jacobian) = 1e-3, _jacobian(target, theta, 0.1 * scale)
     cost = float(residual @ residual)
     for _ in range(ITERATIONS):
@@ -75,10 +91,10 @@ def _descend(target: LogPosterior, start: FloatArray) -> FloatArray:
         # Several dampings are tried at once: a batch of templates costs little more than one.
         dampings = damping * np.array([1e-2, 1.0, 1e2, 1e4])
         ridge = np.maximum(np.diag(hessian), 1e-6 * max(float(np.diag(hessian).max()), 1e-300))
-        moves = np.stack([np.linalg.solve(hessian + d * np.diag(ridge), -gradient) for d in dampings])
+        moves = np.stack([np.linalg.solve(hessian + prior + d * np.diag(ridge), -gradient) for d in dampings])
         candidates = np.clip(theta + moves * scale, low, high)
         costs = (target.residuals(candidates) ** 2).sum(axis=1)
-        pick = int(np.argmin(costs))
+        pick = int(np.argmax(costs <= costs.min() * (1.0 + SAME_COST)))
         if not costs[pick] < cost - 1e-9 * max(1.0, abs(cost)) * 1e-3:
             if damping > 1e6:
                 break

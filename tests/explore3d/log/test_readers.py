@@ -238,3 +238,29 @@ def test_inspect_as_json_is_json_and_as_text_is_lines(tmp_path: Path) -> None:
 def test_what_is_nothing_at_all_is_refused_by_inspect_too(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no line of two or more numbers"):
         looked(tmp_path, "once upon a time\n")
+
+
+DEKTAK = """Scan Parameters
+Scan Type,Standard Scan
+Stylus,Radius: 2.5 \xb5m
+Length,1500.0 um
+Resolution,0.156 um/sample
+
+Analytical Results
+Function,R.Cur Pos,R.Cur Width,M.Cur Pos,M.Cur Width,Result
+Ra,468.0 um,0.0 um,733.0 um,0.0 um,0.00525 um
+
+Scan Data
+Lateral um,Raw Micrometer,
+"""
+
+
+def test_the_export_of_a_dektak_is_read_with_its_stylus(tmp_path: Path) -> None:
+    """The form of a file that such an instrument wrote, whose rows end in two empty cells; numbers made up."""
+    heights = np.round(0.01 * np.sin(0.1 * np.arange(300)), 5)
+    rows = "".join(f"{0.2 * k:.1f},{z:.5f},,\n" for k, z in enumerate(heights))
+    (tmp_path / "scan.csv").write_bytes((DEKTAK + rows).encode("latin-1"))
+    log = load_logs([tmp_path / "scan.csv"])
+    assert log.trace.tip_radius == pytest.approx(2.5e-6)
+    assert log.trace.centers[:, 0] == pytest.approx(0.2e-6 * np.arange(300))
+    assert log.trace.centers[:, 2] == pytest.approx(1e-6 * heights)

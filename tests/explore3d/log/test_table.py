@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +11,11 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from explore3d.errors import UserError
+from explore3d.log import inspect
 from explore3d.log.load import load_logs
 from explore3d.log.record import Log
 from explore3d.log.table import read_table
+from explore3d.log.text import read_pieces, read_text
 
 STYLUS = Path(__file__).parents[4] / "shared" / "data" / "stylus_profile_mm.csv"
 
@@ -316,3 +320,67 @@ def test_a_million_rows_are_read_in_seconds(tmp_path: Path) -> None:
     start = time.process_time()
     assert len(read_table(tmp_path / "scan.csv", units="mm", tip_radius=1.0).trace) == 1_000_000
     assert time.process_time() - start < 5
+
+
+def test_a_byte_order_mark_is_no_part_of_a_table_or_its_sidecar(tmp_path: Path) -> None:
+    rows = "x,z\n" + "".join(f"{0.1 * k:.1f},{k % 3}\n" for k in range(20))
+    (tmp_path / "scan.csv.toml").write_bytes(b"\xef\xbb\xbfunits = 'mm'\ntip_radius = '2 um'\n")
+    path = table(tmp_path, b"\xef\xbb\xbf" + rows.encode())
+    log = read_table(path)
+    assert len(log.trace) == 20 and log.metadata["columns"] == {"x": "x", "z": "z"}
+
+
+# --- long tables ------------------------------------------------------------------------------------------
+
+
+def long_table(path: Path, rows: int = 5000) -> Path:
+    x = 1e-3 * np.arange(rows)
+    z = 0.05 * np.sin(40.0 * x) + 1e-3 * np.random.default_rng(0).normal(size=rows)
+    path.write_text("# a long one\nx [mm];z [um]\n" + "\n".join(f"{a:.3f};{b:.5f}" for a, b in zip(x, z, strict=True)))
+    return path
+
+
+def test_the_pieces_of_a_table_are_the_table(tmp_path: Path) -> None:
+    path = long_table(tmp_path / "long.csv")
+    whole, pieces = read_text(path), list(read_pieces(path, size=3000))
+    assert len(pieces) > 20
+    assert np.array_equal(np.concatenate([piece.rows for piece in pieces]), whole.rows)
+    assert {(piece.names, piece.units) for piece in pieces} == {(("x", "z"), ("mm", "um"))}
+    lines = np.cumsum([0, *(len(piece.rows) for piece in pieces)])[:-1]
+    assert [piece.first_line for piece in pieces] == (lines + whole.first_line).tolist()
+
+
+def test_what_is_wrong_in_a_later_piece_names_its_line(tmp_path: Path) -> None:
+    path = long_table(tmp_path / "long.csv")
+    lines = path.read_text().split("\n")
+    lines[3210] = "1.0;2.0;3.0"
+    path.write_text("\n".join(lines))
+    with pytest.raises(UserError, match=r"long\.csv: line 3211: expected 2 columns; found 3"):
+        list(read_pieces(path, size=3000))
+
+
+def test_a_long_table_is_inspected_in_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = long_table(tmp_path / "long.csv", 20_000)
+    whole = inspect(path)
+    monkeypatch.setattr(sys.modules["explore3d.log.inspect"], "READ_WHOLE", 1000)
+    monkeypatch.setattr(read_pieces, "__defaults__", (None, 50_000))
+    found = inspect(path)
+    assert (found.samples, found.extent, found.metres) == (whole.samples, whole.extent, True)
+    for one, other in zip(found.columns, whole.columns, strict=True):
+        assert {key: one[key] for key in ("name", "unit", "least", "greatest", "missing")} == {
+            key: other[key] for key in ("name", "unit", "least", "greatest", "missing")
+        }
+    assert found.columns[0]["is"] == "advances"
+    assert found.spacing == pytest.approx(whole.spacing, rel=1e-3)
+    assert any("looked at in pieces" in each for each in found.doubtful)
+
+
+def test_a_table_that_memory_cannot_hold_is_refused_before_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = long_table(tmp_path / "long.csv")
+    decode = importlib.import_module("explore3d.log.text.decode")
+    monkeypatch.setattr(decode, "free_memory", lambda: 1e5)
+    monkeypatch.setattr(Path, "read_bytes", lambda self: pytest.fail("it was read"))
+    with pytest.raises(UserError, match=r"long\.csv: to read its .* takes about .* GB are free; possible: a part"):
+        read_text(path)

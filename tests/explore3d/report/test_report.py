@@ -116,6 +116,14 @@ def test_texts_from_outside_cannot_become_markup() -> None:
     assert hostile not in page and "&lt;script&gt;alert(1)" in page
 
 
+def test_names_of_files_and_columns_cannot_become_markup() -> None:
+    hostile = "<img src=x onerror=alert(1)>.csv"
+    whole = analysis((ridge(),))
+    said = whole.model.provenance | {"read_as": [f"x = '{hostile}' mm"], "sources": [hostile], hostile: hostile}
+    page = report_page(replace(whole, model=replace(whole.model, provenance=said)), Pictures({}), [])
+    assert "<img src=x" not in page and "&lt;img src=x onerror=alert(1)&gt;.csv" in page
+
+
 def test_a_profile_is_drawn_as_a_profile(tmp_path: Path) -> None:
     x = np.arange(0.0, 1e-3, 5e-7)
     bump = Feature(

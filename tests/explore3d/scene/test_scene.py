@@ -32,6 +32,12 @@ def test_lengths_are_metres_and_paths_absolute() -> None:
     assert scene.explore.time_budget == 600.0
 
 
+def test_a_byte_order_mark_is_no_part_of_a_scene(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + TEXT.encode())
+    assert load_scene(path).title == load_scene(SCENES / "wire_on_plate.toml").title
+
+
 @pytest.mark.parametrize("path", sorted(SCENES.glob("*.toml")), ids=lambda path: path.stem)
 def test_the_resolved_scene_reads_back_the_same(path: Path) -> None:
     scene = load_scene(path)

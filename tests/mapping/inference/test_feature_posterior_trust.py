@@ -26,7 +26,7 @@ from recorded_features import (
 from explore3d.bench.posterior.calibration import Case, campaign, noise_of, run_case
 from explore3d.bench.posterior.calibration_verdicts import verdicts
 from mapping.feature import Support
-from mapping.geometry.templates.shapes import cap_height, step_height
+from mapping.geometry.templates.shapes import cap_height, groove_height, rim_height, step_height
 from mapping.inference.families.problem import Surroundings
 from mapping.inference.feature_posterior import pose_problem, refine, sample_posterior
 from mapping.inference.sampler.ensemble import sample_ensemble
@@ -128,3 +128,71 @@ def test_a_white_likelihood_on_correlated_noise_fails_the_same_test():
     rows = [run_case(Case("bump", "ell 1 mm", i, assumed="white")) for i in range(60)]
     assert noise_of("ell 1 mm", np.random.default_rng(0)).correlated > 0
     assert verdicts(rows)["along"].coverage < 0.7
+
+
+MIRRORED = [line((x, -12e-3), (x, 12e-3)) for x in (-32e-3, -16e-3, 0.0, 16e-3, 32e-3)]
+BUMP_PATHS = [line((x, -9e-3), (x, 9e-3)) for x in (-1.5e-3, 0.5e-3)] + [line((-9e-3, 0.0), (9e-3, 0.0))]
+PROFILE = [line((-10e-3, 0), (10e-3, 0))]
+FELT = {
+    "wire": (GUESS, CROSSINGS + SLIDES, wire(ENDS), WHITE),
+    "ends between sweeps, mirrored": (
+        feature("ridge", [(-16e-3, 0, 0), (16e-3, 0, 0)], 0.6e-3, 0.6e-3, crossings=3),
+        MIRRORED,
+        wire([(-24e-3, 0, 0), (24e-3, 0, 0)]),
+        Noise(5e-6),
+    ),
+    "ends never seen": (GUESS, CROSSINGS, wire([(-80e-3, 0, 0), (80e-3, 0, 0)]), WHITE),
+    "bump": (
+        feature("bump", (0, 0, 0), 0.4e-3, 1e-3),
+        BUMP_PATHS,
+        lambda feet: cap_height(np.linalg.norm(feet, axis=1), 0.5e-3, 2e-3, TIP),
+        WHITE,
+    ),
+    "lone profile": (
+        feature("bump", (0, 0, 0), 0.4e-3, 1e-3),
+        PROFILE,
+        lambda feet: cap_height(feet[:, 0], 0.5e-3, 3e-3, TIP),
+        WHITE,
+    ),
+    "step": (
+        feature("step", [(-9e-3, 0, 0), (9e-3, 0, 0)], 0.35e-3, 0.0),
+        CROSSINGS,
+        lambda feet: step_height(feet[:, 1] - 0.2e-3, 0.4e-3, TIP),
+        WHITE,
+    ),
+    "pit": (
+        feature("pit", (0.2e-3, 0.1e-3, 0), -0.1e-3, 3e-3),
+        BUMP_PATHS,
+        lambda feet: rim_height(2e-3 - np.linalg.norm(feet, axis=1), TIP, depth=0.1e-3),
+        Noise(10e-6),
+    ),
+    "groove": (
+        feature("groove", [(-9e-3, 0.1e-3, 0), (9e-3, 0, 0)], -0.1e-3, 2.5e-3),
+        CROSSINGS + SLIDES,
+        lambda feet: np.maximum(
+            groove_height(feet[:, 1], 3e-3, TIP),
+            rim_height(np.minimum(feet[:, 0] + 14e-3, 15e-3 - feet[:, 0]), TIP),
+        ),
+        Noise(10e-6),
+    ),
+}
+
+
+QUICK = ("ends between sweeps, mirrored", "bump")
+
+
+@pytest.mark.parametrize(
+    "what", [each if each in QUICK else pytest.param(each, marks=pytest.mark.slow) for each in FELT]
+)
+def test_numbers_that_differ_by_rounding_alone_give_the_same_posterior(what):
+    """Positions in mm and in um differ by their last bits: medians within 1e-6 standard deviations."""
+    guess, paths, height_at, noise = FELT[what]
+    trace = record(paths, height_at, noise)
+    rounded = trace.centers * (1.0 + 1e-12 * np.random.default_rng(3).standard_normal(trace.centers.shape))
+    one, other = (
+        sample_posterior(guess, each, np.random.default_rng(0), base=plate(), noise=noise, confirm=False)
+        for each in (trace, replace(trace, centers=rounded))
+    )
+    assert one.status == other.status
+    off = np.abs(np.median(one.samples, axis=0) - np.median(other.samples, axis=0)) / one.samples.std(axis=0)
+    assert off.max() < 1e-6
