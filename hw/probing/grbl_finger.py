@@ -169,6 +169,8 @@ class GrblFinger:
         self._signals.ignore()
         try:
             self._retreat(self._stage)
+            if self._lost is not None:
+                self._stage.controller.run_out()
         finally:
             self._stage = None
             self._open.close()
@@ -326,6 +328,7 @@ class GrblFinger:
         stage.free(away)
         if self.slide is not None:
             self.slide.sensor.tare()
+            self.slide.sensor.watch.steepest = self.slide.stiffness * stage.speed
         elif self.ask is not None:
             for closed, what in ((True, "touch the tip by hand"), (False, "let go of the tip")):
                 self.ask(f"{self.port}: {what}, within {TOUCH_BY_HAND:.0f} s")

@@ -15,15 +15,29 @@ import numpy as np
 
 from hw import LinkError, Move, NotFeltError, Patience, StoppedError
 from hw.grbl import LONGEST_STANDSTILL, GuardedStage
-from hw.probing.fusion import known_at, positions_at, prompt, rigid_centers, smooth
+from hw.probing.fusion import (
+    OFF_THE_LINE_STEPS,
+    known_at,
+    no_spikes,
+    on_the_way,
+    positions_at,
+    prompt,
+    rigid_centers,
+)
 from hw.probing.lag import EXPECTED, Lag
 from hw.probing.peck import Touched, spaced
 from hw.probing.press_test import press_test
 from hw.sensors import ForceSensor
 from mapping import BoolArray, FloatArray
 
-# Jogs that may be under way or waiting when the next is made, in control periods
+# Jogs that may be under way or waiting when the next is made, in control periods; and less where the way that it takes
+# to brake, with what is made in one period more, is shorter: a planner keeps up its speed with no more (Grbl,
+# jogging.md), and what is queued runs out when the cable is pulled
 QUEUED = 2
+# So many of the last ways sent hold the place of the machine: those queued, the next, and one for a report on its way
+RECENT_WAYS = QUEUED + 2
+# Of the reports at least this share must lie on the way that the machine was sent; at 1 % of garbled bytes 90 % do
+ON_THE_WAY = 0.5
 # Over a slow link a jog lasts this share of a round trip: the force is heard of once in a round trip, and the machine
 # must neither stand for most of it, nor go on for long over what it has not felt. At 20 ms of latency and 115200 baud
 # (30 ms a round trip) 4 mm at 10 mm/s take 1.2 s; with jogs of 10 ms they took 1.7 s
@@ -51,6 +65,20 @@ HELD_BACK = 0.1
 SWEEP_OVERHEAD = 3.0
 # A path of one point is touched for so many control periods
 DWELL = 10
+
+
+@dataclass
+class _Sent:
+    """Where a sweep sent the stage: when, s, to which place (3,), m, which lies how far along its path."""
+
+    times: list[float]
+    ends: list[FloatArray]
+    along: list[float]
+
+    def add(self, when: float, end: FloatArray, along: float) -> None:
+        self.times.append(when)
+        self.ends.append(end)
+        self.along.append(along)
 
 
 @dataclass(frozen=True)
@@ -90,25 +118,26 @@ class Slide:
         if not hit:
             return
         press_test(stage, self.sensor, approach[0], self.stiffness, move.force)
-        depth = float((stage.position() - path[0]) @ approach[0])
+        here = stage.resting()
         last = told = time.monotonic()
+        sent = _Sent([last], [here], [0.0])
         try:
-            for sliding in self._steer(stage, move, path, approach, depth, period):
+            for sliding in self._steer(stage, move, path, approach, sent, period):
                 if not sliding:
                     last = time.monotonic()  # what the tip feels while it settles is no sweep
                 elif time.monotonic() > told + BATCH:
                     told = time.monotonic()
-                    batch = self._fused(stage, last, told - self.sensor.watch.blind)
+                    batch = self._fused(stage, sent, last, told - self.sensor.watch.blind)
                     if len(batch.times):
                         last = float(batch.times[-1])
                         yield batch
         except (StoppedError, LinkError):
-            yield self._fused(stage, last, time.monotonic() - HELD_BACK)
+            yield self._fused(stage, sent, last, time.monotonic() - HELD_BACK)
             raise
         finally:
             if stage.controller.link.is_open and stage.controller.stop_reason is None:
                 stage.controller.cancel_jog()
-        yield self._fused(stage, last)
+        yield self._fused(stage, sent, last)
 
     def _tare(self, stage: GuardedStage, duration: float) -> None:
         """Take the zero anew; it must be about where it was before the last sweep, and stay there for the next one."""
@@ -133,13 +162,15 @@ class Slide:
             raise StoppedError(reason)
 
     def _steer(
-        self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, depth: float, period: float
+        self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, sent: _Sent, period: float
     ) -> Iterator[bool]:
-        """Along the path, one jog a `period` (s); `depth` (m) behind it along the approach follows the force.
+        """Along the path, one jog a `period` (s); a depth behind it along the approach follows the force.
 
         Each period says whether the sweep has begun.
         """
         controller, trend = stage.controller, 0.0
+        depth = float((sent.ends[0] - path[0]) @ approach[0])
+        ahead = stage.stop_within(move.speed) + move.speed * period
         here, at, end = path[0] + depth * approach[0], 0.0, len(path) - 1.0
         queued = [0.0] * QUEUED  # lengths of the last jogs
         settling = SETTLING  # periods to press on before the sweep begins
@@ -149,7 +180,7 @@ class Slide:
         while True:
             inwards = _between(approach, at)
             inwards /= np.linalg.norm(inwards)
-            pressing = self._pressing(stage, inwards, here, sum(queued), made)
+            pressing = self._pressing(stage, inwards, here, min(sum(queued), ahead), made)
             if pressing < -max(PULL * move.force, 0.5 * stage.touch_force):
                 raise StoppedError(
                     f"the force pulls the tip by {-pressing:.2f} N where a body can only press: the sensor's sign "
@@ -177,6 +208,7 @@ class Slide:
                 stage.check(target, "sliding")
                 controller.jog(stage.frame.to_machine(target), max(way / period, 1e-4))
                 made = time.monotonic()
+                sent.add(made, target, at)
                 here, queued = target, [*queued[1:], way]
             yield not settling
             if at >= end and not settling:
@@ -198,20 +230,39 @@ class Slide:
             stage.controller.check()
             if patience.over():
                 raise StoppedError("the machine does not follow; is it held, or its door open?")
+        stage.controller.left(QUEUED)
         stage.listen(self.sensor, made)
         force = stage.frame.turn_to_object(self.sensor.force())
         return -float(force @ inwards)
 
-    def _fused(self, stage: GuardedStage, after: float, until: float = np.inf) -> Touched:
+    def _fused(self, stage: GuardedStage, sent: _Sent, after: float, until: float = np.inf) -> Touched:
         """Samples in contact taken between these times, as far as the stage has reported where it was."""
-        reports = smooth(prompt(stage.controller.reported(after - BEFORE)))
+        reports = prompt(stage.controller.reported(after - BEFORE))
         if len(reports) < 2:
             return Touched(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
-        times, forces = self.sensor.timed(after)
         stamps = np.array([report.at for report in reports])
         places = stage.frame.to_object(
             np.array([stage.controller.machine_position(report.status) for report in reports])
         )
+        off = OFF_THE_LINE_STEPS * stage.controller.settings.resolution
+        good = on_the_way(
+            stamps,
+            places,
+            np.array(sent.times),
+            np.array(sent.ends),
+            np.array(sent.along),
+            queued=RECENT_WAYS,
+            off=off,
+        )
+        if np.mean(good) < ON_THE_WAY:
+            raise StoppedError(
+                f"{np.sum(~good)} of {len(good)} reports of the machine's place lie more than {1e6 * off:.0f} um off "
+                "the way that it was sent: check its cable, and whether another program or a pendant steers it"
+            )
+        stamps, places = stamps[good], places[good]
+        times, forces = self.sensor.timed(after)
+        whole = no_spikes(forces, np.abs(self.sensor.turned) @ self.sensor.watch.noise)
+        times, forces = times[whole], forces[whole]
         forces = stage.frame.turn_to_object(forces)
         pressing = np.linalg.norm(forces, axis=1)
         normals = forces / np.maximum(pressing, self.contact)[:, None]

@@ -215,12 +215,14 @@ class ForceSensor:
                 self.faulty += 1
             else:
                 self._stamp(now, count)
-            # what is no sample of the record may still be a force: it counts for the limit below
-            good.append((sound, sample))
+            # what is no sample of the record may still be a force, and counts for the limit below; a lone jump is none
+            good.append((sound, sample, self.watch.lone))
         limit, touch = self._limit, self._touch
         if (np.isfinite(limit) and not self._struck) or touch < np.inf:
             zero = self.zero
-            for _, (_, x, y, z) in good:
+            for _, (_, x, y, z), lone in good:
+                if lone:
+                    continue
                 felt = ((x - zero[0]) ** 2 + (y - zero[1]) ** 2 + (z - zero[2]) ** 2) ** 0.5
                 if felt > touch:
                     self._touched()
@@ -231,7 +233,7 @@ class ForceSensor:
                     )
                     break
         with self._news:
-            self._samples.extend((now, *sample) for sound, sample in good if sound)
+            self._samples.extend((now, *sample) for sound, sample, _ in good if sound)
             for _ in range(min(taken_back, len(self._samples))):
                 self._samples.pop()
             self._news.notify_all()

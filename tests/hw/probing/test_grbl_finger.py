@@ -95,6 +95,10 @@ def test_status_reports_are_read_as_the_document_writes_them() -> None:
     assert more is not None and more.is_machine and more.position.tolist() == [0.0, -10.0, 5.0]
     for broken in ("<Idle|MPos:0.0", "<Idle>", "Idle|MPos:1,2,3>", "<Idle|MPos:1,2>", "<Run|MPos:1,2,x|FS:0,0>"):
         assert protocol.parse_status(broken) is None
+    # a digit lost, a digit twice, the point lost
+    for place in ("-147.50,-150.000,-44.900", "-147.500,-150.0000,-44.900", "-147.500,-150000,-44.900"):
+        assert protocol.parse_status(f"<Jog|MPos:{place}|FS:600,0>") is None
+        assert protocol.parse_probe(f"[PRB:{place}:1]") is None
 
 
 def test_probe_results_settings_and_offsets_are_read() -> None:
