@@ -22,7 +22,8 @@ class Link:
     Args:
         port: device name or pyserial URL ("/dev/ttyUSB0", "COM3", "socket://host:23").
         framing: cuts what arrives into frames.
-        receive: called in the reading thread with the time of arrival (s, time.monotonic) and the frames.
+        receive: called in the reading thread with the time of arrival (s, time.monotonic) and the frames; without any
+            where one was thrown away.
         baudrate: bits per second.
         write_timeout: longest time a write may take, s.
         lost: called once, in the reading thread, when the connection breaks.
@@ -162,9 +163,11 @@ class Link:
     def _take(self, data: bytes) -> None:
         now = time.monotonic()
         self.received += len(data)
+        bad = self.framing.counts.bad
         frames = self.framing.feed(data)
         if frames:
             self.heard = now
+        if frames or self.framing.counts.bad > bad:
             self._receive(now, frames)
 
     def _break(self, why: str) -> None:

@@ -22,8 +22,8 @@ POLL = 0.05
 # With no sign of life for so long the controller is taken for lost, s
 LONGEST_CONTROLLER_SILENCE = 1.5
 
-# While a report is waited for it is asked for again after so many usual round trips, and POLL at most, ASK_AGAIN s at
-# least: one that was lost costs ten periods of a sensor of 1 kHz, and a busy host's threads take turns every 5 ms
+# What may have been lost is asked for again after so many usual round trips, and POLL at most, ASK_AGAIN s at least: a
+# busy host's threads take turns every 5 ms. What came garbled is asked for again at once
 TRIPS_IN_VAIN, ASK_AGAIN = 3.0, 0.01
 # An idle machine that answers so many requests and still not the line before them has lost the line or its answer:
 # Grbl answers in order, and a line is parsed within 10 ms
@@ -103,6 +103,7 @@ class GrblController:
         self.distrust: str | None = None
         self._offset_known = False
         self.implausible = 0
+        self._unclear = 0
         self._off_the_way = 0
         self._seen_off: FloatArray | None = None
         self._new_offset: FloatArray | None = None
@@ -224,14 +225,26 @@ class GrblController:
         """A report asked for now. Raises LinkError."""
         since, patience = time.monotonic(), Patience(within)
         while not patience.over():
-            again = min(POLL, max(ASK_AGAIN, TRIPS_IN_VAIN * self.round_trip))
+            again, garbled = self._again, self.garbled
             self._request(again)
             with self._news:
-                if self._news.wait_for(lambda: self._fresh(since) or not self.link.is_open, timeout=again):
-                    break
+                while not self._fresh(since) and self.garbled == garbled and self.link.is_open:
+                    if not self._news.wait(again):
+                        break
+            if self._fresh(since) or not self.link.is_open:
+                break
         if not self._fresh(since):
             raise LinkError(self.link.error or f"{self.link.port}: no status report within {within:g} s")
         return self.reports[-1].status
+
+    @property
+    def _again(self) -> float:
+        return min(POLL, max(ASK_AGAIN, TRIPS_IN_VAIN * self.round_trip))
+
+    @property
+    def garbled(self) -> int:
+        """Lines so far that nobody understands."""
+        return self._unclear + self.link.framing.counts.bad
 
     def _request(self, patience: float = POLL) -> None:
         """Ask for a report; its round trip counts from the first asking that is not answered yet.
@@ -474,7 +487,10 @@ class GrblController:
                 if not self.reports:
                     return
                 here = self.machine_position(self.reports[-1].status)
-                self._way, self._sent_to, self._moves_until = (here, here), here, -np.inf
+                # that report may be older than a short way that has ended since
+                there = here if self._way is None or self._sent_to is None else self._sent_to
+                self._way = np.minimum(here, there), np.maximum(here, there)
+                self._sent_to, self._moves_until = here, -np.inf
             self._way = (np.minimum(self._way[0], target), np.maximum(self._way[1], target))
             lasts = float(np.linalg.norm(target - self._sent_to)) / speed
             self._moves_until, self._sent_to = max(self._moves_until, time.monotonic()) + lasts, target
@@ -573,7 +589,9 @@ class GrblController:
             asked = self._asked.popleft() if self._asked else now
             status, round_trip = protocol.parse_status(line), now - (self._in_vain or asked)
             self._in_vain = None
-            if status is not None and self._is_plausible(status):
+            if status is None:
+                self._unclear += 1
+            elif self._is_plausible(status):
                 self.reports.append(Report(now, status, round_trip))
                 if status.offset is not None:
                     self._hear_offset(status.offset * self.settings.report_scale)
@@ -590,6 +608,7 @@ class GrblController:
                 )
         else:
             self._feedback.append(line)
+            self._unclear += not line.startswith(("[", "$", ">"))
 
     def _notify(self) -> None:
         with self._news:
@@ -615,10 +634,11 @@ class GrblController:
     ) -> None:
         """Wait for news, asking for a status meanwhile, so that silence is noticed soon."""
         patience, silence, heard = Patience(within), Patience(stale), self.link.heard
-        idle, seen = 0, len(self.reports) and self.reports[-1].at
+        idle, seen, garbled = 0, len(self.reports) and self.reports[-1].at, self.garbled
         while True:
+            again = POLL if self.garbled == garbled else self._again  # it may have been the answer
             with self._news:
-                if self._news.wait_for(lambda: done() or self._trouble(restarts, alarm), timeout=POLL) and done():
+                if self._news.wait_for(lambda: done() or self._trouble(restarts, alarm), timeout=again) and done():
                     return
             if self.alarm != alarm or self.stop_reason is not None or not self.link.is_open:
                 self.check()

@@ -259,7 +259,35 @@ class GuardedStage:
         """A step in contact, at the guarded speed; returns when it is made."""
         self.check(target, "pressing")
         self.controller.jog(self.frame.to_machine(target), self.guarded_speed)
+        patience, idle, arrived = Patience(LONGEST_STANDSTILL), 0, False
+        while not arrived:
+            arrived, idle = self.arrived(
+                target, self.guarded_speed, max(STANDING, self.controller.settings.resolution), idle
+            )
+            self.controller.check()
+            if patience.over():
+                raise LinkError("the machine does not follow; is it held, or its door open?")
         self.controller.wait_idle(LONGEST_STANDSTILL)
+
+    def arrived(self, here: FloatArray, speed: float, near: float, idle: int) -> tuple[bool, int]:
+        """Whether the stage is `near` (m) to the place that it was sent to by a jog, and how often it stood elsewhere.
+
+        A jog whose line was lost, or that was thrown away for a touch that was none, is sent again.
+
+        Args:
+            speed: of the jog, m/s.
+            idle: how often it stood elsewhere before.
+        """
+        status = self.controller.status()
+        place = self.frame.to_object(self.controller.machine_position(status))
+        if np.linalg.norm(place - here) <= near:
+            self.controller.left(QUEUED_JOGS)
+            return True, 0
+        idle = idle + 1 if status.state == "Idle" else 0
+        if idle > TOLD:
+            self.controller.jog(self.frame.to_machine(here), speed)
+            idle = 0
+        return False, idle
 
     def _feel(self, target: FloatArray, speed: float, sensor: ForceSensor, force: float) -> tuple[FloatArray, bool]:
         """Jog until the sensor feels contact; where the machine then came to rest.
@@ -290,8 +318,7 @@ class GuardedStage:
         """Jog on to `here`; True as soon as the sensor feels contact, False once the stage is `near` (m) to it.
 
         The force is looked at once at least, however fast the stage was there: on a busy host it always is, and
-        would be sent into the body step by step. What the reading thread threw away for a touch that was none is sent
-        again.
+        would be sent into the body step by step.
         """
         patience, made, idle = Patience(LONGEST_STANDSTILL), time.monotonic(), 0
         self.controller.jog(self.frame.to_machine(here), speed)
@@ -300,15 +327,9 @@ class GuardedStage:
             self.listen(sensor, made)
             if self._touches(sensor):
                 return True
-            status = self.controller.status()
-            place = self.frame.to_object(self.controller.machine_position(status))
-            if np.linalg.norm(place - here) <= near:
-                self.controller.left(QUEUED_JOGS)
+            arrived, idle = self.arrived(here, speed, near, idle)
+            if arrived:
                 return False
-            idle = idle + 1 if status.state == "Idle" else 0
-            if idle > TOLD:
-                made, idle = time.monotonic(), 0
-                self.controller.jog(self.frame.to_machine(here), speed)
             if self._touches(sensor):  # felt, and the jog cancelled, while the position was asked for
                 return True
             if patience.over():

@@ -249,6 +249,20 @@ def test_garbled_doubled_and_lost_reply_bytes_never_become_contacts(kind: str) -
     assert np.abs(off_the_body(trace.centers)).max() < 2e-5
 
 
+@SLOW
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", ["garble", "lose", "double"])
+def test_of_two_hundred_pecks_with_one_percent_of_reply_bytes_wrong_all_that_is_kept_is_right(
+    kind: str, seed: int
+) -> None:
+    with machine(pace=10.0) as (server, _), pecker(server) as finger:
+        server.faults.append(Fault(kind, at=0.0, rate=0.01, seed=seed))
+        traces = [finger.execute(across(y=1e-3 * line)) for line in range(5)]
+    assert sum(map(len, traces)) >= 0.95 * 205
+    for trace in traces:
+        assert np.abs(off_the_body(trace.centers)).max() < 2e-5
+
+
 def test_every_alarm_is_said_in_words_with_the_remedy() -> None:
     for number in range(1, 20):
         assert len(protocol.describe(f"ALARM:{number}")) > 30
