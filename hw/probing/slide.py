@@ -8,7 +8,7 @@ is queued can be thrown away, so the machine stops within a period of being aske
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,6 +27,7 @@ from hw.probing.fusion import (
 from hw.probing.lag import EXPECTED, Lag
 from hw.probing.peck import Touched, spaced
 from hw.probing.press_test import press_test
+from hw.probing.zero import ZeroLine, ZerosMoved
 from hw.sensors import ForceSensor
 from mapping import BoolArray, FloatArray
 
@@ -57,7 +58,7 @@ BLIND, UNUSUAL, HARMLESS_STAGE_STEPS = 0.5, 2.0, 2.0
 BEFORE = 0.1
 # A body presses, it never pulls: friction at a steep side may, by less than this share of the force (0.5 on steel)
 PULL = 0.6
-# The zero may move by this, as a displacement of the tip, during one sweep, m: its samples are off by as much
+# The zero may be wrong by this, as a displacement of the tip, during one sweep, m: its samples are off by as much
 ZERO_MOVED = 1.5e-5
 # What was felt so long before a stop may be wrong already, s: two requests for a status
 HELD_BACK = 0.1
@@ -96,6 +97,7 @@ class Slide:
         delay: by how much the force is stamped later than the stage's reports, s (hw.probing.fusion.estimate_delay).
         contact: force above which a sample counts as contact, N.
         lag: what of the delay is left, learnt from one batch of samples to the next.
+        zeros: by how much the sensor's zero has moved in the sweeps so far.
     """
 
     sensor: ForceSensor
@@ -107,6 +109,7 @@ class Slide:
     delay: float = 0.0
     contact: float = 0.05
     lag: Lag = field(default_factory=Lag)
+    zeros: ZerosMoved = field(default_factory=ZerosMoved)
 
     def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
         """Samples in contact with their forces, about every BATCH seconds; what was felt before a stop as well."""
@@ -140,26 +143,48 @@ class Slide:
         yield self._fused(stage, sent, last)
 
     def _tare(self, stage: GuardedStage, duration: float) -> None:
-        """Take the zero anew; it must be about where it was before the last sweep, and stay there for the next one."""
-        before, known = self.sensor.zero, self.sensor.watch.blind > 0.0
+        """Take the zero anew; in free air it must be about where it was, and stay there for the next sweep."""
+        before = self.sensor.zeroed
         self.sensor.tare()
-        moved = float(np.linalg.norm(self.sensor.zero - before))
-        if known and moved > max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0):
-            reason = (
-                f"the sensor's zero moved by {moved:.2f} N during the last sweep, whose samples are off by up to "
-                f"{1e6 * moved / self.stiffness:.0f} um: leave those out; let the sensor warm up, look what hangs on it"
+        assert self.sensor.zeroed is not None
+        most = max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0)
+        moved = 0.0 if before is None else ZeroLine(before, self.sensor.zeroed).moved
+        drift = float(np.linalg.norm(self.sensor.zeroed.drift)) * duration
+        if max(moved, drift) > most:
+            what = (
+                f"moved by {moved:.2f} N since the last sweep"
+                if moved > most
+                else f"drifts by {drift / duration:.2f} N/s while nothing touches, "
+                f"{1e6 * drift / self.stiffness:.0f} um of the tip during one sweep"
             )
+            reason = f"the sensor's zero {what}: let it warm up, or look what hangs on it"
             stage.controller.halt(reason)
             raise StoppedError(reason)
-        drift = float(np.linalg.norm(self.sensor.drift))
-        if drift * duration > max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0):
-            reason = (
-                f"the sensor's zero drifts by {drift:.2f} N/s while nothing touches, "
-                f"{1e6 * drift * duration / self.stiffness:.0f} um of the tip during one sweep: let it warm up, or "
-                "look what hangs on it"
+
+    def settled(self, stage: GuardedStage, felt: Sequence[Touched]) -> list[Touched]:
+        """What a sweep felt, once the tip is in free air again: less what the zero has moved meanwhile.
+
+        Raises:
+            StoppedError: it moved so that nobody knows how far the samples are off.
+            LinkError: no samples.
+        """
+        before, after = self.sensor.zeroed, self.sensor.free_air()
+        assert before is not None
+        line = ZeroLine(before, after)
+        self.sensor.zeroed = after  # the next sweep's zero is held against this one
+        if line.doubt > ZERO_MOVED * self.stiffness:
+            raise StoppedError(
+                f"the sensor's zero moved by {line.moved:.2f} N during the sweep, nobody knows when: its samples may "
+                f"be {1e6 * line.doubt / self.stiffness:.0f} um off and are left out; let the sensor warm up, look "
+                "what hangs on it, run again with --resume"
             )
-            stage.controller.halt(reason)
-            raise StoppedError(reason)
+        self.zeros.learn(line)
+        settled = []
+        for batch in felt:
+            assert batch.forces is not None
+            moved = stage.frame.turn_to_object(line.offsets(batch.times) @ self.sensor.turned.T)
+            settled.append(Touched(batch.times, batch.centers - moved / self.stiffness, batch.forces - moved))
+        return settled
 
     def _steer(
         self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, sent: _Sent, period: float
@@ -226,11 +251,12 @@ class Slide:
         """
         patience = Patience(LONGEST_STANDSTILL)
         left = max(queued, 1.5 * stage.controller.settings.resolution)
-        while np.linalg.norm(stage.position() - here) > left:
+        arrived, idle = False, 0
+        while not arrived:
+            arrived, idle = stage.arrived(here, stage.guarded_speed, left, idle)
             stage.controller.check()
             if patience.over():
                 raise StoppedError("the machine does not follow; is it held, or its door open?")
-        stage.controller.left(QUEUED)
         stage.listen(self.sensor, made)
         force = stage.frame.turn_to_object(self.sensor.force())
         return -float(force @ inwards)

@@ -7,6 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import takewhile
 from types import TracebackType
 from typing import Any
@@ -27,6 +28,21 @@ HISTORY = 10.0
 DELAY_BLOCK = 1.0
 # A host may hold back samples for 0.1 s: over so many s that makes the sensor's period uncertain by 2 %
 PERIOD_SPAN = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class FreeAir:
+    """What a sensor says while nothing touches.
+
+    Args:
+        at: time.monotonic, s.
+        force: (3,) N, in its own axes.
+        drift: (3,) N/s.
+    """
+
+    at: float
+    force: FloatArray
+    drift: FloatArray
 
 
 class ForceSensor:
@@ -52,7 +68,8 @@ class ForceSensor:
         self.link = Link(port, framing, self._hear, baudrate=baudrate, lost=self._on_lost)
         self.rate, self.bits = rate, bits
         self.tick = 1.0 / rate if tick is None else tick
-        self.zero, self.drift = np.zeros(3), np.zeros(3)
+        self.zero = np.zeros(3)
+        self.zeroed: FreeAir | None = None
         self.turned = np.eye(3)
         self._samples: deque[tuple[float, int, float, float, float]] = deque(maxlen=KEPT_SAMPLES)
         self._limit = np.inf
@@ -114,7 +131,7 @@ class ForceSensor:
         """Try for some seconds to get back a sensor that was lost; True if it sends again. Tare it anew."""
         self._samples.clear()
         self.watch.forget()
-        self.fault, self._struck = None, False
+        self.fault, self._struck, self.zeroed = None, False, None
         self._newest, self._least = -np.inf, [np.inf, np.inf]
         if not self.link.reopen(within):
             return False
@@ -160,11 +177,25 @@ class ForceSensor:
         return True
 
     def tare(self, duration: float = 0.2) -> None:
-        """Take the median force of the next moments, free of contact, as zero, and learn its noise and drift (N/s).
+        """Take what is read in free air (`free_air`) as zero, and learn the noise.
 
         Raises:
             LinkError: no samples.
             StoppedError: no axis changes: the value is frozen.
+        """
+        since = time.monotonic()
+        self.zeroed = self.free_air(duration)
+        self.zero = self.zeroed.force
+        ticks, _, forces = self.recorded(since)
+        if len(ticks) > 2:
+            step = float(np.median(np.diff(ticks)))
+            self.watch.learn(forces, step, step * self._period)
+
+    def free_air(self, duration: float = 0.2) -> FreeAir:
+        """The median force of the next moments, s, its drift, and when that was. Nothing may touch.
+
+        Raises:
+            LinkError: no samples.
         """
         since = time.monotonic()
         self.wait(lambda: time.monotonic() > since + duration, duration + 0.5)
@@ -176,12 +207,12 @@ class ForceSensor:
         recent = forces[arrivals > since]
         if len(recent) == 0:
             raise LinkError(f"{self.link.port}: no samples from the {self.name} for {duration:g} s")
-        self.zero = np.median(recent, axis=0)  # a first sample after a reconnection may be anything
+        drift = np.zeros(3)
         if len(ticks) > 2:
             at = (ticks - ticks.mean()) * self._period
-            self.drift = np.asarray(at @ recent / (at @ at))
-            step = float(np.median(np.diff(ticks)))
-            self.watch.learn(recent, step, step * self._period)
+            drift = np.asarray(at @ recent / (at @ at))
+        # the median: a first sample after a reconnection may be anything
+        return FreeAir(0.5 * (since + time.monotonic()), np.median(recent, axis=0), drift)
 
     def recorded(self, since: float = -np.inf) -> tuple[IntArray, FloatArray, FloatArray]:
         """Ticks (N,), arrivals (N,) s and raw forces (N, 3) N of the samples that arrived after `since`."""
