@@ -41,7 +41,7 @@ class SampleWatch:
         self._wrap = 1 << bits
         self.steepest = np.inf
         self.blind = 0.0
-        self.noise = np.zeros(3)
+        self.noise, self._margins = np.zeros(3), [0.0, 0.0, 0.0]
         self._spacing, self._ticks = 0.0, 1.0
         self._longest = [np.inf] * 3
         self.forget()
@@ -82,6 +82,7 @@ class SampleWatch:
         # until then nobody knows that the sensor is frozen: the axis that changes most tells first
         self.blind = spacing * min(self._longest)
         self.noise = 1.4826 * np.median(np.abs(free - np.median(free, axis=0)), axis=0)
+        self._margins = [NOISE_OF_A_DIFFERENCE * float(sd) for sd in self.noise]  # numpy's numbers are slow one by one
         self._equal = [1, 1, 1]
 
     def judge(self, sample: Sample) -> tuple[int, bool, str | None]:
@@ -90,7 +91,7 @@ class SampleWatch:
         `lone` then tells whether it was left out as a jump that the sample before knows nothing of: garbled, no force.
         """
         self.lone = False
-        if not (isfinite(sample[1]) and isfinite(sample[2]) and isfinite(sample[3])):
+        if not isfinite(sample[1] + sample[2] + sample[3]):
             if any(np.isinf(sample[1:])):
                 return self._count, False, "is overloaded or saturated; check the path, and what presses on the tip"
             return self._count, False, "sent a value that is no number; switch it off and on, check its amplifier"
@@ -106,16 +107,19 @@ class SampleWatch:
         if self._spacing > 0.0 and step > LOST_TOGETHER * self._ticks and not self._follows(sample, ahead):
             self._ahead, self.lone = sample[0], ahead is None
             return self._count, False, None
-        if self.steepest < np.inf and (fault := self._jump(sample, last, count)) is not None:
+        if self.steepest < np.inf and self._far(sample, last, count - self._count):
+            fault = self._jump(sample, last, count)
             self.lone = not fault
             return count, False, fault or None
+        self._odd = None
         self._last, self._count = sample, count
-        for axis in range(3):
+        equal = self._equal
+        for axis in (0, 1, 2):
             if sample[axis + 1] != last[axis + 1]:
-                self._equal[axis] = 1
+                equal[axis] = 1
                 continue
-            self._equal[axis] += 1
-            if self._equal[axis] > self._longest[axis]:
+            equal[axis] += 1
+            if equal[axis] > self._longest[axis]:
                 self.doubtful = self._equal[axis]  # so many of the samples kept are the frozen value
                 what = (
                     f"sends the same {'xyz'[axis]} value {self._equal[axis]} times, at most {self._longest[axis]:.0f} "
@@ -126,33 +130,29 @@ class SampleWatch:
     def _follows(self, sample: Sample, ahead: int | None) -> bool:
         return ahead is not None and 0 < (sample[0] - ahead) % self._wrap <= LOST_TOGETHER * self._ticks
 
-    def _jump(self, sample: Sample, last: Sample, count: int) -> str | None:
-        """None: no jump; "": a lone one, perhaps garbled; else what is wrong: it stays there, or goes on jumping.
+    def _jump(self, sample: Sample, last: Sample, count: int) -> str:
+        """ "": a lone one, perhaps garbled; else what is wrong: it stays there, or goes on jumping.
 
         At 1 % of garbled bytes one frame in a thousand passes a sum of 16 bytes with a wrong force: two in a row come
         once in half an hour at 1 kHz.
         """
-        odd = self._odd
-        if self._far(sample, last, count - self._count):
+        if self._odd is None:
             self._odd = sample
-            if odd is None:
-                return ""
-            self._odd = None
-            change = max(abs(a - b) for a, b in zip(sample[1:], last[1:], strict=True))
-            self._last, self._count = sample, count
-            return (
-                f"jumped by {change:.2f} N, faster than the stage can move the tip: its gain, sign or zero changed; "
-                "check its cable and supply, run again"
-            )
+            return ""
         self._odd = None
-        return None
+        change = max(abs(a - b) for a, b in zip(sample[1:], last[1:], strict=True))
+        self._last, self._count = sample, count
+        return (
+            f"jumped by {change:.2f} N, faster than the stage can move the tip: its gain, sign or zero changed; "
+            "check its cable and supply, run again"
+        )
 
     def _far(self, sample: Sample, last: Sample, steps: int) -> bool:
-        samples = max(1.0, steps / self._ticks)
-        most = RINGING * self.steepest * self._spacing * samples + SLIP
-        return any(
-            abs(sample[k + 1] - last[k + 1]) > most + NOISE_OF_A_DIFFERENCE * float(self.noise[k]) for k in range(3)
-        )
+        most = RINGING * self.steepest * self._spacing * max(1.0, steps / self._ticks) + SLIP
+        _, x, y, z = sample
+        _, u, v, w = last
+        noise = self._margins
+        return abs(x - u) > most + noise[0] or abs(y - v) > most + noise[1] or abs(z - w) > most + noise[2]
 
 
 def _longest_run(equal: FloatArray) -> int:

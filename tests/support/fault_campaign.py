@@ -84,7 +84,7 @@ class Witness:
         if {
             "approach": z < R + 1e-3 and force == 0.0 and not self.touched,
             "midway": force > 0.2 and abs(x) < 3e-4,
-            "retreat": self.touched and x > 2.4e-3 and z > R,
+            "retreat": self.touched and x > 2e-3 and z > R,
         }[self.phase]:
             self.struck, self.struck_at = time.monotonic(), now
             self.strike()
