@@ -34,8 +34,6 @@ LONGEST_UNDISTURBED = 60.0
 FORCE_SLACK = 1.1
 # So long after the finger was left nothing may move any more, s; and what is no motion, m
 WATCHED, STILLNESS = 0.3, 1e-9
-# What a device was told before its connection broke may run out for so long, s: nothing reaches it any more
-RUN_OUT = 1.0
 # When a fault strikes, in shares of the undisturbed sweep's time
 STRIKES = {"early": 0.15, "midway": 0.5, "late": 0.85}
 # What can happen to a device, and whether a finger may ever go on after it as if nothing had been
@@ -216,8 +214,6 @@ def _ends_well(rig: Rig, fault: str, share: float, anew: Callable[[], AbstractCo
     _demand(error is not None or FAULTS[fault][1], f"{_told(fault)}, and two sweeps later no FingerError has said so")
     if error is not None:
         _readable(error)
-    if fault == "gone":
-        time.sleep(RUN_OUT)
     _stands_still(rig)
 
 

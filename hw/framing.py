@@ -75,7 +75,7 @@ class Frames:
         """The complete frames, headers included."""
         buffer, at, good = self._rest + data, 0, []
         while True:
-            found = buffer.find(self.header, at)
+            found = at if buffer.startswith(self.header, at) else buffer.find(self.header, at)
             if found < 0:
                 # the last bytes may be the beginning of a header that is still to come
                 found = max(at, len(buffer) - len(self.header) + 1)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from explore3d.log import KIND, SURVEY, Stop, base_event
-from hw import Move, Workspace
+from hw import FingerError, Move, Workspace
 from mapping import Trace
 from mapping.base import Base
 from planners import Outcome, Plan, Spent, drive, within
@@ -45,6 +45,7 @@ class SurveyWatch:
     execute: Execute
     event: Event
     count: SurveyCount = field(default_factory=SurveyCount)
+    refused: str = field(init=False, default="")  # why the finger did not carry out the last move that it refused
     _sweeps: int = field(init=False, default=0)
     _before: int = field(init=False, default=0)
     _told: bool = field(init=False, default=False)
@@ -58,7 +59,11 @@ class SurveyWatch:
         if self.count.planned is not None and not self._told:
             self._told = True
             self.event(SURVEY, {"sweeps": self.count.planned, "before": self._before})
-        trace = self.execute(move)
+        try:
+            trace = self.execute(move)
+        except FingerError as error:
+            self.refused = str(error)
+            raise
         self._sweeps += move.purpose == "sweep"
         return trace
 

@@ -174,7 +174,7 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
         # what the connection counted and learnt of its clocks on the way
         log.event(OUTCOME, _ended(outcome, watch, scene, cut_short) | {"finger": finger.info})
         if not log.samples:
-            raise UserError(f"{session.folder}: nothing was felt: {outcome.detail or outcome.reason}")
+            raise UserError(f"{session.folder}: nothing was felt: {watch.refused or outcome.detail or outcome.reason}")
         session.settle()
         log.close()  # its digest goes into the model
         return log.recorded()

@@ -61,7 +61,7 @@ def _take(block: Block, letter: str, number: float) -> None:
     word = f"{letter}{number:g}"
     if word in MOTIONS:
         if block.motion is not None:
-            raise GcodeError(21)
+            raise GcodeError(24)
         block.motion = word
     elif word in MODAL_GROUPS:
         if MODAL_GROUPS[word] in block.modes:

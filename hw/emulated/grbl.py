@@ -19,6 +19,7 @@ from hw.grbl import RECEIVE_BUFFER
 from mapping import FloatArray
 
 PLANNER_BLOCKS = 15  # of the planner
+WCO_EVERY = 10  # reports of a machine that stands; one that moves tells it less often
 SETTINGS = {
     0: 10, 1: 25, 2: 0, 3: 0, 4: 0, 5: 0, 6: 0, 10: 1, 11: 0.010, 12: 0.002, 13: 0, 20: 1, 21: 0, 22: 1, 23: 0,
     24: 25, 25: 500, 26: 250, 27: 1, 30: 1000, 31: 0, 32: 0, 100: 250, 101: 250, 102: 250,
@@ -159,8 +160,11 @@ class GrblEmulator:
         fields.append(f"FS:{speed:.0f},0")
         if self.motion.probe_closed():
             fields.append("Pn:P")
-        if self._reports % 10 == 0:
+        # the work offset when it changed, and every ten reports; the overrides in the report after it
+        if self._reports % WCO_EVERY == 0:
             fields.append(f"WCO:{self._units(self.offset)}")
+        elif self._reports % WCO_EVERY == 1:
+            fields.append("Ov:100,100,100")
         self._reports += 1
         return f"<{'|'.join(fields)}>"
 
@@ -174,7 +178,9 @@ class GrblEmulator:
         elif byte in (ord("!"), 0x84) and self.state in ("Run", "Jog", "Idle"):
             if self.state == "Jog":
                 self._cancel_jog()
-            elif self.state == "Run" or byte == 0x84:
+            else:
+                if byte == 0x84:
+                    self._say("[MSG:Check Door]")
                 self.motion.brake()
                 self.motion.held = True
                 name = "Hold" if byte == ord("!") else "Door"
@@ -224,8 +230,13 @@ class GrblEmulator:
             self.state = "Idle"
 
     def _read_lines(self) -> None:
-        """Take lines out of the buffer for as long as the parser is free."""
-        while not self._probing and self._dwell is None and len(self.motion.queue) < PLANNER_BLOCKS:
+        """Take lines out of the buffer for as long as the parser is free; in a hold none is."""
+        while (
+            not self.state.startswith(("Hold", "Door"))
+            and not self._probing
+            and self._dwell is None
+            and len(self.motion.queue) < PLANNER_BLOCKS
+        ):
             match = re.search(rb"[\r\n]", self._buffer)
             if match is None:
                 return
@@ -254,6 +265,10 @@ class GrblEmulator:
         text = line.upper().replace(" ", "")
         if text.startswith("$J="):
             self._jog(parse_block(text[3:]))
+        elif text == "$X":
+            if self.state == "Alarm":
+                self._say("[MSG:Caution: Unlocked]")
+                self.state = "Idle"
         elif self.state not in ("Idle", "Alarm"):
             raise GcodeError(8)
         elif text == "$$":
@@ -267,10 +282,6 @@ class GrblEmulator:
         elif text == "$I":
             self._say("[VER:1.1h.20190825:]")
             self._say("[OPT:V,15,128]")
-        elif text == "$X":
-            if self.state == "Alarm":
-                self._say("[MSG:Caution: Unlocked]")
-            self.state = "Idle"
         elif text == "$H":
             self._home()
         elif match := re.fullmatch(r"\$(\d+)=(-?[\d.]+)", text):
@@ -278,7 +289,7 @@ class GrblEmulator:
         elif text == "$":
             self._say("[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]")
         else:
-            raise GcodeError(3)
+            raise GcodeError(3 if re.match(r"\$\d", text) else 2)  # anything else is read as the number of a setting
 
     def _set(self, number: int, value: float) -> None:
         if number not in self.settings:
@@ -319,7 +330,7 @@ class GrblEmulator:
         if "G10" in block.once or "G92" in block.once:
             self._shift(block)
         elif "G92.1" in block.once:
-            self._g92 = np.zeros(3)
+            self._g92, self._reports = np.zeros(3), 0
         elif block.has_axes:
             self._move(self._target(block, self.modes), motion)
         elif block.motion is not None and block.motion.startswith("G38"):
@@ -389,6 +400,7 @@ class GrblEmulator:
             self.state = "Jog"
 
     def _shift(self, block: Block) -> None:
+        self._reports = 0
         for axis, letter in enumerate("XYZ"):
             if letter in block.values:
                 value = block.values[letter] * self._unit()

@@ -22,8 +22,9 @@ POLL = 0.05
 # With no sign of life for so long the controller is taken for lost, s
 LONGEST_CONTROLLER_SILENCE = 1.5
 
-# A report that did not come within this time was lost, s: ten times what asking takes over the slowest links
-ASKED_IN_VAIN = 0.5
+# What may have been lost is asked for again after so many usual round trips, and POLL at most, ASK_AGAIN s at least: a
+# busy host's threads take turns every 5 ms. What came garbled is asked for again at once
+TRIPS_IN_VAIN, ASK_AGAIN = 3.0, 0.01
 # An idle machine that answers so many requests and still not the line before them has lost the line or its answer:
 # Grbl answers in order, and a line is parsed within 10 ms
 UNANSWERED = 6
@@ -91,6 +92,7 @@ class GrblController:
         self.stop_reason: str | None = None
         self.reports: deque[Report] = deque(maxlen=KEPT_REPORTS)
         self._asked: deque[float] = deque()  # when, for every report that has not come yet
+        self._in_vain: float | None = None  # when was asked what is taken for lost since the last report
         self._news = threading.Condition()
         self._answers: deque[str] = deque()
         self._feedback: list[str] = []
@@ -101,10 +103,13 @@ class GrblController:
         self.distrust: str | None = None
         self._offset_known = False
         self.implausible = 0
+        self._unclear = 0
         self._off_the_way = 0
         self._seen_off: FloatArray | None = None
         self._new_offset: FloatArray | None = None
         self._way: tuple[FloatArray, FloatArray] | None = None  # box of where it was sent; None: not known yet
+        self._sent_to: FloatArray | None = None
+        self._moves_until = -np.inf  # at the latest, if nothing stops it, but for one ramp
 
     # connection
 
@@ -220,23 +225,38 @@ class GrblController:
         """A report asked for now. Raises LinkError."""
         since, patience = time.monotonic(), Patience(within)
         while not patience.over():
-            self._request()
+            again, garbled = self._again, self.garbled
+            self._request(again)
             with self._news:
-                if self._news.wait_for(lambda: self._fresh(since) or not self.link.is_open, timeout=POLL):
-                    break
+                while not self._fresh(since) and self.garbled == garbled and self.link.is_open:
+                    if not self._news.wait(again):
+                        break
+            if self._fresh(since) or not self.link.is_open:
+                break
         if not self._fresh(since):
             raise LinkError(self.link.error or f"{self.link.port}: no status report within {within:g} s")
         return self.reports[-1].status
 
-    def _request(self) -> None:
+    @property
+    def _again(self) -> float:
+        return min(POLL, max(ASK_AGAIN, TRIPS_IN_VAIN * self.round_trip))
+
+    @property
+    def garbled(self) -> int:
+        """Lines so far that nobody understands."""
+        return self._unclear + self.link.framing.counts.bad
+
+    def _request(self, patience: float = POLL) -> None:
         """Ask for a report; its round trip counts from the first asking that is not answered yet.
 
-        An asking that was lost would make all reports after it look late: it is forgotten.
+        An answer that was lost would make all reports after it look late. So one that did not come for so long, s, is
+        taken for lost, and the next report to come for late: nobody knows which of the two it answers.
         """
         now = time.monotonic()
         with self._news:
-            while self._asked and now - self._asked[0] > ASKED_IN_VAIN:
-                self._asked.popleft()
+            while self._asked and now - self._asked[0] >= patience:
+                lost = self._asked.popleft()
+                self._in_vain = lost if self._in_vain is None else self._in_vain
             self._asked.append(now)
         self.link.write(protocol.STATUS)
 
@@ -274,7 +294,7 @@ class GrblController:
 
     def move(self, target: FloatArray, speed: float, within: float) -> None:
         """Straight to a target (3,), m, at a speed, m/s; returns when the machine stands there."""
-        self._heading_for(target, anew=True)
+        self._heading_for(target, speed, anew=True)
         self.command(f"G53G1{protocol.words(target)}{protocol.feed_word(speed)}")
         # a dwell is answered when all motion before it is done: sooner and surer than asking for the state
         self.command("G4P0.001", within)
@@ -286,7 +306,7 @@ class GrblController:
         machine came to rest lies further on by its braking distance.
         """
         self.check()
-        self._heading_for(target, anew=True)
+        self._heading_for(target, speed, anew=True)
         work = target - self.offset  # probing obeys the work coordinates: G53 is not for G38
         lines: list[str] = []
         with suppress(_Unanswered):  # not said again: the probe may be closed now. The result is kept, and read below
@@ -320,7 +340,7 @@ class GrblController:
             StoppedError, LinkError: as for `command`.
         """
         self.check()
-        self._heading_for(target, anew=not self._sent and self._standing())
+        self._heading_for(target, speed, anew=not self._sent and self._standing())
         line = f"$J=G53{protocol.words(target)}{protocol.feed_word(speed)}\n".encode("ascii")
         self._settle_answers()
         if sum(self._sent) + len(line) >= protocol.RECEIVE_BUFFER:
@@ -343,6 +363,12 @@ class GrblController:
                     self._sent.popleft()
                 if answer != "ok":
                     raise FingerError(f"{self.link.port}: a jog was refused: {protocol.describe(answer)}")
+
+    def left(self, count: int) -> None:
+        """The machine is known to have at most `count` jogs before it: what came before was answered, heard or not."""
+        self._settle_answers()
+        while len(self._sent) > count:
+            self._sent.popleft()
 
     def cancel_now(self) -> None:
         """Throw away what is queued of jogs, from any thread, and wait for nothing; the link may be gone."""
@@ -454,15 +480,33 @@ class GrblController:
         self.vouched, self.distrust = False, f"{self.link.port}: {reason}"
         self.halt(self.distrust)
 
-    def _heading_for(self, target: FloatArray, anew: bool) -> None:
-        """Reports must lie in the box of the places between which it moves."""
+    def _heading_for(self, target: FloatArray, speed: float, anew: bool) -> None:
+        """Reports must lie in the box of the places between which it moves; it arrives when its speed says."""
         with self._news:
-            if anew or self._way is None:
+            if anew or self._way is None or self._sent_to is None:
                 if not self.reports:
                     return
                 here = self.machine_position(self.reports[-1].status)
-                self._way = (here, here)
+                # that report may be older than a short way that has ended since
+                there = here if self._way is None or self._sent_to is None else self._sent_to
+                self._way = np.minimum(here, there), np.maximum(here, there)
+                self._sent_to, self._moves_until = here, -np.inf
             self._way = (np.minimum(self._way[0], target), np.maximum(self._way[1], target))
+            lasts = float(np.linalg.norm(target - self._sent_to)) / speed
+            self._moves_until, self._sent_to = max(self._moves_until, time.monotonic()) + lasts, target
+
+    def run_out(self) -> None:
+        """Wait until all that it was told has ended, by the clock: for a machine that can be asked and stopped no more.
+
+        One ramp comes on top of the ways at their speeds; an axis has reached its fastest by then.
+        """
+        fastest, slowest = (
+            np.append(self.settings.max_rate, 0.0),
+            np.nanmin(np.append(self.settings.acceleration, np.inf)),
+        )
+        ramp = float(np.nanmax(fastest) / slowest) if slowest > 0.0 else 0.0
+        while (left := self._moves_until + ramp - time.monotonic()) > 0.0:
+            time.sleep(min(left, POLL))
 
     def _standing(self) -> bool:
         return bool(self.reports) and self.reports[-1].status.state == "Idle"
@@ -542,8 +586,12 @@ class GrblController:
 
     def _sort(self, now: float, line: str) -> None:
         if line.startswith("<"):
-            status, round_trip = protocol.parse_status(line), now - self._asked.popleft() if self._asked else 0.0
-            if status is not None and self._is_plausible(status):
+            asked = self._asked.popleft() if self._asked else now
+            status, round_trip = protocol.parse_status(line), now - (self._in_vain or asked)
+            self._in_vain = None
+            if status is None:
+                self._unclear += 1
+            elif self._is_plausible(status):
                 self.reports.append(Report(now, status, round_trip))
                 if status.offset is not None:
                     self._hear_offset(status.offset * self.settings.report_scale)
@@ -560,6 +608,7 @@ class GrblController:
                 )
         else:
             self._feedback.append(line)
+            self._unclear += not line.startswith(("[", "$", ">"))
 
     def _notify(self) -> None:
         with self._news:
@@ -585,10 +634,11 @@ class GrblController:
     ) -> None:
         """Wait for news, asking for a status meanwhile, so that silence is noticed soon."""
         patience, silence, heard = Patience(within), Patience(stale), self.link.heard
-        idle, seen = 0, len(self.reports) and self.reports[-1].at
+        idle, seen, garbled = 0, len(self.reports) and self.reports[-1].at, self.garbled
         while True:
+            again = POLL if self.garbled == garbled else self._again  # it may have been the answer
             with self._news:
-                if self._news.wait_for(lambda: done() or self._trouble(restarts, alarm), timeout=POLL) and done():
+                if self._news.wait_for(lambda: done() or self._trouble(restarts, alarm), timeout=again) and done():
                     return
             if self.alarm != alarm or self.stop_reason is not None or not self.link.is_open:
                 self.check()

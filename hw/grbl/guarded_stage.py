@@ -30,8 +30,13 @@ CRAWL = 1e-4
 # The body is approached in steps of this share of what the tip may run on; the next one is sent when QUEUED_STEPS of
 # them are left. So a host that hears of the touch late lets the tip run on by 2.5 steps, 0.6 of what it may, at most
 STEP_SHARE, QUEUED_STEPS = 0.25, 1.5
+# The jogs in which such a rest may be left: the one under way and the next
+QUEUED_JOGS = 2
 # A lift is queued for so long ahead, s, besides two round trips: a busy host asks twice in it
 LIFT_AHEAD = 0.02
+# A machine whose cable is pulled carries out what it was told: a long way of probing is told in pieces of so long, s; a
+# stop between two takes 0.05 s
+LONGEST_BLIND = 2.0
 # A probe is closed, or open, if so many reports say so: one may be garbled, a contact may bounce
 TOLD = 2
 # The tip is free when a step of this length, m, changes the force by less than a touch
@@ -82,6 +87,10 @@ class GuardedStage:
                 )
         return float(fastest)
 
+    def stop_within(self, speed: float) -> float:
+        """Way that it takes to brake from a speed, m/s, to a stand, m."""
+        return speed**2 / (2.0 * self._acceleration)
+
     def position(self) -> FloatArray:
         """Where the tip centre is now."""
         return self.frame.to_object(self.controller.position())
@@ -102,7 +111,7 @@ class GuardedStage:
             force: that the touch should not exceed, N, as far as the tip's stiffness tells, however late the host is.
         """
         self.check(target, "probing")
-        here = self.position() if self.sensor is not None else self._resting()
+        here = self.resting()
         way = float(np.linalg.norm(target - here))
         if way < STANDING:
             return here, False
@@ -114,7 +123,7 @@ class GuardedStage:
                 raise self._not_felt(target)
         speed = min(speed, self.guarded_speed)
         where, hit = (
-            self._peck(here, target, speed) if self.sensor is None else self._feel(target, speed, self.sensor, force)
+            self._peck_on(here, target, speed) if self.sensor is None else self._feel(target, speed, self.sensor, force)
         )
         if not hit and bound < way:
             raise self._not_felt(where)
@@ -129,17 +138,27 @@ class GuardedStage:
             '"estimate" finds the pose, beyond in [finger.machine] lets the tip go deeper'
         )
 
+    def _peck_on(self, start: FloatArray, target: FloatArray, speed: float) -> tuple[FloatArray, bool]:
+        """Peck, piece by piece where the way is long."""
+        count = max(1, int(np.ceil(np.linalg.norm(target - start) / (speed * LONGEST_BLIND))))
+        where, hit = start, False
+        for number in range(1, count + 1):
+            where, hit = self._peck(where, start + (target - start) * (number / count), speed)
+            if hit:
+                break
+        return where, hit
+
     def _peck(self, start: FloatArray, target: FloatArray, speed: float) -> tuple[FloatArray, bool]:
         """Probe under the controller's own eyes, and judge what it says by where the machine came to rest."""
         if self.closed():
             self._open_by_backing_off(start, target)
-            start = self._resting()
+            start = self.resting()
         way = float(np.linalg.norm(target - start))
         inwards = (target - start) / way
         step = self.controller.settings.resolution
         for _ in range(TOLD):  # a line that was lost on the way moves nothing: it is said again
             found = self.controller.probe(self.frame.to_machine(target), speed, _patience(way, speed))
-            resting = self._resting()
+            resting = self.resting()
             if found.hit or np.linalg.norm(resting - start) > STANDING:
                 break
         if not found.hit:
@@ -156,7 +175,7 @@ class GuardedStage:
         aside = float(np.linalg.norm(where - start - along * inwards))
         ran_on = float((resting - where) @ inwards)
         slack = LATCH_STEPS * step
-        most = BRAKING_DOUBT * speed**2 / (2.0 * self._acceleration) + SEGMENT * speed + slack
+        most = BRAKING_DOUBT * self.stop_within(speed) + SEGMENT * speed + slack
         if aside > slack or not -slack <= along <= way + slack or not -slack <= ran_on <= most:
             raise LinkError(
                 f"the contact reported at {np.round(1e3 * where, 3).tolist()} mm does not fit to where the machine "
@@ -170,7 +189,8 @@ class GuardedStage:
             )
         return where, True
 
-    def _resting(self) -> FloatArray:
+    def resting(self) -> FloatArray:
+        """Where the tip centre stands, as two reports in a row tell it."""
         return self.frame.to_object(self.controller.resting_position())
 
     @contextmanager
@@ -193,7 +213,7 @@ class GuardedStage:
         """A probe that is closed before probing begins is in contact: back, the way it was to go."""
         back = (start - target) / np.linalg.norm(start - target)
         for _ in range(MOST_FREE_STEPS):
-            self.move(self._within(self.position() + FREE_STEP * back), self.guarded_speed)
+            self.move(self._within(self.resting() + FREE_STEP * back), self.guarded_speed)
             if not self.closed():
                 return
         raise StoppedError(
@@ -209,11 +229,12 @@ class GuardedStage:
         """
         if self.sensor is None:
             if self.closed():
-                self._open_by_backing_off(self.position(), self.position() - away)
+                here = self.resting()
+                self._open_by_backing_off(here, here - away)
             return
         before = self._raw(self.sensor)
         for _ in range(MOST_FREE_STEPS):
-            self.move(self._within(self.position() + FREE_STEP * away), min(self.guarded_speed, FREE_STEP / FRESH))
+            self.move(self._within(self.resting() + FREE_STEP * away), min(self.guarded_speed, FREE_STEP / FRESH))
             after = self._raw(self.sensor)
             pressed = float(self.frame.turn_to_object(after - before) @ away)
             if pressed > self.touch_force:
@@ -238,7 +259,35 @@ class GuardedStage:
         """A step in contact, at the guarded speed; returns when it is made."""
         self.check(target, "pressing")
         self.controller.jog(self.frame.to_machine(target), self.guarded_speed)
+        patience, idle, arrived = Patience(LONGEST_STANDSTILL), 0, False
+        while not arrived:
+            arrived, idle = self.arrived(
+                target, self.guarded_speed, max(STANDING, self.controller.settings.resolution), idle
+            )
+            self.controller.check()
+            if patience.over():
+                raise LinkError("the machine does not follow; is it held, or its door open?")
         self.controller.wait_idle(LONGEST_STANDSTILL)
+
+    def arrived(self, here: FloatArray, speed: float, near: float, idle: int) -> tuple[bool, int]:
+        """Whether the stage is `near` (m) to the place that it was sent to by a jog, and how often it stood elsewhere.
+
+        A jog whose line was lost, or that was thrown away for a touch that was none, is sent again.
+
+        Args:
+            speed: of the jog, m/s.
+            idle: how often it stood elsewhere before.
+        """
+        status = self.controller.status()
+        place = self.frame.to_object(self.controller.machine_position(status))
+        if np.linalg.norm(place - here) <= near:
+            self.controller.left(QUEUED_JOGS)
+            return True, 0
+        idle = idle + 1 if status.state == "Idle" else 0
+        if idle > TOLD:
+            self.controller.jog(self.frame.to_machine(here), speed)
+            idle = 0
+        return False, idle
 
     def _feel(self, target: FloatArray, speed: float, sensor: ForceSensor, force: float) -> tuple[FloatArray, bool]:
         """Jog until the sensor feels contact; where the machine then came to rest.
@@ -246,7 +295,7 @@ class GuardedStage:
         The thread that reads the sensor cancels the jog: over a slow link the host hears where the machine is only
         after it went on for as long.
         """
-        start = self.position()
+        start = self.resting()
         way = float(np.linalg.norm(target - start))
         # a late host makes the machine stand: never is more queued than may be run on into the body
         most = self.over_travel if self.stiffness == 0 else min(self.over_travel, force / self.stiffness)
@@ -256,30 +305,30 @@ class GuardedStage:
         with sensor.touching(self.touch_force, self.controller.cancel_now):
             for number in range(1, count + 1):
                 here = start + (target - start) * (number / count)
-                made = time.monotonic()
-                self.controller.jog(self.frame.to_machine(here), speed)
-                hit = self._felt_before(here, QUEUED_STEPS * way / count, made, sensor)
+                hit = self._felt_before(here, speed, QUEUED_STEPS * way / count, sensor)
                 if hit:
                     break
             if not hit:
                 self.controller.wait_idle(LONGEST_STANDSTILL)
                 hit = self._touches(sensor)
         self.controller.cancel_jog()
-        return self.position(), hit
+        return self.resting(), hit
 
-    def _felt_before(self, here: FloatArray, near: float, made: float, sensor: ForceSensor) -> bool:
-        """True as soon as the sensor feels contact, False once the stage is `near` (m) to `here`.
+    def _felt_before(self, here: FloatArray, speed: float, near: float, sensor: ForceSensor) -> bool:
+        """Jog on to `here`; True as soon as the sensor feels contact, False once the stage is `near` (m) to it.
 
         The force is looked at once at least, however fast the stage was there: on a busy host it always is, and
         would be sent into the body step by step.
         """
-        patience = Patience(LONGEST_STANDSTILL)
+        patience, made, idle = Patience(LONGEST_STANDSTILL), time.monotonic(), 0
+        self.controller.jog(self.frame.to_machine(here), speed)
         while True:
             self.controller.check()
             self.listen(sensor, made)
             if self._touches(sensor):
                 return True
-            if np.linalg.norm(self.position() - here) <= near:
+            arrived, idle = self.arrived(here, speed, near, idle)
+            if arrived:
                 return False
             if self._touches(sensor):  # felt, and the jog cancelled, while the position was asked for
                 return True
@@ -330,7 +379,7 @@ class GuardedStage:
             StoppedError: still blocked after `tries`.
         """
         for _ in range(tries):
-            start = self.position()
+            start = self.resting()
             where, hit = self.probe(target, self.guarded_speed)
             if not hit:
                 return
@@ -349,14 +398,15 @@ class GuardedStage:
         Raises:
             StoppedError: something stands there: the force rises, or the probe that had opened closes again.
         """
-        target = self._within(self.position() + distance * away)
-        if float(np.linalg.norm(target - self.position())) < STANDING:
+        self.controller.wait_idle(LONGEST_STANDSTILL)  # an operator's hold: no jog is taken before it is let go
+        start = self.resting()
+        target = self._within(start + distance * away)
+        if float(np.linalg.norm(target - start)) < STANDING:
             return
         sensor = self.sensor if self.sensor is not None and self.sensor.fault is None else None
         most = self.touch_force + (0.0 if sensor is None else float(np.linalg.norm(sensor.force())))
-        self.controller.wait_idle(LONGEST_STANDSTILL)  # an operator's hold: no jog is taken before it is let go
         opened, met = False, 0
-        for here in self._pieces(target):
+        for here in self._pieces(start, target):
             self.controller.jog(self.frame.to_machine(here), self.guarded_speed)
             left = 0.0 if np.array_equal(here, target) else self._run_out
             while True:
@@ -374,9 +424,8 @@ class GuardedStage:
                     break
         self.controller.wait_idle(LONGEST_STANDSTILL)
 
-    def _pieces(self, target: FloatArray) -> Iterator[FloatArray]:
+    def _pieces(self, start: FloatArray, target: FloatArray) -> Iterator[FloatArray]:
         """Ends of the jogs to a target: short ones, for what is queued runs out when the cable is pulled."""
-        start = self.position()
         count = int(np.ceil(np.linalg.norm(target - start) / self._run_out))
         for number in range(1, count):
             yield start + (target - start) * (number / count)
@@ -386,7 +435,7 @@ class GuardedStage:
     def _run_out(self) -> float:
         """What may be queued of a lift, m: what lasts as long as asking where the machine is, and its stop."""
         lasts = LIFT_AHEAD + 2.0 * self.controller.round_trip
-        return max(self.guarded_speed * lasts + self.guarded_speed**2 / (2.0 * self._acceleration), STANDING)
+        return max(self.guarded_speed * lasts + self.stop_within(self.guarded_speed), STANDING)
 
     def _within(self, target: FloatArray) -> FloatArray:
         machine = np.clip(self.frame.to_machine(target), self.bounds[0], self.bounds[1])

@@ -187,7 +187,7 @@ def parse_status(line: str) -> Status | None:
     match = re.fullmatch(r"<([A-Za-z]+)(?::(\d+))?\|([MW])Pos:([-\d.,]+)((?:\|[^|<>]*)*)>", line)
     if match is not None and match[1] not in MACHINE_STATES:
         return None  # garbled: "Jpg" must not pass for a machine that stands
-    position = None if match is None else _vector(match[4])
+    position = None if match is None else _place(match[4])
     if match is None or position is None:
         return None
     fields = dict(part.split(":", 1) for part in match[5].split("|") if ":" in part)
@@ -197,7 +197,7 @@ def parse_status(line: str) -> Status | None:
         substate=None if match[2] is None else int(match[2]),
         position=position,
         is_machine=match[3] == "M",
-        offset=_vector(fields["WCO"]) if "WCO" in fields else None,
+        offset=_place(fields["WCO"]) if "WCO" in fields else None,
         pins=fields.get("Pn", ""),
         blocks=int(blocks) if blocks.isdigit() else None,
         bytes=int(free) if free.isdigit() else None,
@@ -207,7 +207,7 @@ def parse_status(line: str) -> Status | None:
 def parse_probe(line: str) -> Probed | None:
     """The result in a line [PRB:x,y,z:1], or None if it is not one."""
     match = re.fullmatch(r"\[PRB:([-\d.,]+):([01])\]", line)
-    position = None if match is None else _vector(match[1])
+    position = None if match is None else _place(match[1])
     return None if match is None or position is None else Probed(position, match[2] == "1")
 
 
@@ -259,6 +259,13 @@ def words(axes: FloatArray) -> str:
 def feed_word(speed: float) -> str:
     """Feed word of a speed in m/s: mm/min."""
     return f"F{speed * 60e3:.4g}" if speed * 60e3 < 1000 else f"F{speed * 60e3:.0f}"
+
+
+def _place(text: str) -> FloatArray | None:
+    """(3,) of a place as it is reported: always with three decimals (mm) or four (inches); else a digit was lost."""
+    parts = [re.fullmatch(r"-?\d+\.(\d{3,4})", part) for part in text.split(",")]
+    decimals = {len(part[1]) for part in parts if part is not None}
+    return _vector(text) if None not in parts and len(decimals) == 1 else None
 
 
 def _vector(text: str) -> FloatArray | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,9 +12,11 @@ from mapping import BoolArray, FloatArray
 
 # A report that took longer than usual by this, s, came late to a busy host: nobody knows when it was true
 LATE = 5e-4
-# A machine that stands may be reported so far aside, report units (mm, or inches: then more is let pass): two steps of
-# usual motors
-STILL = 0.008
+# A machine stands on its steps, and the line that it was sent along goes between them: each axis is half a step off at
+# either end, and a step between; three axes, in steps
+OFF_THE_LINE_STEPS = 2.0
+# The noise of a sample and the half of its neighbours' exceeds so many standard deviations once in 1e15
+LONE = 8.0 * 1.5**0.5
 
 
 def prompt(reports: Sequence[Report]) -> list[Report]:
@@ -22,18 +25,69 @@ def prompt(reports: Sequence[Report]) -> list[Report]:
     return [report for report in reports if report.round_trip <= usual + LATE]
 
 
-def smooth(reports: Sequence[Report]) -> list[Report]:
-    """The reports that lie between their neighbours: a digit garbled on the way puts the machine aside for one report.
+def on_the_way(
+    times: FloatArray,
+    places: FloatArray,
+    sent: FloatArray,
+    ends: FloatArray,
+    along: FloatArray,
+    queued: int,
+    off: float,
+) -> BoolArray:
+    """(M,) which reports are believed: those on the straight ways between the places where it was sent, in order.
 
-    Off is what lies farther from the middle between its neighbours than these are apart, and STILL.
+    A stage goes exactly where it is sent, and never back along its path; a digit garbled on the way puts it aside, or
+    before what it reports next. Of all that disagree in order the fewest are left out.
+
+    Args:
+        times, places: (M,) s and (M, 3) m of the reports.
+        sent: (K,) when it was sent, s, to each of the places `ends` (K, 3) m in turn; the first is where it stood.
+        along: (K,) how far along the path each of these is; never less than before.
+        queued: at most so many ways are under way or waiting.
+        off: farthest from the line that it was sent along, m.
     """
-    if len(reports) < 3:
-        return list(reports)
-    places = np.array([report.status.position for report in reports])
-    apart = np.linalg.norm(places[2:] - places[:-2], axis=1)
-    off = np.linalg.norm(places[1:-1] - 0.5 * (places[2:] + places[:-2]), axis=1)
-    keep = np.concatenate([[True], off <= apart + STILL, [True]])
-    return [report for report, good in zip(reports, keep, strict=True) if good]
+    last = np.maximum(np.searchsorted(sent, times) - 1, 0)
+    nearest, reached = np.full(len(times), np.inf), np.zeros(len(times))
+    for back in range(queued):
+        end = np.maximum(last - back, 0)
+        begin = np.maximum(end - 1, 0)
+        way = ends[end] - ends[begin]
+        square = np.einsum("ij,ij->i", way, way)
+        share = np.einsum("ij,ij->i", places - ends[begin], way) / np.where(square > 0.0, square, 1.0)
+        share = np.clip(share, 0.0, 1.0)
+        distance = np.linalg.norm(places - ends[begin] - share[:, None] * way, axis=1)
+        nearer = distance < nearest
+        nearest = np.where(nearer, distance, nearest)
+        reached = np.where(nearer, along[begin] + share * (along[end] - along[begin]), reached)
+    keep = nearest <= off
+    keep[keep] = _rising(reached[keep])
+    return keep
+
+
+def _rising(values: FloatArray) -> BoolArray:
+    """(N,) a longest part of the values (N,) that never falls. Reference: Fredman, Discrete Math. 11, 29 (1975)."""
+    tails: list[float] = []  # the lowest value at which a rising part of each length ends
+    ends: list[int] = []  # and where it stands
+    before = np.full(len(values), -1)
+    for i, value in enumerate(values.tolist()):
+        length = bisect_right(tails, value)
+        before[i] = ends[length - 1] if length else -1
+        tails[length : length + 1], ends[length : length + 1] = [value], [i]
+    keep, i = np.zeros(len(values), dtype=bool), ends[-1] if ends else -1
+    while i >= 0:
+        keep[i] = True
+        i = before[i]
+    return keep
+
+
+def no_spikes(forces: FloatArray, noise: FloatArray) -> BoolArray:
+    """(N,) whether a sample (N, 3) lies between its neighbours, N, but for their noise (3,): else it was garbled."""
+    keep = np.ones(len(forces), dtype=bool)
+    if len(forces) > 2:
+        apart = np.abs(forces[2:] - forces[:-2])
+        off = np.abs(forces[1:-1] - 0.5 * (forces[2:] + forces[:-2]))
+        keep[1:-1] = (off <= apart + LONE * noise).all(axis=1)
+    return keep
 
 
 def positions_at(times: FloatArray, reported: FloatArray, positions: FloatArray) -> FloatArray:

@@ -84,6 +84,7 @@ class GrblFinger:
     _begun: float = field(init=False, default=0.0)
     _lost: str | None = field(init=False, default=None)
     _left: bool = field(init=False, default=False)
+    _free: bool = field(init=False, default=False)
     _cut_short: list[str] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
@@ -169,6 +170,8 @@ class GrblFinger:
         self._signals.ignore()
         try:
             self._retreat(self._stage)
+            if self._lost is not None:
+                self._stage.controller.run_out()
         finally:
             self._stage = None
             self._open.close()
@@ -191,7 +194,7 @@ class GrblFinger:
                 if not controller.clear():
                     return  # the position is lost: any motion could do harm
             if controller.alarm is None:
-                stage.lift(self._away, 2.0 * self.tip_radius)
+                self._lift(stage, 2.0 * self.tip_radius)
         except FingerError as error:
             self._lost = (
                 f"{self._lost}; and could not retreat: {error}" if self._lost else f"could not retreat: {error}"
@@ -220,7 +223,8 @@ class GrblFinger:
         controller = self.stage.controller
         sensor = {}
         if self.slide is not None:
-            sensor = {"sensor": self.slide.sensor.info, "lag": self.slide.lag.seconds}
+            zeros = {"moved": self.slide.zeros.moved, "doubt": self.slide.zeros.doubt}
+            sensor = {"sensor": self.slide.sensor.info, "lag": self.slide.lag.seconds, "zero": zeros}
         return {
             "kind": "grbl",
             "touch": "peck" if self.slide is None else "slide",
@@ -248,7 +252,7 @@ class GrblFinger:
         if self._lost is not None and not self._regained(stage):
             raise FingerError(self._lost)
         self._refuse_what_exceeds(move, stage)
-        touched: list[Trace] = []
+        touched: list[Touched] = []
         self._left = False
         try:
             self._carry_out(move, stage, touched)
@@ -256,13 +260,35 @@ class GrblFinger:
             stage.controller.halt(str(error))
             self._lost = str(error)
             self._retreat(stage)  # now, and not when the last samples are thought over: the tip may be pressed hard
-            if not any(map(len, touched)):
+            if not any(len(batch.times) for batch in touched):
                 raise
         except FingerError as error:
             self._cut_short.append(str(error))
-            if not any(map(len, touched)):  # one line was refused, a garbled one perhaps: what was felt before it stays
+            if not any(len(batch.times) for batch in touched):  # what was felt before a line that was refused stays
                 raise
-        return Trace.concatenate(touched or [self._trace(Touched(np.zeros(0), np.zeros((0, 3))))])
+        touched = self._settled(stage, touched)
+        return Trace.concatenate([self._trace(batch) for batch in touched or [_nothing_felt()]])
+
+    def _settled(self, stage: GuardedStage, touched: list[Touched]) -> list[Touched]:
+        """What was felt, put right by what the sensor says in free air; as it is where that cannot be asked."""
+        slide = self.slide
+        if slide is None or not touched or slide.sensor.fault is not None or not slide.sensor.link.is_open:
+            return touched
+        try:
+            if self._lost is None:
+                self._lift(stage, 0.5 * self.tip_radius)
+            return slide.settled(stage, touched) if self._free else touched
+        except (LinkError, StoppedError) as error:
+            if self._lost is None:
+                stage.controller.halt(str(error))
+                self._lost = str(error)
+                self._retreat(stage)
+            return [] if isinstance(error, StoppedError) else touched
+
+    def _lift(self, stage: GuardedStage, distance: float) -> None:
+        assert self._away is not None
+        stage.lift(self._away, distance)
+        self._free = True
 
     def _regained(self, stage: GuardedStage) -> bool:
         """True if all that was lost was the sensor, and it is back: the machine stood still and knows where it is."""
@@ -298,14 +324,14 @@ class GrblFinger:
         if move.speed > stage.speed * (1 + 1e-9):
             raise FingerError(f"the {move.purpose} asks for {move.speed} m/s; at most {stage.speed} m/s is possible")
 
-    def _carry_out(self, move: Move, stage: GuardedStage, touched: list[Trace]) -> None:
+    def _carry_out(self, move: Move, stage: GuardedStage, touched: list[Touched]) -> None:
         away = -move.approach[0]
         lift = 0.5 * self.tip_radius
-        if self._away is not None:
-            stage.lift(self._away, lift)
-        else:
+        if self._away is None:
             self._begin(stage, away)
-        self._away = away
+        elif not self._free:
+            self._lift(stage, lift)
+        self._away, self._free = away, False
         if move.purpose in ("travel", "retreat"):
             for point, inwards in zip(move.path, move.approach, strict=True):
                 self._away = -inwards
@@ -316,9 +342,9 @@ class GrblFinger:
         touch = self.peck if self.slide is None else self.slide
         assert touch is not None
         for batch in touch.trace(stage, move):
-            touched.append(self._trace(batch))
+            touched.append(batch)
             if self.notice is not None and len(batch.times):
-                self.notice(touched[-1])
+                self.notice(self._trace(batch))
         self._away = -move.approach[-1]
 
     def _begin(self, stage: GuardedStage, away: FloatArray) -> None:
@@ -326,6 +352,7 @@ class GrblFinger:
         stage.free(away)
         if self.slide is not None:
             self.slide.sensor.tare()
+            self.slide.sensor.watch.steepest = self.slide.stiffness * stage.speed
         elif self.ask is not None:
             for closed, what in ((True, "touch the tip by hand"), (False, "let go of the tip")):
                 self.ask(f"{self.port}: {what}, within {TOUCH_BY_HAND:.0f} s")
@@ -351,3 +378,7 @@ class GrblFinger:
             force=force,
             resolution=self.stage.controller.settings.resolution,
         )
+
+
+def _nothing_felt() -> Touched:
+    return Touched(np.zeros(0), np.zeros((0, 3)))

@@ -107,7 +107,7 @@ def measured_delay(
         FingerError: there is no body within 10 mm.
     """
     sensor.tare()
-    where, hit = stage.probe(stage.position() + 0.01 * inwards, 2e-3)
+    where, hit = stage.probe(stage.resting() + 0.01 * inwards, 2e-3)
     if not hit:
         raise FingerError("no contact within 10 mm: put the tip before the body first")
     free, low, speed = where - 1e-3 * inwards, where + press / stiffness * inwards, 4e-3

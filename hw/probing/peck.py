@@ -112,7 +112,7 @@ class Peck:
                 garbled += 1
                 if garbled == MOST_TOUCHES or not stage.controller.link.is_open:
                     raise
-                stage.move(stage.position() - self.clearance * inwards)
+                stage.move(stage.resting() - self.clearance * inwards)
                 continue
             if not hit:
                 return where, False, True
@@ -136,7 +136,7 @@ class Peck:
         except NotFeltError:
             if not known:
                 raise
-            here = stage.position()
+            here = stage.resting()
             stage.lift(-inwards, self.stroke)
             above = known[-1] - self.clearance * inwards
             stage.go(above, -inwards, self.clearance)

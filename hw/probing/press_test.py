@@ -50,11 +50,11 @@ def press_test(
     step = max(
         step, min(LEAST_STEPS * stage.controller.settings.resolution, MOST_OF_LIMIT * stage.max_force / stiffness)
     )
-    before, start = _mean_force(stage, sensor), stage.position()
+    before, start = _mean_force(stage, sensor), stage.resting()
     pressed, more = float(np.linalg.norm(before)), step * stiffness
     inwards = -inwards if pressed + more > wanted and pressed > more else inwards  # back, but not out of contact
     stage.creep(start + step * inwards)
-    after, way = _mean_force(stage, sensor), float((stage.position() - start) @ inwards)
+    after, way = _mean_force(stage, sensor), float((stage.resting() - start) @ inwards)
     change = after - before
     rise = float(np.copysign(np.linalg.norm(change), -(change @ inwards)))
     found = rise / max(way, 1e-9)

@@ -8,22 +8,37 @@ is queued can be thrown away, so the machine stops within a period of being aske
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from hw import LinkError, Move, NotFeltError, Patience, StoppedError
 from hw.grbl import LONGEST_STANDSTILL, GuardedStage
-from hw.probing.fusion import known_at, positions_at, prompt, rigid_centers, smooth
+from hw.probing.fusion import (
+    OFF_THE_LINE_STEPS,
+    known_at,
+    no_spikes,
+    on_the_way,
+    positions_at,
+    prompt,
+    rigid_centers,
+)
 from hw.probing.lag import EXPECTED, Lag
 from hw.probing.peck import Touched, spaced
 from hw.probing.press_test import press_test
+from hw.probing.zero import ZeroLine, ZerosMoved
 from hw.sensors import ForceSensor
 from mapping import BoolArray, FloatArray
 
-# Jogs that may be under way or waiting when the next is made, in control periods
+# Jogs that may be under way or waiting when the next is made, in control periods; and less where the way that it takes
+# to brake, with what is made in one period more, is shorter: a planner keeps up its speed with no more (Grbl,
+# jogging.md), and what is queued runs out when the cable is pulled
 QUEUED = 2
+# So many of the last ways sent hold the place of the machine: those queued, the next, and one for a report on its way
+RECENT_WAYS = QUEUED + 2
+# Of the reports at least this share must lie on the way that the machine was sent; at 1 % of garbled bytes 90 % do
+ON_THE_WAY = 0.5
 # Over a slow link a jog lasts this share of a round trip: the force is heard of once in a round trip, and the machine
 # must neither stand for most of it, nor go on for long over what it has not felt. At 20 ms of latency and 115200 baud
 # (30 ms a round trip) 4 mm at 10 mm/s take 1.2 s; with jogs of 10 ms they took 1.7 s
@@ -43,7 +58,7 @@ BLIND, UNUSUAL, HARMLESS_STAGE_STEPS = 0.5, 2.0, 2.0
 BEFORE = 0.1
 # A body presses, it never pulls: friction at a steep side may, by less than this share of the force (0.5 on steel)
 PULL = 0.6
-# The zero may move by this, as a displacement of the tip, during one sweep, m: its samples are off by as much
+# The zero may be wrong by this, as a displacement of the tip, during one sweep, m: its samples are off by as much
 ZERO_MOVED = 1.5e-5
 # What was felt so long before a stop may be wrong already, s: two requests for a status
 HELD_BACK = 0.1
@@ -51,6 +66,20 @@ HELD_BACK = 0.1
 SWEEP_OVERHEAD = 3.0
 # A path of one point is touched for so many control periods
 DWELL = 10
+
+
+@dataclass
+class _Sent:
+    """Where a sweep sent the stage: when, s, to which place (3,), m, which lies how far along its path."""
+
+    times: list[float]
+    ends: list[FloatArray]
+    along: list[float]
+
+    def add(self, when: float, end: FloatArray, along: float) -> None:
+        self.times.append(when)
+        self.ends.append(end)
+        self.along.append(along)
 
 
 @dataclass(frozen=True)
@@ -68,6 +97,7 @@ class Slide:
         delay: by how much the force is stamped later than the stage's reports, s (hw.probing.fusion.estimate_delay).
         contact: force above which a sample counts as contact, N.
         lag: what of the delay is left, learnt from one batch of samples to the next.
+        zeros: by how much the sensor's zero has moved in the sweeps so far.
     """
 
     sensor: ForceSensor
@@ -79,6 +109,7 @@ class Slide:
     delay: float = 0.0
     contact: float = 0.05
     lag: Lag = field(default_factory=Lag)
+    zeros: ZerosMoved = field(default_factory=ZerosMoved)
 
     def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
         """Samples in contact with their forces, about every BATCH seconds; what was felt before a stop as well."""
@@ -90,56 +121,81 @@ class Slide:
         if not hit:
             return
         press_test(stage, self.sensor, approach[0], self.stiffness, move.force)
-        depth = float((stage.position() - path[0]) @ approach[0])
+        here = stage.resting()
         last = told = time.monotonic()
+        sent = _Sent([last], [here], [0.0])
         try:
-            for sliding in self._steer(stage, move, path, approach, depth, period):
+            for sliding in self._steer(stage, move, path, approach, sent, period):
                 if not sliding:
                     last = time.monotonic()  # what the tip feels while it settles is no sweep
                 elif time.monotonic() > told + BATCH:
                     told = time.monotonic()
-                    batch = self._fused(stage, last, told - self.sensor.watch.blind)
+                    batch = self._fused(stage, sent, last, told - self.sensor.watch.blind)
                     if len(batch.times):
                         last = float(batch.times[-1])
                         yield batch
         except (StoppedError, LinkError):
-            yield self._fused(stage, last, time.monotonic() - HELD_BACK)
+            yield self._fused(stage, sent, last, time.monotonic() - HELD_BACK)
             raise
         finally:
             if stage.controller.link.is_open and stage.controller.stop_reason is None:
                 stage.controller.cancel_jog()
-        yield self._fused(stage, last)
+        yield self._fused(stage, sent, last)
 
     def _tare(self, stage: GuardedStage, duration: float) -> None:
-        """Take the zero anew; it must be about where it was before the last sweep, and stay there for the next one."""
-        before, known = self.sensor.zero, self.sensor.watch.blind > 0.0
+        """Take the zero anew; in free air it must be about where it was, and stay there for the next sweep."""
+        before = self.sensor.zeroed
         self.sensor.tare()
-        moved = float(np.linalg.norm(self.sensor.zero - before))
-        if known and moved > max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0):
-            reason = (
-                f"the sensor's zero moved by {moved:.2f} N during the last sweep, whose samples are off by up to "
-                f"{1e6 * moved / self.stiffness:.0f} um: leave those out; let the sensor warm up, look what hangs on it"
+        assert self.sensor.zeroed is not None
+        most = max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0)
+        moved = 0.0 if before is None else ZeroLine(before, self.sensor.zeroed).moved
+        drift = float(np.linalg.norm(self.sensor.zeroed.drift)) * duration
+        if max(moved, drift) > most:
+            what = (
+                f"moved by {moved:.2f} N since the last sweep"
+                if moved > most
+                else f"drifts by {drift / duration:.2f} N/s while nothing touches, "
+                f"{1e6 * drift / self.stiffness:.0f} um of the tip during one sweep"
             )
-            stage.controller.halt(reason)
-            raise StoppedError(reason)
-        drift = float(np.linalg.norm(self.sensor.drift))
-        if drift * duration > max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0):
-            reason = (
-                f"the sensor's zero drifts by {drift:.2f} N/s while nothing touches, "
-                f"{1e6 * drift * duration / self.stiffness:.0f} um of the tip during one sweep: let it warm up, or "
-                "look what hangs on it"
-            )
+            reason = f"the sensor's zero {what}: let it warm up, or look what hangs on it"
             stage.controller.halt(reason)
             raise StoppedError(reason)
 
+    def settled(self, stage: GuardedStage, felt: Sequence[Touched]) -> list[Touched]:
+        """What a sweep felt, once the tip is in free air again: less what the zero has moved meanwhile.
+
+        Raises:
+            StoppedError: it moved so that nobody knows how far the samples are off.
+            LinkError: no samples.
+        """
+        before, after = self.sensor.zeroed, self.sensor.free_air()
+        assert before is not None
+        line = ZeroLine(before, after)
+        self.sensor.zeroed = after  # the next sweep's zero is held against this one
+        if line.doubt > ZERO_MOVED * self.stiffness:
+            raise StoppedError(
+                f"the sensor's zero moved by {line.moved:.2f} N during the sweep, nobody knows when: its samples may "
+                f"be {1e6 * line.doubt / self.stiffness:.0f} um off and are left out; let the sensor warm up, look "
+                "what hangs on it, run again with --resume"
+            )
+        self.zeros.learn(line)
+        settled = []
+        for batch in felt:
+            assert batch.forces is not None
+            moved = stage.frame.turn_to_object(line.offsets(batch.times) @ self.sensor.turned.T)
+            settled.append(Touched(batch.times, batch.centers - moved / self.stiffness, batch.forces - moved))
+        return settled
+
     def _steer(
-        self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, depth: float, period: float
+        self, stage: GuardedStage, move: Move, path: FloatArray, approach: FloatArray, sent: _Sent, period: float
     ) -> Iterator[bool]:
-        """Along the path, one jog a `period` (s); `depth` (m) behind it along the approach follows the force.
+        """Along the path, one jog a `period` (s); a depth behind it along the approach follows the force.
 
         Each period says whether the sweep has begun.
         """
         controller, trend = stage.controller, 0.0
+        depth = float((sent.ends[0] - path[0]) @ approach[0])
+        ahead = stage.stop_within(move.speed) + move.speed * period
         here, at, end = path[0] + depth * approach[0], 0.0, len(path) - 1.0
         queued = [0.0] * QUEUED  # lengths of the last jogs
         settling = SETTLING  # periods to press on before the sweep begins
@@ -149,7 +205,7 @@ class Slide:
         while True:
             inwards = _between(approach, at)
             inwards /= np.linalg.norm(inwards)
-            pressing = self._pressing(stage, inwards, here, sum(queued), made)
+            pressing = self._pressing(stage, inwards, here, min(sum(queued), ahead), made)
             if pressing < -max(PULL * move.force, 0.5 * stage.touch_force):
                 raise StoppedError(
                     f"the force pulls the tip by {-pressing:.2f} N where a body can only press: the sensor's sign "
@@ -177,6 +233,7 @@ class Slide:
                 stage.check(target, "sliding")
                 controller.jog(stage.frame.to_machine(target), max(way / period, 1e-4))
                 made = time.monotonic()
+                sent.add(made, target, at)
                 here, queued = target, [*queued[1:], way]
             yield not settling
             if at >= end and not settling:
@@ -194,7 +251,9 @@ class Slide:
         """
         patience = Patience(LONGEST_STANDSTILL)
         left = max(queued, 1.5 * stage.controller.settings.resolution)
-        while np.linalg.norm(stage.position() - here) > left:
+        arrived, idle = False, 0
+        while not arrived:
+            arrived, idle = stage.arrived(here, stage.guarded_speed, left, idle)
             stage.controller.check()
             if patience.over():
                 raise StoppedError("the machine does not follow; is it held, or its door open?")
@@ -202,16 +261,34 @@ class Slide:
         force = stage.frame.turn_to_object(self.sensor.force())
         return -float(force @ inwards)
 
-    def _fused(self, stage: GuardedStage, after: float, until: float = np.inf) -> Touched:
+    def _fused(self, stage: GuardedStage, sent: _Sent, after: float, until: float = np.inf) -> Touched:
         """Samples in contact taken between these times, as far as the stage has reported where it was."""
-        reports = smooth(prompt(stage.controller.reported(after - BEFORE)))
+        reports = prompt(stage.controller.reported(after - BEFORE))
         if len(reports) < 2:
             return Touched(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
-        times, forces = self.sensor.timed(after)
         stamps = np.array([report.at for report in reports])
         places = stage.frame.to_object(
             np.array([stage.controller.machine_position(report.status) for report in reports])
         )
+        off = OFF_THE_LINE_STEPS * stage.controller.settings.resolution
+        good = on_the_way(
+            stamps,
+            places,
+            np.array(sent.times),
+            np.array(sent.ends),
+            np.array(sent.along),
+            queued=RECENT_WAYS,
+            off=off,
+        )
+        if np.mean(good) < ON_THE_WAY:
+            raise StoppedError(
+                f"{np.sum(~good)} of {len(good)} reports of the machine's place lie more than {1e6 * off:.0f} um off "
+                "the way that it was sent: check its cable, and whether another program or a pendant steers it"
+            )
+        stamps, places = stamps[good], places[good]
+        times, forces = self.sensor.timed(after)
+        whole = no_spikes(forces, np.abs(self.sensor.turned) @ self.sensor.watch.noise)
+        times, forces = times[whole], forces[whole]
         forces = stage.frame.turn_to_object(forces)
         pressing = np.linalg.norm(forces, axis=1)
         normals = forces / np.maximum(pressing, self.contact)[:, None]

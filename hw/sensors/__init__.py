@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from hw.sensors.force_sensor import ForceSensor as ForceSensor
+    from hw.sensors.force_sensor import ForceSensor as ForceSensor, FreeAir as FreeAir
     from hw.sensors.line_sensor import LineSensor as LineSensor, encode_line as encode_line
     from hw.sensors.optoforce import (
         CONFIGURE as CONFIGURE,
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
-    "force_sensor": ("ForceSensor",),
+    "force_sensor": ("ForceSensor", "FreeAir"),
     "line_sensor": ("LineSensor", "encode_line"),
     "optoforce": ("CONFIGURE", "OptoForce", "RATE_CODES", "checksum", "encode_frame"),
 }

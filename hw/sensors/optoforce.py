@@ -35,7 +35,8 @@ def checksum(data: bytes) -> int:
 
 def is_whole(frame: bytes) -> bool:
     """True if the checksum of a data frame is right."""
-    return sum(frame[:-2]) & 0xFFFF == frame[-2] << 8 | frame[-1]
+    high, low = frame[-2:]
+    return sum(frame) - high - low & 0xFFFF == high << 8 | low
 
 
 def encode_frame(counter: int, status: int, counts: tuple[int, int, int]) -> bytes:

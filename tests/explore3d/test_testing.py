@@ -75,7 +75,7 @@ def machine(slides: bool = False) -> Iterator[Rig]:
             "stopped": stop,
             "restarted": lambda: stage.power_up(locked=True),
             "dead": dead,
-            "garbled": lambda: server.faults.append(Fault("garble", at=0.0, rate=0.001)),
+            "garbled": lambda: server.faults.append(Fault("garble", at=0.0, rate=0.01)),
         }
         if slides:
             faults["frozen"] = lambda: setattr(devices[1], "fault", "frozen")

@@ -14,7 +14,11 @@ from explore3d.jobs.run import run
 from explore3d.log.reader import read_log
 from explore3d.log.record import read_base
 from explore3d.scene.mesh_files import load_mesh
+from hw.errors import FingerError
+from hw.move import Move
+from hw.simulated.finger import SimulatedFinger
 from mapping.base.pose import Pose
+from mapping.trace import Trace
 
 ASSETS = Path(__file__).resolve().parents[3] / "assets"
 AXIS = np.array([[-0.007468129, -0.01003007, 0.0], [0.015468129, 0.00603007, 0.0]])
@@ -106,6 +110,18 @@ def test_an_object_that_is_not_there_ends_the_run_in_one_sentence(tmp_path: Path
     with pytest.raises(UserError, match="nothing was felt: no body was touched"):
         run(scene, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+class LooseFinger(SimulatedFinger):
+    def execute(self, move: Move) -> Trace:
+        raise FingerError("the cable is loose; plug it in")
+
+
+def test_a_finger_that_refuses_every_move_says_why_nothing_was_felt(tmp_path: Path) -> None:
+    tile = ASSETS / "meshes" / "tile.ply"
+    scene = write_scene(tmp_path, f'mesh = "{tile}"', tile)
+    with pytest.raises(UserError, match="nothing was felt: the cable is loose; plug it in"):
+        run(scene, tmp_path / "out", finger=LooseFinger(object=load_mesh(tile, "m"), tip_radius=5e-3))
 
 
 @pytest.mark.slow

@@ -33,6 +33,15 @@ class SwiftController:
     def position(self) -> Any:
         return self.place
 
+    resting_position = position
+
+    def status(self) -> Any:
+        return SimpleNamespace(state="Idle", position=self.place)
+
+    def machine_position(self, status: Any) -> Any:
+        return status.position
+
+    def left(self, count: int) -> None: ...
     def check(self) -> None: ...
     def wait_idle(self, within: float) -> None: ...
     def cancel_jog(self) -> None: ...

@@ -13,7 +13,7 @@ from hw.grbl.controller import GrblController, Report
 from hw.grbl.frame import StageFrame
 from hw.grbl.guarded_stage import GuardedStage
 from hw.grbl.protocol import parse_status
-from hw.probing.fusion import estimate_delay, known_at, positions_at, prompt, rigid_centers
+from hw.probing.fusion import estimate_delay, known_at, no_spikes, on_the_way, positions_at, prompt, rigid_centers
 from hw.probing.lag import measured_delay
 from hw.sensors.clock import SensorClock, missing, unwrapped
 from hw.sensors.optoforce import OptoForce
@@ -104,3 +104,35 @@ def test_a_latency_put_into_the_emulated_sensor_is_measured_through_the_ports() 
             controller.close()
     # the scheduling of a busy host is in both; the difference is the latency
     assert found[1] - found[0] == pytest.approx(0.06, abs=0.02)
+
+
+def test_reports_that_a_garbled_digit_puts_aside_or_out_of_their_order_are_left_out() -> None:
+    ends = np.column_stack([1e-4 * np.arange(101), np.zeros(101), 2e-6 * np.arange(101) % 1e-5])
+    sent = 0.01 * np.arange(101)
+    times = np.linspace(0.015, 1.0, 800)
+    at = (times - 0.012) / 0.01  # the machine is a good way behind what it is sent
+    places = np.column_stack([np.interp(at, np.arange(101), ends[:, k]) for k in range(3)])
+    wrong = np.random.default_rng(0).choice(800, 80, replace=False)
+    told = places.copy()
+    # a digit of hundredths of millimetres across the path, or of tenths along it; two next to one another as well
+    told[wrong[:40], 2] += 4e-5
+    told[wrong[40:], 0] -= 2e-4
+    keep = on_the_way(times, told, sent, ends, np.arange(101.0), queued=4, off=8e-6)
+    assert not keep[wrong].any()
+    assert keep.sum() >= 800 - len(wrong) - 2
+
+
+def test_a_stage_that_presses_in_and_out_on_the_spot_is_on_its_way() -> None:
+    depth = 1e-5 * np.array([0.0, 1, 2, 3, 2, 1, 2, 3, 3])
+    ends = np.column_stack([np.zeros(9), np.zeros(9), -depth])
+    times = np.linspace(0.0, 0.08, 200)
+    places = np.column_stack([np.zeros(200), np.zeros(200), np.interp(times - 0.012, 0.01 * np.arange(9), -depth)])
+    assert on_the_way(times, places, 0.01 * np.arange(9), ends, np.zeros(9), queued=4, off=1e-9).all()
+
+
+def test_a_lone_sample_off_its_neighbours_is_no_force() -> None:
+    rng = np.random.default_rng(1)
+    forces = 0.003 * rng.standard_normal((2000, 3)) + np.linspace(0.0, 5.0, 2000)[:, None]
+    assert no_spikes(forces, np.full(3, 0.003)).all()
+    forces[700, 1] += 0.05
+    assert np.flatnonzero(~no_spikes(forces, np.full(3, 0.003))).tolist() == [700]

@@ -95,6 +95,10 @@ def test_status_reports_are_read_as_the_document_writes_them() -> None:
     assert more is not None and more.is_machine and more.position.tolist() == [0.0, -10.0, 5.0]
     for broken in ("<Idle|MPos:0.0", "<Idle>", "Idle|MPos:1,2,3>", "<Idle|MPos:1,2>", "<Run|MPos:1,2,x|FS:0,0>"):
         assert protocol.parse_status(broken) is None
+    # a digit lost, a digit twice, the point lost
+    for place in ("-147.50,-150.000,-44.900", "-147.500,-150.0000,-44.900", "-147.500,-150000,-44.900"):
+        assert protocol.parse_status(f"<Jog|MPos:{place}|FS:600,0>") is None
+        assert protocol.parse_probe(f"[PRB:{place}:1]") is None
 
 
 def test_probe_results_settings_and_offsets_are_read() -> None:
@@ -243,6 +247,20 @@ def test_garbled_doubled_and_lost_reply_bytes_never_become_contacts(kind: str) -
         trace = finger.execute(across(x=0.004))
     assert len(trace) > 0.9 * 24
     assert np.abs(off_the_body(trace.centers)).max() < 2e-5
+
+
+@SLOW
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", ["garble", "lose", "double"])
+def test_of_two_hundred_pecks_with_one_percent_of_reply_bytes_wrong_all_that_is_kept_is_right(
+    kind: str, seed: int
+) -> None:
+    with machine(pace=10.0) as (server, _), pecker(server) as finger:
+        server.faults.append(Fault(kind, at=0.0, rate=0.01, seed=seed))
+        traces = [finger.execute(across(y=1e-3 * line)) for line in range(5)]
+    assert sum(map(len, traces)) >= 0.95 * 205
+    for trace in traces:
+        assert np.abs(off_the_body(trace.centers)).max() < 2e-5
 
 
 def test_every_alarm_is_said_in_words_with_the_remedy() -> None:

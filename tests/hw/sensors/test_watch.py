@@ -78,6 +78,23 @@ def test_an_old_sample_again_is_no_sample() -> None:
     assert not watch.judge(told[3])[1]
 
 
+def test_a_garbled_count_costs_one_sample_and_a_pause_one_more() -> None:
+    told = samples(noise(200, 9))
+    told[50] = (told[50][0] + 512, *told[50][1:])
+    told[150:] = [((count + 3000) % 2**16, *force) for count, *force in told[150:]]
+    watch = watching()
+    judged = [watch.judge(sample) for sample in told]
+    assert [i for i, (_, sound, _) in enumerate(judged) if not sound] == [50, 150]
+    assert not any(fault for _, _, fault in judged)
+    assert judged[-1][0] == 3199
+
+
+def test_what_goes_on_jumping_is_a_fault() -> None:
+    told = noise(100, 6)
+    told[50:53, 2] += (3.0, -4.0, 5.0)
+    assert "jumped" in faults(watching(), samples(told))[0]
+
+
 def test_no_number_and_overload_are_faults() -> None:
     assert "no number" in faults(watching(), [(0, 0.0, 0.0, float("nan"))])[0]
     assert "overloaded" in faults(watching(), [(0, 0.0, 0.0, float("inf"))])[0]
