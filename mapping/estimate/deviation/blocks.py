@@ -20,6 +20,10 @@ STEEPEST = 0.05
 SAME = 4.0
 # Neighbours that a block is compared with beyond its own sweep, and cosine of the angle by which their normals differ
 BLOCK_NEIGHBOURS, SAME_SIDE_COSINE = 6, 0.5
+# Nor is it, from one sweep to the next, so many times steeper than this share of all neighbours are: over the gap
+# between two sweeps an edge is as gentle as any slope, but it is in one place alone
+USUAL_TIMES, USUAL_SHARE = 2.0, 0.75
+TINY = float(np.finfo(float).tiny)
 # A sweep of fewer bins tells nothing of long wavelengths
 FEWEST_BINS = 3
 
@@ -83,13 +87,15 @@ class Blocks:
         along = (np.diff(self.piece) == 0) & gentle[:-1] & gentle[1:]
         one, other = [here[:-1][along]], [here[1:][along]]
         _, near = cKDTree(self.points).query(self.points, min(BLOCK_NEIGHBOURS + 1, count))
-        for column in np.atleast_2d(near.T)[1:]:
-            apart = np.linalg.norm(self.points - self.points[column], axis=1)
-            alike = np.abs(height - height[column]) <= STEEPEST * apart + SAME * np.sqrt(2.0) * self.noise
-            alike &= (self.normals * self.normals[column]).sum(axis=1) > SAME_SIDE_COSINE
-            alike &= gentle & gentle[column]
-            one.append(here[alike])
-            other.append(column[alike])
+        first, second = np.repeat(here, near.shape[1] - 1), near[:, 1:].ravel()
+        sides = (self.normals[first] * self.normals[second]).sum(axis=1) > SAME_SIDE_COSINE
+        first, second = (each[sides & gentle[first] & gentle[second]] for each in (first, second))
+        apart = np.linalg.norm(self.points[first] - self.points[second], axis=1)
+        rise = np.maximum(np.abs(height[first] - height[second]) - SAME * np.sqrt(2.0) * self.noise, 0.0)
+        usual = USUAL_TIMES * float(np.quantile(rise / np.maximum(apart, TINY), USUAL_SHARE)) if len(rise) else 0.0
+        alike = rise <= min(STEEPEST, usual) * apart
+        one.append(first[alike])
+        other.append(second[alike])
         rows, columns = np.concatenate(one), np.concatenate(other)
         graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
         label = connected_components(graph, directed=False)[1]

@@ -347,8 +347,8 @@ def _deviation(
     vertices = before.surface.vertices
     heights = ((now.surface.vertices - vertices) * _vertex_normals(before)).sum(axis=1) + now.offset - before.offset
     for part in parts:
-        inside = part.covers(now.surface.vertices)
-        heights[inside] += part.height
+        if np.isfinite(part.height):
+            heights[part.covers(now.surface.vertices)] += part.height
     keep = seen.smooth(seen.height)
     middle = RigidFrame.of(before.surface).middle
     old, new = Pose.of(before), Pose.of(now)

@@ -14,6 +14,8 @@ from mapping.estimate.deviation.result import Part
 WIDE_PART = 2.0
 # It stands off by more than so many standard deviations of the rest, and by so much of a tip radius
 STANDS_OFF, LEAST_PART = 6.0, 0.02
+# Places where nothing was felt are a tip radius from all that was: when they are so many apart, the hole is wide
+MISSED_SPAN = 1.0
 # A ball that sinks by so many tip radii sinks into an opening 1.3 tip radii wide, or beside the body
 DEEP = 0.25
 # Of the blocks about its middle so many stand off with it: the inside of a ring does not
@@ -65,11 +67,18 @@ def parts_of(blocks: Blocks, height: FloatArray, rest: BoolArray, tip: float, mi
         size = np.abs(heights) * own
         if np.mean(joined[size > 0.5 * size.max()]) > JOINED or (level and np.mean(sure[own]) < MOSTLY):
             continue
-        if _is_wide(points[own], normals[own], blocks, off, tip):
-            largest = heights[own][np.abs(heights[own]).argmax()]
+        empty = missed.points[own[len(index) :]]
+        if _spans(empty, MISSED_SPAN * tip) or _is_wide(points[own], normals[own], blocks, off, tip):
+            here = height[index[own[: len(index)]]]
+            largest = here[np.abs(here).argmax()] if len(here) else np.nan
             path = int((own[: len(index)]).sum()) * BINS_PER_BLOCK * BIN * tip
             found.append(Part(points[own], AROUND_PART * tip, float(largest), path))
     return tuple(found)
+
+
+def _spans(points: FloatArray, length: float) -> bool:
+    """True if two of the places (N, 3) are so far apart, m."""
+    return len(points) > 1 and bool(np.linalg.norm(points - points[0], axis=1).max() >= length)
 
 
 def _in_wide_runs(blocks: Blocks, height: FloatArray, off: BoolArray, width: float) -> BoolArray:

@@ -21,7 +21,7 @@ class Part:
     Args:
         points: (K, 3) places of the model where it was felt, m.
         radius: around each of them that is left out, m.
-        height: the largest departure there, m; negative: missing.
+        height: the largest departure there, m; negative: missing; NaN: missing, for the finger felt nothing there.
         path: length of sweeps over it, m.
     """
 
@@ -45,11 +45,10 @@ class Part:
     def sentence(self) -> str:
         """What it is, in a few words."""
         place = ", ".join(f"{1e3 * value:.4g}" for value in self.points.mean(axis=0))
-        kind = "is missing" if self.height < 0 else "is too much"
-        return (
-            f"a part about {length_text(self.width, 2)} wide {kind} at ({place}) mm (by up to "
-            f"{length_text(abs(self.height), 2)}): left out"
-        )
+        kind = "is too much" if self.height > 0 else "is missing"
+        nothing = not np.isfinite(self.height)
+        depth = "nothing was felt there" if nothing else f"by up to {length_text(abs(self.height), 2)}"
+        return f"a part about {length_text(self.width, 2)} wide {kind} at ({place}) mm ({depth}): left out"
 
 
 @dataclass(frozen=True, eq=False)
