@@ -86,7 +86,7 @@ class Blocks:
         here = np.arange(count)
         along = (np.diff(self.piece) == 0) & gentle[:-1] & gentle[1:]
         one, other = [here[:-1][along]], [here[1:][along]]
-        _, near = cKDTree(self.points).query(self.points, min(BLOCK_NEIGHBOURS + 1, count))
+        near = np.asarray(cKDTree(self.points).query(self.points, min(BLOCK_NEIGHBOURS + 1, count))[1])
         first, second = np.repeat(here, near.shape[1] - 1), near[:, 1:].ravel()
         sides = (self.normals[first] * self.normals[second]).sum(axis=1) > SAME_SIDE_COSINE
         first, second = (each[sides & gentle[first] & gentle[second]] for each in (first, second))
