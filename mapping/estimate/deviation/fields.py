@@ -9,7 +9,7 @@ import numpy as np
 from mapping import FloatArray, Surface
 
 # Reference points of a smooth field stand so many of its lengths apart, and are at most so many
-KNOT_SPACING, MOST_KNOTS = 0.8, 64
+KNOT_SPACING, MOST_KNOTS = 0.6, 128
 # Share of the largest eigenvalue below which a combination of knots says nothing
 LEAST_EIGENVALUE = 1e-7
 
