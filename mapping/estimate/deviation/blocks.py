@@ -20,6 +20,8 @@ STEEPEST = 0.05
 SAME = 4.0
 # Neighbours that a block is compared with beyond its own sweep, and cosine of the angle by which their normals differ
 BLOCK_NEIGHBOURS, SAME_SIDE_COSINE = 6, 0.5
+# Blocks from one side of a fine feature to the other, at most
+BLOCKS_ACROSS = 5
 # Nor is it, from one sweep to the next, so many times steeper than this share of all neighbours are: over the gap
 # between two sweeps an edge is as gentle as any slope, but it is in one place alone
 USUAL_TIMES, USUAL_SHARE = 2.0, 0.75
@@ -87,7 +89,11 @@ class Blocks:
         along = (np.diff(self.piece) == 0) & gentle[:-1] & gentle[1:]
         one, other = [here[:-1][along]], [here[1:][along]]
         near = np.asarray(cKDTree(self.points).query(self.points, min(BLOCK_NEIGHBOURS + 1, count))[1])
-        first, second = np.repeat(here, near.shape[1] - 1), near[:, 1:].ravel()
+        # and those a few blocks on: beyond a ridge the height is what it was before it, beyond a step it is not
+        ahead = [(here[:-lag], here[lag:]) for lag in range(2, BLOCKS_ACROSS + 1)]
+        ahead = [(i[same], j[same]) for i, j in ahead for same in [self.piece[i] == self.piece[j]]]
+        first = np.concatenate([np.repeat(here, near.shape[1] - 1), *(i for i, _ in ahead)])
+        second = np.concatenate([near[:, 1:].ravel(), *(j for _, j in ahead)])
         sides = (self.normals[first] * self.normals[second]).sum(axis=1) > SAME_SIDE_COSINE
         first, second = (each[sides & gentle[first] & gentle[second]] for each in (first, second))
         apart = np.linalg.norm(self.points[first] - self.points[second], axis=1)

@@ -13,7 +13,7 @@ from mapping.base import MAD_TO_SD, Base, LaidTrace, Pose
 from mapping.estimate.deviation.blocks import BIN, BINS_PER_BLOCK, Blocks
 from mapping.estimate.deviation.evidence import Fit, Whitened, best_fit, every_law, whitened
 from mapping.estimate.deviation.fields import RigidFrame, SmoothField, spread
-from mapping.estimate.deviation.parts import parts_of
+from mapping.estimate.deviation.parts import parts_of, stands_off
 from mapping.estimate.deviation.reshaped import fine_enough, reshaped
 from mapping.estimate.deviation.result import Deviation, Part
 
@@ -45,8 +45,9 @@ MOST_ROUNDS = 3
 ROBUST_ROUNDS, LEAST_ROBUST = 12, 0.3
 # Blocks that stand further off the best explanation, in robust standard deviations, do not speak for another
 FAR_OFF = 5.0
-# More of the felt surface than this that nothing explains: the model is another body's
-BEYOND_REPAIR = 0.35
+# More of the felt surface than this that nothing explains: the model is another body's. A step across the body, which is
+# a fine feature, leaves less than a half of it off the rest.
+BEYOND_REPAIR = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +112,7 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
         parts = parts_of(seen, seen.height, seen.smooth(seen.height), tip, missed)
     if not found and not parts:
         return None
-    return _deviation(before, now, blocks, seen, found, parts)
+    return _deviation(before, now, blocks, seen, found, parts, tip)
 
 
 def _covered(parts: Sequence[Part], points: FloatArray) -> BoolArray:
@@ -340,7 +341,13 @@ def _corrected(base: Base, step: _Explanation) -> Base:
 
 
 def _deviation(
-    before: Base, now: Base, blocks: Blocks, seen: Blocks, found: list[_Explanation], parts: tuple[Part, ...]
+    before: Base,
+    now: Base,
+    blocks: Blocks,
+    seen: Blocks,
+    found: list[_Explanation],
+    parts: tuple[Part, ...],
+    tip: float,
 ) -> Deviation:
     """What all rounds and the parts come to."""
     causes = (*(found[0].causes if found else ()), *(("part",) if parts else ()))
@@ -350,6 +357,7 @@ def _deviation(
         if np.isfinite(part.height):
             heights[part.covers(now.surface.vertices)] += part.height
     keep = seen.smooth(seen.height)
+    unexplained = float(np.mean(stands_off(seen.height, seen.noise, tip)))
     middle = RigidFrame.of(before.surface).middle
     old, new = Pose.of(before), Pose.of(now)
     shift, turn = np.zeros(3), 0.0
@@ -375,8 +383,8 @@ def _deviation(
         left=MAD_TO_SD * float(np.median(np.abs(seen.height[keep]))),
         gain=found[0].gain if found else 0.0,
         heights=heights,
-        unexplained=float(1.0 - keep.mean()),
-        beyond_repair=bool(keep.mean() < 1.0 - BEYOND_REPAIR),
+        unexplained=unexplained,
+        beyond_repair=unexplained > BEYOND_REPAIR,
     )
 
 

@@ -45,7 +45,7 @@ def parts_of(blocks: Blocks, height: FloatArray, rest: BoolArray, tip: float, mi
 
     quiet = height[rest] if rest.any() else height
     sd = max(MAD_TO_SD * float(np.median(np.abs(quiet - np.median(quiet)))), blocks.noise)
-    off = np.abs(height) > max(STANDS_OFF * sd, LEAST_PART * tip)
+    off = stands_off(height, sd, tip)
     deep = height < -DEEP * tip
     counts = deep | _in_wide_runs(blocks, height, off, WIDE_PART * tip)
     index = np.flatnonzero(counts)
@@ -74,6 +74,11 @@ def parts_of(blocks: Blocks, height: FloatArray, rest: BoolArray, tip: float, mi
             path = int((own[: len(index)]).sum()) * BINS_PER_BLOCK * BIN * tip
             found.append(Part(points[own], AROUND_PART * tip, float(largest), path))
     return tuple(found)
+
+
+def stands_off(height: FloatArray, sd: float, tip: float) -> BoolArray:
+    """(N,) True for heights that neither noise of a standard deviation (m) nor a smooth remainder explains."""
+    return np.asarray(np.abs(height) > max(STANDS_OFF * sd, LEAST_PART * tip))
 
 
 def _spans(points: FloatArray, length: float) -> bool:

@@ -70,7 +70,7 @@ class Deviation:
         left: of what remains of them, m.
         gain: logarithm of how much more probable the heights are than without a deviation.
         heights: (V,) departure at each vertex of `base`, m, positive where the body stands out of its model.
-        unexplained: share of the felt surface that nothing explains, parts included.
+        unexplained: share of the felt surface that stands off the corrected model, parts included.
     """
 
     base: Base

@@ -192,6 +192,7 @@ def test_a_fine_feature_does_not_pull_the_pose(feature: Callable[[FloatArray, Fl
     assert found is not None
     assert found.causes[0] == "pose"
     assert np.degrees(found.turn) == pytest.approx(0.5, abs=0.05)
+    assert not found.beyond_repair
 
 
 @pytest.mark.parametrize("seed", range(4))
