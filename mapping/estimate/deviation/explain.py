@@ -45,8 +45,8 @@ MOST_ROUNDS = 3
 ROBUST_ROUNDS, LEAST_ROBUST = 12, 0.3
 # Blocks that stand further off the best explanation, in robust standard deviations, do not speak for another
 FAR_OFF = 5.0
-# More of the felt surface than this that nothing explains: the model is another body's. A step across the body, which is
-# a fine feature, leaves less than a half of it off the rest.
+# More of the felt surface than this that nothing explains: the model is another body's. A step across the body, which
+# is a fine feature, leaves less than a half of it off the rest.
 BEYOND_REPAIR = 0.5
 
 
