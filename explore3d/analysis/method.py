@@ -226,7 +226,7 @@ def deviated(work: Work, share: Share) -> None:
         return
     work.base = work.deviation.base
     laid = LaidTrace.of(work.trace, work.base)
-    if work.deviation.parts:
+    if work.deviation.parts and not work.deviation.beyond_repair:
         keep = work.deviation.outside(laid.feet().points)
         work.apart = int((~keep).sum())
         laid = laid.within(keep)
