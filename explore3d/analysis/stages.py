@@ -15,6 +15,7 @@ OPTIONAL_STAGES = (
     "dynamics",
     "base fit",
     "pose",
+    "deviation",
     "algorithms 1 and 2",
     "injected crests",
     "grammar",

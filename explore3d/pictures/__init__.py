@@ -7,7 +7,6 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from explore3d.pictures.corner import corner_picture as corner_picture
     from explore3d.pictures.cross_section import cross_section as cross_section
-    from explore3d.pictures.curvature import curvature_picture as curvature_picture
     from explore3d.pictures.errors import size_picture as size_picture, time_picture as time_picture
     from explore3d.pictures.extent import extent_picture as extent_picture
     from explore3d.pictures.figure import (
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
         png as png,
         styled as styled,
     )
+    from explore3d.pictures.maps import curvature_picture as curvature_picture, deviation_picture as deviation_picture
     from explore3d.pictures.object import object_picture as object_picture, view_directions as view_directions
     from explore3d.pictures.plan import plan_picture as plan_picture
     from explore3d.pictures.profile import (
@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "corner": ("corner_picture",),
     "cross_section": ("cross_section",),
-    "curvature": ("curvature_picture",),
     "errors": ("size_picture", "time_picture"),
     "extent": ("extent_picture",),
     "figure": ("BAND", "DPI", "ESTIMATED", "FAINT", "INK", "MUTED", "TRACED", "TRUTH", "new_figure", "png", "styled"),
+    "maps": ("curvature_picture", "deviation_picture"),
     "object": ("object_picture", "view_directions"),
     "plan": ("plan_picture",),
     "profile": ("profile_line", "profile_picture", "thinned"),

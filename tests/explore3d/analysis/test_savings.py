@@ -125,7 +125,7 @@ def test_where_nothing_is_detected_nothing_follows_and_forcing_it_finds_nothing(
     path = record(flat, 0.1e-3)
     bare, forced = analyze(path), analyze(path, force=NOTHING)
     assert set(NOTHING) <= set(left(bare))
-    assert set(bare.timings) == {"reading", "detection"}
+    assert set(bare.timings) == {"reading", "deviation", "detection"}
     assert bare.model.features == forced.model.features == ()
     assert not set(left(forced)) & {"grammar", "posterior", "estimated surface"}
     assert forced.detections.threshold == bare.detections.threshold

@@ -1,4 +1,4 @@
-"""Curvature maps: the two principal curvatures of the estimated surface, seen from above it."""
+"""Maps in colours over the object: curvature of the estimated surface, departure of the body from its model."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from explore3d.pictures.chart import FONT_SIZE, drawing, image, pixels_png, text_at
 from explore3d.pictures.object import SUPERSAMPLING, cameras_for, pictured, shifted, view_directions
 from explore3d.pictures.render import Body, render
-from mapping import BoolArray, FloatArray, Surface
+from mapping import BoolArray, FloatArray, Surface, length_unit
 
 if TYPE_CHECKING:
     from mapping.geometry.curvature import Curvature
@@ -26,6 +26,8 @@ BLUE_TO_RED = (
 BAR = (16.0, 220.0)  # width and height of the scale of colours, px
 BAR_ROOM = 90.0  # px
 CURVATURE_TITLE = 28.0  # px
+# Places on the scale that bear a number
+MARKS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 
 
 def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float) -> bytes:
@@ -51,7 +53,10 @@ def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float)
         content += text_at(left + 4.0, 18.0, f"Principal curvature, {name}", size=1.1 * FONT_SIZE, bold=True)
         content += shifted(pictured(render([Body(surface, colours)], camera)), left, CURVATURE_TITLE)
     bar = min(BAR[1], height)
-    content += shifted(_bar(top, bar), 2.0 * width + 14.0, CURVATURE_TITLE + 0.5 * (height - bar))
+    marks = [f"{share * top:.2g}" for share in MARKS]
+    content += shifted(
+        _bar(marks, "curvature × tip radius", bar), 2.0 * width + 14.0, CURVATURE_TITLE + 0.5 * (height - bar)
+    )
     return drawing(2.0 * width + BAR_ROOM, height + CURVATURE_TITLE + 10.0, content)
 
 
@@ -62,16 +67,36 @@ def coloured(share: FloatArray) -> FloatArray:
     return np.column_stack([np.interp(np.nan_to_num(share, nan=0.5), places, stops[:, i]) for i in range(3)])
 
 
-def _bar(top: float, height: float) -> str:
-    """The scale of colours, with its numbers."""
+def deviation_picture(surface: Surface, deviation: FloatArray) -> bytes:
+    """SVG of the body, coloured by its departure from the given model: red stands out of it, blue lies under it.
+
+    Args:
+        surface: the corrected model.
+        deviation: (V,) at its vertices, m.
+    """
+    areas = surface.face_areas[:, None]
+    cameras = cameras_for(surface.vertices, view_directions(surface.face_normals * areas / areas.mean(), ()))
+    largest = float(np.abs(deviation).max(initial=0.0)) or 1.0
+    factor, unit = length_unit(largest)
+    colours, left, content = coloured(0.5 + 0.5 * deviation / largest), 0.0, ""
+    for camera in cameras:
+        content += shifted(pictured(render([Body(surface, colours)], camera)), left)
+        left += camera.width / SUPERSAMPLING
+    height = max(camera.height for camera in cameras) / SUPERSAMPLING
+    bar = min(BAR[1], height)
+    marks = [f"{share * largest / factor:.2g}" for share in MARKS]
+    content += shifted(_bar(marks, f"body over its model, {unit}", bar), left + 14.0, 0.5 * (height - bar))
+    return drawing(left + BAR_ROOM, height, content)
+
+
+def _bar(marks: list[str], title: str, height: float) -> str:
+    """The scale of colours, with its numbers at MARKS."""
     column = np.rint(255 * coloured(np.linspace(1.0, 0.0, 128))).astype(np.uint8)
     parts = [image(pixels_png(column[:, None, :]), 0.0, 0.0, BAR[0], height)]
-    for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
-        words = f"{share * top:.2g}".replace("-", "−")
+    for share, mark in zip(MARKS, marks, strict=True):
+        words = mark.replace("-", "−")
         parts.append(text_at(BAR[0] + 5.0, 0.5 * height * (1.0 - share) + 4.0, words, size=0.92 * FONT_SIZE))
-    parts.append(
-        text_at(BAR[0] + 56.0, 0.5 * height, "curvature × tip radius", size=FONT_SIZE, anchor="middle", turned=-90.0)
-    )
+    parts.append(text_at(BAR[0] + 56.0, 0.5 * height, title, size=FONT_SIZE, anchor="middle", turned=-90.0))
     return "".join(parts)
 
 
