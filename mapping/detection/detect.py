@@ -163,14 +163,25 @@ def detect(
         for spacing, bank in behind.banks.items()
     }
     found: list[Searched] = [search(p, behind.banks[p.spacing], level, thresholds[p.spacing], tip) for p in profiles]
-    nulls: list[NullScale | None] = [None] * len(profiles)
-    if (
-        noise is None and level.white > CONTACT_ROUNDING * tip
-    ):  # one that is given is the caller's word; one that was fitted is held against the quiet path
+    lengths = {spacing: sum(p.length for p in profiles if p.spacing == spacing) for spacing in thresholds}
+    # what is stated of the whole trace holds for the sweeps that make most of it
+    usual = max(lengths, key=lambda spacing: lengths[spacing])
+    threshold, bank = thresholds[usual], behind.banks[usual]
+    rounding, remarks = UNRESOLVED * trace.resolution, tuple[str, ...]()
+    # a noise that is given is the caller's word; one that was fitted is held against the quiet path
+    if noise is None and level.white > CONTACT_ROUNDING * tip:
         weighed, nulls = _weighed(profiles, list(found), behind.banks, level, thresholds, tip)
-        # over a base that was fitted to one profile, small features and roughness are the same thing: what speaks
-        # against the law is said, and decides nothing (see _stands_out)
-        found = found if base.kind == "profile" else weighed
+        told = [null for p, null in zip(profiles, nulls, strict=True) if p.spacing == usual and null is not None]
+        scaled = bank.scaled(typical_scale(told)) if told else bank
+        # where all that is kept must stand out of the rounding of the positions, the law of what is less than that
+        # decides nothing; and it is no law: a level path rounds to one value, a steep one to another at each sample
+        if scaled.detection_limit(threshold, tip) > rounding:
+            remarks = (_raised(scaled, bank, threshold, tip, base),) if told else ()
+            # over a base that was fitted to one profile, small features and roughness are the same thing: what
+            # speaks against the law is said, and decides nothing (see _stands_out)
+            if base.kind != "profile":
+                found, level = weighed, effective_noise(bank, told) if told else level
+                bank = scaled
     crossings = []
     for profile, each in zip(profiles, found, strict=True):
         disturbances = each.disturbances
@@ -182,23 +193,19 @@ def detect(
     left_out += unresolved
     if algorithm != 3:
         crossings = _judged(crossings, usable, algorithm, level)
-    lengths = {spacing: sum(p.length for p in profiles if p.spacing == spacing) for spacing in thresholds}
-    # what is stated of the whole trace holds for the sweeps that make most of it
-    usual = max(lengths, key=lambda spacing: lengths[spacing])
-    threshold, length = thresholds[usual], sum(lengths.values())
-    bank, remarks = behind.banks[usual], tuple[str, ...]()
-    told = [
-        null for profile, null in zip(profiles, nulls, strict=True) if profile.spacing == usual and null is not None
-    ]
-    if told:
-        scaled = bank.scaled(typical_scale(told))
-        remarks = (_raised(scaled, bank, threshold, tip, base),)
-        if base.kind != "profile":
-            bank, level = scaled, effective_noise(bank, told)
-    limit = max(bank.detection_limit(threshold, tip), UNRESOLVED * trace.resolution)
+    limit = max(bank.detection_limit(threshold, tip), rounding)
     of_each = _inspected(profiles, behind.banks)
     return Detections(
-        tuple(crossings), level, algorithm, limit, PROBABILITY, threshold, length, left_out, of_each, remarks
+        tuple(crossings),
+        level,
+        algorithm,
+        limit,
+        PROBABILITY,
+        threshold,
+        sum(lengths.values()),
+        left_out,
+        of_each,
+        remarks,
     )
 
 
