@@ -13,6 +13,7 @@ from explore3d.analysis.method import (
     compared_in_time,
     curvature_taken,
     detected,
+    deviated,
     fitted,
     inspected,
     kept_over_base,
@@ -27,6 +28,7 @@ from explore3d.analysis.method import (
     why_no_contact_algorithms,
     why_no_curvature,
     why_no_detection,
+    why_no_deviation,
     why_no_fit,
     why_no_injection,
     why_no_lines,
@@ -55,6 +57,7 @@ def _never(work: Work) -> bool:
 METHOD = (
     MethodStage("base fit", why_no_fit, fitted),
     MethodStage("pose", why_no_pose, placed, possible=lambda work: work.scene is not None and work.base.kind == "mesh"),
+    MethodStage("deviation", why_no_deviation, deviated, possible=lambda work: work.base.kind == "mesh"),
     MethodStage("", None, kept_over_base),
     MethodStage("", None, made_sound),
     MethodStage("algorithms 1 and 2", why_no_contact_algorithms, None, possible=_never),
@@ -114,6 +117,7 @@ def _result(work: Work) -> Analysis:
         inspected=work.inspected,
         account=work.account,
         path=work.path,
+        deviation=work.deviation,
     )
 
 

@@ -25,6 +25,7 @@ from mapping.assembly import assemble, why_none_sought
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import Detections, detect, recovered
 from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
+from mapping.estimate.deviation import Deviation, explain
 from mapping.estimate.envelope import estimate_surface
 from mapping.geometry.curvature import principal_curvatures
 from mapping.inference import refine_all
@@ -81,6 +82,8 @@ class Work:
         features: as they are known by now.
         sound: the trace under sound sweep numbers; None for a log that was searched while it was read.
         path: what became of the recorded path.
+        deviation: what the given model gets wrong; None if nothing is known to be.
+        apart: samples left out for that.
         asked: whether a stage was asked for, by its name.
     """
 
@@ -100,6 +103,8 @@ class Work:
     account: SurfaceAccount | None = None
     sound: SoundSweeps | None = None
     path: PathLedger | None = None
+    deviation: Deviation | None = None
+    apart: int = 0
     time_curve: tuple[tuple[float, float], ...] = ()
     asked: dict[str, bool] = field(default_factory=dict)
 
@@ -202,6 +207,35 @@ def placed(work: Work, share: Share) -> None:
     work.stages.left_out.append(LeftOut("pose", reason))
 
 
+def why_no_deviation(work: Work) -> str | None:
+    """Only a model that was given can be wrong: one that was fitted is what was felt."""
+    if work.log.detections:
+        return None
+    return "" if work.base.kind == "mesh" else "the base was fitted to what was felt"
+
+
+def deviated(work: Work, share: Share) -> None:
+    """The model corrected where what was felt shows it to be wrong at long wavelengths; parts apart are left out."""
+    laid = LaidTrace.of(work.trace, work.base)
+    swept = [event.data for event in work.log.events if event.kind == "move" and event.data["purpose"] == "sweep"]
+    work.deviation = explain(laid, work.base, [np.asarray(data["path"], dtype=np.float64) for data in swept])
+    if work.deviation is None:
+        agrees = "what was felt agrees with the model at long wavelengths"
+        work.stages.left_out.append(LeftOut("deviation map", agrees))
+        work.trace = laid
+        return
+    work.base = work.deviation.base
+    laid = LaidTrace.of(work.trace, work.base)
+    if work.deviation.parts:
+        keep = work.deviation.outside(laid.feet().points)
+        work.apart = int((~keep).sum())
+        laid = laid.within(keep)
+        for part in work.deviation.parts:
+            path = f"{length_text(part.path, 2)} of path over it were not looked at"
+            work.stages.left_out.append(LeftOut("part of the trace", f"{part.sentence()}; {path}"))
+    work.trace = laid
+
+
 def kept_over_base(work: Work, share: Share) -> None:
     """The trace on its base, without the part beyond the border of one found by feeling: there nothing is known."""
     work.laid = LaidTrace.of(work.trace, work.base)
@@ -240,7 +274,7 @@ def why_no_detection(work: Work) -> str | None:
 
 def detected(work: Work, share: Share) -> None:
     """Crossings of single sweeps; samples that cannot have been felt count no more for anything that follows."""
-    beyond = len(work.log.trace) - len(work.laid)
+    beyond = len(work.log.trace) - len(work.laid) - work.apart
     work.detections = detect(work.laid, work.base, **work.settings.detection)
     if work.detections.unfelt:
         keep = np.ones(len(work.trace), dtype=bool)
@@ -249,7 +283,12 @@ def detected(work: Work, share: Share) -> None:
         found = detect(work.laid, work.base, **work.settings.detection)
         work.detections = replace(found, left_out=(*work.detections.left_out, *found.left_out))
     if work.sound is not None:
-        work.path = path_ledger(work.sound, work.detections, beyond)
+        work.path = path_ledger(work.sound, work.detections, beyond, work.apart)
+    if work.deviation is not None and work.deviation.beyond_repair:
+        crossings = len(work.detections.crossings)
+        refused = f"the model is wrong: of {crossings} places that stand off it, none is called a feature"
+        refused += f"; what is needed is {work.deviation.needs()}"
+        work.detections = replace(work.detections, crossings=(), left_out=(*work.detections.left_out, refused))
 
 
 def why_no_injection(work: Work) -> str:
@@ -267,6 +306,8 @@ def limit_measured(work: Work, share: Share) -> None:
 
 def why_no_lines(work: Work) -> str:
     """Why a trace without a single crossing cannot, or need not, hold what only many sweeps together show."""
+    if work.deviation is not None and work.deviation.beyond_repair:
+        return "the model is shown to be wrong beyond repair"
     asked, limit = work.smallest_feature, work.detections.detection_limit
     if work.detections.crossings:
         return ""
@@ -363,12 +404,14 @@ def modelled(work: Work, share: Share) -> None:
     """The features anchored on the base."""
     surface = {} if work.account is None else {"surface": work.account.record()}
     path = {} if work.path is None else {"path": work.path.record()}
+    deviation = {} if work.deviation is None else {"deviation": work.deviation.record()}
     work.model = ObjectModel.attach(
         work.base,
         in_model_frame(work.features, work.base),
-        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface | path,
+        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface | path | deviation,
         inspected=work.inspected.height,
         reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
+        deviation=None if work.deviation is None else work.deviation.heights,
     )
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from explore3d.scene import Scene
     from mapping.detection import Detections
     from mapping.detection.path import PathLedger
+    from mapping.estimate.deviation import Deviation
     from mapping.estimate.envelope import Estimate
     from mapping.geometry.curvature import Curvature
 
@@ -64,6 +65,7 @@ class Analysis:
         folder: where it was written, None if it was not.
         account: which part of the surface was swept, and what became of the rest; None without a scene.
         path: what became of the path that was recorded; None for a log that was searched while it was read.
+        deviation: what the given model gets wrong at long wavelengths, None if nothing.
     """
 
     title: str
@@ -88,3 +90,4 @@ class Analysis:
     folder: Path | None = None
     account: SurfaceAccount | None = None
     path: PathLedger | None = None
+    deviation: Deviation | None = None

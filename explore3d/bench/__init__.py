@@ -35,6 +35,12 @@ if TYPE_CHECKING:
         by_opencamlib as by_opencamlib,
         trace_table as trace_table,
     )
+    from explore3d.bench.wrong_models import (
+        bench_wrong_models as bench_wrong_models,
+        wrong_model_lines as wrong_model_lines,
+        wrong_model_records as wrong_model_records,
+        wrong_model_run as wrong_model_run,
+    )
 
 _PUBLIC = {
     "apparatus": ("write_apparatus",),
@@ -45,5 +51,6 @@ _PUBLIC = {
     "figures": ("write_figures",),
     "scaling": ("AXES", "bench_scaling", "scaling_lines"),
     "trace": ("bench_trace", "bump_mesh", "by_opencamlib", "trace_table"),
+    "wrong_models": ("bench_wrong_models", "wrong_model_lines", "wrong_model_records", "wrong_model_run"),
 }
 doorway(__name__, _PUBLIC)

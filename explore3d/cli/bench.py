@@ -253,6 +253,28 @@ def classify(
     print(classify_table(list(bench_classify(*chosen, patterns, seeds, store))), end="")
 
 
+@bench.command("wrong-models")
+def wrong_models(
+    store: Store,
+    bodies: Annotated[str | None, typer.Option(help="Bodies, separated by commas; those reported if left out.")] = None,
+    wrongs: Annotated[str | None, typer.Option(help="What is wrong, separated by commas; all if left out.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds of bodies, wrongs and noise.")] = 5,
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+) -> None:
+    """Is it named what is wrong with a mesh, is anything invented on it, and what does it cost the finger?
+
+    Example: explore3d bench wrong-models --store wrong.jsonl --bodies plate --wrongs nothing,pose --seeds 2
+    """
+    from explore3d.bench import bench_wrong_models, wrong_model_lines, wrong_model_records
+    from explore3d.bench.scenes import REPORTED, WRONG_BODIES, WRONGS
+
+    chosen = _names(bodies, "--bodies", list(WRONG_BODIES)) if bodies else list(REPORTED)
+    for each in bench_wrong_models(chosen, _names(wrongs, "--wrongs", list(WRONGS)), seeds, store, seconds):
+        named = "named" if each["named"] else "NOT named"
+        print(f"{each['body']}, {each['wrong']}, {each['seed']}: {named}, {each['invented']} invented", flush=True)
+    _print(wrong_model_lines(wrong_model_records(store)))
+
+
 @bench.command()
 def dynamics() -> None:
     """Computing time and error of stiff contact over the stiffness, as CSV.

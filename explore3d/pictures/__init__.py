@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from explore3d.pictures.corner import corner_picture as corner_picture
     from explore3d.pictures.cross_section import cross_section as cross_section
     from explore3d.pictures.curvature import curvature_picture as curvature_picture
+    from explore3d.pictures.deviation import deviation_picture as deviation_picture
     from explore3d.pictures.errors import size_picture as size_picture, time_picture as time_picture
     from explore3d.pictures.extent import extent_picture as extent_picture
     from explore3d.pictures.figure import (
@@ -33,6 +34,7 @@ _PUBLIC = {
     "corner": ("corner_picture",),
     "cross_section": ("cross_section",),
     "curvature": ("curvature_picture",),
+    "deviation": ("deviation_picture",),
     "errors": ("size_picture", "time_picture"),
     "extent": ("extent_picture",),
     "figure": ("BAND", "DPI", "ESTIMATED", "FAINT", "INK", "MUTED", "TRACED", "TRUTH", "new_figure", "png", "styled"),

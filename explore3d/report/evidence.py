@@ -57,6 +57,19 @@ def curvature_maps(pictures: Pictures) -> Html:
     return section("Curvature", "curvature", figure(pictures.files["curvature"], "Maps of curvature", caption))
 
 
+def deviation_map(analysis: Analysis, pictures: Pictures) -> Html:
+    """Where the body departs from the model that was given."""
+    if analysis.deviation is None or "deviation" not in pictures.files:
+        return Html("")
+    before, after = (length_text(value, 2) for value in (analysis.deviation.rms, analysis.deviation.left))
+    caption = (
+        "By how much the body departs from the model that was given, along its normals: red stands out of it, blue "
+        f"lies under it. Typical heights over the model were {before} before it was corrected, and are {after} now."
+    )
+    picture = figure(pictures.files["deviation"], "Map of the deviation from the model", caption)
+    return section("Deviation from the model", "deviation", picture)
+
+
 def compared_with_truth(analysis: Analysis, pictures: Pictures) -> Html:
     """Errors of the features, and of the exploration over time; nothing if no truth is known."""
     if not analysis.truth and not analysis.errors and "time" not in pictures.files:

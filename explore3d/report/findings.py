@@ -69,7 +69,22 @@ def summary(analysis: Analysis) -> list[str]:
 
 def warnings(analysis: Analysis) -> list[str]:
     """What a reader must know before believing the rest, a sentence each."""
-    return [*path_warning(analysis), *form_warnings(analysis), *warning_lines(analysis)]
+    return [
+        *deviation_warning(analysis),
+        *path_warning(analysis),
+        *form_warnings(analysis),
+        *warning_lines(analysis),
+    ]
+
+
+def deviation_warning(analysis: Analysis) -> list[str]:
+    """What the given model gets wrong, and what is needed where that cannot be mended."""
+    deviation = analysis.deviation
+    if deviation is None:
+        return []
+    said = deviation.sentence()
+    needs = f" Needed is {deviation.needs()}." if deviation.beyond_repair else ""
+    return [f"{said[0].upper()}{said[1:]}.{needs}"]
 
 
 def form_warnings(analysis: Analysis) -> list[str]:

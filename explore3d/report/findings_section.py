@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from explore3d import count_text
 from explore3d.analysis import Analysis
 from explore3d.report.findings import (
+    deviation_warning,
     form_warnings,
     limit_sentence,
     path_sentence,
@@ -66,6 +67,7 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
     """Counts, the table of features, and the views."""
     features = analysis.model.features
     content: list[str] = [_counts(analysis)]
+    content.extend(element("p", warning, class_="warning") for warning in deviation_warning(analysis))
     content.extend(element("p", warning, class_="warning") for warning in warning_lines(analysis))
     if features:
         head = ("feature", "height", "width", "length", "place", "evidence", "kind of detail", "posterior")

@@ -11,6 +11,7 @@ from explore3d.pictures import (
     corner_picture,
     cross_section,
     curvature_picture,
+    deviation_picture,
     extent_picture,
     object_picture,
     profile_picture,
@@ -52,7 +53,7 @@ def draw_pictures(analysis: Analysis, sweeps: Sequence[SweepPath], rendered: boo
     files["extents"] = _extents(analysis)
     for feature in shown_features(analysis)[:MOST_CORNERS]:
         files[f"corner-{feature.id}"] = corner_picture(feature)
-    bare = not profile and not analysis.model.features and not rendered
+    bare = not profile and not analysis.model.features and analysis.deviation is None and not rendered
     if bare:  # nothing to see: no need to load a renderer
         why = "nothing was found: the page's own view shows the object and the sweeps"
         left_out.append(LeftOut("rendered pictures", why, "about 3 s (estimated: a renderer and a picture)"))
@@ -102,4 +103,6 @@ def _rendered(analysis: Analysis, sweeps: Sequence[SweepPath]) -> dict[str, byte
     files: dict[str, bytes | None] = {"object": picture}
     if analysis.estimate is not None and analysis.estimate.surface is not None and analysis.curvature is not None:
         files["curvature"] = curvature_picture(analysis.estimate.surface, analysis.curvature, analysis.trace.tip_radius)
+    if analysis.deviation is not None:
+        files["deviation"] = deviation_picture(analysis.base.surface, analysis.deviation.heights)
     return files

@@ -60,6 +60,7 @@ class Base:
         parameters: what the fit found, by the family's own names (SI), empty for a given mesh.
         missed: by how much a fitted base missed sweeps that it was not fitted to, m; None of one that was not tested.
         pose: the motion from the given mesh to where the object stands; None of one that stands as given.
+        offset: by which all heights were found too large, as of a larger ball or a coat; it is taken off them, m.
     """
 
     surface: Surface
@@ -67,6 +68,7 @@ class Base:
     parameters: dict[str, FitValue] = field(default_factory=dict)
     missed: float | None = None
     pose: PoseRecord | None = None
+    offset: float = 0.0
 
     @property
     def known(self) -> bool:
@@ -76,7 +78,8 @@ class Base:
     def record(self) -> dict[str, Any]:
         """JSON values of all but the surface and the kind: the "parameters" of model.json and of a log's base."""
         missed = {} if self.missed is None else {"missed": self.missed}
-        return {**self.parameters, **missed, **({} if self.pose is None else {"pose": dict(self.pose)})}
+        offset = {"offset": self.offset} if self.offset else {}
+        return {**self.parameters, **missed, **offset, **({} if self.pose is None else {"pose": dict(self.pose)})}
 
     @classmethod
     def read(cls, surface: Surface, kind: str, record: Mapping[str, Any]) -> Base:
@@ -84,9 +87,9 @@ class Base:
 
         Raises:
             KeyError: a pose without one of its fields.
-            TypeError: "missed" or the pose of another type.
+            TypeError: "missed", "offset" or the pose of another type.
         """
-        rest, pose = {name: record[name] for name in record if name not in ("missed", "pose")}, None
+        rest, pose = {name: record[name] for name in record if name not in ("missed", "pose", "offset")}, None
         missed = None if record.get("missed") is None else float(record["missed"])
         if record.get("pose") is not None:
             whole = record["pose"]
@@ -98,7 +101,7 @@ class Base:
                 observable=int(whole["observable"]),
                 scatter=float(whole["scatter"]),
             )
-        return cls(surface, kind, rest, missed, pose)
+        return cls(surface, kind, rest, missed, pose, float(record.get("offset", 0.0)))
 
     @cached_property
     def nearest(self) -> NearestPoint:
@@ -130,4 +133,4 @@ class Base:
         clear = nearest.distance > 1e-6 * tip_radius
         safe = np.where(clear, nearest.distance, 1.0)[:, None]
         normals = np.where(clear[:, None], away / safe, nearest.normals)
-        return Feet(nearest.points, normals, signed - tip_radius, nearest.face, nearest.barycentric)
+        return Feet(nearest.points, normals, signed - tip_radius - self.offset, nearest.face, nearest.barycentric)

@@ -53,7 +53,17 @@ class Pose:
     @property
     def turn(self) -> float:
         """Angle of the rotation, rad."""
-        return float(np.linalg.norm(_vector(self.rotation)))
+        return self.angle(self.rotation)
+
+    @staticmethod
+    def angle(rotation: FloatArray) -> float:
+        """Angle of a rotation (3, 3), rad."""
+        return float(np.linalg.norm(_vector(rotation)))
+
+    @staticmethod
+    def turned(vector: FloatArray) -> FloatArray:
+        """(3, 3) rotation by a vector (3,), rad."""
+        return _rotation(vector)
 
     @property
     def shift(self) -> FloatArray:

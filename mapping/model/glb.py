@@ -13,6 +13,8 @@ from mapping.model.feature_mesh import feature_mesh
 from mapping.model.json_record import MODEL_SCHEMA, feature_record
 
 GLB_BASE_COLOUR = (0.78, 0.80, 0.83, 1.0)
+# Ends of the scale of deviations, red and blue
+STANDS_OUT_COLOUR, LIES_UNDER_COLOUR = np.array([0.70, 0.09, 0.17]), np.array([0.13, 0.40, 0.67])
 # glTF allows no NaN in a vertex attribute: this stands for "not known".
 UNKNOWN_ATTRIBUTE = -1.0
 
@@ -22,19 +24,21 @@ def glb_bytes(
     features: Sequence[Feature],
     reach: FloatArray | None = None,
     sigma: FloatArray | None = None,
+    deviation: FloatArray | None = None,
 ) -> bytes:
     """The scene as one GLB file.
 
     Nodes: "base" and one per feature, named by its id, with the feature's record (docs/model.md) in
     `extras`. Float32 vertex attributes: `_SIGMA`, standard deviation of the surface there, m; `_REACH`,
-    0 touched, 1 bridged, 2 extrapolated; both -1 where not known. Vertices are stored relative to the
+    0 touched, 1 bridged, 2 extrapolated; both -1 where not known. A base that departs from the model that was
+    given has `_DEVIATION` as well, m, and its vertices' colours show it. Vertices are stored relative to the
     middle of the base, which the nodes' matrices add back: float32 would lose it far from the origin.
     """
     import trimesh
 
     scene = trimesh.Scene()
     origin = base.bounds.mean(axis=0)
-    _add(scene, "base", base, origin, GLB_BASE_COLOUR, sigma, reach)
+    _add(scene, "base", base, origin, GLB_BASE_COLOUR, sigma, reach, deviation)
     for feature in features:
         mesh = feature_mesh(feature)
         # The central 90 % of a Gaussian is 2 * 1.645 standard deviations wide.
@@ -60,14 +64,19 @@ def _add(
     colour: tuple[float, float, float, float],
     sigma: FloatArray | None,
     reach: FloatArray | None,
+    deviation: FloatArray | None = None,
 ) -> None:
     import trimesh
 
-    material = trimesh.visual.material.PBRMaterial(
-        name=name, baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=0.7, doubleSided=True
-    )
     mesh = trimesh.Trimesh(surface.vertices - origin, surface.faces, process=False)
-    mesh.visual = trimesh.visual.TextureVisuals(material=material)
+    if deviation is None:
+        material = trimesh.visual.material.PBRMaterial(
+            name=name, baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=0.7, doubleSided=True
+        )
+        mesh.visual = trimesh.visual.TextureVisuals(material=material)
+    else:
+        mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=deviation_colours(deviation))
+        mesh.vertex_attributes["_DEVIATION"] = deviation.astype(np.float32)
     for key, values in (("_SIGMA", sigma), ("_REACH", reach)):
         known = (
             np.full(len(surface.vertices), UNKNOWN_ATTRIBUTE)
@@ -78,3 +87,11 @@ def _add(
     transform = np.eye(4)
     transform[:3, 3] = origin
     scene.add_geometry(mesh, node_name=name, geom_name=name, transform=transform)
+
+
+def deviation_colours(deviation: FloatArray) -> FloatArray:
+    """(V, 3) red, green, blue from 0 to 1: from blue, where the body lies deepest under its model, to red."""
+    largest = float(np.abs(deviation).max(initial=0.0)) or 1.0
+    share = np.clip(np.abs(deviation) / largest, 0.0, 1.0)[:, None]
+    ends = np.where((deviation > 0)[:, None], STANDS_OUT_COLOUR, LIES_UNDER_COLOUR)
+    return np.asarray((1.0 - share) * np.array(GLB_BASE_COLOUR[:3]) + share * ends)

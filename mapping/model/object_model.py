@@ -24,7 +24,7 @@ __all__ = ["LeftOut", "ObjectModel"]
 
 
 # Fields over the base's vertices or faces that are kept beside it
-FIELDS = ("reach", "sigma", "inspected")
+FIELDS = ("reach", "sigma", "inspected", "deviation")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,6 +40,7 @@ class ObjectModel:
         reach: (V,) label of each base vertex (0 touched, 1 bridged, 2 extrapolated), or None.
         sigma: (V,) standard deviation of the base at each vertex, m, or None.
         inspected: (F,) height above which each base face is free of features that were not found, m, or None.
+        deviation: (V,) by how much the body stands off the model that was given, at each vertex, m, or None.
     """
 
     base: Base
@@ -50,6 +51,7 @@ class ObjectModel:
     reach: FloatArray | None = None
     sigma: FloatArray | None = None
     inspected: FloatArray | None = None
+    deviation: FloatArray | None = None
 
     @classmethod
     def attach(cls, base: Base, features: Sequence[Feature], **about: Any) -> Self:
@@ -107,7 +109,7 @@ class ObjectModel:
         """
         self._check_ids()
         document = json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-        glb = glb_bytes(self.base.surface, self.features, self.reach, self.sigma)
+        glb = glb_bytes(self.base.surface, self.features, self.reach, self.sigma, self.deviation)
         place = Path(folder)
         place.mkdir(parents=True, exist_ok=True)
         write_whole(place / "model.npz", self._arrays())
@@ -135,6 +137,7 @@ class ObjectModel:
                 arrays.get("reach"),
                 arrays.get("sigma"),
                 arrays.get("inspected"),
+                arrays.get("deviation"),
             )
         except KeyError as error:
             raise ModelError(f"{file}: field {error.args[0]!r} is missing") from error

@@ -133,7 +133,8 @@ class Explore:
             self._account(surveyor, found)
         if outcome.reason == "budget":
             found.left_out.append(f"{_counted(len(found.unexplained()), 'detection')} not looked into: budget spent")
-        why = f"{self._why(outcome.reason, found)}, after {spent.seconds:.0f} s and {spent.metres:.3g} m of finger path"
+        told = outcome.detail if outcome.reason == "model wrong" else self._why(outcome.reason, found)
+        why = f"{told}, after {spent.seconds:.0f} s and {spent.metres:.3g} m of finger path"
         return Outcome(outcome.reason, "; not inspected for ".join([why, *found.unseen]), found)
 
     @staticmethod
@@ -157,6 +158,19 @@ class Explore:
     def _everything(self, surveyor: Surveyor, found: Found) -> Plan:
         yield from surveyor.plan()
         found.surveyed = True
+        deviation = surveyor.deviation()
+        if deviation is None:
+            return (yield from self._hunt(surveyor, found))
+        found.actions.append(deviation.sentence())
+        if deviation.beyond_repair:
+            found.left_out.append("circuits, ridge following and sizing: the model is wrong beyond repair")
+            return Outcome("model wrong", f"{deviation.sentence()}; what is needed is {deviation.needs()}")
+        surveyor.look_again(deviation)
+        outcome = yield from replace(self, base=deviation.base)._hunt(surveyor, found)
+        return outcome
+
+    def _hunt(self, surveyor: Surveyor, found: Found) -> Plan:
+        """Look into what the survey showed, until nothing is left to sharpen."""
         yield from self._faint(surveyor, found)
         if not found.crossings and not found.leads:
             found.left_out.append("circuits, ridge following and sizing: the survey found nothing")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hw import Move
 from mapping import FloatArray, Trace
+from mapping.base import LaidTrace
 from mapping.detection import Coverage, detect
-from mapping.instrument import StatedNoise
+from mapping.estimate.deviation import Deviation, explain
+from mapping.instrument import Noise, StatedNoise
 from planners import Outcome, Plan, executed
 from planners.explore.found import Found
 from planners.survey import Survey
@@ -46,8 +50,11 @@ class Surveyor:
         found: where crossings and noise are noted.
         false_alarms_per_metre: accepted rate of false crossings in the end, 1/m.
         stated: what is known of the noise before; None: nothing.
+        given_noise: that was known before the survey; None: none.
         visible: share of the smallest feature's height that stays visible between two sweeps.
         paths: touched by the sweeps so far, each (K, 3), m.
+        felt: by each sweep that felt anything.
+        commanded: paths of the ball's centre (K, 3) that were carried out, m.
         limit: least height that the sweeps detect one by one, m.
         count: kept up as it goes.
     """
@@ -58,11 +65,15 @@ class Surveyor:
     stated: StatedNoise | None = None
     count: SurveyCount = field(default_factory=SurveyCount)
     visible: float = field(init=False)
+    given_noise: Noise | None = field(init=False)
     paths: list[FloatArray] = field(init=False, default_factory=list)
+    felt: list[Trace] = field(init=False, default_factory=list)
+    commanded: list[FloatArray] = field(init=False, default_factory=list)
     limit: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
         self.visible = self.survey.visible
+        self.given_noise = self.found.noise
 
     def plan(self) -> Plan:
         """Every sweep of the survey; the first ones are detected together, for they tell the noise."""
@@ -70,6 +81,7 @@ class Surveyor:
         if strips and (first := next(self.survey.sweeps(), None)) is not None:
             trace = yield first
             self.count.made += 1
+            self._keep(executed(first, trace), trace)
             self._widen(trace)
         waiting, felt = list[Trace](), 0.0
         moves = list(self.survey.sweeps(self.visible))
@@ -79,6 +91,7 @@ class Surveyor:
             self.count.made += 1
             done = executed(move, trace)
             self.paths.extend(self.survey.touched(part) for part in done)
+            self._keep(done, trace)
             if not done:
                 self.found.left_out.append("a survey sweep was not carried out")
                 continue
@@ -92,6 +105,26 @@ class Surveyor:
         if waiting:
             self._detect(waiting)
         return Outcome("done")
+
+    def _keep(self, done: Sequence[Move], trace: Trace) -> None:
+        self.commanded.extend(part.path for part in done)
+        self.felt.extend([trace] if len(trace) else [])
+
+    def deviation(self) -> Deviation | None:
+        """What all that was felt shows to be wrong with the model, None if nothing."""
+        base = self.survey.base
+        return explain(Trace.concatenate(self.felt), base, self.commanded) if self.felt else None
+
+    def look_again(self, deviation: Deviation) -> None:
+        """What was found on a wrong model is forgotten, and looked for on the corrected one; not where parts differ."""
+        laid = LaidTrace(Trace.concatenate(self.felt), deviation.base)
+        if deviation.parts:
+            laid = laid.within(deviation.outside(laid.feet().points))
+        self.survey = replace(self.survey, base=deviation.base)
+        self.found.crossings.clear()
+        self.found.noise = self.given_noise
+        self.found.unseen.clear()
+        self._detect([laid])
 
     def covered(self) -> Coverage:
         """How much of the surface lies near enough to a sweep to see the smallest feature."""
@@ -114,7 +147,7 @@ class Surveyor:
 
     def _detect(self, waiting: list[Trace]) -> None:
         felt = detect(
-            Trace.concatenate(waiting),
+            waiting[0] if len(waiting) == 1 else Trace.concatenate(waiting),
             self.survey.base,
             noise=self.found.noise,
             stated=self.stated,

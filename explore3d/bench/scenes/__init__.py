@@ -29,6 +29,12 @@ if TYPE_CHECKING:
         sweeps as sweeps,
         wire as wire,
     )
+    from explore3d.bench.scenes.wrong_models import (
+        REPORTED as REPORTED,
+        WRONG_BODIES as WRONG_BODIES,
+        WRONGS as WRONGS,
+        wrong_model as wrong_model,
+    )
 
 _PUBLIC = {
     "bodies": ("joined", "tube"),
@@ -37,5 +43,6 @@ _PUBLIC = {
     "long_log": ("write_long_log",),
     "noise": ("SAMPLE_SPACING", "simulate_noise"),
     "plate_sweeps": ("DIAMETER", "HALF", "Heights", "TIP_RADIUS", "features", "plate", "scaled", "sweeps", "wire"),
+    "wrong_models": ("REPORTED", "WRONGS", "WRONG_BODIES", "wrong_model"),
 }
 doorway(__name__, _PUBLIC)

@@ -52,13 +52,14 @@ class PathLedger:
         }
 
 
-def path_ledger(sound: SoundSweeps, detections: Detections, beyond: int = 0) -> PathLedger:
+def path_ledger(sound: SoundSweeps, detections: Detections, beyond: int = 0, apart: int = 0) -> PathLedger:
     """The account of a trace that was inspected.
 
     Args:
         sound: what was looked at.
         detections: of that.
         beyond: samples that were recorded beyond the base's border, and not looked at.
+        apart: samples on parts that the body has and its model has not, or the other way round, and not looked at.
     """
     inspected_of = dict(detections.inspected_sweeps)
     path = few = inspected = 0.0
@@ -73,11 +74,14 @@ def path_ledger(sound: SoundSweeps, detections: Detections, beyond: int = 0) -> 
             inspected += min(inspected_of[sweep.number], length)
         else:
             few += length
-    lost = {
+    outside = {
         "beyond the base's border": path * beyond / max(len(sound.trace), 1),
+        "where the body departs from its model": path * apart / max(len(sound.trace), 1),
+    }
+    lost = outside | {
         f"sweeps of fewer than {SHORTEST_SWEEP_SAMPLES} samples": few,
         "ends of sweeps, and pieces too short for the smallest crest": path - few - inspected,
     }
-    recorded = path + lost["beyond the base's border"]
+    recorded = path + sum(outside.values())
     left_out = tuple((reason, length) for reason, length in lost.items() if length > WORTH_A_LINE * recorded)
     return PathLedger(recorded, inspected, left_out, sound.cuts)

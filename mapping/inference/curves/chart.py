@@ -1,6 +1,6 @@
 """Chart: Fermi coordinates, distances along and across a curve on the base, in which lines are described.
 
-Reference: theory section 10.3.
+Reference: theory section 10.4.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Development: a curve on a base, unrolled into the plane; a geodesic becomes a straight line (theory section 10.3)."""
+"""Development: a curve on a base, unrolled into the plane; a geodesic becomes a straight line (theory section 10.4)."""
 
 from __future__ import annotations
 

@@ -1,0 +1,126 @@
+"""Blocks: the mean heights of stretches of half a tip radius, and which of them one smooth surface can join."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import BoolArray, FloatArray, IntArray
+from mapping.base import MAD_TO_SD, LaidTrace, SweepHeights
+
+# Width of a bin in tip radii, and bins in a block: a crest of 0.06 tip radii spans three blocks under its whole width
+BIN, BINS_PER_BLOCK = 0.1, 5
+# Of a long trace bins are wider: so many blocks tell any smooth deviation
+MOST_DEVIATION_BLOCKS = 4000
+# A smooth deviation is no steeper than this. The trace of an edge of height h rises by it within sqrt(2 r h), with the
+# slope sqrt(h / 2 r): an edge of 0.005 tip radii and higher is steeper, and a model 3 degrees off is not.
+STEEPEST = 0.05
+# Heights that differ by less than so many standard deviations may be the same
+SAME = 4.0
+# Neighbours that a block is compared with beyond its own sweep, and cosine of the angle by which their normals differ
+BLOCK_NEIGHBOURS, SAME_SIDE_COSINE = 6, 0.5
+# Nor is it, from one sweep to the next, so many times steeper than this share of all neighbours are: over the gap
+# between two sweeps an edge is as gentle as any slope, but it is in one place alone
+USUAL_TIMES, USUAL_SHARE = 2.0, 0.75
+TINY = float(np.finfo(float).tiny)
+# A sweep of fewer bins tells nothing of long wavelengths
+FEWEST_BINS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Mean heights over the base.
+
+    Args:
+        points: (B, 3) feet of the blocks' middles, m.
+        normals: (B, 3) unit directions from there to the ball.
+        height: (B,) m.
+        piece: (B,) number of the unbroken stretch of a sweep that each is a part of, not decreasing.
+        place: (B,) arclength along it, m.
+        steepness: (B,) largest slope of the height between the bins of a block and on to the next, beyond noise.
+        noise: standard deviation of one block by the differences of neighbouring bins, m.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    height: FloatArray
+    piece: IntArray
+    place: FloatArray
+    steepness: FloatArray
+    noise: float
+
+    @classmethod
+    def of(cls, laid: LaidTrace) -> Blocks:
+        """The blocks of all sweeps over the base that they are laid on."""
+        tip = laid.tip_radius
+        length = sum(float(s.arclength[-1]) for s in laid.laid_sweeps if len(s.trace) > 1)
+        spacing = max(BIN * tip, length / (BINS_PER_BLOCK * MOST_DEVIATION_BLOCKS))
+        profiles = [p for s in laid.laid_sweeps if len(s.trace) > 1 for p in s.heights(spacing)]
+        profiles = [p for p in profiles if len(p.height) >= FEWEST_BINS]
+        curved = np.concatenate([np.zeros(0), *(np.diff(p.height, 2) for p in profiles)])
+        sd = MAD_TO_SD * float(np.median(np.abs(curved))) / np.sqrt(6.0) if len(curved) else 0.0
+        parts = [_grouped(profile, number, sd, laid) for number, profile in enumerate(profiles)]
+        if not parts:
+            nothing = np.zeros(0)
+            return cls(np.zeros((0, 3)), np.zeros((0, 3)), nothing, nothing.astype(np.int64), nothing, nothing, 0.0)
+        points, normals, height, piece, place, steepness = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return cls(points, normals, height, piece, place, steepness, sd / np.sqrt(BINS_PER_BLOCK))
+
+    def __len__(self) -> int:
+        return len(self.height)
+
+    def smooth(self, height: FloatArray) -> BoolArray:
+        """(B,) True for the blocks of the largest part of the surface that no steep place divides.
+
+        Fine features and the further side of steps stand off it, and would be bent away if they counted.
+
+        Args:
+            height: (B,) of the blocks, what is known of them already taken off, m.
+        """
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+        from scipy.spatial import cKDTree
+
+        count, gentle = len(self), self.steepness <= STEEPEST
+        here = np.arange(count)
+        along = (np.diff(self.piece) == 0) & gentle[:-1] & gentle[1:]
+        one, other = [here[:-1][along]], [here[1:][along]]
+        near = np.asarray(cKDTree(self.points).query(self.points, min(BLOCK_NEIGHBOURS + 1, count))[1])
+        first, second = np.repeat(here, near.shape[1] - 1), near[:, 1:].ravel()
+        sides = (self.normals[first] * self.normals[second]).sum(axis=1) > SAME_SIDE_COSINE
+        first, second = (each[sides & gentle[first] & gentle[second]] for each in (first, second))
+        apart = np.linalg.norm(self.points[first] - self.points[second], axis=1)
+        rise = np.maximum(np.abs(height[first] - height[second]) - SAME * np.sqrt(2.0) * self.noise, 0.0)
+        usual = USUAL_TIMES * float(np.quantile(rise / np.maximum(apart, TINY), USUAL_SHARE)) if len(rise) else 0.0
+        alike = rise <= min(STEEPEST, usual) * apart
+        one.append(first[alike])
+        other.append(second[alike])
+        rows, columns = np.concatenate(one), np.concatenate(other)
+        graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+        label = connected_components(graph, directed=False)[1]
+        return np.asarray(label == np.bincount(label).argmax())
+
+
+def _grouped(
+    profile: SweepHeights, number: int, sd: float, laid: LaidTrace
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
+    """The blocks of one profile: points, normals, heights, its number, places, steepness (see Blocks).
+
+    Args:
+        sd: noise of one bin, m.
+    """
+    starts = np.arange(0, len(profile.height), BINS_PER_BLOCK)
+    if len(starts) > 1 and len(profile.height) - starts[-1] < FEWEST_BINS:
+        starts = starts[:-1]
+    counts = np.diff(np.append(starts, len(profile.height)))
+    middle = starts + counts // 2
+    if profile.feet is None or profile.normals is None:
+        feet = laid.base.foot(profile.centers[middle], laid.tip_radius)
+        points, normals = feet.points, feet.normals
+    else:
+        points, normals = profile.feet[middle], profile.normals[middle]
+    rise = np.maximum(np.abs(np.diff(profile.height)) - SAME * np.sqrt(2.0) * sd, 0.0) / profile.spacing
+    steep = np.maximum.reduceat(np.append(rise, 0.0), starts)
+    height, place = (np.add.reduceat(values, starts) / counts for values in (profile.height, profile.s))
+    return points, normals, height, np.full(len(starts), number), place, steep

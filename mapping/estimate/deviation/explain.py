@@ -1,0 +1,391 @@
+"""Explain: which causes make what was felt most probable, and the model with them corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, combinations
+
+import numpy as np
+
+from mapping import BoolArray, FloatArray, IntArray, Trace
+from mapping.base import MAD_TO_SD, Base, LaidTrace, Pose
+from mapping.estimate.deviation.blocks import BIN, BINS_PER_BLOCK, Blocks
+from mapping.estimate.deviation.evidence import Fit, Whitened, best_fit, every_law, whitened
+from mapping.estimate.deviation.fields import RigidFrame, SmoothField, spread
+from mapping.estimate.deviation.parts import parts_of
+from mapping.estimate.deviation.reshaped import fine_enough, reshaped
+from mapping.estimate.deviation.result import Deviation, Part
+
+# Fewer blocks tell nothing
+FEWEST_BLOCKS = 24
+# Less noise than this many tip radii is rounding
+ROUNDING = 1e-9
+# Cells over which heights are averaged to see whether anything is wrong, in tip radii; a quantile of their squares,
+# which a fine feature in some cells does not move, with its value for unit white noise; and by how much noise that is
+# correlated within a block may exceed that
+CELL, AGREEING_SHARE, AGREEING_SQUARE, AS_EXPECTED = 2.0, 0.8, 1.642, 4.0
+# Of a turn at the body's edge, a shift, a scale, an offset, in tip radii: what is expected before anything is felt
+EXPECTED_SHARE = 0.1
+# Lengths of smooth fields: the shortest in tip radii, its bumps being 4.7 of them wide at half height, where the widest
+# fine feature is 8; their ratio; the longest as a share of the body
+SHORTEST_FIELD, FIELD_RATIO, LONGEST_FIELD = 2.0, 1.5, 1.0
+# Amplitudes of smooth fields that are tried, in tip radii
+AMPLITUDES = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
+# Before anything is felt a model has each of the causes with this probability; and one that moves the surface by less
+# than this share of the whole is corrected, but not worth a word
+LIKELY_CAUSE, WORTH_NAMING = 0.1, 0.05
+# An explanation is preferred if it makes the heights so much more probable: a thousand times
+LEAST_GAIN = float(np.log(1e3))
+# Two explanations that differ by less cannot be told apart
+ALIKE_EVIDENCE = float(np.log(10.0))
+# Rounds: turns and displacements are linear in the small only
+MOST_ROUNDS = 3
+# Rounds of least absolute heights, and the share of their scatter below which all weigh the same
+ROBUST_ROUNDS, LEAST_ROBUST = 12, 0.3
+# Blocks that stand further off the best explanation, in robust standard deviations, do not speak for another
+FAR_OFF = 5.0
+# More of the felt surface than this that nothing explains: the model is another body's
+BEYOND_REPAIR = 0.35
+
+
+@dataclass(frozen=True, eq=False)
+class _Explanation:
+    """Causes with their sizes: `rigid` as the columns of RigidFrame, `smooth` coefficients of `field`."""
+
+    causes: tuple[str, ...]
+    instead: tuple[str, ...]
+    frame: RigidFrame
+    offset: float
+    pose: FloatArray
+    scale: float
+    field: SmoothField | None
+    smooth: FloatArray
+    gain: float
+
+    def heights(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """(N,) that it gives at places (N, 3) with normals, m."""
+        rigid = self.frame.pose(points, normals) @ self.pose + self.scale * self.frame.scale(points, normals)[:, 0]
+        smooth = 0.0 if self.field is None else self.field.columns(points, normals) @ self.smooth
+        return np.asarray(self.offset + rigid + smooth)
+
+
+def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> Deviation | None:
+    """What is wrong with the model at long wavelengths; None if what was felt agrees with it.
+
+    The heights of blocks of half a tip radius over the model are explained by nothing, or by an offset, a pose, a
+    scale, a smooth deformation, and all of them together: each a Gaussian field whose marginal likelihood has a closed
+    form, under noise that is white and correlated along sweeps. Blocks beyond a steep place do not count: fine features
+    are what is steep. The most probable explanation is corrected, and wide places that still stand off are parts that
+    the model has and the body has not, or the other way round.
+
+    Args:
+        trace: some sweeps all over the body; a LaidTrace on `base` spares laying it down again.
+        base: the model as given or as it was moved.
+        commanded: paths (K, 3) of the ball's centre along which the sweeps were to go, m: where one was and nothing was
+            felt, the body is not; none: not known.
+    """
+    if base.kind != "mesh":
+        return None
+    blocks = Blocks.of(LaidTrace.of(trace, base))
+    if len(blocks) < FEWEST_BLOCKS:
+        return None
+    tip, keep = trace.tip_radius, blocks.smooth(blocks.height)
+    missed = base.foot(_unfelt(commanded, trace), tip)
+    parts = parts_of(blocks, blocks.height, keep, tip, missed)
+    before, now, seen = base, base, blocks
+    found: list[_Explanation] = []
+    while len(found) < MOST_ROUNDS:
+        whole = ~_covered(parts, seen.points)
+        if _agrees(seen, seen.height, seen.smooth(seen.height) & whole, tip):
+            break
+        step = _explanation(seen, whole, base, tip)
+        if step is None:
+            break
+        found.append(step)
+        if not found[1:] and step.field is not None:
+            before = fine_enough(before, step.field.length)
+            now = before
+        now = _corrected(now, step)
+        seen = Blocks.of(LaidTrace.of(trace, now))
+        parts = parts_of(seen, seen.height, seen.smooth(seen.height), tip, missed)
+    if not found and not parts:
+        return None
+    return _deviation(before, now, blocks, seen, found, parts)
+
+
+def _covered(parts: Sequence[Part], points: FloatArray) -> BoolArray:
+    """(N,) True for places (N, 3) that one of the parts takes."""
+    return np.asarray(np.any([np.zeros(len(points), dtype=bool), *(part.covers(points) for part in parts)], axis=0))
+
+
+def _unfelt(commanded: Sequence[FloatArray], trace: Trace) -> FloatArray:
+    """(M, 3) places of commanded paths further than a tip radius from all that was felt, m."""
+    from scipy.spatial import cKDTree
+
+    spacing, dense = 0.5 * trace.tip_radius, [np.zeros((0, 3))]
+    for path in commanded:
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+        where = np.arange(0.0, along[-1], spacing)
+        dense.append(np.column_stack([np.interp(where, along, path[:, k]) for k in range(3)]))
+    places = np.concatenate(dense)
+    distance, _ = cKDTree(trace.centers).query(places, distance_upper_bound=trace.tip_radius)
+    return np.asarray(places[~np.isfinite(distance)])
+
+
+def _agrees(blocks: Blocks, height: FloatArray, keep: BoolArray, tip: float) -> bool:
+    """True if the mean heights of cells are no larger than noise makes them."""
+    from scipy.spatial import cKDTree
+
+    if keep.sum() < FEWEST_BLOCKS:
+        return False
+    places = np.column_stack([blocks.points, CELL * tip * blocks.normals])[keep]
+    _, cell = cKDTree(spread(places, CELL * tip, len(places))).query(places)
+    count = np.bincount(cell)
+    mean = np.bincount(cell, height[keep]) / np.maximum(count, 1)
+    square = count[count > 0] * mean[count > 0] ** 2
+    allowed = AS_EXPECTED * AGREEING_SQUARE * (blocks.noise**2 + (ROUNDING * tip) ** 2)
+    return bool(np.quantile(square, AGREEING_SHARE) <= allowed)
+
+
+def _explanation(blocks: Blocks, whole: BoolArray, base: Base, tip: float) -> _Explanation | None:
+    """The most probable causes of the heights of blocks outside of parts (B,), None if none is probable enough."""
+    frame = RigidFrame.of(base.surface)
+    causes = (frame.offset, frame.pose, frame.scale)
+    rigid = np.column_stack([make(blocks.points, blocks.normals) for make in causes])
+    everything = np.ones(len(blocks), dtype=bool)
+    keep = whole & blocks.smooth(blocks.height - _robust(rigid, blocks.height, everything, EXPECTED_SHARE * tip))
+    if keep.sum() < FEWEST_BLOCKS:
+        return None
+    fields = _fields(blocks.points[keep], frame, tip)
+    flexible = np.column_stack([rigid, *(each.columns(blocks.points, blocks.normals) for each in fields[:1])])
+    left = blocks.height - _robust(flexible, blocks.height, keep, EXPECTED_SHARE * tip)
+    keep = _near(left, keep, blocks.noise)
+    best = _most_probable(blocks, keep, frame, rigid, fields, tip)
+    if best is not None:
+        left = blocks.height - best.heights(blocks.points, blocks.normals)
+        near = _near(left, keep, blocks.noise)
+        if near.sum() < keep.sum():
+            best = _most_probable(blocks, near, frame, rigid, fields, tip)
+    return best
+
+
+def _fields(points: FloatArray, frame: RigidFrame, tip: float) -> list[SmoothField]:
+    """Smooth fields over places (N, 3), from the shortest length that so many knots tell to the body's size."""
+    longest = max(LONGEST_FIELD * 2.0 * frame.length, SHORTEST_FIELD * tip)
+    count = 1 + int(np.log(longest / (SHORTEST_FIELD * tip)) / np.log(FIELD_RATIO))
+    lengths = SHORTEST_FIELD * tip * FIELD_RATIO ** np.arange(count)
+    return [field for field in (SmoothField.over(points, float(length)) for length in lengths) if field is not None]
+
+
+def _near(left: FloatArray, keep: BoolArray, noise: float) -> BoolArray:
+    """(B,) True for blocks to keep whose remaining heights (B,) are no outliers; for all of them if these are few."""
+    sd = max(MAD_TO_SD * float(np.median(np.abs(left[keep]))), noise)
+    near = keep & (np.abs(left) <= FAR_OFF * sd)
+    return near if near.sum() >= FEWEST_BLOCKS else keep
+
+
+def _robust(columns: FloatArray, height: FloatArray, keep: BoolArray, prior: float) -> FloatArray:
+    """(B,) heights of the columns (B, K) that leave the least absolute heights of the blocks to keep."""
+    a, y = columns[keep], height[keep]
+    found = np.zeros(columns.shape[1])
+    for _ in range(ROBUST_ROUNDS):
+        left = np.abs(y - a @ found)
+        sd = max(MAD_TO_SD * float(np.median(left)), 1e-12 * prior)
+        weighted = a / np.maximum(left / sd, LEAST_ROBUST)[:, None]
+        found[:] = np.linalg.solve(weighted.T @ a + np.eye(a.shape[1]) * (sd / prior) ** 2, weighted.T @ y)
+    return np.asarray(columns @ found)
+
+
+# Columns of the rigid causes
+RIGID = {"offset": np.arange(1), "pose": np.arange(1, 7), "scale": np.arange(7, 8)}
+
+
+def _rigid_sets() -> Iterator[tuple[str, ...]]:
+    names = tuple(RIGID)
+    return chain.from_iterable(combinations(names, count) for count in range(len(names) + 1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """The blocks that speak for a cause, with the columns (B, 8) of the rigid ones."""
+
+    height: FloatArray
+    points: FloatArray
+    normals: FloatArray
+    piece: IntArray
+    place: FloatArray
+    rigid: FloatArray
+    noise: float
+    tip: float
+
+    @classmethod
+    def of(cls, blocks: Blocks, keep: BoolArray, rigid: FloatArray, tip: float) -> _Kept:
+        height, points, normals = blocks.height[keep], blocks.points[keep], blocks.normals[keep]
+        piece, place, noise = blocks.piece[keep], blocks.place[keep], max(blocks.noise, ROUNDING * tip)
+        return cls(height, points, normals, piece, place, rigid[keep], noise, tip)
+
+    def whitened(self, smooth: FloatArray) -> list[Whitened]:
+        """Heights, rigid columns and those of a smooth field (B, J) under each law of noise."""
+        columns = np.column_stack([self.height, self.rigid, smooth])
+        return whitened(columns, self.piece, self.place, BIN * BINS_PER_BLOCK * self.tip)
+
+    def rigid_fits(self) -> dict[tuple[str, ...], Fit]:
+        """One for every set of rigid causes."""
+        seen, fits = self.whitened(np.zeros((len(self.height), 0))), {}
+        for names in _rigid_sets():
+            which = np.concatenate([np.zeros(0, dtype=np.int64), *(RIGID[name] for name in names)])
+            fit = best_fit(seen, which, np.full(len(which), EXPECTED_SHARE * self.tip), self.noise, every_law())
+            fits[names] = _before(fit, len(names))
+        return fits
+
+    def bent_fit(self, field: SmoothField) -> tuple[tuple[str, ...], Fit]:
+        """The best one of a smooth field with some rigid causes, and their names."""
+        smooth = field.columns(self.points, self.normals)
+        seen = self.whitened(smooth)
+        bending = np.arange(self.rigid.shape[1], self.rigid.shape[1] + smooth.shape[1])
+        found: list[tuple[tuple[str, ...], Fit]] = []
+        for names in ((), ("pose",), tuple(RIGID)):
+            which = np.concatenate([*(RIGID[name] for name in names), bending])
+            rigid = np.full(len(which) - len(bending), EXPECTED_SHARE * self.tip)
+            priors = [np.append(rigid, np.full(len(bending), amplitude * self.tip)) for amplitude in AMPLITUDES]
+            law = best_fit(seen, which, priors[len(priors) // 2], self.noise, every_law()).law
+            fits = [best_fit(seen, which, prior, self.noise, [law]) for prior in priors]
+            best = max(fits, key=lambda fit: fit.log_evidence)
+            # its amplitude and its length were chosen for these heights: half a logarithm of their number each
+            chosen = replace(best, log_evidence=best.log_evidence - float(np.log(len(self.height))))
+            found.append((names, _before(chosen, len(names) + 1)))
+        return max(found, key=lambda each: each[1].log_evidence)
+
+
+def _before(fit: Fit, causes: int) -> Fit:
+    """The fit with the prior odds of so many causes."""
+    return replace(fit, log_evidence=fit.log_evidence + causes * float(np.log(LIKELY_CAUSE)))
+
+
+def _most_probable(
+    blocks: Blocks, keep: BoolArray, frame: RigidFrame, rigid: FloatArray, fields: list[SmoothField], tip: float
+) -> _Explanation | None:
+    """The explanation of the kept blocks with the highest evidence, None if it is that there is nothing."""
+    kept = _Kept.of(blocks, keep, rigid, tip)
+    fits = kept.rigid_fits()
+    nothing = fits[()].log_evidence
+    best = max(fits, key=lambda names: fits[names].log_evidence)
+    found = replace(_of_fit(best, fits[best], frame, nothing), instead=_instead(best, fits))
+    left = blocks.height - found.heights(blocks.points, blocks.normals)
+    if not _agrees(blocks, left, keep, tip):
+        for field in fields:
+            bent = _of_fit(*kept.bent_fit(field), frame, nothing, field)
+            found = bent if bent.gain > found.gain else found
+    return _ordered(found, kept) if found.gain >= LEAST_GAIN else None
+
+
+def _instead(best: tuple[str, ...], fits: dict[tuple[str, ...], Fit]) -> tuple[str, ...]:
+    """As many other rigid causes that explain the heights as well."""
+    enough = fits[best].log_evidence - ALIKE_EVIDENCE
+    other = [names for names in fits if len(names) == len(best) and names != best]
+    return tuple(" and ".join(names) for names in other if fits[names].log_evidence > enough)
+
+
+def _of_fit(
+    names: tuple[str, ...], fit: Fit, frame: RigidFrame, nothing: float, field: SmoothField | None = None
+) -> _Explanation:
+    """What a fit of rigid causes, and of a smooth field after them, says."""
+    which = np.concatenate([np.zeros(0, dtype=np.int64), *(RIGID[name] for name in names)])
+    values = np.zeros(8)
+    values[which] = fit.coefficients[: len(which)]
+    return _Explanation(
+        causes=names if field is None else (*names, "deformation"),
+        instead=(),
+        frame=frame,
+        offset=float(values[0]),
+        pose=values[1:7],
+        scale=float(values[7]),
+        field=field,
+        smooth=fit.coefficients[len(which) :],
+        gain=fit.log_evidence - nothing,
+    )
+
+
+def _ordered(found: _Explanation, kept: _Kept) -> _Explanation:
+    """With the cause that moves the surface most first, without those that hardly move it."""
+    points, normals, frame = kept.points, kept.normals, found.frame
+    alone = {
+        "offset": np.full(len(points), found.offset),
+        "pose": frame.pose(points, normals) @ found.pose,
+        "scale": found.scale * frame.scale(points, normals)[:, 0],
+        "deformation": 0.0 if found.field is None else found.field.columns(points, normals) @ found.smooth,
+    }
+    size = {cause: float(np.sqrt(np.mean(np.square(alone[cause])))) for cause in found.causes}
+    causes = sorted(found.causes, key=lambda cause: -size[cause])
+    named = tuple(cause for cause in causes if size[cause] >= WORTH_NAMING * size[causes[0]])
+    return replace(found, causes=named, instead=found.instead if len(named) == len(causes) else ())
+
+
+def _corrected(base: Base, step: _Explanation) -> Base:
+    """The model with the causes applied: bent and scaled first, then moved."""
+    frame = step.frame
+    if step.field is not None or step.scale:
+        vertices = base.surface.vertices
+        moved = vertices + step.scale / frame.length * (vertices - frame.middle)
+        if step.field is not None:
+            moved = moved + step.field.displaced(vertices, step.smooth)
+        base = reshaped(base, moved)
+    if step.pose.any():
+        turn, shift = step.pose[:3] / frame.length, step.pose[3:]
+        rotation = Pose.turned(turn)
+        translation = frame.middle - rotation @ frame.middle + shift
+        base = Pose(rotation, translation, frame.middle, np.zeros((6, 6))).moved(base)
+    return replace(base, offset=base.offset + step.offset) if step.offset else base
+
+
+def _deviation(
+    before: Base, now: Base, blocks: Blocks, seen: Blocks, found: list[_Explanation], parts: tuple[Part, ...]
+) -> Deviation:
+    """What all rounds and the parts come to."""
+    causes = (*(found[0].causes if found else ()), *(("part",) if parts else ()))
+    vertices = before.surface.vertices
+    heights = ((now.surface.vertices - vertices) * _vertex_normals(before)).sum(axis=1) + now.offset - before.offset
+    for part in parts:
+        if np.isfinite(part.height):
+            heights[part.covers(now.surface.vertices)] += part.height
+    keep = seen.smooth(seen.height)
+    middle = RigidFrame.of(before.surface).middle
+    old, new = Pose.of(before), Pose.of(now)
+    shift, turn = np.zeros(3), 0.0
+    if new is not None and any(step.pose.any() for step in found):
+        back = np.eye(3) if old is None else old.rotation
+        there = new.onto((middle if old is None else old.back(middle[None])[0])[None])[0]
+        shift, turn = there - middle, Pose.angle(new.rotation @ back.T)
+    bends = [step for step in found if step.field is not None]
+    bent = sum(step.field.columns(blocks.points, blocks.normals) @ step.smooth for step in bends if step.field)
+    smooth = blocks.smooth(blocks.height)
+    return Deviation(
+        base=now,
+        causes=causes,
+        instead=found[0].instead if found else (),
+        shift=shift,
+        turn=turn,
+        scale=float(np.prod([1.0 + step.scale / step.frame.length for step in found])),
+        offset=now.offset - before.offset,
+        bent=float(np.abs(bent).max()) if bends else 0.0,
+        length=bends[0].field.length if bends and bends[0].field else 0.0,
+        parts=parts,
+        rms=MAD_TO_SD * float(np.median(np.abs(blocks.height[smooth]))),
+        left=MAD_TO_SD * float(np.median(np.abs(seen.height[keep]))),
+        gain=found[0].gain if found else 0.0,
+        heights=heights,
+        unexplained=float(1.0 - keep.mean()),
+        beyond_repair=bool(keep.mean() < 1.0 - BEYOND_REPAIR),
+    )
+
+
+def _vertex_normals(base: Base) -> FloatArray:
+    """(V, 3) unit normals at the vertices, the faces' weighted by their areas."""
+    surface = base.surface
+    weighted = surface.face_normals * surface.face_areas[:, None]
+    normals = np.zeros((len(surface.vertices), 3))
+    for corner in range(3):
+        np.add.at(normals, surface.faces[:, corner], weighted)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray(np.divide(normals, length, out=np.zeros_like(normals), where=length > 0))

@@ -1,0 +1,240 @@
+"""What is wrong with a model is named and corrected, and what is no fault of the model is left to detection."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mapping import FloatArray, Surface, Trace
+from mapping.base import Base, LaidTrace
+from mapping.estimate.deviation import explain
+
+TIP = 0.01
+NOISE = 20e-6
+Warp = Callable[[FloatArray], FloatArray]
+
+
+def sheet(u: FloatArray, v: FloatArray) -> FloatArray:
+    """A saddle of 110 x 90 mm, (..., 3)."""
+    return np.stack([u, v, 4.0 * u**2 - 3.0 * v**2], axis=-1)
+
+
+def plane(u: FloatArray, v: FloatArray) -> FloatArray:
+    return np.stack([u, v, 0.0 * u], axis=-1)
+
+
+def model(body: Callable[[FloatArray, FloatArray], FloatArray] = sheet) -> Base:
+    u, v = np.linspace(-0.055, 0.055, 56), np.linspace(-0.045, 0.045, 46)
+    vertices = body(*np.meshgrid(u, v, indexing="ij")).reshape(-1, 3)
+    i, j = (each.ravel() for each in np.meshgrid(np.arange(55), np.arange(45), indexing="ij"))
+    a = 46 * i + j
+    faces = np.concatenate([np.column_stack([a, a + 46, a + 47]), np.column_stack([a, a + 47, a + 1])])
+    return Base(Surface(vertices, faces))
+
+
+def felt(
+    warp: Warp = lambda points: points,
+    *,
+    seed: int = 1,
+    height: Callable[[FloatArray, FloatArray], FloatArray] = lambda u, v: 0.0 * u,
+    each: float = 0.0,
+    noise: float = NOISE,
+    body: Callable[[FloatArray, FloatArray], FloatArray] = sheet,
+) -> Trace:
+    """Crossed sweeps over the warped sheet.
+
+    Args:
+        warp: of places (N, 3).
+        height: of the ball's centre over the sheet at (u, v), m.
+        each: standard deviation of the sweeps' own offsets, m.
+    """
+    rng = np.random.default_rng(seed)
+    s, h = np.arange(-0.05, 0.05, 1e-4), 1e-6
+    lines = [(s, np.full(len(s), v)) for v in np.linspace(-0.038, 0.038, 7)]
+    lines += [(np.full(760, u), s[120:880]) for u in np.linspace(-0.048, 0.048, 8)]
+    centers, sweeps = [], []
+    for number, (u, v) in enumerate(lines):
+        along, across = (
+            (warp(body(u + h * a, v + h * b)) - warp(body(u - h * a, v - h * b))) / (2.0 * h) for a, b in np.eye(2)
+        )
+        normal = np.cross(along, across)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        lift = TIP + height(u, v) + each * rng.standard_normal() + noise * rng.standard_normal(len(u))
+        centers.append(warp(body(u, v)) + lift[:, None] * normal)
+        sweeps.append(np.full(len(u), number))
+    count = sum(map(len, sweeps))
+    return Trace(1e-3 * np.arange(count), np.concatenate(centers), np.concatenate(sweeps), TIP)
+
+
+def turned(points: FloatArray) -> FloatArray:
+    """0.3 mm and 0.5 degrees off."""
+    rotation = Rotation.from_rotvec(np.radians(0.5) * np.array([0.6, -0.8, 0.0])).as_matrix()
+    return points @ rotation.T + 0.3e-3 * np.array([0.48, 0.36, 0.8])
+
+
+def bent(points: FloatArray) -> FloatArray:
+    """0.5 mm up and down over the length of the body."""
+    return points + 0.5e-3 * np.sin(60.0 * points[:, :1] + 30.0 * points[:, 1:2] + 0.4) * np.array([0.0, 0.0, 1.0])
+
+
+def remaining(base: Base, trace: Trace) -> float:
+    """Median of the mean heights of 5 mm, m."""
+    mean = base.foot(trace.centers, TIP).height[: len(trace) // 50 * 50].reshape(-1, 50).mean(axis=1)
+    return float(np.median(np.abs(mean)))
+
+
+def test_a_body_off_its_model_is_moved() -> None:
+    trace, base = felt(turned), model()
+    found = explain(trace, base)
+    assert found is not None
+    assert found.causes == ("pose",)
+    assert np.degrees(found.turn) == pytest.approx(0.5, abs=0.02)
+    assert remaining(found.base, trace) < 0.02 * remaining(base, trace)
+    assert "0.5" in found.sentence()
+    assert "moved" in found.sentence()
+    assert found.base.pose is not None
+
+
+def test_a_body_one_per_cent_larger_is_scaled() -> None:
+    base = model()
+    middle = base.surface.face_areas @ base.surface.vertices[base.surface.faces].mean(axis=1)
+    middle /= base.surface.face_areas.sum()
+    trace = felt(lambda points: middle + 1.01 * (points - middle))
+    found = explain(trace, base)
+    assert found is not None
+    assert found.causes == ("scale",)
+    assert found.scale == pytest.approx(1.01, abs=1e-3)
+    assert remaining(found.base, trace) < 0.1 * remaining(base, trace)
+
+
+def test_a_ball_larger_than_said_is_an_offset() -> None:
+    trace, base = felt(height=lambda u, v: 0.1e-3 + 0.0 * u), model()
+    found = explain(trace, base)
+    assert found is not None
+    assert found.causes == ("offset",)
+    assert found.offset == pytest.approx(0.1e-3, abs=3e-6)
+    assert found.base.offset == found.offset
+    assert np.array_equal(found.base.surface.vertices, base.surface.vertices)
+
+
+def test_a_bent_body_bends_its_model() -> None:
+    trace, base = felt(bent), model()
+    found = explain(trace, base)
+    assert found is not None
+    assert found.causes[0] == "deformation"
+    assert remaining(found.base, trace) < 0.05 * remaining(base, trace)
+    there = (np.abs(base.surface.vertices[:, :2]) < [0.045, 0.035]).all(axis=1)
+    true = bent(base.surface.vertices) - base.surface.vertices
+    assert np.abs(found.heights - true[:, 2])[there].max() < 0.06e-3
+
+
+def dent(u: FloatArray, v: FloatArray) -> FloatArray:
+    share = np.clip(np.hypot(u - 0.02, v + 0.01) / 0.02, 0.0, 1.0)
+    return -1e-3 * (1.0 + np.cos(np.pi * share))
+
+
+def test_a_dent_is_a_part_that_is_left_out() -> None:
+    trace, base = felt(height=dent), model()
+    found = explain(trace, base)
+    assert found is not None
+    assert found.causes == ("part",)
+    (part,) = found.parts
+    assert part.height == pytest.approx(-2e-3, abs=0.3e-3)
+    assert np.linalg.norm(part.points.mean(axis=0)[:2] - [0.02, -0.01]) < 5e-3
+    feet = base.foot(trace.centers, TIP).points
+    assert not found.outside(feet)[dent(trace.centers[:, 0], trace.centers[:, 1]) < -0.5e-3].any()
+    assert found.outside(feet).mean() > 0.75
+
+
+def test_where_the_finger_was_sent_and_felt_nothing_a_part_is_missing() -> None:
+    trace, base = felt(), model()
+    gone = (np.abs(trace.centers[:, 0]) < 0.02) & (np.abs(trace.centers[:, 1]) < 0.02)
+    trace = trace.select(~gone)
+    path = np.column_stack([np.linspace(-0.02, 0.02, 9), np.zeros(9), np.full(9, TIP)])
+    assert explain(trace, base) is None
+    found = explain(trace, base, [path])
+    assert found is not None
+    assert found.causes == ("part",)
+    assert "nothing was felt there" in found.sentence()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_right_model_is_left_alone(seed: int) -> None:
+    assert explain(felt(seed=seed), model()) is None
+
+
+def wire(u: FloatArray, v: FloatArray) -> FloatArray:
+    """The trace of a wire of 0.65 mm across the sheet."""
+    beside = u * np.sin(0.3) + v * np.cos(0.3)
+    return np.maximum(0.65e-3 - beside**2 / (2.0 * (TIP + 0.325e-3)), 0.0)
+
+
+def ring(u: FloatArray, v: FloatArray) -> FloatArray:
+    """The trace of a ring of wire, wider than the ball."""
+    return np.maximum(0.65e-3 - (np.hypot(u, v) - 0.02) ** 2 / (2.0 * (TIP + 0.325e-3)), 0.0)
+
+
+def step(u: FloatArray, v: FloatArray) -> FloatArray:
+    """The trace of an edge 0.5 mm high across the sheet."""
+    before = np.maximum(0.01 - u, 0.0)
+    return np.clip(0.5e-3 - before**2 / (2.0 * TIP), 0.0, None)
+
+
+@pytest.mark.parametrize("feature", [wire, ring, step])
+def test_a_fine_feature_is_no_fault_of_the_model(feature: Callable[[FloatArray, FloatArray], FloatArray]) -> None:
+    assert explain(felt(height=feature), model()) is None
+
+
+@pytest.mark.parametrize("feature", [wire, ring, step])
+def test_a_fine_feature_does_not_pull_the_pose(feature: Callable[[FloatArray, FloatArray], FloatArray]) -> None:
+    found = explain(felt(turned, height=feature), model())
+    assert found is not None
+    assert found.causes[0] == "pose"
+    assert np.degrees(found.turn) == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_offsets_of_single_sweeps_are_noise_and_not_the_model(seed: int) -> None:
+    found = explain(felt(each=0.05e-3, seed=seed), model())
+    assert found is None or found.rms < 0.1e-3
+
+
+def test_a_fitted_base_is_not_doubted() -> None:
+    base = Base(model().surface, "quadric")
+    assert explain(felt(turned), base) is None
+
+
+def test_a_model_of_another_body_is_beyond_repair() -> None:
+    """A plane was given, and a dome was felt."""
+    dome = felt(lambda p: p + np.column_stack([0 * p[:, :2], 12.0 * (p[:, :1] ** 2 - p[:, 1:2] ** 2)]), body=plane)
+    found = explain(dome, model(plane))
+    assert found is not None
+    assert found.beyond_repair
+    assert "mesh" in found.needs()
+
+
+def test_the_same_in_other_units() -> None:
+    """A body, its tip and its error scaled together give the same answer, scaled."""
+    trace, base, factor = felt(turned), model(), 2.0**-20
+    other = Trace(trace.t, factor * trace.centers, trace.sweep, factor * TIP)
+    found, here = (
+        explain(other, Base(Surface(factor * base.surface.vertices, base.surface.faces))),
+        explain(trace, base),
+    )
+    assert found is not None
+    assert here is not None
+    assert found.causes == here.causes
+    assert found.turn == pytest.approx(here.turn, rel=1e-6)
+    assert found.shift == pytest.approx(factor * here.shift, rel=1e-6)
+
+
+def test_a_coarse_mesh_is_divided_before_it_is_bent() -> None:
+    corners = np.array([[-0.055, -0.045, 0.0], [0.055, -0.045, 0.0], [0.055, 0.045, 0.0], [-0.055, 0.045, 0.0]])
+    base = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
+    trace = felt(bent, body=plane)
+    found = explain(LaidTrace(trace, base), base)
+    assert found is not None
+    assert found.causes[0] == "deformation"
+    assert len(found.base.surface.faces) > 100
+    assert remaining(found.base, trace) < 0.1 * remaining(base, trace)
