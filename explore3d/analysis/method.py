@@ -228,6 +228,7 @@ def deviated(work: Work, share: Share) -> None:
         return
     work.base = work.deviation.base
     laid = LaidTrace.of(work.trace, work.base)
+    laid = LaidTrace.of(work.deviation.without_drift(laid), work.base)
     if work.deviation.parts and not work.deviation.beyond_repair:
         keep = work.deviation.outside(laid.feet().points)
         work.apart = int((~keep).sum())
@@ -416,7 +417,7 @@ def modelled(work: Work, share: Share) -> None:
         provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface | path | deviation,
         inspected=work.inspected.height,
         reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
-        deviation=None if work.deviation is None else work.deviation.heights,
+        deviation=work.deviation.heights if work.deviation and work.deviation.of_the_model else None,
     )
 
 

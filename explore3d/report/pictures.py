@@ -99,6 +99,6 @@ def _rendered(analysis: Analysis, sweeps: Sequence[SweepPath]) -> dict[str, byte
     files: dict[str, bytes | None] = {"object": picture}
     if analysis.estimate is not None and analysis.estimate.surface is not None and analysis.curvature is not None:
         files["curvature"] = curvature_picture(analysis.estimate.surface, analysis.curvature, analysis.trace.tip_radius)
-    if analysis.deviation is not None:
+    if analysis.deviation is not None and analysis.deviation.of_the_model:
         files["deviation"] = deviation_picture(analysis.base.surface, analysis.deviation.heights)
     return files

@@ -26,7 +26,8 @@ def is_unseen(crossing: Crossing, inspection: Inspection) -> bool:
     """True if a clear crossing's section is not found in the heights, neither over the base nor over those beside.
 
     A detection's signal-to-noise ratio is of the whole stretch that was fitted together; a low crossing beside a high
-    one may get all of it from the other.
+    one may get all of it from the other. Times the standard deviation of the height, of the same fit under the same
+    noise, it is the height that is claimed, whatever that noise is.
     """
     if crossing.snr < CLAIM or crossing.half_width < 1.2 * inspection.spacing:
         return False
@@ -37,9 +38,8 @@ def is_unseen(crossing: Crossing, inspection: Inspection) -> bool:
         return False
     shape = np.sign(crossing.height) * crest_trace(gap[inside], np.sign(crossing.height), crossing.half_width)
     level = float(np.median(heights[beside])) if beside.any() else 0.0
-    sd = float(np.median(inspection.sd[own][inside]) / np.sqrt(max(shape @ shape, 1e-3)))
     seen = [np.sign(crossing.height) * (shape @ (heights[inside] - base)) / (shape @ shape) for base in (0.0, level)]
-    return bool(max(seen) < SEEN_CLAIM_SHARE * crossing.snr * sd)
+    return bool(max(seen) < SEEN_CLAIM_SHARE * crossing.snr * crossing.height_sd)
 
 
 # A hollow is felt below the base by this share of its depth ...

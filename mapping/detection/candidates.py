@@ -93,6 +93,17 @@ def search(
     return Searched(tuple(found), quiet, _unclear(stretches, len(quiet)))
 
 
+def unclear_bins(
+    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float, null: NullScale
+) -> BoolArray:
+    """(n,) False where something is clearly no noise: the same as `search` finds, which also measures it."""
+    stretches = [
+        (begin, end, snr >= CLEAR * threshold)
+        for _, begin, end, _, snr in _stretches(profile, bank, noise, threshold, tip_radius, null)
+    ]
+    return _unclear(stretches, len(profile.height))
+
+
 def _unclear(stretches: list[tuple[int, int, bool]], count: int) -> BoolArray:
     """(count,) False in the stretches (begin, end, clear) that are clear, and in the skirts and side lobes of these."""
     quiet = np.ones(count, dtype=bool)

@@ -22,32 +22,17 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
-from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH, Bank
+from mapping.detection.filters import Bank
+from mapping.detection.local_level import LOG_VARIANCE_PER_BIN, MEDIAN_OF_UNIT_NORMAL, excess, local_levels
 from mapping.instrument import Noise
 
-# The variance of unit outputs is read from their median absolute value, 0.6745 standard deviations, which what is no
-# noise in less than half of a cell shifts little.
-MEDIAN_OF_UNIT_NORMAL = 0.6744897501960817
 # Variance of the logarithm of that variance in a cell of one half-width; simulated with white and correlated noise and
 # with and without a drift: 2.6 to 4.5, the largest for white noise.
 LOG_VARIANCE_PER_WIDTH = 4.2
-# The same of differences of neighbouring bins, for one bin: 5.4 if they were independent; simulated: 6.6 in white
-# noise, less in correlated noise.
-LOG_VARIANCE_PER_BIN = 6.6
-# Bins in a cell of the local level: three half-widths of the narrowest filter, which sees the level's mean over two.
-LEVEL_BINS = 3 * FILTER_BINS_PER_HALF_WIDTH
 # Half-widths in a cell: the fewest over which the median's own bias stays below 0.03 in the logarithm of the variance.
 CELL_WIDTHS = 12.0
 # A sweep that is shorter than this many half-widths of a filter says nothing of its own about that filter's level.
 LEAST_SWEEP_WIDTHS = 2 * CELL_WIDTHS
-# Standard deviations of chi-square by which levels must differ more than sampling makes them: at nine degrees of
-# freedom one in five hundred logs of one level has that; it is asked some ten times a log, of filters that see alike
-CLEAR_EXCESS = 4.0
-# Twice the log-likelihood that a level of its own by sweep and along the sweeps must bring.
-LEVEL_GAIN = 12.0
-# Variances of the logarithm of the variance, and lengths in cells, among which the likeliest are chosen; and sweeps
-# that are asked, evenly chosen.
-LEVEL_VARIANCES, LEVEL_LENGTHS, ASKED_SWEEPS = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0), (2.0, 4.0, 8.0, 16.0, 32.0), 24
 # Filters between one that is measured and the next: neighbours on the ladder see nearly the same.
 STRIDE = 3
 # Correlation lengths among which that of the effective noise is chosen: a quarter of an octave apart or less.
@@ -120,7 +105,7 @@ def null_scales(
         that (Schwarz 1978).
     """
     widths = np.array([f.half_width for f in bank.filters])
-    local = _local_levels(heights, quiet, bank)
+    local = local_levels(heights, quiet, bank)
     pooled = np.ones(len(widths))
     own = [np.ones((len(widths), _cells(p, widths[0]))) for p in profiles]
     inherited, doubt = [np.zeros(each.shape[1]) for each in own], 1.0
@@ -223,85 +208,6 @@ def _seen(local: FloatArray, bins: float) -> FloatArray:
     return np.sqrt(_running_mean(local, max(1, int(0.5 * bins))))
 
 
-def _local_levels(heights: Sequence[FloatArray], quiet: Sequence[BoolArray], bank: Bank) -> list[FloatArray]:
-    """(n,) of each profile: variance of the bins over the fitted one, by differences of neighbouring quiet bins."""
-    lags = bank.noise.block_covariances(2, bank.spacing, bank.samples)
-    sd = float(np.sqrt(max(2 * (lags[0] - lags[1]), np.finfo(float).tiny)))
-    told = [_difference_levels(h, q, sd) for h, q in zip(heights, quiet, strict=True)]
-    ones = [np.ones(len(h)) for h in heights]
-    y = np.concatenate([each for each, _ in told])
-    v = np.concatenate([each for _, each in told])
-    known = np.isfinite(v)
-    if known.sum() < 3:
-        return ones
-    centre = float(np.average(y[known], weights=1 / v[known]))
-    told = [(np.where(np.isfinite(v), y - centre, 0.0), v) for y, v in told]
-    prior = _level_prior(told)
-    if prior is None:
-        return ones
-    return [np.exp(centre + _smoothed(y, v, prior, len(h))) for (y, v), h in zip(told, heights, strict=True)]
-
-
-def _difference_levels(height: FloatArray, quiet: BoolArray, sd: float) -> tuple[FloatArray, FloatArray]:
-    """(C,) logarithm of the variance in each cell, and its sampling variance, infinite where nothing is known."""
-    step = np.where(quiet[1:] & quiet[:-1], np.abs(np.diff(height)) / sd, np.nan)
-    cells = max(1, len(step) // LEVEL_BINS)
-    edges = np.linspace(0, len(step), cells + 1).astype(np.int64)
-    y, v = np.zeros(cells), np.full(cells, np.inf)
-    for c in range(cells):
-        part = step[edges[c] : edges[c + 1]]
-        part = part[np.isfinite(part)]
-        if len(part) >= FILTER_BINS_PER_HALF_WIDTH:
-            y[c] = 2 * np.log(max(float(np.median(part)), 1e-12) / MEDIAN_OF_UNIT_NORMAL)
-            v[c] = LOG_VARIANCE_PER_BIN / len(part)
-    return y, v
-
-
-def _covariance(cells: int, prior: tuple[float, float, float]) -> FloatArray:
-    """(C, C) of the level's logarithm between cells of one sweep: variance by sweep, along it, its length in cells."""
-    lag = np.abs(np.subtract.outer(np.arange(cells), np.arange(cells)))
-    return np.asarray(prior[0] + prior[1] * np.exp(-lag / prior[2]))
-
-
-def _level_prior(told: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[float, float, float] | None:
-    """Variances by sweep and along the sweeps and length in cells that are likeliest; None if none is needed."""
-    chosen = [told[i] for i in np.unique(np.linspace(0, len(told) - 1, ASKED_SWEEPS).astype(np.int64))]
-    of_sweep = [(float(y @ (1 / v)), float(np.sum(1 / v))) for y, v in told if np.isfinite(v).any()]
-    excess = _excess(np.array([a / w for a, w in of_sweep]), np.array([1 / w for _, w in of_sweep]))
-    y, v = np.concatenate([y for y, _ in told]), np.concatenate([v for _, v in told])
-    if excess == 0.0 and _excess(y[np.isfinite(v)], v[np.isfinite(v)]) == 0.0:
-        return None
-    best, prior, nothing = -np.inf, None, sum(_log_likelihood(y, v, None) for y, v in chosen)
-    for by_sweep in LEVEL_VARIANCES:
-        for along in LEVEL_VARIANCES:
-            for length in LEVEL_LENGTHS if along else LEVEL_LENGTHS[:1]:
-                each = (by_sweep, along, length)
-                value = sum(_log_likelihood(y, v, each) for y, v in chosen)
-                if value > best:
-                    best, prior = value, each
-    return prior if 2 * (best - nothing) > LEVEL_GAIN else None
-
-
-def _log_likelihood(y: FloatArray, v: FloatArray, prior: tuple[float, float, float] | None) -> float:
-    known = np.isfinite(v)
-    covariance = np.diag(v[known])
-    if prior is not None:
-        covariance = covariance + _covariance(len(y), prior)[np.ix_(known, known)]
-    root = np.linalg.cholesky(covariance)
-    return float(-0.5 * np.sum(np.linalg.solve(root, y[known]) ** 2) - np.log(np.diag(root)).sum())
-
-
-def _smoothed(y: FloatArray, v: FloatArray, prior: tuple[float, float, float], count: int) -> FloatArray:
-    """(count,) expected logarithm of the variance in each bin, given those of the cells."""
-    known = np.isfinite(v)
-    covariance = _covariance(len(y), prior)
-    if not known.any():
-        return np.zeros(count)
-    inner = covariance[np.ix_(known, known)] + np.diag(v[known])
-    mean = covariance[:, known] @ np.linalg.solve(inner, y[known])
-    return np.interp(np.arange(count), (np.arange(len(y)) + 0.5) * count / len(y), mean)
-
-
 def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank, k: int) -> FloatArray:
     """Absolute outputs of a filter over their sd, one a coarse bin; NaN where what it sees is not all quiet path."""
     f = bank.filters[k]
@@ -350,11 +256,11 @@ def _deviations(told: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[list[Flo
     rest = [y - each for (y, _), each in zip(told, b, strict=True)]
     cells = np.concatenate([r[np.isfinite(r)] for r in rest])
     sampled = np.concatenate([v[np.isfinite(r)] for r, (_, v) in zip(rest, told, strict=True)])
-    within = _excess(cells, sampled)
+    within = excess(cells, sampled)
     # the mean of a sweep's cells scatters with them
     eb = eb + within / np.array([max(1, int(np.isfinite(y).sum())) for y, _ in told])
     centre = float(np.average(b[known], weights=1 / eb[known]))
-    between = _excess(b[known] - centre, eb[known])
+    between = excess(b[known] - centre, eb[known])
     out = []
     for r, (_, v), each, error in zip(rest, told, b, eb, strict=True):
         sweep = 0.0 if not np.isfinite(each) else (each - centre) * between / (between + error)
@@ -376,18 +282,6 @@ def _doubt(sd: float, threshold: float) -> float:
     nodes, weights = np.polynomial.hermite_e.hermegauss(40)
     tail = float(weights @ ndtr(-threshold * np.exp(-sd * nodes)) / weights.sum())
     return float(max(1.0, threshold / -ndtri(tail)))
-
-
-def _excess(values: FloatArray, errors: FloatArray) -> float:
-    """Variance of values beyond what their errors explain; zero unless chi-square is CLEAR_EXCESS sds high."""
-    if len(values) < 3:
-        return 0.0
-    weight = 1 / errors
-    q = float(weight @ values**2)
-    count = len(values) - 1
-    if q < count + CLEAR_EXCESS * np.sqrt(2 * count):
-        return 0.0
-    return (q - count) / float(weight.sum() - weight @ weight / weight.sum())
 
 
 def _spread(deviations: Sequence[FloatArray]) -> float:

@@ -118,6 +118,7 @@ class Surveyor:
     def look_again(self, deviation: Deviation) -> None:
         """What was found on a wrong model is forgotten, and looked for on the corrected one; not where parts differ."""
         laid = LaidTrace(Trace.concatenate(self.felt), deviation.base)
+        laid = LaidTrace.of(deviation.without_drift(laid), deviation.base)
         if deviation.parts:
             laid = laid.within(deviation.outside(laid.feet().points))
         self.survey = replace(self.survey, base=deviation.base)

@@ -25,6 +25,8 @@ BLOCKS_ACROSS = 5
 # Nor is it, from one sweep to the next, so many times steeper than this share of all neighbours are: over the gap
 # between two sweeps an edge is as gentle as any slope, but it is in one place alone
 USUAL_TIMES, USUAL_SHARE = 2.0, 0.75
+# By how much more than that share of them two sweeps that drift may be apart: of Gaussian levels one pair in 200,000 is
+DRIFTING_TIMES = 4.0
 TINY = float(np.finfo(float).tiny)
 # A sweep of fewer bins tells nothing of long wavelengths
 FEWEST_BINS = 3
@@ -38,7 +40,8 @@ class Blocks:
         points: (B, 3) feet of the blocks' middles, m.
         normals: (B, 3) unit directions from there to the ball.
         height: (B,) m.
-        piece: (B,) number of the unbroken stretch of a sweep that each is a part of, not decreasing.
+        sweep: (B,) number of the sweep that each is a part of.
+        piece: (B,) number of the unbroken stretch of that sweep, not decreasing.
         place: (B,) arclength along it, m.
         steepness: (B,) largest slope of the height between the bins of a block and on to the next, beyond noise.
         noise: standard deviation of one block by the differences of neighbouring bins, m.
@@ -47,6 +50,7 @@ class Blocks:
     points: FloatArray
     normals: FloatArray
     height: FloatArray
+    sweep: IntArray
     piece: IntArray
     place: FloatArray
     steepness: FloatArray
@@ -65,20 +69,23 @@ class Blocks:
         parts = [_grouped(profile, number, sd, laid) for number, profile in enumerate(profiles)]
         if not parts:
             nothing = np.zeros(0)
-            return cls(np.zeros((0, 3)), np.zeros((0, 3)), nothing, nothing.astype(np.int64), nothing, nothing, 0.0)
+            none = nothing.astype(np.int64)
+            return cls(np.zeros((0, 3)), np.zeros((0, 3)), nothing, none, none, nothing, nothing, 0.0)
         points, normals, height, piece, place, steepness = (np.concatenate(each) for each in zip(*parts, strict=True))
-        return cls(points, normals, height, piece, place, steepness, sd / np.sqrt(BINS_PER_BLOCK))
+        sweep = np.array([p.sweep for p in profiles])[piece]
+        return cls(points, normals, height, sweep, piece, place, steepness, sd / np.sqrt(BINS_PER_BLOCK))
 
     def __len__(self) -> int:
         return len(self.height)
 
-    def smooth(self, height: FloatArray) -> BoolArray:
+    def smooth(self, height: FloatArray, drifting: bool = False) -> BoolArray:
         """(B,) True for the blocks of the largest part of the surface that no steep place divides.
 
         Fine features and the further side of steps stand off it, and would be bent away if they counted.
 
         Args:
             height: (B,) of the blocks, what is known of them already taken off, m.
+            drifting: whether each sweep may stand at a level of its own.
         """
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
@@ -98,8 +105,12 @@ class Blocks:
         first, second = (each[sides & gentle[first] & gentle[second]] for each in (first, second))
         apart = np.linalg.norm(self.points[first] - self.points[second], axis=1)
         rise = np.maximum(np.abs(height[first] - height[second]) - SAME * np.sqrt(2.0) * self.noise, 0.0)
-        usual = USUAL_TIMES * float(np.quantile(rise / np.maximum(apart, TINY), USUAL_SHARE)) if len(rise) else 0.0
-        alike = rise <= min(STEEPEST, usual) * apart
+        slope = rise / np.maximum(apart, TINY)
+        usual = np.full(len(slope), USUAL_TIMES * float(np.quantile(slope, USUAL_SHARE)) if len(slope) else 0.0)
+        between = self.piece[first] != self.piece[second]
+        if drifting and between.any():
+            usual[between] = DRIFTING_TIMES * float(np.quantile(slope[between], USUAL_SHARE))
+        alike = slope <= np.minimum(STEEPEST, usual)
         one.append(first[alike])
         other.append(second[alike])
         rows, columns = np.concatenate(one), np.concatenate(other)

@@ -11,6 +11,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray, IntArray, Trace
 from mapping.base import MAD_TO_SD, Base, LaidTrace, Pose
 from mapping.estimate.deviation.blocks import BIN, BINS_PER_BLOCK, Blocks
+from mapping.estimate.deviation.drift import Drift, drift
 from mapping.estimate.deviation.evidence import Fit, Whitened, best_fit, every_law, whitened
 from mapping.estimate.deviation.fields import RigidFrame, SmoothField, spread
 from mapping.estimate.deviation.parts import parts_of, stands_off
@@ -75,10 +76,10 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
     """What is wrong with the model at long wavelengths; None if what was felt agrees with it.
 
     The heights of blocks of half a tip radius over the model are explained by nothing, or by an offset, a pose, a
-    scale, a smooth deformation, and all of them together: each a Gaussian field whose marginal likelihood has a closed
-    form, under noise that is white and correlated along sweeps. Blocks beyond a steep place do not count: fine features
-    are what is steep. The most probable explanation is corrected, and wide places that still stand off are parts that
-    the model has and the body has not, or the other way round.
+    scale, a smooth deformation, and all of them together, or by a line of each sweep's own: each a Gaussian field whose
+    marginal likelihood has a closed form, under noise that is white and correlated along sweeps. Blocks beyond a steep
+    place do not count: fine features are what is steep. The most probable explanation is corrected, and wide places
+    that still stand off are parts that the model has and the body has not, or the other way round.
 
     Args:
         trace: some sweeps all over the body; a LaidTrace on `base` spares laying it down again.
@@ -96,23 +97,28 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
     parts = parts_of(blocks, blocks.height, keep, tip, missed)
     before, now, seen = base, base, blocks
     found: list[_Explanation] = []
-    while len(found) < MOST_ROUNDS:
+    lines: list[Drift] = []
+    while len(found) + len(lines) < MOST_ROUNDS:
         whole = ~_covered(parts, seen.points)
         if _agrees(seen, seen.height, seen.smooth(seen.height) & whole, tip):
             break
-        step = _explanation(seen, whole, base, tip)
-        if step is None:
+        step, own = _explanation(seen, whole, base, tip), _drift(seen, whole, tip)
+        if own is not None and (step is None or own.gain > step.gain):
+            lines.append(own)
+            trace = own.without(LaidTrace.of(trace, now))
+        elif step is not None:
+            found.append(step)
+            if not found[1:] and step.field is not None:
+                before = fine_enough(before, step.field.length)
+                now = before
+            now = _corrected(now, step)
+        else:
             break
-        found.append(step)
-        if not found[1:] and step.field is not None:
-            before = fine_enough(before, step.field.length)
-            now = before
-        now = _corrected(now, step)
         seen = Blocks.of(LaidTrace.of(trace, now))
         parts = parts_of(seen, seen.height, seen.smooth(seen.height), tip, missed)
-    if not found and not parts:
+    if not found and not lines and not parts:
         return None
-    return _deviation(before, now, blocks, seen, found, parts, tip)
+    return _deviation(before, now, blocks, seen, found, lines, parts, tip)
 
 
 def _covered(parts: Sequence[Part], points: FloatArray) -> BoolArray:
@@ -169,6 +175,21 @@ def _explanation(blocks: Blocks, whole: BoolArray, base: Base, tip: float) -> _E
         if near.sum() < keep.sum():
             best = _most_probable(blocks, near, frame, rigid, fields, tip)
     return best
+
+
+def _drift(blocks: Blocks, whole: BoolArray, tip: float) -> Drift | None:
+    """Lines of the sweeps' own that make the heights of blocks outside of parts (B,) more probable; None if none do."""
+    keep = whole & blocks.smooth(blocks.height, drifting=True)
+    if keep.sum() < FEWEST_BLOCKS:
+        return None
+    noise, step = max(blocks.noise, ROUNDING * tip), BIN * BINS_PER_BLOCK * tip
+    found = drift(blocks.sweep[keep], blocks.place[keep], blocks.height[keep], noise, step)
+    # what stands off the lines does not speak for them
+    left = blocks.height - found.at(blocks.sweep, blocks.place)
+    near = _near(left, keep, blocks.noise)
+    if near.sum() < keep.sum():
+        found = drift(blocks.sweep[near], blocks.place[near], blocks.height[near], noise, step)
+    return found if found.gain + float(np.log(LIKELY_CAUSE)) >= LEAST_GAIN else None
 
 
 def _fields(points: FloatArray, frame: RigidFrame, tip: float) -> list[SmoothField]:
@@ -346,11 +367,12 @@ def _deviation(
     blocks: Blocks,
     seen: Blocks,
     found: list[_Explanation],
+    lines: list[Drift],
     parts: tuple[Part, ...],
     tip: float,
 ) -> Deviation:
     """What all rounds and the parts come to."""
-    causes = (*(found[0].causes if found else ()), *(("part",) if parts else ()))
+    causes = (*(found[0].causes if found else ()), *(("drift",) if lines else ()), *(("part",) if parts else ()))
     vertices = before.surface.vertices
     heights = ((now.surface.vertices - vertices) * _vertex_normals(before)).sum(axis=1) + now.offset - before.offset
     for part in parts:
@@ -378,10 +400,11 @@ def _deviation(
         offset=now.offset - before.offset,
         bent=float(np.abs(bent).max()) if bends else 0.0,
         length=bends[0].field.length if bends and bends[0].field else 0.0,
+        lines=tuple(lines),
         parts=parts,
         rms=MAD_TO_SD * float(np.median(np.abs(blocks.height[smooth]))),
         left=MAD_TO_SD * float(np.median(np.abs(seen.height[keep]))),
-        gain=found[0].gain if found else 0.0,
+        gain=(*(step.gain for step in found), *(each.gain for each in lines), 0.0)[0],
         heights=heights,
         unexplained=unexplained,
         beyond_repair=unexplained > BEYOND_REPAIR,

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, length_text
-from mapping.base import Base
+from mapping import BoolArray, FloatArray, Trace, length_text
+from mapping.base import Base, LaidTrace
+from mapping.estimate.deviation.drift import Drift
 
-# What may be wrong with a model; a part is where the body departs from it alone and sharply
-CAUSES = ("offset", "pose", "scale", "deformation", "part")
+# What may be wrong with a model, or with the sweeps over it; a part is where the body departs from it alone and sharply
+CAUSES = ("offset", "pose", "scale", "deformation", "drift", "part")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,7 @@ class Deviation:
         offset: by which the ball, or a coat of the body, is larger than said, m.
         bent: largest smooth displacement along the normal at a place that was felt, m.
         length: over which that changes, m; 0 without one.
+        lines: of the sweeps' own, which are no part of the body; one after the other.
         parts: where the body departs from the model alone.
         rms: of the heights before, where a smooth surface joins them, by their median, m.
         left: of what remains of them, m.
@@ -82,6 +84,7 @@ class Deviation:
     offset: float
     bent: float
     length: float
+    lines: tuple[Drift, ...]
     parts: tuple[Part, ...]
     rms: float
     left: float
@@ -89,6 +92,18 @@ class Deviation:
     heights: FloatArray
     unexplained: float
     beyond_repair: bool = False
+
+    @property
+    def of_the_model(self) -> bool:
+        """True if it is the model that is wrong, and not the sweeps alone."""
+        return self.causes != ("drift",)
+
+    def without_drift(self, laid: LaidTrace) -> Trace:
+        """The trace, laid on the corrected base, without the lines of its sweeps."""
+        trace: Trace = laid
+        for lines in self.lines:
+            trace = lines.without(LaidTrace.of(trace, laid.base))
+        return trace
 
     def outside(self, points: FloatArray) -> BoolArray:
         """(N,) True for places (N, 3) of the model that no missing or extra part takes."""
@@ -99,7 +114,10 @@ class Deviation:
 
     def sentence(self) -> str:
         """What is wrong and what was done about it."""
-        said = [self._said(cause) for cause in self.causes if cause != "part"]
+        said = [self._said(cause) for cause in self.causes if cause not in ("drift", "part")]
+        said += [lines.sentence() for lines in self.lines]
+        if not self.of_the_model:
+            return "; ".join(said)
         said += [part.sentence() for part in self.parts]
         if self.instead:
             said.append(f"the trace cannot tell that from: {', '.join(self.instead)}")
@@ -151,6 +169,7 @@ class Deviation:
             "gain": self.gain,
             "unexplained": self.unexplained,
             "beyond_repair": self.beyond_repair,
+            "drift": [{"sweep": lines.sweep.tolist(), "line": lines.line.tolist()} for lines in self.lines],
             "parts": [
                 {"place": part.points.mean(axis=0).tolist(), "width": part.width, "height": part.height,
                  "path": part.path} for part in self.parts

@@ -256,6 +256,22 @@ def test_rounding_of_the_positions_is_no_feature_but_a_wire_beneath_it_is() -> N
     np.testing.assert_allclose(crossing.height, 0.65e-3, rtol=0.03)
 
 
+def test_where_rounding_sets_the_limit_the_law_of_less_than_that_is_not_told() -> None:
+    """What is kept stands out of the rounding; how the noise below that changes its level decides nothing."""
+    trace = sweep(wire, white=1e-7)
+    centers = trace.centers.copy()
+    rough = np.random.default_rng(5).standard_normal(len(centers)) * np.where(centers[:, 0] > 0.01, 1e-6, 0.0)
+    centers[:, 2] += rough
+    uneven = Trace(trace.t, centers, trace.sweep, TIP)
+    told = detect(uneven, plate())
+    assert told.remarks
+    rounded = detect(replace(uneven, resolution=4e-5), plate())
+    assert not rounded.remarks
+    assert rounded.detection_limit == 2.5 * 4e-5 > told.detection_limit
+    (crossing,) = rounded.crossings
+    np.testing.assert_allclose(crossing.height, 0.65e-3, rtol=0.03)
+
+
 def test_a_tip_thrown_off_for_moments_changes_neither_the_noise_nor_the_wire() -> None:
     """Most of the path lies on the wire, and its flank comes in pieces: as from a force sensor that slides down it."""
     whole = sweep(wire, length=0.012, white=5e-7)

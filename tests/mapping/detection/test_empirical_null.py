@@ -10,6 +10,7 @@ import pytest
 from mapping.arrays import FloatArray
 from mapping.base.base import Base
 from mapping.detection.detect import Detections, detect
+from mapping.detection.level_kernels import expected_level, level_likelihood
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -65,3 +66,19 @@ def test_noise_of_another_law_gives_no_more_than_thrice_the_false_alarms_asked_f
 def test_a_wire_that_stands_out_is_still_found_where_the_level_differs_by_sweep() -> None:
     crossings = [c for c in found(level_by_sweep, 3, WIRE).crossings if abs(c.point[0] - 0.1 * LENGTH) < 1.5e-3]
     assert len({c.sweep for c in crossings}) >= 9
+
+
+@pytest.mark.parametrize("prior", [(0.0, 0.0, 2.0), (0.3, 0.0, 2.0), (0.0, 1.0, 4.0), (0.1, 0.3, 8.0)])
+@pytest.mark.parametrize("cells", [1, 5, 40])
+def test_the_linear_filter_of_the_level_agrees_with_the_full_covariance(cells, prior):
+    rng = np.random.default_rng(cells)
+    read, error = rng.normal(size=cells), rng.uniform(0.1, 0.5, cells)
+    error[2:3] = np.inf
+    lag = np.abs(np.subtract.outer(np.arange(cells), np.arange(cells)))
+    covariance = prior[0] + prior[1] * np.exp(-lag / prior[2])
+    known = np.isfinite(error)
+    inner = covariance[np.ix_(known, known)] + np.diag(error[known])
+    answer = np.linalg.solve(inner, read[known])
+    likelihood = -0.5 * (read[known] @ answer + np.linalg.slogdet(inner)[1])
+    np.testing.assert_allclose(level_likelihood(read, error, *prior), likelihood, rtol=1e-11)
+    np.testing.assert_allclose(expected_level(read, error, *prior), covariance[:, known] @ answer, atol=1e-12)

@@ -196,9 +196,42 @@ def test_a_fine_feature_does_not_pull_the_pose(feature: Callable[[FloatArray, Fl
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_offsets_of_single_sweeps_are_noise_and_not_the_model(seed: int) -> None:
-    found = explain(felt(each=0.05e-3, seed=seed), model())
-    assert found is None or found.rms < 0.1e-3
+def test_levels_of_single_sweeps_are_their_drift_and_not_the_model(seed: int) -> None:
+    trace, base = felt(each=0.05e-3, seed=seed), model()
+    found = explain(trace, base)
+    assert found is not None and found.causes == ("drift",) and not found.of_the_model
+    assert found.base is base and "the sweeps drift" in found.sentence()
+    without = LaidTrace.of(found.without_drift(LaidTrace.of(trace, base)), base)
+    levels = [float(sweep.feet().height.mean()) for sweep in without.laid_sweeps]
+    assert np.std(levels) < 3e-6
+
+
+def test_slopes_of_single_sweeps_are_taken_off() -> None:
+    straight = felt(body=plane)
+    numbers, begins = np.unique(straight.sweep, return_index=True)
+    place = np.linalg.norm(straight.centers - straight.centers[begins[straight.sweep]], axis=1)
+    rise = np.random.default_rng(4).normal(0.0, 1e-3, len(numbers))
+    sloping = straight.centers + np.outer(rise[straight.sweep] * (place - 0.04), [0.0, 0.0, 1.0])
+    trace, base = Trace(straight.t, sloping, straight.sweep, TIP), model(plane)
+    found = explain(trace, base)
+    assert found is not None and found.causes == ("drift",)
+    without = found.without_drift(LaidTrace.of(trace, base))
+    assert np.std(without.centers[:, 2]) < 1.1 * NOISE < 0.7 * np.std(trace.centers[:, 2])
+
+
+@pytest.mark.parametrize("rise", [0.05e-3, 0.3e-3, 2e-3])
+def test_a_step_is_no_drift_however_it_lies(rise: float) -> None:
+    def ball(u: FloatArray) -> FloatArray:
+        return np.where(u > 0, rise, np.maximum(rise - TIP + np.sqrt(np.maximum(TIP**2 - u**2, 0.0)), 0.0))
+
+    for across in (
+        lambda u, v: ball(u - 0.013),
+        lambda u, v: ball(v - 0.003),
+        lambda u, v: ball(0.5 * u + v - 0.004),
+        lambda u, v: np.minimum(ball(u + 0.02), ball(0.02 - u)),
+    ):
+        found = explain(felt(height=across, body=plane), model(plane))
+        assert found is None or "drift" not in found.causes
 
 
 def test_a_fitted_base_is_not_doubted() -> None:
