@@ -18,6 +18,10 @@ MOST_DEVIATION_BLOCKS = 4000
 STEEPEST = 0.05
 # Heights that differ by less than so many standard deviations may be the same
 SAME = 4.0
+# Bins to either side of a place whose means differ where it is an edge, beyond what the bins further out go on as: noise
+# makes JUMP_SD standard deviations of a bin of that (weights 1/2, 3/2, 3/2, 1/2 over three bins each), and a field two
+# tip radii long and 0.15 tip radii high LEAST_JUMP tip radii (its third derivative over three bins)
+JUMP_BINS, JUMP_SD, LEAST_JUMP = 3, float(np.sqrt(5.0 / 3.0)), 5e-4
 # Neighbours that a block is compared with beyond its own sweep, and cosine of the angle by which their normals differ
 BLOCK_NEIGHBOURS, SAME_SIDE_COSINE = 6, 0.5
 # Blocks from one side of a fine feature to the other, at most
@@ -43,7 +47,8 @@ class Blocks:
         sweep: (B,) number of the sweep that each is a part of.
         piece: (B,) number of the unbroken stretch of that sweep, not decreasing.
         place: (B,) arclength along it, m.
-        steepness: (B,) largest slope of the height between the bins of a block and on to the next, beyond noise.
+        steepness: (B,) largest slope of the height between the bins of a block and on to the next, beyond noise;
+            infinite at an edge, however low.
         noise: standard deviation of one block by the differences of neighbouring bins, m.
     """
 
@@ -138,6 +143,20 @@ def _grouped(
     else:
         points, normals = profile.feet[middle], profile.normals[middle]
     rise = np.maximum(np.abs(np.diff(profile.height)) - SAME * np.sqrt(2.0) * sd, 0.0) / profile.spacing
+    rise[_jumps(profile.height) > max(SAME * JUMP_SD * sd, LEAST_JUMP * laid.tip_radius)] = np.inf
     steep = np.maximum.reduceat(np.append(rise, 0.0), starts)
     height, place = (np.add.reduceat(values, starts) / counts for values in (profile.height, profile.s))
     return points, normals, height, np.full(len(starts), number), place, steep
+
+
+def _jumps(height: FloatArray) -> FloatArray:
+    """(n - 1,) by how much the heights (n,) of bins jump from each to the next; zero near the ends.
+
+    What is smooth goes on as it came: half of the rise before and half of that behind are taken off.
+    """
+    jumps = np.zeros(max(len(height) - 1, 0))
+    means = np.convolve(height, np.full(JUMP_BINS, 1.0 / JUMP_BINS), mode="valid")
+    if len(means) > 3 * JUMP_BINS:
+        before, left, right, behind = (means[k * JUMP_BINS : len(means) - (3 - k) * JUMP_BINS] for k in range(4))
+        jumps[2 * JUMP_BINS - 1 :][: len(left)] = np.abs(1.5 * (right - left) - 0.5 * (behind - before))
+    return jumps

@@ -100,7 +100,10 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
     lines: list[Drift] = []
     while len(found) + len(lines) < MOST_ROUNDS:
         whole = ~_covered(parts, seen.points)
-        if _agrees(seen, seen.height, seen.smooth(seen.height) & whole, tip):
+        keep = seen.smooth(seen.height) & whole
+        # where more of the surface agrees with the model than hangs together beside it, that is a plateau
+        level = whole & (np.abs(seen.height) <= FAR_OFF * seen.noise)
+        if _agrees(seen, seen.height, keep, tip) or level.sum() > keep.sum():
             break
         step, own = _explanation(seen, whole, base, tip), _drift(seen, whole, tip)
         if own is not None and (step is None or own.gain > step.gain):
@@ -180,6 +183,8 @@ def _explanation(blocks: Blocks, whole: BoolArray, base: Base, tip: float) -> _E
 def _drift(blocks: Blocks, whole: BoolArray, tip: float) -> Drift | None:
     """Lines of the sweeps' own that make the heights of blocks outside of parts (B,) more probable; None if none do."""
     keep = whole & blocks.smooth(blocks.height, drifting=True)
+    if keep.any():  # one sweep that stands apart is on a step
+        keep = _near(blocks.height - np.median(blocks.height[keep]), keep, blocks.noise)
     if keep.sum() < FEWEST_BLOCKS:
         return None
     noise, step = max(blocks.noise, ROUNDING * tip), BIN * BINS_PER_BLOCK * tip
