@@ -18,7 +18,7 @@ MOST_DEVIATION_BLOCKS = 4000
 STEEPEST = 0.05
 # Heights that differ by less than so many standard deviations may be the same
 SAME = 4.0
-# Bins to either side of a place whose means differ where it is an edge, beyond what the bins further out go on as: noise
+# Bins to either side of a place whose means differ where it is an edge, beyond how the bins further out go on: noise
 # makes JUMP_SD standard deviations of a bin of that (weights 1/2, 3/2, 3/2, 1/2 over three bins each), and a field two
 # tip radii long and 0.15 tip radii high LEAST_JUMP tip radii (its third derivative over three bins)
 JUMP_BINS, JUMP_SD, LEAST_JUMP = 3, float(np.sqrt(5.0 / 3.0)), 5e-4
