@@ -3,7 +3,7 @@
 Each run explores and builds its model as `explore3d run` does, without pictures and report. Every run is one line of a
 JSONL file; what is already in the file is not run again.
 
-    explore3d bench wrong-models --store wrong.jsonl --seeds 5
+    explore3d bench deviation --store wrong.jsonl --seeds 5
 """
 
 from __future__ import annotations

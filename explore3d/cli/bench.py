@@ -253,8 +253,8 @@ def classify(
     print(classify_table(list(bench_classify(*chosen, patterns, seeds, store))), end="")
 
 
-@bench.command("wrong-models")
-def wrong_models(
+@bench.command()
+def deviation(
     store: Store,
     bodies: Annotated[str | None, typer.Option(help="Bodies, separated by commas; those reported if left out.")] = None,
     wrongs: Annotated[str | None, typer.Option(help="What is wrong, separated by commas; all if left out.")] = None,
@@ -263,7 +263,7 @@ def wrong_models(
 ) -> None:
     """Is it named what is wrong with a mesh, is anything invented on it, and what does it cost the finger?
 
-    Example: explore3d bench wrong-models --store wrong.jsonl --bodies plate --wrongs nothing,pose --seeds 2
+    Example: explore3d bench deviation --store wrong.jsonl --bodies plate --wrongs nothing,pose --seeds 2
     """
     from explore3d.bench import bench_wrong_models, wrong_model_lines, wrong_model_records
     from explore3d.bench.scenes import REPORTED, WRONG_BODIES, WRONGS

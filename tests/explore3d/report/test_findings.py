@@ -29,6 +29,7 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
         inspected=SimpleNamespace(untouched=untouched),
         base=SimpleNamespace(kind="mesh"),
         account=None,
+        deviation=None,
         path=None,
         left_out=(),
         stopped=None,
