@@ -47,8 +47,8 @@ class Blocks:
         sweep: (B,) number of the sweep that each is a part of.
         piece: (B,) number of the unbroken stretch of that sweep, not decreasing.
         place: (B,) arclength along it, m.
-        steepness: (B,) largest slope of the height between the bins of a block and on to the next, beyond noise;
-            infinite at an edge, however low.
+        steepness: (B,) largest slope of the height between the bins of a block and on to the next, beyond noise.
+        edge: (B,) whether the height jumps there, however little.
         noise: standard deviation of one block by the differences of neighbouring bins, m.
     """
 
@@ -59,6 +59,7 @@ class Blocks:
     piece: IntArray
     place: FloatArray
     steepness: FloatArray
+    edge: BoolArray
     noise: float
 
     @classmethod
@@ -75,13 +76,22 @@ class Blocks:
         if not parts:
             nothing = np.zeros(0)
             none = nothing.astype(np.int64)
-            return cls(np.zeros((0, 3)), np.zeros((0, 3)), nothing, none, none, nothing, nothing, 0.0)
-        points, normals, height, piece, place, steepness = (np.concatenate(each) for each in zip(*parts, strict=True))
+            return cls(np.zeros((0, 3)), np.zeros((0, 3)), nothing, none, none, nothing, nothing, none > 0, 0.0)
+        points, normals, height, piece, place, steepness, edge = map(np.concatenate, zip(*parts, strict=True))
         sweep = np.array([p.sweep for p in profiles])[piece]
-        return cls(points, normals, height, sweep, piece, place, steepness, sd / np.sqrt(BINS_PER_BLOCK))
+        return cls(points, normals, height, sweep, piece, place, steepness, edge, sd / np.sqrt(BINS_PER_BLOCK))
 
     def __len__(self) -> int:
         return len(self.height)
+
+    def apart(self, distance: float) -> BoolArray:
+        """(B,) True for blocks further (m) from all that is steep: nearer, a height may be the skirt of a feature."""
+        from scipy.spatial import cKDTree
+
+        steep = self.points[self.steepness > STEEPEST]
+        if not len(steep):
+            return np.ones(len(self), dtype=bool)
+        return np.asarray(cKDTree(steep).query(self.points)[0] > distance)
 
     def smooth(self, height: FloatArray, drifting: bool = False) -> BoolArray:
         """(B,) True for the blocks of the largest part of the surface that no steep place divides.
@@ -96,7 +106,7 @@ class Blocks:
         from scipy.sparse.csgraph import connected_components
         from scipy.spatial import cKDTree
 
-        count, gentle = len(self), self.steepness <= STEEPEST
+        count, gentle = len(self), (self.steepness <= STEEPEST) & ~self.edge
         here = np.arange(count)
         along = (np.diff(self.piece) == 0) & gentle[:-1] & gentle[1:]
         one, other = [here[:-1][along]], [here[1:][along]]
@@ -126,8 +136,8 @@ class Blocks:
 
 def _grouped(
     profile: SweepHeights, number: int, sd: float, laid: LaidTrace
-) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
-    """The blocks of one profile: points, normals, heights, its number, places, steepness (see Blocks).
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray, BoolArray]:
+    """The blocks of one profile: points, normals, heights, its number, places, steepness, edges (see Blocks).
 
     Args:
         sd: noise of one bin, m.
@@ -143,10 +153,10 @@ def _grouped(
     else:
         points, normals = profile.feet[middle], profile.normals[middle]
     rise = np.maximum(np.abs(np.diff(profile.height)) - SAME * np.sqrt(2.0) * sd, 0.0) / profile.spacing
-    rise[_jumps(profile.height) > max(SAME * JUMP_SD * sd, LEAST_JUMP * laid.tip_radius)] = np.inf
-    steep = np.maximum.reduceat(np.append(rise, 0.0), starts)
+    jumps = _jumps(profile.height) > max(SAME * JUMP_SD * sd, LEAST_JUMP * laid.tip_radius)
+    steep, edge = (np.maximum.reduceat(np.append(values, 0), starts) for values in (rise, jumps))
     height, place = (np.add.reduceat(values, starts) / counts for values in (profile.height, profile.s))
-    return points, normals, height, np.full(len(starts), number), place, steep
+    return points, normals, height, np.full(len(starts), number), place, steep, edge > 0
 
 
 def _jumps(height: FloatArray) -> FloatArray:

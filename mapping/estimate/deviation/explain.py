@@ -101,9 +101,11 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
     while len(found) + len(lines) < MOST_ROUNDS:
         whole = ~_covered(parts, seen.points)
         keep = seen.smooth(seen.height) & whole
+        # near what is steep a height may be the skirt of a feature: of the model it says something if enough lies apart
+        told = (keep & seen.apart(SHORTEST_FIELD * tip)).sum() >= FEWEST_BLOCKS
         # where more of the surface agrees with the model than hangs together beside it, that is a plateau
         level = whole & (np.abs(seen.height) <= FAR_OFF * seen.noise)
-        if _agrees(seen, seen.height, keep, tip) or level.sum() > keep.sum():
+        if not told or _agrees(seen, seen.height, keep, tip) or level.sum() > keep.sum():
             break
         step, own = _explanation(seen, whole, base, tip), _drift(seen, whole, tip)
         if own is not None and (step is None or own.gain > step.gain):

@@ -47,7 +47,7 @@ def parts_of(blocks: Blocks, height: FloatArray, rest: BoolArray, tip: float, mi
     sd = max(MAD_TO_SD * float(np.median(np.abs(quiet - np.median(quiet)))), blocks.noise)
     off = stands_off(height, sd, tip)
     deep = height < -DEEP * tip
-    counts = deep | _in_wide_runs(blocks, height, off, WIDE_PART * tip)
+    counts = deep | _in_wide_runs(blocks, height, off, tip)
     index = np.flatnonzero(counts)
     points = np.concatenate([blocks.points[index], missed.points])
     if not len(points):
@@ -86,13 +86,24 @@ def _spans(points: FloatArray, length: float) -> bool:
     return len(points) > 1 and bool(np.linalg.norm(points - points[0], axis=1).max() >= length)
 
 
-def _in_wide_runs(blocks: Blocks, height: FloatArray, off: BoolArray, width: float) -> BoolArray:
-    """(B,) True for blocks of stretches that stand off to one side all along, and are so long."""
+def _in_wide_runs(blocks: Blocks, height: FloatArray, off: BoolArray, tip: float) -> BoolArray:
+    """(B,) True for blocks of stretches that stand off to one side all along, and are wide: hollows as a whole, what
+    stands out at half its height.
+
+    A ball of radius r stands off beside what is t high, by sqrt(2 r t - t^2) to either side: that is no width of it.
+    """
     step = float(np.median(np.diff(blocks.place)[np.diff(blocks.piece) == 0], axis=0)) if len(blocks) > 1 else 0.0
     state = np.where(off, np.sign(height), 0.0)
     new = np.flatnonzero((np.diff(state, prepend=np.nan) != 0) | (np.diff(blocks.piece, prepend=-1) != 0))
     lengths = np.diff(np.append(new, len(blocks)))
-    return np.asarray(np.repeat(lengths * step >= width, lengths) & off)
+    if not len(new):
+        return off
+    top = np.maximum.reduceat(height, new)
+    upper = np.add.reduceat((height >= 0.5 * np.repeat(top, lengths)).astype(np.int64), new)
+    half = np.clip(0.5 * top, 0.0, tip)
+    beside = 2.0 * np.sqrt(2.0 * tip * half - half**2)
+    wide = np.where(top > 0, upper * step - beside, lengths * step) >= WIDE_PART * tip
+    return np.asarray(np.repeat(wide, lengths) & off)
 
 
 def _is_wide(points: FloatArray, normals: FloatArray, blocks: Blocks, off: BoolArray, tip: float) -> bool:

@@ -271,3 +271,15 @@ def test_a_coarse_mesh_is_divided_before_it_is_bent() -> None:
     assert found.causes[0] == "deformation"
     assert len(found.base.surface.faces) > 100
     assert remaining(found.base, trace) < 0.1 * remaining(base, trace)
+
+
+def test_the_skirt_of_a_tall_feature_on_a_small_plate_is_no_deviation() -> None:
+    """The paper's bump, 1 / (1 + 15 u^2) high, on a plate of six tip radii: it stands off the plane everywhere."""
+    large = 0.11 / 6.0
+
+    def bump(u: FloatArray, v: FloatArray) -> FloatArray:
+        return large / (1.0 + 15.0 * (u**2 + v**2) / large**2)
+
+    trace = felt(height=bump, body=plane)
+    lifted = trace.centers + np.array([0.0, 0.0, large - TIP])
+    assert explain(Trace(trace.t, lifted, trace.sweep, large), model(plane)) is None
