@@ -26,13 +26,14 @@ class Inspected:
     Args:
         height: (F,) m: a sharp crest at least so high anywhere on the face would have been found; infinity where
             no sweep passed within a tip radius.
-        area: (F,) of the faces, m^2.
+        place, area: (N,) the same at places all over the surface, m, and what each stands for, m^2.
         limit: height found where a sweep crosses it, m.
         probability: with which all this holds.
         asked: height of the smallest feature that the scene asks for, m, or None.
     """
 
     height: FloatArray
+    place: FloatArray
     area: FloatArray
     limit: float
     probability: float
@@ -44,21 +45,21 @@ class Inspected:
         limit = detections.detection_limit
         if base.kind == "profile":  # a strip as wide as one likes: all of it lies under the one sweep
             height = np.full(len(base.surface.faces), limit)
-            return cls(height, base.surface.face_areas, limit, detections.probability, asked)
+            return cls(height, height, base.surface.face_areas, limit, detections.probability, asked)
         places, _ = LaidTrace.of(trace, base).touched(MOST_SURFACE_CELLS)
         if not np.isfinite(limit):
             places = places[:0]
-        height = found_heights(base.surface, places, trace.tip_radius, limit)
-        return cls(height, base.surface.face_areas, limit, detections.probability, asked)
+        found = found_heights(base.surface, places, trace.tip_radius, limit)
+        return cls(found.face, found.place, found.area, limit, detections.probability, asked)
 
     def share(self, height: float) -> float:
         """Share of the area on which every crest at least `height` m high would have been found."""
-        return float(self.area[self.height <= height].sum() / self.area.sum())
+        return float(self.area[self.place <= height].sum() / self.area.sum())
 
     @property
     def untouched(self) -> float:
         """Share of the area that no sweep came near."""
-        return float(self.area[~np.isfinite(self.height)].sum() / self.area.sum())
+        return float(self.area[~np.isfinite(self.place)].sum() / self.area.sum())
 
     def record(self) -> dict[str, Any]:
         """JSON values: the share of the area that is inspected for features above some heights, m."""

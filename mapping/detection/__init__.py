@@ -7,6 +7,7 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from mapping.detection.coverage import (
         Coverage as Coverage,
+        FoundHeights as FoundHeights,
         coverage as coverage,
         face_samples as face_samples,
         found_heights as found_heights,
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from mapping.detection.recovery import recovered as recovered
 
 _PUBLIC = {
-    "coverage": ("Coverage", "coverage", "face_samples", "found_heights"),
+    "coverage": ("Coverage", "FoundHeights", "coverage", "face_samples", "found_heights"),
     "crossing": ("Crossing",),
     "detect": ("SHORTEST_SWEEP_SAMPLES", "Detections", "detect"),
     "filters.matched_filter": ("LADDER",),

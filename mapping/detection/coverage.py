@@ -50,8 +50,23 @@ def coverage(surface: Surface, touched: FloatArray, reach: float, region: BoolAr
     return Coverage(share, float((share * areas).sum() / total) if total > 0 else 0.0, reach)
 
 
-def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limit: float) -> FloatArray:
-    """(F,) m: a crest at least this high anywhere on the face would have been found; infinity where it might not.
+@dataclass(frozen=True, eq=False)
+class FoundHeights:
+    """From which height on a crest would have been found; infinity where it might not have been.
+
+    Args:
+        face: (F,) anywhere on each face, m.
+        place: (N,) at each of many places all over the surface, m.
+        area: (N,) that each place stands for, m^2.
+    """
+
+    face: FloatArray
+    place: FloatArray
+    area: FloatArray
+
+
+def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limit: float) -> FoundHeights:
+    """The height from which on a crest would have been found, by face and by place.
 
     A ball that passes a sharp crest of height D at the distance y still rises to D - (r - sqrt(r^2 - y^2)); it is
     found, with the probability that `limit` is stated for, if that is at least the detection limit. Taken is the
@@ -67,20 +82,22 @@ def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limi
     from scipy.spatial import cKDTree
 
     if not len(touched):
-        return np.full(len(surface.faces), np.inf)
+        nowhere = np.full(len(surface.faces), np.inf)
+        return FoundHeights(nowhere, nowhere, surface.face_areas)
     step = 0.06 * tip_radius
     while _sample_count(surface, step) > MOST_FACE_SAMPLES:
         step *= 1.5  # a coarser answer is a more cautious one
     points, owner = face_samples(surface, step)
     distance, _ = cKDTree(touched).query(points, distance_upper_bound=0.9 * tip_radius, workers=-1)
     # as far as a place of the face may lie from the nearest sample
-    distance = np.asarray(distance) + 0.55 * (_longest_sides(surface) / _parts(surface, step))[owner]
+    parts = _parts(surface, step)
+    distance = np.asarray(distance) + 0.55 * (_longest_sides(surface) / parts)[owner]
     passed = distance < tip_radius
     lost = np.full(len(points), np.inf)
     lost[passed] = distance[passed] ** 2 / (tip_radius + np.sqrt(tip_radius**2 - distance[passed] ** 2))
     worst = np.zeros(len(surface.faces))
     np.maximum.at(worst, owner, lost)
-    return limit + worst
+    return FoundHeights(limit + worst, limit + lost, (surface.face_areas / parts**2)[owner])
 
 
 def found_probability(

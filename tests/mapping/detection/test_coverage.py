@@ -30,14 +30,14 @@ def plate(cells: int = 24) -> Surface:
 def test_a_face_beside_a_sweep_hides_what_the_ball_passes_over() -> None:
     surface = plate()
     touched = np.column_stack([np.linspace(0, 0.06, 601), np.full(601, 0.03), np.zeros(601)])
-    height = found_heights(surface, touched, R, 1e-4)
+    height = found_heights(surface, touched, R, 1e-4).face
     middle = surface.vertices[surface.faces].mean(axis=1)
     away = np.abs(surface.vertices[surface.faces][:, :, 1] - 0.03).max(axis=1)
     near = away < 0.8 * R
     exact, beyond = (1e-4 + R - np.sqrt(R**2 - (away[near] + more) ** 2) for more in (0.0, 0.1 * R))
     assert (height[near] >= exact).all() and (height[near] <= beyond).all()
     assert np.isinf(height[np.abs(middle[:, 1] - 0.03) > 1.1 * R]).all()
-    assert np.isinf(found_heights(surface, touched[:0], R, 1e-4)).all()
+    assert np.isinf(found_heights(surface, touched[:0], R, 1e-4).face).all()
 
 
 def test_the_probability_of_finding_is_what_detection_does() -> None:
@@ -72,3 +72,15 @@ def test_a_survey_inspects_what_it_was_asked_for() -> None:
     part = Inspected.of(half, base, detect(half, base), 4e-4)
     assert 0.2 < part.share(4e-4) < 0.5 and part.untouched > 0.4
     assert "No sweep came near" in part.sentence()
+
+
+def test_the_share_that_was_passed_does_not_depend_on_how_large_the_faces_are():
+    corners = 0.2 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
+    plate = Surface(corners, [[0, 1, 2], [0, 2, 3]])
+    line = np.column_stack([np.linspace(-0.05, 0.05, 201), np.zeros(201), np.zeros(201)])
+    found = found_heights(plate, line, 0.01, 1e-4)
+    assert np.isinf(found.face).all()
+    assert found.area.sum() == pytest.approx(0.16)
+    # at least the strip of half a tip radius to either side, at most that of a whole one and the round ends
+    passed = found.area[np.isfinite(found.place)].sum()
+    assert 0.1 * 0.01 < passed < 0.1 * 0.02 + np.pi * 0.01**2
