@@ -120,10 +120,12 @@ def test_libigl_reads_the_right_curvature_from_the_mesh(bend):
 def test_zippering_is_fast():
     import time
 
-    trace = raster(cap, pitch=0.01, spacing=0.002)
-    start = time.process_time()
-    mesh = mesh_sweeps(trace, spacing=0.0)
-    assert len(mesh.vertices) / (time.process_time() - start) > 2e5
+    trace, seconds = raster(cap, pitch=0.01, spacing=0.002), []
+    for _ in range(3):  # the first one loads or compiles the kernels; a busy machine disturbs each of them
+        start = time.process_time()
+        mesh = mesh_sweeps(trace, spacing=0.0)
+        seconds.append(time.process_time() - start)
+    assert len(mesh.vertices) / min(seconds) > 2e5
 
 
 def test_pitch_is_the_distance_between_sweeps():
