@@ -145,7 +145,7 @@ class Session:
 
     @property
     def holds_samples(self) -> bool:
-        """True if there is a log that must not be lost: the one that is being written, or the one whose place it takes."""
+        """True if there is a log that must not be lost: the one being written, or the one whose place it takes."""
         return bool(self._log is not None and self._log.samples) or self._goes_on_in_place
 
     def open_log(self, **settings: Any) -> Recorder:

@@ -23,11 +23,12 @@ import numpy as np
 from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
 from mapping.detection.filters import Bank
-from mapping.detection.local_level import LOG_VARIANCE_PER_BIN, MEDIAN_OF_UNIT_NORMAL, excess, local_levels
-from mapping.instrument import Noise
+from mapping.detection.local_level import LOG_VARIANCE_PER_BIN, excess, local_levels
+from mapping.instrument import Noise, robust_sd
 
-# Variance of the logarithm of that variance in a cell of one half-width; simulated with white and correlated noise and
-# with and without a drift: 2.6 to 4.5, the largest for white noise.
+# The scale of unit outputs is read from their median absolute value, which what is no noise in less than half of a cell
+# shifts little. Variance of the logarithm of the variance so read in a cell of one half-width; simulated with white and
+# correlated noise and with and without a drift: 2.6 to 4.5, the largest for white noise.
 LOG_VARIANCE_PER_WIDTH = 4.2
 # Half-widths in a cell: the fewest over which the median's own bias stays below 0.03 in the logarithm of the variance.
 CELL_WIDTHS = 12.0
@@ -123,7 +124,7 @@ def null_scales(
         if all(p.length >= LEAST_SWEEP_WIDTHS * widths[k] for p in profiles):
             inherited, variance = _deviations(told)
             doubt = _doubt(0.5 * np.sqrt(variance), threshold)
-        level = 2 * np.log(max(float(np.median(together)), 1e-12) / MEDIAN_OF_UNIT_NORMAL)
+        level = 2 * np.log(max(robust_sd(together), 1e-12))
         error = LOG_VARIANCE_PER_WIDTH * widths[k] / length + _spread(inherited)
         pooled[k] = _likely_scale(level, error, length / widths[k], len(measured))
         if not any(deviation.any() for deviation in inherited):
@@ -232,7 +233,7 @@ def _cell_levels(z: FloatArray, cells: int, bank: Bank, k: int) -> tuple[FloatAr
         part = part[np.isfinite(part)]
         width = len(part) * step / bank.filters[k].half_width
         if width >= 1.0:
-            level[c] = 2 * np.log(max(float(np.median(part)), 1e-12) / MEDIAN_OF_UNIT_NORMAL)
+            level[c] = 2 * np.log(max(robust_sd(part), 1e-12))
             variance[c] = LOG_VARIANCE_PER_WIDTH / width
     return level, variance
 

@@ -20,6 +20,35 @@ def level_likelihood(read, error, by_sweep, along, length):  # type: ignore[no-u
         by_sweep, along: variances of b and of x.
         length: correlation length of x in cells.
     """
+    _, (squared, crossed, ones, logdet) = _forward(read, error, along, length)
+    told = 1.0 + by_sweep * ones
+    return -0.5 * (squared - by_sweep * crossed * crossed / told + logdet + np.log(told))
+
+
+@njit(cache=True)
+def expected_level(read, error, by_sweep, along, length):  # type: ignore[no-untyped-def]
+    """(C,) expectation of the level's logarithm in each cell, given all readings; arguments as above."""
+    filtered, (_, crossed, ones, _) = _forward(read, error, along, length)
+    decay = np.exp(-1.0 / length)
+    # back along x (Rauch, Tung and Striebel 1965)
+    for c in range(len(read) - 2, -1, -1):
+        ahead = along + decay * decay * (filtered[c, 2] - along)
+        share = decay * filtered[c, 2] / ahead if ahead > 0.0 else 0.0
+        for j in range(2):
+            filtered[c, j] += share * (filtered[c + 1, j] - decay * filtered[c, j])
+    of_sweep = by_sweep * crossed / (1.0 + by_sweep * ones)
+    return of_sweep + filtered[:, 0] - of_sweep * filtered[:, 1]
+
+
+@njit(cache=True)
+def _forward(read, error, along, length):  # type: ignore[no-untyped-def]
+    """The filter along x.
+
+    Returns:
+        (C, 3): what the readings up to a cell say of x there, what readings of one everywhere would say, and the
+        variance of x; and of the innovations of both: products, and the logarithm of their variances.
+    """
+    filtered = np.zeros((len(read), 3))
     squared, crossed, ones, logdet = 0.0, 0.0, 0.0, 0.0
     decay = np.exp(-1.0 / length)
     state, answer, variance = 0.0, 0.0, along
@@ -37,37 +66,5 @@ def level_likelihood(read, error, by_sweep, along, length):  # type: ignore[no-u
             logdet += np.log(total)
             state, answer = state + gain * off, answer + gain * one
             variance *= error[c] / total
-    told = 1.0 + by_sweep * ones
-    return -0.5 * (squared - by_sweep * crossed * crossed / told + logdet + np.log(told))
-
-
-@njit(cache=True)
-def expected_level(read, error, by_sweep, along, length):  # type: ignore[no-untyped-def]
-    """(C,) expectation of the level's logarithm in each cell, given all readings; arguments as above."""
-    count = len(read)
-    decay = np.exp(-1.0 / length)
-    # columns: what the readings say of x, and what readings of one everywhere would say
-    filtered, variances = np.zeros((count, 2)), np.zeros(count)
-    state, answer, variance = 0.0, 0.0, along
-    crossed, ones = 0.0, 0.0
-    for c in range(count):
-        if c > 0:
-            state, answer = decay * state, decay * answer
-            variance = along + decay * decay * (variance - along)
-        if np.isfinite(error[c]):
-            total = variance + error[c]
-            gain = variance / total
-            off, one = read[c] - state, 1.0 - answer
-            crossed += off * one / total
-            ones += one * one / total
-            state, answer = state + gain * off, answer + gain * one
-            variance *= error[c] / total
-        filtered[c, 0], filtered[c, 1], variances[c] = state, answer, variance
-    # back along x (Rauch, Tung and Striebel 1965)
-    for c in range(count - 2, -1, -1):
-        ahead = along + decay * decay * (variances[c] - along)
-        share = decay * variances[c] / ahead if ahead > 0.0 else 0.0
-        for j in range(2):
-            filtered[c, j] += share * (filtered[c + 1, j] - decay * filtered[c, j])
-    of_sweep = by_sweep * crossed / (1.0 + by_sweep * ones)
-    return of_sweep + filtered[:, 0] - of_sweep * filtered[:, 1]
+        filtered[c, 0], filtered[c, 1], filtered[c, 2] = state, answer, variance
+    return filtered, (squared, crossed, ones, logdet)

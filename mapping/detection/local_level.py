@@ -13,12 +13,10 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray
 from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH, Bank
+from mapping.instrument import robust_sd
 
-# The variance of unit outputs is read from their median absolute value, 0.6745 standard deviations, which what is no
-# noise in less than half of a cell shifts little.
-MEDIAN_OF_UNIT_NORMAL = 0.6744897501960817
-# The same of differences of neighbouring bins, for one bin: 5.4 if they were independent; simulated: 6.6 in white
-# noise, less in correlated noise.
+# Variance of the logarithm of the variance that the median absolute difference of neighbouring bins tells, for one bin:
+# 5.4 if they were independent; simulated: 6.6 in white noise, less in correlated noise.
 LOG_VARIANCE_PER_BIN = 6.6
 # Bins in a cell of the local level: three half-widths of the narrowest filter, which sees the level's mean over two.
 LEVEL_BINS = 3 * FILTER_BINS_PER_HALF_WIDTH
@@ -70,7 +68,7 @@ def _difference_levels(height: FloatArray, quiet: BoolArray, sd: float) -> tuple
         part = step[edges[c] : edges[c + 1]]
         part = part[np.isfinite(part)]
         if len(part) >= FILTER_BINS_PER_HALF_WIDTH:
-            y[c] = 2 * np.log(max(float(np.median(part)), 1e-12) / MEDIAN_OF_UNIT_NORMAL)
+            y[c] = 2 * np.log(max(robust_sd(part), 1e-12))
             v[c] = LOG_VARIANCE_PER_BIN / len(part)
     return y, v
 

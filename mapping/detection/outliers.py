@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import BoolArray, FloatArray
-from mapping.base import LaidSweep, SweepHeights
+from mapping.base import MAD_TO_SD, LaidSweep, SweepHeights
+from mapping.instrument import robust_sd
 
 # Blocks in which the bend is looked for, in samples: a run between two of them loses less than half of its bend.
 BLOCKS = (1, 3, 9, 27, 81)
@@ -32,7 +33,6 @@ FOOT = 0.25
 # Share of the usual step between readings below which a reading counts as the one before, and how many such in a row
 # are a reading that is stuck: by chance (0.008)^8.
 UNCHANGED, STUCK = 0.01, 8
-MEDIAN_OF_UNIT_NORMAL = 0.6744897501960817
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ def _level(differences: FloatArray, resolution: float) -> FloatArray | None:
     """(N,) sd of the differences of neighbouring samples around each; None where they do not scatter at all."""
     cells = max(1, len(differences) // LEVEL_SAMPLES)
     whole = len(differences) // cells * cells
-    levels = np.median(np.abs(differences[:whole]).reshape(cells, -1), axis=1) / MEDIAN_OF_UNIT_NORMAL
+    levels = MAD_TO_SD * np.median(np.abs(differences[:whole]).reshape(cells, -1), axis=1)
     usual = float(np.median(levels))
     if usual <= resolution:
         return None
@@ -114,7 +114,7 @@ def _impossible(height: FloatArray, level: FloatArray, step: float, tip_radius: 
         bend = (2 * means[size:-size] - means[: -2 * size] - means[2 * size :]) / level[size : 1 - 2 * size]
         # a few thousand tell the scatter as well as all of them
         every = max(1, size // 2, len(bend) // 2000)
-        sd = max(float(np.median(np.abs(bend[::every]))) / MEDIAN_OF_UNIT_NORMAL, np.finfo(float).tiny)
+        sd = max(robust_sd(bend[::every]), np.finfo(float).tiny)
         allowed = ALLOWED_BEND * (size * step) ** 2 / tip_radius
         excess = bend / sd
         if excess.max() <= OUT:

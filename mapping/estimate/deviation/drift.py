@@ -14,7 +14,7 @@ import numpy as np
 
 from mapping import FloatArray, IntArray, Trace, length_text
 from mapping.base import LaidTrace
-from mapping.estimate.deviation.evidence import NOISE_GRID, laws
+from mapping.estimate.deviation.evidence import NOISE_GRID, decorrelated, laws
 
 # Standard deviations of the sweeps' offsets and half rises that are tried, against the noise of a block: a factor of
 # three apart, for a variance that is wrong by that costs a fifth of what one sweep says
@@ -72,16 +72,17 @@ def drift(sweep: IntArray, place: FloatArray, height: FloatArray, noise: float, 
         step: between blocks, m.
     """
     order = np.argsort(sweep, kind="stable")
-    place, own = place[order], height[order]
-    numbers, row, counts = np.unique(sweep[order], return_inverse=True, return_counts=True)
-    first = np.cumsum([0, *counts[:-1]])
+    sweep, place, height = sweep[order], place[order], height[order]
+    numbers, first, row, counts = np.unique(sweep, return_index=True, return_inverse=True, return_counts=True)
     middle = 0.5 * (place[first] + place[first + counts - 1])
     half = np.maximum(0.5 * (place[first + counts - 1] - place[first]), step)
-    columns = np.column_stack([own, np.ones(len(own)), (place - middle[row]) / half[row]])
+    columns = np.column_stack([height, np.ones(len(height)), (place - middle[row]) / half[row]])
     best: _Best | None = None
     nothing = -np.inf
     for law in laws():
-        grams = _grams(columns, first, counts, place, step, *law)
+        flat, log_scale = decorrelated(columns, sweep, place / step, *law)
+        products = np.add.reduceat(flat[:, :, None] * flat[:, None, :], first, axis=0)
+        grams = _Grams(products, counts, log_scale)
         for white in noise * NOISE_GRID:
             log = _likelihoods(grams, white, noise)
             nothing = max(nothing, float(log[0, 0]))
@@ -117,30 +118,6 @@ class _Best:
         inner = np.eye(2) + t[:, None] * t * g[:, 1:, 1:] / self.white**2
         right = (t * g[:, 1:, 0] / self.white**2)[..., None]
         return np.asarray(t * np.linalg.solve(inner, right)[..., 0])
-
-
-def _grams(
-    columns: FloatArray, first: IntArray, counts: IntArray, place: FloatArray, step: float, level: float, length: float
-) -> _Grams:
-    """Of columns (B, 3) whitened by a Kalman filter along all sweeps at once; level against the white part."""
-    white, log_scale = np.empty_like(columns), 0.0
-    mean, spread = np.zeros((len(first), 3)), np.full(len(first), level**2)
-    for k in range(int(counts.max())):
-        here = np.flatnonzero(counts > k)
-        which = first[here] + k
-        if k:
-            keep = np.exp(-np.abs(place[which] - place[which - 1]) / (step * length))
-            mean[here] *= keep[:, None]
-            spread[here] = keep**2 * spread[here] + (1.0 - keep**2) * level**2
-        total = spread[here] + 1.0
-        innovation = columns[which] - mean[here]
-        white[which] = innovation / np.sqrt(total)[:, None]
-        gain = spread[here] / total
-        mean[here] += gain[:, None] * innovation
-        spread[here] *= 1.0 - gain
-        log_scale += 0.5 * float(np.log(total).sum())
-    products = np.add.reduceat(white[:, :, None] * white[:, None, :], first, axis=0)
-    return _Grams(products, counts, log_scale)
 
 
 def _likelihoods(grams: _Grams, white: float, noise: float) -> FloatArray:

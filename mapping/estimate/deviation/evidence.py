@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, IntArray
+from mapping import FloatArray, IntArray
 
 # Correlated part of a block's noise in units of the white part, and its length in blocks: from none to offsets of
 # whole sweeps
@@ -64,47 +64,53 @@ def every_law() -> list[int]:
 def whitened(columns: FloatArray, piece: IntArray, place: FloatArray, step: float) -> list[Whitened]:
     """One for each law of noise.
 
-    A Kalman filter of one state along all pieces at once: its innovations are independent.
-
     Args:
         columns: (B, 1 + K) heights first.
         piece: (B,) number of the stretch of each block, not decreasing.
         place: (B,) arclength in it, m.
         step: between blocks, m.
     """
-    _, row, counts = np.unique(piece, return_inverse=True, return_counts=True)
-    starts = np.cumsum([0, *counts[:-1]])
-    rank = np.arange(len(piece)) - starts[row]
-    index = np.full((len(counts), counts.max()), -1)
-    index[row, rank] = np.arange(len(piece))
-    gap = np.zeros(index.shape)
-    gap[row, rank] = np.append(0.0, np.diff(place)) / step * (rank > 0)
-    return [_whitened(columns, index, gap, level, length) for level, length in laws()]
+    found = []
+    for level, length in laws():
+        white, log_scale = decorrelated(columns, piece, place / step, level, length)
+        y, a = white[:, 0], white[:, 1:]
+        found.append(Whitened(a.T @ a, a.T @ y, float(y @ y), log_scale, len(y)))
+    return found
 
 
-def _whitened(columns: FloatArray, index: IntArray, gap: FloatArray, level: float, length: float) -> Whitened:
+def decorrelated(
+    columns: FloatArray, piece: IntArray, place: FloatArray, level: float, length: float
+) -> tuple[FloatArray, float]:
+    """(B, K) columns as noise of one law would be white with unit variance, and the logarithm of the filter's gain.
+
+    A Kalman filter of one state along all pieces at once: its innovations are independent.
+
+    Args:
+        columns: (B, K).
+        piece: (B,) number of the stretch of each block, not decreasing.
+        place: (B,) place in it, in blocks.
+        level, length: of the law (see `laws`).
+    """
     if level == 0.0:
-        white, log_scale = columns, 0.0
-    else:
-        white, log_scale = np.empty_like(columns), 0.0
-        rows, width = index.shape[0], columns.shape[1]
-        mean, spread = np.zeros((rows, width)), np.full(rows, level**2)
-        for k in range(index.shape[1]):
-            here: BoolArray = index[:, k] >= 0
-            which = index[here, k]
-            if k:
-                keep = np.exp(-np.abs(gap[here, k]) / length)
-                mean[here] *= keep[:, None]
-                spread[here] = keep**2 * spread[here] + (1.0 - keep**2) * level**2
-            total = spread[here] + 1.0
-            innovation = columns[which] - mean[here]
-            white[which] = innovation / np.sqrt(total)[:, None]
-            gain = spread[here] / total
-            mean[here] += gain[:, None] * innovation
-            spread[here] *= 1.0 - gain
-            log_scale += 0.5 * float(np.log(total).sum())
-    y, a = white[:, 0], white[:, 1:]
-    return Whitened(a.T @ a, a.T @ y, float(y @ y), log_scale, len(y))
+        return columns, 0.0
+    _, starts, counts = np.unique(piece, return_index=True, return_counts=True)
+    white, log_scale = np.empty_like(columns), 0.0
+    mean, spread = np.zeros((len(starts), columns.shape[1])), np.full(len(starts), level**2)
+    for k in range(int(counts.max())):
+        here = np.flatnonzero(counts > k)
+        which = starts[here] + k
+        if k:
+            keep = np.exp(-np.abs(place[which] - place[which - 1]) / length)
+            mean[here] *= keep[:, None]
+            spread[here] = keep**2 * spread[here] + (1.0 - keep**2) * level**2
+        total = spread[here] + 1.0
+        innovation = columns[which] - mean[here]
+        white[which] = innovation / np.sqrt(total)[:, None]
+        gain = spread[here] / total
+        mean[here] += gain[:, None] * innovation
+        spread[here] *= 1.0 - gain
+        log_scale += 0.5 * float(np.log(total).sum())
+    return white, log_scale
 
 
 def best_fit(seen: list[Whitened], which: IntArray, prior: FloatArray, noise: float, among: list[int]) -> Fit:
