@@ -21,12 +21,6 @@ if TYPE_CHECKING:
     from mapping.base.pose import Pose as Pose, estimate_pose as estimate_pose
     from mapping.base.profiles import Form as Form
     from mapping.base.projection import onto_base as onto_base
-    from mapping.base.robust import (
-        MAD_TO_SD as MAD_TO_SD,
-        RobustFit as RobustFit,
-        robust_fit as robust_fit,
-        robust_scale as robust_scale,
-    )
 
 _PUBLIC = {
     "anchor": ("anchor", "tangent_frame"),
@@ -39,6 +33,5 @@ _PUBLIC = {
     "pose": ("Pose", "estimate_pose"),
     "profiles": ("Form",),
     "projection": ("onto_base",),
-    "robust": ("MAD_TO_SD", "RobustFit", "robust_fit", "robust_scale"),
 }
 doorway(__name__, _PUBLIC)

@@ -11,7 +11,7 @@ from mapping.base.base import Base, Feet
 from mapping.base.cells import Cells
 from mapping.base.fit import fit_base
 from mapping.base.laid_trace import LaidTrace
-from mapping.base.robust import robust_scale
+from mapping.instrument import robust_scale
 
 MOST_EXTENT_CELLS = 4000
 # Samples that are asked where a trace leaves the base. The border is known to the base's triangles, half a tip radius:

@@ -13,9 +13,9 @@ from mapping.base.base import Base
 from mapping.base.polyhedron import polyhedron
 from mapping.base.profiles import AUTO, Form, fit_profile, profile_frame
 from mapping.base.quadrics import FAMILIES, Cloud, Family, Fitted, cylinder, plane, sheet, sphere
-from mapping.base.robust import FEATURE_RESIDUAL_SDS, robust_scale
 from mapping.base.star import star
 from mapping.base.tube import tube
+from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_scale
 
 MOST_BASE_CELLS = 4000
 # Families for what no simple one explains

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from mapping import FloatArray, IntArray, Trace, TraceError
 from mapping.base.base import Base, PoseRecord
 from mapping.base.cells import Cells
-from mapping.base.robust import BISQUARE, MAD_TO_SD
+from mapping.instrument import BISQUARE, MAD_TO_SD
 
 # Cells that the pose is fitted to, and of these the share that leads there: a few rounds with all of them then do
 MOST_POSE_CELLS, LEADING = 4000, 8

@@ -12,7 +12,7 @@ from mapping import FloatArray, IntArray, Surface, Trace
 from mapping.base.base import FitValue
 from mapping.base.cells import Cells
 from mapping.base.profiles import SHORTEST_BEND
-from mapping.base.robust import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_fit, robust_scale
+from mapping.instrument import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_fit, robust_scale
 
 # Upward part of the mean direction from a round body's middle of what was felt inside it, without contact normals
 BELOW = -0.6

@@ -8,7 +8,7 @@ import numpy as np
 
 from mapping import FloatArray, IntArray, Surface
 from mapping.base.quadrics import Cloud, Fitted, outside
-from mapping.base.robust import robust_fit
+from mapping.instrument import robust_fit
 
 Radius = Callable[[FloatArray], FloatArray]
 

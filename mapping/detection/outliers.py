@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import BoolArray, FloatArray
-from mapping.base import MAD_TO_SD, LaidSweep, SweepHeights
-from mapping.instrument import robust_sd
+from mapping.base import LaidSweep, SweepHeights
+from mapping.instrument import MAD_TO_SD, robust_sd
 
 # Blocks in which the bend is looked for, in samples: a run between two of them loses less than half of its bend.
 BLOCKS = (1, 3, 9, 27, 81)

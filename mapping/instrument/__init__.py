@@ -1,4 +1,4 @@
-"""The instrument: the noise of a sweep, its fit, its statement, and the tip's calibration."""
+"""The instrument: the noise of a sweep, its fit, its statement, robust measures of it, and the tip's calibration."""
 
 from typing import TYPE_CHECKING
 
@@ -12,13 +12,31 @@ if TYPE_CHECKING:
         perturbed as perturbed,
         relative_sd as relative_sd,
     )
-    from mapping.instrument.noise import Noise as Noise, estimate_noise as estimate_noise, robust_sd as robust_sd
+    from mapping.instrument.noise import Noise as Noise, estimate_noise as estimate_noise
+    from mapping.instrument.robust import (
+        BISQUARE as BISQUARE,
+        FEATURE_RESIDUAL_SDS as FEATURE_RESIDUAL_SDS,
+        MAD_TO_SD as MAD_TO_SD,
+        RobustFit as RobustFit,
+        robust_fit as robust_fit,
+        robust_scale as robust_scale,
+        robust_sd as robust_sd,
+    )
     from mapping.instrument.stated import StatedNoise as StatedNoise
     from mapping.instrument.tip_calibration import TipCalibration as TipCalibration, calibrate_tip as calibrate_tip
 
 _PUBLIC = {
     "fit": ("Blocks", "NoiseFit", "fit_noise", "perturbed", "relative_sd"),
-    "noise": ("Noise", "estimate_noise", "robust_sd"),
+    "noise": ("Noise", "estimate_noise"),
+    "robust": (
+        "BISQUARE",
+        "FEATURE_RESIDUAL_SDS",
+        "MAD_TO_SD",
+        "RobustFit",
+        "robust_fit",
+        "robust_scale",
+        "robust_sd",
+    ),
     "stated": ("StatedNoise",),
     "tip_calibration": ("TipCalibration", "calibrate_tip"),
 }

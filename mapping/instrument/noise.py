@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping import FloatArray, NoiseError
+from mapping.instrument.robust import robust_sd
 
 # The median of |x| of a standard normal variable: turns a median absolute deviation into a standard deviation.
-MEDIAN_OF_ABSOLUTE_NORMAL = 0.6744897501960817
 
 # A correlated part must lower chi-square by this much, or the noise counts as white.
 LEAST_CHI_SQUARE_GAIN = 6.0
@@ -145,11 +145,6 @@ def estimate_noise(residual: ArrayLike, s: ArrayLike) -> Noise:
         raise NoiseError(f"the noise needs at least 16 samples to be estimated; found {len(s)}")
     blocks, variances, counts, spacing = _allan_variances(residual, s)
     return _fit_allan(blocks, variances, counts, spacing)
-
-
-def robust_sd(values: FloatArray) -> float:
-    """Standard deviation of the Gaussian core of values about zero (median absolute value)."""
-    return float(np.median(np.abs(values)) / MEDIAN_OF_ABSOLUTE_NORMAL)
 
 
 def _mean_variance(x: FloatArray) -> FloatArray:

@@ -9,7 +9,8 @@ import numpy as np
 
 from hw import Move
 from mapping import FloatArray, SurfaceError, Trace, TraceError
-from mapping.base import BASE_TRIANGLE_SIZE, MAD_TO_SD, Base, Cells, fit_base, robust_scale, rolled_off, touched_part
+from mapping.base import BASE_TRIANGLE_SIZE, Base, Cells, fit_base, rolled_off, touched_part
+from mapping.instrument import MAD_TO_SD, robust_scale
 from planners import Outcome, Plan, PlannerError
 from planners.explore.feel_line import Felt, FeltLine, empty_at, facing
 from planners.survey import Survey

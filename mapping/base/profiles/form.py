@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import BoolArray, FloatArray, FormError, Trace
-from mapping.base import robust_fit
+from mapping.instrument import robust_fit
 
 POSSIBLE_FORMS = "auto, line, arc, poly:N with N from 1 to 12, gaussian:WAVELENGTH such as gaussian:0.8mm, none"
 # The normal equations in the splines' basis have the condition 5e6 at degree 12, 3e8 at 15 and 2.5e11 at 20: of 16

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import FloatArray
-from mapping.base import robust_fit, robust_scale
+from mapping.instrument import robust_fit, robust_scale
 
 # A bend of a base stands alone if it leaves what the rest of the base bends about by so many of that scatter, over
 # less than this share of the length: form bends everywhere. Simulated on 480 places, 1500 random forms each: forms

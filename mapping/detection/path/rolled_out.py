@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import BoolArray, ComplexArray, FloatArray, IntArray, Trace
-from mapping.base import Base, Feet, robust_scale
+from mapping.base import Base, Feet
+from mapping.instrument import robust_scale
 
 # Blocks that the reach of a turn is cut into: a turn is placed to an eighth of it
 BLOCKS_PER_REACH = 8

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray
-from mapping.base import MAD_TO_SD, LaidTrace, SweepHeights
+from mapping.base import LaidTrace, SweepHeights
+from mapping.instrument import MAD_TO_SD
 
 # Width of a bin in tip radii, and bins in a block: a crest of 0.06 tip radii spans three blocks under its whole width
 BIN, BINS_PER_BLOCK = 0.1, 5

@@ -9,7 +9,7 @@ from itertools import chain, combinations
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Trace
-from mapping.base import MAD_TO_SD, Base, LaidTrace, Pose
+from mapping.base import Base, LaidTrace, Pose
 from mapping.estimate.deviation.blocks import BIN, BINS_PER_BLOCK, Blocks
 from mapping.estimate.deviation.drift import Drift, drift
 from mapping.estimate.deviation.evidence import Fit, Whitened, best_fit, every_law, whitened
@@ -17,6 +17,7 @@ from mapping.estimate.deviation.fields import RigidFrame, SmoothField, spread
 from mapping.estimate.deviation.parts import parts_of, stands_off
 from mapping.estimate.deviation.reshaped import fine_enough, reshaped
 from mapping.estimate.deviation.result import Deviation, Part
+from mapping.instrument import MAD_TO_SD
 
 # Fewer blocks tell nothing
 FEWEST_BLOCKS = 24

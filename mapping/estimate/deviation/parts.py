@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from mapping import BoolArray, FloatArray
-from mapping.base import MAD_TO_SD, Feet
+from mapping.base import Feet
 from mapping.estimate.deviation.blocks import BIN, BINS_PER_BLOCK, Blocks
 from mapping.estimate.deviation.result import Part
+from mapping.instrument import MAD_TO_SD
 
 # A stretch of a sweep that stands off over so many tip radii is wide: the ball goes into it, or onto it, as a whole,
 # which it does with no fine feature

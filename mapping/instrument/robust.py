@@ -11,7 +11,8 @@ from mapping import FloatArray
 # Tukey's bisquare at 4.685 standard deviations keeps 95 % efficiency on Gaussian residuals (Beaton and Tukey, The
 # fitting of power series, Technometrics 16, 1974).
 BISQUARE = 4.685
-MAD_TO_SD = 1.4826
+# Standard deviation of normal values against their median absolute deviation
+MAD_TO_SD = 1.482602218505602
 # A residual beyond so many standard deviations counts as a feature: its size does not matter any more.
 FEATURE_RESIDUAL_SDS = 3.0
 L1_ROUNDS = 15
@@ -27,6 +28,11 @@ class RobustFit:
     coefficients: FloatArray
     residual: FloatArray
     cost: float
+
+
+def robust_sd(values: FloatArray) -> float:
+    """Standard deviation of the Gaussian core of values about zero (median absolute value)."""
+    return float(MAD_TO_SD * np.median(np.abs(values)))
 
 
 def robust_scale(residual: FloatArray) -> float:
