@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from explore3d.pictures.chart import FONT_SIZE, drawing, image, pixels_png, text_at
 from explore3d.pictures.object import SUPERSAMPLING, cameras_for, pictured, shifted, view_directions
 from explore3d.pictures.render import Body, render
-from mapping import BoolArray, FloatArray, Surface, length_unit
+from mapping import BoolArray, Feature, FloatArray, Surface, length_unit
+from mapping.geometry.mesh import NearestPoint
 
 if TYPE_CHECKING:
     from mapping.geometry.curvature import Curvature
@@ -26,38 +28,60 @@ BLUE_TO_RED = (
 BAR = (16.0, 220.0)  # width and height of the scale of colours, px
 BAR_ROOM = 90.0  # px
 CURVATURE_TITLE = 28.0  # px
+# An edge of 2 r that spans a body of radius 5 r or more stays nearer to it than this share of r: (2 r)^2 / (8 * 5 r)
+LID_SAGITTA = 0.1
 # Places on the scale that bear a number
 MARKS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 
 
-def curvature_picture(surface: Surface, curvature: Curvature, tip_radius: float) -> bytes:
+def curvature_picture(
+    surface: Surface, curvature: Curvature, tip_radius: float, base: Surface, features: Sequence[Feature]
+) -> bytes:
     """SVG of k1 and k2 in units of 1/r: red bulges out, blue bends in; pale where
     the value is within three standard deviations of zero, grey where none is valid.
+
+    A row for each view of the object's own picture; what merely closes an opening of the object is not drawn.
 
     Args:
         surface: the estimated surface.
         curvature: at its vertices.
         tip_radius: r, m.
+        base: the global model.
+        features: that were found: they are turned to the front.
     """
     areas = surface.face_areas[:, None]
-    direction = view_directions(surface.face_normals * areas / areas.mean(), ())[0]
-    camera = cameras_for(surface.vertices, [direction, direction])[0]
-    width, height = camera.width / SUPERSAMPLING, camera.height / SUPERSAMPLING
+    directions = view_directions(surface.face_normals * areas / areas.mean(), features)
+    surface = _without_lids(surface, base, tip_radius)
     scaled = [np.asarray(values) * tip_radius for values in (curvature.k1, curvature.k2)]
     top = _span(scaled, curvature.valid)
-    content = ""
-    for left, values, name in zip((0.0, width), scaled, ("larger, k₁", "smaller, k₂"), strict=True):
-        colours = coloured(0.5 + 0.5 * values / top)
-        colours[np.abs(values) < SIGNIFICANT * curvature.sd * tip_radius] = FLAT_COLOUR
-        colours[~curvature.valid] = NOT_VALID
-        content += text_at(left + 4.0, 18.0, f"Principal curvature, {name}", size=1.1 * FONT_SIZE, bold=True)
-        content += shifted(pictured(render([Body(surface, colours)], camera)), left, CURVATURE_TITLE)
-    bar = min(BAR[1], height)
+    content, down, right = "", CURVATURE_TITLE, 0.0
+    for direction in directions:
+        camera = cameras_for(surface.vertices, [direction, direction])[0]
+        width, height = camera.width / SUPERSAMPLING, camera.height / SUPERSAMPLING
+        for left, values, name in zip((0.0, width), scaled, ("larger, k₁", "smaller, k₂"), strict=True):
+            colours = coloured(0.5 + 0.5 * values / top)
+            colours[np.abs(values) < SIGNIFICANT * curvature.sd * tip_radius] = FLAT_COLOUR
+            colours[~curvature.valid] = NOT_VALID
+            if not right:
+                content += text_at(left + 4.0, 18.0, f"Principal curvature, {name}", size=1.1 * FONT_SIZE, bold=True)
+            content += shifted(pictured(render([Body(surface, colours)], camera)), left, down)
+        down, right = down + height, max(right, 2.0 * width)
+    bar = min(BAR[1], down - CURVATURE_TITLE)
     marks = [f"{share * top:.2g}" for share in MARKS]
-    content += shifted(
-        _bar(marks, "curvature × tip radius", bar), 2.0 * width + 14.0, CURVATURE_TITLE + 0.5 * (height - bar)
-    )
-    return drawing(2.0 * width + BAR_ROOM, height + CURVATURE_TITLE + 10.0, content)
+    middle = 0.5 * (CURVATURE_TITLE + down - bar)
+    content += shifted(_bar(marks, "curvature × tip radius", bar), right + 14.0, middle)
+    return drawing(right + BAR_ROOM, down + 10.0, content)
+
+
+def _without_lids(surface: Surface, base: Surface, tip_radius: float) -> Surface:
+    """The faces that a ball can rest on: one wider than the ball whose longest edge leaves the base closes a hole."""
+    corners = surface.vertices[surface.faces]
+    others = np.roll(corners, 1, axis=1)
+    edges = np.linalg.norm(corners - others, axis=2)
+    wide, longest = np.flatnonzero(edges.max(axis=1) > 2.0 * tip_radius), edges.argmax(axis=1)
+    middles = 0.5 * (corners + others)[wide, longest[wide]]
+    off = NearestPoint(base).query(middles).distance > LID_SAGITTA * tip_radius
+    return Surface(surface.vertices, np.delete(surface.faces, wide[off], axis=0))
 
 
 def coloured(share: FloatArray) -> FloatArray:

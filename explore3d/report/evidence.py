@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 
 from explore3d.analysis import Analysis, Comparison
-from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
+from explore3d.report.markup import Html, Row, badge, element, figure, folded, paragraph, section, table
 from explore3d.report.pictures import Pictures, shown_features
 from mapping import UNKNOWN_TEXT, length_text
 
@@ -41,7 +41,9 @@ def posteriors(pictures: Pictures) -> Html:
     for name, picture in pictures.files.items():
         if name.startswith("corner-"):
             caption = "Draws of the posterior, each parameter and each pair: 90 % intervals, contours of 50 and 90 %."
-            content.append(figure(picture, f"Posterior of {name.removeprefix('corner-')}", caption))
+            feature = name.removeprefix("corner-")
+            drawn = figure(picture, f"Posterior of {feature}", caption)
+            content.append(folded(f"{feature}: every parameter", name, drawn))
     return section("Posteriors", "posteriors", *content) if content else Html("")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 
@@ -31,21 +32,45 @@ def paragraph(*content: str) -> Html:
 
 
 def table(head: Row, rows: Iterable[Row], *, numeric: Sequence[int] = ()) -> Html:
-    """A table that scrolls sideways on narrow screens; columns in `numeric` are aligned to the right."""
+    """A table that scrolls sideways on narrow screens; columns in `numeric` are aligned to the right.
+
+    It can be scrolled by keyboard, so it can be reached by keyboard, and says what it is by its first column.
+    """
 
     def cells(kind: str, row: Row) -> Html:
         return element(
             "tr",
-            *(element(kind, each, **({"class_": "number"} if i in numeric else {})) for i, each in enumerate(row)),
+            # a header without a word is none
+            *(
+                element(kind if each else "td", each, **({"class_": "number"} if i in numeric else {}))
+                for i, each in enumerate(row)
+            ),
         )
 
     body = element("tbody", *(cells("td", row) for row in rows))
-    return element("div", element("table", element("thead", cells("th", head)), body), class_="table")
+    whole = element("table", element("thead", cells("th", head)), body)
+    return element("div", whole, class_="table", role="group", tabindex="0", aria_label=f"Table: {head[0]}")
 
 
 def section(title: str, name: str, *content: str) -> Html:
     """A titled section that can be linked to as #name."""
     return element("section", element("h2", title), *content, id=name)
+
+
+def contents(sections: Iterable[str]) -> Html:
+    """Links to the sections among pieces of a page, in their order."""
+    found = [
+        (match["name"], match["title"])
+        for each in sections
+        if (match := re.match(r'<section id="(?P<name>[^"]*)"><h2>(?P<title>.*?)</h2>', each))
+    ]
+    links = [element("a", Html(title), href=f"#{name}") for name, title in found]
+    return element("nav", *links, class_="contents", aria_label="Contents")
+
+
+def folded(summary: str, name: str, *content: str) -> Html:
+    """What is opened by a click, or by a link to #name."""
+    return element("details", element("summary", summary), element("div", *content, id=name))
 
 
 def figure(picture: bytes, description: str, caption: str) -> Html:

@@ -66,7 +66,9 @@ def _processor() -> str:
 
 
 REPORT_CSS = """
-:root { --ink: #1f2933; --soft: #52606d; --faint: #e4e7eb; --paper: #ffffff; --accent: #c62828; }
+:root { color-scheme: light dark; --ink: #1f2933; --soft: #52606d; --faint: #e4e7eb; --paper: #ffffff; --wash: #f5f7fa;
+  --link: #1d4e89; --edge: #9aa5b1; --chosen: #fff4cc; --warn: #fff8eb; --good: #e3f5ea; --good-ink: #14613c;
+  --bad: #fdecea; --bad-ink: #9b1c1c; --plain: #eef1f4; --plain-ink: #3e4c59; }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--paper); color: var(--ink);
   font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
@@ -77,7 +79,7 @@ h2 { font-size: 1.25rem; margin: 0 0 .6rem; font-weight: 650; }
 section { margin-top: 2.6rem; padding-top: 1.4rem; border-top: 1px solid var(--faint); }
 p { margin: .5rem 0; max-width: 46rem; }
 p.lead { font-size: 1.2rem; line-height: 1.5; max-width: 52rem; }
-.warning { border-left: 4px solid #d97706; background: #fff8eb; padding: .6rem .9rem; max-width: 52rem; }
+.warning { border-left: 4px solid #d97706; background: var(--warn); padding: .6rem .9rem; max-width: 52rem; }
 .facts { display: flex; flex-wrap: wrap; gap: 1px; margin: 1.4rem 0 0; background: var(--faint);
   border: 1px solid var(--faint); border-radius: 8px; overflow: hidden; }
 .facts div { background: var(--paper); padding: .7rem .9rem; flex: 1 1 150px; }
@@ -85,17 +87,18 @@ p.lead { font-size: 1.2rem; line-height: 1.5; max-width: 52rem; }
 .facts span { color: var(--soft); font-size: .85rem; }
 .table { overflow: auto; max-height: 34rem; margin: .8rem 0; border: 1px solid var(--faint); border-radius: 8px; }
 table { border-collapse: collapse; width: 100%; font-size: .92rem; font-variant-numeric: tabular-nums; }
-th { position: sticky; top: 0; background: #f5f7fa; text-align: left; font-weight: 600; color: var(--soft);
+th { position: sticky; top: 0; background: var(--wash); text-align: left; font-weight: 600; color: var(--soft);
   white-space: nowrap; }
-th, td { padding: .5rem .8rem; border-bottom: 1px solid var(--faint); vertical-align: top; }
+thead td { background: var(--wash); }
+th, td { padding: .5rem .7rem; border-bottom: 1px solid var(--faint); vertical-align: top; }
 tr:last-child td { border-bottom: 0; }
 td.number, th.number { text-align: right; white-space: nowrap; }
 td b, td span, td small { white-space: nowrap; } td small.note { white-space: normal; min-width: 9rem; }
 td small { display: block; color: var(--soft); font-size: .82rem; }
 .badge { display: inline-block; padding: .05rem .5rem; border-radius: 999px; font-size: .82rem; white-space: nowrap; }
-.badge.good { background: #e3f5ea; color: #14613c; }
-.badge.bad { background: #fdecea; color: #9b1c1c; }
-.badge.plain { background: #eef1f4; color: #3e4c59; }
+.badge.good { background: var(--good); color: var(--good-ink); }
+.badge.bad { background: var(--bad); color: var(--bad-ink); }
+.badge.plain { background: var(--plain); color: var(--plain-ink); }
 .bar { display: inline-block; height: .7rem; background: #829ab1; border-radius: 2px; min-width: 1px; }
 figure { margin: 1rem 0; }
 figure > img, figure > svg { max-width: 100%; height: auto; display: block; border: 1px solid var(--faint);
@@ -104,26 +107,37 @@ figcaption { color: var(--soft); font-size: .9rem; margin-top: .45rem; max-width
 .view { border: 1px solid var(--faint); border-radius: 8px; overflow: hidden; }
 .view .stage { position: relative; height: 560px; } .view.flat .stage { height: 400px; }
 .view canvas { width: 100%; height: 100%; display: block; touch-action: none; cursor: grab; }
-.view canvas:focus-visible { outline: 2px solid #1d4e89; outline-offset: -2px; }
+.view canvas:focus-visible { outline: 2px solid var(--link); outline-offset: -2px; }
 .view .tools { display: flex; flex-wrap: wrap; gap: .3rem 1.1rem; align-items: center; padding: .4rem .8rem;
-  background: #f5f7fa; border-bottom: 1px solid var(--faint); font-size: .88rem; }
+  background: var(--wash); border-bottom: 1px solid var(--faint); font-size: .88rem; }
 .view .tools button { margin-left: auto; }
-.view .label { position: absolute; margin: 0; padding: .35rem .6rem; background: #fffffff0; border: 1px solid #9aa5b1;
-  pointer-events: none; font: inherit; font-size: .85rem; line-height: 1.4; white-space: pre; }
+.view .label { position: absolute; margin: 0; padding: .35rem .6rem; background: var(--paper);
+  border: 1px solid var(--edge); pointer-events: none; font: inherit; font-size: .85rem; line-height: 1.4;
+  white-space: pre; }
 .view .scale { position: absolute; left: 14px; bottom: 10px; border-bottom: 3px solid var(--ink); font-size: .82rem;
   pointer-events: none; text-align: center; white-space: nowrap; }
 .hint { color: var(--soft); font-size: .85rem; }
-button { font: inherit; color: #1d4e89; background: none; border: 1px solid #b8c4d0; border-radius: 6px;
+button { font: inherit; color: var(--link); background: none; border: 1px solid var(--edge); border-radius: 6px;
   padding: .05rem .5rem; cursor: pointer; }
 td button.feature { border: 0; padding: 0; font-weight: 600; text-align: left; white-space: nowrap; }
 td button.feature:hover { text-decoration: underline; }
-tr.chosen td { background: #fff4cc; }
-nav { font-size: .92rem; margin-top: 1.1rem; } nav a { margin-right: 1.1rem; }
-a { color: #1d4e89; text-decoration: none; } a:hover { text-decoration: underline; }
+tr.chosen td { background: var(--chosen); }
+nav { font-size: .92rem; margin-top: 1.1rem; } nav a { margin-right: 1.1rem; display: inline-block; }
+:target { scroll-margin-top: 1rem; }
+.table:focus-visible { outline: 2px solid var(--link); }
+a { color: var(--link); text-decoration: none; } a:hover { text-decoration: underline; }
 details { margin-top: .6rem; } summary { cursor: pointer; color: var(--soft); }
-pre { background: #f5f7fa; padding: .8rem; border-radius: 8px; overflow: auto; font-size: .82rem; }
+pre { background: var(--wash); padding: .8rem; border-radius: 8px; overflow: auto; font-size: .82rem; }
 code { font-size: .9em; }
 @media (max-width: 640px) { h1 { font-size: 1.5rem; } main { padding: 1.4rem .9rem 3rem; }
   .view .stage { height: 380px; } }
-@media print { .view, .hint, .to-look { display: none; } section { break-inside: avoid; } .table { max-height: none; } }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e4e7eb; --soft: #a8b4c2; --faint: #323f4b; --paper: #141b22; --wash: #1e2831; --link: #8fbcf0;
+    --edge: #52606d; --chosen: #4a3f12; --warn: #33280f; --good: #163a29; --good-ink: #a5e0bf; --bad: #4a1d1d;
+    --bad-ink: #f7b5b0; --plain: #2b3742; --plain-ink: #c4ced8; }
+  /* drawn in ink on paper: light becomes dark and the hues stay; what holds pixels keeps its own */
+  figure > svg:not(:has(image)) { filter: invert(.9) hue-rotate(180deg); }
+}
+@media print { .view, .hint, .to-look, nav { display: none; } figure, tr, h2 { break-inside: avoid; }
+  h2 { break-after: avoid; } .table { max-height: none; overflow: visible; } }
 """

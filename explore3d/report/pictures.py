@@ -98,7 +98,13 @@ def _rendered(analysis: Analysis, sweeps: Sequence[SweepPath]) -> dict[str, byte
     picture = object_picture(analysis.base.surface, analysis.model.features, sweeps)
     files: dict[str, bytes | None] = {"object": picture}
     if analysis.estimate is not None and analysis.estimate.surface is not None and analysis.curvature is not None:
-        files["curvature"] = curvature_picture(analysis.estimate.surface, analysis.curvature, analysis.trace.tip_radius)
+        files["curvature"] = curvature_picture(
+            analysis.estimate.surface,
+            analysis.curvature,
+            analysis.trace.tip_radius,
+            analysis.base.surface,
+            analysis.model.features,
+        )
     if analysis.deviation is not None and analysis.deviation.of_the_model:
         files["deviation"] = deviation_picture(analysis.base.surface, analysis.deviation.heights)
     return files

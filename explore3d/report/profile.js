@@ -58,8 +58,9 @@ function show(root, data) {
     const first = Math.max(0, firstFrom(x, span[0]) - 1), last = Math.min(x.length, firstFrom(x, span[1]) + 2);
     heights = range(y, first, last);
     pen.font = "12px system-ui, sans-serif";
-    pen.strokeStyle = "#e4e7eb";
-    pen.fillStyle = "#1f2933";
+    const style = getComputedStyle(document.documentElement);
+    pen.strokeStyle = style.getPropertyValue("--faint");
+    pen.fillStyle = style.getPropertyValue("--ink");
     pen.textAlign = "center";
     for (const [place, word] of ticks(...span, 8)) {
       pen.strokeRect(right(place), edge.top, 0, high());
@@ -188,6 +189,7 @@ function show(root, data) {
   });
   root.querySelector("button.reset").addEventListener("click", reset);
   new ResizeObserver(redraw).observe(canvas);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   draw();
   return { choose, pick };
 }

@@ -178,6 +178,8 @@ function show(root, data) {
       gl.drawElements(gl.TRIANGLES, part.count, gl.UNSIGNED_INT, 0);
     }
   };
+  // The page's own ground, which is dark where the reader wants that
+  const paper = () => getComputedStyle(document.body).backgroundColor.match(/[\d.]+/g).slice(0, 3).map((v) => v / 255);
   const draw = () => {
     waiting = false;
     const ratio = window.devicePixelRatio || 1;
@@ -186,7 +188,7 @@ function show(root, data) {
     [canvas.width, canvas.height] = [Math.round(ratio * width), Math.round(ratio * height)];
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.enable(gl.DEPTH_TEST);
-    gl.clearColor(1, 1, 1, 1);
+    gl.clearColor(...paper(), 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     meshesOf(false);
     gl.useProgram(thin());
@@ -346,6 +348,7 @@ function show(root, data) {
   });
   root.querySelector("button.reset").addEventListener("click", reset);
   new ResizeObserver(redraw).observe(canvas);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   reset();
   draw();
   return { choose, pick, at: (id) => centreOf(features.find((each) => each.id === id)) };
