@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from explore3d.analysis.result import Analysis as Analysis
     from explore3d.analysis.savings import without_needless_dynamics as without_needless_dynamics
     from explore3d.analysis.stages import Progress as Progress, Stages as Stages, silent as silent
-    from explore3d.analysis.surface_account import SurfaceAccount as SurfaceAccount
+    from explore3d.analysis.surface_account import SurfaceAccount as SurfaceAccount, swept_share as swept_share
     from explore3d.analysis.truth import Comparison as Comparison, TrueFeature as TrueFeature, compare as compare
 
 _PUBLIC = {
@@ -23,7 +23,7 @@ _PUBLIC = {
     "result": ("Analysis",),
     "savings": ("without_needless_dynamics",),
     "stages": ("Progress", "Stages", "silent"),
-    "surface_account": ("SurfaceAccount",),
+    "surface_account": ("SurfaceAccount", "swept_share"),
     "truth": ("Comparison", "TrueFeature", "compare"),
 }
 doorway(__name__, _PUBLIC)

@@ -118,6 +118,7 @@ def _result(work: Work) -> Analysis:
         account=work.account,
         path=work.path,
         deviation=work.deviation,
+        judgements=work.judgements,
     )
 
 

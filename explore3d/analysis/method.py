@@ -15,7 +15,7 @@ from explore3d import UserError, __version__
 from explore3d.analysis.inspected import Inspected, base_reach
 from explore3d.analysis.result import TipCount
 from explore3d.analysis.stages import Stages
-from explore3d.analysis.surface_account import SurfaceAccount
+from explore3d.analysis.surface_account import SurfaceAccount, swept_share
 from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature
 from explore3d.log import Log, stop_of
@@ -29,7 +29,7 @@ from mapping.estimate.deviation import Deviation, explain
 from mapping.estimate.envelope import estimate_surface
 from mapping.geometry.curvature import principal_curvatures
 from mapping.inference import refine_all
-from mapping.model import ObjectModel
+from mapping.model import Judgement, ObjectModel, judged
 
 if TYPE_CHECKING:
     from mapping.estimate.envelope import Estimate
@@ -84,6 +84,7 @@ class Work:
         sound: the trace under sound sweep numbers; None for a log that was searched while it was read.
         path: what became of the recorded path.
         deviation: what the given model gets wrong; None if nothing is known to be.
+        judgements: what became of the scene's tolerances.
         apart: samples left out for that.
         asked: whether a stage was asked for, by its name.
     """
@@ -102,6 +103,7 @@ class Work:
     estimate: Estimate | None = None
     curvature: Curvature | None = None
     account: SurfaceAccount | None = None
+    judgements: tuple[Judgement, ...] = ()
     inspections: Inspections | None = None
     sound: SoundSweeps | None = None
     path: PathLedger | None = None
@@ -419,6 +421,12 @@ def modelled(work: Work, share: Share) -> None:
         reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
         deviation=work.deviation.heights if work.deviation and work.deviation.of_the_model else None,
     )
+    if work.scene is not None and work.scene.tolerance:
+        swept = swept_share(work.inspected, work.account, work.base)
+        limit = work.detections.detection_limit
+        work.judgements = judged(work.model.features, work.scene.tolerances, limit, swept)
+        record = [each.record() for each in work.judgements]
+        work.model = replace(work.model, provenance=work.model.provenance | {"tolerances": record})
 
 
 def in_model_frame(features: tuple[Feature, ...], base: Base) -> tuple[Feature, ...]:
@@ -464,6 +472,8 @@ def _provenance(work: Work) -> dict[str, Any]:
         "tip_sd": work.settings.tip_sd,
         "tip_sd_assumed": log.tip_sd_assumed,
         "form": asdict(log.form),
+        "recorded": log.metadata.get("started"),
+        "about": {name: value for name, value in vars(work.scene.about).items() if value} if work.scene else {},
         "seed": work.settings.seed,
         "log_sha256": log.sha256,
         "samples": len(log.trace),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from explore3d import count_text
-from explore3d.analysis.inspected import MOST_SURFACE_CELLS
+from explore3d.analysis.inspected import MOST_SURFACE_CELLS, Inspected
 from explore3d.log import Log
 from explore3d.scene import Scene
 from mapping import BoolArray, FloatArray, Trace, length_text
@@ -22,6 +22,8 @@ from planners.paths import Carrier, reachable, resampled
 
 # More of the reachable surface than this not swept: said first, and the command's exit status is not 0
 MOST_UNSWEPT = 0.05
+# Share of the surface from which on it counts as all of it: it is printed in whole per cent
+NEARLY_ALL = 0.995
 # Places of the surface that are asked, at most about so many
 MOST_ACCOUNT_PLACES = 60_000
 # A sweep on the other side of a thin plate has not touched this one: opposite normals count as this many reaches apart
@@ -219,3 +221,17 @@ def _causes(reasons: Sequence[str]) -> tuple[tuple[str, int], ...]:
         first.setdefault(kind, plain)
         counts[kind] += 1
     return tuple((first[kind], count) for kind, count in counts.most_common())
+
+
+def swept_share(inspected: Inspected | None, account: SurfaceAccount | None, base: Base) -> float:
+    """Share of the surface that the sweeps came near; 1 if that is nearly all, or if there is but one profile.
+
+    Args:
+        inspected: which places are free of features; None if not asked.
+        account: of a scene, which leaves out what no ball can reach; None without one.
+        base: the global model.
+    """
+    if inspected is None or base.kind == "profile":
+        return 1.0
+    swept = 1.0 - (inspected.untouched if account is None else account.unswept)
+    return 1.0 if swept > NEARLY_ALL else swept

@@ -6,12 +6,10 @@ from math import isfinite
 from pathlib import Path
 
 from explore3d import count_text
-from explore3d.analysis import ABSORBED, Analysis
+from explore3d.analysis import ABSORBED, Analysis, swept_share
 from mapping import Feature, length_text
 from mapping.detection.path import PathLedger
 
-# Share of the surface from which on it counts as all of it: it is printed in whole per cent
-NEARLY_ALL = 0.995
 # One and several of each reason for which a sweep is cut
 CUT_NAMES = {
     "turn": ("turn", "turns"),
@@ -61,6 +59,7 @@ def summary(analysis: Analysis) -> list[str]:
         *lines,
         *(feature_line(feature) for feature in features[:MOST_LISTED_FEATURES]),
         *more,
+        *tolerance_lines(analysis),
         limit_sentence(analysis),
         *warnings(analysis),
         *([account.sentence()] if account is not None else []),
@@ -152,14 +151,13 @@ def warning_lines(analysis: Analysis) -> list[str]:
 
 def swept_part(analysis: Analysis) -> str:
     """'' on the 21 % of the surface that was swept'' where the sweeps did not come near all of it, else ''."""
-    inspected = analysis.inspected
-    if inspected is None or analysis.base.kind == "profile":
-        return ""
-    # the account of a scene leaves out what no ball can reach
-    untouched = inspected.untouched if analysis.account is None else analysis.account.unswept
-    return (
-        "" if 1.0 - untouched > NEARLY_ALL else f" on the {100 * (1.0 - untouched):.0f} % of the surface that was swept"
-    )
+    share = swept_share(analysis.inspected, analysis.account, analysis.base)
+    return "" if share == 1.0 else f" on the {100 * share:.0f} % of the surface that was swept"
+
+
+def tolerance_lines(analysis: Analysis) -> list[str]:
+    """A line for each tolerance of the scene: the verdict, and what it rests on."""
+    return [f"{each.verdict}: {each.tolerance.text()} ({each.reason()})" for each in analysis.judgements]
 
 
 def feature_line(feature: Feature) -> str:

@@ -22,6 +22,9 @@ from explore3d.report.pictures import Pictures, is_profile
 from mapping import UNKNOWN_TEXT, Feature, Interval, length_text
 from mapping.geometry.mesh import arclengths
 from mapping.inference.kinds import kind_named, kind_of
+from mapping.model import FAIL, PASS, UNDECIDED
+
+VERDICT_BADGES = {PASS: "good", FAIL: "bad", UNDECIDED: "plain"}
 
 
 def headline(analysis: Analysis) -> Html:
@@ -29,11 +32,22 @@ def headline(analysis: Analysis) -> Html:
     warnings = [*stop_lines(analysis), *([analysis.recovered] if analysis.recovered else [])]
     return element(
         "header",
-        element("p", "Haptic exploration", class_="kind"),
+        element("p", _when_and_who(analysis), class_="kind"),
         element("h1", analysis.title or "Untitled"),
         *(element("p", f"{_capital(sentence)}.", class_="warning") for sentence in warnings),
         element("p", found_sentence(analysis), class_="lead"),
     )
+
+
+def _when_and_who(analysis: Analysis) -> str:
+    """When it was recorded, by whom and with what, as far as anybody said."""
+    known, about = analysis.model.provenance, analysis.model.provenance.get("about", {})
+    parts = ["Haptic exploration"]
+    if known.get("recorded"):
+        parts.append(f"{known['recorded'][:16].replace('T', ' ')} UTC")
+    words = (("part", "part {}"), ("operator", "by {}"), ("instrument", "with {}"))
+    parts += [phrase.format(about[name]) for name, phrase in words if name in about]
+    return " · ".join(parts)
 
 
 def found_sentence(analysis: Analysis) -> str:
@@ -72,7 +86,7 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
     if features:
         head = ("feature", "height", "width", "length", "place", "evidence", "kind of detail", "posterior")
         shared = _shared_notes(features)
-        content.append(table(head, [_row(feature, analysis, shared) for feature in features]))
+        content.append(table(head, [_row(feature, analysis, pictures, shared) for feature in features]))
         content.extend(paragraph(f"{_capital(note)} (all of them).") for note in shared)
         content.append(paragraph("Ranges are central 90 % intervals. ", limit_sentence(analysis)))
     if analysis.inspected is not None and not is_profile(analysis):
@@ -93,6 +107,22 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
     content.append(element("h2", "To look around", class_="to-look"))
     content.append(view)
     return section("What was found", "found", *content)
+
+
+def against_tolerances(analysis: Analysis) -> Html:
+    """What the drawing allows, and whether that is proved; nothing where the scene names no tolerance."""
+    if not analysis.judgements:
+        return Html("")
+    rows = [
+        (badge(each.verdict, VERDICT_BADGES[each.verdict]), element("span", each.tolerance.text()), each.reason())
+        for each in analysis.judgements
+    ]
+    rule = (
+        "Passed or failed is what is proved with 95 % probability (the default of ISO 14253-1); the rest is undecided, "
+        "and a longer exploration, or a slower one, may decide it."
+    )
+    table_of_them = table(("verdict", "tolerance", "what it rests on"), rows)
+    return section("Tolerances", "tolerances", table_of_them, paragraph(rule))
 
 
 def _counts(analysis: Analysis) -> Html:
@@ -120,7 +150,7 @@ def _shared_notes(features: Sequence[Feature]) -> tuple[str, ...]:
     return tuple(note for note in features[0].notes if all(note in feature.notes for feature in features))
 
 
-def _row(feature: Feature, analysis: Analysis, shared: Sequence[str]) -> Row:
+def _row(feature: Feature, analysis: Analysis, pictures: Pictures, shared: Sequence[str]) -> Row:
     cells = [_with_range(getattr(feature, name)) for name in ("height", "width")]
     length = _with_range(feature.length) if len(feature.axis) > 1 else Html("point")
     evidence = element("span", f"S/N {feature.evidence.snr:.0f}") + element(
@@ -134,7 +164,7 @@ def _row(feature: Feature, analysis: Analysis, shared: Sequence[str]) -> Row:
     notes = element("small", "; ".join(own), class_="note") if own else Html("")
     name = element("button", feature.id, type="button", class_="feature", data_feature=feature.id, aria_pressed="false")
     name = Html(name + notes)
-    return (name, *cells, length, _place(feature, analysis), Html(evidence), detail, _posterior(feature))
+    return (name, *cells, length, _place(feature, analysis), Html(evidence), detail, _posterior(feature, pictures))
 
 
 def _place(feature: Feature, analysis: Analysis) -> Html:
@@ -148,12 +178,14 @@ def _place(feature: Feature, analysis: Analysis) -> Html:
     return Html(element("span", f"{text} {name}") + element("small", known))
 
 
-def _posterior(feature: Feature) -> Html:
+def _posterior(feature: Feature, pictures: Pictures) -> Html:
     if feature.posterior is None:
         return badge("none", "plain")
     kind = "good" if feature.posterior.status in ("converged", "not needed") else "bad"
     label = "by Laplace" if feature.posterior.status == "not needed" else feature.posterior.status
-    return Html(badge(label, kind) + element("small", f"{len(feature.posterior.samples)} draws"))
+    draws, picture = f"{len(feature.posterior.samples)} draws", f"corner-{feature.id}"
+    shown = element("a", draws, href=f"#{picture}") if picture in pictures.files else draws
+    return Html(badge(label, kind) + element("small", shown))
 
 
 def _with_range(interval: Interval) -> Html:

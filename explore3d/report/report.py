@@ -9,8 +9,8 @@ from explore3d.analysis import Analysis
 from explore3d.pictures import SweepPath, sweep_paths
 from explore3d.report.account import account_of_time, provenance, what_was_left_out
 from explore3d.report.evidence import compared_with_truth, cross_sections, curvature_maps, deviation_map, posteriors
-from explore3d.report.findings_section import facts, headline, what_was_found
-from explore3d.report.markup import Html, element, text
+from explore3d.report.findings_section import against_tolerances, facts, headline, what_was_found
+from explore3d.report.markup import Html, contents, element, text
 from explore3d.report.page import REPORT_CSS
 from explore3d.report.pictures import Pictures, draw_pictures, is_profile
 from explore3d.report.view3d import object_view, profile_view
@@ -50,11 +50,9 @@ def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPa
         view = profile_view(analysis.trace, analysis.base, analysis.model.features)
     else:
         view = object_view(analysis.base.surface, analysis.model.features, sweeps)
-    content = element(
-        "main",
-        headline(analysis),
-        facts(analysis),
+    sections = [
         what_was_found(analysis, pictures, view),
+        against_tolerances(analysis),
         deviation_map(analysis, pictures),
         cross_sections(analysis, pictures),
         posteriors(pictures),
@@ -63,7 +61,8 @@ def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPa
         what_was_left_out(analysis, pictures),
         account_of_time(analysis),
         provenance(analysis),
-    )
+    ]
+    content = element("main", headline(analysis), facts(analysis), contents(sections), *sections)
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{REPORT_SECURITY_POLICY}">'

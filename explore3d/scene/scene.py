@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -30,7 +31,9 @@ from explore3d.scene.values import (
 )
 from hw import Finger
 from mapping import KINDS, Surface
+from mapping.inference.kinds import kind_named
 from mapping.instrument import Noise, StatedNoise
+from mapping.model import Tolerance
 from planners.survey import fastest_speed
 
 SCENE_SCHEMA = "explore3d/scene/1"
@@ -132,6 +135,34 @@ class Truth(Table):
     length: Extent | None = None
 
 
+class About(Table):
+    """Whose exploration it is: for people alone."""
+
+    operator: Annotated[str, INFORMATIVE] = ""
+    instrument: Annotated[str, INFORMATIVE] = ""
+    part: Annotated[str, INFORMATIVE] = ""
+
+
+class ToleranceTable(Table):
+    """What a drawing allows of a size of every feature of a kind, hollows measured downwards: at most `limit` (m)."""
+
+    kind: Literal["any", *KINDS]  # type: ignore[valid-type]
+    size: Literal["height", "width", "length"]
+    limit: Length | None = None
+    least: Extent = 0.0
+
+    @model_validator(mode="after")
+    def _says_something(self) -> ToleranceTable:
+        if self.limit is None and self.least == 0.0:
+            raise ValueError("give limit (at most), least (at least), or both")
+        if self.limit is not None and self.least >= self.limit:
+            raise ValueError(f"least must lie below limit; found least {self.least:g} m and limit {self.limit:g} m")
+        if self.size == "length" and self.kind != "any" and not kind_named(self.kind).line:
+            lines = ", ".join(name for name in KINDS if kind_named(name).line)
+            raise ValueError(f"a {self.kind} has no length; possible with length: any, {lines}")
+        return self
+
+
 class Scene(Table):
     """The whole file. Paths are absolute after loading; `path` is the file, `text` what stood in it."""
 
@@ -139,6 +170,7 @@ class Scene(Table):
 
     schema_: Literal["explore3d/scene/1"] = Field(alias="schema")
     title: str = ""
+    about: About = About()
     seed: Annotated[int, Field(ge=0)] = 1
     tip: Tip
     model: GlobalModel
@@ -147,6 +179,7 @@ class Scene(Table):
     detection: Detection = Detection()
     explore: Exploration = Exploration()
     truth: tuple[Truth, ...] = ()
+    tolerance: tuple[ToleranceTable, ...] = ()
     _path: Path = PrivateAttr(default=Path("scene.toml"))
     _text: str = PrivateAttr(default="")
     _meshes: Mapping[Path, Surface] = PrivateAttr(default_factory=dict)
@@ -194,6 +227,14 @@ class Scene(Table):
         told = self.finger.noise
         noise = Noise(told.white, told.correlated, told.correlation_length)
         return StatedNoise(noise, told.doubt) if noise.sd > 0 else None
+
+    @property
+    def tolerances(self) -> tuple[Tolerance, ...]:
+        """What the drawing allows."""
+        return tuple(
+            Tolerance(each.kind, each.size, inf if each.limit is None else each.limit, each.least)
+            for each in self.tolerance
+        )
 
     @property
     def sweep_speed(self) -> float:

@@ -1,4 +1,4 @@
-"""The annotated model: features on the base, written as JSON and GLB, merged."""
+"""The annotated model: features on the base, written as JSON and GLB, merged, held against tolerances."""
 
 from typing import TYPE_CHECKING
 
@@ -8,10 +8,21 @@ if TYPE_CHECKING:
     from mapping.model.feature_mesh import drawn_at_least as drawn_at_least, feature_mesh as feature_mesh
     from mapping.model.merging import merge_model as merge_model
     from mapping.model.object_model import ObjectModel as ObjectModel
+    from mapping.model.tolerance import (
+        ANY as ANY,
+        FAIL as FAIL,
+        PASS as PASS,
+        TOLERATED_SIZES as TOLERATED_SIZES,
+        UNDECIDED as UNDECIDED,
+        Judgement as Judgement,
+        Tolerance as Tolerance,
+        judged as judged,
+    )
 
 _PUBLIC = {
     "feature_mesh": ("drawn_at_least", "feature_mesh"),
     "merging": ("merge_model",),
     "object_model": ("ObjectModel",),
+    "tolerance": ("ANY", "FAIL", "PASS", "TOLERATED_SIZES", "UNDECIDED", "Judgement", "Tolerance", "judged"),
 }
 doorway(__name__, _PUBLIC)

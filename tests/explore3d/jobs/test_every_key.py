@@ -49,7 +49,8 @@ REAL, EMULATED = MACHINE.format("/dev/one"), MACHINE.format("emulator")
 # Scenes in which every key has something to act on
 SCENES = {
     "on a mesh": f"{PLAIN}{BOX}{TILE}{OBJECT}{NOISE}finger.dynamics.mass = 0.1\n"
-    '[[truth]]\nkind = "ridge"\naxis = [[0, 0, 0], [0.01, 0, 0]]\nheight = 0.00065\n',
+    '[[truth]]\nkind = "ridge"\naxis = [[0, 0, 0], [0.01, 0, 0]]\nheight = 0.00065\n'
+    '[[tolerance]]\nkind = "ridge"\nsize = "height"\nlimit = 0.001\nleast = 0.0001\n',
     "out of its pose": f'{PLAIN}{TILE}model.pose = "estimate"\n{OBJECT}',
     "unknown": f"{PLAIN}{BOX}{OBJECT}",
     "pecked": f"{PLAIN}{TILE}{OBJECT}{EMULATED}",
@@ -185,7 +186,7 @@ def concluded(scene: Scene) -> Any:
     """What the analysis of one sweep says."""
     corners = 0.02 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
     analysis = build_model(felt(), scene, Base(Surface(corners, np.array([[0, 1, 2], [0, 2, 3]]))), Stages())
-    return told((analysis.title, analysis.truth))
+    return told((analysis.title, analysis.truth, analysis.judgements))
 
 
 def has_effect(key: Key, info: FieldInfo, looks: Callable[[Scene], Any]) -> bool:

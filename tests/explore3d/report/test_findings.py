@@ -32,6 +32,7 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
         deviation=None,
         path=None,
         left_out=(),
+        judgements=(),
         stopped=None,
         go_on="",
     )

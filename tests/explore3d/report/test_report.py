@@ -19,6 +19,7 @@ from mapping.feature import Feature, Interval, LeftOut, Support
 from mapping.geometry.templates.shapes import chain_height
 from mapping.instrument.noise import Noise
 from mapping.model.object_model import ObjectModel
+from mapping.model.tolerance import Tolerance, judged
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -74,6 +75,31 @@ def test_the_page_says_what_was_found_and_what_was_left_out(folder: Path) -> Non
         "4.5 s",
     ):
         assert sentence in text, sentence
+
+
+def test_every_section_is_in_the_contents_and_every_link_leads_somewhere(folder: Path) -> None:
+    page = (folder / "report.html").read_text()
+    ids, links = set(re.findall(r' id="([^"]+)"', page)), re.findall(r'href="#([^"]+)"', page)
+    assert set(links) <= ids
+    listed = re.findall(r'href="#([^"]+)"', page[page.index("<nav") : page.index("</nav>")])
+    assert listed == re.findall(r'<section id="([^"]+)"', page)
+
+
+def test_a_table_is_reached_by_keyboard_and_has_no_empty_header(folder: Path) -> None:
+    page = (folder / "report.html").read_text()
+    assert page.count('class="table"') == page.count('class="table" role="group" tabindex="0"') > 2
+    assert "<th></th>" not in page and not re.search(r'<th class="number"></th>', page)
+
+
+def test_tolerances_and_who_stand_on_the_page_as_text() -> None:
+    made = analysis()
+    judgements = judged(made.model.features, [Tolerance("ridge", "height", 5e-4)], 4e-5, 1.0)
+    about = {"about": {"operator": "<b>Ann</b>"}, "recorded": "2026-11-23T08:30:12+00:00"}
+    model = replace(made.model, provenance=made.model.provenance | about)
+    page = report_page(replace(made, model=model, judgements=judgements), Pictures({}), ())
+    text = words(page)
+    assert "fail height of every ridge: at most 0.5 mm ridge-1 conforms with probability below 0.001" in text
+    assert "Haptic exploration · 2026-11-23 08:30 UTC · by &lt;b&gt;Ann&lt;/b&gt;" in text
 
 
 def test_every_figure_lies_beside_the_page_as_an_svg_with_its_words(folder: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from math import inf
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from explore3d.errors import SceneError
 from explore3d.scene.scene import load_scene, parse_scene
 from explore3d.scene.to_toml import scene_text
+from mapping.model.tolerance import Tolerance
 
 SCENES = Path(__file__).parents[3] / "assets" / "scenes"
 TEXT = (SCENES / "wire_on_plate.toml").read_text()
@@ -87,6 +89,32 @@ def test_a_mistake_is_named_in_one_line_with_its_place(old: str, new: str, messa
     text = refusal(TEXT.replace(old, new, 1))
     assert text.startswith(f"here/wire.toml: {message}")
     assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ('kind = "ridge"\nsize = "height"', "tolerance[0]: give limit (at most), least (at least), or both"),
+        ('kind = "ridge"\nsize = "depth"\nlimit = 1', "tolerance[0].size: should be 'height', 'width' or 'length'"),
+        ('kind = "wire"\nsize = "height"\nlimit = 1', "tolerance[0].kind: should be 'any', 'ridge'"),
+        ('kind = "any"\nsize = "height"\nlimit = "-1 mm"', "tolerance[0].limit: should be greater than 0"),
+        (
+            'kind = "any"\nsize = "height"\nlimit = 1\nleast = 2',
+            "tolerance[0]: least must lie below limit; found least",
+        ),
+        (
+            'kind = "bump"\nsize = "length"\nlimit = 1',
+            "tolerance[0]: a bump has no length; possible with length: any, ",
+        ),
+    ],
+)
+def test_a_tolerance_that_says_nothing_is_refused(keys: str, message: str) -> None:
+    assert refusal(f"{TEXT}\n[[tolerance]]\n{keys}\n").startswith(f"here/wire.toml: {message}")
+
+
+def test_a_tolerance_has_a_limit_on_either_side_or_on_both() -> None:
+    scene = parse_scene(f'{TEXT}\n[[tolerance]]\nkind = "any"\nsize = "width"\nleast = "2 mm"\n', "s.toml")
+    assert scene.tolerances == (Tolerance("any", "width", inf, 0.002),)
 
 
 def test_further_mistakes_are_counted_and_unknown_keys_come_first() -> None:
