@@ -112,8 +112,8 @@ def test_a_given_pose_needs_no_search_and_one_finds_the_object_where_it_is(recor
 def test_a_bare_object_needs_no_rendering_and_a_picture_of_it_changes_no_number(record, tmp_path):
     path = record(flat, 0.1e-3)
     bare, drawn = analyze(path, tmp_path / "bare"), analyze(path, tmp_path / "drawn", force=["rendered pictures"])
-    assert not (tmp_path / "bare" / "pictures" / "object.png").exists()
-    assert (tmp_path / "drawn" / "pictures" / "object.png").exists()
+    assert not (tmp_path / "bare" / "pictures" / "object.svg").exists()
+    assert (tmp_path / "drawn" / "pictures" / "object.svg").exists()
     assert bare.model.features == drawn.model.features
     assert bare.detections.threshold == drawn.detections.threshold
 

@@ -167,7 +167,7 @@ def test_a_job_that_a_signal_ends_leaves_the_older_session(older: Older, tmp_pat
     assert came in ("kept", "killed", "as it was")
 
 
-@pytest.mark.parametrize("free", [60_000, pytest.param(2_000_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("free", [60_000, pytest.param(250_000, marks=pytest.mark.slow)])
 def test_a_full_disk_leaves_the_older_session_and_the_log(older: Older, tmp_path: Path, free: int) -> None:
     assert fill(older, "run", free, tmp_path) == "kept"
 
