@@ -14,7 +14,7 @@ from explore3d.jobs.conclude import conclude
 from explore3d.jobs.objects import not_one_object
 from explore3d.jobs.session import Job, Session
 from explore3d.log import LOG, digest, large_log, load_logs, read_base
-from explore3d.scene import load_mesh, parse_scene
+from explore3d.scene import load_mesh, recorded_scene
 from mapping.base import Base
 
 
@@ -164,7 +164,7 @@ def _analyze(
     stages = Stages(progress, force)
     with stages.stage("reading"):
         log = load_logs(paths, tip_radius=tip_radius, **table)
-        scene = parse_scene(log.scene_text, log.sources[0]) if log.scene_text else None
+        scene = recorded_scene(log.scene_text, log.sources[0]) if log.scene_text else None
         base = Base(load_mesh(model, model_units)) if model is not None else read_base(log.events)
     if session is None:
         return build_model(log, scene, base, stages)

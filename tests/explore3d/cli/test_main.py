@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from in_process import explore3d_main
+from scene_files import write_scene_file
 
 from explore3d import __version__
 from explore3d.cli.bench import bench
@@ -40,12 +41,10 @@ def test_the_help_lists_every_command(monkeypatch: pytest.MonkeyPatch, capsys: p
 
 
 def variant(folder: Path, old: str, new: str) -> Path:
-    """The wire scene with one text replaced, its meshes where they were."""
+    """The wire scene with one text replaced, its meshes beside it."""
     text = (SCENES / "wire_on_plate.toml").read_text()
     assert old in text
-    path = folder / "scene.toml"
-    path.write_text(text.replace(old, new, 1).replace("../meshes", str(SCENES.parent / "meshes")))
-    return path
+    return write_scene_file(folder / "scene.toml", text.replace(old, new, 1))
 
 
 NAN = "OFF\n3 1 0\n0 0 0\nnan 0 0\n0 1 0\n3 0 1 2\n"
