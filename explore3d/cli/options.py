@@ -75,6 +75,10 @@ Pixel = Annotated[
     str | None,
     typer.Option(help='The file is a map of heights whose pixels are so far apart: "1 um", or "1 um, 2 um".'),
 ]
+Average = Annotated[
+    int | None,
+    typer.Option(min=1, metavar="N", help="Make one sample, their mean, of N consecutive ones: for long recordings."),
+]
 Part = Annotated[
     str | None, typer.Option(help="Which one of several that a file holds: topic of a bag, sheet, channel, layer.")
 ]

@@ -1,10 +1,9 @@
-"""read_table: a recorded table of x, y, z or of one profile x, z becomes the Log that the analysis takes."""
+"""Rows of a table as samples: which are usable, in what order the finger made them, and the trace that they are."""
 
 from __future__ import annotations
 
-import hashlib
 import re
-from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -12,178 +11,59 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log.record import Log
-from explore3d.log.table_columns import (
-    LENGTH_ROLES,
-    POSITION,
-    VECTORS,
-    find_columns,
-    label,
-    length_factors,
-    time_factor,
-)
-from explore3d.log.table_order import Order, clipped, cloud_order, profile_order, sentinels
-from explore3d.log.table_settings import TableSettings, load_settings
-from explore3d.log.text import LEAST_ROWS, TableText, length_factor, read_text
-from mapping import BoolArray, FloatArray, IntArray, Trace, TraceError, length_text
-from mapping.base import Form
+from explore3d.log.table.columns import LENGTH_ROLES, POSITION, VECTORS, label
+from explore3d.log.table.order import Order, clipped, cloud_order, profile_order, sentinels
+from explore3d.log.table.settings import TableSettings
+from explore3d.log.text import LEAST_ROWS, TableText, length_factor
+from mapping import BoolArray, FloatArray, IntArray, Trace, TraceError
 
 NO_MARK = frozenset(("0", "false", "no", "f", "n", "invalid", "bad", "fail", ""))
-# Relative doubt of a tip's radius that nobody stated: assumed, not measured, and the model says so. A trace knows
-# R = r + a of a wire: 1 % of a ball of 10 mm is a third of a wire's width of 0.65 mm, which its interval then shows;
-# its height does not hang on r
-TIP_DOUBT = 0.01
 CLOCK = re.compile(r"(?:(?P<h>\d+):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:[.,]\d*)?)")
 
 Columns = dict[str, FloatArray]
 
 
-def read_table(
-    path: Path | str,
-    *,
-    units: str | dict[str, str] | None = None,
-    tip_radius: str | float | None = None,
-    columns: str | dict[str, str | int] | None = None,
-    frame: dict[str, Any] | None = None,
-    jump: str | float | None = None,
-    reference: str | None = None,
-    decimal: str | None = None,
-    pixel: str | float | Sequence[str | float] | None = None,
-) -> Log:
-    """Read a CSV or TXT table of positions of the tip.
-
-    Delimiter (; , tab, blanks), decimal comma, header, comments and stated units are found. Rows marked invalid
-    (a column `valid` with 0) or without a number are left out, counted, and said in `Log.recovered`. A table of
-    x, z is one sweep along x with z outward; one of x, y, z is cut into sweeps by a column `sweep`, else where
-    the finger jumped. What the file does not say comes from the arguments or from a sidecar FILE.toml with the
-    same names; see TableSettings.
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """What the rows of a table are.
 
     Args:
-        path: the file.
-        units: of the coordinates, e.g. "mm"; None: stated in the header.
-        tip_radius: radius of the fingertip, e.g. "2 um", or in m.
-        columns: e.g. "x=X, z=Y" or {"x": 1, "z": 2}.
-        frame: {"origin": (3,), "rotation": (3, 3)}: object = rotation @ table + origin.
-        jump: a longer step begins a new sweep; None: ten median steps.
-        reference: "centre" (default) or "bottom": the point of the ball that the coordinates give.
-        decimal: "." or ",", where the file leaves open what "1,234" is.
-        pixel: "1 um" or ("1 um", "2 um"): the file is a map of heights, with these distances of columns and rows.
-
-    Raises:
-        UserError: one line naming the file and the field.
+        text: the table, or its first piece.
+        roles: column of each role.
+        factors: metres per unit of the columns of lengths.
+        values: (N,) of each role, in SI units, in the order of movement.
+        order: its sweeps.
+        rows: that the file has.
+        left_out: of them.
+        dropped: what is said of those, in a clause and in few words.
+        said: what was recognised or is doubtful.
+        average: what averaging did, for the log; None: nothing.
     """
-    path = Path(path)
-    settings, sidecar = load_settings(
-        path,
-        units=units,
-        tip_radius=tip_radius,
-        columns=columns,
-        frame=frame,
-        jump=jump,
-        reference=reference,
-        decimal=decimal,
-        pixel=pixel,
-    )
-    text = read_text(path, settings.decimal)
-    if settings.pixel is not None:
-        return heights_log(path, text.rows, settings.pixel, "", settings, sidecar, said=text.said)
-    return table_log(text, settings, sidecar)
+
+    text: TableText
+    roles: dict[str, int]
+    factors: dict[str, float]
+    values: Columns
+    order: Order
+    rows: int
+    left_out: int
+    dropped: list[tuple[str, str]]
+    said: list[str]
+    average: dict[str, Any] | None = None
+    cut_short: bool = False
+
+    @property
+    def cut(self) -> bool:
+        """True if the file ends within a line."""
+        return self.text.cut or self.cut_short
 
 
-def heights_log(
-    path: Path,
-    heights: FloatArray,
-    pixel: tuple[float, float],
-    unit: str,
-    settings: TableSettings,
-    sidecar: Path | None,
-    said: Sequence[str] = (),
-    kind: str = "a map of heights",
-) -> Log:
-    """The log of a map: each row is a sweep along x, the first at y = 0; one row is a profile.
-
-    Args:
-        heights: (rows, columns), in `unit`; NaN where none was measured.
-        pixel: distance of the columns and of the rows, m.
-        unit: that the file states for the heights; "": none, then the settings must.
-        said: what was recognised.
-
-    Raises:
-        UserError: one line naming the file and the field.
-    """
-    if heights.ndim != 2 or heights.shape[1] < 2:
-        raise UserError(f"{path}: field heights: expected rows of two heights or more; found shape {heights.shape}")
-    rows, columns = heights.shape
-    along, across = np.tile(np.arange(columns) * pixel[0], rows), np.repeat(np.arange(rows) * pixel[1], columns)
-    table = [along, across, heights.ravel(), np.repeat(np.arange(rows, dtype=np.float64), columns)]
-    names: tuple[str, ...] = ("x", "y", "z", "sweep")
-    units: tuple[str, ...] = ("m", "m", unit, "")
-    if rows == 1:
-        table, names, units = [along, heights[0]], ("x", "z"), ("m", unit)
-    size = f"a map of {columns} x {rows} heights at {length_text(pixel[0])} x {length_text(pixel[1])}"
-    text = TableText(path, names, units, np.column_stack(table), said=(size, *said), kind=kind)
-    asked = settings.units if isinstance(settings.units, str) else (settings.units or {}).get("z")
-    return table_log(text, settings.model_copy(update={"units": {"z": asked} if asked else None}), sidecar)
+def nothing_left(path: Path, dropped: list[tuple[str, str]]) -> UserError:
+    """There is no row to go on with."""
+    return UserError(f"{path}: field samples: no row is left ({'; '.join(words for words, _ in dropped)})")
 
 
-def table_log(text: TableText, settings: TableSettings, sidecar: Path | None) -> Log:
-    """The log of a table, wherever its columns come from.
-
-    Raises:
-        UserError: one line naming the file and the field.
-    """
-    path = text.path
-    if settings.tip_radius is None:
-        raise UserError(
-            f"{path}: field tip_radius: a table does not state the radius of the fingertip; give it with "
-            f'--tip-radius "2 um", or write tip_radius = "2 um" in {path.name}.toml'
-        )
-    roles = find_columns(text, settings.columns)
-    factors = length_factors(text, roles, settings.units)
-    said = list(text.said)
-    rows = _with_texts(text, roles, said)
-    good, dropped = _good_rows(text, rows, roles)
-    whole = bool(good.all())
-    values = {role: np.array(rows[:, index] if whole else rows[good, index]) for role, index in roles.items()}
-    for role, factor in factors.items():
-        values[role] *= factor
-    if "t" in roles:
-        factor, assumed = time_factor(text, roles, values["t"])
-        values["t"] *= factor
-        said += [assumed] * bool(assumed)
-    order = _order(values, settings.jump, text, None if text.blocks is None else text.blocks[good].astype(np.int64))
-    values = {role: value[order.rows] for role, value in values.items()} if _moved(order) else values
-    said += [order.said] * bool(order.said) + _doubts(text, roles, values, settings)
-    trace = _trace(values, settings, text, order)
-    left_out = len(rows) - int(good.sum())
-    return Log(
-        trace=trace,
-        metadata={
-            "format": "profile" if "y" not in roles else "points",
-            "columns": {role: text.names[index] or index + 1 for role, index in roles.items()},
-            "metres_per_unit": factors,
-            "rows": len(rows),
-            "rows_left_out": left_out,
-            "sidecar": str(sidecar) if sidecar else None,
-            "settings": settings.model_dump(mode="json"),
-            "read_as": [_read_as(text, roles, factors, trace, dropped, said)],
-        },
-        complete=not text.cut,
-        recovered="; ".join([words for words, _ in dropped] + ["the last line was incomplete"] * text.cut),
-        sha256=_digest(path),
-        sources=(str(path),),
-        tip_sd=TIP_DOUBT * settings.tip_radius if settings.tip_sd is None else settings.tip_sd,
-        tip_sd_assumed=settings.tip_sd is None,
-        form=Form.read(settings.form, settings.mask),
-    )
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _read_as(
+def read_as(
     text: TableText,
     roles: dict[str, int],
     factors: dict[str, float],
@@ -204,8 +84,14 @@ def _read_as(
     return "; ".join([", ".join(parts), *said])
 
 
-def _with_texts(text: TableText, roles: dict[str, int], said: list[str]) -> FloatArray:
-    """The rows with labels as numbers, marks as 0 and 1, and times of day as seconds; what cannot be is said."""
+def with_texts(
+    text: TableText, roles: dict[str, int], said: list[str], numbers: dict[str, int] | None = None
+) -> FloatArray:
+    """The rows with labels as numbers, marks as 0 and 1, and times of day as seconds; what cannot be is said.
+
+    Args:
+        numbers: of the labels so far; new ones are added. None: there was no piece before this one.
+    """
     rows = text.rows
     for role, index in list(roles.items()):
         cells = text.texts.get(index)
@@ -214,8 +100,8 @@ def _with_texts(text: TableText, roles: dict[str, int], said: list[str]) -> Floa
         if rows is text.rows:
             rows = rows.copy()
         if role == "sweep":
-            names = {name: number for number, name in enumerate(dict.fromkeys(cells))}
-            rows[:, index] = [names[cell] for cell in cells]
+            numbers = {} if numbers is None else numbers
+            rows[:, index] = [numbers.setdefault(cell, len(numbers)) for cell in cells]
         elif role == "valid":
             rows[:, index] = [cell.lower() not in NO_MARK for cell in cells]
         elif role == "t" and (seconds := _seconds(cells)) is not None:
@@ -238,8 +124,8 @@ def _seconds(cells: list[str]) -> FloatArray | None:
     return np.array([3600 * int(c["h"] or 0) + 60 * int(c["m"]) + float(c["s"].replace(",", ".")) for c in clock if c])
 
 
-def _good_rows(text: TableText, rows: FloatArray, roles: dict[str, int]) -> tuple[BoolArray, list[tuple[str, str]]]:
-    """Mask of the usable rows, and what is said of the others, in a clause and in few words."""
+def good_rows(text: TableText, rows: FloatArray, roles: dict[str, int]) -> tuple[BoolArray, list[tuple[str, str]]]:
+    """Mask of the usable rows, perhaps of none, and what is said of the others, in a clause and in few words."""
     used = [index for role, index in roles.items() if role != "valid"]
     finite: BoolArray = np.isfinite(rows[:, used[0]])
     for index in used[1:]:
@@ -256,8 +142,6 @@ def _good_rows(text: TableText, rows: FloatArray, roles: dict[str, int]) -> tupl
         count = int((~finite & valid).sum())
         said.append((f"{count} of {len(valid)} rows lack a number and are left out", f"{count} left out: no number"))
     good = valid & finite
-    if not good.any():
-        raise UserError(f"{text.path}: field samples: no row is left ({'; '.join(words for words, _ in said)})")
     for role in (role for role in POSITION if role in roles):
         column = np.where(good, rows[:, roles[role]], np.nan)
         none = sentinels(column)
@@ -288,11 +172,11 @@ def _zeros_at_the_end(rows: FloatArray, good: BoolArray, columns: list[int]) -> 
     return int(len(kept) - 1 - np.flatnonzero(some)[-1]) if some.any() else 0
 
 
-def _moved(order: Order) -> bool:
+def is_moved(order: Order) -> bool:
     return not np.array_equal(order.rows, np.arange(len(order.rows)))
 
 
-def _order(values: Columns, jump: float | None, text: TableText, blocks: IntArray | None) -> Order:
+def order_of(values: Columns, jump: float | None, text: TableText, blocks: IntArray | None) -> Order:
     """The rows in the order of movement, and their sweeps: the file's own, or by the way the positions went."""
     count = len(values["x"])
     rows = np.arange(count)
@@ -326,7 +210,7 @@ def _order(values: Columns, jump: float | None, text: TableText, blocks: IntArra
     return Order(rows[order.rows], order.sweep, "; ".join(filter(None, (said, order.said))))
 
 
-def _doubts(text: TableText, roles: dict[str, int], values: Columns, settings: TableSettings) -> list[str]:
+def doubts(text: TableText, roles: dict[str, int], values: Columns, settings: TableSettings) -> list[str]:
     """What is odd about the values, and not mended."""
     found = []
     if said := clipped(values["z"]):
@@ -344,7 +228,7 @@ def _doubts(text: TableText, roles: dict[str, int], values: Columns, settings: T
     return found
 
 
-def _trace(values: Columns, settings: TableSettings, text: TableText, order: Order) -> Trace:
+def trace_of(values: Columns, settings: TableSettings, text: TableText, order: Order) -> Trace:
     radius = settings.tip_radius
     assert radius is not None
     x, z = values["x"], values["z"]
