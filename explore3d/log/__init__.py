@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         averaged_log as averaged_log,
         averaging_words as averaging_words,
         lone_steps as lone_steps,
+        step_lengths as step_lengths,
         unit_vectors as unit_vectors,
         usual_step as usual_step,
     )
@@ -51,6 +52,7 @@ _PUBLIC = {
         "SAMPLE_GAP",
         "about_averaging",
         "lone_steps",
+        "step_lengths",
         "averaged_file",
         "averaged_log",
         "averaging_words",

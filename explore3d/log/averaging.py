@@ -60,7 +60,7 @@ def _averaged(traces: Iterable[Trace], length: int, name: str) -> tuple[Trace, I
         vectors = [getattr(trace, field) for field in VECTOR_FIELDS if getattr(trace, field) is not None]
         table = np.column_stack([trace.centers, trace.t, trace.sweep, *vectors])
         joined = table if last is None else np.concatenate([last[None], table])
-        steps, ticks = np.linalg.norm(np.diff(joined[:, :3], axis=0), axis=1), np.diff(joined[:, 3])
+        steps, ticks = step_lengths(joined), np.diff(joined[:, 3])
         if some is None:
             some, step, tick = trace, usual_step(steps), usual_step(ticks)
         cut = (np.diff(joined[:, 4]) != 0) | lone_steps(steps, SAMPLE_GAP * step)
@@ -120,7 +120,7 @@ def about_averaging(
         rows: samples that it was given.
         cuts: of them that follow a gap, or an end.
     """
-    steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)[np.diff(sweep) == 0]
+    steps = step_lengths(centers)[np.diff(sweep) == 0]
     spacing = float(np.median(steps)) if len(steps) else 0.0
     return {
         "length": means.length,
@@ -145,6 +145,14 @@ def averaging_words(about: dict[str, Any]) -> str:
         f"{about['white_noise']:.3g} of it, what is correlated over more than {spacing} does not; crests lower than "
         f"{length_text(about['smallest_crest'])} are smeared, tops lie up to {length_text(about['lowered'])} too low"
     )
+
+
+def step_lengths(points: FloatArray) -> FloatArray:
+    """(N - 1,) distance of each position, the first three columns, from the one before it."""
+    squares = np.diff(points[:, 0]) ** 2
+    for axis in (1, 2):
+        squares += np.diff(points[:, axis]) ** 2
+    return np.asarray(np.sqrt(squares))
 
 
 def usual_step(steps: FloatArray) -> float:

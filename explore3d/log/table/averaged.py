@@ -14,6 +14,7 @@ from explore3d.log import (
     averaging_words,
     lone_steps,
     must_fit_analysis,
+    step_lengths,
     unit_vectors,
     usual_step,
 )
@@ -116,7 +117,7 @@ class _Taking:
         if is_moved(order_of(values, self.settings.jump, self.first, blocks)):
             raise self._in_no_order()
         self.said += doubts(self.first, self.roles, values, self.settings)
-        self.step = usual_step(np.linalg.norm(np.diff(_points(values), axis=0), axis=1))
+        self.step = usual_step(step_lengths(_points(values)))
 
     def _in_no_order(self) -> UserError:
         return UserError(
@@ -129,7 +130,7 @@ class _Taking:
         others = [values[role] for role in self._others()]
         table = np.column_stack([points, *others, np.zeros(len(points)), blocks])
         joined = table if self.last is None else np.concatenate([self.last[None], table])
-        steps = np.linalg.norm(np.diff(joined[:, :3], axis=0), axis=1)
+        steps = step_lengths(joined)
         cut = lone_steps(steps, SAMPLE_GAP * self.step) | (np.diff(joined[:, -1]) != 0)
         jump = JUMP * self.step if self.settings.jump is None else self.settings.jump
         jumps = steps > jump if self.settings.jump is not None else lone_steps(steps, jump)
