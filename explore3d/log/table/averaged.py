@@ -102,14 +102,14 @@ class _Taking:
         values = {
             role: np.asarray(rows[good, index]) * self.factors.get(role, 1.0) for role, index in self.roles.items()
         }
-        if text is self.first:
+        if self.last is None:
             self._know(values, None if text.blocks is None else text.blocks[good].astype(np.int64))
         if "t" in values:
             values["t"] = values["t"] * self.seconds
         self._add(values, blocks[good])
 
     def _know(self, values: Columns, blocks: IntArray | None) -> None:
-        """What is usual, from the first piece."""
+        """What is usual, from the first piece with a usable row."""
         if "t" in values:
             self.seconds, assumed = time_factor(self.first, self.roles, values["t"])
             self.said += [assumed] * bool(assumed)
