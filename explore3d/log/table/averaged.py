@@ -23,6 +23,7 @@ from explore3d.log.table.order import JUMP, Order
 from explore3d.log.table.rows import (
     Columns,
     Samples,
+    blocks_of,
     doubts,
     good_rows,
     is_moved,
@@ -103,7 +104,7 @@ class _Taking:
             role: np.asarray(rows[good, index]) * self.factors.get(role, 1.0) for role, index in self.roles.items()
         }
         if self.last is None:
-            self._know(values, None if text.blocks is None else text.blocks[good].astype(np.int64))
+            self._know(values, blocks_of(text, good))
         if "t" in values:
             values["t"] = values["t"] * self.seconds
         self._add(values, blocks[good])

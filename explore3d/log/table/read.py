@@ -15,6 +15,7 @@ from explore3d.log.table.averaged import averaged
 from explore3d.log.table.columns import find_columns, length_factors, time_factor
 from explore3d.log.table.rows import (
     Samples,
+    blocks_of,
     doubts,
     good_rows,
     is_moved,
@@ -154,7 +155,7 @@ def table_log(text: TableText, settings: TableSettings, sidecar: Path | None) ->
         factor, assumed = time_factor(text, roles, values["t"])
         values["t"] *= factor
         said += [assumed] * bool(assumed)
-    order = order_of(values, settings.jump, text, None if text.blocks is None else text.blocks[good].astype(np.int64))
+    order = order_of(values, settings.jump, text, blocks_of(text, good))
     values = {role: value[order.rows] for role, value in values.items()} if is_moved(order) else values
     said += [order.said] * bool(order.said) + doubts(text, roles, values, settings)
     left_out = len(rows) - int(good.sum())

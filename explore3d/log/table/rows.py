@@ -173,13 +173,14 @@ def _zeros_at_the_end(rows: FloatArray, good: BoolArray, columns: list[int]) -> 
 
 
 def is_moved(order: Order) -> bool:
-    return not np.array_equal(order.rows, np.arange(len(order.rows)))
+    """True if the rows do not stand in the order of movement."""
+    return order.rows is not None
 
 
 def order_of(values: Columns, jump: float | None, text: TableText, blocks: IntArray | None) -> Order:
     """The rows in the order of movement, and their sweeps: the file's own, or by the way the positions went."""
     count = len(values["x"])
-    rows = np.arange(count)
+    rows: IntArray | None = None
     said = ""
     if "t" in values and (backwards := int((np.diff(values["t"]) < 0).sum())):
         if backwards > count // 20 and count >= LEAST_ROWS and "sweep" not in values:
@@ -196,10 +197,10 @@ def order_of(values: Columns, jump: float | None, text: TableText, blocks: IntAr
         found = int(blocks[-1] - blocks[0]) + 1
         return Order(rows, blocks - blocks[0], "; ".join([*[said] * bool(said), f"{found} sweeps between blank lines"]))
     if "y" not in values and jump is None:
-        order = profile_order(values["x"][rows])
+        order = profile_order(values["x"] if rows is None else values["x"][rows])
     else:
         points = np.stack([values["x"], values.get("y", np.zeros(count)), values["z"]]).T
-        points = points[rows] if said.startswith("the rows") else points
+        points = points if rows is None else points[rows]
         found_order = cloud_order(points, jump)
         if found_order is None:
             raise UserError(
@@ -207,7 +208,15 @@ def order_of(values: Columns, jump: float | None, text: TableText, blocks: IntAr
                 'says which order it was; give a column of times or of sweeps (--columns "t=..., sweep=..."), or sort'
             )
         order = found_order
-    return Order(rows[order.rows], order.sweep, "; ".join(filter(None, (said, order.said))))
+    moved = rows if order.rows is None else order.rows if rows is None else rows[order.rows]
+    return Order(moved, order.sweep, "; ".join(filter(None, (said, order.said))))
+
+
+def blocks_of(text: TableText, good: BoolArray) -> IntArray | None:
+    """(N,) number of the block between blank lines of each usable row; None if there is one block."""
+    if text.blocks is None or text.blocks[0] == text.blocks[-1]:
+        return None
+    return np.asarray(text.blocks[good].astype(np.int64))
 
 
 def doubts(text: TableText, roles: dict[str, int], values: Columns, settings: TableSettings) -> list[str]:
