@@ -139,7 +139,7 @@ def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(jobs, "analyze_each", lambda *given, **options: calls.append((given, options)) or [])
     monkeypatch.setattr(report, "show", lambda *given: None)
     options = ["--tip-radius", "2 um", "--units", "mm", "--columns", "x=1, z=2", "--frame", "0 mm, 1 mm,5 mm"]
-    options += ["--pixel", "1 um", "--part", "/tip", "--same-object"]
+    options += ["--pixel", "1 um", "--part", "/tip", "--average", "20", "--same-object"]
     options += ["--tip-sd", "20 nm", "--form", "line", "--mask", "1mm..2mm"]
     options += ["--model", "body.ply", "--model-units", "mm", "--force", "curvature"]
     assert explore3d_main(monkeypatch, "analyze", "a.csv", "b.mcap", "--out", tmp_path, *options) == 0
@@ -153,6 +153,7 @@ def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatc
         "columns": "x=1, z=2",
         "pixel": "1 um",
         "part": "/tip",
+        "average": 20,
         "tip_sd": "20 nm",
         "form": "line",
         "mask": ["1mm..2mm"],
