@@ -39,7 +39,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
 def test_a_package_of_others_is_named_in_a_scene_and_its_table_is_checked(installed: Path) -> None:
     scene = load_scene(KLIPPER / "scene.toml")
     assert type(scene.finger).__name__ == "KlipperTable"
-    assert parse_scene(scene.resolved, "scene.toml").resolved == scene.resolved
+    assert parse_scene(scene.resolved, "scene.toml", files_from=[KLIPPER]).resolved == scene.resolved
     assert scene.finger.is_real
     for old, new, message in (
         ("origin =", "orign =", "finger.orign: unknown key; did you mean 'origin'"),
@@ -61,11 +61,11 @@ def test_what_is_not_installed_is_named_with_what_is() -> None:
 @pytest.mark.slow
 def test_the_command_line_plans_and_explores_with_it(installed: Path) -> None:
     program = (
-        "import subprocess, sys; from fake_moonraker import FakePrinter; from pathlib import Path\n"
+        "import shutil, subprocess, sys; from fake_moonraker import FakePrinter; from pathlib import Path\n"
         "with FakePrinter(lambda x, y: 0.025, pace=200.0) as printer:\n"
         f"    text = Path({str(KLIPPER / 'scene.toml')!r}).read_text()\n"
-        f"    text = text.replace('../../assets', {str(ROOT / 'assets')!r})\n"
-        "    scene = Path(sys.argv[1]); scene.write_text(text.replace('http://localhost:7125', printer.url))\n"
+        "    scene = Path(sys.argv[1]); shutil.copy('tile.ply', scene.parent)\n"
+        "    scene.write_text(text.replace('http://localhost:7125', printer.url))\n"
         "    for words in (['plan', scene], ['run', scene, '--out', sys.argv[2], '--arm']):\n"
         "        done = subprocess.run([sys.executable, '-m', 'explore3d', *words], capture_output=True, text=True)\n"
         "        print(done.returncode, done.stdout.splitlines()[:1], done.stderr[-300:])\n"

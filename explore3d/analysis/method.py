@@ -114,7 +114,7 @@ class Work:
 
     def __post_init__(self) -> None:
         self.trace = self.log.trace
-        self.settings = AnalysisSettings.of(self.scene)
+        self.settings = AnalysisSettings.of(self.scene).of_means(self.log.metadata.get("average"))
         if self.log.tip_sd is not None:
             self.settings = replace(self.settings, tip_sd=self.log.tip_sd)
         if self.given is not None:
@@ -481,6 +481,7 @@ def _provenance(work: Work) -> dict[str, Any]:
         "stopped": None if stop is None else stop.text,
         "complete": stop is None or not stop.incomplete,
         "read_as": log.metadata.get("read_as", []),
+        "average": log.metadata.get("average"),
         "noise": {"white": noise.white, "correlated": noise.correlated, "length": noise.length},
         "detection_limit": work.detections.detection_limit,
         "limit_measured": {"injected": work.detections.injected, "recovered": work.detections.recovered},

@@ -7,7 +7,20 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Columns, Force, Frame, Json, Out, Overwrite, Part, Pixel, SameObject, TipRadius, Units
+from explore3d.cli.options import (
+    Average,
+    Columns,
+    Force,
+    Frame,
+    Json,
+    Out,
+    Overwrite,
+    Part,
+    Pixel,
+    SameObject,
+    TipRadius,
+    Units,
+)
 
 
 def analyze(
@@ -39,6 +52,7 @@ def analyze(
     columns: Columns = None,
     pixel: Pixel = None,
     part: Part = None,
+    average: Average = None,
     frame: Frame = None,
     same_object: SameObject = False,
     model: Annotated[
@@ -78,6 +92,7 @@ def analyze(
             columns=columns,
             pixel=pixel,
             part=part,
+            average=average,
             frame=origin,
         )
     if told and not json:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from explore3d import UserError
-from explore3d.cli.options import Json, length, point
+from explore3d.cli.options import FilesFrom, Json, length, point
 from explore3d.cli.run import SceneFile
 
 Arm = Annotated[bool, typer.Option("--arm", help="Let a real machine move.")]
@@ -74,6 +74,7 @@ def calibrate(
     arm: Arm = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the last recording beside --out.")] = False,
     json: Json = False,
+    files_from: FilesFrom = None,
 ) -> None:
     """Find the tip's radius, its noise and the sensor's delay on a reference sphere; write a tip profile.
 
@@ -83,16 +84,23 @@ def calibrate(
 
     words = ["explore3d", "calibrate", str(scene), "--radius", radius, "--center", center, "--out", str(out)]
     words += ["--lines", str(lines), "--radius-sd", radius_sd, *["--arm"] * arm]
+    folders = files_from or []
+    words += [part for folder in folders for part in ("--files-from", str(folder))]
     sphere, doubt = length("--radius", radius, positive=True), length("--radius-sd", radius_sd)
     place = point("--center", center)
     with Recording(out, shlex.join(words), resume) as kept:
-        profile = find(scene, sphere, place, lines=lines, radius_sd=doubt, arm=arm, recording=kept)
+        profile = find(scene, sphere, place, lines=lines, radius_sd=doubt, arm=arm, recording=kept, files_from=folders)
         kept.write(profile)
     print(as_json(profile.record()) if json else "\n".join([*profile.lines(), f"profile: {out}"]))
 
 
 def selftest(
-    scene: SceneFile, radius: Radius, center: Center = "0 mm, 0 mm, 0 mm", arm: Arm = False, json: Json = False
+    scene: SceneFile,
+    radius: Radius,
+    center: Center = "0 mm, 0 mm, 0 mm",
+    arm: Arm = False,
+    json: Json = False,
+    files_from: FilesFrom = None,
 ) -> None:
     """Scan a reference sphere along four lines; print the range of radii with the time it took.
 
@@ -100,7 +108,8 @@ def selftest(
     """
     from explore3d.jobs import as_json, selftest as test
 
-    found = test(scene, length("--radius", radius, positive=True), point("--center", center), arm=arm)
+    sphere = length("--radius", radius, positive=True)
+    found = test(scene, sphere, point("--center", center), arm=arm, files_from=files_from or ())
     words = f"range of radii {1e3 * found['range']:.4f} mm in {found['time']:.1f} s ({found['samples']:.0f} contacts)"
     print(as_json(found) if json else words)
 
@@ -111,6 +120,7 @@ def reprobe(
     touches: Annotated[int, typer.Option(help="How often to touch it.", min=1)] = 3,
     arm: Arm = False,
     json: Json = False,
+    files_from: FilesFrom = None,
 ) -> None:
     """Touch one place of an earlier session again, and say how far off the record it is.
 
@@ -118,5 +128,5 @@ def reprobe(
     """
     from explore3d.jobs import as_json, reprobe as touch
 
-    found = touch(folder, point("--at", at), touches=touches, arm=arm)
+    found = touch(folder, point("--at", at), touches=touches, arm=arm, files_from=files_from or ())
     print(as_json(found.record()) if json else "\n".join(found.lines()))

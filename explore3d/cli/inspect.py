@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Columns, Json, Part, Pixel, TipRadius, Units
+from explore3d.cli.options import Average, Columns, Json, Part, Pixel, TipRadius, Units
 
 
 def inspect(
@@ -17,6 +17,7 @@ def inspect(
     columns: Columns = None,
     pixel: Pixel = None,
     part: Part = None,
+    average: Average = None,
     json: Json = False,
 ) -> None:
     """Say what a file is: columns, units, sweeps, extent, spacing, gaps, what is doubtful and how to settle it.
@@ -28,5 +29,5 @@ def inspect(
 
     from explore3d.log import inspect as look
 
-    found = look(file, tip_radius=tip_radius, units=units, columns=columns, pixel=pixel, part=part)
+    found = look(file, tip_radius=tip_radius, units=units, columns=columns, pixel=pixel, part=part, average=average)
     print(dumps(asdict(found), ensure_ascii=False, allow_nan=False) if json else "\n".join(found.lines()))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Columns, Frame, Out, Overwrite, Part, Pixel, TipRadius, Units, length
+from explore3d.cli.options import Average, Columns, Frame, Out, Overwrite, Part, Pixel, TipRadius, Units, length
 
 
 def merge(
@@ -20,6 +20,7 @@ def merge(
     columns: Columns = None,
     pixel: Pixel = None,
     part: Part = None,
+    average: Average = None,
     frame: Frame = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -43,6 +44,7 @@ def merge(
         columns=columns,
         pixel=pixel,
         part=part,
+        average=average,
         frame=None if frame is None else {"origin": [each.strip() for each in frame.split(",")]},
     )
     print("\n".join([*map(feature_line, merged.features), f"model: {out / 'model.json'}"]))

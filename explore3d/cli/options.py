@@ -63,9 +63,21 @@ Force = Annotated[
         help="Run a stage that the report says was left out; may be repeated.",
     ),
 ]
+FilesFrom = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--files-from",
+        metavar="DIR",
+        help="A folder that the scene may name files in, beside its own and those next to that; may be repeated.",
+    ),
+]
 Pixel = Annotated[
     str | None,
     typer.Option(help='The file is a map of heights whose pixels are so far apart: "1 um", or "1 um, 2 um".'),
+]
+Average = Annotated[
+    int | None,
+    typer.Option(min=1, metavar="N", help="Make one sample, their mean, of N consecutive ones: for long recordings."),
 ]
 Part = Annotated[
     str | None, typer.Option(help="Which one of several that a file holds: topic of a bag, sheet, channel, layer.")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import INCOMPLETE, Force, Json, Out, Overwrite
+from explore3d.cli.options import INCOMPLETE, FilesFrom, Force, Json, Out, Overwrite
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene to explore.")]
 
@@ -24,15 +24,16 @@ def run(
         bool, typer.Option("--resume", help="Go on where a broken-off session in that folder stopped.")
     ] = False,
     overwrite: Overwrite = False,
+    files_from: FilesFrom = None,
 ) -> None:
     """Explore the scene with its finger; write the log, the annotated model and the report.
 
     Example: explore3d run wire/scene.toml --out out/wire
     """
-    from explore3d.scene import load_scene
+    from explore3d.jobs import open_scene
 
-    if not arm and load_scene(scene).finger.is_real:
-        plan(scene, out, json, overwrite)
+    if not arm and open_scene(scene, files_from or ()).finger.is_real:
+        plan(scene, out, json, overwrite, files_from)
         if not json:
             print("dry run: connected and checked, nothing was moved; add --arm to explore with the real machine")
         return
@@ -42,7 +43,14 @@ def run(
 
     with shown(quiet=json) as progress:
         analysis = explore(
-            scene, out, progress=progress, force=force or (), arm=arm, resume=resume, overwrite=overwrite
+            scene,
+            out,
+            progress=progress,
+            force=force or (),
+            arm=arm,
+            resume=resume,
+            overwrite=overwrite,
+            files_from=files_from or (),
         )
     show(analysis, out, json)
     short = analysis.account is not None and analysis.account.short
@@ -55,6 +63,7 @@ def plan(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for a picture of the sweeps.")] = None,
     json: Json = False,
     overwrite: Overwrite = False,
+    files_from: FilesFrom = None,
 ) -> None:
     """Show the planned sweeps, their length, time and limit violations; nothing is moved.
 
@@ -62,4 +71,4 @@ def plan(
     """
     from explore3d.jobs import show_plan
 
-    show_plan(scene, out, json, overwrite)
+    show_plan(scene, out, json, overwrite, files_from or ())

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from explore3d.jobs.merge import load as load, merge as merge
     from explore3d.jobs.plan import plan_scene as plan_scene, show_plan as show_plan
     from explore3d.jobs.reprobe import reprobe as reprobe
-    from explore3d.jobs.run import cause as cause, run as run, scene_finger as scene_finger
+    from explore3d.jobs.run import cause as cause, open_scene as open_scene, run as run, scene_finger as scene_finger
 
 _PUBLIC = {
     "analyze": ("analyze", "analyze_each"),
@@ -30,6 +30,6 @@ _PUBLIC = {
     "merge": ("load", "merge"),
     "plan": ("plan_scene", "show_plan"),
     "reprobe": ("reprobe",),
-    "run": ("cause", "run", "scene_finger"),
+    "run": ("cause", "open_scene", "run", "scene_finger"),
 }
 doorway(__name__, _PUBLIC)

@@ -13,8 +13,8 @@ from explore3d.analysis import Analysis, Progress, Stages, build_model, silent
 from explore3d.jobs.conclude import conclude
 from explore3d.jobs.objects import not_one_object
 from explore3d.jobs.session import Job, Session
-from explore3d.log import LOG, digest, large_log, load_logs, read_base
-from explore3d.scene import load_mesh, parse_scene
+from explore3d.log import LOG, digest, large_log, load_logs, must_fit_analysis, read_base
+from explore3d.scene import load_mesh, recorded_scene
 from mapping.base import Base
 
 
@@ -42,7 +42,8 @@ def analyze(
         force: stages to run although the recording does not need them.
         overwrite: replace, once this one is complete, a session of another recording in that folder.
         table: tip_sd, form, mask (explore3d.log.load_logs); units, columns, frame, jump, reference, pixel of a table
-            (explore3d.log.table.read_table); part: which of several that a file holds.
+            (explore3d.log.table.read_table); average: samples of a run that becomes one, their mean; part: which of
+            several that a file holds.
 
     Raises:
         UserError: input that cannot be used, named by file and field.
@@ -135,7 +136,7 @@ def _command(
 def table_words(tip_radius: str | float | None, table: dict[str, Any]) -> list[str]:
     """The options of a command that say again how to read what does not say it."""
     words = [] if tip_radius is None else ["--tip-radius", str(tip_radius)]
-    for name in ("units", "columns", "pixel", "part", "tip_sd", "form"):
+    for name in ("units", "columns", "pixel", "part", "tip_sd", "form", "average"):
         words += [f"--{name.replace('_', '-')}", str(table[name])] if table.get(name) else []
     words += [part for mask in table.get("mask") or () for part in ("--mask", mask)]
     origin = (table.get("frame") or {}).get("origin")
@@ -152,7 +153,7 @@ def _analyze(
     force: Collection[str],
     table: dict[str, Any],
 ) -> Analysis:
-    if len(paths) == 1 and (large := large_log(paths[0])) is not None:
+    if len(paths) == 1 and table.get("average") is None and (large := large_log(paths[0])) is not None:
         from explore3d.jobs.streaming import analyze_stream
 
         unused = [name for name in ("tip_sd", "form", "mask") if table.get(name) is not None]
@@ -164,7 +165,8 @@ def _analyze(
     stages = Stages(progress, force)
     with stages.stage("reading"):
         log = load_logs(paths, tip_radius=tip_radius, **table)
-        scene = parse_scene(log.scene_text, log.sources[0]) if log.scene_text else None
+        must_fit_analysis(", ".join(log.sources), len(log.trace))
+        scene = recorded_scene(log.scene_text, log.sources[0]) if log.scene_text else None
         base = Base(load_mesh(model, model_units)) if model is not None else read_base(log.events)
     if session is None:
         return build_model(log, scene, base, stages)

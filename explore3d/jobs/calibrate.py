@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 import tomllib
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +17,10 @@ from numpy.typing import ArrayLike
 
 from explore3d import UserError, __version__, count_text
 from explore3d.jobs.resume import Execute, Replay
-from explore3d.jobs.run import cause, scene_finger
+from explore3d.jobs.run import cause, open_scene, scene_finger
 from explore3d.jobs.session import locked, undisturbed
 from explore3d.log import OUTCOME, LogWriter, read_log
-from explore3d.scene import Scene, load_scene, scene_text
+from explore3d.scene import Scene, scene_text
 from hw import Finger, Move
 from hw.probing import GrblFinger
 from mapping import Trace
@@ -76,6 +77,7 @@ def calibrate(
     radius_sd: float = 0.0,
     arm: bool = False,
     recording: Recording | None = None,
+    files_from: Collection[Path | str] = (),
 ) -> TipProfile:
     """Sweep over a reference sphere and fit tip and noise to it.
 
@@ -86,12 +88,13 @@ def calibrate(
         lines: sweeps over the sphere.
         arm: let a real machine move.
         recording: entered; keeps every sweep as soon as it is made.
+        files_from: folders that the scene may name files in, beside those near it.
 
     Raises:
         FingerError: the finger is lost, or not armed.
         CalibrationError: the contacts do not determine the tip.
     """
-    scene = scene if isinstance(scene, Scene) else load_scene(scene)
+    scene = open_scene(scene, files_from)
     if not radius > 0.0:
         raise UserError(f"radius of the reference sphere: should be greater than 0; found {radius:g} m")
     scene.check_size("the reference sphere", 2.0 * radius)
@@ -247,7 +250,12 @@ def write_profile(profile: TipProfile, path: Path) -> None:
 
 
 def selftest(
-    scene: Scene | Path | str, radius: float, center: tuple[float, float, float], *, arm: bool = False
+    scene: Scene | Path | str,
+    radius: float,
+    center: tuple[float, float, float],
+    *,
+    arm: bool = False,
+    files_from: Collection[Path | str] = (),
 ) -> dict[str, float]:
     """Range of radii over a reference sphere, scanned along four lines, with the time it took (as ISO 10360 pairs).
 
@@ -257,7 +265,7 @@ def selftest(
     Raises:
         FingerError, CalibrationError: as for `calibrate`.
     """
-    profile = calibrate(scene, radius, center, lines=4, arm=arm)
+    profile = calibrate(scene, radius, center, lines=4, arm=arm, files_from=files_from)
     tip = profile.tip
     spread = float(np.hypot(tip.noise.white, tip.noise.correlated))
     return {

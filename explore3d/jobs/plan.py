@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,10 @@ import numpy as np
 from explore3d import count_text, seconds_text
 from explore3d.analysis import SurfaceAccount
 from explore3d.jobs.expedition import Explorer, explorer
-from explore3d.jobs.run import scene_digest, scene_finger
+from explore3d.jobs.run import open_scene, scene_digest, scene_finger
 from explore3d.jobs.session import Job, Session
 from explore3d.pictures import plan_picture
-from explore3d.scene import Scene, load_scene
+from explore3d.scene import Scene
 from hw import Finger, Move
 from hw.probing import GrblFinger
 from hw.simulated import SimulatedFinger
@@ -92,13 +93,17 @@ class DryRun:
         return plan_picture(self.base, self.moves, self.tip_radius, [number - 1 for number, _ in self.violations])
 
 
-def plan_scene(path: Path | str) -> DryRun:
+def plan_scene(path: Path | str, files_from: Collection[Path | str] = ()) -> DryRun:
     """Plan the exploration of a scene, and check every move against the finger's limits.
+
+    Args:
+        path: the scene's file.
+        files_from: folders that it may name files in, beside those near it.
 
     Raises:
         SceneError: a scene that cannot be used.
     """
-    scene = load_scene(path)
+    scene = open_scene(path, files_from)
     with scene_finger(scene) as finger:
         return _planned(scene, finger)
 
@@ -179,7 +184,13 @@ def imagined(discover: Discover) -> tuple[list[Move], Base]:
     return [move for move, _ in record], outcome.value
 
 
-def show_plan(path: Path | str, out: Path | None, as_json: bool, overwrite: bool = False) -> None:
+def show_plan(
+    path: Path | str,
+    out: Path | None,
+    as_json: bool,
+    overwrite: bool = False,
+    files_from: Collection[Path | str] = (),
+) -> None:
     """Plan, and print the plan in words or as JSON; with a folder, write plan.json and plan.png into it.
 
     Raises:
@@ -189,10 +200,11 @@ def show_plan(path: Path | str, out: Path | None, as_json: bool, overwrite: bool
     import json
 
     if out is None:
-        plan = plan_scene(path)
+        plan = plan_scene(path, files_from)
     else:
-        with Session(out, Job("plan", scene_digest(load_scene(path))), overwrite=overwrite) as session:
-            plan = plan_scene(path)
+        subject = scene_digest(open_scene(path, files_from))
+        with Session(out, Job("plan", subject), overwrite=overwrite) as session:
+            plan = plan_scene(path, files_from)
             session.write("plan.json", json.dumps(plan.record(), indent=1))
             session.write("plan.png", plan.picture())
     if as_json:

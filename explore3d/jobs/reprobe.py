@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from explore3d import UserError, __version__, count_text
-from explore3d.jobs.run import cause, scene_finger
+from explore3d.jobs.run import cause, open_scene, scene_finger
 from explore3d.log import LOG, Log, LogWriter, read_log
-from explore3d.scene import load_scene
 from hw import Move
 from mapping import BoolArray, FloatArray, Trace, length_text
 
@@ -70,7 +70,14 @@ class Reprobed:
         ]
 
 
-def reprobe(folder: Path | str, at: tuple[float, float, float], *, touches: int = 3, arm: bool = False) -> Reprobed:
+def reprobe(
+    folder: Path | str,
+    at: tuple[float, float, float],
+    *,
+    touches: int = 3,
+    arm: bool = False,
+    files_from: Collection[Path | str] = (),
+) -> Reprobed:
     """Touch a place of an earlier session again, with that session's finger, as it was touched then.
 
     Args:
@@ -78,6 +85,7 @@ def reprobe(folder: Path | str, at: tuple[float, float, float], *, touches: int 
         at: (3,) a point on the body or a ball's centre, m; the nearest recorded sample counts.
         touches: how often.
         arm: let a real machine move.
+        files_from: folders that its scene may name files in, beside those near it and those that the session read.
 
     Raises:
         UserError: no session there, or nothing was recorded within two tip radii.
@@ -91,7 +99,7 @@ def reprobe(folder: Path | str, at: tuple[float, float, float], *, touches: int 
     approach = _approach(log, sample)
     there = _neighbours(log.trace, sample, approach)
     center = log.trace.centers[there].mean(axis=0)
-    scene = load_scene(folder / "scene.toml")
+    scene = open_scene(folder / "scene.toml", files_from)
     path = _unused(folder)
     about = {"software": f"explore3d {__version__}", "reprobes": log.sha256, "sample": sample}
     felt = []

@@ -18,7 +18,7 @@ from explore3d.analysis import Analysis, Progress, Stages, silent, without_needl
 from explore3d.jobs.conclude import conclude
 from explore3d.jobs.expedition import SurveyWatch, explorer, known_base
 from explore3d.jobs.resume import BROKEN_OFF, Replay
-from explore3d.jobs.session import Job, Session
+from explore3d.jobs.session import Job, Session, unchanged_files
 from explore3d.log import EXPLORATION, OUTCOME, Log, read_base, read_log, stop_of
 from explore3d.scene import FingerNoise, GivenFingerTable, Scene, load_scene
 from hw import Finger, Move
@@ -43,6 +43,7 @@ def run(
     resume: bool = False,
     overwrite: bool = False,
     finger: Finger | None = None,
+    files_from: Collection[Path | str] = (),
 ) -> Analysis:
     """Explore, log, and build the annotated model.
 
@@ -59,6 +60,7 @@ def run(
         overwrite: replace, once this one is complete, a session of another scene in that folder.
         finger: explore with this one, not with the one that the scene names; whether it may move is its own affair.
             The session's scene says `kind = "given"`, and keeps what it states of the noise.
+        files_from: folders that the scene may name files in, beside those near it.
 
     Raises:
         UserError: a scene or folder that cannot be used.
@@ -66,16 +68,17 @@ def run(
     """
     stages = Stages(progress, force)
     with stages.stage("setting up"):
-        scene = scene if isinstance(scene, Scene) else load_scene(scene)
+        scene = open_scene(scene, files_from)
         known_base(scene)  # a mesh that cannot be used is refused before a folder is made
         if finger is None:
             finger = scene_finger(without_needless_dynamics(scene, stages), arm)
         else:
             scene = _with_given(scene, finger)
     words = [part for name in force for part in ("--force", name)] + ["--arm"] * arm
+    words += [part for folder in files_from for part in ("--files-from", str(folder))]
     again = shlex.join(["explore3d", "run", str(scene.path), "--out", str(out), *words])
     go_on = f"{again} --resume"
-    job = Job("run", scene_digest(scene), ("plan",), go_on, again)
+    job = Job("run", scene_digest(scene), ("plan",), go_on, again, scene.files)
     with Session(out, job, resume=resume, overwrite=overwrite) as session:
         replay = None if session.source is None else Replay(read_log(session.source))
         session.write("scene.toml", scene.resolved)
@@ -89,6 +92,17 @@ def run(
             error.add_note(session.stopped)
             raise
     return replace(analysis, folder=session.place)
+
+
+def open_scene(scene: Scene | Path | str, files_from: Collection[Path | str] = ()) -> Scene:
+    """A scene as it is, or the one in a file; that of a session may name what the session read.
+
+    Raises:
+        SceneError: a scene that cannot be used.
+    """
+    if isinstance(scene, Scene):
+        return scene
+    return load_scene(scene, [*files_from, *unchanged_files(Path(scene).parent)])
 
 
 def _with_given(scene: Scene, finger: Finger) -> Scene:

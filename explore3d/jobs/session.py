@@ -25,7 +25,7 @@ from types import TracebackType
 from typing import Any
 
 from explore3d import FolderError, UserError, __version__
-from explore3d.log import LOG, Recorder
+from explore3d.log import LOG, Recorder, digest
 from hw import SIGNALS
 
 MARKER = "session.json"
@@ -45,6 +45,8 @@ class Job:
         replaces: other commands whose session of the same subject it may replace.
         go_on: the command that goes on with it where it ended early.
         again: the command that begins it again, where nothing was recorded.
+        reads: files that its scene names: the session's own scene may name them where they are, while they stay as
+            they were (`unchanged_files`).
     """
 
     name: str = ""
@@ -52,6 +54,7 @@ class Job:
     replaces: tuple[str, ...] = ()
     go_on: str = ""
     again: str = ""
+    reads: tuple[Path, ...] = ()
 
     def may_replace(self, earlier: dict[str, Any]) -> bool:
         """True if a session with that record is an earlier one of the same."""
@@ -101,6 +104,7 @@ class Session:
         self._goes_on_in_place = False
         self._log: Recorder | None = None
         self._started = datetime.now(UTC)
+        self._reads = {str(path): digest(path) for path in self.job.reads}
         self._lock: int | None = None
 
     def __enter__(self) -> Session:
@@ -388,7 +392,7 @@ class Session:
         shutil.rmtree(commit)
 
     def _mark(self, state: str, of: dict[str, Any] | None = None, files: Sequence[str] | None = None) -> None:
-        about = {"job": self.job.name, "subject": self.job.subject} if of is None else of
+        about = {"job": self.job.name, "subject": self.job.subject, "reads": self._reads} if of is None else of
         now = datetime.now(UTC)
         record = {
             "schema": SESSION_SCHEMA,
@@ -396,6 +400,7 @@ class Session:
             "stopped": self.stopped or about.get("stopped"),
             "job": about.get("job"),
             "subject": about.get("subject"),
+            "reads": about.get("reads", {}),
             "version": __version__,
             "started": self._started.isoformat(timespec="seconds"),
             "finished": None if state == "running" else now.isoformat(timespec="seconds"),
@@ -444,6 +449,16 @@ def _record(place: Path) -> dict[str, Any] | None:
         return dict(record) | {"files": [str(name) for name in record["files"]], "state": str(record["state"])}
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def unchanged_files(place: Path) -> tuple[Path, ...]:
+    """The files that the session in a folder read and that are what they were then.
+
+    A session that somebody else hands over can state no digest of a file that it does not know.
+    """
+    reads = (_record(place) or {}).get("reads")
+    known = reads if isinstance(reads, dict) else {}
+    return tuple(Path(name) for name, sha256 in known.items() if Path(name).is_file() and digest(Path(name)) == sha256)
 
 
 def _inside(folder: Path, name: str) -> bool:

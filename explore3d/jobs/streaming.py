@@ -11,7 +11,7 @@ from explore3d.jobs.conclude import conclude
 from explore3d.jobs.condense import CHUNK, KEPT_BACKGROUND_SAMPLES, Condensed, condense
 from explore3d.jobs.session import Session
 from explore3d.log import Log, LogStream, count_samples, digest, head, read_base
-from explore3d.scene import AnalysisSettings, parse_scene
+from explore3d.scene import AnalysisSettings, recorded_scene
 from mapping import LeftOut, Trace
 from mapping.base import Base, fit_base
 
@@ -35,7 +35,7 @@ def analyze_stream(
     """
     stages = Stages(progress, force)
     scene_text, events = head(path)
-    scene = parse_scene(scene_text, path) if scene_text else None
+    scene = recorded_scene(scene_text, path) if scene_text else None
     base = base or read_base(events) or _fitted(path, tip_radius, stages)
     settings = AnalysisSettings.of(scene)
     out = None if session is None else session.folder.resolve()

@@ -5,9 +5,21 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from explore3d.log.averaging import (
+        SAMPLE_GAP as SAMPLE_GAP,
+        about_averaging as about_averaging,
+        averaged_file as averaged_file,
+        averaged_log as averaged_log,
+        averaging_words as averaging_words,
+        lone_steps as lone_steps,
+        step_lengths as step_lengths,
+        unit_vectors as unit_vectors,
+        usual_step as usual_step,
+    )
     from explore3d.log.format import LOG as LOG, MAGIC as MAGIC
     from explore3d.log.inspect import Inspection as Inspection, inspect as inspect
     from explore3d.log.load import load_logs as load_logs
+    from explore3d.log.memory import must_fit as must_fit, must_fit_analysis as must_fit_analysis
     from explore3d.log.reader import digest as digest, iter_log as iter_log, read_log as read_log
     from explore3d.log.record import (
         EXPLORATION as EXPLORATION,
@@ -27,14 +39,30 @@ if TYPE_CHECKING:
         head as head,
         large_log as large_log,
     )
-    from explore3d.log.table import heights_log as heights_log, read_table as read_table, table_log as table_log
-    from explore3d.log.table_settings import load_settings as load_settings
+    from explore3d.log.table import (
+        heights_log as heights_log,
+        load_settings as load_settings,
+        read_table as read_table,
+        table_log as table_log,
+    )
     from explore3d.log.writer import LogWriter as LogWriter, Recorder as Recorder
 
 _PUBLIC = {
+    "averaging": (
+        "SAMPLE_GAP",
+        "about_averaging",
+        "lone_steps",
+        "step_lengths",
+        "averaged_file",
+        "averaged_log",
+        "averaging_words",
+        "unit_vectors",
+        "usual_step",
+    ),
     "format": ("LOG", "MAGIC"),
     "inspect": ("Inspection", "inspect"),
     "load": ("load_logs",),
+    "memory": ("must_fit", "must_fit_analysis"),
     "reader": ("digest", "iter_log", "read_log"),
     "record": (
         "EXPLORATION",
@@ -49,8 +77,7 @@ _PUBLIC = {
         "stop_of",
     ),
     "stream": ("LogStream", "count_samples", "head", "large_log"),
-    "table": ("heights_log", "read_table", "table_log"),
-    "table_settings": ("load_settings",),
+    "table": ("heights_log", "load_settings", "read_table", "table_log"),
     "writer": ("LogWriter", "Recorder"),
 }
 doorway(__name__, _PUBLIC)

@@ -5,26 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from explore3d import UserError
+from explore3d.log.averaging import SAMPLE_GAP
 from explore3d.log.format import LOG
 from explore3d.log.readers import Reader, read_recording, reader_of
 from explore3d.log.record import Log
-from explore3d.log.table import table_log
-from explore3d.log.table_columns import EVEN, POSITION, advances, counts, find_columns
-from explore3d.log.table_order import sentinels
+from explore3d.log.table import (
+    EVEN,
+    POSITION,
+    TableSettings,
+    advances,
+    counts,
+    find_columns,
+    load_settings,
+    sentinels,
+    table_log,
+)
 from explore3d.log.text import TableText, read_pieces, read_text
 from mapping import FloatArray, length_text
 
-if TYPE_CHECKING:
-    from explore3d.log.table_settings import TableSettings
-
 TABLE = "a table of numbers"
 READ_WHOLE = 256 * 2**20  # bytes of a table that is held at once: 1.5e7 rows of two columns, in 1 GB
-SAMPLE_GAP = 5.0  # usual steps: a longer one within a sweep is a gap, samples were lost or left out there
 MOST_LISTED_COLUMNS = 16  # columns that are listed one by one
 
 
@@ -141,19 +146,25 @@ def _in_pieces(path: Path, reader: Reader, settings: Mapping[str, Any]) -> Inspe
 
     def read(asked: Mapping[str, Any]) -> Log:
         assert first is not None
-        return table_log(first, *_settings(path, asked))
+        return table_log(first, *_settings(path, asked)) if given.average is None else read_recording(path, asked)
 
     log, assumed = _read(settings, doubts, read)
     doubts = [each.removeprefix(f"{path}: ") for each in doubts]
-    doubts.append(
-        f"it is long and was looked at in pieces: how it is read, sweeps, spacing, gaps and repeats are those of its "
-        f"first {len(first.rows):,} rows"
+    doubts += (
+        []
+        if given.average is not None
+        else [
+            "it is long and was looked at in pieces: how it is read, sweeps, spacing, gaps and repeats are those of "
+            f"its first {len(first.rows):,} rows"
+        ]
     )
     found = Inspection(
         str(path), reader.name, path.stat().st_size, columns, doubtful=tuple(doubts), unsaid=reader.unsaid
     )
     if log is None:
         return replace(found, samples=rows)
+    if given.average is not None:
+        return _with_log(found, log, assumed)
     roles, factors = find_columns(first, given.columns), log.metadata["metres_per_unit"]
     extent = tuple(
         factors[role] * (sums[roles[role]].greatest - sums[roles[role]].least) if role in roles else 0.0
@@ -247,8 +258,6 @@ def _with_log(found: Inspection, log: Log, assumed: set[str]) -> Inspection:
 
 
 def _settings(path: Path, settings: Mapping[str, Any]) -> tuple[TableSettings, Path | None]:
-    from explore3d.log.table_settings import load_settings
-
     return load_settings(path, **{key: value for key, value in settings.items() if value is not None})
 
 

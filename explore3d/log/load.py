@@ -32,7 +32,7 @@ def load_logs(
         tip_sd: standard deviation of that radius; None: what scene or table say.
         form: what the base is, where it is fitted (mapping.base.Form); None: what a table's sidecar says.
         mask: stretches in x that the base is not fitted to, "1.2mm..1.4mm"; None: what a table's sidecar says.
-        table: the other settings of read_table.
+        table: the other settings of read_table; `average` is one for every kind of file.
 
     Raises:
         UserError: one line naming the file and the field.

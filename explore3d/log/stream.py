@@ -33,7 +33,7 @@ class LogStream:
 
     def __init__(self, path: Path | str, tip_radius: float | None = None) -> None:
         self.path = Path(path)
-        self._reading = Reading(self.path, tip_radius, events=[])
+        self.reading = Reading(self.path, tip_radius, events=[])
 
     def sweeps(self, samples: int) -> Iterator[Trace]:
         """Traces of at least that many samples (the last one fewer), each of whole sweeps.
@@ -42,7 +42,7 @@ class LogStream:
         """
         held: list[NDArray[np.void]] = []
         count, last = 0, None
-        for batch in _batches(self._reading):
+        for batch in _batches(self.reading):
             before = batch["sweep"][0] if last is None else last
             ends, last = np.flatnonzero(np.diff(batch["sweep"], prepend=before)), batch["sweep"][-1]
             cut = len(batch) if count >= 4 * samples else int(ends[-1]) if len(ends) else None
@@ -50,33 +50,33 @@ class LogStream:
                 held.append(batch)
                 count += len(batch)
                 continue
-            yield _trace([each for each in (*held, batch[:cut]) if len(each)], self._reading)
+            yield _trace([each for each in (*held, batch[:cut]) if len(each)], self.reading)
             held = [batch[cut:]] if cut < len(batch) else []
             count = len(batch) - cut
         if count:
-            yield _trace(held, self._reading)
-        if not self._reading.samples:
-            raise UserError(f"{self.path}: field samples: the log holds none{_loss(self._reading, ', ')}")
+            yield _trace(held, self.reading)
+        if not self.reading.samples:
+            raise UserError(f"{self.path}: field samples: the log holds none{_loss(self.reading, ', ')}")
 
     @property
     def scene_text(self) -> str:
         """The scene's text, "" if none."""
-        return str(self._reading.start.get("scene", ""))
+        return str(self.reading.start.get("scene", ""))
 
     @property
     def events(self) -> tuple[Event, ...]:
         """What has been noted so far."""
-        return tuple(self._reading.events or ())
+        return tuple(self.reading.events or ())
 
     @property
     def complete(self) -> bool:
         """True once everything that the log promised was read."""
-        return self._reading.complete
+        return self.reading.complete
 
     @property
     def recovered(self) -> str:
         """One sentence on what is missing, once all was read."""
-        return _loss(self._reading)
+        return _loss(self.reading)
 
 
 def head(path: Path | str) -> tuple[str, tuple[Event, ...]]:

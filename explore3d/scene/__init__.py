@@ -30,7 +30,12 @@ if TYPE_CHECKING:
         OptoForceTable as OptoForceTable,
     )
     from explore3d.scene.mesh_files import load_mesh as load_mesh
-    from explore3d.scene.scene import Scene as Scene, load_scene as load_scene, parse_scene as parse_scene
+    from explore3d.scene.scene import (
+        Scene as Scene,
+        load_scene as load_scene,
+        parse_scene as parse_scene,
+        recorded_scene as recorded_scene,
+    )
     from explore3d.scene.settings import AnalysisSettings as AnalysisSettings
     from explore3d.scene.simulated import SimulatedFingerTable as SimulatedFingerTable
     from explore3d.scene.to_toml import scene_text as scene_text
@@ -63,7 +68,7 @@ _PUBLIC = {
     ),
     "machine": ("EMULATOR", "LineSensorTable", "MachineTable", "OptoForceTable"),
     "mesh_files": ("load_mesh",),
-    "scene": ("Scene", "load_scene", "parse_scene"),
+    "scene": ("Scene", "load_scene", "parse_scene", "recorded_scene"),
     "settings": ("AnalysisSettings",),
     "simulated": ("SimulatedFingerTable",),
     "to_toml": ("scene_text",),

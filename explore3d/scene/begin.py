@@ -100,7 +100,8 @@ def begin_scene(
     is_beside = copy.exists() and copy.samefile(mesh)
     refuse_to_replace([path] if is_beside else [path, copy])
     # read where it will stand, with the mesh where it is: nothing is written that cannot be used
-    parse_scene(text.replace(values["mesh"], _quoted(mesh.resolve().as_posix())), path).base_surface()
+    where_it_is = text.replace(values["mesh"], _quoted(mesh.resolve().as_posix()))
+    parse_scene(where_it_is, path, files_from=[mesh] if mesh.exists() else ()).base_surface()
     folder.mkdir(parents=True, exist_ok=True)
     if not is_beside:
         shutil.copyfile(mesh, copy)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,6 +15,7 @@ from explore3d import MeshFileError, SceneError, UnitError
 from explore3d.scene.complaint import complaint
 from explore3d.scene.finger import FingerTable, Setting, finger_table
 from explore3d.scene.mesh_files import load_mesh
+from explore3d.scene.named_files import NamedFiles, with_files
 from explore3d.scene.to_toml import scene_text
 from explore3d.scene.values import (
     INFORMATIVE,
@@ -183,6 +184,7 @@ class Scene(Table):
     _path: Path = PrivateAttr(default=Path("scene.toml"))
     _text: str = PrivateAttr(default="")
     _meshes: Mapping[Path, Surface] = PrivateAttr(default_factory=dict)
+    _is_recorded: bool = PrivateAttr(default=False)
 
     @model_validator(mode="after")
     def _within_reason(self) -> Scene:
@@ -215,6 +217,19 @@ class Scene(Table):
     def text(self) -> str:
         """The text of that file."""
         return self._text
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that it names and that jobs read, as far as they are there."""
+        found: dict[Path, None] = {}
+
+        def keep(_: str, path: Path) -> Path:
+            if path.is_file():
+                found[path] = None
+            return path
+
+        with_files(self, keep)
+        return tuple(found)
 
     @property
     def resolved(self) -> str:
@@ -302,6 +317,10 @@ class Scene(Table):
     def _surface(self, field: str, mesh: Path, units: str) -> Surface:
         if mesh in self._meshes:
             return self._meshes[mesh]
+        if self._is_recorded:
+            raise SceneError(
+                f"{self._path}: {field}: {mesh} is named by a recording; only a scene's own files are read"
+            )
         try:
             surface = load_mesh(mesh, units)
         except (MeshFileError, UnitError) as error:
@@ -327,8 +346,12 @@ class Scene(Table):
             )
 
 
-def load_scene(path: Path | str) -> Scene:
+def load_scene(path: Path | str, files_from: Collection[Path | str] = ()) -> Scene:
     """The scene in a TOML file; its relative paths count from the file's folder.
+
+    Args:
+        path: the file.
+        files_from: folders, or files, that it may name beside those near it (explore3d.scene.named_files).
 
     Raises:
         SceneError: no such file, not TOML, an unknown or missing key, a value that is not possible, or a
@@ -341,55 +364,70 @@ def load_scene(path: Path | str) -> Scene:
         text = path.read_text(encoding="utf-8-sig")  # a BOM of some editors is no part of it
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(f"{path}: not a readable scene file ({error})") from error
-    return parse_scene(text, path)
+    return parse_scene(text, path, files_from=files_from)
 
 
-def parse_scene(text: str, path: Path | str, meshes: Mapping[str, Surface] | None = None) -> Scene:
+def parse_scene(
+    text: str,
+    path: Path | str,
+    meshes: Mapping[str, Surface] | None = None,
+    files_from: Collection[Path | str] = (),
+) -> Scene:
     """The scene in a text that stood, or might have stood, in the file `path`.
 
     Args:
         meshes: surfaces (m) that are held in memory, by the names that the text has for their files; None: none.
+        files_from: as for load_scene.
 
     Raises:
         SceneError: see `load_scene`.
     """
     path = Path(path)
+    held = {(path.resolve().parent / name).resolve(): each for name, each in (meshes or {}).items()}
+    named = NamedFiles.of(path, files_from, held)
+    scene = with_files(_parsed(text, path, named), named.place)
+    scene._path, scene._text, scene._meshes = path, text, held
+    _ = scene.sweep_speed  # a speed that cannot be known is refused here, as every other value
+    return scene
+
+
+def recorded_scene(text: str, path: Path | str) -> Scene:
+    """The scene that a log holds: what it asks of the analysis. The files that it names are not opened.
+
+    Raises:
+        SceneError: see `load_scene`.
+    """
+    path = Path(path)
+    scene = _parsed(text, path, None)
+    scene._path, scene._text, scene._is_recorded = path, text, True
+    _ = scene.sweep_speed
+    return scene
+
+
+def _parsed(text: str, path: Path, named: NamedFiles | None) -> Scene:
+    """The scene as it stands there; without `named` it may name no tip profile that would have to be read."""
     try:
-        tables = _with_profile(tomllib.loads(text), path)
+        tables = _with_profile(tomllib.loads(text), path, named)
         if isinstance(tables.get("finger"), dict):
             tables |= {"finger": finger_table(tables["finger"])}
-        scene = Scene.model_validate(tables)
+        return Scene.model_validate(tables)
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{path}: not valid TOML: {error}") from error
     except ValidationError as error:
         raise SceneError(f"{path}: {complaint(error, Scene)}") from error
     except SceneError as error:
         raise error if str(error).startswith(f"{path}: ") else SceneError(f"{path}: {error}") from error
-    scene = _with_absolute_paths(scene, path.resolve().parent)
-    scene._path, scene._text = path, text
-    scene._meshes = {(path.resolve().parent / name).resolve(): each for name, each in (meshes or {}).items()}
-    _ = scene.sweep_speed  # a speed that cannot be known is refused here, as every other value
-    return scene
 
 
-def _with_profile(tables: dict[str, Any], path: Path) -> dict[str, Any]:
+def _with_profile(tables: dict[str, Any], path: Path, named: NamedFiles | None) -> dict[str, Any]:
     """The tables with the tip radius of the tip profile that they name, and how well it is known."""
     tip = tables.get("tip")
-    if not isinstance(tip, dict) or not isinstance(tip.get("profile"), str) or "radius" in tip:
+    if named is None or not isinstance(tip, dict) or not isinstance(tip.get("profile"), str) or "radius" in tip:
         return tables  # beside a radius the profile only says where it came from, as in a resolved scene
-    profile = path.resolve().parent / tip["profile"]
+    profile = named.place("tip.profile", Path(tip["profile"]))
     try:
         known = tomllib.loads(profile.read_text(encoding="utf-8"))
         radius, doubt = known["radius"], {"radius_sd": known["radius_sd"]}
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError) as error:
         raise SceneError(f"{path}: tip.profile: {profile}: not a tip profile of calibrate ({error})") from error
     return tables | {"tip": doubt | tip | {"radius": radius, "profile": str(profile)}}
-
-
-def _with_absolute_paths(scene: Scene, folder: Path) -> Scene:
-    finger = scene.finger
-    places = {name: (folder / value).resolve() for name, value in finger if isinstance(value, Path)}
-    model = scene.model
-    if model.mesh is not None:
-        model = model.model_copy(update={"mesh": (folder / model.mesh).resolve()})
-    return scene.model_copy(update={"finger": finger.model_copy(update=places), "model": model})

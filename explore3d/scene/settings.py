@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from mapping.instrument import StatedNoise
+from mapping.instrument import Noise, StatedNoise
 
 if TYPE_CHECKING:
     from explore3d.scene.scene import Scene
@@ -36,6 +37,14 @@ class AnalysisSettings:
             return cls()
         of = scene.detection
         return cls(of.algorithm, of.false_alarms_per_metre, scene.seed, scene.tip.radius_sd, scene.noise)
+
+    def of_means(self, average: Mapping[str, Any] | None) -> AnalysisSettings:
+        """The same of a recording whose samples are means: their white noise is less than the scene states."""
+        if average is None or self.noise is None:
+            return self
+        noise = self.noise.noise
+        white = noise.white * float(average["white_noise"])
+        return replace(self, noise=replace(self.noise, noise=Noise(white, noise.correlated, noise.length)))
 
     @property
     def detection(self) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from mapping.instrument.averaging import Means as Means, RunMeans as RunMeans
     from mapping.instrument.fit import (
         Blocks as Blocks,
         NoiseFit as NoiseFit,
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from mapping.instrument.tip_calibration import TipCalibration as TipCalibration, calibrate_tip as calibrate_tip
 
 _PUBLIC = {
+    "averaging": ("Means", "RunMeans"),
     "fit": ("Blocks", "NoiseFit", "fit_noise", "perturbed", "relative_sd"),
     "noise": ("Noise", "estimate_noise"),
     "robust": (

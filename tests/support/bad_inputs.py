@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
-WIRE = (ASSETS / "scenes" / "wire_on_plate.toml").read_text().replace("../meshes", str(ASSETS / "meshes"))
-GRBL = (ASSETS / "scenes" / "grbl_peck.toml").read_text().replace("../meshes", str(ASSETS / "meshes"))
+WIRE = (ASSETS / "scenes" / "wire_on_plate.toml").read_text()
+GRBL = (ASSETS / "scenes" / "grbl_peck.toml").read_text()
 TRIANGLE = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
 PROFILE = "x,z\n" + "".join(f"{0.01 * k:.2f},{0.001 * (k * 7 % 11):.3f}\n" for k in range(200))
 MM, TIP = ("--units", "mm"), ("--tip-radius", "2 um")
@@ -129,14 +129,30 @@ def scenes() -> None:
     ):
         scene(old, new, *said)
     for old, new, *said in (
-        (f"{ASSETS}/meshes/plate.ply", "absent.ply", "model.mesh", "absent.ply"),
-        (f"{ASSETS}/meshes/wire_on_plate.ply", "absent.ply", "finger.object", "absent.ply"),
-        (f"{ASSETS}/meshes/plate.ply", "mesh.off", "model.mesh"),
-        (f"{ASSETS}/meshes/plate.ply", ".", "model.mesh"),
-        (f"{ASSETS}/meshes/plate.ply", "", "model.mesh"),
-        (f"{ASSETS}/meshes/plate.ply", "s.toml", "model.mesh"),
+        ("../meshes/plate.ply", "absent.ply", "model.mesh", "absent.ply"),
+        ("../meshes/wire_on_plate.ply", "absent.ply", "finger.object", "absent.ply"),
+        ("../meshes/plate.ply", "mesh.off", "model.mesh"),
+        ("../meshes/plate.ply", ".", "model.mesh"),
+        ("../meshes/plate.ply", "", "model.mesh"),
+        ("../meshes/plate.ply", "s.toml", "model.mesh"),
     ):
         scene(old, new, *said, mesh__off="OFF\n0 0 0\n")
+    for name, *said in (  # near it means: in or below its own folder or a folder beside that
+        ("../../plate.ply", "model.mesh", "--files-from"),
+        ("../plate.ply", "model.mesh", "--files-from"),
+        ("meshes/../../../etc/passwd", "model.mesh", "--files-from"),
+        (f"{ASSETS}/meshes/../meshes/plate.ply", "model.mesh", "own folder or a folder beside", "--files-from"),
+        ("/dev/zero", "model.mesh", "--files-from /dev"),
+        ("a\\u0000b.ply", "model.mesh", "no file's name"),
+    ):
+        scene("../meshes/plate.ply", name, *said)
+        scene("../meshes/plate.ply", name, *said, command="plan {}/s.toml --out {}/out")
+    scene("../meshes/wire_on_plate.ply", "/etc/passwd", "finger.object", "--files-from /etc")
+    scene(
+        'radius = "10 mm"', 'profile = "/etc/passwd"', "tip.profile", "--files-from /etc",
+        command="calibrate {}/s.toml --radius 12mm --out {}/out/tip.toml",
+    )  # fmt: skip
+    scene(radius, radius, "--files-from", "no such", command="run {}/s.toml --out {}/out --files-from {}/absent")
     for content in (
         "",
         "OFF\n",
@@ -148,7 +164,7 @@ def scenes() -> None:
         b"\x00\xff" * 100,
         "OFF\n3 1 0\n0 0 0\n1e-12 0 0\n0 1e-12 0\n3 0 1 2\n",
     ):
-        scene(f"{ASSETS}/meshes/plate.ply", "mesh.off", "model.mesh", "mesh.off", mesh__off=content)
+        scene("../meshes/plate.ply", "mesh.off", "model.mesh", "mesh.off", mesh__off=content)
     for content in (b"", b"\xff\xfe\x00", b"\x00" * 50, b"[" * 2000, b"x,z\n1,2\n", b"\x89PNG\r\n"):
         bad("run {}/s.toml --out {}/out", "s.toml", s__toml=content)
     for old, new, *said in (

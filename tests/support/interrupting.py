@@ -11,6 +11,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from scene_files import write_scene_file
+
 ROOT = Path(__file__).resolve().parents[2]
 ASSETS = ROOT / "assets"
 SCENE = """
@@ -36,9 +38,8 @@ time_budget = "{budget}"
 
 def bare_tile(folder: Path, budget: str = "10 min", seed: int = 4) -> Path:
     """A scene that takes seconds, of a tile with nothing on it."""
-    path = folder / f"tile-{budget.replace(' ', '-')}-{seed}.toml"
-    path.write_text(SCENE.format(assets=ASSETS, budget=budget, seed=seed))
-    return path
+    text = SCENE.format(assets=ASSETS, budget=budget, seed=seed)
+    return write_scene_file(folder / f"tile-{budget.replace(' ', '-')}-{seed}.toml", text)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from explore3d import UserError, parse_length
-from explore3d.log import MAGIC, Log, load_settings, read_log, read_table, table_log
+from explore3d.log import MAGIC, Log, averaged_file, load_settings, read_log, read_table, table_log
 from explore3d.log.text import length_factor, read_text
 
 TIP = "the radius of the fingertip"
@@ -35,8 +35,9 @@ class McapLog:
         return 1.0 if first.startswith(MAGIC) and not of_others(first) else 0.0
 
     def read(self, path: Path, settings: Mapping[str, Any]) -> Log:
-        radius = settings.get("tip_radius")
-        return read_log(path, None if radius is None else parse_length(radius))
+        given, length = settings.get("tip_radius"), settings.get("average")
+        radius = None if given is None else parse_length(given)
+        return read_log(path, radius) if length is None else averaged_file(path, radius, length)
 
 
 class TextTable:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import entry_points
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from explore3d import UserError
-from explore3d.log import LOG, Log
+from explore3d.log import LOG, Log, averaged_log, digest
 from explore3d.log.readers.arrays import NpyArray, NpzArrays
 from explore3d.log.readers.clouds import ObjPoints, PcdPoints, PlyPoints, StlPoints
 from explore3d.log.readers.instruments import InstrumentFile, X3pFile
@@ -83,8 +82,11 @@ def read_recording(path: Path, settings: Mapping[str, Any]) -> Log:
             raise UserError(f"{path}: is a folder without {LOG}; expected a log, a table, or the folder of a session")
         path = path / LOG
     given = {key: value for key, value in settings.items() if value is not None}
+    length = given.get("average")
+    if length is not None and not (isinstance(length, int) and length >= 1):
+        raise UserError(f"{path}: field average: expected a whole number of samples, 1 or more; found {length!r}")
     read = reader_of(path).read(path, given)
-    if isinstance(read, Log):
-        return read
-    about = {"read_as": [f"{reader_of(path).name}, {len(read)} rows"]}
-    return Log(trace=read, metadata=about, sha256=hashlib.sha256(path.read_bytes()).hexdigest(), sources=(str(path),))
+    if not isinstance(read, Log):
+        about = {"read_as": [f"{reader_of(path).name}, {len(read)} rows"]}
+        read = Log(trace=read, metadata=about, sha256=digest(path), sources=(str(path),))
+    return read if length is None or "average" in read.metadata else averaged_log(read, length)

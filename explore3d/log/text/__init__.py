@@ -6,7 +6,7 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from explore3d.log.text.header import role_of as role_of
-    from explore3d.log.text.pieces import read_pieces as read_pieces
+    from explore3d.log.text.pieces import TEXT_PIECE as TEXT_PIECE, read_pieces as read_pieces
     from explore3d.log.text.read import LEAST_ROWS as LEAST_ROWS, TableText as TableText, read_text as read_text
     from explore3d.log.text.spelling import (
         NO_UNIT as NO_UNIT,
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "header": ("role_of",),
-    "pieces": ("read_pieces",),
+    "pieces": ("TEXT_PIECE", "read_pieces"),
     "read": ("LEAST_ROWS", "TableText", "read_text"),
     "spelling": ("NO_UNIT", "length_factor", "name_and_unit", "time_factor_of"),
 }

@@ -29,37 +29,6 @@ _MINUS = str.maketrans({"\u2212": "-", "\u2013": "-", "\ufe63": "-", "\uff0d": "
 _BLANK_IN_NUMBER = re.compile("(?<=\\d)[\u00a0\u202f\u2009\u2007](?=\\d{3})")
 
 
-# Bytes of memory that a byte of a table takes while it becomes a trace: 3.7 measured, 3e6 rows of two columns in 51 MB
-READING = 4.0
-
-
-def must_fit(path: Path) -> None:
-    """Refuse a table that the memory which is free cannot hold.
-
-    Raises:
-        UserError: naming both.
-    """
-    try:
-        need, free = READING * path.stat().st_size, free_memory()
-    except OSError:
-        return  # who reads it says why not
-    if need > free:
-        raise UserError(
-            f"{path}: to read its {path.stat().st_size:,} bytes takes about {need / 1e9:.1f} GB of memory; "
-            f"{free / 1e9:.1f} GB are free; possible: a part of its rows, or every tenth (explore3d inspect looks at "
-            "it in pieces)"
-        )
-
-
-def free_memory() -> float:
-    """Bytes that a program may still take; infinite where the system does not say it."""
-    try:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-    except OSError:
-        return float("inf")
-    return next((1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")), float("inf"))
-
-
 def decoded(path: Path) -> bytes:
     """The file as UTF-8 with lines that end in a newline; the last one may lack it.
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log.text.decode import decoded, must_fit
+from explore3d.log import must_fit
+from explore3d.log.text.decode import decoded
 from explore3d.log.text.dialect import COMMENTS, MISSING, Dialect, find_dialect, split
 from explore3d.log.text.header import FEW, read_header, role_of
 from explore3d.log.text.spelling import length_factor
@@ -433,4 +434,6 @@ def _not_a_length(name: str) -> bool:
 def _counts(column: FloatArray) -> bool:
     """True if a column counts the rows: 0, 1, 2, ... or 1, 2, 3, ..."""
     start = column[0] if len(column) else np.nan
-    return len(column) >= 2 and start in (0.0, 1.0) and bool(np.array_equal(column, start + np.arange(len(column))))
+    if len(column) < 2 or start not in (0.0, 1.0) or column[-1] != start + len(column) - 1:  # most, at no cost
+        return False
+    return bool(np.array_equal(column, start + np.arange(len(column))))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from bad_inputs import BAD, Bad
+from scene_files import write_scene_file
 
 from explore3d.cli.main import main
 from hw import SimulatedFinger
@@ -28,7 +29,10 @@ def refused(bad: Bad, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
 
     folder.mkdir()
     for name, content in bad.files:
-        (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
+        if isinstance(content, str) and name.endswith(".toml"):
+            write_scene_file(folder / name, content)
+        else:
+            (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
     if bad.make is not None:
         bad.make(folder)
     before = sorted(folder.rglob("*"))

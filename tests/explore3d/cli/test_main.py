@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from in_process import explore3d_main
+from scene_files import write_scene_file
 
 from explore3d import __version__
 from explore3d.cli.bench import bench
@@ -40,12 +41,10 @@ def test_the_help_lists_every_command(monkeypatch: pytest.MonkeyPatch, capsys: p
 
 
 def variant(folder: Path, old: str, new: str) -> Path:
-    """The wire scene with one text replaced, its meshes where they were."""
+    """The wire scene with one text replaced, its meshes beside it."""
     text = (SCENES / "wire_on_plate.toml").read_text()
     assert old in text
-    path = folder / "scene.toml"
-    path.write_text(text.replace(old, new, 1).replace("../meshes", str(SCENES.parent / "meshes")))
-    return path
+    return write_scene_file(folder / "scene.toml", text.replace(old, new, 1))
 
 
 NAN = "OFF\n3 1 0\n0 0 0\nnan 0 0\n0 1 0\n3 0 1 2\n"
@@ -140,7 +139,7 @@ def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(jobs, "analyze_each", lambda *given, **options: calls.append((given, options)) or [])
     monkeypatch.setattr(report, "show", lambda *given: None)
     options = ["--tip-radius", "2 um", "--units", "mm", "--columns", "x=1, z=2", "--frame", "0 mm, 1 mm,5 mm"]
-    options += ["--pixel", "1 um", "--part", "/tip", "--same-object"]
+    options += ["--pixel", "1 um", "--part", "/tip", "--average", "20", "--same-object"]
     options += ["--tip-sd", "20 nm", "--form", "line", "--mask", "1mm..2mm"]
     options += ["--model", "body.ply", "--model-units", "mm", "--force", "curvature"]
     assert explore3d_main(monkeypatch, "analyze", "a.csv", "b.mcap", "--out", tmp_path, *options) == 0
@@ -154,6 +153,7 @@ def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatc
         "columns": "x=1, z=2",
         "pixel": "1 um",
         "part": "/tip",
+        "average": 20,
         "tip_sd": "20 nm",
         "form": "line",
         "mask": ["1mm..2mm"],

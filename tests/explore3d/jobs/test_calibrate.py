@@ -35,7 +35,7 @@ def test_the_simulated_tip_is_found_within_its_interval_and_written_as_a_profile
     text = (tmp_path / "scene.toml").read_text().replace('radius = "10 mm"', 'profile = "tip.toml"')
     named = parse_scene(text, tmp_path / "other.toml")
     assert named.tip.radius == profile.tip.radius
-    resolved = parse_scene(named.resolved, tmp_path / "resolved.toml")
+    resolved = parse_scene(named.resolved, tmp_path / "resolved.toml", files_from=[tmp_path])
     assert resolved.tip.radius == profile.tip.radius
     assert AnalysisSettings.of(named).tip_sd == AnalysisSettings.of(resolved).tip_sd == profile.tip.radius_sd > 0.0
     sure = text.replace('profile = "tip.toml"', 'profile = "tip.toml"\nradius_sd = 0')

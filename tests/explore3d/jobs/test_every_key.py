@@ -196,7 +196,7 @@ def has_effect(key: Key, info: FieldInfo, looks: Callable[[Scene], Any]) -> bool
     """
     accepted, refused = 0, 0
     for text in SCENES.values():
-        scene = parse_scene(text, "scene.toml")
+        scene = parse_scene(text, "scene.toml", files_from=[MESHES])
         tables = scene.model_dump(mode="json", by_alias=True)
         try:
             value = value_at(tables, key)
@@ -205,7 +205,9 @@ def has_effect(key: Key, info: FieldInfo, looks: Callable[[Scene], Any]) -> bool
         before = None
         for other in others(value, info):
             try:
-                after = looks(parse_scene(scene_text(written(changed(tables, key, other))), "scene.toml"))
+                after = looks(
+                    parse_scene(scene_text(written(changed(tables, key, other))), "scene.toml", files_from=[MESHES])
+                )
             except (SceneError, FingerError):
                 refused += 1
                 continue
@@ -236,7 +238,7 @@ def test_every_key_of_the_scene_changes_something_or_says_that_it_informs() -> N
 
 @pytest.mark.parametrize("name", SCENES)
 def test_two_readings_of_a_scene_configure_the_same(name: str) -> None:
-    one, two = (configured(parse_scene(SCENES[name], "scene.toml")) for _ in range(2))
+    one, two = (configured(parse_scene(SCENES[name], "scene.toml", files_from=[MESHES])) for _ in range(2))
     assert one == two
 
 

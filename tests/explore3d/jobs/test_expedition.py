@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scene_files import write_scene_file
 
 from explore3d.analysis.result import Analysis
 from explore3d.errors import UserError
@@ -47,9 +48,8 @@ length = 0.028
 
 
 def write_scene(folder: Path, model: str, object: Path, axis: np.ndarray = AXIS) -> Path:
-    path = folder / "scene.toml"
-    path.write_text(SCENE.format(model=model, object=object, axis=axis.tolist()))
-    return path
+    touched = object.relative_to(folder) if object.is_relative_to(folder) else object
+    return write_scene_file(folder / "scene.toml", SCENE.format(model=model, object=touched, axis=axis.tolist()))
 
 
 def moved_tile(folder: Path) -> tuple[Path, Pose]:

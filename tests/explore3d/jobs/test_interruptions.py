@@ -269,6 +269,7 @@ def test_another_scene_needs_overwrite_and_is_refused_before_anything_moves(
     before = digests(out)
     other = tmp_path / "other.toml"
     other.write_text(older.scene.read_text().replace("seed = 4", "seed = 6"))
+    shutil.copytree(older.scene.parent / "meshes", tmp_path / "meshes")
     (tmp_path / "second").mkdir()
     shutil.copy(older.of("run") / "log.mcap", tmp_path / "second")
     for words in (["run", other], ["run", other, "--resume"], ["analyze", tmp_path / "second"]):

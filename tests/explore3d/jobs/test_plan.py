@@ -5,21 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scene_files import write_scene_file
 
 from explore3d.errors import SceneError
 from explore3d.jobs.plan import DryRun, plan_scene
 from explore3d.scene.scene import parse_scene
 
 WIRE = Path(__file__).resolve().parents[3] / "assets" / "scenes" / "wire_on_plate.toml"
-TEXT = WIRE.read_text().replace('"../meshes', f'"{WIRE.parents[1]}/meshes')
+TEXT = WIRE.read_text()
 RIDGE = TEXT.replace("[survey]", '[survey]\nshortest_ridge = "40 mm"')
 FASTEST = RIDGE.replace('speed = "30 mm/s"', 'speed = "fastest"')
 
 
 def planned(folder: Path, text: str) -> DryRun:
-    path = folder / "scene.toml"
-    path.write_text(text)
-    return plan_scene(path)
+    return plan_scene(write_scene_file(folder / "scene.toml", text))
 
 
 def sweeping(plan: DryRun) -> float:

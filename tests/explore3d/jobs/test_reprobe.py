@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scene_files import write_scene_file
 
 from explore3d.errors import UserError
 from explore3d.jobs.reprobe import reprobe
@@ -40,7 +41,7 @@ force = 1.0
 @pytest.fixture
 def session(tmp_path: Path) -> Path:
     """One sweep along x, felt where sample 200 is 0.1 mm too high."""
-    (tmp_path / "scene.toml").write_text(SCENE)
+    write_scene_file(tmp_path / "scene.toml", SCENE)
     scene = load_scene(tmp_path / "scene.toml")
     move = Move([[-0.01, 0.002, R], [0.01, 0.002, R]], [0.0, 0.0, -1.0], speed=0.03)
     with scene_finger(scene) as finger, LogWriter(tmp_path / "log.mcap", tip_radius=R) as log:

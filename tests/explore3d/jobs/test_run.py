@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scene_files import write_scene_file
 
 from explore3d.analysis.result import Analysis
 from explore3d.jobs.analyze import analyze
@@ -55,9 +56,7 @@ length = 0.028
 
 
 def write_scene(folder: Path, name: str = "wire_on_tile", truth: str = WIRE) -> Path:
-    path = folder / f"{name}.toml"
-    path.write_text(SCENE.format(assets=ASSETS, object=name, truth=truth))
-    return path
+    return write_scene_file(folder / f"{name}.toml", SCENE.format(assets=ASSETS, object=name, truth=truth))
 
 
 @pytest.fixture(scope="module")

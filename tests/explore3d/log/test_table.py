@@ -379,8 +379,10 @@ def test_a_table_that_memory_cannot_hold_is_refused_before_it_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = long_table(tmp_path / "long.csv")
-    decode = importlib.import_module("explore3d.log.text.decode")
-    monkeypatch.setattr(decode, "free_memory", lambda: 1e5)
+    memory = importlib.import_module("explore3d.log.memory")
+    monkeypatch.setattr(memory, "free_memory", lambda: 1e5)
     monkeypatch.setattr(Path, "read_bytes", lambda self: pytest.fail("it was read"))
-    with pytest.raises(UserError, match=r"long\.csv: to read its .* takes about .* GB are free; possible: a part"):
+    with pytest.raises(
+        UserError, match=r"long\.csv: to read its .* takes about .* GB are free; possible: --average 50, "
+    ):
         read_text(path)

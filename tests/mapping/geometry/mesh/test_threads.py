@@ -33,7 +33,7 @@ def test_little_work_starts_no_thread_and_much_work_does(monkeypatch: pytest.Mon
     rows = np.ones((10, 2))
     by_shares(work, rows, 10)
     assert seen == [threading.main_thread().name]
-    by_shares(work, rows, 10**6)
+    by_shares(work, rows, 10**5)
     assert len(seen) == 3 and threading.main_thread().name not in seen[1:]
 
 
@@ -43,3 +43,17 @@ def test_an_error_in_a_share_comes_out() -> None:
 
     with pytest.raises(ValueError, match="bad row"):
         by_shares(fails, np.ones((10, 2)), 10**6)
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_no_share_is_larger_than_the_memory_is_asked_for(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(row_shares, "cores", lambda: number)
+    seen: list[int] = []
+
+    def work(rows: np.ndarray) -> np.ndarray:
+        seen.append(len(rows))
+        return squares(rows)
+
+    rows = np.random.default_rng(2).normal(size=(4000, 3))
+    assert np.array_equal(by_shares(work, rows, 15_000), squares(rows))
+    assert max(seen) * 15_000 <= row_shares.MOST_VALUES

@@ -33,12 +33,12 @@ class Order:
     """Rows as sweeps.
 
     Args:
-        rows: (N,) the rows in the order of movement.
+        rows: (N,) the rows in the order of movement; None: as they stand.
         sweep: (N,) number of each one's sweep.
         said: what was recognised, "" if the rows stand as one expects.
     """
 
-    rows: IntArray
+    rows: IntArray | None
     sweep: IntArray
     said: str = ""
 
@@ -102,17 +102,17 @@ def profile_order(x: FloatArray) -> Order:
     """One sweep along x; several where x turns back; sorted by x if the rows are in no order."""
     count = len(x)
     steps = np.diff(x)
-    rows, one = np.arange(count), np.zeros(count, dtype=np.int64)
+    one = np.zeros(count, dtype=np.int64)
     if (steps >= 0).all() or (steps <= 0).all():
-        return Order(rows, one)
+        return Order(None, one)
     length, path = float(np.ptp(x)), float(np.abs(steps).sum())
     if length > ADVANCE * path:
         back = int(min((steps > 0).sum(), (steps < 0).sum()))
-        return Order(rows, one, f"x steps back {back} times")
+        return Order(None, one, f"x steps back {back} times")
     turns = turning_points(x, TURN * length)
     sweep = _cut(count, turns)
     if count >= SHORT_ROW * (sweep[-1] + 1) and _progress(x, sweep) > ADVANCE and _overlap(x, sweep):
-        return Order(rows, sweep, f"x turns back {sweep[-1]} times: {sweep[-1] + 1} sweeps")
+        return Order(None, sweep, f"x turns back {sweep[-1]} times: {sweep[-1] + 1} sweeps")
     order = np.argsort(x, kind="stable")
     return Order(order, one, "the rows stood in no order and are sorted by x")
 
@@ -136,17 +136,16 @@ def _progress(x: FloatArray, sweep: IntArray) -> float:
 
 def cloud_order(points: FloatArray, jump: float | None) -> Order | None:
     """Sweeps of points: cut at each jump, or where straight rows turn; None if the points are in no order."""
-    rows = np.arange(len(points))
     steps = np.sqrt(sum(np.diff(column) ** 2 for column in points.T))
     moving = steps[steps > 0]
     if jump is not None or not len(moving):
-        return Order(rows, _counted(steps > (np.inf if jump is None else jump)))
+        return Order(None, _counted(steps > (np.inf if jump is None else jump)))
     if _disordered(points, moving):
         return None
     jumps = steps > JUMP * float(np.median(moving[:: len(moving) // 100_000 * 2 + 1]))
     turned = _rows_that_turn(points)
     if turned is None or turned[-1] <= jumps.sum():
-        return Order(rows, _counted(jumps))
+        return Order(None, _counted(jumps))
     sweep = _counted(jumps | (np.diff(turned) > 0))
     u = points @ _main_direction(points)
     starts = np.flatnonzero(np.diff(turned, prepend=-1))
@@ -154,7 +153,7 @@ def cloud_order(points: FloatArray, jump: float | None) -> Order | None:
     signs = np.sign(u[ends] - u[starts])
     both = bool((signs[1:] * signs[:-1] < 0).mean() > 0.5)
     said = "rows to and fro" if both else "rows one way"
-    return Order(rows, sweep, f"{said}, cut where they turn: {sweep[-1] + 1} sweeps")
+    return Order(None, sweep, f"{said}, cut where they turn: {sweep[-1] + 1} sweeps")
 
 
 def _counted(cuts: BoolArray) -> IntArray:

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
 
 from explore3d import UserError
-from explore3d.log.table_columns import Role
+from explore3d.log.table.columns import Role
 from explore3d.scene import Extent, Length, LengthUnit, Point, Table, complaint
 
 Row = tuple[float, float, float]
@@ -65,6 +65,7 @@ class TableSettings(Table):
         mask: stretches in x that the base is not fitted to, "1.2mm..1.4mm".
         decimal: sign of the numbers, where the file leaves it open ("1,234"); None: found.
         pixel: distance of the columns and of the rows of a map of heights, m; one for both or two.
+        average: runs of so many consecutive samples become one each, their mean; None: every sample is taken.
         part: which one of several the file holds: topic of a bag, sheet of a workbook, channel of an instrument.
     """
 
@@ -79,6 +80,7 @@ class TableSettings(Table):
     mask: tuple[str, ...] = ()
     decimal: Literal[".", ","] | None = None
     pixel: Annotated[tuple[Length, Length] | None, BeforeValidator(_both_ways)] = None
+    average: Annotated[int, Field(ge=1)] | None = None
     part: str | None = None
 
     @model_validator(mode="before")

@@ -168,7 +168,9 @@ def _by_number(table: TableText, free: list[int]) -> dict[str, int]:
 
 def counts(column: FloatArray) -> bool:
     """True if a column counts the rows: from 0 or 1 on in steps of 1."""
-    return bool(column[0] in (0.0, 1.0) and np.array_equal(column, column[0] + np.arange(len(column))))
+    if column[0] not in (0.0, 1.0) or column[-1] != column[0] + len(column) - 1:  # most columns, at no cost
+        return False
+    return bool(np.array_equal(column, column[0] + np.arange(len(column))))
 
 
 def advances(column: FloatArray) -> bool:
