@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from explore3d import UserError, __version__, count_text
-from explore3d.jobs.run import cause, scene_finger
+from explore3d.jobs import cause, scene_finger
 from explore3d.log import LOG, Log, LogWriter, read_log
 from explore3d.scene import load_scene
 from hw import Move
