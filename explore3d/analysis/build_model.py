@@ -62,17 +62,17 @@ METHOD = (
     MethodStage("", None, made_sound),
     MethodStage("algorithms 1 and 2", why_no_contact_algorithms, None, possible=_never),
     MethodStage("detection", why_no_detection, detected),
-    MethodStage("injected crests", why_no_injection, limit_measured),
+    MethodStage("injected crests", why_no_injection, limit_measured, sized=False),
     MethodStage("grammar", why_no_lines, assembled),
     MethodStage("posterior", why_no_posterior, refined_all),
-    MethodStage("long chain", why_no_chain, None),
+    MethodStage("long chain", why_no_chain, None, sized=False),
     MethodStage("", None, believed),
-    MethodStage("smoothing", why_no_smoothing, None),
-    MethodStage("estimated surface", why_no_surface, surface_estimated),
-    MethodStage("curvature", why_no_curvature, curvature_taken, possible=_never),
+    MethodStage("smoothing", why_no_smoothing, None, sized=False),
+    MethodStage("estimated surface", why_no_surface, surface_estimated, sized=False),
+    MethodStage("curvature", why_no_curvature, curvature_taken, possible=_never, sized=False),
     MethodStage("", None, inspected),
     MethodStage("", None, modelled),
-    MethodStage("error against time", why_no_time_curve, compared_in_time, possible=_never),
+    MethodStage("error against time", why_no_time_curve, compared_in_time, possible=_never, sized=False),
 )
 
 
@@ -118,6 +118,7 @@ def _result(work: Work) -> Analysis:
         account=work.account,
         path=work.path,
         deviation=work.deviation,
+        dropped=tuple(work.dropped),
     )
 
 

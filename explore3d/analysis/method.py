@@ -45,6 +45,9 @@ NOISE_FREE = 2e-8
 # What is left out where what may be a feature is none: taken for form, or too wide
 ABSORBED = "part of the form"
 
+# Why a stage that does not tell existence, places and sizes was left out
+NOT_IN_QUICK = "quick results were asked for: existence, places and sizes"
+
 # Told the share of a stage that is done, 0 to 1
 Share = Callable[[float], None]
 
@@ -59,12 +62,14 @@ class MethodStage:
             no function at all: it always runs.
         run: does the stage's work; None for a part of another stage.
         possible: False where there is nothing to work on: then the stage is left out even if forced.
+        sized: False if existence, places and sizes do without it: quick results leave it out.
     """
 
     name: str
     why_not: Callable[[Work], str | None] | None
     run: Callable[[Work, Share], None] | None
     possible: Callable[[Work], bool] = lambda work: True
+    sized: bool = True
 
 
 @dataclass
@@ -85,6 +90,7 @@ class Work:
         path: what became of the recorded path.
         deviation: what the given model gets wrong; None if nothing is known to be.
         apart: samples left out for that.
+        dropped: features that were supposed and not kept, and why.
         asked: whether a stage was asked for, by its name.
     """
 
@@ -107,6 +113,7 @@ class Work:
     path: PathLedger | None = None
     deviation: Deviation | None = None
     apart: int = 0
+    dropped: list[tuple[Feature, str]] = field(default_factory=list)
     time_curve: tuple[tuple[float, float], ...] = ()
     asked: dict[str, bool] = field(default_factory=dict)
 
@@ -137,6 +144,8 @@ class Work:
         """Ask whether a stage is needed, and run and time it or note why not."""
         if stage.why_not is not None:
             reason = stage.why_not(self)
+            if reason == "" and self.stages.quick and not stage.sized:
+                reason = NOT_IN_QUICK
             self.asked[stage.name] = reason is not None and self.stages.needed(
                 stage.name, reason, possible=stage.possible(self)
             )
@@ -343,7 +352,7 @@ def refined_all(work: Work, share: Share) -> None:
         base=work.base,
         noise=work.detections.noise,
         tip_sd=work.settings.tip_sd,
-        confirm=work.stages.is_forced("long chain"),
+        confirm=work.stages.is_forced("long chain") or (None if work.stages.quick else False),
         progress=share,
     )
 
@@ -365,6 +374,7 @@ def believed(work: Work, share: Share) -> None:
         x, y, z = np.round(1e3 * feature.axis[0], 2)
         reason = f"all sweeps together hardly speak for it (log odds {feature.evidence.log_odds:.1f})"
         work.stages.left_out.append(LeftOut(f"a {feature.kind} at ({x:g}, {y:g}, {z:g}) mm", reason))
+        work.dropped.append((feature, reason))
     work.features = kept
 
 

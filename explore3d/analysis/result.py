@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mapping import LeftOut, Trace
+from mapping import Feature, LeftOut, Trace
 from mapping.base import Base
 from mapping.model import ObjectModel
 
@@ -66,6 +66,7 @@ class Analysis:
         account: which part of the surface was swept, and what became of the rest; None without a scene.
         path: what became of the path that was recorded; None for a log that was searched while it was read.
         deviation: what the given model gets wrong at long wavelengths, None if nothing.
+        dropped: features that were supposed and not kept, each with the reason.
     """
 
     title: str
@@ -91,3 +92,4 @@ class Analysis:
     account: SurfaceAccount | None = None
     path: PathLedger | None = None
     deviation: Deviation | None = None
+    dropped: tuple[tuple[Feature, str], ...] = ()

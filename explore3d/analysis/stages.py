@@ -42,6 +42,7 @@ class Stages:
     Args:
         progress: told what is under way.
         forced: names of stages, of OPTIONAL_STAGES, to run even where the scene does not need them.
+        quick: only what existence, places and sizes need; the rest is left out unless it is forced.
 
     Raises:
         UserError: a stage to be forced that there is not.
@@ -49,6 +50,7 @@ class Stages:
 
     progress: Progress = silent
     forced: Collection[str] = ()
+    quick: bool = False
     timings: dict[str, float] = field(default_factory=dict)
     left_out: list[LeftOut] = field(default_factory=list)
 

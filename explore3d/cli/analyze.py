@@ -7,7 +7,20 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import Columns, Force, Frame, Json, Out, Overwrite, Part, Pixel, SameObject, TipRadius, Units
+from explore3d.cli.options import (
+    Columns,
+    Force,
+    Frame,
+    Json,
+    NoReport,
+    Out,
+    Overwrite,
+    Part,
+    Pixel,
+    SameObject,
+    TipRadius,
+    Units,
+)
 
 
 def analyze(
@@ -48,6 +61,10 @@ def analyze(
     force: Force = None,
     json: Json = False,
     overwrite: Overwrite = False,
+    no_report: NoReport = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Only existence, places and sizes: no report, no chains, no surface.")
+    ] = False,
 ) -> None:
     """Build the annotated model and the report from recordings alone.
 
@@ -74,6 +91,8 @@ def analyze(
             progress=progress,
             force=force or (),
             overwrite=overwrite,
+            report=not no_report,
+            quick=quick,
             units=units,
             columns=columns,
             pixel=pixel,

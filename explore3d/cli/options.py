@@ -63,6 +63,7 @@ Force = Annotated[
         help="Run a stage that the report says was left out; may be repeated.",
     ),
 ]
+NoReport = Annotated[bool, typer.Option("--no-report", help="Write no report and no pictures: tables and model alone.")]
 Pixel = Annotated[
     str | None,
     typer.Option(help='The file is a map of heights whose pixels are so far apart: "1 um", or "1 um, 2 um".'),

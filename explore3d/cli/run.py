@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import INCOMPLETE, Force, Json, Out, Overwrite
+from explore3d.cli.options import INCOMPLETE, Force, Json, NoReport, Out, Overwrite
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene to explore.")]
 
@@ -24,6 +24,7 @@ def run(
         bool, typer.Option("--resume", help="Go on where a broken-off session in that folder stopped.")
     ] = False,
     overwrite: Overwrite = False,
+    no_report: NoReport = False,
 ) -> None:
     """Explore the scene with its finger; write the log, the annotated model and the report.
 
@@ -42,7 +43,14 @@ def run(
 
     with shown(quiet=json) as progress:
         analysis = explore(
-            scene, out, progress=progress, force=force or (), arm=arm, resume=resume, overwrite=overwrite
+            scene,
+            out,
+            progress=progress,
+            force=force or (),
+            arm=arm,
+            resume=resume,
+            overwrite=overwrite,
+            report=not no_report,
         )
     show(analysis, out, json)
     short = analysis.account is not None and analysis.account.short

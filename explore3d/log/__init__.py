@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         large_log as large_log,
     )
     from explore3d.log.table import heights_log as heights_log, read_table as read_table, table_log as table_log
-    from explore3d.log.table_settings import load_settings as load_settings
+    from explore3d.log.table_settings import load_settings as load_settings, sidecar_of as sidecar_of
     from explore3d.log.writer import LogWriter as LogWriter, Recorder as Recorder
 
 _PUBLIC = {
@@ -50,7 +50,7 @@ _PUBLIC = {
     ),
     "stream": ("LogStream", "count_samples", "head", "large_log"),
     "table": ("heights_log", "read_table", "table_log"),
-    "table_settings": ("load_settings",),
+    "table_settings": ("load_settings", "sidecar_of"),
     "writer": ("LogWriter", "Recorder"),
 }
 doorway(__name__, _PUBLIC)

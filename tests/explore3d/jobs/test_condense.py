@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from explore3d.analysis.stages import Stages
 from explore3d.bench.scenes.long_log import WIRE_RADIUS, write_long_log
 from explore3d.jobs import condense as module
 from explore3d.jobs.condense import Condensed, condense
@@ -133,10 +134,12 @@ def test_lengths_along_a_sweep_survive_samples_left_out_of_it(log: Path):
 @pytest.mark.slow
 def test_a_streamed_analysis_finds_the_wire_and_leaves_no_chunks_behind(log: Path, tmp_path: Path):
     from explore3d.jobs.analyze import analyze
+    from explore3d.jobs.session import Session
     from explore3d.jobs.streaming import analyze_stream
 
     out = tmp_path / "out"
-    streamed = analyze_stream(log, out, chunk=CHUNK)
+    with Session(out) as session:
+        streamed = analyze_stream(log, session, Stages(), chunk=CHUNK)
     assert not (tmp_path / "out.chunks").exists()
     assert (out / "report.html").is_file()
     assert any("samples were searched" in each.reason for each in streamed.left_out)
