@@ -5,7 +5,12 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from explore3d.jobs.analyze import analyze as analyze, analyze_each as analyze_each
+    from explore3d.jobs.analyze import (
+        Told as Told,
+        analyze as analyze,
+        analyze_each as analyze_each,
+        log_path as log_path,
+    )
     from explore3d.jobs.expedition import Explored as Explored, Explorer as Explorer, explorer as explorer
     from explore3d.jobs.merge import load as load, merge as merge
     from explore3d.jobs.plan import plan_scene as plan_scene, show_plan as show_plan
@@ -14,7 +19,7 @@ if TYPE_CHECKING:
     from explore3d.jobs.session import locked as locked, undisturbed as undisturbed
 
 _PUBLIC = {
-    "analyze": ("analyze", "analyze_each"),
+    "analyze": ("Told", "analyze", "analyze_each", "log_path"),
     "expedition": ("Explored", "Explorer", "explorer"),
     "merge": ("load", "merge"),
     "plan": ("plan_scene", "show_plan"),
