@@ -14,13 +14,12 @@ from explore3d.cli.analyze import analyze
 from explore3d.cli.batch import batch
 from explore3d.cli.begin import examples, init
 from explore3d.cli.bench import bench
-from explore3d.cli.compare import compare
 from explore3d.cli.doctor import doctor
 from explore3d.cli.figures import figures
 from explore3d.cli.hardware import calibrate, emulate, reprobe, selftest
 from explore3d.cli.inspect import inspect
 from explore3d.cli.interrupted import DISK_ERRORS, InterruptedJobError, is_kept, one_line, told
-from explore3d.cli.merge import merge
+from explore3d.cli.later import compare, merge
 from explore3d.cli.options import INCOMPLETE
 from explore3d.cli.run import plan, run
 from explore3d.cli.stability import stability

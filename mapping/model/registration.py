@@ -15,7 +15,7 @@ TURN_SD = 0.02
 # Features of one scan count as those of the other while they lie so many standard deviations apart (Cauchy's loss
 # keeps 95 % of its efficiency for normal residuals at this constant: Holland and Welsch, 1977)
 CAUCHY = 2.385
-ITERATIONS = 30
+REGISTRATION_STEPS = 30
 # A shift is believed if it brings this many more features together than none does: two could be chance
 FEWEST_MORE = 2.0
 
@@ -78,7 +78,7 @@ def register(first: Sequence[Feature], second: Sequence[Feature], most_shift: fl
     shift = _voted(first, second, most_shift)
     prior = np.diag([*[1.0 / most_shift**2] * 3, *[1.0 / TURN_SD**2] * 3])
     found = replace(none, shift=shift, covariance=np.zeros((6, 6)))
-    for _ in range(ITERATIONS):
+    for _ in range(REGISTRATION_STEPS):
         pairs = _pairs(first, [replace(each, axis=found.moved(each.axis)) for each in second])
         if not pairs:
             return none

@@ -1,4 +1,4 @@
-"""explore3d compare: what changed between two scans of one object."""
+"""explore3d merge, compare: what later logs of one object add to its model, and what has changed since."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from explore3d import UserError, count_text
-from explore3d.cli.options import Columns, Json, Overwrite, Part, Pixel, TipRadius, Units, length
+from explore3d.cli.options import Columns, Frame, Json, Out, Overwrite, Part, Pixel, TipRadius, Units, length
 
 if TYPE_CHECKING:
     from explore3d.jobs import Compared
@@ -16,6 +16,44 @@ if TYPE_CHECKING:
 # Changes that are listed one by one; the JSON has them all
 MOST_LISTED_CHANGES = 30
 MEASURES = {"grown": "by", "shrunk": "by", "moved": "by", "new": "height", "gone": "height"}
+
+
+def merge(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="Folder or model.json of the known model.")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Later recordings of it, as for analyze.")],
+    out: Out,
+    pose_sd: Annotated[str, typer.Option(help='Standard deviation of the pose between the logs, "0.1 mm".')] = "0 mm",
+    tip_radius: TipRadius = None,
+    units: Units = None,
+    columns: Columns = None,
+    pixel: Pixel = None,
+    part: Part = None,
+    frame: Frame = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Update a model's features by later logs instead of finding them anew; none is removed.
+
+    A log whose mesh or samples lie off the model's base is refused: it shows another object, or another frame.
+
+    Example: explore3d merge out/wire out/second/log.mcap --out out/both
+    """
+    from explore3d.jobs import merge as join
+    from explore3d.report import feature_line
+
+    merged = join(
+        model,
+        logs,
+        out,
+        length("--pose-sd", pose_sd),
+        overwrite,
+        tip_radius=tip_radius,
+        units=units,
+        columns=columns,
+        pixel=pixel,
+        part=part,
+        frame=None if frame is None else {"origin": [each.strip() for each in frame.split(",")]},
+    )
+    print("\n".join([*map(feature_line, merged.features), f"model: {out / 'model.json'}"]))
 
 
 def compare(
