@@ -17,6 +17,11 @@ if TYPE_CHECKING:
     from explore3d.analysis.forecast import Forecast as Forecast, forecast as forecast, worst_errors as worst_errors
     from explore3d.analysis.method import ABSORBED as ABSORBED
     from explore3d.analysis.result import Analysis as Analysis
+    from explore3d.analysis.roughness import (
+        Roughness as Roughness,
+        roughness_of as roughness_of,
+        why_no_roughness_of as why_no_roughness_of,
+    )
     from explore3d.analysis.savings import without_needless_dynamics as without_needless_dynamics
     from explore3d.analysis.stages import Progress as Progress, Stages as Stages, silent as silent
     from explore3d.analysis.surface_account import SurfaceAccount as SurfaceAccount
@@ -29,6 +34,7 @@ _PUBLIC = {
     "forecast": ("Forecast", "forecast", "worst_errors"),
     "method": ("ABSORBED",),
     "result": ("Analysis",),
+    "roughness": ("Roughness", "roughness_of", "why_no_roughness_of"),
     "savings": ("without_needless_dynamics",),
     "stages": ("Progress", "Stages", "silent"),
     "surface_account": ("SurfaceAccount",),

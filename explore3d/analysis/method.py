@@ -14,6 +14,7 @@ import numpy as np
 from explore3d import UserError, __version__
 from explore3d.analysis.inspected import Inspected, base_reach
 from explore3d.analysis.result import TipCount
+from explore3d.analysis.roughness import Roughness, roughness_of, why_no_roughness_of
 from explore3d.analysis.stages import Stages
 from explore3d.analysis.surface_account import SurfaceAccount
 from explore3d.analysis.time_curve import time_curve
@@ -91,6 +92,7 @@ class Work:
         deviation: what the given model gets wrong; None if nothing is known to be.
         apart: samples left out for that.
         dropped: features that were supposed and not kept, and why.
+        roughness: what the surface is like beside the features.
         asked: whether a stage was asked for, by its name.
     """
 
@@ -114,6 +116,7 @@ class Work:
     deviation: Deviation | None = None
     apart: int = 0
     dropped: list[tuple[Feature, str]] = field(default_factory=list)
+    roughness: Roughness | None = None
     time_curve: tuple[tuple[float, float], ...] = ()
     asked: dict[str, bool] = field(default_factory=dict)
 
@@ -410,6 +413,16 @@ def curvature_taken(work: Work, share: Share) -> None:
         work.curvature = principal_curvatures(work.estimate.surface, noise=work.estimate.sd)
 
 
+def why_no_roughness(work: Work) -> str | None:
+    """Only a trace that is all there, long enough and felt by a fine tip tells of it."""
+    return None if work.log.detections else why_no_roughness_of(work.laid, work.stages.cutoffs[0])
+
+
+def roughness_taken(work: Work, share: Share) -> None:
+    """The standards' parameters of what is left beside the features."""
+    work.roughness = roughness_of(work.laid, work.features, work.detections.noise.sd, *work.stages.cutoffs)
+
+
 def inspected(work: Work, share: Share) -> None:
     """Which places are free of features, and above which height."""
     work.inspected = Inspected.of(work.laid, work.base, work.detections, work.smallest_feature)
@@ -420,11 +433,12 @@ def modelled(work: Work, share: Share) -> None:
     """The features anchored on the base."""
     surface = {} if work.account is None else {"surface": work.account.record()}
     path = {} if work.path is None else {"path": work.path.record()}
+    rough = {} if work.roughness is None else {"roughness": work.roughness.record()}
     deviation = {} if work.deviation is None else {"deviation": work.deviation.record()}
     work.model = ObjectModel.attach(
         work.base,
         in_model_frame(work.features, work.base),
-        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface | path | deviation,
+        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface | path | deviation | rough,
         inspected=work.inspected.height,
         reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
         deviation=work.deviation.heights if work.deviation and work.deviation.of_the_model else None,

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from explore3d import UserError, __version__
-from explore3d.cli.analyze import analyze
+from explore3d.cli.analyze import analyze, roughness
 from explore3d.cli.batch import batch
 from explore3d.cli.begin import examples, init
 from explore3d.cli.bench import bench
@@ -37,7 +37,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-MODEL = (init, examples, plan, run, analyze, batch, compare, inspect, merge, figures)
+MODEL = (init, examples, plan, run, analyze, roughness, batch, compare, inspect, merge, figures)
 MACHINE = (doctor, emulate, calibrate, selftest, reprobe, stability)
 for command in (*MODEL, *MACHINE):
     app.command()(one_line(command))

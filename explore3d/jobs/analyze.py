@@ -30,6 +30,7 @@ def analyze(
     overwrite: bool = False,
     report: bool = True,
     quick: bool = False,
+    cutoffs: tuple[float | None, float | None] = (None, None),
     **table: Any,
 ) -> Analysis:
     """Build the annotated model of what was recorded.
@@ -44,6 +45,7 @@ def analyze(
         force: stages to run although the recording does not need them.
         overwrite: replace, once this one is complete, a session of another recording in that folder.
         report: False to write no report and no pictures.
+        cutoffs: nesting indices of the L-filter and of the S-filter for roughness, m; None: by the standard.
         quick: only existence, places and sizes: no report, no chains, no estimated surface.
         table: tip_sd, form, mask (explore3d.log.load_logs); units, columns, frame, jump, reference, pixel of a table
             (explore3d.log.table.read_table); part: which of several that a file holds.
@@ -52,7 +54,7 @@ def analyze(
         UserError: input that cannot be used, named by file and field.
     """
     paths = [logs] if isinstance(logs, str | Path) else list(logs)
-    told = Told(tip_radius, model, model_units, tuple(force), quick, table)
+    told = Told(tip_radius, model, model_units, tuple(force), quick, table, cutoffs)
     if out is not None:
         words = ["explore3d", "analyze", *map(str, paths), "--out", str(out), *told.words()]
         words += [] if report or quick else ["--no-report"]
@@ -73,6 +75,7 @@ class Told:
     force: tuple[str, ...] = ()
     quick: bool = False
     table: Mapping[str, Any] = field(default_factory=dict)
+    cutoffs: tuple[float | None, float | None] = (None, None)
 
     def words(self) -> list[str]:
         """The options of a command that say the same."""
@@ -94,6 +97,7 @@ class Told:
             "model_units": None if self.model is None else self.model_units,
             "force": sorted(self.force),
             "quick": self.quick,
+            "cutoffs": [] if self.cutoffs == (None, None) else list(self.cutoffs),
             "sidecars": [digest(path) for path in sidecars if path is not None],
             **self.table,
         }
@@ -122,7 +126,7 @@ def analyze_each(
     paths = [Path(path) for path in logs]
     if len(paths) == 1 or same_object:
         return [analyze(paths, out, **settings)]
-    options = ("model", "model_units", "progress", "force", "overwrite", "report", "quick")
+    options = ("model", "model_units", "progress", "force", "overwrite", "report", "quick", "cutoffs")
     read = {name: value for name, value in settings.items() if name not in options}
     why = not_one_object([load_logs([path], **read) for path in paths])
     if not why:
@@ -173,7 +177,7 @@ def table_words(tip_radius: str | float | None, table: dict[str, Any]) -> list[s
 def _analyze(
     paths: Sequence[Path | str], session: Session | None, told: Told, progress: Progress, report: bool
 ) -> Analysis:
-    stages = Stages(progress, told.force, told.quick)
+    stages = Stages(progress, told.force, told.quick, told.cutoffs)
     if len(paths) == 1 and (large := large_log(paths[0])) is not None:
         from explore3d.jobs.streaming import analyze_stream
 

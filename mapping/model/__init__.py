@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         compare_models as compare_models,
     )
     from mapping.model.feature_mesh import drawn_at_least as drawn_at_least, feature_mesh as feature_mesh
+    from mapping.model.json_record import plain as plain
     from mapping.model.merging import merge_model as merge_model
     from mapping.model.object_model import ObjectModel as ObjectModel
     from mapping.model.registration import Registration as Registration, register as register
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "comparison": ("Change", "Comparison", "compare_models"),
     "feature_mesh": ("drawn_at_least", "feature_mesh"),
+    "json_record": ("plain",),
     "merging": ("merge_model",),
     "object_model": ("ObjectModel",),
     "registration": ("Registration", "register"),

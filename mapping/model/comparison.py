@@ -175,10 +175,10 @@ def _alone(own: ObjectModel, other: ObjectModel, motion: Registration, paired: s
     for each, chance in zip(alone, seen, strict=True):
         odds = each.evidence.log_odds
         there = 1.0 if odds is None else probability(odds)
-        went = 0.0 if chance == 0.0 else there * share / (share + (1.0 - share) * (1.0 - chance))
+        left = 0.0 if chance == 0.0 else there * share / (share + (1.0 - share) * (1.0 - chance))
         names = ("", each.id) if kind == "new" else (each.id, "")
         place = motion.applied(each) if kind == "new" else each
-        changes.append(Change(kind, *names, float(went), each.height, _place(place)))
+        changes.append(Change(kind, *names, float(left), each.height, _place(place)))
     return changes
 
 
@@ -189,7 +189,7 @@ def _missed(feature: Feature, own: ObjectModel, other: ObjectModel, motion: Regi
     if not _was_inspected(feature, other, motion, back):
         return 1.0
     limits = [model.provenance.get("detection_limit") for model in (own, other)]
-    ratio = limits[0] / limits[1] if all(limits) else 1.0
+    ratio = float(limits[0]) / float(limits[1]) if limits[0] and limits[1] else 1.0
     return float(max(LEAST_MISSED, ndtr(THRESHOLD_SNR - feature.evidence.snr * ratio)))
 
 

@@ -92,7 +92,7 @@ def register(first: Sequence[Feature], second: Sequence[Feature], most_shift: fl
         found = replace(
             found,
             shift=found.shift + step[:3],
-            rotation=_turn(step[3:]) @ found.rotation,
+            rotation=_turn(np.asarray(step[3:], dtype=np.float64)) @ found.rotation,
             covariance=np.linalg.inv(normal),
             pairs=len(pairs),
         )
@@ -135,7 +135,8 @@ def _voted(first: Sequence[Feature], second: Sequence[Feature], most: float) -> 
         square = np.where(like, ((offsets - shift) ** 2).sum(axis=2), np.inf)
         votes[k] = np.exp(-0.5 * square.min(axis=0) / scale**2).sum()
     best = int(votes.argmax())
-    return candidates[best] if votes[best] >= votes[0] + FEWEST_MORE or len(b) < 3 else candidates[0]
+    believed = votes[best] >= votes[0] + FEWEST_MORE or len(b) < 3
+    return np.asarray(candidates[best if believed else 0], dtype=np.float64)
 
 
 def _spacing(points: FloatArray) -> float:
