@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from explore3d.analysis.result import Analysis as Analysis
     from explore3d.analysis.roughness import (
         Roughness as Roughness,
+        residual as residual,
         roughness_of as roughness_of,
         why_no_roughness_of as why_no_roughness_of,
     )
@@ -34,7 +35,7 @@ _PUBLIC = {
     "forecast": ("Forecast", "forecast", "worst_errors"),
     "method": ("ABSORBED",),
     "result": ("Analysis",),
-    "roughness": ("Roughness", "roughness_of", "why_no_roughness_of"),
+    "roughness": ("Roughness", "residual", "roughness_of", "why_no_roughness_of"),
     "savings": ("without_needless_dynamics",),
     "stages": ("Progress", "Stages", "silent"),
     "surface_account": ("SurfaceAccount",),

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError, count_text
-from mapping import BoolArray, Feature, FloatArray, Interval, length_text
-from mapping.base import LaidSweep, LaidTrace
+from mapping import BoolArray, Feature, FloatArray, Interval, Trace, length_text
+from mapping.base import Base, LaidSweep, LaidTrace
 from mapping.estimate.roughness import (
     EVALUATED_SECTIONS,
     NESTING_INDICES,
@@ -158,38 +158,68 @@ def _pieces(sweep: LaidSweep, trace: LaidTrace, features: Sequence[Feature]) -> 
     return found
 
 
+def residual(trace: Trace, base: Base, features: Sequence[Feature]) -> tuple[FloatArray, tuple[float, float]]:
+    """Heights over the base of a profile (N,) or a raster (M, N), m, NaN where a feature is; spacing of rows, columns.
+
+    Raises:
+        UserError: several sweeps that are no raster.
+    """
+    laid = LaidTrace.of(trace, base)
+    pieces = [piece for sweep in laid.laid_sweeps for piece in _pieces(sweep, laid, features)]
+    if len(pieces) == 1:
+        stretch = pieces[0][0]
+        return np.where(stretch.keep, stretch.heights, np.nan), (0.0, stretch.spacing)
+    raster = _raster(pieces)
+    if isinstance(raster, str):
+        raise UserError(f"heights on a grid need one profile or a raster: {raster}")
+    heights, keep, spacing = raster
+    return np.where(keep, heights, np.nan), spacing
+
+
 def _areal(
     pieces: Sequence[tuple[Stretch, FloatArray]], cutoff: float, short_cutoff: float | None
 ) -> tuple[dict[str, Interval], int, str]:
     """Areal parameters where the sweeps are a raster; else the reason why not."""
+    raster = _raster(pieces)
+    if isinstance(raster, str):
+        return {}, 0, raster
+    heights, keep, spacing = raster
+    row, _ = spacing
+    if row * FEWEST_ROWS > cutoff:
+        return {}, 0, f"the rows lie {length_text(row, 2)} apart, too far for a filter of {length_text(cutoff)}"
+    short = short_cutoff if short_cutoff is not None and row * FEWEST_IN_SHORT <= short_cutoff else None
+    values, squares = areal_parameters(heights, keep, spacing, cutoff, short)
+    return values, squares, "" if values else f"not one square of {length_text(cutoff)} fits on the raster"
+
+
+def _raster(
+    pieces: Sequence[tuple[Stretch, FloatArray]],
+) -> tuple[FloatArray, BoolArray, tuple[float, float]] | str:
+    """Heights and what is kept (M, N) of parallel, evenly spaced sweeps, and the spacing (m); else why not."""
     if len(pieces) < FEWEST_ROWS:
-        return {}, 0, f"{count_text(len(pieces), 'sweep is', 'sweeps are')} no raster"
-    ways = np.array([(place[-1] - place[0]) / max(np.linalg.norm(place[-1] - place[0]), 1e-300) for _, place in pieces])
+        return f"{count_text(len(pieces), 'sweep is', 'sweeps are')} no raster"
+    ways = np.array([place[-1] - place[0] for _, place in pieces])
+    ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), np.finfo(float).tiny)
     along = ways[0]
     if np.abs(ways @ along).min() < PARALLEL:
-        return {}, 0, "the sweeps are not parallel"
+        return "the sweeps are not parallel"
     middles = np.array([place.mean(axis=0) for _, place in pieces])
     off = middles - middles[0] - np.outer((middles - middles[0]) @ along, along)
     across = off[np.linalg.norm(off, axis=1).argmax()]
-    offset = off @ (across / max(float(np.linalg.norm(across)), 1e-300))
+    offset = off @ (across / max(float(np.linalg.norm(across)), np.finfo(float).tiny))
     order = np.argsort(offset)
     gaps = np.diff(offset[order])
     row = float(np.median(gaps))
     if row <= 0.0 or np.abs(gaps - row).max() > EVEN_ROWS * row:
-        return {}, 0, "the sweeps are not evenly spaced"
-    if row * FEWEST_ROWS > cutoff:
-        return {}, 0, f"the rows lie {length_text(row, 2)} apart, too far for a filter of {length_text(cutoff)}"
+        return "the sweeps are not evenly spaced"
     low = max(float((place @ along).min()) for _, place in pieces)
     high = min(float((place @ along).max()) for _, place in pieces)
     column = float(np.median([piece.spacing for piece, _ in pieces]))
     grid = np.arange(low, high, column)
     if not len(grid):
-        return {}, 0, "the sweeps have no stretch in common"
+        return "the sweeps have no stretch in common"
     rows = [_on_grid(pieces[k][0], pieces[k][1] @ along, grid) for k in order]
-    heights, keep = np.array([each for each, _ in rows]), np.array([each for _, each in rows])
-    short = short_cutoff if short_cutoff is not None and row * FEWEST_IN_SHORT <= short_cutoff else None
-    values, squares = areal_parameters(heights, keep, (row, column), cutoff, short)
-    return values, squares, "" if values else f"not one square of {length_text(cutoff)} fits on the raster"
+    return np.array([each for each, _ in rows]), np.array([each for _, each in rows]), (row, column)
 
 
 def _on_grid(piece: Stretch, at: FloatArray, grid: FloatArray) -> tuple[FloatArray, BoolArray]:
