@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
+from mapping.model.merging import NORMAL_QUANTILE_95
 from mapping.model.object_model import ObjectModel
 from mapping.model.registration import Registration, matched, register, separation
 from mapping.model.table import probability
@@ -129,7 +130,7 @@ def _log_normal(length: FloatArray, variance: FloatArray, dimensions: FloatArray
 
 
 def _sd(interval: Interval) -> float:
-    return (interval.high - interval.low) / (2.0 * 1.6448536)
+    return (interval.high - interval.low) / (2.0 * NORMAL_QUANTILE_95)
 
 
 def _place(feature: Feature) -> tuple[float, float, float]:

@@ -75,6 +75,8 @@ def register(first: Sequence[Feature], second: Sequence[Feature], most_shift: fl
     none = Registration(np.zeros(3), np.eye(3), centre, np.zeros((6, 6)), 0)
     if not first or not second:
         return none
+    from scipy.spatial.transform import Rotation
+
     shift = _voted(first, second, most_shift)
     prior = np.diag([*[1.0 / most_shift**2] * 3, *[1.0 / TURN_SD**2] * 3])
     found = replace(none, shift=shift, covariance=np.zeros((6, 6)))
@@ -92,7 +94,7 @@ def register(first: Sequence[Feature], second: Sequence[Feature], most_shift: fl
         found = replace(
             found,
             shift=found.shift + step[:3],
-            rotation=_turn(np.asarray(step[3:], dtype=np.float64)) @ found.rotation,
+            rotation=Rotation.from_rotvec(step[3:]).as_matrix() @ found.rotation,
             covariance=np.linalg.inv(normal),
             pairs=len(pairs),
         )
@@ -109,16 +111,6 @@ def _rows(lever: FloatArray) -> FloatArray:
     """(3, 6) derivative of a place by shift and turn."""
     x, y, z = lever
     return np.column_stack([np.eye(3), np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])])
-
-
-def _turn(vector: FloatArray) -> FloatArray:
-    """Rotation by a vector of angles (Rodrigues)."""
-    angle = float(np.linalg.norm(vector))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = vector / angle
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
 
 
 def _voted(first: Sequence[Feature], second: Sequence[Feature], most: float) -> FloatArray:

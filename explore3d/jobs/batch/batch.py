@@ -33,7 +33,7 @@ class Standing:
         done: logs that have a row by now, of those to be analysed.
         of: logs to be analysed.
         failed: of those done, without a result.
-        left: estimate of the seconds that the rest takes; None before the first is done.
+        left: estimate of the seconds that the rest takes; None before the second is done.
     """
 
     done: int
@@ -104,15 +104,18 @@ def batch(
         store, result = Store(place_of(str(out))), Batch(len(tasks))
         keep = str((Path(out) / "models").resolve()) if models else None
         jobs = list(_to_do(tasks, store, result, keep, retry))
-        began, failed = time.perf_counter(), sum(result.statuses.values())
+        first_done, failed = 0.0, sum(result.statuses.values())
         tell(Standing(0, len(jobs), failed, None))
         try:
             if jobs:
                 with closing(_answers(jobs, limits or Limits(), workers or cores(), scheduler)) as answers:
                     for done, answer in enumerate(answers, 1):
+                        first_done = time.perf_counter() if done == 1 else first_done
                         store.add(answer["run"], answer["features"])
                         result.note(answer["run"])
-                        left = (time.perf_counter() - began) / done * (len(jobs) - done)
+                        # before the first one workers began: that is not repeated
+                        spent = (time.perf_counter() - first_done) / max(done - 1, 1)
+                        left = None if done == 1 else spent * (len(jobs) - done)
                         tell(Standing(done, len(jobs), len(result.failures), left))
         except BaseException as error:
             kept = result.known + sum(result.statuses.values())
