@@ -13,7 +13,7 @@ from typing import Any
 
 from explore3d import FolderError, UserError, count_text
 from explore3d.analysis import run_key
-from explore3d.jobs import locked
+from explore3d.jobs import cause, locked
 from explore3d.jobs.batch.cluster import answers_of_cluster, is_installed
 from explore3d.jobs.batch.one_log import Job
 from explore3d.jobs.batch.places import is_remote, place_of
@@ -117,9 +117,11 @@ def batch(
                         spent = (time.perf_counter() - first_done) / max(done - 1, 1)
                         left = None if done == 1 else spent * (len(jobs) - done)
                         tell(Standing(done, len(jobs), len(result.failures), left))
+        except UserError:  # refused: no worker has begun
+            raise
         except BaseException as error:
             kept = result.known + sum(result.statuses.values())
-            error.add_note(f"stopped after {kept} of {count_text(len(tasks), 'log')}")
+            error.add_note(f"stopped after {kept} of {count_text(len(tasks), 'log')}: {cause(error)}")
             error.add_note(f"kept: {out}; the same command goes on with it")
             raise
         store.pack()

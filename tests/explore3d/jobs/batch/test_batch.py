@@ -24,6 +24,7 @@ from explore3d.jobs import Told
 from explore3d.jobs.analyze import analyze
 from explore3d.jobs.batch import Limits, batch, tasks_of
 from explore3d.jobs.batch.batch import Batch
+from explore3d.jobs.batch.one_log import Job
 from explore3d.jobs.batch.worker import Worker
 
 ROOT = Path(__file__).parents[4]
@@ -124,10 +125,37 @@ def test_a_wrong_call_is_one_line_and_begins_nothing(
     assert not (here / "store").exists()
 
 
+def test_a_batch_that_is_interrupted_says_what_is_kept(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*given: Any) -> Any:
+        yield {"run": jobs[0].row("done"), "features": []}
+        raise KeyboardInterrupt
+
+    paths = [write_profile(here / f"{name}.csv", seed) for seed, name in enumerate("ab")]
+    tasks = tasks_of([str(path) for path in paths], SAID)
+    jobs = [Job.of(task) for task in tasks]
+    monkeypatch.setattr(sys.modules["explore3d.jobs.batch.batch"], "_answers", interrupted)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        batch(tasks, here / "store")
+    assert caught.value.__notes__ == [
+        "stopped after 1 of 2 logs: interrupted (Ctrl-C)",
+        f"kept: {here / 'store'}; the same command goes on with it",
+    ]
+    assert [row["log"] for row in rows(here / "store", "runs")] == [str(paths[0])]
+
+
+def test_a_scheduler_that_does_not_answer_or_cannot_be_asked_is_one_line(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.modules["explore3d.jobs.batch.cluster"], "PATIENCE", 0.5)
+    path = write_profile(here / "a.csv")
+    words = ["batch", path, "--out", here / "store", "--tip-radius", "2 um", "--scheduler", "tcp://127.0.0.1:9"]
+    assert explore3d_main(monkeypatch, *words) == 2
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert "does not answer" in line or 'pip install "explore3d[cluster]"' in line
+
+
 @pytest.mark.slow
 def test_a_worker_that_is_lost_is_begun_again(here: Path) -> None:
-    from explore3d.jobs.batch.one_log import Job
-
     (task,) = tasks_of([str(write_profile(here / "a.csv"))], SAID)
     with Worker(Limits()) as worker:
         assert worker.carry_out(Job.of(task))["run"]["status"] == "done"
