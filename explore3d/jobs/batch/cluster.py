@@ -80,6 +80,6 @@ def _carry_out(record: dict[str, Any], limits: Limits) -> Answer:
     """What a thread of a Dask worker does with a job: its own worker carries it out."""
     worker = getattr(_own, "worker", None)
     if worker is None:
-        worker = _own.worker = Worker(limits)
-    answer: Answer = worker.carry_out(Job.read(record))
+        worker = _own.worker = Worker()
+    answer: Answer = worker.carry_out(Job.read(record), limits)
     return answer

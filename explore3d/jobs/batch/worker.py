@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -36,15 +37,11 @@ class Limits:
 
 
 class Worker:
-    """A process that is begun when the first job comes, and ends with the `with` block.
+    """A process that is begun when the first job comes, and ends with the `with` block."""
 
-    Args:
-        limits: of each job.
-    """
-
-    def __init__(self, limits: Limits) -> None:
-        self._limits = limits
+    def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
+        self._closed = False
 
     def __enter__(self) -> Worker:
         return self
@@ -52,22 +49,29 @@ class Worker:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
     ) -> None:
-        self.stop()
+        self.close()
 
-    def carry_out(self, job: Job) -> Answer:
-        """The rows of a job, whatever became of it."""
+    def carry_out(self, job: Job, limits: Limits) -> Answer:
+        """The rows of a job, whatever became of it within its limits."""
         for _ in range(_TRIES):
-            answer = self._asked(json.dumps({"job": job.record(), **asdict(self._limits)}))
+            answer = self._asked(json.dumps({"job": job.record(), **asdict(limits)}))
             if answer is not None:
                 return answer
-            self.stop()
+            if self._closed:
+                break
+            self._stop()
         return {"run": job.row("killed", f"its worker was lost {_TRIES} times"), "features": []}
 
-    def stop(self) -> None:
-        """End the process; a log that it works on is given up."""
+    def close(self) -> None:
+        """End the process, from any thread; the log that it works on is given up, and no other is begun."""
+        self._closed = True
+        self._stop()
+
+    def _stop(self) -> None:
         process, self._process = self._process, None
         if process is not None:
-            process.kill()
+            with suppress(ProcessLookupError):  # it leads a group: the copy that it has made ends, too
+                os.killpg(process.pid, signal.SIGKILL)
             process.wait()
             for pipe in (process.stdin, process.stdout):
                 if pipe is not None:
@@ -109,12 +113,12 @@ def answers_here(jobs: Sequence[Job], limits: Limits, workers: int) -> Generator
     come: SimpleQueue[Answer | BaseException] = SimpleQueue()
     for job in [*jobs, *[None] * workers]:
         waiting.put(job)
-    crew = [Worker(limits) for _ in range(min(workers, len(jobs)))]
+    crew = [Worker() for _ in range(min(workers, len(jobs)))]
 
     def work(worker: Worker) -> None:
         try:
             while (job := waiting.get()) is not None:
-                come.put(worker.carry_out(job))
+                come.put(worker.carry_out(job, limits))
         except BaseException as error:  # told to whoever waits: it would wait forever
             come.put(error)
 
@@ -134,4 +138,4 @@ def answers_here(jobs: Sequence[Job], limits: Limits, workers: int) -> Generator
         for _ in crew:
             waiting.put(None)
         for worker in crew:
-            worker.stop()
+            worker.close()

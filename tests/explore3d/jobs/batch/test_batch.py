@@ -157,11 +157,11 @@ def test_a_scheduler_that_does_not_answer_or_cannot_be_asked_is_one_line(
 @pytest.mark.slow
 def test_a_worker_that_is_lost_is_begun_again(here: Path) -> None:
     (task,) = tasks_of([str(write_profile(here / "a.csv"))], SAID)
-    with Worker(Limits()) as worker:
-        assert worker.carry_out(Job.of(task))["run"]["status"] == "done"
+    with Worker() as worker:
+        assert worker.carry_out(Job.of(task), Limits())["run"]["status"] == "done"
         assert worker._process is not None
         os.kill(worker._process.pid, signal.SIGKILL)
-        assert worker.carry_out(Job.of(task))["run"]["status"] == "done"
+        assert worker.carry_out(Job.of(task), Limits())["run"]["status"] == "done"
 
 
 # A campaign of 200 logs, 20 of them bad in ten ways
