@@ -55,7 +55,7 @@ def test_the_ten_questions_are_answered(store: Path) -> None:
 
 def test_the_question_in_polars_is_answered(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("polars")
-    exec(re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[0], {})
+    exec(re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[-1], {})
     assert "ridge-1" in capsys.readouterr().out
 
 
