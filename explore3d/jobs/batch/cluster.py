@@ -70,10 +70,11 @@ def answers_of_cluster(
 
 
 def _answer(future: Any, job: Job) -> Answer:
-    if future.status == "finished":
+    """What came of a job; a result whose worker was lost before it was fetched is computed again, and waited for."""
+    try:
         return dict(future.result())
-    error = future.exception()
-    return {"run": job.row("killed", f"lost on the cluster: {type(error).__name__}: {error}"), "features": []}
+    except Exception as error:  # whatever the cluster lost it to costs this log alone
+        return {"run": job.row("killed", f"lost on the cluster: {type(error).__name__}: {error}"), "features": []}
 
 
 def _carry_out(record: dict[str, Any], limits: Limits) -> Answer:

@@ -24,6 +24,7 @@ from explore3d.jobs import Told
 from explore3d.jobs.analyze import analyze
 from explore3d.jobs.batch import Limits, batch, tasks_of
 from explore3d.jobs.batch.batch import Batch
+from explore3d.jobs.batch.cluster import _answer
 from explore3d.jobs.batch.one_log import Job
 from explore3d.jobs.batch.worker import Worker
 
@@ -300,6 +301,29 @@ def test_a_cluster_started_by_hand_does_the_same_and_a_lost_worker_loses_nothing
             each.wait()
     runs = rows(tmp_path / "store", "runs")
     assert len(runs) == len(paths) and {row["status"] for row in runs} == {"done"}
+
+
+def test_a_result_that_a_lost_worker_held_is_waited_for(tmp_path: Path) -> None:
+    """Its future is told as finished, and is pending again when the result is asked for."""
+
+    class Future:
+        status = "pending"
+
+        def __init__(self, error: Exception | None = None) -> None:
+            self.error = error
+
+        def result(self) -> dict[str, Any]:
+            if self.error is not None:
+                raise self.error
+            return {"run": {"status": "done"}, "features": []}
+
+        def exception(self) -> Exception | None:
+            return self.error
+
+    (task,) = tasks_of([str(write_profile(tmp_path / "a.csv"))], SAID)
+    assert _answer(Future(), Job.of(task))["run"]["status"] == "done"
+    lost = _answer(Future(RuntimeError("four workers died")), Job.of(task))["run"]
+    assert lost["status"] == "killed" and lost["reason"] == "lost on the cluster: RuntimeError: four workers died"
 
 
 def test_a_result_counts_what_failed() -> None:
