@@ -7,9 +7,22 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from explore3d.analysis.arviz_export import arviz_export as arviz_export
     from explore3d.analysis.build_model import build_model as build_model
+    from explore3d.analysis.feature_table import (
+        FEATURE_COLUMNS as FEATURE_COLUMNS,
+        csv_text as csv_text,
+        feature_rows as feature_rows,
+        parquet_bytes as parquet_bytes,
+        run_key as run_key,
+    )
     from explore3d.analysis.forecast import Forecast as Forecast, forecast as forecast, worst_errors as worst_errors
     from explore3d.analysis.method import ABSORBED as ABSORBED
     from explore3d.analysis.result import Analysis as Analysis
+    from explore3d.analysis.roughness import (
+        Roughness as Roughness,
+        residual as residual,
+        roughness_of as roughness_of,
+        why_no_roughness_of as why_no_roughness_of,
+    )
     from explore3d.analysis.savings import without_needless_dynamics as without_needless_dynamics
     from explore3d.analysis.stages import Progress as Progress, Stages as Stages, silent as silent
     from explore3d.analysis.surface_account import SurfaceAccount as SurfaceAccount, swept_share as swept_share
@@ -18,9 +31,11 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "arviz_export": ("arviz_export",),
     "build_model": ("build_model",),
+    "feature_table": ("FEATURE_COLUMNS", "csv_text", "feature_rows", "parquet_bytes", "run_key"),
     "forecast": ("Forecast", "forecast", "worst_errors"),
     "method": ("ABSORBED",),
     "result": ("Analysis",),
+    "roughness": ("Roughness", "residual", "roughness_of", "why_no_roughness_of"),
     "savings": ("without_needless_dynamics",),
     "stages": ("Progress", "Stages", "silent"),
     "surface_account": ("SurfaceAccount", "swept_share"),

@@ -22,6 +22,7 @@ from explore3d.analysis.method import (
     modelled,
     placed,
     refined_all,
+    roughness_taken,
     surface_estimated,
     tip_counts,
     why_no_chain,
@@ -34,6 +35,7 @@ from explore3d.analysis.method import (
     why_no_lines,
     why_no_pose,
     why_no_posterior,
+    why_no_roughness,
     why_no_smoothing,
     why_no_surface,
     why_no_time_curve,
@@ -62,17 +64,18 @@ METHOD = (
     MethodStage("", None, made_sound),
     MethodStage("algorithms 1 and 2", why_no_contact_algorithms, None, possible=_never),
     MethodStage("detection", why_no_detection, detected),
-    MethodStage("injected crests", why_no_injection, limit_measured),
+    MethodStage("injected crests", why_no_injection, limit_measured, sized=False),
     MethodStage("grammar", why_no_lines, assembled),
     MethodStage("posterior", why_no_posterior, refined_all),
-    MethodStage("long chain", why_no_chain, None),
+    MethodStage("long chain", why_no_chain, None, sized=False),
     MethodStage("", None, believed),
-    MethodStage("smoothing", why_no_smoothing, None),
-    MethodStage("estimated surface", why_no_surface, surface_estimated),
-    MethodStage("curvature", why_no_curvature, curvature_taken, possible=_never),
+    MethodStage("smoothing", why_no_smoothing, None, sized=False),
+    MethodStage("estimated surface", why_no_surface, surface_estimated, sized=False),
+    MethodStage("curvature", why_no_curvature, curvature_taken, possible=_never, sized=False),
+    MethodStage("roughness", why_no_roughness, roughness_taken, sized=False),
     MethodStage("", None, inspected),
     MethodStage("", None, modelled),
-    MethodStage("error against time", why_no_time_curve, compared_in_time, possible=_never),
+    MethodStage("error against time", why_no_time_curve, compared_in_time, possible=_never, sized=False),
 )
 
 
@@ -119,6 +122,8 @@ def _result(work: Work) -> Analysis:
         path=work.path,
         deviation=work.deviation,
         judgements=work.judgements,
+        dropped=tuple(work.dropped),
+        roughness=work.roughness,
     )
 
 

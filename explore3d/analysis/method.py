@@ -14,6 +14,7 @@ import numpy as np
 from explore3d import UserError, __version__
 from explore3d.analysis.inspected import Inspected, base_reach
 from explore3d.analysis.result import TipCount
+from explore3d.analysis.roughness import Roughness, roughness_of, why_no_roughness_of
 from explore3d.analysis.stages import Stages
 from explore3d.analysis.surface_account import SurfaceAccount, swept_share
 from explore3d.analysis.time_curve import time_curve
@@ -45,6 +46,9 @@ NOISE_FREE = 2e-8
 # What is left out where what may be a feature is none: taken for form, or too wide
 ABSORBED = "part of the form"
 
+# Why a stage that does not tell existence, places and sizes was left out
+NOT_IN_QUICK = "quick results were asked for: existence, places and sizes"
+
 # Told the share of a stage that is done, 0 to 1
 Share = Callable[[float], None]
 
@@ -59,12 +63,14 @@ class MethodStage:
             no function at all: it always runs.
         run: does the stage's work; None for a part of another stage.
         possible: False where there is nothing to work on: then the stage is left out even if forced.
+        sized: False if existence, places and sizes do without it: quick results leave it out.
     """
 
     name: str
     why_not: Callable[[Work], str | None] | None
     run: Callable[[Work, Share], None] | None
     possible: Callable[[Work], bool] = lambda work: True
+    sized: bool = True
 
 
 @dataclass
@@ -86,6 +92,8 @@ class Work:
         deviation: what the given model gets wrong; None if nothing is known to be.
         judgements: what became of the scene's tolerances.
         apart: samples left out for that.
+        dropped: features that were supposed and not kept, and why.
+        roughness: what the surface is like beside the features.
         asked: whether a stage was asked for, by its name.
     """
 
@@ -109,6 +117,8 @@ class Work:
     path: PathLedger | None = None
     deviation: Deviation | None = None
     apart: int = 0
+    dropped: list[tuple[Feature, str]] = field(default_factory=list)
+    roughness: Roughness | None = None
     time_curve: tuple[tuple[float, float], ...] = ()
     asked: dict[str, bool] = field(default_factory=dict)
 
@@ -139,6 +149,8 @@ class Work:
         """Ask whether a stage is needed, and run and time it or note why not."""
         if stage.why_not is not None:
             reason = stage.why_not(self)
+            if reason == "" and self.stages.quick and not stage.sized:
+                reason = NOT_IN_QUICK
             self.asked[stage.name] = reason is not None and self.stages.needed(
                 stage.name, reason, possible=stage.possible(self)
             )
@@ -345,7 +357,7 @@ def refined_all(work: Work, share: Share) -> None:
         base=work.base,
         noise=work.detections.noise,
         tip_sd=work.settings.tip_sd,
-        confirm=work.stages.is_forced("long chain"),
+        confirm=work.stages.is_forced("long chain") or (None if work.stages.quick else False),
         progress=share,
     )
 
@@ -367,6 +379,7 @@ def believed(work: Work, share: Share) -> None:
         x, y, z = np.round(1e3 * feature.axis[0], 2)
         reason = f"all sweeps together hardly speak for it (log odds {feature.evidence.log_odds:.1f})"
         work.stages.left_out.append(LeftOut(f"a {feature.kind} at ({x:g}, {y:g}, {z:g}) mm", reason))
+        work.dropped.append((feature, reason))
     work.features = kept
 
 
@@ -402,6 +415,16 @@ def curvature_taken(work: Work, share: Share) -> None:
         work.curvature = principal_curvatures(work.estimate.surface, noise=work.estimate.sd)
 
 
+def why_no_roughness(work: Work) -> str | None:
+    """Only a trace that is all there, long enough and felt by a fine tip tells of it."""
+    return None if work.log.detections else why_no_roughness_of(work.laid, work.stages.cutoffs[0])
+
+
+def roughness_taken(work: Work, share: Share) -> None:
+    """The standards' parameters of what is left beside the features."""
+    work.roughness = roughness_of(work.laid, work.features, work.detections.noise.sd, *work.stages.cutoffs)
+
+
 def inspected(work: Work, share: Share) -> None:
     """Which places are free of features, and above which height."""
     work.inspected = Inspected.of(work.laid, work.base, work.detections, work.smallest_feature)
@@ -412,11 +435,12 @@ def modelled(work: Work, share: Share) -> None:
     """The features anchored on the base."""
     surface = {} if work.account is None else {"surface": work.account.record()}
     path = {} if work.path is None else {"path": work.path.record()}
+    rough = {} if work.roughness is None else {"roughness": work.roughness.record()}
     deviation = {} if work.deviation is None else {"deviation": work.deviation.record()}
     work.model = ObjectModel.attach(
         work.base,
         in_model_frame(work.features, work.base),
-        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface | path | deviation,
+        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface | path | deviation | rough,
         inspected=work.inspected.height,
         reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
         deviation=work.deviation.heights if work.deviation and work.deviation.of_the_model else None,

@@ -22,6 +22,7 @@ OPTIONAL_STAGES = (
     "posterior",
     "long chain",
     "estimated surface",
+    "roughness",
     "smoothing",
     "curvature",
     "error against time",
@@ -42,6 +43,8 @@ class Stages:
     Args:
         progress: told what is under way.
         forced: names of stages, of OPTIONAL_STAGES, to run even where the scene does not need them.
+        cutoffs: nesting indices of the L-filter and of the S-filter for roughness, m; None: by the standard.
+        quick: only what existence, places and sizes need; the rest is left out unless it is forced.
 
     Raises:
         UserError: a stage to be forced that there is not.
@@ -49,6 +52,8 @@ class Stages:
 
     progress: Progress = silent
     forced: Collection[str] = ()
+    quick: bool = False
+    cutoffs: tuple[float | None, float | None] = (None, None)
     timings: dict[str, float] = field(default_factory=dict)
     left_out: list[LeftOut] = field(default_factory=list)
 

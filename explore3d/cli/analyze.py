@@ -7,12 +7,14 @@ from typing import Annotated
 
 import typer
 
+from explore3d import UserError
 from explore3d.cli.options import (
     Average,
     Columns,
     Force,
     Frame,
     Json,
+    NoReport,
     Out,
     Overwrite,
     Part,
@@ -20,6 +22,7 @@ from explore3d.cli.options import (
     SameObject,
     TipRadius,
     Units,
+    length,
 )
 
 
@@ -62,6 +65,10 @@ def analyze(
     force: Force = None,
     json: Json = False,
     overwrite: Overwrite = False,
+    no_report: NoReport = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Only existence, places and sizes: no report, no chains, no surface.")
+    ] = False,
 ) -> None:
     """Build the annotated model and the report from recordings alone.
 
@@ -88,6 +95,8 @@ def analyze(
             progress=progress,
             force=force or (),
             overwrite=overwrite,
+            report=not no_report,
+            quick=quick,
             units=units,
             columns=columns,
             pixel=pixel,
@@ -99,3 +108,58 @@ def analyze(
         print(told[0])
     for analysis in analyses:
         show(analysis, out, json)
+
+
+def roughness(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="Log, table, map (docs/log.md).")],
+    cutoff: Annotated[
+        str | None, typer.Option(help='Nesting index of the L-filter, "0.8 mm"; else the largest that fits 5 times.')
+    ] = None,
+    short_cutoff: Annotated[
+        str | None, typer.Option(help='Nesting index of the S-filter, "2.5 um"; else what belongs to the other.')
+    ] = None,
+    tip_radius: TipRadius = None,
+    form: Annotated[str | None, typer.Option(help="Form that is removed first, as for analyze.")] = None,
+    units: Units = None,
+    columns: Columns = None,
+    pixel: Pixel = None,
+    part: Part = None,
+    json: Json = False,
+) -> None:
+    """Roughness and waviness beside the features, by ISO 21920-2 and ISO 25178-2, each with its interval.
+
+    Example: explore3d roughness scan.csv --tip-radius "2 um" --units mm --cutoff "0.8 mm"
+    """
+    from json import dumps
+
+    from explore3d.cli.progress import shown
+    from explore3d.jobs import analyze as carry_out
+    from mapping.model import plain
+
+    with shown(quiet=json) as progress:
+        analysis = carry_out(
+            log,
+            tip_radius=tip_radius,
+            form=form,
+            units=units,
+            columns=columns,
+            pixel=pixel,
+            part=part,
+            quick=True,
+            force=("roughness",),
+            progress=progress,
+            cutoffs=(
+                None if cutoff is None else length("--cutoff", cutoff, positive=True),
+                None if short_cutoff is None else length("--short-cutoff", short_cutoff, positive=True),
+            ),
+        )
+    found = analysis.roughness
+    if found is None:
+        raise UserError(
+            f"{log}: too short, or too full of features, for one section of the filter; a shorter --cutoff may do"
+        )
+    if json:
+        print(dumps(plain(found.record()), ensure_ascii=False, allow_nan=False))
+        return
+    print("\n".join(f"  {name:<4} {value:<12} {span}".rstrip() for name, value, span in found.rows()))
+    print(found.sentence())

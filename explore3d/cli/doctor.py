@@ -54,6 +54,7 @@ REQUIRED_PACKAGES = {
     "emcee": ("emcee", "posterior distributions of a feature's size and place"),
     "trimesh": ("trimesh", "reading meshes, writing model.glb"),
     "matplotlib": ("matplotlib", "the pictures of plans and of benches"),
+    "pyarrow": ("pyarrow.parquet", "the table of features, stores of many logs"),
     "mcap": ("mcap.writer", "logs"),
     "zstandard": ("zstandard", "compressed logs"),
     "pydantic": ("pydantic", "scenes"),

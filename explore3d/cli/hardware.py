@@ -39,7 +39,7 @@ def emulate(
     import time
     from contextlib import suppress
 
-    from explore3d.jobs import Emulation, serve
+    from explore3d.jobs.machines import Emulation, serve
 
     if device != "grbl" or sensor not in (None, "optoforce", "line"):
         raise UserError(f"cannot emulate {device!r} with sensor {sensor!r}; possible: grbl, optoforce or line sensor")
@@ -80,7 +80,7 @@ def calibrate(
 
     Example: explore3d calibrate scene.toml --radius "12.5 mm" --out tip.toml --arm
     """
-    from explore3d.jobs import Recording, as_json, calibrate as find
+    from explore3d.jobs.machines import Recording, as_json, calibrate as find
 
     words = ["explore3d", "calibrate", str(scene), "--radius", radius, "--center", center, "--out", str(out)]
     words += ["--lines", str(lines), "--radius-sd", radius_sd, *["--arm"] * arm]
@@ -106,7 +106,7 @@ def selftest(
 
     Example: explore3d selftest scene.toml --radius "12.5 mm" --arm
     """
-    from explore3d.jobs import as_json, selftest as test
+    from explore3d.jobs.machines import as_json, selftest as test
 
     sphere = length("--radius", radius, positive=True)
     found = test(scene, sphere, point("--center", center), arm=arm, files_from=files_from or ())
@@ -126,7 +126,7 @@ def reprobe(
 
     Example: explore3d reprobe out/wire --at "12 mm, 3 mm, 0 mm"
     """
-    from explore3d.jobs import as_json, reprobe as touch
+    from explore3d.jobs.machines import as_json, reprobe as touch
 
     found = touch(folder, point("--at", at), touches=touches, arm=arm, files_from=files_from or ())
     print(as_json(found.record()) if json else "\n".join(found.lines()))

@@ -1,4 +1,4 @@
-"""explore3d inspect: what a file holds, how it is understood, and what it leaves open."""
+"""explore3d inspect, export: what a file holds, how it is understood; and what was found, in the forms of others."""
 
 from __future__ import annotations
 
@@ -31,3 +31,28 @@ def inspect(
 
     found = look(file, tip_radius=tip_radius, units=units, columns=columns, pixel=pixel, part=part, average=average)
     print(dumps(asdict(found), ensure_ascii=False, allow_nan=False) if json else "\n".join(found.lines()))
+
+
+def export(
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="Model (folder or model.json); for X3P a log, or its session.")
+    ],
+    to: Annotated[
+        list[Path], typer.Option("--to", help="NAME.csv, NAME.dxf, NAME.x3p, ro-crate-metadata.json; may be repeated.")
+    ],
+    tip_radius: TipRadius = None,
+    units: Units = None,
+    columns: Columns = None,
+    pixel: Pixel = None,
+    part: Part = None,
+) -> None:
+    """Write crest lines (CSV, DXF), heights over the base beside the features (X3P), or a session's record (RO-Crate).
+
+    Example: explore3d export out/wire --to crests.dxf --to crests.csv
+    """
+    from explore3d.jobs import Told, export as write
+
+    table = {"units": units, "columns": columns, "pixel": pixel, "part": part}
+    told = Told(tip_radius, table={name: value for name, value in table.items() if value is not None})
+    for path in to:
+        print(f"written: {write(source, path, told)}")

@@ -10,15 +10,16 @@ from typing import Annotated
 import typer
 
 from explore3d import UserError, __version__
-from explore3d.cli.analyze import analyze
+from explore3d.cli.analyze import analyze, roughness
+from explore3d.cli.batch import batch
 from explore3d.cli.begin import examples, init
 from explore3d.cli.bench import bench
 from explore3d.cli.doctor import doctor
 from explore3d.cli.figures import figures
 from explore3d.cli.hardware import calibrate, emulate, reprobe, selftest
-from explore3d.cli.inspect import inspect
+from explore3d.cli.inspect import export, inspect
 from explore3d.cli.interrupted import DISK_ERRORS, InterruptedJobError, is_kept, one_line, told
-from explore3d.cli.merge import merge
+from explore3d.cli.later import compare, merge
 from explore3d.cli.options import INCOMPLETE
 from explore3d.cli.run import plan, run
 from explore3d.cli.stability import stability
@@ -36,7 +37,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-MODEL = (init, examples, plan, run, analyze, inspect, merge, figures)
+MODEL = (init, examples, plan, run, analyze, roughness, batch, compare, inspect, export, merge, figures)
 MACHINE = (doctor, emulate, calibrate, selftest, reprobe, stability)
 for command in (*MODEL, *MACHINE):
     app.command()(one_line(command))

@@ -71,6 +71,7 @@ FilesFrom = Annotated[
         help="A folder that the scene may name files in, beside its own and those next to that; may be repeated.",
     ),
 ]
+NoReport = Annotated[bool, typer.Option("--no-report", help="Write no report and no pictures: tables and model alone.")]
 Pixel = Annotated[
     str | None,
     typer.Option(help='The file is a map of heights whose pixels are so far apart: "1 um", or "1 um, 2 um".'),

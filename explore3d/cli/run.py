@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d.cli.options import INCOMPLETE, FilesFrom, Force, Json, Out, Overwrite
+from explore3d.cli.options import INCOMPLETE, FilesFrom, Force, Json, NoReport, Out, Overwrite
 
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.toml", help="The scene to explore.")]
 
@@ -25,6 +25,7 @@ def run(
     ] = False,
     overwrite: Overwrite = False,
     files_from: FilesFrom = None,
+    no_report: NoReport = False,
 ) -> None:
     """Explore the scene with its finger; write the log, the annotated model and the report.
 
@@ -51,6 +52,7 @@ def run(
             resume=resume,
             overwrite=overwrite,
             files_from=files_from or (),
+            report=not no_report,
         )
     show(analysis, out, json)
     short = analysis.account is not None and analysis.account.short

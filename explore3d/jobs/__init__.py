@@ -5,31 +5,30 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from explore3d.jobs.analyze import analyze as analyze, analyze_each as analyze_each
-    from explore3d.jobs.calibrate import (
-        Recording as Recording,
-        as_json as as_json,
-        calibrate as calibrate,
-        selftest as selftest,
-        write_profile as write_profile,
+    from explore3d.jobs.analyze import (
+        Told as Told,
+        analyze as analyze,
+        analyze_each as analyze_each,
+        log_path as log_path,
     )
-    from explore3d.jobs.emulate import Emulation as Emulation, serve as serve
+    from explore3d.jobs.compare import Compared as Compared, compare_scans as compare_scans, watched as watched
     from explore3d.jobs.expedition import Explored as Explored, Explorer as Explorer, explorer as explorer
-    from explore3d.jobs.machine_finger import GrblFingerTable as GrblFingerTable
+    from explore3d.jobs.export import export as export
     from explore3d.jobs.merge import load as load, merge as merge
     from explore3d.jobs.plan import plan_scene as plan_scene, show_plan as show_plan
-    from explore3d.jobs.reprobe import reprobe as reprobe
+    from explore3d.jobs.resume import Execute as Execute, Replay as Replay
     from explore3d.jobs.run import cause as cause, open_scene as open_scene, run as run, scene_finger as scene_finger
+    from explore3d.jobs.session import locked as locked, undisturbed as undisturbed
 
 _PUBLIC = {
-    "analyze": ("analyze", "analyze_each"),
-    "calibrate": ("Recording", "as_json", "calibrate", "selftest", "write_profile"),
-    "emulate": ("Emulation", "serve"),
+    "analyze": ("Told", "analyze", "analyze_each", "log_path"),
+    "compare": ("Compared", "compare_scans", "watched"),
     "expedition": ("Explored", "Explorer", "explorer"),
-    "machine_finger": ("GrblFingerTable",),
+    "export": ("export",),
     "merge": ("load", "merge"),
     "plan": ("plan_scene", "show_plan"),
-    "reprobe": ("reprobe",),
+    "resume": ("Execute", "Replay"),
     "run": ("cause", "open_scene", "run", "scene_finger"),
+    "session": ("locked", "undisturbed"),
 }
 doorway(__name__, _PUBLIC)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from explore3d import UserError, parse_length
-from explore3d.analysis import Analysis, Progress, Stages, build_model, silent
+from explore3d.analysis import Analysis, Progress, Stages, build_model, run_key, silent
 from explore3d.jobs.conclude import conclude
 from explore3d.jobs.objects import not_one_object
 from explore3d.jobs.session import Job, Session
-from explore3d.log import LOG, digest, large_log, load_logs, must_fit_analysis, read_base
+from explore3d.log import LOG, digest, large_log, load_logs, must_fit_analysis, read_base, sidecar_of
 from explore3d.scene import load_mesh, recorded_scene
 from mapping.base import Base
 
@@ -28,6 +28,9 @@ def analyze(
     progress: Progress = silent,
     force: Collection[str] = (),
     overwrite: bool = False,
+    report: bool = True,
+    quick: bool = False,
+    cutoffs: tuple[float | None, float | None] = (None, None),
     **table: Any,
 ) -> Analysis:
     """Build the annotated model of what was recorded.
@@ -41,6 +44,9 @@ def analyze(
         progress: told the stage and the share of it that is done.
         force: stages to run although the recording does not need them.
         overwrite: replace, once this one is complete, a session of another recording in that folder.
+        report: False to write no report and no pictures.
+        cutoffs: nesting indices of the L-filter and of the S-filter for roughness, m; None: by the standard.
+        quick: only existence, places and sizes: no report, no chains, no estimated surface.
         table: tip_sd, form, mask (explore3d.log.load_logs); units, columns, frame, jump, reference, pixel of a table
             (explore3d.log.table.read_table); average: samples of a run that becomes one, their mean; part: which of
             several that a file holds.
@@ -49,12 +55,53 @@ def analyze(
         UserError: input that cannot be used, named by file and field.
     """
     paths = [logs] if isinstance(logs, str | Path) else list(logs)
+    told = Told(tip_radius, model, model_units, tuple(force), quick, table, cutoffs)
     if out is not None:
-        again = _command(paths, out, tip_radius, model, model_units, force, table)
-        with results(paths, out, Job("analyze", digest_of(paths), again=again), overwrite) as session:
-            found = _analyze(paths, session, tip_radius, model, model_units, progress, force, table)
+        words = ["explore3d", "analyze", *map(str, paths), "--out", str(out), *told.words()]
+        words += [] if report or quick else ["--no-report"]
+        job = Job("analyze", digest_of(paths), again=shlex.join(words))
+        with results(paths, out, job, overwrite) as session:
+            found = _analyze(paths, session, told, progress, report and not quick)
         return replace(found, folder=session.folder)
-    return _analyze(paths, None, tip_radius, model, model_units, progress, force, table)
+    return _analyze(paths, None, told, progress, False)
+
+
+@dataclass(frozen=True)
+class Told:
+    """What an analysis is told that its recordings do not say; fields as the arguments of analyze."""
+
+    tip_radius: str | float | None = None
+    model: Path | str | None = None
+    model_units: str = "m"
+    force: tuple[str, ...] = ()
+    quick: bool = False
+    table: Mapping[str, Any] = field(default_factory=dict)
+    cutoffs: tuple[float | None, float | None] = (None, None)
+
+    def words(self) -> list[str]:
+        """The options of a command that say the same."""
+        words = [] if self.model is None else ["--model", str(self.model), "--model-units", self.model_units]
+        words += table_words(self.tip_radius, dict(self.table))
+        words += [part for name in self.force for part in ("--force", name)]
+        return [*words, "--quick"] if self.quick else words
+
+    def record(self, paths: Sequence[Path | str]) -> dict[str, Any]:
+        """All that decides, beside the recordings' bytes, what comes of them: files by their digests.
+
+        Raises:
+            UserError: a sidecar that cannot be read.
+        """
+        sidecars = [sidecar_of(log_path(path)) for path in paths]
+        return {
+            "tip_radius": self.tip_radius,
+            "model": None if self.model is None or not Path(self.model).is_file() else digest(self.model),
+            "model_units": None if self.model is None else self.model_units,
+            "force": sorted(self.force),
+            "quick": self.quick,
+            "cutoffs": [] if self.cutoffs == (None, None) else list(self.cutoffs),
+            "sidecars": [digest(path) for path in sidecars if path is not None],
+            **self.table,
+        }
 
 
 def analyze_each(
@@ -80,7 +127,7 @@ def analyze_each(
     paths = [Path(path) for path in logs]
     if len(paths) == 1 or same_object:
         return [analyze(paths, out, **settings)]
-    options = ("model", "model_units", "progress", "force", "overwrite")
+    options = ("model", "model_units", "progress", "force", "overwrite", "report", "quick", "cutoffs")
     read = {name: value for name, value in settings.items() if name not in options}
     why = not_one_object([load_logs([path], **read) for path in paths])
     if not why:
@@ -118,21 +165,6 @@ def log_path(path: Path | str) -> Path:
     return Path(path) / LOG if Path(path).is_dir() else Path(path)
 
 
-def _command(
-    paths: Sequence[Path | str],
-    out: Path | str,
-    tip_radius: str | float | None,
-    model: Path | str | None,
-    model_units: str,
-    force: Collection[str],
-    table: dict[str, Any],
-) -> str:
-    words = ["explore3d", "analyze", *map(str, paths), "--out", str(out)]
-    words += [] if model is None else ["--model", str(model), "--model-units", model_units]
-    words += table_words(tip_radius, table)
-    return shlex.join([*words, *(part for name in force for part in ("--force", name))])
-
-
 def table_words(tip_radius: str | float | None, table: dict[str, Any]) -> list[str]:
     """The options of a command that say again how to read what does not say it."""
     words = [] if tip_radius is None else ["--tip-radius", str(tip_radius)]
@@ -144,30 +176,26 @@ def table_words(tip_radius: str | float | None, table: dict[str, Any]) -> list[s
 
 
 def _analyze(
-    paths: Sequence[Path | str],
-    session: Session | None,
-    tip_radius: str | float | None,
-    model: Path | str | None,
-    model_units: str,
-    progress: Progress,
-    force: Collection[str],
-    table: dict[str, Any],
+    paths: Sequence[Path | str], session: Session | None, told: Told, progress: Progress, report: bool
 ) -> Analysis:
-    if len(paths) == 1 and table.get("average") is None and (large := large_log(paths[0])) is not None:
+    stages = Stages(progress, told.force, told.quick, told.cutoffs)
+    if len(paths) == 1 and told.table.get("average") is None and (large := large_log(paths[0])) is not None:
         from explore3d.jobs.streaming import analyze_stream
 
-        unused = [name for name in ("tip_sd", "form", "mask") if table.get(name) is not None]
+        unused = [name for name in ("tip_sd", "form", "mask") if told.table.get(name) is not None]
         if unused:
             raise UserError(f"{large}: is too large to be loaded at once; {', '.join(unused)} cannot be set for it yet")
-        given = None if model is None else Base(load_mesh(model, model_units))
-        radius = None if tip_radius is None else parse_length(tip_radius)
-        return analyze_stream(large, session, base=given, tip_radius=radius, progress=progress, force=force)
-    stages = Stages(progress, force)
+        given = None if told.model is None else Base(load_mesh(told.model, told.model_units))
+        radius = None if told.tip_radius is None else parse_length(told.tip_radius)
+        run = run_key(digest(large), told.record(paths))
+        return analyze_stream(large, session, stages, base=given, tip_radius=radius, report=report, run=run)
     with stages.stage("reading"):
-        log = load_logs(paths, tip_radius=tip_radius, **table)
+        log = load_logs(paths, tip_radius=told.tip_radius, **told.table)
         must_fit_analysis(", ".join(log.sources), len(log.trace))
         scene = recorded_scene(log.scene_text, log.sources[0]) if log.scene_text else None
-        base = Base(load_mesh(model, model_units)) if model is not None else read_base(log.events)
+        given = None if told.model is None else Base(load_mesh(told.model, told.model_units))
+        base = given or read_base(log.events)
     if session is None:
         return build_model(log, scene, base, stages)
-    return conclude(session, log, scene, base, stages)
+    run = run_key(log.sha256, told.record(paths))
+    return conclude(session, log, scene, base, stages, report=report, run=run)

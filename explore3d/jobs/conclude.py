@@ -4,26 +4,55 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from explore3d.analysis import Analysis, Forecast, Stages, build_model, forecast, worst_errors
+from explore3d.analysis import (
+    FEATURE_COLUMNS,
+    Analysis,
+    Forecast,
+    Stages,
+    build_model,
+    csv_text,
+    feature_rows,
+    forecast,
+    parquet_bytes,
+    worst_errors,
+)
 from explore3d.jobs.session import Session
 from explore3d.log import Log
 from explore3d.report import write_report
 from explore3d.scene import Scene
 from mapping.base import Base
+from mapping.geometry.mesh import write_whole
+
+# The table of features beside the model, for every program and for those that ask many at once
+FEATURES_CSV, FEATURES_PARQUET = "features.csv", "features.parquet"
 
 
 def conclude(
-    session: Session, log: Log, scene: Scene | None, base: Base | None, stages: Stages, go_on: str = ""
+    session: Session,
+    log: Log,
+    scene: Scene | None,
+    base: Base | None,
+    stages: Stages,
+    go_on: str = "",
+    *,
+    report: bool = True,
+    run: str = "",
 ) -> Analysis:
-    """Build the model of a log and write it, with its pictures and report, into a session's folder.
+    """Build the model of a log and write it, with its table, pictures and report, into a session's folder.
 
     Args:
+        report: False to leave pictures and report out.
+        run: key of the analysis in the table.
         go_on: the command that goes on with an exploration that ended early.
     """
     analysis = replace(build_model(log, scene, base, stages), go_on=go_on)
     with session.staging() as folder:
-        with stages.stage("report"):
-            write_report(analysis, folder, stages.is_forced("rendered pictures"))
+        if report:
+            with stages.stage("report"):
+                write_report(analysis, folder, stages.is_forced("rendered pictures"))
+        table = feature_rows(analysis, run)
+        write_whole(folder / FEATURES_CSV, csv_text(FEATURE_COLUMNS, table))
+        write_whole(folder / FEATURES_PARQUET, parquet_bytes(FEATURE_COLUMNS, table))
         about = {"forecast": forecast(analysis), "errors": worst_errors(analysis.errors)}
         known = {name: each.record() if isinstance(each, Forecast) else each for name, each in about.items() if each}
         provenance = analysis.model.provenance | known

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from explore3d import UserError, __version__, count_text, seconds_text
-from explore3d.analysis import Analysis, Progress, Stages, silent, without_needless_dynamics
+from explore3d.analysis import Analysis, Progress, Stages, run_key, silent, without_needless_dynamics
+from explore3d.jobs.analyze import Told
 from explore3d.jobs.conclude import conclude
 from explore3d.jobs.expedition import SurveyWatch, explorer, known_base
 from explore3d.jobs.resume import BROKEN_OFF, Replay
@@ -44,6 +45,7 @@ def run(
     overwrite: bool = False,
     finger: Finger | None = None,
     files_from: Collection[Path | str] = (),
+    report: bool = True,
 ) -> Analysis:
     """Explore, log, and build the annotated model.
 
@@ -61,6 +63,7 @@ def run(
         finger: explore with this one, not with the one that the scene names; whether it may move is its own affair.
             The session's scene says `kind = "given"`, and keeps what it states of the noise.
         files_from: folders that the scene may name files in, beside those near it.
+        report: False to write no report and no pictures.
 
     Raises:
         UserError: a scene or folder that cannot be used.
@@ -74,7 +77,7 @@ def run(
             finger = scene_finger(without_needless_dynamics(scene, stages), arm)
         else:
             scene = _with_given(scene, finger)
-    words = [part for name in force for part in ("--force", name)] + ["--arm"] * arm
+    words = [part for name in force for part in ("--force", name)] + ["--arm"] * arm + ["--no-report"] * (not report)
     words += [part for folder in files_from for part in ("--files-from", str(folder))]
     again = shlex.join(["explore3d", "run", str(scene.path), "--out", str(out), *words])
     go_on = f"{again} --resume"
@@ -86,7 +89,8 @@ def run(
         stop = stop_of(log)
         session.stopped = stop.text if stop is not None and stop.incomplete else ""
         try:
-            analysis = conclude(session, log, scene, read_base(log.events), stages, go_on)
+            key, base = run_key(log.sha256, Told(force=tuple(force)).record([])), read_base(log.events)
+            analysis = conclude(session, log, scene, base, stages, go_on, report=report, run=key)
         except BaseException as error:
             session.stopped = session.stopped or f"stopped after all sweeps, before the report: {cause(error)}"
             error.add_note(session.stopped)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Collection
 from pathlib import Path
 
-from explore3d.analysis import Analysis, Progress, Stages, build_model, silent
+from explore3d.analysis import Analysis, Stages, build_model
 from explore3d.jobs.conclude import conclude
 from explore3d.jobs.condense import CHUNK, KEPT_BACKGROUND_SAMPLES, Condensed, condense
 from explore3d.jobs.session import Session
@@ -19,12 +18,13 @@ from mapping.base import Base, fit_base
 def analyze_stream(
     path: Path,
     session: Session | None,
+    stages: Stages,
     *,
     base: Base | None = None,
     tip_radius: float | None = None,
-    progress: Progress = silent,
-    force: Collection[str] = (),
     chunk: int = CHUNK,
+    report: bool = True,
+    run: str = "",
 ) -> Analysis:
     """The annotated model of one large log; arguments and errors as for explore3d.jobs.analyze.analyze.
 
@@ -32,8 +32,9 @@ def analyze_stream(
 
     Args:
         session: entered, for model and report; None writes nothing.
+        stages: the account of what runs and what is left out.
+        report, run: as for conclude.
     """
-    stages = Stages(progress, force)
     scene_text, events = head(path)
     scene = recorded_scene(scene_text, path) if scene_text else None
     base = base or read_base(events) or _fitted(path, tip_radius, stages)
@@ -49,7 +50,7 @@ def analyze_stream(
     stages.left_out.append(LeftOut("part of the trace", searched))
     if session is None:
         return build_model(log, scene, base, stages)
-    analysis = conclude(session, log, scene, base, stages)
+    analysis = conclude(session, log, scene, base, stages, report=report, run=run)
     if folder is not None:
         shutil.rmtree(folder, ignore_errors=True)
     return analysis

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         heights_log as heights_log,
         load_settings as load_settings,
         read_table as read_table,
+        sidecar_of as sidecar_of,
         table_log as table_log,
     )
     from explore3d.log.writer import LogWriter as LogWriter, Recorder as Recorder
@@ -77,7 +78,7 @@ _PUBLIC = {
         "stop_of",
     ),
     "stream": ("LogStream", "count_samples", "head", "large_log"),
-    "table": ("heights_log", "load_settings", "read_table", "table_log"),
+    "table": ("heights_log", "load_settings", "read_table", "sidecar_of", "table_log"),
     "writer": ("LogWriter", "Recorder"),
 }
 doorway(__name__, _PUBLIC)

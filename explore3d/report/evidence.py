@@ -59,6 +59,16 @@ def curvature_maps(pictures: Pictures) -> Html:
     return section("Curvature", "curvature", figure(pictures.files["curvature"], "Maps of curvature", caption))
 
 
+def roughness_table(analysis: Analysis) -> Html:
+    """What the surface is like beside the features, by the standards."""
+    rough = analysis.roughness
+    if rough is None:
+        return Html("")
+    rows: list[Row] = list(rough.rows())
+    content = [table(("parameter", "value", "90 % interval"), rows, numeric=(1, 2)), paragraph(rough.sentence())]
+    return section("Roughness beside the features", "roughness", *content)
+
+
 def deviation_map(analysis: Analysis, pictures: Pictures) -> Html:
     """Where the body departs from the model that was given."""
     if analysis.deviation is None or "deviation" not in pictures.files:

@@ -17,6 +17,8 @@ CUT_NAMES = {
     "beside itself": ("place where it would come beside itself", "places where it would come beside itself"),
     "number given again": ("number that was given again", "numbers that were given again"),
 }
+# What a job's folder may hold, the first of which that is there is named last
+RESULTS = (("report", "report.html"), ("features", "features.csv"))
 MOST_LISTED_FEATURES = 20  # features that are listed one by one; the report has them all
 
 
@@ -28,7 +30,8 @@ def show(analysis: Analysis, out: Path, as_json: bool) -> None:
         print(json.dumps(analysis.model.document(), ensure_ascii=False, allow_nan=False))
     else:
         place = out if analysis.folder is None else analysis.folder
-        print("\n".join([*stop_lines(analysis), *summary(analysis), f"report: {place / 'report.html'}"]))
+        written = [f"{what}: {place / name}" for what, name in RESULTS if (place / name).is_file()]
+        print("\n".join([*stop_lines(analysis), *summary(analysis), *written[:1]]))
 
 
 def stop_lines(analysis: Analysis) -> list[str]:

@@ -8,7 +8,14 @@ from pathlib import Path
 from explore3d.analysis import Analysis
 from explore3d.pictures import SweepPath, sweep_paths
 from explore3d.report.account import account_of_time, provenance, what_was_left_out
-from explore3d.report.evidence import compared_with_truth, cross_sections, curvature_maps, deviation_map, posteriors
+from explore3d.report.evidence import (
+    compared_with_truth,
+    cross_sections,
+    curvature_maps,
+    deviation_map,
+    posteriors,
+    roughness_table,
+)
 from explore3d.report.findings_section import against_tolerances, facts, headline, what_was_found
 from explore3d.report.markup import Html, contents, element, text
 from explore3d.report.page import REPORT_CSS
@@ -54,6 +61,7 @@ def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPa
         what_was_found(analysis, pictures, view),
         against_tolerances(analysis),
         deviation_map(analysis, pictures),
+        roughness_table(analysis),
         cross_sections(analysis, pictures),
         posteriors(pictures),
         curvature_maps(pictures),

@@ -26,7 +26,7 @@ from mapping import Surface
 FINGER_GROUP, SENSOR_GROUP = "explore3d.fingers", "explore3d.sensors"
 FINGERS = {
     "simulated": "explore3d.scene.simulated:SimulatedFingerTable",
-    "grbl": "explore3d.jobs.machine_finger:GrblFingerTable",
+    "grbl": "explore3d.jobs.machines.machine_finger:GrblFingerTable",
     "given": "explore3d.scene.finger:GivenFingerTable",
 }
 SENSORS = {

@@ -57,7 +57,7 @@ def sample_posterior(
     noise: Noise | None = None,
     others: Sequence[Feature] = (),
     tip_sd: float = 0.0,
-    confirm: bool = True,
+    confirm: bool | None = True,
 ) -> Posterior:
     """Draws of a feature's parameters given the trace.
 
@@ -72,7 +72,8 @@ def sample_posterior(
         noise: level and correlation of a sample; estimated from the trace if None.
         others: features near by, which the trace also shows (the feature itself may be among them).
         tip_sd: standard deviation of the tip's radius, m; above 0 the radius is a parameter with a Gaussian prior.
-        confirm: False to stop at importance sampling where its k-hat is below 0.5.
+        confirm: False to stop at importance sampling where its k-hat is below 0.5; None to stop there in any case:
+            the posterior's status then says where it cannot be trusted.
 
     Raises:
         MappingError: a kind that has no closed form, or no sample near the feature.
@@ -89,7 +90,7 @@ def refine(
     noise: Noise | None = None,
     others: Sequence[Feature] = (),
     tip_sd: float = 0.0,
-    confirm: bool = True,
+    confirm: bool | None = True,
 ) -> Feature:
     """The feature with posterior, intervals and axis from the draws; arguments as for `sample_posterior`.
 
@@ -123,7 +124,7 @@ def solve(
     noise: Noise | None = None,
     others: Sequence[Feature] = (),
     tip_sd: float = 0.0,
-    confirm: bool = True,
+    confirm: bool | None = True,
 ) -> Solution:
     """Pose and solve a feature's posterior; arguments as for `sample_posterior`."""
     base = base or _fitted(trace)
@@ -171,14 +172,14 @@ def pose_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
 
 
 def solve_problem(
-    problem: PosteriorProblem, rng: np.random.Generator, *, confirm: bool = True, adapt: bool = True
+    problem: PosteriorProblem, rng: np.random.Generator, *, confirm: bool | None = True, adapt: bool = True
 ) -> Solution:
     """Optimum, misfit (unless `adapt` is False: the noise is known), importance sampling, and emcee where needed."""
     optima = find_optima(problem.target, problem.beginnings)
     if adapt:
         problem, optima = account_for_misfit(problem, optima)
     fast = importance_sample(problem.target, [laplace(problem.target, optimum) for optimum in optima], rng)
-    if not confirm and fast.k_hat < TRUSTED_K_HAT:
+    if confirm is None or (not confirm and fast.k_hat < TRUSTED_K_HAT):
         return Solution(problem, _from_importance(problem, fast, rng), fast, None)
     walkers = walkers_for(len(problem.window), fast.draws.shape[1])
     starts = _starts(problem, fast, rng, walkers)
@@ -199,9 +200,11 @@ def _starts(problem: PosteriorProblem, fast: Importance, rng: np.random.Generato
 def _from_importance(problem: PosteriorProblem, fast: Importance, rng: np.random.Generator) -> Posterior:
     shape = problem.target.shape
     samples = fast.draws[resample(rng, fast.weights, KEPT_DRAWS)]
-    reason = f"importance sampling of the Laplace approximation has k-hat {fast.k_hat:.2f} < {TRUSTED_K_HAT}"
-    nan = float("nan")
-    return Posterior(shape.names, shape.units, samples, nan, nan, "not needed", reason, fast.k_hat, fast.ess)
+    trusted, nan = fast.k_hat < TRUSTED_K_HAT, float("nan")
+    reason = f"importance sampling of the Laplace approximation has k-hat {fast.k_hat:.2f}"
+    reason += f" < {TRUSTED_K_HAT}" if trusted else f", at most {TRUSTED_K_HAT} can be trusted; no chain was asked for"
+    status = "not needed" if trusted else "chain too short"
+    return Posterior(shape.names, shape.units, samples, nan, nan, status, reason, fast.k_hat, fast.ess)
 
 
 def _from_chain(problem: PosteriorProblem, fast: Importance, chain: Chain, rng: np.random.Generator) -> Posterior:

@@ -30,7 +30,7 @@ def refine_all(
     base: Base,
     noise: Noise | None = None,
     tip_sd: float = 0.0,
-    confirm: bool = True,
+    confirm: bool | None = True,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[Feature, ...]:
     """The features with their posteriors, each beside the others as well as they are known by then.
@@ -47,7 +47,7 @@ def refine_all(
         base: the global model.
         noise: of the samples; None: estimated from the trace.
         tip_sd: standard deviation of the tip's radius, m; above 0 it is a parameter.
-        confirm: False to stop at importance sampling where it can be trusted.
+        confirm: False to stop at importance sampling where it can be trusted, None to stop there in any case.
         progress: told the share that is done, after each feature.
     """
     tip = trace.tip_radius

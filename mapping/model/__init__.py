@@ -5,9 +5,17 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from mapping.model.comparison import (
+        Change as Change,
+        Comparison as Comparison,
+        compare_models as compare_models,
+    )
     from mapping.model.feature_mesh import drawn_at_least as drawn_at_least, feature_mesh as feature_mesh
+    from mapping.model.json_record import plain as plain
     from mapping.model.merging import merge_model as merge_model
     from mapping.model.object_model import ObjectModel as ObjectModel
+    from mapping.model.registration import Registration as Registration, register as register
+    from mapping.model.table import SIZES as SIZES, probability as probability, rows as rows
     from mapping.model.tolerance import (
         ANY as ANY,
         FAIL as FAIL,
@@ -20,9 +28,13 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
+    "comparison": ("Change", "Comparison", "compare_models"),
     "feature_mesh": ("drawn_at_least", "feature_mesh"),
+    "json_record": ("plain",),
     "merging": ("merge_model",),
     "object_model": ("ObjectModel",),
+    "registration": ("Registration", "register"),
+    "table": ("SIZES", "probability", "rows"),
     "tolerance": ("ANY", "FAIL", "PASS", "TOLERATED_SIZES", "UNDECIDED", "Judgement", "Tolerance", "judged"),
 }
 doorway(__name__, _PUBLIC)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from html import escape
 from typing import Any
@@ -34,9 +35,15 @@ def _row(feature: Feature) -> dict[str, Any]:
         "snr": float(support.snr),
         "crossings": support.crossings,
         "log_odds": support.log_odds,
+        "probability": None if support.log_odds is None else probability(support.log_odds),
         "finer_than_the_tip": feature.curvature_feature,
         "face": None if feature.anchor is None else feature.anchor.face,
     }
+
+
+def probability(log_odds: float) -> float:
+    """Of the feature against nothing, with even odds beforehand."""
+    return 0.5 * (1.0 + math.tanh(0.5 * log_odds))
 
 
 def dataframe(features: Sequence[Feature]) -> Any:

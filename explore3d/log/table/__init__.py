@@ -14,12 +14,16 @@ if TYPE_CHECKING:
     )
     from explore3d.log.table.order import sentinels as sentinels
     from explore3d.log.table.read import heights_log as heights_log, read_table as read_table, table_log as table_log
-    from explore3d.log.table.settings import TableSettings as TableSettings, load_settings as load_settings
+    from explore3d.log.table.settings import (
+        TableSettings as TableSettings,
+        load_settings as load_settings,
+        sidecar_of as sidecar_of,
+    )
 
 _PUBLIC = {
     "columns": ("EVEN", "POSITION", "advances", "counts", "find_columns"),
     "order": ("sentinels",),
     "read": ("heights_log", "read_table", "table_log"),
-    "settings": ("TableSettings", "load_settings"),
+    "settings": ("TableSettings", "load_settings", "sidecar_of"),
 }
 doorway(__name__, _PUBLIC)

@@ -99,13 +99,22 @@ def load_settings(table: Path, **options: Any) -> tuple[TableSettings, Path | No
     Raises:
         UserError: a setting that is unknown or wrong, in one line that names the file and the field.
     """
-    sidecar = next((path for path in (Path(f"{table}.toml"), table.with_suffix(".toml")) if _is_sidecar(path)), None)
+    sidecar = sidecar_of(table)
     stated: dict[str, Any] = {}
     if sidecar is not None:
         stated = _parse(sidecar)
         _validate(stated, sidecar)
     given = {key: value for key, value in options.items() if value is not None}
     return _validate(stated | given, table), sidecar
+
+
+def sidecar_of(table: Path) -> Path | None:
+    """The file that says what a table does not: scan.csv.toml or scan.toml beside scan.csv, unless it is a scene.
+
+    Raises:
+        UserError: it is not TOML, or cannot be read.
+    """
+    return next((path for path in (Path(f"{table}.toml"), table.with_suffix(".toml")) if _is_sidecar(path)), None)
 
 
 def _is_sidecar(path: Path) -> bool:

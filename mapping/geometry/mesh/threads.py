@@ -43,3 +43,7 @@ def cores() -> int:
 def _threads() -> ThreadPoolExecutor:
     """One pool for all: a sampler asks for shares thousands of times."""
     return ThreadPoolExecutor(cores(), thread_name_prefix="rows")
+
+
+if hasattr(os, "register_at_fork"):  # threads do not live on in a copy of the process: it gets a pool of its own
+    os.register_at_fork(after_in_child=_threads.cache_clear)

@@ -10,7 +10,7 @@ import pytest
 
 from explore3d.cli import doctor
 from explore3d.cli.doctor import STATES, examine
-from explore3d.jobs.emulate import Emulation
+from explore3d.jobs.machines.emulate import Emulation
 from hw.emulated.pty_server import PtyServer
 
 

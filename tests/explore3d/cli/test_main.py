@@ -163,6 +163,8 @@ def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatc
         "model_units": "mm",
         "force": ["curvature"],
         "overwrite": False,
+        "report": True,
+        "quick": False,
     }
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from explore3d.analysis.stages import Stages
 from explore3d.bench.scenes.long_log import WIRE_RADIUS, write_long_log
 from explore3d.jobs import condense as module
 from explore3d.jobs.condense import Condensed, condense
@@ -138,7 +139,7 @@ def test_a_streamed_analysis_finds_the_wire_and_leaves_no_chunks_behind(log: Pat
 
     out = tmp_path / "out"
     with Session(out) as session:
-        streamed = analyze_stream(log, session, chunk=CHUNK)
+        streamed = analyze_stream(log, session, Stages(), chunk=CHUNK)
     assert not (tmp_path / "out.chunks").exists()
     assert (out / "report.html").is_file()
     assert any("samples were searched" in each.reason for each in streamed.left_out)

@@ -19,7 +19,7 @@ from explore3d.analysis.build_model import build_model
 from explore3d.analysis.stages import Stages
 from explore3d.errors import SceneError
 from explore3d.jobs.expedition import explorer
-from explore3d.jobs.machine_finger import GrblFingerTable
+from explore3d.jobs.machines.machine_finger import GrblFingerTable
 from explore3d.jobs.run import scene_finger
 from explore3d.log.record import Log
 from explore3d.scene import scene as scene_file

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from mapping.base.base import Base
 from mapping.base.projection import onto_base
 from mapping.feature import Details
 from mapping.geometry.templates.shapes import cap_height, groove_height, rim_height, step_height
-from mapping.inference.feature_posterior import Solution, refine, sample_posterior, solve
+from mapping.inference.feature_posterior import Solution, _from_importance, refine, sample_posterior, solve
 from mapping.inference.sampler.psis import resample
 from mapping.inference.summary import describe
 from mapping.instrument.noise import Noise
@@ -262,3 +263,12 @@ def test_a_faceted_base_does_not_shake_the_axis():
     around = np.arctan2(points[:, 1], points[:, 0]) - course
     assert np.abs(radius * around).max() < 2e-6 and np.abs(points[:, 2] - axis[:, 2]).max() < 1e-9
     assert np.abs(np.hypot(points[:, 0], points[:, 1]) - radius).max() < 14e-6
+
+
+@pytest.mark.parametrize(("k_hat", "status"), [(0.3, "not needed"), (0.8, "chain too short")])
+def test_importance_sampling_that_no_chain_may_follow_says_whether_it_can_be_trusted(k_hat: float, status: str) -> None:
+    shape = SimpleNamespace(names=("height",), units=("m",))
+    problem = SimpleNamespace(target=SimpleNamespace(shape=shape))
+    fast = SimpleNamespace(draws=np.ones((50, 1)), weights=np.full(50, 0.02), k_hat=k_hat, ess=10.0)
+    posterior = _from_importance(problem, fast, np.random.default_rng(0))
+    assert posterior.status == status and f"k-hat {k_hat:.2f}" in posterior.reason

@@ -16,9 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explore3d import UserError, __version__, count_text
-from explore3d.jobs.resume import Execute, Replay
-from explore3d.jobs.run import cause, open_scene, scene_finger
-from explore3d.jobs.session import locked, undisturbed
+from explore3d.jobs import Execute, Replay, cause, locked, open_scene, scene_finger, undisturbed
 from explore3d.log import OUTCOME, LogWriter, read_log
 from explore3d.scene import Scene, scene_text
 from hw import Finger, Move

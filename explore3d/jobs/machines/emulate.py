@@ -119,7 +119,7 @@ class EmulatorProcess:
     def __enter__(self) -> EmulatorProcess:
         settings = json.dumps(asdict(self.emulation) | {"mesh": str(self.emulation.mesh)})
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "explore3d.jobs.emulate", self._folder.name, settings],
+            [sys.executable, "-m", "explore3d.jobs.machines.emulate", self._folder.name, settings],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from calibration_sphere import RADIUS, sphere_scene
 
-from explore3d.jobs.calibrate import calibrate, selftest, write_profile
+from explore3d.jobs.machines.calibrate import calibrate, selftest, write_profile
 from explore3d.scene.scene import parse_scene
 from explore3d.scene.settings import AnalysisSettings
 

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import SerializeAsAny, model_validator
 
 from explore3d import SceneError
-from explore3d.jobs.emulate import Emulation, EmulatorProcess
+from explore3d.jobs.machines.emulate import Emulation, EmulatorProcess
 from explore3d.scene import EMULATOR, FingerTable, LengthUnit, MachineTable, SensorTable, Setting
 from hw import Finger
 from hw.grbl import StageFrame

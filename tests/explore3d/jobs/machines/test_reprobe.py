@@ -9,14 +9,14 @@ import pytest
 from scene_files import write_scene_file
 
 from explore3d.errors import UserError
-from explore3d.jobs.reprobe import reprobe
+from explore3d.jobs.machines.reprobe import reprobe
 from explore3d.jobs.run import scene_finger
 from explore3d.log.reader import read_log
 from explore3d.log.writer import LogWriter
 from explore3d.scene.scene import load_scene
 from hw.move import Move
 
-MESHES = Path(__file__).parents[3] / "assets" / "meshes"
+MESHES = Path(__file__).parents[4] / "assets" / "meshes"
 R = 0.01
 SCENE = f"""
 schema = "explore3d/scene/1"

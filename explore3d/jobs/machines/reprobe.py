@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from explore3d import UserError, __version__, count_text
-from explore3d.jobs.run import cause, open_scene, scene_finger
+from explore3d.jobs import cause, open_scene, scene_finger
 from explore3d.log import LOG, Log, LogWriter, read_log
 from hw import Move
 from mapping import BoolArray, FloatArray, Trace, length_text

@@ -1,0 +1,90 @@
+"""What was found in the forms of others: read back by the libraries of those forms."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from in_process import explore3d_main
+from small_profiles import TIP, write_profile
+
+from explore3d import load
+from explore3d.jobs.analyze import Told, analyze
+from explore3d.jobs.export import CRATE, crests_csv, crests_dxf, export
+from mapping import Feature, Interval, Support, Surface
+from mapping.base import Base
+from mapping.model import ObjectModel
+
+PLATE = Base(Surface(0.05 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2], [0, 2, 3]]))
+
+
+def model() -> ObjectModel:
+    size, up = Interval.normal(1e-3, 1e-5), np.array([0.0, 0.0, 1.0])
+    axes = {"ridge": np.array([[0.0, 0, 0], [0.01, 0, 0], [0.02, 0.01, 0]]), "bump": np.array([[0.0, 0.02, 0]])}
+    features = [
+        Feature(kind, axis, np.tile(up, (len(axis), 1)), size, size, size, Support(9.0, 3), True, 1e-6)
+        for kind, axis in axes.items()
+    ]
+    return ObjectModel.attach(PLATE, features)
+
+
+def test_crest_lines_as_a_table_hold_every_vertex() -> None:
+    rows = list(csv.DictReader(io.StringIO(crests_csv(model()))))
+    assert [(row["id"], row["vertex"]) for row in rows] == [*[("ridge-1", str(k)) for k in (1, 2, 3)], ("bump-1", "1")]
+    assert (float(rows[2]["x"]), float(rows[2]["y"]), float(rows[2]["height"])) == (0.02, 0.01, 1e-3)
+
+
+def test_a_drawing_has_a_layer_for_each_kind_in_millimetres() -> None:
+    ezdxf = pytest.importorskip("ezdxf")
+    drawing = ezdxf.read(io.StringIO(crests_dxf(model()).decode()))
+    line, point = drawing.modelspace()
+    assert not drawing.audit().errors and drawing.units == 4
+    assert [tuple(each.dxf.location) for each in line.vertices][2] == (20.0, 10.0, 0.0)
+    assert (line.dxf.layer, point.dxf.layer, tuple(point.dxf.location)) == ("RIDGE", "BUMP", (0.0, 20.0, 0.0))
+    assert line.get_xdata("EXPLORE3D")[0].value == "ridge-1" and line.get_xdata("EXPLORE3D")[1].value == 1.0
+
+
+def test_the_residual_leaves_the_features_out_and_keeps_the_rest(tmp_path: Path) -> None:
+    x3pio = pytest.importorskip("x3pio")
+    path = write_profile(tmp_path / "a.csv", 1)
+    profile = x3pio.read(str(export(path, tmp_path / "a.x3p", Told(TIP))))
+    heights = profile.layers[0].z
+    assert profile.header.x.increment == pytest.approx(0.5e-6, rel=1e-3) and len(heights) == 400
+    # a crest of 1 um under a parabola of 6 um radius is 2 x 3.46 um wide, 14 samples; there are two
+    assert 26 <= np.isnan(heights).sum() <= 36
+    assert np.nanstd(heights) == pytest.approx(10e-9, rel=0.2) and np.nanmax(heights) < 100e-9
+
+
+def test_the_record_of_a_session_names_its_files_by_their_digests(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    analyze(write_profile(tmp_path / "a.csv"), out, tip_radius=TIP, quick=True)
+    assert explore3d_main(monkeypatch, "export", out, "--to", out / CRATE, "--to", tmp_path / "c.csv") == 0
+    assert capsys.readouterr().out.splitlines()[0] == f"written: {out / CRATE}"
+    graph = {each["@id"]: each for each in json.loads((out / CRATE).read_text())["@graph"]}
+    for part in graph["./"]["hasPart"]:
+        file = graph[part["@id"]]
+        assert file["sha256"] == hashlib.sha256((out / file["name"]).read_bytes()).hexdigest()
+    assert graph["#fingertip"]["value"] == TIP and graph["#analysis"]["endTime"]
+    assert graph["#analysis"]["object"]["@id"].endswith(load(out).provenance["log_sha256"])
+    assert len(graph["./"]["hasPart"]) == 5
+
+
+def test_what_cannot_be_written_is_refused_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model().save(tmp_path / "model")
+    for target, complaint in (
+        ("a.step", "its name says no form; possible: NAME.csv"),
+        (CRATE, "stands in that folder"),
+        (f"model/{CRATE}", "is no session with a model that is whole"),
+    ):
+        assert explore3d_main(monkeypatch, "export", tmp_path / "model", "--to", tmp_path / target) == 2
+        assert complaint in capsys.readouterr().err.splitlines()[-1]
+        assert not (tmp_path / target).exists()
