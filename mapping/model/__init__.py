@@ -8,10 +8,12 @@ if TYPE_CHECKING:
     from mapping.model.feature_mesh import drawn_at_least as drawn_at_least, feature_mesh as feature_mesh
     from mapping.model.merging import merge_model as merge_model
     from mapping.model.object_model import ObjectModel as ObjectModel
+    from mapping.model.touchable import touchable as touchable
 
 _PUBLIC = {
     "feature_mesh": ("drawn_at_least", "feature_mesh"),
     "merging": ("merge_model",),
     "object_model": ("ObjectModel",),
+    "touchable": ("touchable",),
 }
 doorway(__name__, _PUBLIC)
