@@ -1,0 +1,75 @@
+"""DisplayFinger: a simulated finger that explores what a display shows, in place of the body that was explored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hw.errors import FingerError
+from hw.move import Move
+from hw.simulated import SimulatedFinger
+from mapping import BoolArray, FloatArray, Trace
+from mapping.geometry.contact import Contacts
+from mapping.geometry.proxy import Proxy, ProxyBody
+
+# Steps in which the hand comes down on the body at the beginning of a sweep
+LANDING_STEPS = 200
+
+
+@dataclass(kw_only=True)
+class DisplayFinger(SimulatedFinger):
+    """Like SimulatedFinger, but what it feels is the proxy: the hand presses into the display's spring.
+
+    The device is led along the commanded path, deeper by force over stiffness; the samples are the proxy's centres. It
+    closes the circle: explore, display, and explore what is displayed.
+
+    Args:
+        object: the base of what is displayed: it bounds the workspace, and stands in the stem's way.
+        display: what is displayed.
+        stiffness: of the spring, N/m.
+        friction: coefficient.
+
+    Raises:
+        FingerError: a stiffness that is not positive, a ball of another size than the tip.
+    """
+
+    display: ProxyBody
+    stiffness: float = 1000.0
+    friction: float = 0.0
+    _force: float = field(init=False, default=1.0)
+
+    def __post_init__(self, margin: float | None) -> None:
+        super().__post_init__(margin)
+        self._require_positive("stiffness")
+        if self.display.radius != self.tip_radius:
+            raise FingerError(
+                f"the display is made for a ball of {self.display.radius} m, the finger's tip has {self.tip_radius} m"
+            )
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """Settings of the simulation."""
+        return super().info | {"kind": "display", "stiffness": self.stiffness, "friction": self.friction}
+
+    def execute(self, move: Move) -> Trace:
+        """Carry out one move; see SimulatedFinger."""
+        self._force = move.force
+        return super().execute(move)
+
+    def _pressed(self, path: FloatArray, approach: FloatArray) -> tuple[Contacts, BoolArray]:
+        depth = self._force / self.stiffness
+        stroke = 2.0 * self.tip_radius if self.stroke is None else self.stroke
+        down = np.linspace(-stroke, depth, LANDING_STEPS)[:-1, None] * approach[0]
+        felt = Proxy(self.display, self.friction).follow(np.vstack([path[0] + down, path + depth * approach]))
+        centers, touching = felt.centers[len(down) :], felt.touching[len(down) :]
+        device = felt.device[len(down) :]
+        pull = centers - device
+        size = np.linalg.norm(pull, axis=1)
+        touching = touching & (size > 0.0)
+        normals = np.where(touching[:, None], pull / np.where(size > 0.0, size, 1.0)[:, None], -approach)
+        keep = touching & (-(normals * approach).sum(axis=1) >= np.cos(self.field_angle))
+        points, count = centers - self.tip_radius * normals, touching.astype(np.int64)
+        nothing = np.zeros(len(path), dtype=bool)
+        return Contacts(centers, points, normals, count.astype(np.int8), count, np.zeros(len(path)), nothing), keep
