@@ -29,12 +29,14 @@ class Calls:
         read, write: addresses of the functions.
         state: handed to both as it is.
         keep: what must live as long as the addresses are used.
+        returns: True of functions that cannot hang; others are guarded.
     """
 
     read: int
     write: int
     state: int
     keep: Any = None
+    returns: bool = False
 
 
 @runtime_checkable

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hw.errors import FingerError
-from hw.move import Move
+from hw import FingerError, Move
 from hw.simulated import SimulatedFinger
 from mapping import BoolArray, FloatArray, Trace
 from mapping.geometry.contact import Contacts

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from hw import FingerError
 from hw.display.device import Display
-from hw.errors import FingerError
 from mapping import FloatArray
 from mapping.geometry.proxy import ProxyBody, free_place
 
@@ -22,7 +22,7 @@ LOOK_PERIOD, GUARD_PERIOD = 0.05, 1e-3
 # Seconds after which a loop that makes no step is stuck in its device
 STUCK_TIME = 4e-3
 # Columns of a run's records
-FIELDS = (
+RECORD_FIELDS = (
     "t", "x", "y", "z", "px", "py", "pz", "fx", "fy", "fz", "touching", "late", "computing", "energy",
 )  # fmt: skip
 REASONS = {
@@ -31,6 +31,7 @@ REASONS = {
     3: "the device is frozen: its position did not change for 4 ms",
     4: "the device was lost",
     5: "stopped",
+    6: "the device hung: no step for 4 ms",
 }
 
 
@@ -67,8 +68,8 @@ class Run:
     """What came of a run.
 
     Args:
-        records: (N, 14) `FIELDS` of each step: s, m and N; places on the body, forces of the device; lateness and
-            computing time of the step, s; energy that the observer holds for the hand's, J, negative if it was made.
+        records: (N, 14) `RECORD_FIELDS` of each step: s, m and N; places on the body, forces of the device; lateness
+            and computing time of the step, s; energy that the observer holds for the hand's, J: below 0 it was made.
         reason: why it ended.
         steps: how many steps were made.
         lost: records that came too fast to be kept.
@@ -80,8 +81,8 @@ class Run:
     lost: int
 
     def column(self, name: str) -> FloatArray:
-        """(N,) one of `FIELDS`."""
-        return np.asarray(self.records[:, FIELDS.index(name)])
+        """(N,) one of `RECORD_FIELDS`."""
+        return np.asarray(self.records[:, RECORD_FIELDS.index(name)])
 
     @property
     def centers(self) -> FloatArray:
@@ -136,7 +137,7 @@ class DisplayLoop:
         calls, kernel, given = self._begin()
         control = np.zeros(4, dtype=np.int64)
         period = 1.0 / self.display.rate
-        ring = np.zeros((max(int(RING_TIME * self.display.rate), 1000), len(FIELDS)))
+        ring = np.zeros((max(int(RING_TIME * self.display.rate), 1000), len(RECORD_FIELDS)))
         kept: list[FloatArray] = []
         if not paced:
             lost = 0
@@ -155,7 +156,8 @@ class DisplayLoop:
         lost, seen = 0, 0
         guard = threading.Thread(target=self._guard, args=(control, worker, calls), name="guard", daemon=True)
         worker.start()
-        guard.start()
+        if not calls.returns:
+            guard.start()
         try:
             while True:
                 alive = worker.is_alive()
@@ -172,7 +174,7 @@ class DisplayLoop:
                     break
                 time.sleep(LOOK_PERIOD)
         finally:
-            control[0] = 1
+            control[0] = control[0] or 1
             worker.join(timeout=1.0)
         return self._ended(control, kept, lost)
 
@@ -222,7 +224,7 @@ class DisplayLoop:
             if done != seen:
                 seen, since = done, now
             elif done > 0 and now - since > STUCK_TIME and control[0] == 0:
-                control[0] = 1
+                control[0] = 2
                 _call(calls.write, calls.state, np.zeros(3))
             time.sleep(GUARD_PERIOD)
 
@@ -233,7 +235,7 @@ class DisplayLoop:
         return np.asarray(records)
 
     def _ended(self, control: Any, kept: list[FloatArray], lost: int) -> Run:
-        records = np.concatenate(kept) if kept else np.zeros((0, len(FIELDS)))
+        records = np.concatenate(kept) if kept else np.zeros((0, len(RECORD_FIELDS)))
         return Run(records, REASONS.get(int(control[2]), "stopped"), int(control[1]), lost)
 
 

@@ -15,7 +15,7 @@ from mapping.geometry.proxy import proxy_step, workspace
 
 # Columns of a record: time, device (3), proxy (3), force (3), touching, lateness, computing time, energy
 RECORD = 14
-RUNNING, ENDED, DEVICE_SILENT, DEVICE_FROZEN, DEVICE_LOST, ASKED_TO_STOP = 0, 1, 2, 3, 4, 5
+RUNNING, ENDED, DEVICE_SILENT, DEVICE_FROZEN, DEVICE_LOST, ASKED_TO_STOP, DEVICE_HUNG = 0, 1, 2, 3, 4, 5, 6
 # s; a device that says nothing for so long is let go of: with the period of 1 kHz, 5 ms
 PATIENCE_TIME = 4e-3
 MONOTONIC = 1  # clock_gettime's number of the clock that nobody sets
@@ -45,7 +45,7 @@ def run_loop(  # type: ignore[no-untyped-def]
         read, write, device: its functions and their state; clock, sleep: the C library's.
         paced: True keeps to the clock; False simulates as fast as it can, with the time of the steps.
         period: s; steps: at most.
-        control: (4,) int64: stop, steps done, reason, number of the last record + 1.
+        control: (4,) int64: 1 to stop, 2 because the device hung; steps done, reason, number of the last record + 1.
         state: (12,) what is kept between calls: proxy (3), last place (3), both in the kernels' frame, last force (3),
             energy (J), whether the device was outside of the body before.
         ring: (R, RECORD) the newest records.
@@ -77,7 +77,7 @@ def run_loop(  # type: ignore[no-untyped-def]
                 now = seconds(clock, stamp) - begin
             late = now - due
         if control[0] != 0:
-            reason = ASKED_TO_STOP
+            reason = ASKED_TO_STOP if control[0] == 1 else DEVICE_HUNG
             break
         answer = read(device, np.int64(place.ctypes.data))
         if answer < 0:

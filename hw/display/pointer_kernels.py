@@ -56,7 +56,7 @@ def pointer(typing_context, address):  # type: ignore[no-untyped-def]
 
 
 # The header of a simulated device's state, float64 each: what simulated.py fills in
-HEADER = 32
+STATE_HEADER = 32
 AT_STEP, AT_STEPS, AT_FAULT, AT_FAULT_STEP = 0, 1, 2, 3
 AT_POSITION, AT_VELOCITY, AT_FORCE = 4, 7, 10
 AT_ADVANCE = 13  # a11 a12 a21 a22 b1 b2 of one period
@@ -80,13 +80,13 @@ def advance(state: Any, wish: Any) -> None:
 @cfunc(CALL, cache=True)  # type: ignore[untyped-decorator]
 def read_simulated(state: int, place: int) -> int:
     """The next sample of a simulated device: its hand moves on by one period first."""
-    header = carray(pointer(state), HEADER)
+    header = carray(pointer(state), STATE_HEADER)
     step, steps = int(header[AT_STEP]), int(header[AT_STEPS])
     at_fault = header[AT_FAULT] > 0.0 and step >= header[AT_FAULT_STEP]
     if at_fault and header[AT_FAULT] == UNPLUGGED:
         return -1
-    whole = carray(pointer(state), HEADER + 3 * steps)
-    row = HEADER + 3 * min(step, steps - 1)
+    whole = carray(pointer(state), STATE_HEADER + 3 * steps)
+    row = STATE_HEADER + 3 * min(step, steps - 1)
     advance(header, whole[row : row + 3])
     header[AT_STEP] = step + 1.0
     if at_fault and header[AT_FAULT] == SILENT:
@@ -102,7 +102,7 @@ def read_simulated(state: int, place: int) -> int:
 @cfunc(CALL, cache=True)  # type: ignore[untyped-decorator]
 def write_simulated(state: int, place: int) -> int:
     """The force of a simulated device from now on."""
-    header, force = carray(pointer(state), HEADER), carray(pointer(place), 3)
+    header, force = carray(pointer(state), STATE_HEADER), carray(pointer(place), 3)
     for k in range(3):
         header[AT_FORCE + k] = force[k]
     return 0

@@ -9,11 +9,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hw import FingerError
 from hw.display.device import Calls
-from hw.errors import FingerError
 from mapping import FloatArray
 
-FAULTS = ("silent", "frozen", "unplugged")
+DEVICE_FAULTS = ("silent", "frozen", "unplugged")
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,8 @@ class SimulatedDisplay:
                 raise FingerError(f"a simulated display's {name} must be positive; found {getattr(self, name)!r}")
         if not (0 <= self.damping < np.inf and 0 <= self.hand.stiffness < np.inf and 0 <= self.hand.damping < np.inf):
             raise FingerError("damping and grip of a simulated display must be at least 0 and finite")
-        if self.fault is not None and self.fault not in FAULTS:
-            raise FingerError(f"unknown fault {self.fault!r}; possible: {', '.join(FAULTS)}")
+        if self.fault is not None and self.fault not in DEVICE_FAULTS:
+            raise FingerError(f"unknown fault {self.fault!r}; possible: {', '.join(DEVICE_FAULTS)}")
         self._state = self._begin(places)
 
     @property
@@ -104,6 +104,7 @@ class SimulatedDisplay:
             pointer_kernels.write_simulated.address,
             self._state.ctypes.data,
             self._state,
+            returns=True,
         )
 
     def __enter__(self) -> SimulatedDisplay:
@@ -119,7 +120,7 @@ class SimulatedDisplay:
 
         header = np.zeros(32)
         header[1] = len(places)
-        header[2] = 0.0 if self.fault is None else 1.0 + FAULTS.index(self.fault)
+        header[2] = 0.0 if self.fault is None else 1.0 + DEVICE_FAULTS.index(self.fault)
         header[3] = self.fault_time * self.rate
         header[4:7] = places[0]
         stiffness, damping = self.hand.stiffness, self.hand.damping + self.damping

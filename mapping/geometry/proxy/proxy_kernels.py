@@ -31,14 +31,16 @@ from mapping.geometry.proxy.halfspace_kernels import length, nearest_allowed
 
 CAPSULE, RING = 0.0, 1.0
 MOST_NEIGHBOURS = 256  # elements within reach that are looked at together; more of them shorten the reach
-NEWTON_STEPS = 4  # the chord's nearest place is off by a part in a thousand of the ring's width: squared four times
-MOST_ROUNDS = 48  # projections in one step; what is left of the way is gone in the next
+RING_NEWTON_STEPS = (
+    4  # the chord's nearest place is off by a part in a thousand of the ring's width: squared four times
+)
+MOST_PROJECTIONS = 48  # projections in one step; what is left of the way is gone in the next
 # Of the radius: a shorter move ends the step. The error is its square over twice the radius: 1e-14 radii
 STILL = 1e-7
 SHORTEST_REACH = 1e-3  # of the radius: how far the ball may move beyond the device's own motion
 ALLOWED = 1e-13  # of the radius: a half-space that is violated by less is kept
 # Cosine between the normal and the way out of an element, below which the place is too deep to be projected at once
-SURE = 0.05
+LEAST_COSINE_OUT = 0.05
 
 
 @njit(cache=True)
@@ -101,7 +103,7 @@ def off_bell(rounds, j, o):  # type: ignore[no-untyped-def]
     u = u0 + min(max(((rho - u0) * du + (z - z0) * dz) / (du * du + dz * dz), 0.0), 1.0) * du
     height, scale, p = rounds[j, 12], rounds[j, 13], rounds[j, 14]
     g = 0.0
-    for _ in range(NEWTON_STEPS):
+    for _ in range(RING_NEWTON_STEPS):
         base = 1.0 + (u / scale) ** 2 / p
         g = height * base**-p
         slope = -2.0 * g * u / (scale * scale * base)
@@ -194,7 +196,7 @@ def projected(body, radius, code, n, x):  # type: ignore[no-untyped-def]
             out = sub(x, on_segment(vector(rounds, j), (rounds[j, 3], rounds[j, 4], rounds[j, 5]), x))
             whole = radius + rounds[j, 6]
     d = length(out)
-    if not (SURE * whole < d < whole) or dot(out, n) < SURE * d:
+    if not (LEAST_COSINE_OUT * whole < d < whole) or dot(out, n) < LEAST_COSINE_OUT * d:
         return False, x
     return True, moved(x, whole / d - 1.0, out)
 
@@ -208,14 +210,14 @@ def follow(body, radius, o, x, reach, work):  # type: ignore[no-untyped-def]
     """
     found, normals, bounds, numbers, active, weight = work[0], work[1], work[2], work[3], work[4], work[5]
     rounds, held = 0, 0
-    while rounds < MOST_ROUNDS:
+    while rounds < MOST_PROJECTIONS:
         near = gather(body, radius, o, reach, work)
         if near < 0:
             rounds += 1
             reach *= 0.5
             continue
         room = reach
-        while rounds < MOST_ROUNDS and room > 0.0:
+        while rounds < MOST_PROJECTIONS and room > 0.0:
             rounds += 1
             count = 0
             for i in range(near):
