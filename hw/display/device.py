@@ -29,7 +29,7 @@ class Calls:
         read, write: addresses of the functions.
         state: handed to both as it is.
         keep: what must live as long as the addresses are used.
-        returns: True of functions that cannot hang; others are guarded.
+        returns: True of simulated functions: they cannot hang, and each sample is a period after the one before.
     """
 
     read: int

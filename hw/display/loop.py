@@ -198,7 +198,8 @@ class DisplayLoop:
             self._state[3:6] = self.body.into(place[None])[0]
         given = (
             self.body.arrays, scale * self.body.radius, frame, look.friction, look.stiffness, look.damping,
-            look.controlled, self.display.damping, self.display.max_force, self.display.resolution == 0.0,
+            look.controlled, self.display.damping, self.display.max_force,
+            self.display.resolution == 0.0, calls.returns,
             pointer_kernels.Function(calls.read), pointer_kernels.Function(calls.write), calls.state, clock, sleep,
         )  # fmt: skip
         return calls, loop_kernels.run_loop, given

@@ -32,7 +32,7 @@ def seconds(clock, stamp):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy", nogil=True)
 def run_loop(  # type: ignore[no-untyped-def]
     body, radius, frame, friction, stiffness, virtual, controlled, damping, most_force, dithers,
-    read, write, device, clock, sleep, paced, period, steps, control, state, ring,
+    own_time, read, write, device, clock, sleep, paced, period, steps, control, state, ring,
 ):  # fmt: skip
     """Run steps until they are done, `control[0]` is set, or the device is lost; the reason.
 
@@ -42,6 +42,7 @@ def run_loop(  # type: ignore[no-untyped-def]
         friction, stiffness (N/m), virtual damping (N s/m).
         controlled: True adds the passivity controller's damping; the observer always runs.
         damping: of the device, N s/m; most_force: N; dithers: True if its positions never repeat.
+        own_time: True of a device whose samples are a period apart however late they are asked for.
         read, write, device: its functions and their state; clock, sleep: the C library's.
         paced: True keeps to the clock; False simulates as fast as it can, with the time of the steps.
         period: s; steps: at most.
@@ -62,8 +63,9 @@ def run_loop(  # type: ignore[no-untyped-def]
     first = control[1]
     begin = seconds(clock, stamp) - first * period
     heard = held = first * period
+    missed = 0.0
     for n in range(steps):
-        due = (first + n) * period
+        due = (first + n) * period + missed
         late, now = 0.0, due
         if paced:
             now = seconds(clock, stamp) - begin
@@ -76,6 +78,8 @@ def run_loop(  # type: ignore[no-untyped-def]
             while now < due:
                 now = seconds(clock, stamp) - begin
             late = now - due
+            if late > period:  # what was missed is missed: no burst of steps makes up for it
+                missed += late
         if control[0] != 0:
             reason = ASKED_TO_STOP if control[0] == 1 else DEVICE_HUNG
             break
@@ -101,7 +105,8 @@ def run_loop(  # type: ignore[no-untyped-def]
             reason = DEVICE_LOST
             break
         # what the hand gave since the last force, and the least that the mechanism took of it (Cauchy and Schwarz)
-        energy += damping * square / period - (felt[0] * dx[0] + felt[1] * dx[1] + felt[2] * dx[2])
+        span = period if own_time else period + late
+        energy += damping * square / span - (felt[0] * dx[0] + felt[1] * dx[1] + felt[2] * dx[2])
         proxy, touching = proxy_step(body, radius, friction, proxy, last, x, work)
         # a hand that begins inside of the body is not thrown out: it feels nothing until it was outside once
         state[10] = 1.0 if state[10] > 0.0 or not touching else 0.0
@@ -109,7 +114,7 @@ def run_loop(  # type: ignore[no-untyped-def]
         pull = stiffness * back
         if felt_now:
             f0, f1, f2 = pull * (proxy[0] - x[0]), pull * (proxy[1] - x[1]), pull * (proxy[2] - x[2])
-            drag = virtual / period
+            drag = virtual / span
         else:
             f0, f1, f2, drag = 0.0, 0.0, 0.0, 0.0
         # What the springs hold is the hand's to take back; credit beyond it is dropped, so that none is saved up
@@ -120,7 +125,7 @@ def run_loop(  # type: ignore[no-untyped-def]
         stored = pull * soft * (away - 0.5 * soft)
         energy = min(energy, stored)
         if controlled and energy < stored and square > 0.0:
-            drag += min((stored - energy) / square, damping / period)
+            drag += min((stored - energy) / square, damping / span)
         f0, f1, f2 = f0 - drag * dx[0], f1 - drag * dx[1], f2 - drag * dx[2]
         size = sqrt(f0 * f0 + f1 * f1 + f2 * f2)
         share = most_force / size * (1.0 - 1e-12) if size > most_force else 1.0

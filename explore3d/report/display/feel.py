@@ -41,7 +41,7 @@ class Felt:
         trace: the proxy's centres while it touched, a sweep for each time that it came down.
         left_out: features that have no closed form to be felt.
         passive_stiffness: Colgate's limit 2 b / T, N/m.
-        tip_radius: of the proxy, m.
+        tip_radius: of the proxy, m; period: of the steps, s.
     """
 
     run: Run
@@ -49,6 +49,7 @@ class Felt:
     left_out: tuple[LeftOut, ...]
     passive_stiffness: float
     tip_radius: float
+    period: float
 
     def lines(self) -> list[str]:
         """What the terminal is told."""
@@ -58,7 +59,8 @@ class Felt:
         lines = [f"{run.steps} steps, {run.reason}; {len(self.trace)} of them in contact"]
         if len(late) and late.any():
             lines.append(
-                f"late by {np.median(late):.1f} us in the middle, {np.quantile(late, 0.999):.0f} us at most in 99.9 %; "
+                f"late by {np.median(late):.1f} us in the middle, by {np.quantile(late, 0.999):.0f} us in 99.9 %, "
+                f"by a period or more in {100.0 * np.mean(late > 1e6 * self.period):.2g} %; "
                 f"a step takes {np.median(computing):.1f} us, {np.quantile(computing, 0.999):.0f} us at most in 99.9 %"
             )
         if run.lost:
@@ -148,7 +150,7 @@ def feel(
             for number in np.unique(trace.sweep):
                 sweep = trace.select(trace.sweep == number)
                 writer.write(_move(sweep, run, speed), sweep)
-    return Felt(run, trace, left_out, loop.passive_stiffness, radius)
+    return Felt(run, trace, left_out, loop.passive_stiffness, radius, 1.0 / rate)
 
 
 def _tip(model: ObjectModel, tip_radius: float | None) -> float:

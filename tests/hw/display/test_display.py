@@ -121,7 +121,9 @@ def test_the_loop_keeps_to_the_clock_and_says_by_how_much_not() -> None:
         seen: list[FloatArray] = []
         begin = time.monotonic()
         run = loop.run(300, look=lambda records: bool(seen.append(records)))
-    assert abs(time.monotonic() - begin - 0.3) < 0.25
+    took, late = time.monotonic() - begin, run.column("late")
+    missed = late[late > 1e-3].sum()  # on a busy machine
+    assert -2e-3 < took - 0.3 - missed < 0.2
     assert run.steps == 300 and run.lost == 0
     assert sum(map(len, seen)) == 300
     assert (run.column("late") >= 0.0).all() and np.median(run.column("computing")) < 1e-3
