@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hw import FingerError
-from hw.display import Calls, Display, DisplayLoop, Hand, Rendering, SimulatedDisplay, python_calls
+from hw.display import Calls, Display, DisplayLoop, Hand, Rendering, SimulatedDisplay, loop as loop_module, python_calls
 from mapping import FloatArray, Surface
 from mapping.geometry.proxy import ProxyBody
 
@@ -135,8 +135,10 @@ def test_a_look_may_stop_it() -> None:
     assert run.reason == "stopped" and run.steps < 2000
 
 
-def test_a_device_that_hangs_in_read_is_let_go_of_by_the_guard() -> None:
-    hang, count = 0.3, 0
+def test_a_device_that_hangs_in_read_is_let_go_of_by_the_guard(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert loop_module.STUCK_TIME + loop_module.GUARD_PERIOD <= 5e-3
+    monkeypatch.setattr(loop_module, "STUCK_TIME", 0.1)  # so long a busy machine keeps nobody waiting
+    hang, count = 1.0, 0
 
     def read() -> FloatArray:
         nonlocal count
@@ -150,7 +152,7 @@ def test_a_device_that_hangs_in_read_is_let_go_of_by_the_guard() -> None:
     device._calls = python_calls(read, lambda force: (device.forces.append(force), stamps.append(time.monotonic()))[0])
     run = DisplayLoop(device, ProxyBody(PLATE, (), R)).run(200)
     zero = next(i for i, force in enumerate(device.forces) if i > 10 and not force.any())
-    assert stamps[zero] - stamps[zero - 1] < 0.1 < hang  # 5 ms on a quiet machine
+    assert stamps[zero] - stamps[zero - 1] < 0.5 * hang
     assert run.steps < 200 and run.reason == "the device hung: no step for 4 ms"
 
 
