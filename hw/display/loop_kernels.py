@@ -19,6 +19,7 @@ RUNNING, ENDED, DEVICE_SILENT, DEVICE_FROZEN, DEVICE_LOST, ASKED_TO_STOP, DEVICE
 # s; a device that says nothing for so long is let go of: with the period of 1 kHz, 5 ms
 PATIENCE_TIME = 4e-3
 MONOTONIC = 1  # clock_gettime's number of the clock that nobody sets
+AT_DEVICE = 1e-6  # of the radius: a proxy so near to the device's place is there
 SPIN_TIME = 80e-6  # s before the instant that sleeping ends and waiting begins: a sleep is late by about as much
 
 
@@ -108,19 +109,22 @@ def run_loop(  # type: ignore[no-untyped-def]
         span = period if own_time else period + late
         energy += damping * square / span - (felt[0] * dx[0] + felt[1] * dx[1] + felt[2] * dx[2])
         proxy, touching = proxy_step(body, radius, friction, proxy, last, x, work)
-        # a hand that begins inside of the body is not thrown out: it feels nothing until it was outside once
-        state[10] = 1.0 if state[10] > 0.0 or not touching else 0.0
-        felt_now = touching and state[10] > 0.0
-        pull = stiffness * back
-        if felt_now:
-            f0, f1, f2 = pull * (proxy[0] - x[0]), pull * (proxy[1] - x[1]), pull * (proxy[2] - x[2])
-            drag = virtual / span
-        else:
-            f0, f1, f2, drag = 0.0, 0.0, 0.0, 0.0
-        # What the springs hold is the hand's to take back; credit beyond it is dropped, so that none is saved up
-        pull = stiffness * back * back
         away = sub(proxy, x)
-        away = sqrt(dot(away, away)) if felt_now else 0.0
+        away = sqrt(dot(away, away))
+        # a hand that begins inside of the body is not thrown out: it feels nothing until it was outside once
+        if away <= AT_DEVICE * radius:
+            state[10] = 1.0
+        if state[10] == 0.0:
+            away = 0.0
+        # The spring pulls whenever the two are apart, also while the proxy is still on its way: a force that waits for
+        # contact would come from nowhere
+        pull = stiffness * back
+        f0, f1, f2, drag = 0.0, 0.0, 0.0, 0.0
+        if away > 0.0:
+            f0, f1, f2 = pull * (proxy[0] - x[0]), pull * (proxy[1] - x[1]), pull * (proxy[2] - x[2])
+            drag = virtual / span if touching else 0.0
+        # What the springs hold is the hand's to take back; credit beyond it is dropped, so that none is saved up
+        pull *= back
         soft = min(away, most_force * back / pull)  # beyond, the force is limited
         stored = pull * soft * (away - 0.5 * soft)
         energy = min(energy, stored)

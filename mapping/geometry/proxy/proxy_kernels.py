@@ -34,10 +34,12 @@ MOST_NEIGHBOURS = 256  # elements within reach that are looked at together; more
 RING_NEWTON_STEPS = (
     4  # the chord's nearest place is off by a part in a thousand of the ring's width: squared four times
 )
+FEW_NEIGHBOURS = 32  # with fewer it looks twice as far the next time
 MOST_PROJECTIONS = 48  # projections in one step; what is left of the way is gone in the next
 # Of the radius: a shorter move ends the step. The error is its square over twice the radius: 1e-14 radii
 STILL = 1e-7
 SHORTEST_REACH = 1e-3  # of the radius: how far the ball may move beyond the device's own motion
+FIRST_REACH = 0.25  # of the radius: how far it looks at first at most; further where nothing is near
 ALLOWED = 1e-13  # of the radius: a half-space that is violated by less is kept
 # Cosine between the normal and the way out of an element, below which the place is too deep to be projected at once
 LEAST_COSINE_OUT = 0.05
@@ -242,7 +244,7 @@ def follow(body, radius, o, x, reach, work):  # type: ignore[no-untyped-def]
                 return moved(o, 1.0, step), held > 0
             if way >= room:
                 o = moved(o, room / way, step)
-                reach, room = 2.0 * reach, 0.0
+                reach, room = (2.0 if near < FEW_NEIGHBOURS else 1.0) * reach, 0.0
             else:
                 o = moved(o, 1.0, step)
                 room -= way
@@ -261,7 +263,7 @@ def proxy_step(body, radius, friction, o, last, x, work):  # type: ignore[no-unt
         radius: of the ball; friction: coefficient; o, last, x: (3,) tuples, all in the frame of the body.
     """
     moved_by = sub(x, last)
-    reach = 2.0 * length(moved_by) + SHORTEST_REACH * radius
+    reach = min(2.0 * length(moved_by) + SHORTEST_REACH * radius, FIRST_REACH * radius)
     end, touching = follow(body, radius, o, x, reach, work)
     if friction == 0.0 or not touching:
         return end, touching
