@@ -35,7 +35,7 @@ RING_NEWTON_STEPS = (
     4  # the chord's nearest place is off by a part in a thousand of the ring's width: squared four times
 )
 FEW_NEIGHBOURS = 32  # with fewer it looks twice as far the next time
-MOST_PROJECTIONS = 48  # projections in one step; what is left of the way is gone in the next
+MOST_PROJECTIONS = 24  # projections in one step; what is left of the way is gone in the next
 # Of the radius: a shorter move ends the step. The error is its square over twice the radius: 1e-14 radii
 STILL = 1e-7
 SHORTEST_REACH = 1e-3  # of the radius: how far the ball may move beyond the device's own motion
