@@ -130,7 +130,7 @@ class DisplayLoop:
             look: is shown new records (n, 14) some times a second; returns True to stop.
 
         Raises:
-            FingerError: see above; KeyboardInterrupt passes, after the force is zero.
+            FingerError: see above. Ctrl-C ends a paced run as `look` does.
         """
         if steps < 1:
             raise FingerError(f"a display runs at least one step; found {steps}")
@@ -146,7 +146,9 @@ class DisplayLoop:
                 before = int(control[3])
                 kernel(*given, False, period, some, control, self._state, ring)
                 fresh = self._between(ring, before, int(control[3]))
-                kept = [*kept, fresh] if keep else [fresh]
+                if not keep:
+                    kept.clear()
+                kept.append(fresh)
                 if look is not None and look(fresh):
                     break
             return self._ended(control, kept, lost)
@@ -159,20 +161,25 @@ class DisplayLoop:
         if not calls.returns:
             guard.start()
         try:
-            while True:
-                alive = worker.is_alive()
-                now = int(control[3])
+            alive = True
+            while alive:
+                alive, now = worker.is_alive(), int(control[3])
                 if now > seen:
-                    oldest = max(seen, now - len(ring) + int(0.1 * len(ring)) if alive else now - len(ring))
+                    # what is being written over meanwhile is not read
+                    oldest = max(seen, now - (int(0.9 * len(ring)) if alive else len(ring)))
                     lost += oldest - seen
                     fresh = self._between(ring, oldest, now)
                     seen = now
-                    kept = [*kept, fresh] if keep else [fresh]
+                    if not keep:
+                        kept.clear()
+                    kept.append(fresh)
                     if look is not None and look(fresh):
-                        control[0] = 1
-                if not alive:
-                    break
-                time.sleep(LOOK_PERIOD)
+                        control[0] = control[0] or 1
+                if alive:
+                    try:
+                        time.sleep(LOOK_PERIOD)
+                    except KeyboardInterrupt:
+                        control[0] = control[0] or 1
         finally:
             control[0] = control[0] or 1
             worker.join(timeout=1.0)

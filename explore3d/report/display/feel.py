@@ -144,12 +144,13 @@ def feel(
             writer = stack.enter_context(LogWriter(log, tip_radius=radius, metadata=about))
         stack.enter_context(device)
         loop = DisplayLoop(device, body, rendering)
-        run = loop.run(steps, paced=paced, look=look)
-        trace = felt_trace(run, radius, rate)
+        watched = look if writer is None else _Recorder(writer, radius, look)
+        run = loop.run(steps, paced=paced, look=watched)
+        trace = felt_trace(run.records, radius)
         if writer is not None:
             for number in np.unique(trace.sweep):
                 sweep = trace.select(trace.sweep == number)
-                writer.write(_move(sweep, run, speed), sweep)
+                writer.write(_move(sweep, speed), sweep)
     return Felt(run, trace, left_out, loop.passive_stiffness, radius, 1.0 / rate)
 
 
@@ -160,17 +161,38 @@ def _tip(model: ObjectModel, tip_radius: float | None) -> float:
     return float(known)
 
 
-def felt_trace(run: Run, radius: float, rate: float) -> Trace:
-    """The proxy's centres while it touched."""
+def felt_trace(records: FloatArray, radius: float, sweeps: int = 0, inside: bool = False) -> Trace:
+    """The proxy's centres while it touched, a sweep for each time that it came down.
+
+    Args:
+        records: (N, 14) of a run.
+        radius: of the proxy, m.
+        sweeps: how many there were before; inside: whether the last one still goes on.
+    """
+    run = Run(records, "", len(records), 0)
     touching = run.column("touching") > 0.0
-    begins = touching & ~np.append(False, touching[:-1])
-    sweep = np.cumsum(begins)[touching]
-    force = -run.forces[touching]
-    t = run.column("t")[touching]
-    return Trace(t, run.centers[touching], sweep, radius, force=force)
+    begins = touching & ~np.append(inside, touching[:-1])
+    sweep = sweeps + np.cumsum(begins)[touching]
+    return Trace(run.column("t")[touching], run.centers[touching], sweep, radius, force=-run.forces[touching])
 
 
-def _move(sweep: Trace, run: Run, speed: float) -> Move:
+class _Recorder:
+    """Has every sample on disk within a fraction of a second: whatever ends the program costs nothing that was felt."""
+
+    def __init__(self, writer: LogWriter, radius: float, look: Callable[[FloatArray], bool] | None) -> None:
+        self._writer, self._radius, self._look = writer, radius, look
+        self._sweeps, self._inside = 0, False
+
+    def __call__(self, records: FloatArray) -> bool:
+        trace = felt_trace(records, self._radius, self._sweeps, self._inside)
+        if len(trace):
+            self._sweeps = int(trace.sweep[-1])
+            self._writer.felt(trace)
+        self._inside = bool(records[-1, 10] > 0.0)
+        return self._look is not None and self._look(records)
+
+
+def _move(sweep: Trace, speed: float) -> Move:
     force = sweep.force if sweep.force is not None else np.zeros((1, 3))
     way = force.mean(axis=0)
     size = float(np.linalg.norm(way))

@@ -159,3 +159,21 @@ def test_a_finger_explores_what_is_displayed() -> None:
     x, _, z = trace.centers.T
     assert len(trace) > 300
     assert np.abs(z - R - cap_height(x, HEIGHT, 0.5 * HEIGHT, R)).max() < 1e-8
+
+
+def test_what_breaks_off_a_display_costs_nothing_that_was_felt(tmp_path: Path) -> None:
+    from explore3d.log import read_log
+
+    count = 0
+
+    def broken(records: np.ndarray) -> bool:
+        nonlocal count
+        count += 1
+        if count == 3:
+            raise RuntimeError("the power fails")
+        return False
+
+    with pytest.raises(RuntimeError, match="power"):
+        feel(model(), paced=False, log=tmp_path / "felt.mcap", look=broken)
+    trace = read_log(tmp_path / "felt.mcap").trace
+    assert len(trace) > 2000 and trace.sweep.max() >= 2
