@@ -84,7 +84,7 @@ def _strongest(diameter: float, height: float, noise: NoiseSource, rng: np.rando
     level = step_height(inside, height, STROKE_TIP) if height > 0.0 else np.zeros_like(x)
     centers = np.column_stack([x, np.zeros_like(x), STROKE_TIP + level])
     centers += noise.of_centers(rng, len(x), STROKE_SPACING)
-    trace = Trace(np.arange(len(x)) * 2e-4, centers, np.zeros(len(x), dtype=np.int64), STROKE_TIP)
+    trace = Trace(2e-4 * np.arange(float(len(x))), centers, np.zeros(len(x), dtype=np.int64), STROKE_TIP)
     known = Noise(noise.white, noise.correlated, noise.correlation_length)
     found = detect(trace, _plate(), noise=known, false_alarms_per_metre=FORCED_CHOICE)
     return max((abs(each.snr) for each in found.crossings), default=0.0)

@@ -55,7 +55,8 @@ class Vibration:
     def spectrum(self) -> tuple[FloatArray, FloatArray]:
         """Frequencies, Hz, and (F,) amplitudes of the heights' discrete Fourier transform, m s."""
         heights = self.height - 0.5 * (self.height[0] + self.height[-1])
-        return np.fft.rfftfreq(len(heights), 1.0 / self.rate), np.abs(np.fft.rfft(heights)) / self.rate
+        frequency = np.asarray(np.fft.rfftfreq(len(heights), 1.0 / self.rate), dtype=np.float64)
+        return frequency, np.abs(np.fft.rfft(heights)) / self.rate
 
     def band(self, share: float = 0.9) -> tuple[float, float]:
         """Frequencies, Hz, between which that share of the velocity's energy lies: what skin and actuators follow."""
