@@ -43,7 +43,7 @@ class Rendering:
         stiffness: of the spring between device and proxy, N/m.
         friction: coefficient.
         damping: virtual, N s/m, while it touches.
-        controlled: True adds the passivity controller; the observer always runs.
+        controlled: True bounds the force so that no energy can be made; the observer always runs.
         scale: metres on the body for each metre of the device.
         origin: (3,) place on the body where the device's origin is, m.
     """
@@ -105,7 +105,8 @@ class DisplayLoop:
         rendering: how.
 
     Raises:
-        FingerError: the first sample does not come, or this system has no clock that compiled code can read.
+        FingerError: the first sample does not come, this system has no clock that compiled code can read, or the device
+            states no damping: then no force is passive, and the controller would allow none.
     """
 
     display: Display
@@ -188,6 +189,11 @@ class DisplayLoop:
     def _begin(self) -> tuple[Any, Any, tuple[Any, ...]]:
         from hw.display import loop_kernels, pointer_kernels
 
+        if self.rendering.controlled and not self.display.damping > 0.0:
+            raise FingerError(
+                f"the display {self.display.info.get('kind', '')} states a damping of {self.display.damping} N s/m: then "
+                "no force is passive; state what its mechanism has, or hand in Rendering(controlled=False)"
+            )
         calls, look = self.display.calls(), self.rendering
         try:
             clock, sleep = pointer_kernels.clock_function(), pointer_kernels.sleep_function()

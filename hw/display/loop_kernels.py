@@ -41,7 +41,7 @@ def run_loop(  # type: ignore[no-untyped-def]
         body, radius: of the proxy, in the kernels' frame.
         frame: (5,) device to kernels' frame: scale, offset (3,); and device metres in one metre of that frame.
         friction, stiffness (N/m), virtual damping (N s/m).
-        controlled: True adds the passivity controller's damping; the observer always runs.
+        controlled: True bounds the force by the energy that is there; the observer always runs.
         damping: of the device, N s/m; most_force: N; dithers: True if its positions never repeat.
         own_time: True of a device whose samples are a period apart however late they are asked for.
         read, write, device: its functions and their state; clock, sleep: the C library's.
@@ -128,11 +128,13 @@ def run_loop(  # type: ignore[no-untyped-def]
         soft = min(away, most_force * back / pull)  # beyond, the force is limited
         stored = pull * soft * (away - 0.5 * soft)
         energy = min(energy, stored)
-        if controlled and energy < stored and square > 0.0:
-            drag += min((stored - energy) / square, damping / span)
         f0, f1, f2 = f0 - drag * dx[0], f1 - drag * dx[1], f2 - drag * dx[2]
         size = sqrt(f0 * f0 + f1 * f1 + f2 * f2)
-        share = most_force / size * (1.0 - 1e-12) if size > most_force else 1.0
+        # Whatever the hand does next, it gets back no more than is there: -F.dx + b dx^2 / T is least -F^2 T / (4 b)
+        most = most_force
+        if controlled:
+            most = min(most, sqrt(max(4.0 * damping * energy / period, 0.0)))
+        share = most / size * (1.0 - 1e-12) if size > most else 1.0
         felt = (share * f0, share * f1, share * f2)
         force[0], force[1], force[2] = felt
         if write(device, np.int64(force.ctypes.data)) < 0:

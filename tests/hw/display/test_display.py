@@ -105,6 +105,36 @@ def test_below_colgates_limit_no_random_motion_makes_energy() -> None:
     assert run.column("energy").min() > -1e-9
 
 
+@pytest.mark.parametrize("share", [1.5, 10.0])
+def test_above_the_limit_the_controller_lets_no_energy_be_made(share: float) -> None:
+    rng = np.random.default_rng(4)
+    wishes = np.zeros((20_000, 3))
+    wishes[:, 2] = R + 1e-3 + np.cumsum(rng.standard_normal(20_000)) * 30e-6
+    wishes[:, 2] = R + np.abs(wishes[:, 2] - R) * np.sign(np.sin(np.arange(20_000) / 700.0))
+    least = []
+    for controlled in (True, False):
+        with SimulatedDisplay(wishes, damping=1.0, max_force=50.0) as display:
+            look = Rendering(stiffness=share * 2000.0, controlled=controlled)
+            run = DisplayLoop(display, ProxyBody(PLATE, (), R), look).run(20_000, paced=False)
+        assert (run.column("touching") > 0).mean() > 0.1
+        least.append(run.column("energy").min())
+    assert least[0] > -1e-12 and least[1] < -1e-9
+
+
+def test_below_the_limit_the_controller_changes_nothing() -> None:
+    felt = []
+    for controlled in (True, False):
+        with SimulatedDisplay(pressed(2e-3), damping=1.0) as display:
+            look = Rendering(stiffness=1000.0, controlled=controlled)
+            felt.append(DisplayLoop(display, ProxyBody(PLATE, (), R), look).run(3000, paced=False).forces)
+    assert np.allclose(felt[0], felt[1], atol=1e-9)
+
+
+def test_a_device_without_damping_is_refused() -> None:
+    with pytest.raises(FingerError, match=r"no force is passive.*controlled=False"):
+        DisplayLoop(SimulatedDisplay(pressed(1e-3), damping=0.0), ProxyBody(PLATE, (), R)).run(10, paced=False)
+
+
 def test_a_hand_that_begins_inside_is_not_thrown_out() -> None:
     wishes = np.zeros((3000, 3))
     wishes[:, 2] = R + np.interp(np.arange(3000), [0, 1000, 2000, 3000], [-1e-3, -1e-3, 1e-3, -1e-3])
