@@ -190,9 +190,10 @@ class DisplayLoop:
         from hw.display import loop_kernels, pointer_kernels
 
         if self.rendering.controlled and not self.display.damping > 0.0:
+            name = self.display.info.get("kind", "")
             raise FingerError(
-                f"the display {self.display.info.get('kind', '')} states a damping of {self.display.damping} N s/m: then "
-                "no force is passive; state what its mechanism has, or hand in Rendering(controlled=False)"
+                f"the display {name} states a damping of {self.display.damping} N s/m: then no force is passive; "
+                "state what its mechanism has, or hand in Rendering(controlled=False)"
             )
         calls, look = self.display.calls(), self.rendering
         try:
