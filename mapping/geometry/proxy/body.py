@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mapping import BoolArray, ContactError, FloatArray, Surface
 from mapping.geometry.mesh import NearestPoint, TriangleTree, distances
-from mapping.geometry.proxy.draping import CHORD_ERROR, joined, terrace_mesh, trench_mesh
+from mapping.geometry.proxy.draping import CHORD_ERROR, followed, joined, terrace_mesh, trench_mesh
 from mapping.geometry.proxy.parts import Bell, Chain, Part, Terrace, Trench
 
 # Legs of a chain, and rings of a bell, that share a bounding sphere
@@ -38,7 +39,10 @@ class ProxyBody:
             raise ContactError(f"the proxy's radius must be a positive length in metres; found {radius!r}")
         for part in parts:
             _check(part)
-        self.base, self.parts, self.radius = NearestPoint(base), tuple(parts), float(radius)
+        self.base, self.radius = NearestPoint(base), float(radius)
+        # the legs of an axis cut corners on a bent base: it is the base that the feature lies on
+        parts = [each if isinstance(each, Bell) else self._laid(each) for each in parts]
+        self.parts = tuple(parts)
         trenches = [part for part in parts if isinstance(part, Trench)]
         meshes = [(base.vertices, base.faces), *(trench_mesh(each, self.base) for each in trenches)]
         meshes += [terrace_mesh(each, self.base) for each in parts if isinstance(each, Terrace)]
@@ -80,6 +84,10 @@ class ProxyBody:
         scale = self.scale
         proxy_kernels.least_gaps(self.arrays, scale * self.radius, self.into(centers), scale * reach, out)
         return out / scale
+
+    def _laid(self, part: Chain | Trench | Terrace) -> Chain | Trench | Terrace:
+        axis, normals = followed(part.axis, part.normals, self.base)
+        return replace(part, axis=axis, normals=normals)
 
     def _rounds(self, parts: Sequence[Chain | Bell]) -> tuple[FloatArray, FloatArray]:
         rows = [self._capsules(part) if isinstance(part, Chain) else self._rings(part) for part in parts]
@@ -134,6 +142,9 @@ class ProxyBody:
             block = np.zeros((legs, 11))
             block[:, 0:3], block[:, 3:6], block[:, 9] = axis[:legs], axis[-legs:], half
             block[:, 6:9] = up / np.linalg.norm(up, axis=1, keepdims=True)
+            if len(axis) > 1 and not np.array_equal(axis[0], axis[-1]):
+                block[0, 10] += 1.0
+                block[-1, 10] += 2.0
             center = 0.5 * (axis.min(axis=0) + axis.max(axis=0))
             reach = np.linalg.norm(axis - center, axis=1).max() + half
             hulls.append(np.concatenate([center, [reach, first, first + legs]]))

@@ -34,30 +34,26 @@ def trench_mesh(trench: Trench, base: NearestPoint) -> Mesh:
         rows = [axis + share * np.vstack([ring, ring[:1]]) for share in shares]
         return _hollow([draped(row, base) for row in rows], trench.depth, sides=(False, True))
     closed = np.array_equal(axis[0], axis[-1])
-    axis, normals = _followed(axis, trench.normals, base)
-    tangents, laterals = _frames(axis, normals)
+    laterals = _laterals(axis, trench.normals)
     reach = half * _mitres(axis, closed)[:, None] * laterals
     sag = 0.5 * (draped(axis + reach, base)[0] + draped(axis - reach, base)[0]) - axis
     rows = [axis + (2.0 * share - 1.0) * reach for share in _shares(sag)]
     mesh = _hollow([draped(row, base) for row in rows], trench.depth, sides=(True, True))
     if closed:
         return mesh
-    meshes = [mesh]
-    for end, way in ((0, -1.0), (-1, 1.0)):
-        turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _chords(half) // 2 + 1)
-        bow = _even(half, 2 * len(turn) - 2) * way * np.cos(turn)[:, None] * tangents[end]
-        arc = half * np.sin(turn)[:, None] * laterals[end] + bow
-        rows = [axis[end] + share * arc for share in _shares(sag)]
-        meshes.append(_hollow([draped(row, base) for row in rows], trench.depth, sides=(False, True)))
-    return joined(meshes)
+    ends = []
+    for end in (0, -1):
+        rim, outward = draped(np.array([row[end] for row in rows]), base)
+        ends.append(_strips([rim, rim - trench.depth * outward]))
+    return joined([mesh, *ends])
 
 
 def terrace_mesh(terrace: Terrace, base: NearestPoint) -> Mesh:
     """(vertices, faces) of the wall, the higher level and the ramps that end it, m."""
-    axis, normals = _followed(terrace.axis, terrace.normals, base)
+    axis, normals = terrace.axis, terrace.normals
     s = arclengths(axis)
     ramp = RAMP * terrace.height
-    tangents, _ = _frames(axis, normals)
+    tangents = directions(axis)
     axis = np.vstack([axis[:1] - ramp * tangents[:1], axis, axis[-1:] + ramp * tangents[-1:]])
     normals = np.vstack([normals[:1], normals, normals[-1:]])
     laterals = terrace.high_side * np.cross(normals, directions(axis))
@@ -140,11 +136,10 @@ def _plane(normal: FloatArray) -> tuple[FloatArray, FloatArray]:
     return first, np.cross(normal, first)
 
 
-def _frames(axis: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(tangents, laterals) unit vectors along an axis and across it; lateral = normal x tangent."""
-    tangents = directions(axis)
-    laterals = np.cross(normals, tangents)
-    return tangents, laterals / np.linalg.norm(laterals, axis=1, keepdims=True)
+def _laterals(axis: FloatArray, normals: FloatArray) -> FloatArray:
+    """(K, 3) unit vectors across an axis: normal x tangent."""
+    laterals = np.cross(normals, directions(axis))
+    return np.asarray(laterals / np.linalg.norm(laterals, axis=1, keepdims=True))
 
 
 def _mitres(axis: FloatArray, closed: bool) -> FloatArray:
@@ -159,8 +154,10 @@ def _mitres(axis: FloatArray, closed: bool) -> FloatArray:
     return np.asarray(1.0 / cosine)
 
 
-def _followed(axis: FloatArray, normals: FloatArray, base: NearestPoint) -> tuple[FloatArray, FloatArray]:
-    """The axis with its legs halved until their middles lie on the base."""
+def followed(axis: FloatArray, normals: FloatArray, base: NearestPoint) -> tuple[FloatArray, FloatArray]:
+    """The axis and its normals, the legs halved until their middles lie on the base; a point stays one."""
+    if len(axis) == 1:
+        return axis, normals
     keep = np.append(True, np.linalg.norm(np.diff(axis, axis=0), axis=1) > 0.0)
     axis, normals = axis[keep], normals[keep]
     for _ in range(MOST_HALVINGS):

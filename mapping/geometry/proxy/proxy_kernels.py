@@ -6,7 +6,7 @@ the wish on the half-spaces of the elements nearby; no motion within them can pa
 
 Lengths are in the frame of the body's TriangleTree. `body` is the tuple that ProxyBody.arrays gives:
 rows, leaves, boxes, links (the tree), open (F,) 1 where a triangle may be cut open, rounds (M, 15), groups (G, 6),
-legs (C, 11) of the axes that triangles are cut open along, trenches (H, 6).
+legs (C, 11) of the axes that triangles are cut open along (last column: 1 a first leg, 2 a last one), trenches (H, 6).
 """
 
 from __future__ import annotations
@@ -81,6 +81,10 @@ def is_cut_away(body, point, normal):  # type: ignore[no-untyped-def]
             continue
         for j in range(int(trenches[h, 4]), int(trenches[h, 5])):
             a, b = (legs[j, 0], legs[j, 1], legs[j, 2]), (legs[j, 3], legs[j, 4], legs[j, 5])
+            way, from_a = sub(b, a), sub(point, a)
+            along, ends = dot(from_a, way), legs[j, 10]
+            if (along < 0.0 and (ends == 1.0 or ends == 3.0)) or (along > dot(way, way) and ends >= 2.0):
+                continue  # a groove ends square
             off = sub(point, on_segment(a, b, point))
             if dot(off, off) < legs[j, 9] * legs[j, 9] and dot(normal, (legs[j, 6], legs[j, 7], legs[j, 8])) > 0.3:
                 return True

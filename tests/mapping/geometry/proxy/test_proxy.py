@@ -193,3 +193,31 @@ def test_bad_balls_places_and_friction_are_refused() -> None:
     with pytest.raises(ContactError, match="finite and of shape"):
         Proxy(body).follow([[0.0, 0.0, np.nan]])
     assert len(Proxy(body).follow(np.zeros((0, 3))).centers) == 0
+
+
+def test_a_groove_ends_square_where_its_axis_ends() -> None:
+    body = ProxyBody(PLATE, (Trench(*LINE, 1e-3, 0.1e-3),), 5e-3)
+    y = np.linspace(15e-3, 24e-3, 1500)
+    rim = 20e-3 - y
+    form = rim_height(np.minimum(rim, 0.5e-3), 5e-3, 0.1e-3)
+    device = np.column_stack([np.zeros_like(y), y, 5e-3 - 0.02e-3 + form])
+    felt = Proxy(body).follow(device)
+    _, place, z = felt.centers.T
+    assert np.abs(z - 5e-3 - rim_height(np.minimum(20e-3 - place, 0.5e-3), 5e-3, 0.1e-3)).max() < 1e-6
+
+
+def test_an_axis_of_few_points_follows_a_bent_base() -> None:
+    u, v = np.meshgrid(np.linspace(-0.6, 0.6, 241), np.linspace(-0.02, 0.02, 5), indexing="ij")
+    points = 0.04 * np.column_stack([np.sin(u.ravel()), v.ravel() / 0.04, np.cos(u.ravel())])
+    corner = (np.arange(240)[:, None] * 5 + np.arange(4)).ravel()
+    quads = np.stack([corner, corner + 5, corner + 6, corner + 1], axis=1)
+    bent = Surface(points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    turn = np.linspace(-0.4, 0.4, 6)
+    normals = np.column_stack([np.sin(turn), np.zeros(6), np.cos(turn)])
+    ridge = Chain(0.04 * normals, normals, 0.3e-3, 0.2e-3)
+    built = ProxyBody(bent, (ridge,), 5e-3)
+    fine = np.linspace(-0.35, 0.35, 2000)
+    way = np.column_stack([np.sin(fine), np.zeros(2000), np.cos(fine)])
+    felt = Proxy(built).follow((0.04 + 5.3e-3 - 0.02e-3) * way)
+    height = np.linalg.norm(felt.centers, axis=1) - 0.04 - 5e-3
+    assert np.abs(height - 0.3e-3).max() < 1e-6  # its chords alone would dip by 0.1 mm
