@@ -297,7 +297,12 @@ def touch(
     """
     from explore3d.bench import bench_touch, touch_lines
 
-    _print(touch_lines(list(bench_touch(trials, seed))))
+    answers = []
+    for each in bench_touch(trials, seed):
+        answers.append(each)
+        told = f"{each.stimulus}, {each.noise}, {1e6 * each.height:.2f} um: {100.0 * each.right:.0f} % right"
+        print(told, flush=True)
+    _print(touch_lines(answers))
 
 
 @bench.command()
