@@ -22,6 +22,8 @@ FULL_SCALE_16_BIT = 32767
 CURVE_RATE = 200.0
 # Points of one AHAP parameter curve: Core Haptics takes no more
 MOST_AHAP_POINTS = 16
+# s; continuous events of Core Haptics last no longer
+LONGEST_AHAP_EVENT = 30.0
 
 
 def wav_bytes(vibration: Vibration, full_scale: float | None = None) -> bytes:
@@ -58,15 +60,16 @@ def ahap_bytes(vibration: Vibration, full_scale: float | None = None) -> bytes:
     pattern: list[dict[str, Any]] = [
         {
             "Event": {
-                "Time": 0.0,
+                "Time": float(begin),
                 "EventType": "HapticContinuous",
-                "EventDuration": vibration.duration,
+                "EventDuration": float(min(vibration.duration - begin, LONGEST_AHAP_EVENT)),
                 "EventParameters": [
                     {"ParameterID": "HapticIntensity", "ParameterValue": 1.0},
                     {"ParameterID": "HapticSharpness", "ParameterValue": sharpness},
                 ],
             }
         }
+        for begin in np.arange(0.0, vibration.duration, LONGEST_AHAP_EVENT)
     ]
     for time, size in _events(vibration):
         pattern.append(
