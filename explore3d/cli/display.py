@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -57,19 +58,22 @@ def display(
         stiffness=stiffness, friction=friction, damping=damping, scale=scale, origin=point("--origin", origin)
     )
     known = ObjectModel.load(model)
+    look = None if json or not sys.stderr.isatty() else live(known)
     felt = feel(
         known,
         device,
         tip_radius=None if tip_radius is None else length("--tip-radius", tip_radius, positive=True),
         exaggeration=exaggeration,
         rendering=rendering,
-        rate=parse_rate(rate),
+        rate=_parsed("--rate", rate, parse_rate),
         speed=_speed(speed),
         seconds=seconds,
         paced=not fast,
         log=log,
-        look=None if json or not sys.stderr.isatty() else live(known),
+        look=look,
     )
+    if look is not None:
+        print(file=sys.stderr)  # the live line ends
     print(dumps(felt.record(), allow_nan=False) if json else "\n".join(felt.lines()))
     if log is not None and not json:
         print(f"log: {log}")
@@ -125,12 +129,16 @@ def vibrate(
 def _speed(text: str) -> float:
     from explore3d import parse_speed
 
+    return _parsed("--speed", text, parse_speed)
+
+
+def _parsed(option: str, text: str, parse: Callable[[str], float]) -> float:
     try:
-        value = parse_speed(text)
+        value = parse(text)
     except UnitError as error:
-        raise UserError(f"--speed: {error}") from error
+        raise UserError(f"{option}: {error}") from error
     if not value > 0.0:
-        raise UserError(f"--speed: should be greater than 0; found {text!r}")
+        raise UserError(f"{option}: should be greater than 0; found {text!r}")
     return value
 
 
