@@ -11,18 +11,15 @@ from hw import FingerError, Move
 from hw.simulated import SimulatedFinger
 from mapping import BoolArray, FloatArray, Trace
 from mapping.geometry.contact import Contacts
-from mapping.geometry.proxy import Proxy, ProxyBody
-
-# Steps in which the hand comes down on the body at the beginning of a sweep
-LANDING_STEPS = 200
+from mapping.geometry.proxy import ProxyBody, pressed_along
 
 
 @dataclass(kw_only=True)
 class DisplayFinger(SimulatedFinger):
     """Like SimulatedFinger, but what it feels is the proxy: the hand presses into the display's spring.
 
-    The device is led along the commanded path, deeper by force over stiffness; the samples are the proxy's centres. It
-    closes the circle: explore, display, and explore what is displayed.
+    The device is led along the commanded path, pressed in until the force is held; the samples are the proxy's centres.
+    It closes the circle: explore, display, and explore what is displayed.
 
     Args:
         object: the base of what is displayed: it bounds the workspace, and stands in the stem's way.
@@ -59,12 +56,8 @@ class DisplayFinger(SimulatedFinger):
         return super().execute(move)
 
     def _pressed(self, path: FloatArray, approach: FloatArray) -> tuple[Contacts, BoolArray]:
-        depth = self._force / self.stiffness
-        stroke = 2.0 * self.tip_radius if self.stroke is None else self.stroke
-        down = np.linspace(-stroke, depth, LANDING_STEPS)[:-1, None] * approach[0]
-        felt = Proxy(self.display, self.friction).follow(np.vstack([path[0] + down, path + depth * approach]))
-        centers, touching = felt.centers[len(down) :], felt.touching[len(down) :]
-        device = felt.device[len(down) :]
+        felt = pressed_along(self.display, path, approach, self._force / self.stiffness, self.friction)
+        centers, touching, device = felt.centers, felt.touching, felt.device
         pull = centers - device
         size = np.linalg.norm(pull, axis=1)
         touching = touching & (size > 0.0)

@@ -9,7 +9,7 @@ import numpy as np
 from explore3d import UserError
 from mapping import FloatArray, ObjectModel
 from mapping.geometry.mesh import arclengths
-from mapping.geometry.proxy import Proxy, ProxyBody
+from mapping.geometry.proxy import ProxyBody, pressed_along
 from mapping.model import touchable
 
 # m; the ball is pressed so little that it is beside its place by less than a sample of audio at 1 mm/s
@@ -147,22 +147,11 @@ def vibration(
 
 
 def heights_along(body: ProxyBody, places: FloatArray) -> FloatArray:
-    """(N,) heights of the ball over the base's own trace where it stands over places (N, 3) of the base, m.
-
-    Twice: pressed deep enough to reach every floor, then so little under the path that this gave that the ball is
-    beside its place by nothing that a sample shows.
-    """
+    """(N,) heights of the ball over the base's own trace where it stands over places (N, 3) of the base, m."""
     near = body.base.query(places)
-    feet, normals = near.points, near.normals
-    deepest = max((part.depth for part in body.parts if hasattr(part, "depth")), default=0.0)
-    level = np.full(len(feet), -min(1.01 * deepest + PRESSING, 0.3 * body.radius))
-    height = level
-    for _ in range(3):
-        device = feet + (body.radius + level)[:, None] * normals
-        felt = Proxy(body).follow(device)
-        height = np.einsum("ij,ij->i", felt.centers - feet, normals) - body.radius
-        level = height - PRESSING
-    return np.asarray(height)
+    path = near.points + body.radius * near.normals
+    felt = pressed_along(body, path, -near.normals, PRESSING)
+    return np.einsum("ij,ij->i", felt.centers - near.points, near.normals) - body.radius
 
 
 def kinks(height: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:

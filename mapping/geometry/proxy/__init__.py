@@ -13,13 +13,18 @@ if TYPE_CHECKING:
         Terrace as Terrace,
         Trench as Trench,
     )
-    from mapping.geometry.proxy.proxy import Followed as Followed, Proxy as Proxy, free_place as free_place
+    from mapping.geometry.proxy.proxy import (
+        Followed as Followed,
+        Proxy as Proxy,
+        free_place as free_place,
+        pressed_along as pressed_along,
+    )
     from mapping.geometry.proxy.proxy_kernels import proxy_step as proxy_step, workspace as workspace
 
 _PUBLIC = {
     "body": ("ProxyBody",),
     "parts": ("Bell", "Chain", "Part", "Terrace", "Trench"),
-    "proxy": ("Followed", "Proxy", "free_place"),
+    "proxy": ("Followed", "Proxy", "free_place", "pressed_along"),
     "proxy_kernels": ("proxy_step", "workspace"),
 }
 doorway(__name__, _PUBLIC)

@@ -64,6 +64,11 @@ class ProxyBody:
         return max((part.height for part in self.parts if not isinstance(part, Trench)), default=0.0)
 
     @property
+    def bottom(self) -> float:
+        """Depth of the deepest part below the base, m."""
+        return max((part.depth for part in self.parts if isinstance(part, Trench)), default=0.0)
+
+    @property
     def scale(self) -> float:
         """Length of one metre in the frame of the kernels."""
         return float(self._tree.scale_in(1.0))

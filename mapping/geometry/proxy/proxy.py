@@ -12,6 +12,8 @@ from mapping.geometry.proxy.body import ProxyBody
 
 # Tip radii beyond the highest part at which a free place is looked for first
 CLEARANCE = 1e-3
+# Of the radius: so deep the first pressing goes at most; and how often it is repeated
+DEEPEST_PRESSING, PRESSING_ROUNDS = 0.3, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,27 @@ class Proxy:
         centers = body.out(centers)
         self._center = centers[-1].copy()
         return Followed(places, centers, touching)
+
+
+def pressed_along(
+    body: ProxyBody, path: FloatArray, inwards: FloatArray, press: float, friction: float = 0.0
+) -> Followed:
+    """The ball where a device stands over each place of a path, pressed a little into the spring and no more.
+
+    First it is pressed deep enough for every floor, but then the ball is beside its place, and dwells at kinks; so
+    twice more, each time as deep as the ball was found.
+
+    Args:
+        path: (N, 3) places of the device if nothing were there, m, near the base's own trace.
+        inwards: (N, 3) unit directions of pressing.
+        press: depth of the device below the ball, m.
+        friction: coefficient.
+    """
+    depth = np.full(len(path), min(1.01 * body.bottom, DEEPEST_PRESSING * body.radius) + press)
+    for _ in range(PRESSING_ROUNDS):
+        felt = Proxy(body, friction).follow(path + depth[:, None] * inwards)
+        depth = np.einsum("ij,ij->i", felt.centers - path, inwards) + press
+    return felt
 
 
 def free_place(body: ProxyBody, place: FloatArray) -> FloatArray:
