@@ -151,7 +151,7 @@ def heights_along(body: ProxyBody, places: FloatArray) -> FloatArray:
     near = body.base.query(places)
     path = near.points + body.radius * near.normals
     felt = pressed_along(body, path, -near.normals, PRESSING)
-    return np.einsum("ij,ij->i", felt.centers - near.points, near.normals) - body.radius
+    return np.asarray(np.einsum("ij,ij->i", felt.centers - near.points, near.normals) - body.radius)
 
 
 def kinks(height: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
