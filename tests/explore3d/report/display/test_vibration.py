@@ -16,7 +16,8 @@ from explore3d.report.display.haptic_files import ahap_bytes, hjif_bytes, wav_by
 from hw.display import DisplayFinger, Rendering
 from mapping import Feature, Interval, ObjectModel, Support, Surface
 from mapping.base import Base
-from mapping.geometry.templates import cap_height, contact_half_width
+from mapping.geometry.proxy import ProxyBody, Trench
+from mapping.geometry.templates import cap_height, contact_half_width, groove_height
 from mapping.model import touchable
 
 R, HEIGHT, SPEED = 5e-3, 0.2e-3, 30e-3
@@ -177,3 +178,16 @@ def test_what_breaks_off_a_display_costs_nothing_that_was_felt(tmp_path: Path) -
         feel(model(), paced=False, log=tmp_path / "felt.mcap", look=broken)
     trace = read_log(tmp_path / "felt.mcap").trace
     assert len(trace) > 2000 and trace.sweep.max() >= 2
+
+
+def test_a_finger_on_a_stiff_display_reaches_into_hollows() -> None:
+    from hw import Move
+
+    body = ProxyBody(PLATE, (Trench(model()["ridge-1"].axis, np.tile([0.0, 0.0, 1.0], (2, 1)), 3e-3, 0.15e-3),), R)
+    finger = DisplayFinger(object=PLATE, tip_radius=R, rate=1000.0, display=body)
+    level = np.array([[-6e-3, 1e-3, R], [6e-3, 1e-3, R]])
+    trace = finger.execute(Move(level, [0.0, 0.0, -1.0], speed=SPEED))
+    x, _, z = trace.centers.T
+    assert np.abs(z - R - groove_height(x, 3e-3, R, 0.15e-3)).max() < 1e-6
+    spacing = np.diff(x)  # it neither dwells nor hurries, but for the tip's own lean
+    assert len(x) == 401 and spacing.min() > 0.8 * SPEED / 1000.0 and spacing.max() < 1.2 * SPEED / 1000.0
