@@ -173,6 +173,7 @@ class Details:
         axis_sd: (K,) standard deviation of the axis across itself, at even steps along it, m.
         end_intervals: (2, 2) 90 % interval of the first and the last end along the axis, m, from where it is stated.
         ends_seen: whether the data say that the axis does not go on there.
+        high_side: of a step, +1 if the side of normal x tangent (along the axis) is the higher one, else -1.
     """
 
     trace_curvature: float | None = None
@@ -182,6 +183,7 @@ class Details:
     axis_sd: FloatArray | None = None
     end_intervals: FloatArray | None = None
     ends_seen: tuple[bool, bool] | None = None
+    high_side: float | None = None
 
     def known(self) -> dict[str, Any]:
         """What is known, by name."""

@@ -287,6 +287,25 @@ def dynamics() -> None:
 
 
 @bench.command()
+def touch(
+    trials: Annotated[int, typer.Option(min=1, help="Pairs of strokes for each stimulus, noise and height.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Of the noise.")] = 0,
+) -> None:
+    """LaMotte's task: which of two strokes went over something? The detector's answers beside people's.
+
+    Example: explore3d bench touch --trials 20
+    """
+    from explore3d.bench import bench_touch, touch_lines
+
+    answers = []
+    for each in bench_touch(trials, seed):
+        answers.append(each)
+        told = f"{each.stimulus}, {each.noise}, {1e6 * each.height:.2f} um: {100.0 * each.right:.0f} % right"
+        print(told, flush=True)
+    _print(touch_lines(answers))
+
+
+@bench.command()
 def scaling(
     store: Store,
     axes: Annotated[str | None, typer.Option(help="samples, triangles, features, separated by commas; all.")] = None,

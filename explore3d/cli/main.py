@@ -14,6 +14,7 @@ from explore3d.cli.analyze import analyze, roughness
 from explore3d.cli.batch import batch
 from explore3d.cli.begin import examples, init
 from explore3d.cli.bench import bench
+from explore3d.cli.display import display, vibrate
 from explore3d.cli.doctor import doctor
 from explore3d.cli.figures import figures
 from explore3d.cli.hardware import calibrate, emulate, reprobe, selftest
@@ -37,7 +38,22 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-MODEL = (init, examples, plan, run, analyze, roughness, batch, compare, inspect, export, merge, figures)
+MODEL = (
+    init,
+    examples,
+    plan,
+    run,
+    analyze,
+    roughness,
+    batch,
+    compare,
+    inspect,
+    export,
+    merge,
+    display,
+    vibrate,
+    figures,
+)
 MACHINE = (doctor, emulate, calibrate, selftest, reprobe, stability)
 for command in (*MODEL, *MACHINE):
     app.command()(one_line(command))

@@ -107,6 +107,9 @@ figcaption { color: var(--soft); font-size: .9rem; margin-top: .45rem; max-width
 .view { border: 1px solid var(--faint); border-radius: 8px; overflow: hidden; }
 .view .stage { position: relative; height: 560px; } .view.flat .stage { height: 400px; }
 .view canvas { width: 100%; height: 100%; display: block; touch-action: none; cursor: grab; }
+.view canvas.strip { position: absolute; right: 14px; bottom: 10px; width: 280px; height: 84px;
+  background: var(--paper); border: 1px solid var(--edge); border-radius: 4px; pointer-events: none; }
+.view canvas.strip[hidden] { display: none; }
 .view canvas:focus-visible { outline: 2px solid var(--link); outline-offset: -2px; }
 .view .tools { display: flex; flex-wrap: wrap; gap: .3rem 1.1rem; align-items: center; padding: .4rem .8rem;
   background: var(--wash); border-bottom: 1px solid var(--faint); font-size: .88rem; }

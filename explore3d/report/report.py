@@ -56,7 +56,7 @@ def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPa
     if is_profile(analysis):
         view = profile_view(analysis.trace, analysis.base, analysis.model.features)
     else:
-        view = object_view(analysis.base.surface, analysis.model.features, sweeps)
+        view = object_view(analysis.base.surface, analysis.model.features, sweeps, analysis.trace.tip_radius)
     sections = [
         what_was_found(analysis, pictures, view),
         against_tolerances(analysis),

@@ -14,7 +14,7 @@ from explore3d.pictures import SweepPath, profile_line, thinned, view_directions
 from explore3d.report.markup import Html, data_script, element, script, text
 from mapping import Feature, FloatArray, Surface, Trace, length_unit
 from mapping.base import Base
-from mapping.inference.kinds import kind_of
+from mapping.inference.kinds import kind_of, sizes_of
 from mapping.model import drawn_at_least, feature_mesh
 
 # More than this makes pages slow without showing more.
@@ -29,13 +29,19 @@ VIEW_BASE_COLOUR = (0.9, 0.915, 0.935)
 SWEEP_COLOUR = (0.42, 0.52, 0.62)
 NOTICED_COLOUR = (0.93, 0.55, 0.13)
 SWEEP_WIDTH, NOTICED_WIDTH = 1.2, 2.4  # px
+FEEL_BOX = Html('<label><input type="checkbox" class="feel"> feel with the pointer (sound, gamepad)</label>')
 LAYERS = {"base": "base", "sweeps": "sweeps", "noticed": "what a sweep noticed", "features": "features"}
 # Shares of a box that the places of a view are rounded to: 3 um of 0.2 m
 STEPS = 65535
 
 
-def object_view(base: Surface, features: Sequence[Feature], sweeps: Sequence[SweepPath]) -> Html:
-    """The base, the sweeps and the features, to be turned by hand; a click on a feature tells its record."""
+def object_view(
+    base: Surface, features: Sequence[Feature], sweeps: Sequence[SweepPath], tip_radius: float | None = None
+) -> Html:
+    """The base, the sweeps and the features, to be turned by hand; a click on a feature tells its record.
+
+    With a tip radius (m) the pointer feels the features as that fingertip does.
+    """
     shown = [_mesh(lighter(base), "base", VIEW_BASE_COLOUR)]
     for feature in features:
         shape = feature_mesh(drawn_at_least(feature, LEAST_FEATURE_SHARE * base.size))
@@ -57,11 +63,16 @@ def object_view(base: Surface, features: Sequence[Feature], sweeps: Sequence[Swe
         "eye": _eye(sweeps, features).tolist(),
         "meshes": shown,
         "lines": lines,
+        "touch": [] if tip_radius is None else [_touch(each, tip_radius) for each in features],
     }
     present = {each["layer"] for each in (*shown, *lines)}
     boxes = [_layer(name, words) for name, words in LAYERS.items() if name in present]
+    scripts = ["viewer.js"]
+    if data["touch"]:
+        boxes.append(FEEL_BOX)
+        scripts.append("touch.js")
     keys = "Drag to turn, shift and drag to move, scroll to zoom, click a feature. Keys: arrows, + −, n and p for the "
-    return _view(boxes, "The object in 3D", keys + "next and previous feature, 0 for the whole.", data, "viewer.js")
+    return _view(boxes, "The object in 3D", keys + "next and previous feature, 0 for the whole.", data, scripts)
 
 
 def profile_view(trace: Trace, base: Base, features: Sequence[Feature]) -> Html:
@@ -91,7 +102,7 @@ def profile_view(trace: Trace, base: Base, features: Sequence[Feature]) -> Html:
     keys = (
         "Scroll to zoom, drag to move, click a feature. Keys: arrows, + −, n and p for the next and previous feature, "
     )
-    return _view([], "The height along the profile", keys + "0 for the whole.", data, "profile.js")
+    return _view([], "The height along the profile", keys + "0 for the whole.", data, ["profile.js"])
 
 
 def hover_text(feature: Feature) -> list[str]:
@@ -105,23 +116,31 @@ def hover_text(feature: Feature) -> list[str]:
     return [*lines, f"signal to noise {feature.evidence.snr:.0f}, crossings {feature.evidence.crossings}", finer]
 
 
-def _view(boxes: Sequence[Html], label: str, keys: str, data: dict[str, Any], code: str) -> Html:
-    """A canvas with its buttons, its data, and the script that draws them."""
+def _view(boxes: Sequence[Html], label: str, keys: str, data: dict[str, Any], codes: Sequence[str]) -> Html:
+    """A canvas with its buttons, its data, and the scripts that draw them."""
     tools = element("div", *boxes, element("button", "show all", type="button", class_="reset"), class_="tools")
     canvas = element("canvas", tabindex="0", role="application", aria_label=f"{label}. {keys}")
-    flat = " flat" if code == "profile.js" else ""
+    flat = " flat" if "profile.js" in codes else ""
+    strip = [element("canvas", class_="strip", hidden="hidden")] if "touch.js" in codes else []
     stage = element(
         "div",
         canvas,
         element("pre", class_="label", hidden="hidden", aria_live="polite"),
         *([] if flat else [element("div", class_="scale")]),
+        *strip,
         class_="stage",
     )
     whole = element("div", tools, stage, id="view", class_=f"view{flat}")
-    program = Path(__file__).with_name(code).read_text(encoding="utf-8")
+    programs = [Path(__file__).with_name(code).read_text(encoding="utf-8") for code in codes]
     # the scripts are wrapped, so that their names are nobody else's
-    wrapped = script("{\n" + program + "}\n")
+    wrapped = "".join(script("{\n" + program + "}\n") for program in programs)
     return Html(whole + element("p", keys, class_="hint") + data_script("view-data", data) + wrapped)
+
+
+def _touch(feature: Feature, tip_radius: float) -> dict[str, Any]:
+    """What the pointer feels of a feature: its axis, its height and the half-width of what it does to the trace."""
+    half = sizes_of(feature, tip_radius).half_width
+    return {"axis": feature.axis.ravel().tolist(), "height": float(feature.height.median), "half": half}
 
 
 def _layer(name: str, words: str) -> Html:

@@ -55,6 +55,16 @@ function matrix(camera, aspect) {
   return Float32Array.from({ length: 16 }, (_, i) => rows[i % 4][Math.floor(i / 4)]);
 }
 
+// From where and in which direction a place of the canvas (shares of it, from the upper left) is looked at.
+function ray(camera, aspect, x, y) {
+  const [right, up, back] = frame(camera.yaw, camera.pitch), half = Math.tan(0.5 * FIELD);
+  const [aside, above] = [(2 * x - 1) * half * aspect, (1 - 2 * y) * half];
+  return [
+    camera.target.map((each, i) => each + camera.distance * back[i]),
+    back.map((each, i) => aside * right[i] + above * up[i] - each),
+  ];
+}
+
 // Where a point is seen, px from the upper left corner; null behind the camera.
 function seenAt(point, m, width, height) {
   const clip = [0, 1, 3].map((row) => m[row] * point[0] + m[4 + row] * point[1] + m[8 + row] * point[2] + m[12 + row]);
@@ -145,7 +155,7 @@ function show(root, data) {
     gl.enableVertexAttribArray(0);
     gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
     buffer(gl.ELEMENT_ARRAY_BUFFER, faces);
-    return { ...part, array, count: faces.length };
+    return { ...part, array, count: faces.length, points, faces };
   });
   const lines = data.lines.map((part) => {
     const array = gl.createVertexArray(), ends = pieces(places(part), part.starts);
@@ -351,7 +361,11 @@ function show(root, data) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   reset();
   draw();
-  return { choose, pick, at: (id) => centreOf(features.find((each) => each.id === id)) };
+  const looked = (x, y) => {
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    return ray(camera, width / height, x / width, y / height);
+  };
+  return { choose, pick, ray: looked, base: meshes.find((part) => !part.id), at: (id) => centreOf(features.find((each) => each.id === id)) };
 
   function centreOf(part) {
     const middle = part.low.map((each, i) => each + 0.5 * part.span[i]);
@@ -363,5 +377,5 @@ if (typeof document !== "undefined") {
   const root = document.getElementById("view");
   window.explore3dView = show(root, JSON.parse(document.getElementById("view-data").textContent));
 } else {
-  module.exports = { bytes, places, pieces, frame, matrix, seenAt, overview, roundLength };
+  module.exports = { bytes, places, pieces, frame, matrix, ray, seenAt, overview, roundLength };
 }

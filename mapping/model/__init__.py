@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         Tolerance as Tolerance,
         judged as judged,
     )
+    from mapping.model.touchable import touchable as touchable
 
 _PUBLIC = {
     "comparison": ("Change", "Comparison", "compare_models"),
@@ -36,5 +37,6 @@ _PUBLIC = {
     "registration": ("Registration", "register"),
     "table": ("SIZES", "probability", "rows"),
     "tolerance": ("ANY", "FAIL", "PASS", "TOLERATED_SIZES", "UNDECIDED", "Judgement", "Tolerance", "judged"),
+    "touchable": ("touchable",),
 }
 doorway(__name__, _PUBLIC)

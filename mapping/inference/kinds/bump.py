@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
+from mapping.geometry.proxy import Bell, Part
 from mapping.geometry.templates import chain_height
 from mapping.inference.families import (
     BellShape,
@@ -34,6 +35,13 @@ class Bump(Crest, PointKind):
         if feature.details.exponent is None:
             return super().trace(feature, feet, normals, tip_radius)
         return _bell(feature, feet, tip_radius)
+
+    def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
+        """The cap, or the bell that the feature's details describe."""
+        scale, exponent, height = feature.details.scale, feature.details.exponent, feature.height.median
+        if scale is None or exponent is None or not height > 0.0:
+            return super().part(feature, exaggeration)
+        return Bell(feature.axis[0], feature.normals[0], exaggeration * height, exaggeration * scale, exponent)
 
     def shape(self, seen: Seen) -> BumpShape:
         return bump_shape(seen.window, seen.spot, seen.sizes, seen.tip_radius, seen.free)

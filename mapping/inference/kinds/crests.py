@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
+from mapping.geometry.proxy import Chain, Part
 from mapping.geometry.templates import chain_height, contact_half_width, radius_of_cap, width_of_cap
 from mapping.inference.kinds.kind import Kind, Section
 from mapping.inference.likelihood import Shape
@@ -20,22 +21,35 @@ class Crest(Kind):
 
     def trace(self, feature: Feature, feet: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
         """(N,) heights of a chain of capsules, m; see `Kind.trace`."""
-        height, width = feature.height.median, max(feature.width.median, 1e-12)
+        height = feature.height.median
         if height <= 0.0:
             return np.zeros(len(feet))
-        known = feature.details.radius
-        radius = float(radius_of_cap(height, width) if known is None else known)
+        radius = crest_radius(feature)
         # a low and wide one is a part of a large ball, which on a bent base comes out again elsewhere
         near = axis_distance(feet, feature.axis) < CREST_TRACE_REACH * contact_half_width(height, radius, tip_radius)
         crest = feature.axis + (height - radius) * feature.normals
         over = np.minimum(chain_height(feet, normals, crest, radius, tip_radius), height)
         return np.where(near, over, 0.0)
 
+    def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
+        """The chain of capsules; None of one that does not stand out."""
+        height = exaggeration * feature.height.median
+        if not height > 0.0:
+            return None
+        return Chain(feature.axis, feature.normals, height, exaggeration * crest_radius(feature))
+
     def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
         """Height and width of a round section, and its radius."""
         radii = np.exp(draws[:, -1])
         cap = Interval.from_draws(width_of_cap(draws[:, -2], radii))
         return Section(Interval.from_draws(draws[:, -2]), cap, {"radius": float(np.median(radii))})
+
+
+def crest_radius(feature: Feature) -> float:
+    """Radius of a crest's section, m: as fitted, or of the cap of its height and width."""
+    known = feature.details.radius
+    width = max(feature.width.median, 1e-12)
+    return float(radius_of_cap(feature.height.median, width) if known is None else known)
 
 
 def axis_distance(points: FloatArray, axis: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
+from mapping.geometry.proxy import Part, Trench
 from mapping.geometry.templates import rim_height
 from mapping.inference.families import Sizes
 from mapping.inference.kinds.crests import axis_distance
@@ -28,6 +29,11 @@ class Hollow(Kind):
         if height >= 0.0:
             return np.zeros(len(feet))
         return rim_height(0.5 * width - axis_distance(feet, feature.axis), tip_radius, -height)
+
+    def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
+        """The trench; None of one that is not hollow. Where the bottom was not felt, it is as deep as the ball sank."""
+        depth, width = -exaggeration * feature.height.median, exaggeration * feature.width.median
+        return Trench(feature.axis, feature.normals, width, depth) if depth > 0.0 and width > 0.0 else None
 
     def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
         """Depth and width; where the ball hangs between the rims, the dip bounds the depth from below (censored)."""

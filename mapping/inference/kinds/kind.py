@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval, MappingError
+from mapping.geometry.proxy import Part
 from mapping.geometry.templates import contact_half_width, radius_of_cap
 from mapping.inference.families import PosteriorProblem, Sizes, Surroundings
 from mapping.inference.likelihood import Shape
@@ -136,6 +137,15 @@ class Kind:
                 ) -> FloatArray:  # fmt: skip
         """(N,) heights for a picture of a sweep that crosses the feature at places x (N,), m; others as in `trace`."""
         return self.trace(feature, feet, normals, tip_radius)
+
+    def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
+        """The feature's median shape as a body that can be touched; None where no closed form, or no side, is known.
+
+        Args:
+            feature: of this kind.
+            exaggeration: factor of its section, height and width; the axis stays.
+        """
+        return None
 
     def outline(self, height: float, width: float) -> tuple[FloatArray, bool]:
         """The section (M, 2) that a mesh is drawn with, m (across, outward), and whether it closes to a tube."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
+from mapping.geometry.proxy import Part, Terrace
 from mapping.geometry.templates import contact_half_width, step_height
 from mapping.inference.families import Sizes, StepShape
 from mapping.inference.kinds.kind import Section, place_sd, preliminary
@@ -35,7 +36,15 @@ class Step(LineKind):
 
     def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
         sign = 1.0 if feature.height.median >= 0.0 else -1.0
-        return Section(Interval.from_draws(sign * draws[:, -1]), Interval(0.0, 0.0, 0.0))
+        side = {"high_side": shape.high_side}  # type: ignore[attr-defined]
+        return Section(Interval.from_draws(sign * draws[:, -1]), Interval(0.0, 0.0, 0.0), side)
+
+    def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
+        """The terrace; None of an edge whose higher side was not recorded, or that is a point or closed."""
+        side, height = feature.details.high_side, exaggeration * abs(feature.height.median)
+        if side is None or not height > 0.0 or len(feature.axis) < 2 or feature.closed:
+            return None
+        return Terrace(feature.axis, feature.normals, height, side)
 
     def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
         s, lateral, _ = shape.chart.coordinates(feet)

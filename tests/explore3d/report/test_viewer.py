@@ -116,3 +116,37 @@ def test_a_profiles_view_finds_its_places_by_halving() -> None:
     for value in (-1.0, 0.1, 0.2, 0.9, 2.0):
         assert told("profile.js", f"v.firstFrom({x}, {value})") == int(np.searchsorted(x, value))
     assert [word for _, word in told("profile.js", "v.ticks(-0.31, 0.42, 5)")] == ["-0.2", "0.0", "0.2", "0.4"]
+
+
+@node
+def test_the_pointer_looks_where_a_point_is_seen() -> None:
+    camera = json.dumps({"target": [0.1, -0.2, 0.05], "distance": 0.7, "size": 0.3, "yaw": 0.8, "pitch": 0.4})
+    point = np.array([0.12, -0.17, 0.08])
+    column, row = told("viewer.js", f"v.seenAt({point.tolist()}, v.matrix({camera}, 1.6), 640, 400)")
+    origin, way = map(np.array, told("viewer.js", f"v.ray({camera}, 1.6, {column / 640}, {row / 400})"))
+    along = (point - origin) @ way / (way @ way)
+    np.testing.assert_allclose(origin + along * way, point, atol=1e-8)
+
+
+@node
+def test_the_pointer_meets_the_nearest_face_and_feels_what_is_there() -> None:
+    points = [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1]
+    call = f"v.meets({points}, [0, 1, 2, 3, 4, 5], [0.2, 0.2, 5], [0, 0, -2])"
+    np.testing.assert_allclose(told("touch.js", call), [0.2, 0.2, 1.0])
+    assert told("touch.js", f"v.meets({points}, [0, 1, 2], [0.9, 0.9, 5], [0, 0, -1])") is None
+    features = json.dumps(
+        [{"axis": [0, -1, 0, 0, 1, 0], "height": 0.2, "half": 0.5}, {"axis": [3, 0, 0], "height": -0.1, "half": 0.4}]
+    )
+    heights = told("touch.js", f"[...v.crossed([-1, 0, 0], [3, 0, 0], {features}, 9)]")
+    np.testing.assert_allclose(heights, [0, 0, 0.2, 0, 0, 0, 0, 0, -0.1], atol=1e-7)
+    loud = told("touch.js", "[...v.sound([0, 0, 1, 1], 10, 1e9)]")
+    np.testing.assert_allclose(loud, [0, 0, 1e-8, 0], atol=1e-12)
+
+
+def test_the_view_says_what_the_pointer_feels_only_if_it_knows_the_tip() -> None:
+    features = ObjectModel.attach(BASE, (ridge(),)).features
+    silent, felt = (object_view(BASE.surface, features, [sweep(0.01)], tip) for tip in (None, 10e-3))
+    assert data_of(silent)["touch"] == [] and "touch.js" not in silent and 'class="feel"' not in silent
+    (touch,) = data_of(felt)["touch"]
+    assert touch["height"] == pytest.approx(0.65e-3, rel=0.1) and touch["half"] > 1e-3
+    assert 'class="feel"' in felt and len(felt) - len(silent) < 9_000

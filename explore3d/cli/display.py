@@ -1,0 +1,147 @@
+"""explore3d display, vibrate: what was found, for the hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from explore3d import UnitError, UserError
+from explore3d.cli.options import Json, TipRadius, length, point
+
+Model = Annotated[Path, typer.Argument(metavar="MODEL", help="Folder or model.json of an annotated model.")]
+Exaggeration = Annotated[
+    float, typer.Option(help="Make the features' heights and widths so many times larger, 1 to 100.")
+]
+Speed = Annotated[str, typer.Option(help="Speed of the crossing.")]
+
+
+def display(
+    model: Model,
+    device: Annotated[str, typer.Option(help="simulated, or one of an installed package.")] = "simulated",
+    log: Annotated[Path | None, typer.Option("--log", help="Record what is felt: an MCAP log for analyze.")] = None,
+    tip_radius: TipRadius = None,
+    stiffness: Annotated[float, typer.Option(help="Of the surface, N/m.")] = 500.0,
+    friction: Annotated[float, typer.Option(help="Coefficient of friction.")] = 0.0,
+    damping: Annotated[float, typer.Option(help="Virtual damping while it touches, N s/m.")] = 0.0,
+    exaggeration: Exaggeration = 1.0,
+    scale: Annotated[float, typer.Option(help="Millimetres on the model for each millimetre of the device.")] = 1.0,
+    origin: Annotated[
+        str, typer.Option(metavar="X,Y,Z", help="Place on the model where the device's origin is.")
+    ] = "0 mm, 0 mm, 0 mm",
+    rate: Annotated[str, typer.Option(help="Of the simulated device; a real one says its own.")] = "1 kHz",
+    speed: Speed = "30 mm/s",
+    seconds: Annotated[float | None, typer.Option(help="Stop after so long.")] = None,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="Let the simulated device run as fast as it can, not by the clock.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Feel a model with a force-feedback device, or let a simulated hand cross each of its features.
+
+    The force is zero when the program ends, however it ends, and within 5 ms when the device falls silent.
+
+    Example: explore3d display out/wire --log felt.mcap
+    """
+    import sys
+    from json import dumps
+
+    from explore3d import parse_rate
+    from explore3d.report.display import feel, live
+    from hw.display import Rendering
+    from mapping import ObjectModel
+
+    _positive("--seconds", seconds)
+    rendering = Rendering(
+        stiffness=stiffness, friction=friction, damping=damping, scale=scale, origin=point("--origin", origin)
+    )
+    known = ObjectModel.load(model)
+    look = None if json or not sys.stderr.isatty() else live(known)
+    felt = feel(
+        known,
+        device,
+        tip_radius=None if tip_radius is None else length("--tip-radius", tip_radius, positive=True),
+        exaggeration=exaggeration,
+        rendering=rendering,
+        rate=_parsed("--rate", rate, parse_rate),
+        speed=_speed(speed),
+        seconds=seconds,
+        paced=not fast,
+        log=log,
+        look=look,
+    )
+    if look is not None:
+        print(file=sys.stderr)  # the live line ends
+    print(dumps(felt.record(), allow_nan=False) if json else "\n".join(felt.lines()))
+    if log is not None and not json:
+        print(f"log: {log}")
+
+
+def vibrate(
+    model: Model,
+    path: Annotated[
+        str, typer.Option("--path", metavar="X,Y,Z; X,Y,Z", help="Places over the model that the fingertip crosses.")
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="File: .wav, .ahap (Apple) or .hjif (MPEG).")],
+    speed: Speed = "30 mm/s",
+    tip_radius: TipRadius = None,
+    exaggeration: Exaggeration = 1.0,
+    full_scale: Annotated[
+        str | None, typer.Option(help="Height that full scale stands for, of the actuator; else the crossing's own.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Write what a fingertip that crosses a model feels as a vibration, and say how it stands to people's thresholds.
+
+    Example: explore3d vibrate out/wire --path "0 mm, -10 mm, 0 mm; 0 mm, 10 mm, 0 mm" --out wire.wav
+    """
+    from json import dumps
+
+    import numpy as np
+
+    from explore3d.report.display import haptic_file, vibration
+    from mapping import ObjectModel
+
+    places = np.array([point("--path", each) for each in path.split(";")])
+    found = vibration(
+        ObjectModel.load(model),
+        places,
+        _speed(speed),
+        tip_radius=None if tip_radius is None else length("--tip-radius", tip_radius, positive=True),
+        exaggeration=exaggeration,
+    )
+    scale = None if full_scale is None else length("--full-scale", full_scale, positive=True)
+    haptic_file(found, out, scale)
+    low, high = found.band()
+    record = {
+        "file": str(out),
+        "seconds": found.duration,
+        "amplitude": found.amplitude,
+        "band": [low, high],
+        "events": found.events.tolist(),
+        "times_threshold": found.above_threshold(),
+    }
+    print(dumps(record, allow_nan=False) if json else "\n".join([*found.lines(), f"vibration: {out}"]))
+
+
+def _speed(text: str) -> float:
+    from explore3d import parse_speed
+
+    return _parsed("--speed", text, parse_speed)
+
+
+def _parsed(option: str, text: str, parse: Callable[[str], float]) -> float:
+    try:
+        value = parse(text)
+    except UnitError as error:
+        raise UserError(f"{option}: {error}") from error
+    if not value > 0.0:
+        raise UserError(f"{option}: should be greater than 0; found {text!r}")
+    return value
+
+
+def _positive(option: str, value: float | None) -> None:
+    if value is not None and not value > 0.0:
+        raise UserError(f"{option}: should be greater than 0; found {value:g}")

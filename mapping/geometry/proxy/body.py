@@ -1,0 +1,217 @@
+"""ProxyBody: a base with its fine features' closed forms, laid out for the proxy's kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mapping import BoolArray, ContactError, FloatArray, Surface
+from mapping.geometry.mesh import NearestPoint, TriangleTree, distances
+from mapping.geometry.proxy.draping import CHORD_ERROR, followed, joined, terrace_mesh, trench_mesh
+from mapping.geometry.proxy.parts import Bell, Chain, Part, Terrace, Trench
+
+# Legs of a chain, and rings of a bell, that share a bounding sphere
+LEGS_PER_GROUP = 16
+# A low cap is part of a large sphere, which on a bent base comes out again elsewhere: it is there up to this many
+# half-widths of its own chord, as in `mapping.inference.kinds`
+CAP_REACH = 1.5
+# A bell ends where it is hardly higher than the base: this share of its height
+BELL_END = 1e-4
+
+
+class ProxyBody:
+    """What a proxy touches: the union of a base and of what stands on it, without what is cut out of it.
+
+    Args:
+        base: the mesh.
+        parts: the features.
+        radius: of the ball that will touch it, m.
+
+    Raises:
+        ContactError: sizes that are not positive and finite, axes of the wrong shape.
+    """
+
+    def __init__(self, base: Surface, parts: Sequence[Part], radius: float) -> None:
+        if not (np.isfinite(radius) and radius > 0):
+            raise ContactError(f"the proxy's radius must be a positive length in metres; found {radius!r}")
+        for part in parts:
+            _check(part)
+        self.base, self.radius = NearestPoint(base), float(radius)
+        # the legs of an axis cut corners on a bent base: it is the base that the feature lies on
+        parts = [each if isinstance(each, Bell) else self._laid(each) for each in parts]
+        self.parts = tuple(parts)
+        trenches = [part for part in parts if isinstance(part, Trench)]
+        meshes = [(base.vertices, base.faces), *(trench_mesh(each, self.base) for each in trenches)]
+        meshes += [terrace_mesh(each, self.base) for each in parts if isinstance(each, Terrace)]
+        whole = joined(meshes)
+        self._tree = TriangleTree(Surface(*whole), 2.0 * radius)
+        is_open = np.zeros(len(whole[1]), dtype=np.uint8)
+        is_open[: len(base.faces)] = _touched(base, trenches)
+        rounds, groups = self._rounds([part for part in parts if isinstance(part, Chain | Bell)])
+        legs, hulls = self._legs(trenches)
+        tree = self._tree
+        self.arrays: tuple[Any, ...] = (
+            tree.rows, tree.leaves, tree.boxes, tree.links, np.ascontiguousarray(is_open[tree.order]),
+            rounds, groups, legs, hulls,
+        )  # fmt: skip
+
+    @property
+    def top(self) -> float:
+        """Height of the highest part over the base, m."""
+        return max((part.height for part in self.parts if not isinstance(part, Trench)), default=0.0)
+
+    @property
+    def bottom(self) -> float:
+        """Depth of the deepest part below the base, m."""
+        return max((part.depth for part in self.parts if isinstance(part, Trench)), default=0.0)
+
+    @property
+    def scale(self) -> float:
+        """Length of one metre in the frame of the kernels."""
+        return float(self._tree.scale_in(1.0))
+
+    def into(self, points: FloatArray) -> FloatArray:
+        """Points (N, 3), m, in the frame of the kernels."""
+        return self._tree.into(points)
+
+    def out(self, points: FloatArray) -> FloatArray:
+        """Points (N, 3) of the frame of the kernels, m."""
+        return self._tree.out(points)
+
+    def gaps(self, centers: FloatArray, reach: float) -> FloatArray:
+        """(N,) gap between balls at centres (N, 3), m, and the body, m; `reach` where it is larger."""
+        from mapping.geometry.proxy import proxy_kernels
+
+        out = np.empty(len(centers))
+        scale = self.scale
+        proxy_kernels.least_gaps(self.arrays, scale * self.radius, self.into(centers), scale * reach, out)
+        return out / scale
+
+    def _laid(self, part: Chain | Trench | Terrace) -> Chain | Trench | Terrace:
+        axis, normals = followed(part.axis, part.normals, self.base)
+        return replace(part, axis=axis, normals=normals)
+
+    def _rounds(self, parts: Sequence[Chain | Bell]) -> tuple[FloatArray, FloatArray]:
+        rows = [self._capsules(part) if isinstance(part, Chain) else self._rings(part) for part in parts]
+        groups: list[tuple[FloatArray, float, int, int]] = []
+        first = 0
+        for block in rows:
+            for start in range(0, len(block), LEGS_PER_GROUP):
+                some = block[start : start + LEGS_PER_GROUP]
+                low, high = _ends(some)
+                ends = np.concatenate([low, high])
+                center = 0.5 * (ends.min(axis=0) + ends.max(axis=0))
+                reach = float((np.linalg.norm(ends - center, axis=1) + np.tile(_widths(some), 2)).max())
+                groups.append((center, reach, first + start, first + start + len(some)))
+            first += len(block)
+        table = [np.concatenate([center, [reach, start, stop]]) for center, reach, start, stop in groups]
+        return _rows(rows, 15), _rows([np.array(table)] if table else [], 6)
+
+    def _capsules(self, chain: Chain) -> FloatArray:
+        """(K - 1, 15) or, of a bump, (1, 15): ends, radius, normal, least cosine to it, kind."""
+        line = self.into(chain.axis + (chain.height - chain.radius) * chain.normals)
+        legs = max(len(line) - 1, 1)
+        rows = np.zeros((legs, 15))
+        rows[:, 0:3], rows[:, 3:6] = line[:legs], line[-legs:]
+        rows[:, 6] = self.scale * chain.radius
+        up = chain.normals[:legs] + chain.normals[-legs:]
+        rows[:, 7:10] = up / np.linalg.norm(up, axis=1, keepdims=True)
+        rows[:, 10] = -2.0
+        if chain.height < chain.radius:
+            share = 1.0 - chain.height / chain.radius
+            sine = CAP_REACH * np.sqrt((1.0 - share) * (1.0 + share))
+            rows[:, 10] = np.sqrt(1.0 - sine**2) if sine < 1.0 else -2.0
+        return rows
+
+    def _rings(self, bell: Bell) -> FloatArray:
+        """(M, 15): foot, axis, (distance from axis, height) of both circles of each ring, kind, the bell's sizes."""
+        u = meridian(bell)
+        z = bell.height * (1.0 + (u / bell.scale) ** 2 / bell.exponent) ** -bell.exponent
+        rows = np.zeros((len(u) - 1, 15))
+        rows[:, 0:3] = self.into(bell.point[None])
+        rows[:, 3:6] = bell.normal
+        rows[:, 6:10] = self.scale * np.column_stack([u[:-1], z[:-1], u[1:], z[1:]])
+        rows[:, 11] = 1.0
+        rows[:, 12:15] = self.scale * bell.height, self.scale * bell.scale, bell.exponent
+        return rows
+
+    def _legs(self, trenches: Sequence[Trench]) -> tuple[FloatArray, FloatArray]:
+        rows, hulls, first = [], [], 0
+        for trench in trenches:
+            axis = self.into(trench.axis)
+            legs, half = max(len(axis) - 1, 1), 0.5 * self.scale * trench.width
+            up = trench.normals[:legs] + trench.normals[-legs:]
+            block = np.zeros((legs, 11))
+            block[:, 0:3], block[:, 3:6], block[:, 9] = axis[:legs], axis[-legs:], half
+            block[:, 6:9] = up / np.linalg.norm(up, axis=1, keepdims=True)
+            if len(axis) > 1 and not np.array_equal(axis[0], axis[-1]):
+                block[0, 10] += 1.0
+                block[-1, 10] += 2.0
+            center = 0.5 * (axis.min(axis=0) + axis.max(axis=0))
+            reach = np.linalg.norm(axis - center, axis=1).max() + half
+            hulls.append(np.concatenate([center, [reach, first, first + legs]]))
+            rows.append(block)
+            first += legs
+        return _rows(rows, 11), _rows([np.array(hulls)] if hulls else [], 6)
+
+
+def meridian(bell: Bell) -> FloatArray:
+    """(M,) distances from the axis between which chords of a bell miss it by CHORD_ERROR at most, m."""
+    p, w = bell.exponent, bell.scale
+    end = w * np.sqrt(p * np.expm1(-np.log(BELL_END) / p))
+    fine = w * np.sinh(np.linspace(0.0, np.arcsinh(end / w), 4001))
+    base = 1.0 + (fine / w) ** 2 / p
+    z = bell.height * base**-p
+    slope = np.gradient(z, fine)
+    bend = np.abs(np.gradient(slope, fine)) / (1.0 + slope**2) ** 1.5
+    speed = np.sqrt(1.0 + slope**2)
+    # a chord of length l misses a curve of curvature k by k l^2 / 8
+    density = speed * np.sqrt(bend / (8.0 * CHORD_ERROR))
+    parts = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))])
+    return np.asarray(np.interp(np.linspace(0.0, parts[-1], 2 + int(parts[-1])), parts, fine))
+
+
+def _ends(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Ends of the skeleton of capsules, or of rings, (M, 3) each."""
+    if rows[0, 11] == 0.0:
+        return rows[:, 0:3], rows[:, 3:6]
+    return rows[:, 0:3] + rows[:, 7:8] * rows[:, 3:6], rows[:, 0:3] + rows[:, 9:10] * rows[:, 3:6]
+
+
+def _widths(rows: FloatArray) -> FloatArray:
+    """Distance of the surface from the skeleton, at most."""
+    return np.asarray(rows[:, 6] if rows[0, 11] == 0.0 else rows[:, 8])
+
+
+def _rows(blocks: Sequence[FloatArray], width: int) -> FloatArray:
+    return np.ascontiguousarray(np.concatenate(blocks)) if blocks else np.zeros((0, width))
+
+
+def _touched(base: Surface, trenches: Sequence[Trench]) -> BoolArray:
+    """(F,) True of faces that a trench may open."""
+    corners = base.vertices[base.faces]
+    middle = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    touched = np.zeros(len(middle), dtype=bool)
+    for trench in trenches:
+        touched |= distances(middle, trench.axis) <= reach + 0.5 * trench.width
+    return touched
+
+
+def _check(part: Part) -> None:
+    """Raises ContactError for sizes that no part can have."""
+    for name in ("height", "radius", "scale", "exponent", "width", "depth"):
+        size = getattr(part, name, 1.0)
+        if not (np.isfinite(size) and size > 0.0):
+            raise ContactError(f"a {type(part).__name__.lower()}'s {name} must be positive and finite; found {size!r}")
+    axis = part.point[None] if isinstance(part, Bell) else part.axis
+    normals = part.normal[None] if isinstance(part, Bell) else part.normals
+    if axis.ndim != 2 or axis.shape[1] != 3 or axis.shape != normals.shape or not np.isfinite(axis).all():
+        raise ContactError(
+            f"an axis and its normals must be finite and of one shape (K, 3); found {axis.shape} and {normals.shape}"
+        )
+    if isinstance(part, Terrace) and (len(axis) < 2 or np.array_equal(axis[0], axis[-1])):
+        raise ContactError("a step's edge needs two ends; a closed one, or a single point, says no higher side")

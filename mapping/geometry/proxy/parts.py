@@ -1,0 +1,81 @@
+"""Parts: the closed forms of fine features as bodies, which a proxy touches: added to a base, or cut into it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mapping import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A ridge or a round bump: a chain of capsules whose crest stands over the base.
+
+    Args:
+        axis: (K, 3) points of the base under the crest, m; one of a bump.
+        normals: (K, 3) outward unit normals there.
+        height: of the crest over the base, m, positive.
+        radius: of the section, m, positive.
+    """
+
+    axis: FloatArray
+    normals: FloatArray
+    height: float
+    radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Bell:
+    """A bump with a skirt, z = height (1 + u^2 / (p scale^2))^-p about the normal (theory equation 2.7).
+
+    Args:
+        point, normal: (3,) m, and the outward unit normal.
+        height, scale: m, positive; exponent: p, positive.
+    """
+
+    point: FloatArray
+    normal: FloatArray
+    height: float
+    scale: float
+    exponent: float
+
+
+@dataclass(frozen=True, eq=False)
+class Trench:
+    """A groove or a pit: all of the base that is nearer to the axis than half the width, lowered, with upright walls.
+
+    A groove ends square at the ends of its axis, as the family that is fitted to it does.
+
+    Args:
+        axis: (K, 3) points of the base, m; one of a pit; first equals last of a closed groove.
+        normals: (K, 3) outward unit normals there.
+        width, depth: m, positive.
+    """
+
+    axis: FloatArray
+    normals: FloatArray
+    width: float
+    depth: float
+
+
+@dataclass(frozen=True, eq=False)
+class Terrace:
+    """A step: the base on one side of an upright edge, raised.
+
+    The record of a step says where the edge is and how high, not how far the higher level goes: it runs as far from
+    the edge as the edge is long, then down on a ramp; so it does past the ends of the edge.
+
+    Args:
+        axis: (K, 3) points of the base under the edge, m, K >= 2.
+        normals: (K, 3) outward unit normals there.
+        height: m, positive.
+        high_side: +1 if the side of normal x tangent is the higher one, else -1.
+    """
+
+    axis: FloatArray
+    normals: FloatArray
+    height: float
+    high_side: float
+
+
+Part = Chain | Bell | Trench | Terrace
