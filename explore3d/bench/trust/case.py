@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from explore3d.analysis import Analysis, Stages, build_model
+from explore3d.analysis import Analysis, Stages, build_model, compare
 from explore3d.bench.trust.laws import LAWS, Level, Path
 from explore3d.bench.trust.paths import (
-    SWEEP_LENGTH,
-    SWEEPS,
+    PATH_LENGTH,
+    SWEEPS_SIDE_BY_SIDE,
     TRUST_BODIES,
     WIRE_DRAWS,
     WIRE_PLACES,
@@ -86,7 +86,7 @@ class Case:
 
 def recordings_of(metres: float, wires: int) -> tuple[int, int]:
     """How many bare recordings are so many metres, and how many with wires have so many."""
-    return ceil(metres / (SWEEPS * SWEEP_LENGTH)), ceil(wires / len(WIRE_PLACES))
+    return ceil(metres / (SWEEPS_SIDE_BY_SIDE * PATH_LENGTH)), ceil(wires / len(WIRE_PLACES))
 
 
 def cases(of: str, laws: Sequence[str], bodies: Sequence[str], bare: int, wired: int) -> Iterator[Case]:
@@ -205,8 +205,6 @@ def _recovery(analysis: Analysis, laid: LaidTrace, rng: np.random.Generator) -> 
 
 def _against_truth(analysis: Analysis, path: Path, truth: Sequence[Any]) -> dict[str, Any]:
     """How many wires were found and whether their intervals hold them."""
-    from explore3d.analysis.truth import compare
-
     rows = compare(analysis.model, truth, path.tip_radius)
     found = [row for row in rows if row.status == "found"]
     inside: dict[str, list[bool]] = {

@@ -6,6 +6,7 @@ recorded. Its level is a standard deviation of single samples unless its sentenc
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -39,7 +40,7 @@ class Path:
     def parts(self) -> list[slice]:
         """The samples of each sweep."""
         edges = np.flatnonzero(np.diff(self.sweep, prepend=-1, append=self.sweep[-1] + 1))
-        return [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
 
     @property
     def t(self) -> FloatArray:
@@ -149,7 +150,7 @@ def _mixed(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
 
 def _tones(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
     tones = [np.sin(2 * np.pi * (hertz * path.t + rng.random())) for hertz in (8.0, 50.0)]
-    return _white(path, level, rng) + 0.5 * level.sd * np.sum(tones, axis=0)
+    return np.asarray(_white(path, level, rng) + 0.5 * level.sd * np.sum(tones, axis=0))
 
 
 def _resonance(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
@@ -196,7 +197,7 @@ def _linear_drift(path: Path, level: Level, rng: np.random.Generator) -> FloatAr
 def _random_walk(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
     """A walk that comes two levels far over the length of a sweep of forty tips."""
     steps = 2.0 * level.sd * np.sqrt(path.spacing / (40.0 * path.tip_radius))
-    return _white(path, level, rng) + steps * np.cumsum(rng.standard_normal(len(path.sweep)))
+    return np.asarray(_white(path, level, rng) + steps * np.cumsum(rng.standard_normal(len(path.sweep))))
 
 
 def _lines(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:

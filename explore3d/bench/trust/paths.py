@@ -16,8 +16,8 @@ from mapping.base import Base
 from mapping.geometry.contact import BallContact
 
 # Sweeps of one recording, their distance and the distance of their samples in tip radii, and their length, m
-SWEEPS, PITCH, SPACING, SWEEP_LENGTH = 12, 0.5, 0.01, 0.22
-# Wires of one recording; places along the sweeps, shares of these, that they scatter about; their diameters in tip radii
+SWEEPS_SIDE_BY_SIDE, SWEEP_PITCH, SPACING_SHARE, PATH_LENGTH = 12, 0.5, 0.01, 0.22
+# Wires of one recording: places that they scatter about, shares of the sweeps; and their diameters in tip radii
 WIRE_PLACES, WIRE_DIAMETERS = (0.2, 0.5, 0.8), (0.02, 0.05)
 # Wires of so many draws lie on each body
 WIRE_DRAWS = 4
@@ -39,7 +39,7 @@ class Body:
 
 def plane(size: float) -> Body:
     """A plate."""
-    side = 0.5 * SWEEP_LENGTH + size
+    side = 0.5 * PATH_LENGTH + size
     corners = side * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
 
     def at(along: FloatArray, across: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -122,8 +122,8 @@ def wired_path(
     base, wires, truth = Base(surface), [], []
     for share in WIRE_PLACES:
         diameter = tip_radius * rng.uniform(*WIRE_DIAMETERS)
-        place = (share + rng.uniform(-0.05, 0.05) - 0.5) * SWEEP_LENGTH
-        low, high = PITCH * tip_radius * np.array([rng.uniform(-4.5, -2.5), rng.uniform(1.5, 4.5)])
+        place = (share + rng.uniform(-0.05, 0.05) - 0.5) * PATH_LENGTH
+        low, high = SWEEP_PITCH * tip_radius * np.array([rng.uniform(-4.5, -2.5), rng.uniform(1.5, 4.5)])
         across = np.linspace(low, high, 321)
         lean = rng.uniform(-0.3, 0.3)
         axis, up = body.at(place + lean * across, across)
@@ -137,11 +137,11 @@ def wired_path(
 
 def _felt(body: Body, surface: Surface, base: Base, tip_radius: float) -> tuple[Path, Base]:
     """Where the ball rests when it comes from outside."""
-    spacing = SPACING * tip_radius
-    along = np.arange(-0.5 * SWEEP_LENGTH, 0.5 * SWEEP_LENGTH, spacing)
-    across = PITCH * tip_radius * (np.arange(SWEEPS) - 0.5 * (SWEEPS - 1))
-    points, out = body.at(np.tile(along, SWEEPS), np.repeat(across, len(along)))
+    spacing = SPACING_SHARE * tip_radius
+    along = np.arange(-0.5 * PATH_LENGTH, 0.5 * PATH_LENGTH, spacing)
+    across = SWEEP_PITCH * tip_radius * (np.arange(SWEEPS_SIDE_BY_SIDE) - 0.5 * (SWEEPS_SIDE_BY_SIDE - 1))
+    points, out = body.at(np.tile(along, SWEEPS_SIDE_BY_SIDE), np.repeat(across, len(along)))
     contacts = BallContact(surface, tip_radius).first_contact(points + 4.0 * tip_radius * out, -out)
     normals = np.asarray(base.foot(contacts.centers, tip_radius).normals)
-    sweep = np.repeat(np.arange(SWEEPS), len(along))
+    sweep = np.repeat(np.arange(SWEEPS_SIDE_BY_SIDE), len(along))
     return Path(np.array(contacts.centers), normals, sweep, spacing, tip_radius), base

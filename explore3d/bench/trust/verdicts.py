@@ -14,11 +14,12 @@ from explore3d.bench.trust.case import COUNTED_RATE
 from explore3d.bench.trust.laws import LAWS
 from explore3d.report import machine_section, page, paragraph, section, table
 from explore3d.scene import AnalysisSettings
+from mapping.geometry.mesh import write_whole
 
 # A promise is broken beyond this many times the rate that was asked for, and beyond so many features a metre
 MOST_TIMES_ASKED, MOST_FEATURES = 3.0, 0.05
-INTERVALS = ("place", "height", "width", "length", "crossing")
-HEAD = (
+TRUE_VALUES = ("place", "height", "width", "length", "crossing")
+VERDICT_HEAD = (
     "law",
     "m",
     "false/m, 1 asked",
@@ -29,7 +30,7 @@ HEAD = (
     "found at limit",
     "wires found",
     "invented/m beside wires",
-    *(f"{name} in 90 %" for name in INTERVALS),
+    *(f"{name} in 90 %" for name in TRUE_VALUES),
     "CPU s/m",
 )
 
@@ -71,7 +72,7 @@ class Verdict:
 
     @property
     def row(self) -> tuple[str, ...]:
-        """The cells of HEAD."""
+        """The cells of VERDICT_HEAD."""
         cells = [
             self.law,
             f"{self.often[1]:.0f}",
@@ -83,7 +84,7 @@ class Verdict:
             _share_text(self.recovered),
             _share_text(self.found),
             _rate_text(self.invented, MOST_FEATURES / MOST_TIMES_ASKED),
-            *(_share_text(self.inside[name]) for name in INTERVALS),
+            *(_share_text(self.inside[name]) for name in TRUE_VALUES),
             f"{self.cpu:.2f}",
         ]
         return tuple(cells)
@@ -99,7 +100,7 @@ def _verdict(law: str, records: Sequence[dict[str, Any]]) -> Verdict:
     wired = [each for each in records if each["wires"]]
     metres = float(sum(each["metres"] for each in bare))
     limits = [each["limit"] / each["level"] for each in bare if np.isfinite(each["limit"])]
-    inside = {name: [yes for each in wired for yes in each["inside"][name]] for name in INTERVALS}
+    inside = {name: [yes for each in wired for yes in each["inside"][name]] for name in TRUE_VALUES}
     weighed = [any("crests are weighed" in said for said in each["warnings"]) for each in bare]
     return Verdict(
         law,
@@ -156,20 +157,20 @@ def trust_line(record: dict[str, Any]) -> str:
 def verdict_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
     """A line for each law, for the terminal."""
     for each in verdicts:
-        yield ", ".join(f"{name}: {cell}" for name, cell in zip(HEAD, each.row, strict=True))
+        yield ", ".join(f"{name}: {cell}" for name, cell in zip(VERDICT_HEAD, each.row, strict=True))
 
 
-LEAD = (
+TRUST_LEAD = (
     "Simulated instruments of many laws of error sweep bare bodies and bodies that wires lie on. Each recording is "
     "analysed as explore3d analyze does, its body's mesh given, and held against what was promised."
 )
-READING = (
+HOW_TO_READ_IT = (
     "Rates are a metre of inspected path, with the range of rates (90 %) that the count allows; ! marks a rate that is "
     "surely more than three times what was asked for (features: more than 0.05 a metre), ? one that is so by its count "
     "alone. A law is in units of its level, the standard deviation of single samples, and so is the printed limit of "
     "detection. Warned: share of bare recordings of which the analysis says what is unusual. Found at limit: crests of "
-    "the printed limit that were put into bare recordings and found, 95 % promised. Intervals hold the truth in 90 % of "
-    "cases if they are right; crossing: the place of a single sweep's crossing."
+    "the printed limit that were put into bare recordings and found, 95 % promised. Intervals hold the truth in 90 % "
+    "of cases if they are right; crossing: the place of a single sweep's crossing."
 )
 
 
@@ -180,14 +181,14 @@ def write_trust(records: Sequence[dict[str, Any]], of: str, out: Path) -> tuple[
     rows = [each.row for each in verdicts]
     laws = [(name, law.sentence) for name, law in LAWS.items()]
     warned = [(law, said) for law in LAWS if (said := _usual_warnings(records, law))]
-    numeric = tuple(range(1, len(HEAD)))
+    numeric = tuple(range(1, len(VERDICT_HEAD)))
     written = {
         "trust.html": page(
             "Trust",
             "What is promised, under laws of error",
-            LEAD,
-            paragraph(f"Set of seeds and scales: {of}. ", READING),
-            section("Verdicts", "verdicts", table(HEAD, rows, numeric=numeric)),
+            TRUST_LEAD,
+            paragraph(f"Set of seeds and scales: {of}. ", HOW_TO_READ_IT),
+            section("Verdicts", "verdicts", table(VERDICT_HEAD, rows, numeric=numeric)),
             section("Warnings", "warnings", table(("law", "what is said, share of bare recordings"), warned)),
             section("Laws", "laws", table(("law", "what it is"), laws)),
             machine_section(),
@@ -195,9 +196,9 @@ def write_trust(records: Sequence[dict[str, Any]], of: str, out: Path) -> tuple[
         "trust.md": "\n\n".join(
             [
                 f"# Trust: promises under laws of error ({of})",
-                LEAD,
-                READING,
-                _markdown(HEAD, rows),
+                TRUST_LEAD,
+                HOW_TO_READ_IT,
+                _markdown(VERDICT_HEAD, rows),
                 "## Warnings",
                 _markdown(("law", "what is said, share of bare recordings"), warned),
                 "## Laws",
@@ -208,7 +209,7 @@ def write_trust(records: Sequence[dict[str, Any]], of: str, out: Path) -> tuple[
         "trust.json": json.dumps({"set": of, "verdicts": [asdict(each) for each in verdicts]}, indent=1) + "\n",
     }
     for name, text in written.items():
-        (out / name).write_text(text)
+        write_whole(out / name, text)
     return tuple(out / name for name in written)
 
 
