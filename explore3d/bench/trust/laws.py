@@ -217,11 +217,11 @@ def _backlash(path: Path, level: Level, rng: np.random.Generator) -> Recorded:
 
 
 def _stick_slip(path: Path, level: Level, rng: np.random.Generator) -> Recorded:
-    """The finger holds, and slips on by some twelve samples at once; it is recorded all the while."""
+    """The finger holds, and slips on by some four samples at once; it is recorded all the while."""
     index = np.arange(len(path.sweep))
     for part in path.parts:
         count = part.stop - part.start
-        slips = np.unique(np.concatenate([[0], np.cumsum(rng.integers(6, 19, count // 6)), [count]]).clip(0, count))
+        slips = np.unique(np.concatenate([[0], np.cumsum(rng.integers(2, 7, count // 2)), [count]]).clip(0, count))
         index[part] = part.start + np.repeat(slips[:-1], np.diff(slips))
     noise = level.sd * rng.standard_normal(len(index))
     return index, path.centers[index] + noise[:, None] * path.normals[index]
@@ -282,7 +282,7 @@ LAWS: dict[str, Law] = {
     "random walk": Law("white, a random walk of 2 levels over forty tip radii", _heights(_random_walk)),
     "lines": Law("white, each sweep its own offset and slope of 3 levels", _heights(_lines)),
     "backlash": Law("white, each machine axis with a play of one level", _backlash),
-    "stick-slip": Law("white, the finger held and let go on every twelve samples", _stick_slip),
+    "stick-slip": Law("white, the finger held and let go on every four samples", _stick_slip),
     "encoder 0.5": Law("white, coordinates in steps of half a level", _encoder(0.5)),
     "encoder 1": Law("white, coordinates in steps of one level", _encoder(1.0)),
     "gaps": Law("white, three gaps a metre of half a tip radius to two", _gaps),
