@@ -40,8 +40,8 @@ STRIDE = 3
 CORRELATION_LENGTHS = 40
 # Share of a filter's width from which features may have been taken out: its output loses that share of its variance.
 MISSING_SHARE = 0.1
-# Core standard deviations between which outputs are counted, and Student's degrees of freedom among which those of their
-# tails are chosen: a factor of 1.3 apart, for in 10^4 outputs the likeliest scatters by as much.
+# Core standard deviations between which outputs are counted, and Student's degrees of freedom among which those of
+# their tails are chosen, a factor of 1.3 apart.
 TAIL_EDGES = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0])
 TAIL_DEGREES = np.geomspace(3.0, 100.0, 14)
 
@@ -298,7 +298,7 @@ def _doubt(sd: float, threshold: float) -> float:
 
 
 def _heavier_tail(outputs: FloatArray, count: float, threshold: float) -> float:
-    """Factor by which a Gaussian threshold rises for outputs (M,) whose tails are heavier than Gaussian ones; 1 or more.
+    """Factor by which a Gaussian threshold rises for outputs (M,) whose tails are heavier than Gaussian ones.
 
     Counts of outputs between TAIL_EDGES of their core's sd are Student's t's, its degrees of freedom the likeliest of
     a ladder, if that is likelier than Gaussian by Schwarz' criterion.

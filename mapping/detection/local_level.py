@@ -15,9 +15,9 @@ import numpy as np
 from mapping import BoolArray, FloatArray
 from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH, Bank
 
-# Share of the absolute differences of neighbouring bins, the smaller ones, whose mean tells the level of a cell: what is
-# no noise in less than a quarter of it shifts that little, and positions in steps of the noise's own size, half of whose
-# differences may be zero, still tell it, which their median does not. That mean for a Gaussian law, over its sd:
+# Share of the absolute differences of neighbouring bins, the smaller ones, whose mean tells the level of a cell: what
+# is no noise in less than a quarter of it shifts that little, and positions in steps of the noise's own size, half of
+# whose differences may be zero, still tell it, which their median does not. That mean for a Gaussian law, over its sd:
 # sqrt(2 / pi) (1 - exp(-q^2 / 2)) / 0.75 with q = 1.1503, the quantile.
 SMALLER_SHARE, MEAN_OF_SMALLER = 0.75, 0.51489
 # Variance of the logarithm of the variance so told, for one bin; simulated: 5.3 in white noise, 4.1 in correlated noise

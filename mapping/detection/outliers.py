@@ -20,8 +20,9 @@ from mapping.instrument import robust_sd
 
 # Blocks in which the bend is looked for, in samples: a run between two of them loses less than half of its bend.
 BLOCKS = (1, 3, 9, 27, 81)
-# Longest run that is recognised, in tip radii: a crest so wide needs only a thousandth of the radius of height.
-LONGEST_RUN = 0.2
+# Longest run that is recognised, in tip radii: bursts are told by the bends at both their ends, and what is longer may be
+# a part of the body whose ends were passed too fast.
+LONGEST_RUN = 0.5
 # Bends of the trace, in those of the ball, that the body's own curvature and the sampling allow.
 ALLOWED_BEND = 3.0
 # Standard deviations beyond that: at 5 kHz a Gaussian law has one such sample in 10^6 hours.
