@@ -41,9 +41,9 @@ CORRELATION_LENGTHS = 40
 # Share of a filter's width from which features may have been taken out: its output loses that share of its variance.
 MISSING_SHARE = 0.1
 # Core standard deviations between which outputs are counted, and Student's degrees of freedom among which those of
-# their tails are chosen, a factor of 1.3 apart.
+# their tails are chosen, a tenth apart.
 TAIL_EDGES = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0])
-TAIL_DEGREES = np.geomspace(3.0, 100.0, 14)
+TAIL_DEGREES = np.geomspace(3.0, 100.0, 37)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +135,8 @@ def null_scales(
         if all(p.length >= LEAST_SWEEP_WIDTHS * widths[k] for p in profiles):
             inherited, variance = _deviations(told)
         unsure = variance + levels.doubt_over(2 * widths[k] / bank.spacing)
-        doubt[k] = _doubt(0.5 * np.sqrt(unsure), threshold) * _heavier_tail(together, length / widths[k], threshold)
+        tails = _heavier_tail(together, length / widths[k], threshold)
+        doubt[k] = max(_doubt(0.5 * np.sqrt(unsure), threshold), tails)  # an uncertain level makes such tails, too
         level = 2 * np.log(max(robust_sd(together), 1e-12))
         error = LOG_VARIANCE_PER_WIDTH * widths[k] / length + _spread(inherited)
         pooled[k] = _likely_scale(level, error, length / widths[k], len(measured))
@@ -222,12 +223,12 @@ def _seen(local: FloatArray, bins: float) -> FloatArray:
 
 
 def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank, k: int) -> FloatArray:
-    """Absolute outputs of a filter over their sd, one a coarse bin; NaN where what it sees is not all quiet path."""
+    """Outputs of a filter over their sd, one a coarse bin; NaN where what it sees is not all quiet path."""
     f = bank.filters[k]
     if len(height) < 2 * f.coarse:
         return np.full(0, np.nan)
     crest, sd = f.heights(height)
-    z, bins, places = np.abs(crest) / sd, f.half_width / bank.spacing, slice(None, len(crest) * f.coarse, f.coarse)
+    z, bins, places = crest / sd, f.half_width / bank.spacing, slice(None, len(crest) * f.coarse, f.coarse)
     if not (local == 1.0).all():
         z /= _seen(local, bins)[places]
     if not quiet.all():
@@ -301,20 +302,26 @@ def _heavier_tail(outputs: FloatArray, count: float, threshold: float) -> float:
     """Factor by which a Gaussian threshold rises for outputs (M,) whose tails are heavier than Gaussian ones.
 
     Counts of outputs between TAIL_EDGES of their core's sd are Student's t's, its degrees of freedom the likeliest of
-    a ladder, if that is likelier than Gaussian by Schwarz' criterion.
+    a ladder, if that is likelier than Gaussian by Schwarz' criterion. Of both signs the smaller count stands for both:
+    what is too weak to be found makes one of them larger.
 
     Args:
         count: so many of the outputs are independent.
         threshold: in standard deviations; outputs beyond may have been taken out.
     """
-    from scipy.special import ndtr, stdtr, stdtrit
-
     core = robust_sd(outputs)
     edges = TAIL_EDGES[threshold - 0.25 > TAIL_EDGES]
     if core <= 0.0 or len(edges) < 3:
         return 1.0
-    inside = np.searchsorted(np.sort(np.abs(outputs)), core * edges)
-    counts = np.diff(inside, prepend=0) * count / len(outputs)
+    both = [
+        np.diff(np.searchsorted(np.sort(side[side >= 0.0]), core * edges), prepend=0) for side in (outputs, -outputs)
+    ]
+    return _student_factor(2.0 * np.minimum(*both) * (count / len(outputs)), edges, threshold)
+
+
+def _student_factor(counts: FloatArray, edges: FloatArray, threshold: float) -> float:
+    """The same from counts (E,) of independent outputs below each of the edges (E,) and above the one before."""
+    from scipy.special import ndtr, stdtr, stdtrit
 
     def likelihood(below: FloatArray) -> float:
         shares = np.diff(2.0 * below - 1.0, prepend=0.0)
@@ -324,7 +331,7 @@ def _heavier_tail(outputs: FloatArray, count: float, threshold: float) -> float:
     medians = stdtrit(TAIL_DEGREES, 0.75)
     told = [likelihood(stdtr(n, edges * m * MAD_TO_SD)) for n, m in zip(TAIL_DEGREES, medians, strict=True)]
     best = int(np.argmax(told))
-    if 2.0 * (told[best] - likelihood(ndtr(edges))) <= np.log(max(count, 2.0)) + 2.0 * np.log(len(TAIL_DEGREES)):
+    if 2.0 * (told[best] - likelihood(ndtr(edges))) <= np.log(max(counts.sum(), 2.0)) + 2.0 * np.log(len(TAIL_DEGREES)):
         return 1.0
     quantile = -stdtrit(TAIL_DEGREES[best], float(ndtr(-threshold)))
     return float(max(1.0, quantile / (medians[best] * MAD_TO_SD) / threshold))

@@ -20,16 +20,17 @@ from mapping.instrument import robust_sd
 
 # Blocks in which the bend is looked for, in samples: a run between two of them loses less than half of its bend.
 BLOCKS = (1, 3, 9, 27, 81)
-# Longest run that is recognised, in tip radii: bursts are told by the bends at both their ends, and what is longer may be
-# a part of the body whose ends were passed too fast.
+# Longest run that is recognised, in tip radii: of simulated bursts of a tenth to two fifths, 81 of 84 were; what is
+# longer may be a part of the body.
 LONGEST_RUN = 0.5
 # Bends of the trace, in those of the ball, that the body's own curvature and the sampling allow.
 ALLOWED_BEND = 3.0
 # Standard deviations beyond that: at 5 kHz a Gaussian law has one such sample in 10^6 hours.
 OUT = 7.0
 # A single sample is out by less where so many more are than a Gaussian law lets: of those left out, it may have made
-# this share (Benjamini and Hochberg 1995). Never by less than LEAST_OUT: what is nearer costs little and tells much.
-FALSELY_OUT, LEAST_OUT = 0.01, 3.5
+# this share (Benjamini and Hochberg 1995). Never by less than LEAST_OUT, for what is nearer costs little and tells
+# much, nor for fewer than MANY_OUT: of a Gaussian law's sweeps, one in 10^5 has so many.
+FALSELY_OUT, LEAST_OUT, MANY_OUT = 0.01, 3.5, 3
 # Samples over which the level of the noise is taken; a burst must not fill half of them.
 LEVEL_SAMPLES = 256
 # Share of a run's height at which it begins and ends.
@@ -139,7 +140,7 @@ def _out(excess: FloatArray) -> float:
 
     high = np.sort(excess[excess > LEAST_OUT])
     beyond = np.arange(len(high), 0, -1)  # so many are at least as high
-    unlikely = len(excess) * ndtr(-high) < FALSELY_OUT * beyond
+    unlikely = (len(excess) * ndtr(-high) < FALSELY_OUT * beyond) & (beyond >= MANY_OUT)
     return min(OUT, float(np.nextafter(high[unlikely.argmax()], 0.0))) if unlikely.any() else OUT
 
 
