@@ -55,6 +55,7 @@ class NullScale:
         own: (F, C) by which this profile's cells differ from that.
         local: (n,) variance of the bins over the fitted one.
         doubt: (F,) by which a Gaussian threshold must rise for these being uncertain, and for heavier tails.
+        tails: (F,) by which it must rise for the tails alone.
         spacing: width of a profile bin, m.
         widths: (F,) half-widths of the filters, m.
     """
@@ -63,6 +64,7 @@ class NullScale:
     own: FloatArray
     local: FloatArray
     doubt: FloatArray
+    tails: FloatArray
     spacing: float
     widths: FloatArray
 
@@ -99,6 +101,7 @@ def null_scales(
     quiet: Sequence[BoolArray],
     bank: Bank,
     threshold: float,
+    tails: FloatArray | None = None,
 ) -> list[NullScale]:
     """The scale of each profile.
 
@@ -108,6 +111,7 @@ def null_scales(
         quiet: (n,) of each: False where something was taken out.
         bank: filters for the fitted noise.
         threshold: signal-to-noise ratio at which the scale must serve.
+        tails: (F,) factors for heavier tails, from where nothing exceeds the threshold; None: measured here.
 
     Method:
         log variance of an output in cell c of sweep j = a_k + level_j(s) + b_j + w_jc: the level from differences of
@@ -118,7 +122,7 @@ def null_scales(
     widths = np.array([f.half_width for f in bank.filters])
     levels = local_levels(heights, quiet, bank)
     local = levels.variance
-    pooled, doubt = np.ones(len(widths)), np.ones(len(widths))
+    pooled, doubt, heavier = (np.ones(len(widths)) for _ in range(3))
     own = [np.ones((len(widths), _cells(p, widths[0]))) for p in profiles]
     inherited, variance = [np.zeros(each.shape[1]) for each in own], 0.0
     measured = [*range(0, len(widths), STRIDE)]
@@ -127,7 +131,8 @@ def null_scales(
         together = np.concatenate([each[np.isfinite(each)] for each in outputs])
         length = len(together) * bank.filters[k].coarse * bank.spacing
         if length < CELL_WIDTHS * widths[k]:
-            pooled[k:], doubt[k:] = (pooled[k - STRIDE], doubt[k - STRIDE]) if k else (1.0, 1.0)
+            for factor in (pooled, doubt, heavier):
+                factor[k:] = factor[k - STRIDE] if k else 1.0
             for each in own:
                 each[k:] = each[[k - STRIDE]] if k else 1.0
             break
@@ -135,8 +140,9 @@ def null_scales(
         if all(p.length >= LEAST_SWEEP_WIDTHS * widths[k] for p in profiles):
             inherited, variance = _deviations(told)
         unsure = variance + levels.doubt_over(2 * widths[k] / bank.spacing)
-        tails = _heavier_tail(together, length / widths[k], threshold)
-        doubt[k] = max(_doubt(0.5 * np.sqrt(unsure), threshold), tails)  # an uncertain level makes such tails, too
+        heavier[k] = _heavier_tail(together, length / widths[k], threshold) if tails is None else tails[k]
+        # an uncertain level makes such tails, too
+        doubt[k] = max(_doubt(0.5 * np.sqrt(unsure), threshold), heavier[k])
         level = 2 * np.log(max(robust_sd(together), 1e-12))
         error = LOG_VARIANCE_PER_WIDTH * widths[k] / length + _spread(inherited)
         pooled[k] = _likely_scale(level, error, length / widths[k], len(measured))
@@ -145,9 +151,11 @@ def null_scales(
             pooled[k] = max(1.0, pooled[k])
         for each, deviation in zip(own, inherited, strict=True):
             each[k] = np.exp(0.5 * deviation)
-    pooled, doubt = _between(pooled, measured), _between(doubt, measured)
+    pooled, doubt, heavier = (_between(each, measured) for each in (pooled, doubt, heavier))
     own = [_between(each, measured) for each in own]
-    return [NullScale(pooled, each, v, doubt, bank.spacing, widths) for each, v in zip(own, local, strict=True)]
+    return [
+        NullScale(pooled, each, v, doubt, heavier, bank.spacing, widths) for each, v in zip(own, local, strict=True)
+    ]
 
 
 def typical_scale(scales: Sequence[NullScale]) -> FloatArray:
