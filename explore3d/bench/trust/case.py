@@ -16,6 +16,7 @@ from explore3d.analysis import Analysis, Stages, build_model, compare
 from explore3d.bench.trust.laws import LAWS, Level, Path
 from explore3d.bench.trust.paths import (
     PATH_LENGTH,
+    SPACING_SHARE,
     SWEEPS_SIDE_BY_SIDE,
     TRUST_BODIES,
     WIRE_DRAWS,
@@ -24,7 +25,7 @@ from explore3d.bench.trust.paths import (
     wired_path,
 )
 from explore3d.log import Log
-from mapping import Feature, FloatArray, Trace
+from mapping import Feature, FloatArray, Trace, length_text
 from mapping.base import LaidTrace
 from mapping.detection import detect
 from mapping.geometry.mesh import nearest_on, resample
@@ -58,6 +59,16 @@ class CaseSet:
     sizes: tuple[float, ...]
     levels: tuple[float, float]
     lengths: tuple[float, float]
+
+    def sentence(self) -> str:
+        """Its scales and seeds."""
+        tips, sizes = (" and ".join(length_text(each) for each in values) for values in (self.tips, self.sizes))
+        return (
+            f"The set {self.name!r}: tips of {tips}, bodies of {sizes} radius, levels of {self.levels[0]:g} to "
+            f"{self.levels[1]:g} tip radii, correlation over {self.lengths[0]:g} to {self.lengths[1]:g} tip radii, "
+            f"seeds from {self.first_seed} on; {SWEEPS_SIDE_BY_SIDE} sweeps of {length_text(PATH_LENGTH)} a recording, "
+            f"a sample every {SPACING_SHARE:g} tip radii."
+        )
 
 
 # What the detection was built with, and what is reported; the latter was never run while anything was mended

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from explore3d.bench.trust.case import COUNTED_RATE
+from explore3d.bench.trust.case import COUNTED_RATE, TRUST_SETS
 from explore3d.bench.trust.laws import LAWS
 from explore3d.report import machine_section, page, paragraph, section, table
 from explore3d.scene import AnalysisSettings
+from mapping import length_text
 from mapping.geometry.mesh import write_whole
 
 # A promise is broken beyond this many times the rate that was asked for, and beyond so many features a metre
@@ -40,7 +41,7 @@ class Verdict:
     """What the recordings of one law came to; shares are (successes, trials), rates (count, metres).
 
     Args:
-        law: its name.
+        name: of the law, or of body and tip.
         recordings, wired: how many bare ones, and how many with wires.
         often: false candidates where COUNTED_RATE was asked for.
         seldom: false candidates at the rate that the product asks for unless told otherwise.
@@ -55,7 +56,7 @@ class Verdict:
         cpu: seconds of analysis a metre of bare path.
     """
 
-    law: str
+    name: str
     recordings: int
     wired: int
     often: tuple[int, float]
@@ -74,7 +75,7 @@ class Verdict:
     def row(self) -> tuple[str, ...]:
         """The cells of VERDICT_HEAD."""
         cells = [
-            self.law,
+            self.name,
             f"{self.often[1]:.0f}",
             _rate_text(self.often, COUNTED_RATE),
             _rate_text(self.seldom, AnalysisSettings().false_alarms_per_metre),
@@ -95,7 +96,19 @@ def law_verdicts(records: Sequence[dict[str, Any]]) -> list[Verdict]:
     return [_verdict(law, own) for law in LAWS if (own := [each for each in records if each["law"] == law])]
 
 
-def _verdict(law: str, records: Sequence[dict[str, Any]]) -> Verdict:
+def body_verdicts(records: Sequence[dict[str, Any]]) -> list[Verdict]:
+    """One for each body and tip, over all laws."""
+    groups = dict.fromkeys((each["body"], each["tip"]) for each in records)
+    return [
+        _verdict(
+            f"{body}, {length_text(tip)}",
+            [each for each in records if each["body"] == body and each["tip"] == tip],
+        )
+        for body, tip in groups
+    ]
+
+
+def _verdict(name: str, records: Sequence[dict[str, Any]]) -> Verdict:
     bare = [each for each in records if not each["wires"]]
     wired = [each for each in records if each["wires"]]
     metres = float(sum(each["metres"] for each in bare))
@@ -103,7 +116,7 @@ def _verdict(law: str, records: Sequence[dict[str, Any]]) -> Verdict:
     inside = {name: [yes for each in wired for yes in each["inside"][name]] for name in TRUE_VALUES}
     weighed = [any("crests are weighed" in said for said in each["warnings"]) for each in bare]
     return Verdict(
-        law,
+        name,
         len(bare),
         len(wired),
         (sum(each["often"] for each in bare), float(sum(each["often_metres"] for each in bare))),
@@ -179,6 +192,9 @@ def write_trust(records: Sequence[dict[str, Any]], of: str, out: Path) -> tuple[
     out.mkdir(parents=True, exist_ok=True)
     verdicts = law_verdicts(records)
     rows = [each.row for each in verdicts]
+    by_body = [each.row for each in body_verdicts(records)]
+    head_of_bodies = ("body, tip", *VERDICT_HEAD[1:])
+    scales = TRUST_SETS[of].sentence()
     laws = [(name, law.sentence) for name, law in LAWS.items()]
     warned = [(law, said) for law in LAWS if (said := _usual_warnings(records, law))]
     numeric = tuple(range(1, len(VERDICT_HEAD)))
@@ -187,8 +203,9 @@ def write_trust(records: Sequence[dict[str, Any]], of: str, out: Path) -> tuple[
             "Trust",
             "What is promised, under laws of error",
             TRUST_LEAD,
-            paragraph(f"Set of seeds and scales: {of}. ", HOW_TO_READ_IT),
+            paragraph(scales, " ", HOW_TO_READ_IT),
             section("Verdicts", "verdicts", table(VERDICT_HEAD, rows, numeric=numeric)),
+            section("Bodies and tips", "bodies", table(head_of_bodies, by_body, numeric=numeric)),
             section("Warnings", "warnings", table(("law", "what is said, share of bare recordings"), warned)),
             section("Laws", "laws", table(("law", "what it is"), laws)),
             machine_section(),
@@ -197,8 +214,12 @@ def write_trust(records: Sequence[dict[str, Any]], of: str, out: Path) -> tuple[
             [
                 f"# Trust: promises under laws of error ({of})",
                 TRUST_LEAD,
+                scales,
                 HOW_TO_READ_IT,
                 _markdown(VERDICT_HEAD, rows),
+                "## Bodies and tips",
+                "All laws together.",
+                _markdown(head_of_bodies, by_body),
                 "## Warnings",
                 _markdown(("law", "what is said, share of bare recordings"), warned),
                 "## Laws",

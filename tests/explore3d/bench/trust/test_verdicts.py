@@ -11,12 +11,21 @@ from typer.testing import CliRunner
 
 from explore3d.bench.trust.case import BUILDING, REPORTED_TRUST, bench_trust, recordings_of, trust_records
 from explore3d.bench.trust.paths import TRUST_BODIES, bare_path, wired_path
-from explore3d.bench.trust.verdicts import VERDICT_HEAD, law_verdicts, poisson_range, write_trust
+from explore3d.bench.trust.verdicts import VERDICT_HEAD, body_verdicts, law_verdicts, poisson_range, write_trust
 from explore3d.cli.bench import bench
 
 
 def record(law: str, often: int, crossings: int, wires: bool = False) -> dict:
-    common = {"of": "building", "law": law, "body": "plane", "number": 0, "wires": wires, "level": 1e-5, "cpu": 2.0}
+    common = {
+        "of": "building",
+        "law": law,
+        "body": "plane",
+        "number": 0,
+        "wires": wires,
+        "level": 1e-5,
+        "cpu": 2.0,
+        "tip": 4e-3,
+    }
     common |= {"crossings": crossings, "metres": 2.0, "features": [], "warnings": [], "limit": 3e-5}
     if wires:
         inside = {name: [True, False] for name in ("place", "height", "width", "length", "crossing")}
@@ -33,10 +42,12 @@ def test_both_sets_have_nothing_in_common():
 def test_counts_of_a_law_are_added():
     records = [record("white", 1, 0), record("white", 3, 1), record("white", 0, 0, wires=True), record("1/f", 9, 9)]
     white, pink = law_verdicts(records)
-    assert (white.law, white.recordings, white.wired) == ("white", 2, 1)
+    assert (white.name, white.recordings, white.wired) == ("white", 2, 1)
     assert white.often == (4, 4.0) and white.seldom == (1, 4.0) and white.limit == pytest.approx(3.0)
     assert white.recovered == (54, 60) and white.found == (2, 3) and white.inside["place"] == (1, 2)
     assert white.cpu == pytest.approx(1.0) and not white.row[2].endswith(("!", "?"))
+    (plane,) = body_verdicts(records)
+    assert plane.name == "plane, 4 mm" and plane.often == (13, 6.0) and plane.wired == 1
     assert pink.row[2].endswith(" ?") and pink.row[3].endswith(" !")  # 4.5 a metre for 1, and for 0.01
 
 
@@ -65,7 +76,7 @@ def test_a_recording_is_analysed_once_and_told(tmp_path: Path):
     assert not list(bench_trust("building", ["white"], ["plane"], bare, wired, store))
     page, text, figures = write_trust(trust_records(store), "building", tmp_path / "out")
     assert all(name in text.read_text() for name in VERDICT_HEAD) and "<table" in page.read_text()
-    assert json.loads(figures.read_text())["verdicts"][0]["law"] == "white"
+    assert json.loads(figures.read_text())["verdicts"][0]["name"] == "white"
 
 
 @pytest.mark.parametrize("option, word", [("--laws", "pink"), ("--bodies", "cube"), ("--set", "mine")])
