@@ -20,8 +20,8 @@ from mapping.instrument import robust_sd
 
 # Blocks in which the bend is looked for, in samples: a run between two of them loses less than half of its bend.
 BLOCKS = (1, 3, 9, 27, 81)
-# Longest run that is recognised, in tip radii: of simulated bursts of a tenth to two fifths, 81 of 84 were; what is
-# longer may be a part of the body.
+# Longest run that is recognised, in tip radii: of 84 simulated bursts of a tenth to two fifths, 3 were taken for
+# something felt (5 with a fifth); what is longer may be a part of the body.
 LONGEST_RUN = 0.5
 # Bends of the trace, in those of the ball, that the body's own curvature and the sampling allow.
 ALLOWED_BEND = 3.0
