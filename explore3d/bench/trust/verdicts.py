@@ -183,7 +183,8 @@ HOW_TO_READ_IT = (
     "alone. A law is in units of its level, the standard deviation of single samples, and so is the printed limit of "
     "detection. Warned: share of bare recordings of which the analysis says what is unusual. Found at limit: crests of "
     "the printed limit that were put into bare recordings and found, 95 % promised. Intervals hold the truth in 90 % "
-    "of cases if they are right; crossing: the place of a single sweep's crossing."
+    "of cases if they are right; crossing: the place of a single sweep's crossing. The gate asks for 300 m and 200 "
+    "wires of each law; the columns say how much was run."
 )
 
 
@@ -214,6 +215,7 @@ def write_trust(records: Sequence[dict[str, Any]], of: str, out: Path) -> tuple[
             [
                 f"# Trust: promises under laws of error ({of})",
                 TRUST_LEAD,
+                f"`explore3d bench trust --set {of} --store trust.jsonl --out trust` makes this page.",
                 scales,
                 HOW_TO_READ_IT,
                 _markdown(VERDICT_HEAD, rows),
