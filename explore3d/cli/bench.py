@@ -276,6 +276,48 @@ def deviation(
 
 
 @bench.command()
+def trust(
+    store: Store,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for page, Markdown and JSON.")] = None,
+    of: Annotated[
+        str, typer.Option("--set", help="building, or reported: seeds and scales that nothing was built with.")
+    ] = "building",
+    laws: Annotated[str | None, typer.Option(help="Laws of error, separated by commas; all if left out.")] = None,
+    bodies: Annotated[str | None, typer.Option(help="Bodies, separated by commas; all if left out.")] = None,
+    metres: Annotated[float, typer.Option(min=1.0, help="Bare path of each law, m.")] = 300.0,
+    wires: Annotated[int, typer.Option(min=0, help="Wires of each law that are found and measured.")] = 198,
+    quick: Annotated[bool, typer.Option("--quick", help="5 m and 3 wires of each law: minutes.")] = False,
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+) -> None:
+    """Do promises hold under noise of any law? False alarms, invented features, limits, intervals, computing time.
+
+    Example: explore3d bench trust --store trust.jsonl --out trust --laws white,1/f --quick
+    """
+    from explore3d.bench.trust import (
+        LAWS,
+        TRUST_BODIES,
+        TRUST_SETS,
+        bench_trust,
+        law_verdicts,
+        recordings_of,
+        trust_line,
+        trust_records,
+        verdict_lines,
+        write_trust,
+    )
+
+    _names(of, "--set", list(TRUST_SETS))
+    chosen = _names(laws, "--laws", list(LAWS)), _names(bodies, "--bodies", list(TRUST_BODIES))
+    bare, wired = recordings_of(*((5.0, 3) if quick else (metres, wires)))
+    for each in bench_trust(of, *chosen, bare, wired, store, seconds):
+        print(f"{each['law']}, {each['body']}, {each['number']}: {trust_line(each)}", flush=True)
+    records = [each for each in trust_records(store) if each["of"] == of]
+    _print(verdict_lines(law_verdicts(records)))
+    if out is not None:
+        _print(str(path) for path in write_trust(records, of, out))
+
+
+@bench.command()
 def dynamics() -> None:
     """Computing time and error of stiff contact over the stiffness, as CSV.
 

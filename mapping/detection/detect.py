@@ -242,9 +242,12 @@ def _weighed(
         weak = sum(int((found[i].unclear & ~found[i].quiet).sum()) for i in numbers)
         if weak > MOST_WEAK * sum(len(mask) for mask in masks):
             masks = [found[i].unclear for i in numbers]
+        tails = None
         for _ in range(NULL_ROUNDS):
             heights = [without(p.height, mask, bank.drift > 0) for p, mask in zip(group, masks, strict=True)]
-            scales = null_scales(group, heights, masks, bank, threshold)
+            scales = null_scales(group, heights, masks, bank, threshold, tails)
+            # what is found, but not clear, stays out of the tails: they tell of noise that is nowhere found
+            tails = scales[0].tails
             if all(scale.as_fitted for scale in scales):
                 break
             for i, scale in zip(numbers, scales, strict=True):

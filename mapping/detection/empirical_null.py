@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from mapping import BoolArray, FloatArray
-from mapping.base import SweepHeights
+from mapping.base import MAD_TO_SD, SweepHeights
 from mapping.detection.filters import Bank
 from mapping.detection.local_level import LOG_VARIANCE_PER_BIN, excess, local_levels
 from mapping.instrument import Noise, robust_sd
@@ -40,6 +40,10 @@ STRIDE = 3
 CORRELATION_LENGTHS = 40
 # Share of a filter's width from which features may have been taken out: its output loses that share of its variance.
 MISSING_SHARE = 0.1
+# Core standard deviations between which outputs are counted, and Student's degrees of freedom among which those of
+# their tails are chosen, a tenth apart.
+TAIL_EDGES = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0])
+TAIL_DEGREES = np.geomspace(3.0, 100.0, 37)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +54,8 @@ class NullScale:
         pooled: (F,) for each filter of the bank, over all sweeps.
         own: (F, C) by which this profile's cells differ from that.
         local: (n,) variance of the bins over the fitted one.
+        doubt: (F,) by which a Gaussian threshold must rise for these being uncertain, and for heavier tails.
+        tails: (F,) by which it must rise for the tails alone.
         spacing: width of a profile bin, m.
         widths: (F,) half-widths of the filters, m.
     """
@@ -57,25 +63,31 @@ class NullScale:
     pooled: FloatArray
     own: FloatArray
     local: FloatArray
+    doubt: FloatArray
+    tails: FloatArray
     spacing: float
     widths: FloatArray
 
     @property
     def as_fitted(self) -> bool:
         """True if the outputs scatter as the fitted noise says, everywhere."""
-        return bool((self.pooled == 1.0).all() and (self.own == 1.0).all() and (self.local == 1.0).all())
+        return all(bool((each == 1.0).all()) for each in (self.pooled, self.own, self.local, self.doubt))
 
     @cached_property
     def _middles(self) -> FloatArray:
         cells = self.own.shape[1]
         return np.asarray((np.arange(cells) + 0.5) * len(self.local) / cells)
 
-    def along(self, k: int) -> FloatArray:
-        """(n,) of the k-th filter in each bin."""
+    def level(self, k: int) -> FloatArray:
+        """(n,) of the k-th filter in each bin, as it is likeliest."""
         own = np.full(len(self.local), self.pooled[k] * self.own[k, 0])
         if self.own.shape[1] > 1:
             own = self.pooled[k] * np.exp(np.interp(np.arange(len(own)), self._middles, np.log(self.own[k])))
         return np.asarray(own * _seen(self.local, self.widths[k] / self.spacing))
+
+    def along(self, k: int) -> FloatArray:
+        """(n,) of the k-th filter in each bin, doubt included: what the threshold is a multiple of."""
+        return np.asarray(self.doubt[k] * self.level(k))
 
     def at(self, half_width: float, place: float) -> float:
         """Of the filter nearest to a half-width, m, at a bin."""
@@ -89,6 +101,7 @@ def null_scales(
     quiet: Sequence[BoolArray],
     bank: Bank,
     threshold: float,
+    tails: FloatArray | None = None,
 ) -> list[NullScale]:
     """The scale of each profile.
 
@@ -98,6 +111,7 @@ def null_scales(
         quiet: (n,) of each: False where something was taken out.
         bank: filters for the fitted noise.
         threshold: signal-to-noise ratio at which the scale must serve.
+        tails: (F,) factors for heavier tails, from where nothing exceeds the threshold; None: measured here.
 
     Method:
         log variance of an output in cell c of sweep j = a_k + level_j(s) + b_j + w_jc: the level from differences of
@@ -106,24 +120,29 @@ def null_scales(
         that (Schwarz 1978).
     """
     widths = np.array([f.half_width for f in bank.filters])
-    local = local_levels(heights, quiet, bank)
-    pooled = np.ones(len(widths))
+    levels = local_levels(heights, quiet, bank)
+    local = levels.variance
+    pooled, doubt, heavier = (np.ones(len(widths)) for _ in range(3))
     own = [np.ones((len(widths), _cells(p, widths[0]))) for p in profiles]
-    inherited, doubt = [np.zeros(each.shape[1]) for each in own], 1.0
+    inherited, variance = [np.zeros(each.shape[1]) for each in own], 0.0
     measured = [*range(0, len(widths), STRIDE)]
     for k in measured:
         outputs = [_outputs(h, q, v, bank, k) for h, q, v in zip(heights, quiet, local, strict=True)]
         together = np.concatenate([each[np.isfinite(each)] for each in outputs])
         length = len(together) * bank.filters[k].coarse * bank.spacing
         if length < CELL_WIDTHS * widths[k]:
-            pooled[k:] = pooled[k - STRIDE] if k else 1.0
+            for factor in (pooled, doubt, heavier):
+                factor[k:] = factor[k - STRIDE] if k else 1.0
             for each in own:
                 each[k:] = each[[k - STRIDE]] if k else 1.0
             break
         told = [_cell_levels(z, len(i), bank, k) for z, i in zip(outputs, inherited, strict=True)]
         if all(p.length >= LEAST_SWEEP_WIDTHS * widths[k] for p in profiles):
             inherited, variance = _deviations(told)
-            doubt = _doubt(0.5 * np.sqrt(variance), threshold)
+        unsure = variance + levels.doubt_over(2 * widths[k] / bank.spacing)
+        heavier[k] = _heavier_tail(together, length / widths[k], threshold) if tails is None else tails[k]
+        # an uncertain level makes such tails, too
+        doubt[k] = max(_doubt(0.5 * np.sqrt(unsure), threshold), heavier[k])
         level = 2 * np.log(max(robust_sd(together), 1e-12))
         error = LOG_VARIANCE_PER_WIDTH * widths[k] / length + _spread(inherited)
         pooled[k] = _likely_scale(level, error, length / widths[k], len(measured))
@@ -131,15 +150,17 @@ def null_scales(
             # one level everywhere: the fitted one is not undercut, for many a law has lighter middles than tails
             pooled[k] = max(1.0, pooled[k])
         for each, deviation in zip(own, inherited, strict=True):
-            each[k] = np.exp(0.5 * deviation) * doubt
-    pooled = _between(pooled, measured)
+            each[k] = np.exp(0.5 * deviation)
+    pooled, doubt, heavier = (_between(each, measured) for each in (pooled, doubt, heavier))
     own = [_between(each, measured) for each in own]
-    return [NullScale(pooled, each, v, bank.spacing, widths) for each, v in zip(own, local, strict=True)]
+    return [
+        NullScale(pooled, each, v, doubt, heavier, bank.spacing, widths) for each, v in zip(own, local, strict=True)
+    ]
 
 
 def typical_scale(scales: Sequence[NullScale]) -> FloatArray:
     """(F,) for each filter, the median over all cells of all profiles."""
-    levels = [each.pooled[:, None] * each.own * np.sqrt(np.median(each.local)) for each in scales]
+    levels = [(each.doubt * each.pooled)[:, None] * each.own * np.sqrt(np.median(each.local)) for each in scales]
     return np.asarray(np.median(np.concatenate(levels, axis=1), axis=1))
 
 
@@ -153,7 +174,7 @@ def effective_noise(bank: Bank, scales: Sequence[NullScale]) -> Noise:
     from scipy.optimize import nnls
 
     numbers = range(0, len(bank.filters), STRIDE)
-    measured = [np.mean([np.mean(scale.along(k) ** 2) for scale in scales]) for k in numbers]
+    measured = [np.mean([np.mean(scale.level(k) ** 2) for scale in scales]) for k in numbers]
     target = np.array([bank.filters[k].sd ** 2 * m for k, m in zip(numbers, measured, strict=True)])
     level = float(np.mean([scale.local.mean() for scale in scales])) * bank.noise.white**2
     white = np.array([_output_variance(bank, k, Noise(1.0)) for k in numbers])
@@ -210,12 +231,12 @@ def _seen(local: FloatArray, bins: float) -> FloatArray:
 
 
 def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank, k: int) -> FloatArray:
-    """Absolute outputs of a filter over their sd, one a coarse bin; NaN where what it sees is not all quiet path."""
+    """Outputs of a filter over their sd, one a coarse bin; NaN where what it sees is not all quiet path."""
     f = bank.filters[k]
     if len(height) < 2 * f.coarse:
         return np.full(0, np.nan)
     crest, sd = f.heights(height)
-    z, bins, places = np.abs(crest) / sd, f.half_width / bank.spacing, slice(None, len(crest) * f.coarse, f.coarse)
+    z, bins, places = crest / sd, f.half_width / bank.spacing, slice(None, len(crest) * f.coarse, f.coarse)
     if not (local == 1.0).all():
         z /= _seen(local, bins)[places]
     if not quiet.all():
@@ -283,6 +304,45 @@ def _doubt(sd: float, threshold: float) -> float:
     nodes, weights = np.polynomial.hermite_e.hermegauss(40)
     tail = float(weights @ ndtr(-threshold * np.exp(-sd * nodes)) / weights.sum())
     return float(max(1.0, threshold / -ndtri(tail)))
+
+
+def _heavier_tail(outputs: FloatArray, count: float, threshold: float) -> float:
+    """Factor by which a Gaussian threshold rises for outputs (M,) whose tails are heavier than Gaussian ones.
+
+    Counts of outputs between TAIL_EDGES of their core's sd are Student's t's, its degrees of freedom the likeliest of
+    a ladder, if that is likelier than Gaussian by Schwarz' criterion. Of both signs the smaller count stands for both:
+    what is too weak to be found makes one of them larger.
+
+    Args:
+        count: so many of the outputs are independent.
+        threshold: in standard deviations; outputs beyond may have been taken out.
+    """
+    core = robust_sd(outputs)
+    edges = TAIL_EDGES[threshold - 0.25 > TAIL_EDGES]
+    if core <= 0.0 or len(edges) < 3:
+        return 1.0
+    both = [
+        np.diff(np.searchsorted(np.sort(side[side >= 0.0]), core * edges), prepend=0) for side in (outputs, -outputs)
+    ]
+    return _student_factor(2.0 * np.minimum(*both) * (count / len(outputs)), edges, threshold)
+
+
+def _student_factor(counts: FloatArray, edges: FloatArray, threshold: float) -> float:
+    """The same from counts (E,) of independent outputs below each of the edges (E,) and above the one before."""
+    from scipy.special import ndtr, stdtr, stdtrit
+
+    def likelihood(below: FloatArray) -> float:
+        shares = np.diff(2.0 * below - 1.0, prepend=0.0)
+        return float(counts @ np.log(shares / shares.sum()))
+
+    # the same core for all: half of the outputs are below its median
+    medians = stdtrit(TAIL_DEGREES, 0.75)
+    told = [likelihood(stdtr(n, edges * m * MAD_TO_SD)) for n, m in zip(TAIL_DEGREES, medians, strict=True)]
+    best = int(np.argmax(told))
+    if 2.0 * (told[best] - likelihood(ndtr(edges))) <= np.log(max(counts.sum(), 2.0)) + 2.0 * np.log(len(TAIL_DEGREES)):
+        return 1.0
+    quantile = -stdtrit(TAIL_DEGREES[best], float(ndtr(-threshold)))
+    return float(max(1.0, quantile / (medians[best] * MAD_TO_SD) / threshold))
 
 
 def _spread(deviations: Sequence[FloatArray]) -> float:

@@ -27,7 +27,7 @@ def level_likelihood(read, error, by_sweep, along, length):  # type: ignore[no-u
 
 @njit(cache=True)
 def expected_level(read, error, by_sweep, along, length):  # type: ignore[no-untyped-def]
-    """(C,) expectation of the level's logarithm in each cell, given all readings; arguments as above."""
+    """(C, 2) expectation of the level's logarithm in each cell, given all readings, and its variance; as above."""
     filtered, (_, crossed, ones, _) = _forward(read, error, along, length)
     decay = np.exp(-1.0 / length)
     # back along x (Rauch, Tung and Striebel 1965)
@@ -36,8 +36,12 @@ def expected_level(read, error, by_sweep, along, length):  # type: ignore[no-unt
         share = decay * filtered[c, 2] / ahead if ahead > 0.0 else 0.0
         for j in range(2):
             filtered[c, j] += share * (filtered[c + 1, j] - decay * filtered[c, j])
-    of_sweep = by_sweep * crossed / (1.0 + by_sweep * ones)
-    return of_sweep + filtered[:, 0] - of_sweep * filtered[:, 1]
+        filtered[c, 2] += share * share * (filtered[c + 1, 2] - ahead)
+    of_sweep, told = by_sweep * crossed / (1.0 + by_sweep * ones), by_sweep / (1.0 + by_sweep * ones)
+    out = np.empty((len(read), 2))
+    out[:, 0] = of_sweep + filtered[:, 0] - of_sweep * filtered[:, 1]
+    out[:, 1] = filtered[:, 2] + told * (1.0 - filtered[:, 1]) ** 2
+    return out
 
 
 @njit(cache=True)

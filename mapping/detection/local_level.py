@@ -8,16 +8,21 @@ likeliest of a ladder; each cell's expected level follows, shrunk by what is not
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from mapping import BoolArray, FloatArray
 from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH, Bank
-from mapping.instrument import robust_sd
 
-# Variance of the logarithm of the variance that the median absolute difference of neighbouring bins tells, for one bin:
-# 5.4 if they were independent; simulated: 6.6 in white noise, less in correlated noise.
-LOG_VARIANCE_PER_BIN = 6.6
+# Share of the absolute differences of neighbouring bins, the smaller ones, whose mean tells the level of a cell: what
+# is no noise in less than a quarter of it shifts that little, and positions in steps of the noise's own size, half of
+# whose differences may be zero, still tell it, which their median does not. That mean for a Gaussian law, over its sd:
+# sqrt(2 / pi) (1 - exp(-q^2 / 2)) / 0.75 with q = 1.1503, the quantile.
+SMALLER_SHARE, MEAN_OF_SMALLER = 0.75, 0.51489
+# Variance of the logarithm of the variance so told, for one bin; simulated: 5.3 in white noise, 4.1 in correlated noise
+# (the median absolute difference: 6.6).
+LOG_VARIANCE_PER_BIN = 5.3
 # Bins in a cell of the local level: three half-widths of the narrowest filter, which sees the level's mean over two.
 LEVEL_BINS = 3 * FILTER_BINS_PER_HALF_WIDTH
 # Standard deviations of chi-square by which levels must differ more than sampling makes them: at nine degrees of
@@ -31,8 +36,27 @@ LEVEL_GAIN = 12.0
 LEVEL_VARIANCES, LEVEL_LENGTHS, ASKED_SWEEPS = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0), (2.0, 4.0, 8.0, 16.0, 32.0), 24
 
 
-def local_levels(heights: Sequence[FloatArray], quiet: Sequence[BoolArray], bank: Bank) -> list[FloatArray]:
-    """(n,) of each profile: variance of the bins over the fitted one, by differences of neighbouring quiet bins."""
+@dataclass(frozen=True, eq=False)
+class LocalLevels:
+    """How the noise of single bins changes its level.
+
+    Args:
+        variance: (n,) of each profile: variance of the bins over the fitted one.
+        doubt: variance of its logarithm that remains in a usual cell.
+        shared: bins over which that error is shared.
+    """
+
+    variance: list[FloatArray]
+    doubt: float = 0.0
+    shared: float = 1.0
+
+    def doubt_over(self, bins: float) -> float:
+        """Variance of the logarithm of the mean level over so many bins."""
+        return self.doubt * min(1.0, self.shared / bins)
+
+
+def local_levels(heights: Sequence[FloatArray], quiet: Sequence[BoolArray], bank: Bank) -> LocalLevels:
+    """The level along each profile, by differences of neighbouring quiet bins."""
     lags = bank.noise.block_covariances(2, bank.spacing, bank.samples)
     sd = float(np.sqrt(max(2 * (lags[0] - lags[1]), np.finfo(float).tiny)))
     told = [_difference_levels(h, q, sd) for h, q in zip(heights, quiet, strict=True)]
@@ -41,16 +65,20 @@ def local_levels(heights: Sequence[FloatArray], quiet: Sequence[BoolArray], bank
     v = np.concatenate([each for _, each in told])
     known = np.isfinite(v)
     if known.sum() < 3:
-        return ones
+        return LocalLevels(ones)
     centre = float(np.average(y[known], weights=1 / v[known]))
     told = [(np.where(np.isfinite(v), y - centre, 0.0), v) for y, v in told]
     prior = _level_prior(told)
     if prior is None:
-        return ones
+        return LocalLevels(ones)
     from mapping.detection.level_kernels import expected_level
 
     levels = [expected_level(y, v, *prior) for y, v in told]
-    return [np.exp(centre + _at_bins(level, len(h))) for level, h in zip(levels, heights, strict=True)]
+    variance = [np.exp(centre + _at_bins(level[:, 0], len(h))) for level, h in zip(levels, heights, strict=True)]
+    doubt = float(np.median(np.concatenate([level[:, 1] for level in levels])))
+    # so many cells say it together, and err together
+    cells = float(np.median(v[known])) / max(doubt, np.finfo(float).tiny)
+    return LocalLevels(variance, doubt, LEVEL_BINS * max(1.0, cells))
 
 
 def _at_bins(level: FloatArray, bins: int) -> FloatArray:
@@ -68,7 +96,8 @@ def _difference_levels(height: FloatArray, quiet: BoolArray, sd: float) -> tuple
         part = step[edges[c] : edges[c + 1]]
         part = part[np.isfinite(part)]
         if len(part) >= FILTER_BINS_PER_HALF_WIDTH:
-            y[c] = 2 * np.log(max(robust_sd(part), 1e-12))
+            smaller = np.partition(part, int(SMALLER_SHARE * len(part)))[: int(SMALLER_SHARE * len(part))]
+            y[c] = 2 * np.log(max(float(smaller.mean()) / MEAN_OF_SMALLER, 1e-12))
             v[c] = LOG_VARIANCE_PER_BIN / len(part)
     return y, v
 

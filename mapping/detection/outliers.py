@@ -20,12 +20,17 @@ from mapping.instrument import MAD_TO_SD, robust_sd
 
 # Blocks in which the bend is looked for, in samples: a run between two of them loses less than half of its bend.
 BLOCKS = (1, 3, 9, 27, 81)
-# Longest run that is recognised, in tip radii: a crest so wide needs only a thousandth of the radius of height.
-LONGEST_RUN = 0.2
+# Longest run that is recognised, in tip radii: of 84 simulated bursts of a tenth to two fifths, 3 were taken for
+# something felt (5 with a fifth); what is longer may be a part of the body.
+LONGEST_RUN = 0.5
 # Bends of the trace, in those of the ball, that the body's own curvature and the sampling allow.
 ALLOWED_BEND = 3.0
 # Standard deviations beyond that: at 5 kHz a Gaussian law has one such sample in 10^6 hours.
 OUT = 7.0
+# A single sample is out by less where so many more are than a Gaussian law lets: of those left out, it may have made
+# this share (Benjamini and Hochberg 1995). Never by less than LEAST_OUT, for what is nearer costs little and tells
+# much, nor for fewer than MANY_OUT: of a Gaussian law's sweeps, one in 10^5 has so many.
+FALSELY_OUT, LEAST_OUT, MANY_OUT = 0.01, 3.5, 3
 # Samples over which the level of the noise is taken; a burst must not fill half of them.
 LEVEL_SAMPLES = 256
 # Share of a run's height at which it begins and ends.
@@ -117,15 +122,26 @@ def _impossible(height: FloatArray, level: FloatArray, step: float, tip_radius: 
         sd = max(robust_sd(bend[::every]), np.finfo(float).tiny)
         allowed = ALLOWED_BEND * (size * step) ** 2 / tip_radius
         excess = bend / sd
-        if excess.max() <= OUT:
+        if excess.max() <= (LEAST_OUT if size == 1 else OUT):
             continue
         excess -= allowed / (sd * level[size : 1 - 2 * size])
-        for at in np.flatnonzero((excess > OUT) & (excess >= np.roll(excess, 1)) & (excess > np.roll(excess, -1))):
+        out = _out(excess) if size == 1 else OUT
+        for at in np.flatnonzero((excess > out) & (excess >= np.roll(excess, 1)) & (excess > np.roll(excess, -1))):
             low, high = _run(height, int(at) + size, size)
             if high - low <= LONGEST_RUN * tip_radius / step and not off[low:high].all():
                 runs += not off[low:high].any()
                 off[low:high] = True
     return off, runs
+
+
+def _out(excess: FloatArray) -> float:
+    """Standard deviations beyond which hardly any of the values (N,) is of a Gaussian law, OUT at most."""
+    from scipy.special import ndtr
+
+    high = np.sort(excess[excess > LEAST_OUT])
+    beyond = np.arange(len(high), 0, -1)  # so many are at least as high
+    unlikely = (len(excess) * ndtr(-high) < FALSELY_OUT * beyond) & (beyond >= MANY_OUT)
+    return min(OUT, float(np.nextafter(high[unlikely.argmax()], 0.0))) if unlikely.any() else OUT
 
 
 def _run(height: FloatArray, begin: int, size: int) -> tuple[int, int]:

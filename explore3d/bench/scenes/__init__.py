@@ -5,7 +5,15 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from explore3d.bench.scenes.bodies import joined as joined, tube as tube
+    from explore3d.bench.scenes.bodies import (
+        Mesh as Mesh,
+        blob as blob,
+        blob_normals as blob_normals,
+        cylinder as cylinder,
+        joined as joined,
+        sphere_mesh as sphere_mesh,
+        tube as tube,
+    )
     from explore3d.bench.scenes.exploring import (
         BENCH_TIP_RADIUS as BENCH_TIP_RADIUS,
         SCENES as SCENES,
@@ -37,7 +45,7 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
-    "bodies": ("joined", "tube"),
+    "bodies": ("Mesh", "blob", "blob_normals", "cylinder", "joined", "sphere_mesh", "tube"),
     "exploring": ("BENCH_TIP_RADIUS", "BenchScene", "SCENES"),
     "kinds": ("BODIES_BY_KIND", "INSPECTED_HALF_SIDE", "MIDDLE"),
     "long_log": ("write_long_log",),

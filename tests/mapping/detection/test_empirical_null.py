@@ -6,11 +6,16 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.special import ndtr, ndtri, stdtrit
 
 from mapping.arrays import FloatArray
 from mapping.base.base import Base
 from mapping.detection.detect import Detections, detect
+from mapping.detection.empirical_null import _heavier_tail
+from mapping.detection.filters.matched_filter import build_bank
 from mapping.detection.level_kernels import expected_level, level_likelihood
+from mapping.detection.local_level import local_levels
+from mapping.instrument.noise import Noise
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -81,4 +86,29 @@ def test_the_linear_filter_of_the_level_agrees_with_the_full_covariance(cells, p
     answer = np.linalg.solve(inner, read[known])
     likelihood = -0.5 * (read[known] @ answer + np.linalg.slogdet(inner)[1])
     np.testing.assert_allclose(level_likelihood(read, error, *prior), likelihood, rtol=1e-11)
-    np.testing.assert_allclose(expected_level(read, error, *prior), covariance[:, known] @ answer, atol=1e-12)
+    expected = expected_level(read, error, *prior)
+    np.testing.assert_allclose(expected[:, 0], covariance[:, known] @ answer, atol=1e-12)
+    left = covariance - covariance[:, known] @ np.linalg.solve(inner, covariance[known])
+    np.testing.assert_allclose(expected[:, 1], np.diag(left), atol=1e-12)
+
+
+def test_heavier_tails_raise_the_threshold_by_what_they_are_and_gaussian_ones_by_nothing() -> None:
+    rng = np.random.default_rng(1)
+    for seed in range(20):
+        assert _heavier_tail(np.random.default_rng(seed).standard_normal(3000), 3000.0, 5.0) == 1.0
+    told = _heavier_tail(rng.standard_t(6, 40_000), 40_000.0, 5.0)
+    # by the quantiles of both laws, each over its own core
+    right = stdtrit(6.0, float(ndtr(-5.0))) / stdtrit(6.0, 0.25) / (5.0 / ndtri(0.75))
+    assert told == pytest.approx(right, rel=0.15) and right > 1.5
+
+
+def test_positions_in_steps_of_the_noise_still_tell_its_level() -> None:
+    rng, bank = np.random.default_rng(1), build_bank(Noise(1.0), 1.0, 1.0, 12.0, 100.0, 0)
+    quiet = [np.ones(4000, dtype=bool)] * 4
+    level = np.exp(0.5 * np.sin(np.arange(4000) / 300.0))
+    exact = [level * rng.standard_normal(4000) for _ in quiet]
+    told = local_levels([np.round(2.0 * each) / 2.0 for each in exact], quiet, bank)
+    assert 0.0 < told.doubt < 0.1 and told.doubt_over(1e6) < 0.01 * told.doubt
+    # rounding to steps of half the noise adds a twelfth of their square
+    off = np.log(np.concatenate(told.variance) / (np.tile(level**2, 4) + 0.25 / 12.0))
+    assert abs(off.mean()) < 0.1 and off.std() < 3.0 * np.sqrt(told.doubt)

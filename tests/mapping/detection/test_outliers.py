@@ -8,6 +8,7 @@ import pytest
 from mapping.arrays import FloatArray
 from mapping.base.base import Base
 from mapping.detection.detect import Detections, detect
+from mapping.detection.outliers import LEAST_OUT, OUT, _out
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -66,3 +67,10 @@ def test_places_of_crossings_count_all_samples() -> None:
     crest[BURST] += 0.4e-3
     (crossing,) = found(sweeps(3, crest)).crossings
     assert abs(0.5 * (crossing.start + crossing.stop) * STEP - 0.08) < 0.3e-3
+
+
+def test_single_samples_are_out_where_more_are_than_a_gaussian_law_lets() -> None:
+    rng = np.random.default_rng(1)
+    wrongly = [_out(np.random.default_rng(seed).standard_normal(5000)) for seed in range(100)]
+    assert all(limit == OUT for limit in wrongly)
+    assert LEAST_OUT <= _out(rng.standard_t(3, 5000)) < 5.0
