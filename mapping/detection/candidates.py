@@ -47,11 +47,13 @@ class Searched:
         disturbances: above the threshold, the strongest first.
         quiet: (n,) False where something exceeds the threshold.
         unclear: (n,) False where something is clearly no noise.
+        weak: bins of what exceeds the threshold upwards and downwards, and is not clear.
     """
 
     disturbances: tuple[Disturbance, ...]
     quiet: BoolArray
     unclear: BoolArray
+    weak: tuple[int, int]
 
 
 def search(
@@ -73,9 +75,10 @@ def search(
         null: how far the outputs scatter where nothing is, against the noise; None: as the noise says.
     """
     found: list[Disturbance] = []
-    stretches = []
+    stretches, downwards = [], []
     for height, begin, end, crest, snr in _stretches(profile, bank, noise, threshold, tip_radius, null):
         stretches.append((begin, end, snr >= CLEAR * threshold))
+        downwards.append(crest < 0)
         for low, high in _crests(height, begin, end, crest, profile, noise, tip_radius):
             beside = (low > begin, high < end)
             sign = float(np.sign(crest))
@@ -90,7 +93,12 @@ def search(
     quiet = np.ones(len(profile.height), dtype=bool)
     for begin, end, _ in stretches:
         quiet[begin:end] = False
-    return Searched(tuple(found), quiet, _unclear(stretches, len(quiet)))
+    unclear = _unclear(stretches, len(quiet))
+    down = np.zeros(len(quiet), dtype=bool)
+    for (begin, end, _), downward in zip(stretches, downwards, strict=True):
+        down[begin:end] = downward
+    weak = unclear & ~quiet
+    return Searched(tuple(found), quiet, unclear, (int((weak & ~down).sum()), int((weak & down).sum())))
 
 
 def unclear_bins(

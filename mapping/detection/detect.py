@@ -239,7 +239,9 @@ def _weighed(
         group, threshold = [profiles[i] for i in numbers], thresholds[spacing]
         # weak features are no reason to doubt the law where the path beside them, most of it, is as fitted
         masks = [found[i].quiet for i in numbers]
-        weak = sum(int((found[i].unclear & ~found[i].quiet).sum()) for i in numbers)
+        # noise goes up as often as down, features mostly one way: of both the lesser is what noise can have made, and
+        # a path that was chosen for what is on it doubts no law
+        weak = 2 * min(sum(found[i].weak[0] for i in numbers), sum(found[i].weak[1] for i in numbers))
         if weak > MOST_WEAK * sum(len(mask) for mask in masks):
             masks = [found[i].unclear for i in numbers]
         tails = None
