@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from explore3d.analysis import Stages, build_model
-from explore3d.bench.scenes import SECTION_BODIES, SECTION_NOISES, TRUE_FAMILIES, section_body, section_trace
+from explore3d.bench.scenes import TRUE_FAMILIES, section_body, section_trace
 from explore3d.log import Log
 from mapping import Feature, Interval
 
@@ -56,7 +56,7 @@ def section_trial(body: str, noise: str, seed: int) -> dict[str, Any]:
         "kinds": [feature.kind for feature in features],
         "cpu": process_time() - begin,
         "posterior": analysis.timings.get("posterior", 0.0),
-        "true_height": truth.height if np.isfinite(truth.height) else None,
+        "true_height": truth.height,
         "true_widths": list(truth.widths),
     }
     if not features:
@@ -64,9 +64,7 @@ def section_trial(body: str, noise: str, seed: int) -> dict[str, Any]:
     main = max(features, key=lambda feature: feature.evidence.snr)
     judged = {"height": _judged(main.height, (truth.height,) * 2), "width": _judged(main.width, truth.widths)}
     flagged = is_flagged(main)
-    if truth.kind not in ("ridge", "groove") or not np.isfinite(truth.height):
-        whole = "flagged" if flagged else "wrong"
-    elif main.kind != truth.kind or len(features) > 1:
+    if main.kind != truth.kind or len(features) > 1:
         whole = "flagged" if flagged else "miscounted"
     elif "wrong" in judged.values():
         whole = "flagged" if flagged else "wrong"
@@ -76,46 +74,45 @@ def section_trial(body: str, noise: str, seed: int) -> dict[str, Any]:
         name: [size.median, size.low, size.high, size.censored]
         for name, size in (("height", main.height), ("width", main.width))
     }
-    return record | {"judged": whole, "flagged": flagged, "sizes": sizes, "notes": list(main.notes)} | {
-        f"{name}_judged": each for name, each in judged.items()
-    }
+    return (
+        record
+        | {"judged": whole, "flagged": flagged, "sizes": sizes, "notes": list(main.notes)}
+        | {f"{name}_judged": each for name, each in judged.items()}
+    )
 
 
 def is_flagged(feature: Feature) -> bool:
     """True if a remark says that the feature is not of the form that its sizes are those of."""
-    return any("no ideal" in note for note in feature.notes)
+    return feature.details.misfit is not None
 
 
 def _judged(interval: Interval, truth: tuple[float, float]) -> str:
-    """"true" if the interval holds one of the true values, "bounded" if it is a bound that they keep to, else "wrong"."""
+    """Whether the interval holds one of the true values ("true"), or is a bound that they keep to, or is "wrong"."""
     if interval.censored:
-        magnitude = [abs(each) for each in truth]
-        return "bounded" if max(magnitude) >= min(abs(interval.low), abs(interval.high)) else "wrong"
+        largest = max(abs(each) for each in truth)
+        kept = largest >= min(abs(interval.low), abs(interval.high))
+        return "bounded" if kept and not (interval.bounded and min(truth) > interval.high) else "wrong"
     return "true" if interval.low <= truth[1] and truth[0] <= interval.high else "wrong"
 
 
 def section_lines(records: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """A line for each section and noise: shares judged right, of what sort, false flags, coverage and bias of height."""
+    """A line for each section and noise: share and sorts of what is right, and coverage and bias of the height."""
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for record in records:
         groups.setdefault((record["body"], record["noise"]), []).append(record)
-    yield "section,noise,trials,right,true,bounded,flagged,wrong,miscounted,missed,height covered,height bias,posterior s"
+    yield "section,noise,trials,right %,true,bounded,flagged,wrong,miscounted,missed,covered %,bias %,posterior s"
     for (body, noise), some in groups.items():
         counts = {name: sum(each["judged"] == name for each in some) for name in JUDGED_RIGHT}
         rest = {name: sum(each["judged"] == name for each in some) for name in ("wrong", "miscounted", "missed")}
         shares = [100.0 * sum(counts.values()) / len(some), *counts.values(), *rest.values()]
-        sized = [each for each in some if "sizes" in each and each["true_height"] and not each["sizes"]["height"][3]]
+        sized = [each for each in some if "sizes" in each and not each["sizes"]["height"][3]]
         covered = 100.0 * float(np.mean([each["height_judged"] == "true" for each in sized])) if sized else np.nan
         ratios = [each["sizes"]["height"][0] / each["true_height"] - 1.0 for each in sized]
         bias = 100.0 * float(np.mean(ratios)) if sized else np.nan
         seconds = float(np.mean([each["posterior"] for each in some]))
-        yield ",".join(
-            [body, noise, str(len(some)), *(f"{share:.0f}" for share in shares), f"{covered:.0f}", f"{bias:+.1f}"]
-            + [f"{seconds:.2f}"]
-        )
+        numbers = [*(f"{share:.0f}" for share in shares), f"{covered:.0f}", f"{bias:+.1f}", f"{seconds:.2f}"]
+        yield ",".join([body, noise, str(len(some)), *numbers])
     known = [each for each in records if each["body"] in TRUE_FAMILIES and "flagged" in each]
     if known:
         false = sum(each["flagged"] for each in known)
         yield f"remarks on sections of a family that the house has: {false} of {len(known)}"
-
-

@@ -10,9 +10,10 @@ import numpy as np
 from mapping import EmptyWindowError, Feature, FloatArray, Posterior, Trace
 from mapping.base import Base, fit_base
 from mapping.inference.evidence import better_section, log_evidence_of_nothing
-from mapping.inference.families import PosteriorProblem, Surroundings, with_free_tip
+from mapping.inference.families import PosteriorProblem, Surroundings, with_free_tip, with_nominal_tip
 from mapping.inference.kinds import kind_of
 from mapping.inference.model_error import account_for_misfit
+from mapping.inference.pooled_residual import PooledResidual, pooled_residual, with_remark
 from mapping.inference.sampler import (
     TRUSTED_K_HAT,
     Chain,
@@ -24,11 +25,15 @@ from mapping.inference.sampler import (
     sample_ensemble,
     walkers_for,
 )
+from mapping.inference.sections import UNLIKELY_FAMILY, averaged, probabilities
 from mapping.inference.summary import describe
 from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise
 
 KEPT_DRAWS = 1000
+# The Gaussian approximation of an evidence is taken to be off by no more than this (a PLACEHOLDER; where a
+# parameter is bounded by its prior alone)
+ROUGH_EVIDENCE = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +45,14 @@ class Solution:
         posterior: draws and their trustworthiness.
         importance: the fast answer, with its evidence.
         chain: what emcee did, or None if it did not run.
+        likely: further families that remain likely, each with its probability over that of this one.
     """
 
     problem: PosteriorProblem
     posterior: Posterior
     importance: Importance
     chain: Chain | None
+    likely: tuple[tuple[float, Solution], ...] = ()
 
 
 def sample_posterior(
@@ -106,11 +113,13 @@ def refine(
     except EmptyWindowError as error:  # one feature without a sample must not cost all others
         nothing = replace(feature.evidence, log_odds=0.0)
         return replace(feature, evidence=nothing, notes=(*feature.notes, f"no posterior: {error}"))
-    found = describe(solution.problem, solution.posterior, base)
-    if solution.problem.misfit > 0.0:  # intervals hold within the family only
-        note = f"no ideal {found.kind} fits the trace within its noise: the sizes are those of the closest one"
-        found = replace(found, notes=(*found.notes, note))
+    families = [(share, each.problem, each.posterior) for share, each in [(1.0, solution), *solution.likely]]
+    found = averaged(describe(solution.problem, solution.posterior, base), families)
+    pooled = _pooled(solution, noise.rounded(trace.resolution))
+    found = with_remark(found, pooled, raised=solution.problem.misfit > 0.0)
     odds = odds_against_nothing(solution)
+    if solution.problem.misfit > 0.0:  # under noise that was raised to the misfit existence is not judged
+        odds = max(odds, pooled.log_odds)
     return replace(found, evidence=replace(found.evidence, log_odds=odds if np.isfinite(odds) else None))
 
 
@@ -130,10 +139,56 @@ def solve(
     noise = (noise or noise_of_trace(trace, base)).rounded(trace.resolution)
     around = Surroundings(trace, base, noise, others, tip_sd)
     solution = solve_problem(pose_problem(feature, around), rng, confirm=confirm)
+    solution = _beside_rivals(solution, around, rng, confirm)
     if solution.problem.misfit == 0.0:
         return solution
     better = better_section(solution.problem, around, rng)
     return solution if better is None else solve_problem(better, rng, confirm=confirm)
+
+
+def _beside_rivals(first: Solution, around: Surroundings, rng: np.random.Generator, confirm: bool) -> Solution:
+    """The most probable of a solved problem and its rivals, with those that remain likely beside it.
+
+    All are weighed under the noise of the trace: noise that was raised until one of them fits speaks for none.
+    """
+    problem, optimum, own = first.problem, _best_draw(first), first.importance.log_evidence
+    if problem.misfit > 0.0:
+        problem = replace(problem.under(around.noise), misfit=0.0)
+        optimum = find_optima(problem.target, optimum[None])[0]
+        own = laplace(problem.target, optimum).log_evidence
+    nominal = with_nominal_tip(problem)
+    kept = [(own, first)]
+    for posed in kind_of(problem.feature).rivals(nominal, optimum[: len(nominal.target.shape.names)]):
+        rival = with_free_tip(posed, around.tip_sd, around.base.kind != "mesh") if around.tip_sd > 0.0 else posed
+        optima = find_optima(rival.target, rival.beginnings)
+        roughly = max(laplace(rival.target, each).log_evidence for each in optima)
+        if roughly < own + np.log(UNLIKELY_FAMILY) - ROUGH_EVIDENCE:
+            continue
+        rival = replace(rival, beginnings=np.array(optima))
+        fast = importance_sample(rival.target, [laplace(rival.target, each) for each in optima], rng)
+        if fast.log_evidence > own + np.log(UNLIKELY_FAMILY):
+            kept.append((fast.log_evidence, Solution(rival, _from_importance(rival, fast, rng), fast, None)))
+    kept.sort(key=lambda each: -each[0])
+    shares = probabilities([evidence for evidence, _ in kept])
+    likely = zip(shares[1:] / shares[0], (solved for _, solved in kept[1:]), strict=True)
+    best = kept[0][1]
+    if best is not first:
+        misfit = account_for_misfit(best.problem, [_best_draw(best)])[0].misfit
+        if confirm or misfit > 0.0 or best.importance.k_hat >= TRUSTED_K_HAT:
+            best = solve_problem(best.problem, rng, confirm=confirm)
+    return replace(best, likely=tuple((float(odds), solved) for odds, solved in likely if odds > UNLIKELY_FAMILY))
+
+
+def _best_draw(solution: Solution) -> FloatArray:
+    """The draw (P,) of the highest density."""
+    draws = solution.importance.draws
+    return np.asarray(draws[int(np.argmax(solution.problem.target.log_density(draws)))])
+
+
+def _pooled(solution: Solution, noise: Noise) -> PooledResidual:
+    """What all crossings together say against the solved family, under the noise of the trace."""
+    problem = solution.problem if solution.problem.misfit == 0.0 else solution.problem.under(noise)
+    return pooled_residual(problem, find_optima(problem.target, _best_draw(solution)[None])[0])
 
 
 def settle(feature: Feature, around: Surroundings) -> Feature:

@@ -13,17 +13,17 @@ from mapping.instrument import Noise
 
 SECTION_TIP = 10e-3
 # Finer than any detail of the sections, m: a corner is missed by half of it, its trace by (5e-7)^2 / 2r
-GRID = 1e-6
+SECTION_GRID = 1e-6
 # Spacing of the tabled traces, m: what lies between is taken linearly, which is off by (5e-6)^2 / 8r on an arc
 TABLED = 5e-6
-SWEEP_HALF = 12e-3
+SWEEP_HALF = 20e-3
 SWEEP_PITCH = 3e-3
 # Every so many samples of the paper's apparatus one is kept: 18 um
 EVERY = 3
 # How many sweeps cross the line, in turn
 SWEEP_COUNTS = (3, 5, 9, 14, 20)
-# 0.06 mm of a sample, all white and nearly all correlated over half a millimetre
-SECTION_NOISES = {"white": Noise(0.06e-3), "OU": Noise(0.02e-3, 0.0566e-3, 0.5e-3)}
+# 0.06 mm of a sample: all of it white, and a third of its variance correlated over 0.3 mm
+SECTION_NOISES = {"white": Noise(0.06e-3), "OU": Noise(0.049e-3, 0.0346e-3, 0.3e-3)}
 # Seeds that were looked into while building, and those that are reported; what is built with has sizes of its own, too
 FIRST_BUILT_WITH = 1000
 
@@ -38,7 +38,7 @@ class SectionBody:
         kind: what it is.
         profile: heights of the body over the plate at distances x (N,) from its middle, m.
         half: half of its foot, m.
-        height: true height (negative: depth) of the crest, m; NaN where it varies along the line.
+        height: true height (negative: depth) of the crest, m; where it varies along the line, in the mean.
         widths: least and largest width that is true of it, m: of upright walls one, of skirts from half height to a
             twentieth of it.
         factor: height at the places s (N,) along the line over that of the profile.
@@ -54,9 +54,7 @@ class SectionBody:
 
 def _wire(size: float) -> SectionBody:
     a = 0.325e-3 * size
-    return SectionBody(
-        "ridge", lambda x: a + np.sqrt(np.clip(a**2 - x**2, 0.0, None)), a, 2.0 * a, (2.0 * a, 2.0 * a)
-    )
+    return SectionBody("ridge", lambda x: a + np.sqrt(np.clip(a**2 - x**2, 0.0, None)), a, 2.0 * a, (2.0 * a, 2.0 * a))
 
 
 def _trapezoid(kind: str, height: float, top: float, foot: float) -> SectionBody:
@@ -98,14 +96,14 @@ def _filleted(size: float) -> SectionBody:
 
 
 def _burrs(size: float) -> SectionBody:
-    """A crack between two burrs: what the ball feels is a ridge with a dent."""
+    """A crack between two burrs, which the ball feels as a ridge with a dent: as high as the burrs, as wide as both."""
     height, width, burr = 0.15e-3 * size, 2e-3 * size, 0.3e-3 * size
 
     def profile(x: FloatArray) -> FloatArray:
         out = np.abs(x) - 0.5 * width
         return np.where(out < 0.0, -1e-3, height * np.clip(1.0 - np.abs(2.0 * out / burr - 1.0), 0.0, 1.0))
 
-    return SectionBody("burrs", profile, 0.5 * width + burr, height, (width, width + 2.0 * burr))
+    return SectionBody("ridge", profile, 0.5 * width + burr, height, (width, width + 2.0 * burr))
 
 
 def _bead(size: float) -> SectionBody:
@@ -120,7 +118,7 @@ def _bead(size: float) -> SectionBody:
         "ridge",
         profile,
         0.5 * foot,
-        float("nan"),
+        height,
         (foot, foot),
         lambda s: 1.0 + 0.15 * np.sin(2.0 * np.pi * s / 20e-3),
     )
@@ -129,9 +127,7 @@ def _bead(size: float) -> SectionBody:
 def _taper(size: float) -> SectionBody:
     """A round crest that grows along the line by a twelfth of its height each centimetre."""
     wire = _wire(size)
-    return SectionBody(
-        "ridge", wire.profile, wire.half, float("nan"), (wire.half, 3.0 * wire.half), lambda s: 1.0 + 8.0 * s
-    )
+    return SectionBody("ridge", wire.profile, wire.half, wire.height, wire.widths, lambda s: 1.0 + 8.0 * s)
 
 
 SECTION_BODIES: dict[str, Callable[[float], SectionBody]] = {
@@ -188,7 +184,11 @@ def felt(body: SectionBody, distance: FloatArray, along: FloatArray, tip: float)
         return dilated(body.profile, body.half, distance, tip)
     factor = body.factor(along)
     levels = np.linspace(factor.min(), factor.max(), 25)
-    tables = np.array([dilated(lambda x, k=k: k * body.profile(x), body.half, distance, tip) for k in levels])
+
+    def grown(level: float) -> Profile:
+        return lambda x: level * body.profile(x)
+
+    tables = np.array([dilated(grown(float(level)), body.half, distance, tip) for level in levels])
     place = np.clip((factor - levels[0]) / (levels[1] - levels[0]), 0.0, len(levels) - 1.0)
     low = np.minimum(place.astype(np.int64), len(levels) - 2)
     share, number = place - low, np.arange(len(distance))
@@ -197,7 +197,7 @@ def felt(body: SectionBody, distance: FloatArray, along: FloatArray, tip: float)
 
 def dilated(profile: Profile, half: float, distance: FloatArray, tip: float) -> FloatArray:
     """(N,) heights of a ball over a profile on a plane: the largest over all places that it may touch, m."""
-    x = np.linspace(-half, half, 2 * int(np.ceil(half / GRID)) + 1)
+    x = np.linspace(-half, half, 2 * int(np.ceil(half / SECTION_GRID)) + 1)
     z = profile(x)
     z[[0, -1]] = np.maximum(z[[0, -1]], 0.0)  # the plane goes up to the foot
     reach = half + np.sqrt(2.0 * tip * max(float(z.max()), 0.0)) + 2.0 * TABLED

@@ -25,6 +25,8 @@ class Crest(Kind):
             return np.zeros(len(feet))
         known = feature.details.radius
         radius = float(radius_of_cap(height, width) if known is None else known)
+        if known is None and feature.details.top is not None and feature.details.run is not None:
+            return _flat_topped(feature, feet, tip_radius)
         # a low and wide one is a part of a large ball, which on a bent base comes out again elsewhere
         near = axis_distance(feet, feature.axis) < CREST_TRACE_REACH * contact_half_width(height, radius, tip_radius)
         crest = feature.axis + (height - radius) * feature.normals
@@ -36,6 +38,20 @@ class Crest(Kind):
         radii = np.exp(draws[:, -1])
         cap = Interval.from_draws(width_of_cap(draws[:, -2], radii))
         return Section(Interval.from_draws(draws[:, -2]), cap, {"radius": float(np.median(radii))})
+
+
+def _flat_topped(feature: Feature, feet: FloatArray, tip_radius: float) -> FloatArray:
+    """(N,) heights of a line with a flat top and straight flanks, m."""
+    from mapping.geometry.templates import section_heights
+
+    away = axis_distance(feet, feature.axis)[:, None]
+    top, run = feature.details.top or 0.0, feature.details.run or 0.0
+    across, up = np.array([[0.5 * top, 0.5 * top + run]]), np.array([[feature.height.median, 0.0]])
+    nowhere, endless = np.zeros_like(away), np.array([[-1e300, 1e300]])
+    out = np.empty((1, len(feet)))
+    section_heights(nowhere, away, np.zeros((0, *away.shape)), nowhere, np.zeros((1, 0)), endless, across, up,
+                    tip_radius, out)  # fmt: skip
+    return np.asarray(out[0])
 
 
 def axis_distance(points: FloatArray, axis: FloatArray) -> FloatArray:
