@@ -31,9 +31,11 @@ from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise
 
 KEPT_DRAWS = 1000
-# The Gaussian approximation of an evidence is taken to be off by no more than this (a PLACEHOLDER; where a
-# parameter is bounded by its prior alone)
-ROUGH_EVIDENCE = 4.0
+# Draws of which the best begins the search for the optimum
+FEW_BEGINNINGS = 200
+# The Gaussian approximation of a log evidence was off by -2.0 to +2.9 (33 families of 11 lines of explore3d bench
+# sections --building): what it takes for less likely by more than both of these is
+ROUGH_EVIDENCE = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,57 +140,66 @@ def solve(
     base = base or _fitted(trace)
     noise = (noise or noise_of_trace(trace, base)).rounded(trace.resolution)
     around = Surroundings(trace, base, noise, others, tip_sd)
-    solution = solve_problem(pose_problem(feature, around), rng, confirm=confirm)
-    solution = _beside_rivals(solution, around, rng, confirm)
+    solution = _likeliest(_rough(pose_problem(feature, around), around), around, rng, confirm)
     if solution.problem.misfit == 0.0:
         return solution
     better = better_section(solution.problem, around, rng)
     return solution if better is None else solve_problem(better, rng, confirm=confirm)
 
 
-def _beside_rivals(first: Solution, around: Surroundings, rng: np.random.Generator, confirm: bool) -> Solution:
-    """The most probable of a solved problem and its rivals, with those that remain likely beside it.
+def _rough(first: PosteriorProblem, around: Surroundings) -> list[PosteriorProblem]:
+    """The problem and its rivals, as far as they may be likely by the Laplace approximation; the likeliest first.
 
-    All are weighed under the noise of the trace: noise that was raised until one of them fits speaks for none.
+    All are weighed under the noise of the trace: noise that is raised until one of them fits would speak for none.
     """
-    problem, optimum, own = first.problem, _best_draw(first), first.importance.log_evidence
-    if problem.misfit > 0.0:
-        problem = replace(problem.under(around.noise), misfit=0.0)
-        optimum = find_optima(problem.target, optimum[None])[0]
-        own = laplace(problem.target, optimum).log_evidence
-    nominal = with_nominal_tip(problem)
-    kept = [(own, first)]
-    for posed in kind_of(problem.feature).rivals(nominal, optimum[: len(nominal.target.shape.names)]):
-        rival = with_free_tip(posed, around.tip_sd, around.base.kind != "mesh") if around.tip_sd > 0.0 else posed
-        optima = find_optima(rival.target, rival.beginnings)
-        roughly = max(laplace(rival.target, each).log_evidence for each in optima)
-        if roughly < own + np.log(UNLIKELY_FAMILY) - ROUGH_EVIDENCE:
-            continue
-        rival = replace(rival, beginnings=np.array(optima))
-        fast = importance_sample(rival.target, [laplace(rival.target, each) for each in optima], rng)
-        if fast.log_evidence > own + np.log(UNLIKELY_FAMILY):
-            kept.append((fast.log_evidence, Solution(rival, _from_importance(rival, fast, rng), fast, None)))
-    kept.sort(key=lambda each: -each[0])
-    shares = probabilities([evidence for evidence, _ in kept])
-    likely = zip(shares[1:] / shares[0], (solved for _, solved in kept[1:]), strict=True)
-    best = kept[0][1]
-    if best is not first:
-        misfit = account_for_misfit(best.problem, [_best_draw(best)])[0].misfit
-        if confirm or misfit > 0.0 or best.importance.k_hat >= TRUSTED_K_HAT:
-            best = solve_problem(best.problem, rng, confirm=confirm)
-    return replace(best, likely=tuple((float(odds), solved) for odds, solved in likely if odds > UNLIKELY_FAMILY))
+    optima = find_optima(first.target, first.beginnings)
+    nominal = with_nominal_tip(first)
+    rivals = kind_of(first.feature).rivals(nominal, optima[0][: len(nominal.target.shape.names)])
+    if not rivals:
+        return [first]
+    weighed = []
+    for problem in (first, *(_felt(each, around) for each in rivals)):
+        found = optima if problem is first else find_optima(problem.target, problem.beginnings)
+        evidence = max(laplace(problem.target, optimum).log_evidence for optimum in found)
+        weighed.append((evidence, replace(problem, beginnings=np.array(found))))
+    weighed.sort(key=lambda each: -each[0])
+    least = weighed[0][0] + np.log(UNLIKELY_FAMILY) - ROUGH_EVIDENCE
+    return [problem for evidence, problem in weighed if evidence > least]
 
 
-def _best_draw(solution: Solution) -> FloatArray:
-    """The draw (P,) of the highest density."""
-    draws = solution.importance.draws
-    return np.asarray(draws[int(np.argmax(solution.problem.target.log_density(draws)))])
+def _felt(problem: PosteriorProblem, around: Surroundings) -> PosteriorProblem:
+    """The problem with the tip's radius as a parameter, if that is doubtful."""
+    return with_free_tip(problem, around.tip_sd, around.base.kind != "mesh") if around.tip_sd > 0.0 else problem
+
+
+def _likeliest(
+    problems: Sequence[PosteriorProblem], around: Surroundings, rng: np.random.Generator, confirm: bool
+) -> Solution:
+    """The most probable of some problems on one window, solved, with those that remain likely beside it."""
+    best = solve_problem(problems[0], rng, confirm=confirm)
+    if best.problem.misfit > 0.0:  # none fits: what the others would say is no better founded
+        return best
+    solved = [best]
+    for problem in problems[1:]:
+        target = problem.target.with_likelihood(best.problem.target.likelihood)
+        modes = [laplace(target, optimum) for optimum in find_optima(target, problem.beginnings)]
+        fast, rival = importance_sample(target, modes, rng), replace(problem, target=target)
+        solved.append(Solution(rival, _from_importance(rival, fast, rng), fast, None))
+    shares = probabilities([each.importance.log_evidence for each in solved])
+    order = [int(k) for k in np.argsort(-shares, kind="stable")]
+    first = solved[order[0]]
+    if first is not best and (confirm or first.importance.k_hat >= TRUSTED_K_HAT):
+        first = solve_problem(first.problem, rng, confirm=confirm, adapt=False)
+    likely = [(float(shares[k] / shares[order[0]]), solved[k]) for k in order[1:]]
+    return replace(first, likely=tuple(each for each in likely if each[0] > UNLIKELY_FAMILY))
 
 
 def _pooled(solution: Solution, noise: Noise) -> PooledResidual:
     """What all crossings together say against the solved family, under the noise of the trace."""
     problem = solution.problem if solution.problem.misfit == 0.0 else solution.problem.under(noise)
-    return pooled_residual(problem, find_optima(problem.target, _best_draw(solution)[None])[0])
+    draws = solution.importance.draws[:: max(1, len(solution.importance.draws) // FEW_BEGINNINGS)]
+    begin = draws[int(np.argmax(problem.target.log_density(draws)))]
+    return pooled_residual(problem, find_optima(problem.target, begin[None])[0])
 
 
 def settle(feature: Feature, around: Surroundings) -> Feature:

@@ -45,9 +45,7 @@ def dilated(u: FloatArray, s: FloatArray, corners: list[tuple[float, float]], ti
 )
 @pytest.mark.parametrize("tip", [10e-3, 1e-3])
 @pytest.mark.parametrize("beyond", [0.0, 0.4e-3])
-def test_the_ball_rests_on_what_holds_it_highest(
-    corners: list[tuple[float, float]], tip: float, beyond: float
-) -> None:
+def test_the_ball_rests_on_what_holds_it_highest(corners: list[tuple[float, float]], tip: float, beyond: float) -> None:
     u = np.linspace(-4e-3, 4e-3, 801)
     s = np.full(len(u), beyond)
     # the grid of places misses a corner by up to 1.3 um: that far down a slope of the ball of up to 45 degrees
