@@ -9,7 +9,7 @@ import numpy as np
 
 from mapping import FloatArray
 from mapping.inference.curves import Chart, CurveModes
-from mapping.inference.families.hollow import bin_nodes
+from mapping.inference.families.hollow import line_nodes
 from mapping.inference.families.problem import Sizes
 from mapping.inference.families.ridge import RidgeShape
 from mapping.inference.likelihood import Prior, Uniform, Window
@@ -69,12 +69,7 @@ class TrapezoidShape:
 
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """(n, nodes) distances along the chart, lateral distances, (m, n, nodes) modes, and bends of the base."""
-        nodes = bin_nodes(self.window)
-        s, lateral, leg = self.chart.coordinates(nodes.reshape(-1, 3))
-        shape = nodes.shape[:2]
-        basis = self.modes.basis(s).reshape(-1, *shape)
-        return s.reshape(shape), lateral.reshape(shape), basis, self.chart.bend[leg].reshape(shape)
+        return line_nodes(self.window, self.chart, self.modes)
 
 
 def trapezoid_beside(ridge: RidgeShape, sizes: Sizes, *, roof: bool) -> TrapezoidShape:
