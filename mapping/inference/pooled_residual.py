@@ -8,7 +8,7 @@ what remains of the residual the statistic follows Fisher's F: a noise that was 
 nothing.
 
 The same splines, with amplitudes of their own instead of a family's, are a section that is free: by it something is
-there, whatever its form (theory section 8.1).
+there, whatever its form (theory section 8.5).
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def pooled_residual(problem: PosteriorProblem, theta: FloatArray) -> PooledResid
     """Test a posed problem at its optimum (P,), under the noise that it is posed with."""
     target = problem.target
     section, places = _section(problem, theta)
-    ways = [each for each in (section, _lengthwise(problem, theta, places)) if len(each)]
+    ways = [each for each in (section, _lengthwise(problem, theta, places) * section.any(axis=0)) if len(each)]
     if not len(section):
         return PooledResidual(1.0, 0.0, False, -np.inf)
     residual, jacobian = _linearised(target, theta)
@@ -105,12 +105,16 @@ def with_remark(feature: Feature, pooled: PooledResidual, *, raised: bool) -> Fe
 
 
 def _section(problem: PosteriorProblem, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(M, n) splines of the distance from the axis at each bin, and the (n,) places along it, -1 to 1."""
+    """(M, n) splines of the distance from the axis at each bin, and the (n,) places along it, -1 to 1.
+
+    Bins that the ball reaches over an end of the line, or where a neighbour stands out as well, say nothing here.
+    """
     from scipy.interpolate import BSpline
 
     shape: Any = with_nominal_tip(problem).target.shape
     window, kind = problem.window, kind_of(problem.feature)
-    inside = np.ones(len(window), dtype=bool)
+    beside = problem.target.beside
+    inside = np.ones(len(window), dtype=bool) if beside is None else beside == 0.0
     if kind.line:
         s, lateral, _ = shape.chart.coordinates(window.feet)
         away = lateral - shape.modes.lateral(theta[None, : shape.modes.count], s)[0]
@@ -118,10 +122,8 @@ def _section(problem: PosteriorProblem, theta: FloatArray) -> tuple[FloatArray, 
         if "start" in shape.names:
             first = shape.names.index("start")
             low, high = float(theta[first]), float(theta[first + 1])
-            # over an end the section is another
-            inside = (s > low + problem.sizes.half_width) & (s < high - problem.sizes.half_width)
-            if inside.sum() < BINS_PER_SPLINE * 2:
-                inside = (s > low) & (s < high)
+            margin = problem.sizes.half_width
+            inside &= (s > low + margin) & (s < high - margin)
         places = np.clip(2.0 * (s - low) / max(high - low, 1e-300) - 1.0, -1.0, 1.0)
     else:
         place = np.zeros(2)
