@@ -185,13 +185,19 @@ def _likeliest(
         modes = [laplace(target, optimum) for optimum in find_optima(target, problem.beginnings)]
         fast, rival = importance_sample(target, modes, rng), replace(problem, target=target)
         solved.append(Solution(rival, _from_importance(rival, fast, rng), fast, None))
-    shares = probabilities([each.importance.log_evidence for each in solved])
+    shares = probabilities([each.importance.log_evidence + np.log1p(_plain_odds(each)) for each in solved])
     order = [int(k) for k in np.argsort(-shares, kind="stable")]
     first = solved[order[0]]
     if first is not best and (confirm or first.importance.k_hat >= TRUSTED_K_HAT):
         first = solve_problem(first.problem, rng, confirm=confirm, adapt=False)
     likely = [(float(shares[k] / shares[order[0]]), solved[k]) for k in order[1:]]
     return replace(first, likely=tuple(each for each in likely if each[0] > UNLIKELY_FAMILY))
+
+
+def _plain_odds(solution: Solution) -> float:
+    """Bayes factor of the plainest member of a solved family against all of it."""
+    shape = with_nominal_tip(solution.problem).target.shape
+    return kind_of(solution.problem.feature).plain_odds(shape, solution.posterior.samples[:, : len(shape.names)])
 
 
 def _pooled(solution: Solution, noise: Noise) -> PooledResidual:

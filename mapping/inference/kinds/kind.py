@@ -119,6 +119,15 @@ class Kind:
         """
         return ()
 
+    def plain_odds(self, shape: Shape, draws: FloatArray) -> float:
+        """Bayes factor of the plainest member of a family, which people make and lay there, against all of it; 0: none.
+
+        Args:
+            shape: the family.
+            draws: (S, P) of its posterior.
+        """
+        return 0.0
+
     def draws_of_height(self, shape: Shape, draws: FloatArray) -> FloatArray:
         """(S,) heights that draws (S, P) of one of the competing families say, m.
 

@@ -69,6 +69,21 @@ class Ridge(Crest, LineKind):
         parts = {"top": float(np.median(top)), "run": float(np.median(run)), "radius": None}
         return Section(Interval.from_draws(height), Interval.from_draws(top + 2.0 * run), parts)
 
+    def plain_odds(self, shape: Any, draws: FloatArray) -> float:
+        """Of a wire that lies on the base: its radius is half its height.
+
+        By the ratio of the densities of the radius there, after the data and before (Savage's ratio; Dickey, Annals of
+        Mathematical Statistics 42, 1971), the former from the draws by Gaussian kernels of Silverman's width.
+        """
+        if not isinstance(shape, RidgeShape):
+            return 0.0
+        lying = np.log(0.5 * draws[:, -2])
+        off = draws[:, -1] - lying
+        width = 1.06 * max(float(off.std()), 1e-9) * len(off) ** -0.2
+        after = float(np.exp(-0.5 * (off / width) ** 2).mean()) / (width * np.sqrt(2.0 * np.pi))
+        before = float(np.exp(shape.priors[-1].log_density(np.median(lying))))
+        return float(after / before)
+
     def draws_of_height(self, shape: Shape, draws: FloatArray) -> FloatArray:
         return shape.parts(draws)[0] if isinstance(shape, TrapezoidShape) else draws[:, -2]
 
