@@ -123,7 +123,7 @@ def _section(problem: PosteriorProblem, theta: FloatArray) -> tuple[FloatArray, 
         if "start" in shape.names:
             first = shape.names.index("start")
             low, high = float(theta[first]), float(theta[first + 1])
-            margin = problem.sizes.half_width
+            margin = problem.sizes.radius  # over which an end may be rounded
             inside &= (s > low + margin) & (s < high - margin)
         places = np.clip(2.0 * (s - low) / max(high - low, 1e-300) - 1.0, -1.0, 1.0)
     else:
