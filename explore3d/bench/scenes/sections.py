@@ -162,7 +162,6 @@ def section_trace(name: str, noise: str, seed: int) -> Trace:
     slant, place = rng.uniform(-0.35, 0.35), rng.uniform(-1e-3, 1e-3)
     run = np.arange(-SWEEP_HALF, SWEEP_HALF, SAMPLE_SPACING)
     across = SWEEP_PITCH * (np.arange(count) - 0.5 * (count - 1)) * min(1.0, 20e-3 / (SWEEP_PITCH * (count - 1)))
-    # keep the slanting line inside every sweep
     feet = np.column_stack([np.repeat(across, len(run)), np.tile(run, count), np.zeros(len(run) * count)])
     distance = -np.sin(slant) * feet[:, 0] + np.cos(slant) * (feet[:, 1] - place)
     along = np.cos(slant) * feet[:, 0] + np.sin(slant) * (feet[:, 1] - place)
@@ -177,8 +176,8 @@ def section_trace(name: str, noise: str, seed: int) -> Trace:
 def felt(body: SectionBody, distance: FloatArray, along: FloatArray, tip: float) -> FloatArray:
     """(N,) heights of the ball over the plate's trace, m.
 
-    A height that varies along the line by a slope g is felt as the local section's, to within r g^2 / 2 (0.6 um of
-    the weld bead, 0.1 um of the taper).
+    A height that varies along the line by a slope g is felt as the local section's, to within r g^2 / 2 (2.8 um
+    of the weld bead where it is steepest, 0.1 um of the taper).
     """
     if body.factor is None:
         return dilated(body.profile, body.half, distance, tip)
