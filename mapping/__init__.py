@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         UNKNOWN_TEXT as UNKNOWN_TEXT,
         Anchor as Anchor,
         Details as Details,
+        Dropped as Dropped,
         Feature as Feature,
         Interval as Interval,
         LeftOut as LeftOut,
@@ -99,6 +100,7 @@ _PUBLIC = {
     "feature": (
         "Anchor",
         "Details",
+        "Dropped",
         "Feature",
         "Interval",
         "LeftOut",

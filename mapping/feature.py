@@ -1,4 +1,4 @@
-"""Feature: a detail of the object finer than its global model, and the values that describe it; and LeftOut."""
+"""Feature: a detail of the object finer than its global model, and its values; Dropped, and LeftOut."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ SUBSTANTIAL = 0.5 * math.log(10.0)
 
 LENGTH_UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 UNKNOWN_TEXT = "–"
+# A lower bound below this share of the upper one reads as none
+NEXT_TO_NOTHING = 0.02
 
 
 def length_unit(size: float) -> tuple[float, str]:
@@ -56,7 +58,8 @@ def _rounded(value: float, digits: int) -> str:
 class Interval:
     """A value with its central 90 % interval: 5 %, 50 % and 95 % quantiles (SI units).
 
-    `censored` is True where the data only bound the value from below ("at least low").
+    `censored` is True where the data only bound the value from below ("at least low"); with `bounded`, too, from above
+    as well ("between low and high"): any value within is as good, and the median is none of its own.
 
     As a number it is its median: `interval > 1e-3` compares that, and so does sorting; `interval.low > 1e-3` asks for
     95 % certainty. As text it reads "0.65 mm (0.64 to 0.66)"; `f"{interval:um}"` chooses the unit.
@@ -66,6 +69,7 @@ class Interval:
     low: float
     high: float
     censored: bool = False
+    bounded: bool = False
 
     @classmethod
     def from_draws(cls, draws: FloatArray) -> Interval:
@@ -89,7 +93,11 @@ class Interval:
         """
         if not math.isfinite(self.median):
             return UNKNOWN_TEXT, ""
-        factor, name = _unit(unit) if unit else length_unit(self.median)
+        factor, name = _unit(unit) if unit else length_unit(self.high if self.bounded else self.median)
+        if self.bounded:
+            high = f"{_rounded(self.high / factor, 2)} {name}"
+            nothing = self.low < NEXT_TO_NOTHING * self.high
+            return (f"at most {high}" if nothing else f"between {_rounded(self.low / factor, 2)} and {high}"), ""
         if self.censored:
             return f"at least {_rounded(self.low / factor, 3)} {name}", ""
         spread = self.high - self.low
@@ -170,6 +178,8 @@ class Details:
         trace_curvature: of the trace over the crest, 1/m.
         radius: of a protruding section's cap, m.
         scale, exponent: of a bump of revolution with a skirt (m, 1).
+        top, run: width of a flat top and run of each flank beside it, m.
+        misfit: in which way no family of its kind fits it, in words.
         axis_sd: (K,) standard deviation of the axis across itself, at even steps along it, m.
         end_intervals: (2, 2) 90 % interval of the first and the last end along the axis, m, from where it is stated.
         ends_seen: whether the data say that the axis does not go on there.
@@ -180,6 +190,9 @@ class Details:
     radius: float | None = None
     scale: float | None = None
     exponent: float | None = None
+    top: float | None = None
+    run: float | None = None
+    misfit: str | None = None
     axis_sd: FloatArray | None = None
     end_intervals: FloatArray | None = None
     ends_seen: tuple[bool, bool] | None = None
@@ -260,6 +273,30 @@ class Feature:
     def closed(self) -> bool:
         """True for a ridge or groove that returns to its beginning."""
         return len(self.axis) > 2 and bool(np.array_equal(self.axis[0], self.axis[-1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Dropped:
+    """Something that was detected, and is no feature of the model.
+
+    Args:
+        kind: of the feature that it was taken for, or of the lone crossing ("convex", "concave", "step up", "step
+            down").
+        point: (3,) place on the base, m.
+        height: signed height over the base, m.
+        snr: signal-to-noise ratio of all its crossings together (matched filter).
+        crossings: number of crossings by sweeps.
+        log_odds: log Bayes factor against nothing, or None if it was dropped before that was asked.
+        reason: one sentence saying why.
+    """
+
+    kind: str
+    point: FloatArray
+    height: float
+    snr: float
+    crossings: int
+    log_odds: float | None
+    reason: str
 
 
 @dataclass(frozen=True)

@@ -122,7 +122,6 @@ def _result(work: Work) -> Analysis:
         path=work.path,
         deviation=work.deviation,
         judgements=work.judgements,
-        dropped=tuple(work.dropped),
         roughness=work.roughness,
     )
 

@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from explore3d import __version__
-from mapping.model import SIZES, rows
+from mapping import Dropped
+from mapping.model import SIZES, probability, rows
 
 if TYPE_CHECKING:
     from explore3d.analysis.result import Analysis
@@ -28,9 +29,9 @@ FEATURE_COLUMNS: dict[str, str] = {
     "kind": "string",
     **dict.fromkeys("xyz", "float64"),
     **{
-        f"{size}{end}": "bool" if end == "_censored" else "float64"
+        f"{size}{end}": "bool" if end in ("_censored", "_bounded") else "float64"
         for size in SIZES
-        for end in ("", "_low", "_high", "_censored")
+        for end in ("", "_low", "_high", "_censored", "_bounded")
     },
     "position_sd": "float64",
     "snr": "float64",
@@ -57,16 +58,23 @@ def run_key(sha256: str, settings: Mapping[str, Any]) -> str:
 
 
 def feature_rows(analysis: Analysis, run: str) -> list[Row]:
-    """A row for each feature, those that were supposed and dropped last; columns as FEATURE_COLUMNS.
+    """A row for each feature, what was detected and dropped last; columns as FEATURE_COLUMNS.
 
     Args:
         run: key of the analysis.
     """
     kept = [row | {"kept": True, "why_dropped": None} for row in rows(analysis.model.features)]
-    dropped = rows([feature for feature, _ in analysis.dropped])
-    reasons = [reason for _, reason in analysis.dropped]
-    lost = [row | {"id": None, "kept": False, "why_dropped": why} for row, why in zip(dropped, reasons, strict=True)]
-    return [{"run": run} | {name: _known(value) for name, value in row.items()} for row in (*kept, *lost)]
+    table = (*kept, *map(_dropped_row, analysis.model.dropped))
+    return [{"run": run} | {name: _known(value) for name, value in row.items()} for row in table]
+
+
+def _dropped_row(dropped: Dropped) -> Row:
+    """What is known of something that is no feature; its other columns are empty."""
+    row: Row = dict.fromkeys(FEATURE_COLUMNS) | {"kind": dropped.kind, "height": dropped.height, "snr": dropped.snr}
+    row |= {name: float(value) for name, value in zip("xyz", dropped.point, strict=True)}
+    row |= {"crossings": dropped.crossings, "log_odds": dropped.log_odds, "kept": False, "why_dropped": dropped.reason}
+    row["probability"] = None if dropped.log_odds is None else probability(dropped.log_odds)
+    return {name: value for name, value in row.items() if name != "run"}
 
 
 def _known(value: Any) -> Any:

@@ -21,7 +21,7 @@ from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature
 from explore3d.log import Log, stop_of
 from explore3d.scene import AnalysisSettings, Scene
-from mapping import Feature, LeftOut, Trace, length_text
+from mapping import Dropped, Feature, LeftOut, Trace, length_text
 from mapping.assembly import Inspections, assemble, why_none_sought
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import Detections, detect, recovered
@@ -30,7 +30,7 @@ from mapping.estimate.deviation import Deviation, explain
 from mapping.estimate.envelope import estimate_surface
 from mapping.geometry.curvature import principal_curvatures
 from mapping.inference import refine_all
-from mapping.model import Judgement, ObjectModel, judged
+from mapping.model import Judgement, ObjectModel, dropped_crossings, dropped_features, judged
 
 if TYPE_CHECKING:
     from mapping.estimate.envelope import Estimate
@@ -86,13 +86,13 @@ class Work:
         base: the global model.
         detections: crossings, noise, detection limit.
         features: as they are known by now.
+        dropped: what was detected and is no feature.
         inspections: the heights of the trace that the features were assembled from.
         sound: the trace under sound sweep numbers; None for a log that was searched while it was read.
         path: what became of the recorded path.
         deviation: what the given model gets wrong; None if nothing is known to be.
         judgements: what became of the scene's tolerances.
         apart: samples left out for that.
-        dropped: features that were supposed and not kept, and why.
         roughness: what the surface is like beside the features.
         asked: whether a stage was asked for, by its name.
     """
@@ -108,6 +108,7 @@ class Work:
     model: ObjectModel = field(init=False)
     inspected: Inspected = field(init=False)
     features: tuple[Feature, ...] = ()
+    dropped: tuple[Dropped, ...] = ()
     estimate: Estimate | None = None
     curvature: Curvature | None = None
     account: SurfaceAccount | None = None
@@ -117,7 +118,6 @@ class Work:
     path: PathLedger | None = None
     deviation: Deviation | None = None
     apart: int = 0
-    dropped: list[tuple[Feature, str]] = field(default_factory=list)
     roughness: Roughness | None = None
     time_curve: tuple[tuple[float, float], ...] = ()
     asked: dict[str, bool] = field(default_factory=dict)
@@ -373,14 +373,13 @@ def why_no_chain(work: Work) -> str | None:
 
 def believed(work: Work, share: Share) -> None:
     """Without what all sweeps together hardly speak for: a false alarm that later sweeps passed by."""
-    # without a posterior nothing was found
-    kept = tuple(f for f in work.features if f.evidence.likely)
-    for feature in (f for f in work.features if f not in kept):
-        x, y, z = np.round(1e3 * feature.axis[0], 2)
-        reason = f"all sweeps together hardly speak for it (log odds {feature.evidence.log_odds:.1f})"
-        work.stages.left_out.append(LeftOut(f"a {feature.kind} at ({x:g}, {y:g}, {z:g}) mm", reason))
-        work.dropped.append((feature, reason))
-    work.features = kept
+    unlikely = dropped_features([feature for feature in work.features if not feature.evidence.likely])
+    lone = dropped_crossings(work.detections.crossings, work.features, work.trace.tip_radius)
+    work.dropped = (*unlikely, *lone)
+    for each in unlikely:
+        x, y, z = np.round(1e3 * each.point, 2)
+        work.stages.left_out.append(LeftOut(f"a {each.kind} at ({x:g}, {y:g}, {z:g}) mm", each.reason))
+    work.features = tuple(feature for feature in work.features if feature.evidence.likely)
 
 
 def why_no_smoothing(work: Work) -> str | None:
@@ -443,6 +442,7 @@ def modelled(work: Work, share: Share) -> None:
         provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface | path | deviation | rough,
         inspected=work.inspected.height,
         reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
+        dropped=work.dropped,
         deviation=work.deviation.heights if work.deviation and work.deviation.of_the_model else None,
     )
     if work.scene is not None and work.scene.tolerance:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mapping import Feature, LeftOut, Trace
+from mapping import LeftOut, Trace
 from mapping.base import Base
 from mapping.model import Judgement, ObjectModel
 
@@ -68,7 +68,6 @@ class Analysis:
         path: what became of the path that was recorded; None for a log that was searched while it was read.
         deviation: what the given model gets wrong at long wavelengths, None if nothing.
         judgements: what became of each tolerance of the scene.
-        dropped: features that were supposed and not kept, each with the reason.
         roughness: what the surface is like beside the features; None where a trace cannot tell.
     """
 
@@ -96,5 +95,4 @@ class Analysis:
     path: PathLedger | None = None
     deviation: Deviation | None = None
     judgements: tuple[Judgement, ...] = ()
-    dropped: tuple[tuple[Feature, str], ...] = ()
     roughness: Roughness | None = None

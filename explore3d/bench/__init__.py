@@ -29,6 +29,11 @@ if TYPE_CHECKING:
     )
     from explore3d.bench.figures import write_figures as write_figures
     from explore3d.bench.scaling import AXES as AXES, bench_scaling as bench_scaling, scaling_lines as scaling_lines
+    from explore3d.bench.sections import (
+        bench_sections as bench_sections,
+        section_lines as section_lines,
+        section_trial as section_trial,
+    )
     from explore3d.bench.touch import Answer as Answer, bench_touch as bench_touch, touch_lines as touch_lines
     from explore3d.bench.trace import (
         bench_trace as bench_trace,
@@ -52,6 +57,7 @@ _PUBLIC = {
     "figures": ("write_figures",),
     "scaling": ("AXES", "bench_scaling", "scaling_lines"),
     "touch": ("Answer", "bench_touch", "touch_lines"),
+    "sections": ("bench_sections", "section_lines", "section_trial"),
     "trace": ("bench_trace", "bump_mesh", "by_opencamlib", "trace_table"),
     "wrong_models": ("bench_wrong_models", "wrong_model_lines", "wrong_model_records", "wrong_model_run"),
 }

@@ -317,6 +317,26 @@ def trust(
         _print(str(path) for path in write_trust(records, of, out))
 
 
+def sections(
+    store: Store,
+    bodies: Annotated[str | None, typer.Option(help="Sections, separated by commas; all if left out.")] = None,
+    noises: Annotated[str | None, typer.Option(help="white, OU or both, separated by a comma.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds of place, slant, number of sweeps and noise.")] = 20,
+    building: Annotated[bool, typer.Option("--building", help="The seeds and sizes that may be looked into.")] = False,
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+) -> None:
+    """Are the sizes of lines that are no half-cylinder true, bounds, or remarked upon? As CSV.
+
+    Example: explore3d bench sections --store sections.jsonl --bodies rectangle,triangle --seeds 2
+    """
+    from explore3d.bench import bench_sections, section_lines
+    from explore3d.bench.scenes import FIRST_BUILT_WITH, SECTION_BODIES, SECTION_NOISES
+
+    chosen = _names(bodies, "--bodies", list(SECTION_BODIES)), _names(noises, "--noises", list(SECTION_NOISES))
+    first = FIRST_BUILT_WITH if building else 0
+    _print(section_lines(list(bench_sections(*chosen, range(first, first + seeds), store, seconds))))
+
+
 @bench.command()
 def dynamics() -> None:
     """Computing time and error of stiff contact over the stiffness, as CSV.

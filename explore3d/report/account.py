@@ -3,22 +3,48 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 
 from explore3d import seconds_text
 from explore3d.analysis import Analysis, forecast
 from explore3d.report.markup import Html, Row, element, paragraph, section, table
 from explore3d.report.pictures import Pictures
-from mapping import LeftOut, length_text
+from mapping import Dropped, LeftOut, length_text
+
+# Dropped detections that the page lists: what a reader looks through
+MOST_DROPPED_SHOWN = 20
 
 
 def what_was_left_out(analysis: Analysis, pictures: Pictures) -> Html:
     """Stages that were not needed or could not be done."""
     silent = tuple(LeftOut("part of the trace", sentence) for sentence in analysis.detections.left_out)
     everything = (*analysis.left_out, *silent, *pictures.left_out)
-    if not everything:
-        return section("What was left out", "left-out", paragraph("Nothing."))
-    rows = [(element("b", each.stage), each.reason, each.saved) for each in everything]
-    return section("What was left out", "left-out", table(("stage", "why", "what that saved"), rows))
+    content = []
+    if everything:
+        rows = [(element("b", each.stage), each.reason, each.saved) for each in everything]
+        content.append(table(("stage", "why", "what that saved"), rows))
+    if analysis.model.dropped:
+        content.append(_dropped(analysis.model.dropped))
+    return section("What was left out", "left-out", *(content or [paragraph("Nothing.")]))
+
+
+def _dropped(dropped: Sequence[Dropped]) -> Html:
+    """Detections that are no feature, the plainest first."""
+    head = ("detected, and no feature", "at, mm", "height", "signal to noise", "why")
+    plainest = sorted(dropped, key=lambda each: -each.snr)
+    rows: list[Row] = [
+        (
+            element("b", each.kind),
+            ", ".join(f"{1e3 * value:.2f}" for value in each.point),
+            length_text(each.height, 2),
+            f"{each.snr:.1f}",
+            each.reason,
+        )
+        for each in plainest[:MOST_DROPPED_SHOWN]
+    ]
+    more = len(dropped) - MOST_DROPPED_SHOWN
+    rest = [paragraph(f"and {more} more, in model.json.")] if more > 0 else []
+    return Html("".join([table(head, rows), *rest]))
 
 
 def account_of_time(analysis: Analysis) -> Html:

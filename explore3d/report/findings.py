@@ -19,6 +19,7 @@ CUT_NAMES = {
 }
 # What a job's folder may hold, the first of which that is there is named last
 RESULTS = (("report", "report.html"), ("features", "features.csv"))
+MOST_REMARKS = 5  # remarks on the form of features; the report and model.json have them all
 MOST_LISTED_FEATURES = 20  # features that are listed one by one; the report has them all
 
 
@@ -75,6 +76,7 @@ def warnings(analysis: Analysis) -> list[str]:
         *deviation_warning(analysis),
         *path_warning(analysis),
         *form_warnings(analysis),
+        *misfit_warnings(analysis),
         *warning_lines(analysis),
     ]
 
@@ -93,6 +95,13 @@ def form_warnings(analysis: Analysis) -> list[str]:
     """What was taken for form, and what was assumed of the tip."""
     absorbed = [f"{each.reason[0].upper()}{each.reason[1:]}." for each in analysis.left_out if each.stage == ABSORBED]
     return [*absorbed, *tip_sentence(analysis)]
+
+
+def misfit_warnings(analysis: Analysis) -> list[str]:
+    """Features that are not of the form that their sizes are those of."""
+    wrong = [feature for feature in analysis.model.features if feature.details.misfit]
+    more = [f"... and {len(wrong) - MOST_REMARKS} features more."] if len(wrong) > MOST_REMARKS else []
+    return [*(f"Warning: {feature.id}: {feature.details.misfit}." for feature in wrong[:MOST_REMARKS]), *more]
 
 
 def tip_sentence(analysis: Analysis) -> list[str]:

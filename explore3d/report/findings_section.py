@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 from explore3d import count_text
 from explore3d.analysis import Analysis
@@ -11,6 +12,7 @@ from explore3d.report.findings import (
     deviation_warning,
     form_warnings,
     limit_sentence,
+    misfit_warnings,
     path_sentence,
     path_warning,
     stop_lines,
@@ -96,6 +98,7 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
         content.extend([element("p", warning, class_="warning")] if warning else [])
         content.append(paragraph(analysis.account.sentence()))
     content.extend(element("p", each, class_="warning") for each in form_warnings(analysis))
+    content.extend(element("p", each, class_="warning") for each in misfit_warnings(analysis))
     if analysis.path is not None:
         kind = "warning" if path_warning(analysis) else ""
         content.append(element("p", path_sentence(analysis.path), class_=kind))
@@ -215,7 +218,7 @@ def _sizes(feature: Feature) -> list[tuple[str, str]]:
 
 def _described(interval: Interval) -> str:
     if interval.median < 0:
-        interval = Interval(-interval.median, -interval.high, -interval.low, interval.censored)
+        interval = replace(interval, median=-interval.median, low=-interval.high, high=-interval.low)
     median, span = interval.text()
     return f"{median} ({span})" if span else median
 

@@ -97,7 +97,7 @@ def in_unit(scale: float) -> Callable[[], Answer]:
 
 def _scaled_feature(feature: Feature, scale: float) -> Feature:
     def interval(old: Interval) -> Interval:
-        return Interval(scale * old.median, scale * old.low, scale * old.high, old.censored)
+        return replace(old, median=scale * old.median, low=scale * old.low, high=scale * old.high)
 
     return replace(
         feature, axis=scale * feature.axis, height=interval(feature.height), width=interval(feature.width),

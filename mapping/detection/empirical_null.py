@@ -21,10 +21,10 @@ from functools import cached_property
 import numpy as np
 
 from mapping import BoolArray, FloatArray
-from mapping.base import MAD_TO_SD, SweepHeights
+from mapping.base import SweepHeights
 from mapping.detection.filters import Bank
 from mapping.detection.local_level import LOG_VARIANCE_PER_BIN, excess, local_levels
-from mapping.instrument import Noise, robust_sd
+from mapping.instrument import MAD_TO_SD, Noise, robust_sd
 
 # The scale of unit outputs is read from their median absolute value, which what is no noise in less than half of a cell
 # shifts little. Variance of the logarithm of the variance so read in a cell of one half-width; simulated with white and

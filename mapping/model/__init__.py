@@ -10,6 +10,7 @@ if TYPE_CHECKING:
         Comparison as Comparison,
         compare_models as compare_models,
     )
+    from mapping.model.dropped import dropped_crossings as dropped_crossings, dropped_features as dropped_features
     from mapping.model.feature_mesh import drawn_at_least as drawn_at_least, feature_mesh as feature_mesh
     from mapping.model.json_record import plain as plain
     from mapping.model.merging import merge_model as merge_model
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "comparison": ("Change", "Comparison", "compare_models"),
+    "dropped": ("dropped_crossings", "dropped_features"),
     "feature_mesh": ("drawn_at_least", "feature_mesh"),
     "json_record": ("plain",),
     "merging": ("merge_model",),

@@ -46,6 +46,8 @@ def _size(feature: Feature) -> tuple[float, float]:
     height, width = feature.height.median, feature.width.median
     height = height if np.isfinite(height) else 0.0
     width = width if np.isfinite(width) and width > 0 else max(abs(height), feature.position_sd)
+    if feature.width.bounded:  # drawn no narrower than a bar as wide as high, if the bounds allow that
+        width = max(width, min(abs(height), feature.width.high))
     return height, width
 
 

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
-from mapping import KINDS, Anchor, Details, Feature, FloatArray, Interval, LeftOut, ModelError, Posterior, Support
+from mapping import (
+    KINDS,
+    Anchor,
+    Details,
+    Dropped,
+    Feature,
+    FloatArray,
+    Interval,
+    LeftOut,
+    ModelError,
+    Posterior,
+    Support,
+)
 
 # Names of the values under "extra" that have a type of their own
 DETAILS = frozenset(each.name for each in fields(Details))
@@ -98,14 +110,30 @@ def left_out_record(left_out: LeftOut) -> Record:
     return {"stage": left_out.stage, "reason": left_out.reason, "saved": left_out.saved}
 
 
+def dropped_record(dropped: Dropped) -> Record:
+    """One detection that is no feature, as a record."""
+    return {each.name: plain(getattr(dropped, each.name), f"dropped.{each.name}") for each in fields(Dropped)}
+
+
+def read_dropped(record: Record) -> Dropped:
+    """The detection that a record describes.
+
+    Raises:
+        TypeError: a field is missing, or unknown.
+    """
+    known = Dropped(**record)
+    point = np.array(known.point, dtype=np.float64)
+    return replace(known, point=point, height=_number(known.height), snr=_number(known.snr))
+
+
 def _interval_record(interval: Interval) -> Record:
     record = {name: plain(float(getattr(interval, name))) for name in ("median", "low", "high")}
-    return {**record, "censored": True} if interval.censored else record
+    return record | {name: True for name in ("censored", "bounded") if getattr(interval, name)}
 
 
 def _read_interval(record: Record) -> Interval:
     median, low, high = (_number(record[name]) for name in ("median", "low", "high"))
-    return Interval(median, low, high, bool(record.get("censored", False)))
+    return Interval(median, low, high, bool(record.get("censored", False)), bool(record.get("bounded", False)))
 
 
 def _anchor_record(anchor: Anchor) -> Record:

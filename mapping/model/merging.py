@@ -154,7 +154,15 @@ def joined_axis(axis: FloatArray, other: FloatArray, share: float) -> FloatArray
 
 
 def merge_intervals(a: Interval, b: Interval) -> Interval:
-    """The interval of two independent measurements; of two lower bounds the higher; a bound yields to a value."""
+    """The interval of two independent measurements; of two lower bounds the higher; a bound yields to a value.
+
+    Two that bound from both sides leave what is within both, or the narrower of them where nothing is.
+    """
+    if a.bounded and b.bounded and max(a.low, b.low) < min(a.high, b.high):
+        low, high = max(a.low, b.low), min(a.high, b.high)
+        return replace(a, median=float(np.clip(a.median, low, high)), low=low, high=high)
+    if a.bounded and b.bounded:
+        return min(a, b, key=lambda each: each.high - each.low)
     if a.censored and b.censored:
         return a if a.low >= b.low else b
     if a.censored or b.censored:
@@ -189,6 +197,5 @@ def merge_model(model: ObjectModel, new: Sequence[Feature], source: str, pose_sd
     history = [*model.provenance.get("merged", []), source]
     about = {"left_out": model.left_out, "timings": model.timings, "reach": model.reach, "sigma": model.sigma}
     about["inspected"] = model.inspected
-    return ObjectModel.attach(
-        model.base, [*features, *added], provenance={**model.provenance, "merged": history}, **about
-    )
+    provenance = {**model.provenance, "merged": history}
+    return ObjectModel.attach(model.base, [*features, *added], provenance=provenance, dropped=model.dropped, **about)

@@ -13,11 +13,20 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from mapping import Feature, FloatArray, LeftOut, ModelError, Surface
+from mapping import Dropped, Feature, FloatArray, LeftOut, ModelError, Surface
 from mapping.base import Base, anchor
 from mapping.geometry.mesh import write_whole
 from mapping.model.glb import glb_bytes
-from mapping.model.json_record import MODEL_SCHEMA, Record, feature_record, left_out_record, plain, read_feature
+from mapping.model.json_record import (
+    MODEL_SCHEMA,
+    Record,
+    dropped_record,
+    feature_record,
+    left_out_record,
+    plain,
+    read_dropped,
+    read_feature,
+)
 from mapping.model.table import dataframe, html_table
 
 __all__ = ["LeftOut", "ObjectModel"]
@@ -41,6 +50,7 @@ class ObjectModel:
         sigma: (V,) standard deviation of the base at each vertex, m, or None.
         inspected: (F,) height above which each base face is free of features that were not found, m, or None.
         deviation: (V,) by how much the body stands off the model that was given, at each vertex, m, or None.
+        dropped: what was detected and is no feature.
     """
 
     base: Base
@@ -52,6 +62,7 @@ class ObjectModel:
     sigma: FloatArray | None = None
     inspected: FloatArray | None = None
     deviation: FloatArray | None = None
+    dropped: tuple[Dropped, ...] = ()
 
     @classmethod
     def attach(cls, base: Base, features: Sequence[Feature], **about: Any) -> Self:
@@ -134,10 +145,8 @@ class ObjectModel:
                 tuple(LeftOut(**each) for each in record["left_out"]),
                 {name: float(seconds) for name, seconds in record["timings"].items()},
                 record["provenance"],
-                arrays.get("reach"),
-                arrays.get("sigma"),
-                arrays.get("inspected"),
-                arrays.get("deviation"),
+                **{name: arrays.get(name) for name in FIELDS},
+                dropped=tuple(read_dropped(each) for each in record.get("dropped", [])),
             )
         except KeyError as error:
             raise ModelError(f"{file}: field {error.args[0]!r} is missing") from error
@@ -162,6 +171,7 @@ class ObjectModel:
             },
             "features": [feature_record(feature) for feature in self.features],
             "left_out": [left_out_record(each) for each in self.left_out],
+            "dropped": [dropped_record(each) for each in self.dropped],
             "timings": {name: round(float(seconds), 6) for name, seconds in self.timings.items()},
             "provenance": plain(self.provenance, "provenance"),
         }

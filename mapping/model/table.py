@@ -28,6 +28,7 @@ def _row(feature: Feature) -> dict[str, Any]:
             f"{name}_low": size.low,
             f"{name}_high": size.high,
             f"{name}_censored": size.censored,
+            f"{name}_bounded": size.bounded,
         }
     support = feature.evidence
     return row | {

@@ -37,6 +37,16 @@ if TYPE_CHECKING:
         sweeps as sweeps,
         wire as wire,
     )
+    from explore3d.bench.scenes.sections import (
+        FIRST_BUILT_WITH as FIRST_BUILT_WITH,
+        SECTION_BODIES as SECTION_BODIES,
+        SECTION_NOISES as SECTION_NOISES,
+        SECTION_TIP as SECTION_TIP,
+        TRUE_FAMILIES as TRUE_FAMILIES,
+        dilated as dilated,
+        section_body as section_body,
+        section_trace as section_trace,
+    )
     from explore3d.bench.scenes.wrong_models import (
         REPORTED as REPORTED,
         WRONG_BODIES as WRONG_BODIES,
@@ -51,6 +61,16 @@ _PUBLIC = {
     "long_log": ("write_long_log",),
     "noise": ("SAMPLE_SPACING", "simulate_noise"),
     "plate_sweeps": ("DIAMETER", "HALF", "Heights", "TIP_RADIUS", "features", "plate", "scaled", "sweeps", "wire"),
+    "sections": (
+        "FIRST_BUILT_WITH",
+        "SECTION_BODIES",
+        "SECTION_NOISES",
+        "SECTION_TIP",
+        "TRUE_FAMILIES",
+        "dilated",
+        "section_body",
+        "section_trace",
+    ),
     "wrong_models": ("REPORTED", "WRONGS", "WRONG_BODIES", "wrong_model"),
 }
 doorway(__name__, _PUBLIC)

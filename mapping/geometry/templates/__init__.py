@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         pit_heights as pit_heights,
         step_heights as step_heights,
     )
+    from mapping.geometry.templates.section_kernels import section_heights as section_heights
     from mapping.geometry.templates.shapes import (
         cap_height as cap_height,
         chain_height as chain_height,
@@ -36,6 +37,7 @@ _PUBLIC = {
     "cap_section": ("radius_of_cap", "width_of_cap"),
     "chain_kernels": ("chain_heights",),
     "hollow_kernels": ("groove_heights", "pit_heights", "step_heights"),
+    "section_kernels": ("section_heights",),
     "shapes": (
         "cap_height",
         "chain_height",

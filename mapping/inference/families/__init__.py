@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from mapping.inference.families.problem import (
         MEETING_REACH as MEETING_REACH,
         MODEL_FLOOR as MODEL_FLOOR,
+        PRECISE as PRECISE,
         PosteriorProblem as PosteriorProblem,
         Sizes as Sizes,
         Surroundings as Surroundings,
@@ -25,6 +26,11 @@ if TYPE_CHECKING:
     )
     from mapping.inference.families.ridge import RidgeShape as RidgeShape, rounding_of as rounding_of
     from mapping.inference.families.step import StepShape as StepShape
+    from mapping.inference.families.trapezoid import (
+        TrapezoidShape as TrapezoidShape,
+        touched_widths as touched_widths,
+        trapezoid_beside as trapezoid_beside,
+    )
 
 _PUBLIC = {
     "bell": ("BellShape", "bell_shape", "width_at_half_height"),
@@ -35,6 +41,7 @@ _PUBLIC = {
     "problem": (
         "MEETING_REACH",
         "MODEL_FLOOR",
+        "PRECISE",
         "PosteriorProblem",
         "Sizes",
         "Surroundings",
@@ -43,5 +50,6 @@ _PUBLIC = {
     ),
     "ridge": ("RidgeShape", "rounding_of"),
     "step": ("StepShape",),
+    "trapezoid": ("TrapezoidShape", "touched_widths", "trapezoid_beside"),
 }
 doorway(__name__, _PUBLIC)

@@ -96,12 +96,18 @@ class GrooveShape:
 
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """(n, nodes) distances along the chart, lateral distances, (m, n, nodes) modes, and bends of the base."""
-        nodes = bin_nodes(self.window)
-        s, lateral, leg = self.chart.coordinates(nodes.reshape(-1, 3))
-        shape = nodes.shape[:2]
-        basis = self.modes.basis(s).reshape(-1, *shape)
-        return s.reshape(shape), lateral.reshape(shape), basis, self.chart.bend[leg].reshape(shape)
+        return line_nodes(self.window, self.chart, self.modes)
+
+
+def line_nodes(
+    window: Window, chart: Chart, modes: CurveModes
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """(n, nodes) distances along the chart, lateral distances, (m, n, nodes) modes, and bends of the base."""
+    nodes = bin_nodes(window)
+    s, lateral, leg = chart.coordinates(nodes.reshape(-1, 3))
+    shape = nodes.shape[:2]
+    basis = modes.basis(s).reshape(-1, *shape)
+    return s.reshape(shape), lateral.reshape(shape), basis, chart.bend[leg].reshape(shape)
 
 
 def bin_nodes(window: Window) -> FloatArray:

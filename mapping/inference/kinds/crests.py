@@ -24,6 +24,8 @@ class Crest(Kind):
         height = feature.height.median
         if height <= 0.0:
             return np.zeros(len(feet))
+        if feature.details.radius is None and feature.details.top is not None and feature.details.run is not None:
+            return _flat_topped(feature, feet, tip_radius)
         radius = crest_radius(feature)
         # a low and wide one is a part of a large ball, which on a bent base comes out again elsewhere
         near = axis_distance(feet, feature.axis) < CREST_TRACE_REACH * contact_half_width(height, radius, tip_radius)
@@ -50,6 +52,20 @@ def crest_radius(feature: Feature) -> float:
     known = feature.details.radius
     width = max(feature.width.median, 1e-12)
     return float(radius_of_cap(feature.height.median, width) if known is None else known)
+
+
+def _flat_topped(feature: Feature, feet: FloatArray, tip_radius: float) -> FloatArray:
+    """(N,) heights of a line with a flat top and straight flanks, m."""
+    from mapping.geometry.templates import section_heights
+
+    away = axis_distance(feet, feature.axis)[:, None]
+    top, run = feature.details.top or 0.0, feature.details.run or 0.0
+    across, up = np.array([[0.5 * top, 0.5 * top + run]]), np.array([[feature.height.median, 0.0]])
+    nowhere, endless = np.zeros_like(away), np.array([[-1e300, 1e300]])
+    out = np.empty((1, len(feet)))
+    section_heights(nowhere, away, np.zeros((0, *away.shape)), nowhere, np.zeros((1, 0)), endless, across, up,
+                    tip_radius, out)  # fmt: skip
+    return np.asarray(out[0])
 
 
 def axis_distance(points: FloatArray, axis: FloatArray) -> FloatArray:

@@ -111,6 +111,40 @@ class Kind:
         """Further families on the same window, tried where the first does not fit within the noise."""
         return ()
 
+    def rivals(self, problem: PosteriorProblem, optimum: FloatArray) -> Sequence[PosteriorProblem]:
+        """Further families that may leave the same trace, weighed against the first by their evidence.
+
+        Args:
+            problem: as posed for the nominal tip.
+            optimum: (P,) of it, where the search for theirs begins.
+        """
+        return ()
+
+    def plain_odds(self, shape: Shape, draws: FloatArray) -> float:
+        """Bayes factor of the plainest member of a family, which people make and lay there, against all of it; 0: none.
+
+        Args:
+            shape: the family.
+            draws: (S, P) of its posterior.
+        """
+        return 0.0
+
+    def draws_of_height(self, shape: Shape, draws: FloatArray) -> FloatArray:
+        """(S,) heights that draws (S, P) of one of the competing families say, m.
+
+        Raises:
+            MappingError: the kind has none that compete.
+        """
+        raise MappingError(f"no families compete for a {self.name!r}")
+
+    def widths_felt(self, shape: Shape, draws: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(S,) widths that were touched if draws (S, P) are true, and within which the foot lies, m.
+
+        Raises:
+            MappingError: the kind has no families that compete.
+        """
+        raise MappingError(f"no families compete for a {self.name!r}")
+
     def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
         """What draws (S, P) of the shape's parameters say of the feature's cross-section.
 

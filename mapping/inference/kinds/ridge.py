@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from mapping import FloatArray
-from mapping.inference.families import RidgeShape, Sizes, rounding_of
+from mapping import Feature, FloatArray, Interval
+from mapping.geometry.templates import contact_half_width
+from mapping.inference.families import (
+    PosteriorProblem,
+    RidgeShape,
+    Sizes,
+    TrapezoidShape,
+    rounding_of,
+    touched_widths,
+    trapezoid_beside,
+)
 from mapping.inference.kinds.crests import Crest
+from mapping.inference.kinds.kind import Section
 from mapping.inference.kinds.lines import LineKind, Parameters, Traced
 from mapping.inference.kinds.posing import height_prior, radius_prior
-from mapping.inference.likelihood import Uniform
+from mapping.inference.likelihood import Shape, Uniform
+
+# Widths of a flat top and runs of a flank, in half-widths of the disturbance, from which their optimum is searched:
+# upright and gentle flanks, tops that are hardly felt and such as fill the disturbance
+FLAT_STARTS = ((0.3, 0.02), (1.0, 0.02), (0.1, 0.6))
+ROOF_STARTS = ((0.02,), (0.6,))
 
 
 class Ridge(Crest, LineKind):
@@ -30,6 +47,52 @@ class Ridge(Crest, LineKind):
 
     def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
         return float(np.log(4.0 * sizes.radius)), float(np.log(0.5 * sizes.height))
+
+    def rivals(self, problem: PosteriorProblem, optimum: FloatArray) -> Sequence[PosteriorProblem]:
+        """Lines with straight flanks, and with a flat top or none, on the same course."""
+        ridge: Any = problem.target.shape
+        course, last = ridge.modes.count, len(optimum) - 1
+        kept = np.delete(optimum, [last] if ridge.chart.closed else [course, last])
+        posed = []
+        for roof, parts in ((False, FLAT_STARTS), (True, ROOF_STARTS)):
+            shape = trapezoid_beside(ridge, problem.sizes, roof=roof)
+            begun = np.log(problem.sizes.half_width * np.array(parts))
+            beginnings = np.column_stack([np.tile(kept, (len(parts), 1)), begun])
+            posed.append(replace(problem, target=replace(problem.target, shape=shape), beginnings=beginnings))
+        return posed
+
+    def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
+        """Of a round section, or of one with a flat top: what its flanks lead to."""
+        if not isinstance(shape, TrapezoidShape):
+            return super().section(feature, shape, draws)
+        height, top, run = shape.parts(draws)
+        parts = {"top": float(np.median(top)), "run": float(np.median(run)), "radius": None}
+        return Section(Interval.from_draws(height), Interval.from_draws(top + 2.0 * run), parts)
+
+    def plain_odds(self, shape: Any, draws: FloatArray) -> float:
+        """Of a wire that lies on the base: its radius is half its height.
+
+        By the ratio of the densities of the radius there, after the data and before (Savage's ratio; Dickey, Annals of
+        Mathematical Statistics 42, 1971), the former from the draws by Gaussian kernels of Silverman's width.
+        """
+        if not isinstance(shape, RidgeShape):
+            return 0.0
+        lying = np.log(0.5 * draws[:, -2])
+        off = draws[:, -1] - lying
+        width = 1.06 * max(float(off.std()), 1e-9) * len(off) ** -0.2
+        after = float(np.exp(-0.5 * (off / width) ** 2).mean()) / (width * np.sqrt(2.0 * np.pi))
+        before = float(np.exp(shape.priors[-1].log_density(np.median(lying))))
+        return float(after / before)
+
+    def draws_of_height(self, shape: Shape, draws: FloatArray) -> FloatArray:
+        return shape.parts(draws)[0] if isinstance(shape, TrapezoidShape) else draws[:, -2]
+
+    def widths_felt(self, shape: Any, draws: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if isinstance(shape, TrapezoidShape):
+            return touched_widths(*shape.parts(draws), shape.tip_radius)
+        height, radius = draws[:, -2], np.exp(draws[:, -1])
+        kink = contact_half_width(height, radius, shape.tip_radius)
+        return 2.0 * kink * radius / (radius + shape.tip_radius), 2.0 * kink
 
     def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
         """The compiled form, over points instead of bins."""

@@ -35,6 +35,11 @@ class Laplace:
     covariance: FloatArray
     log_density: float
 
+    @property
+    def log_evidence(self) -> float:
+        """Log of the integral of the density, were it this Gaussian."""
+        return self.log_density + 0.5 * float(np.linalg.slogdet(2.0 * np.pi * self.covariance)[1])
+
 
 def find_optima(target: LogPosterior, starts: FloatArray) -> list[FloatArray]:
     """Distinct optima (P,) reached by Levenberg-Marquardt from the starts (M, P), best first.

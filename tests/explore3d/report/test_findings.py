@@ -14,7 +14,12 @@ from mapping.feature import Interval
 def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
     height = Interval(0.651e-3, 0.648e-3, 0.654e-3)
     return SimpleNamespace(
-        id=name, curvature_feature=finer, height=height, width=Interval(1e-3, 1e-3, 1e-3), length=length
+        id=name,
+        curvature_feature=finer,
+        height=height,
+        width=Interval(1e-3, 1e-3, 1e-3),
+        length=length,
+        details=SimpleNamespace(misfit=None),
     )
 
 

@@ -1,0 +1,118 @@
+"""Sections: does a line that is no half-cylinder get sizes that are true, bounds, or a remark, and no confident error?
+
+Each trial builds the model as `explore3d analyze` does, without pictures and report, from a trace over a plate whose
+section was dilated by brute force. Every trial is one line of a JSONL file; what is already in it is not run again.
+
+    explore3d bench sections --store sections.jsonl --seeds 20
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any
+
+import numpy as np
+
+from explore3d.analysis import Stages, build_model
+from explore3d.bench.scenes import TRUE_FAMILIES, section_body, section_trace
+from explore3d.log import Log
+from mapping import Feature, Interval
+
+# What each judgement of a trial's line means
+JUDGED_RIGHT = ("true", "bounded", "flagged")
+
+
+def bench_sections(
+    bodies: Sequence[str], noises: Sequence[str], seeds: range, store: Path, seconds: float = np.inf
+) -> Iterator[dict[str, Any]]:
+    """Run what is not yet in the store and append it there, until so many seconds have passed; yields all records."""
+    begin = perf_counter()
+    lines = store.read_text(encoding="utf-8").splitlines() if store.exists() else []
+    done = {(each["body"], each["noise"], each["seed"]): each for each in map(json.loads, lines)}
+    for seed in seeds:
+        for body in bodies:
+            for noise in noises:
+                if (body, noise, seed) not in done:
+                    if perf_counter() - begin > seconds:
+                        return
+                    record = {"body": body, "noise": noise, "seed": seed} | section_trial(body, noise, seed)
+                    with store.open("a", encoding="utf-8") as file:
+                        file.write(json.dumps(record) + "\n")
+                    done[body, noise, seed] = record
+                yield done[body, noise, seed]
+
+
+def section_trial(body: str, noise: str, seed: int) -> dict[str, Any]:
+    """Analyse one trace, and judge what is said of its line."""
+    truth, trace = section_body(body, seed), section_trace(body, noise, seed)
+    begin = process_time()
+    analysis = build_model(Log(trace), None, None, Stages())
+    features = analysis.model.features
+    record: dict[str, Any] = {
+        "sweeps": int(trace.sweep.max()) + 1,
+        "kinds": [feature.kind for feature in features],
+        "cpu": process_time() - begin,
+        "posterior": analysis.timings.get("posterior", 0.0),
+        "true_height": truth.height,
+        "true_widths": list(truth.widths),
+    }
+    if not features:
+        return record | {"judged": "missed"}
+    main = max(features, key=lambda feature: feature.evidence.snr)
+    judged = {"height": _judged(main.height, (truth.height,) * 2), "width": _judged(main.width, truth.widths)}
+    flagged = is_flagged(main)
+    if main.kind != truth.kind or len(features) > 1:
+        whole = "flagged" if flagged else "miscounted"
+    elif "wrong" in judged.values():
+        whole = "flagged" if flagged else "wrong"
+    else:
+        whole = "bounded" if "bounded" in judged.values() else "true"
+    sizes = {
+        name: [size.median, size.low, size.high, size.censored]
+        for name, size in (("height", main.height), ("width", main.width))
+    }
+    return (
+        record
+        | {"judged": whole, "flagged": flagged, "sizes": sizes, "notes": list(main.notes)}
+        | {f"{name}_judged": each for name, each in judged.items()}
+    )
+
+
+def is_flagged(feature: Feature) -> bool:
+    """True if a remark says that the feature is not of the form that its sizes are those of."""
+    return feature.details.misfit is not None
+
+
+def _judged(interval: Interval, truth: tuple[float, float]) -> str:
+    """Whether the interval holds one of the true values ("true"), or is a bound that they keep to, or is "wrong"."""
+    if interval.censored:
+        largest = max(abs(each) for each in truth)
+        kept = largest >= min(abs(interval.low), abs(interval.high))
+        return "bounded" if kept and not (interval.bounded and min(truth) > interval.high) else "wrong"
+    return "true" if interval.low <= truth[1] and truth[0] <= interval.high else "wrong"
+
+
+def section_lines(records: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """A line for each section and noise: share and sorts of what is right, and coverage and bias of the height."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for record in records:
+        groups.setdefault((record["body"], record["noise"]), []).append(record)
+    yield "section,noise,trials,right %,true,bounded,flagged,wrong,miscounted,missed,covered %,bias %,posterior s"
+    for (body, noise), some in groups.items():
+        counts = {name: sum(each["judged"] == name for each in some) for name in JUDGED_RIGHT}
+        rest = {name: sum(each["judged"] == name for each in some) for name in ("wrong", "miscounted", "missed")}
+        shares = [100.0 * sum(counts.values()) / len(some), *counts.values(), *rest.values()]
+        sized = [each for each in some if "sizes" in each and not each["sizes"]["height"][3]]
+        covered = 100.0 * float(np.mean([each["height_judged"] == "true" for each in sized])) if sized else np.nan
+        ratios = [each["sizes"]["height"][0] / each["true_height"] - 1.0 for each in sized]
+        bias = 100.0 * float(np.mean(ratios)) if sized else np.nan
+        seconds = float(np.mean([each["posterior"] for each in some]))
+        numbers = [*(f"{share:.0f}" for share in shares), f"{covered:.0f}", f"{bias:+.1f}", f"{seconds:.2f}"]
+        yield ",".join([body, noise, str(len(some)), *numbers])
+    known = [each for each in records if each["body"] in TRUE_FAMILIES and "flagged" in each]
+    if known:
+        false = sum(each["flagged"] for each in known)
+        yield f"remarks on sections of a family that the house has: {false} of {len(known)}"

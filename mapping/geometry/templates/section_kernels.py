@@ -1,0 +1,81 @@
+"""Compiled traces of lines with a polygon for a section, averaged over the nodes of each bin."""
+
+# mypy: disable-error-code="untyped-decorator"
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mapping import FloatArray
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def section_heights(
+    s: FloatArray,
+    lateral: FloatArray,
+    basis: FloatArray,
+    bend: FloatArray,
+    courses: FloatArray,
+    ends: FloatArray,
+    across: FloatArray,
+    up: FloatArray,
+    tip: float,
+    out: FloatArray,
+) -> None:
+    """Heights (W, n) of W lines over bins with q nodes; written to `out`.
+
+    Half of the section, which is the same on both sides, has the corners `across` (W, K), from the middle outwards,
+    and `up` (W, K), which falls from the crest. The ball rests on the top, on a corner (an arc of its own radius) or on
+    a flank (a line parallel to it), whichever holds it highest: dilation distributes over unions. Beyond an end, cut
+    square, what touches is the circle in which the ball crosses the end's plane. On a curved base heights over it are
+    felt as a ball of curvature 1/r + k feels them over a plane.
+
+    Args:
+        s, lateral: (n, q) places of the nodes along and across the chart, m.
+        basis: (m, n, q) lateral modes there.
+        bend: (n, q) curvature of the base across the line, 1/m.
+        courses: (W, m) coefficients of the modes.
+        ends: (W, 2) where the line begins and ends along the chart, m.
+        across, up: (W, K) corners, m.
+        tip: radius of the fingertip, m.
+        out: (W, n) heights, m.
+    """
+    walkers, bins = out.shape
+    modes, nodes, corners = basis.shape[0], s.shape[1], across.shape[1]
+    for w in range(walkers):
+        top, crest = across[w, 0], up[w, 0]
+        for i in range(bins):
+            total = 0.0
+            for q in range(nodes):
+                aside = lateral[i, q]
+                for m in range(modes):
+                    aside -= courses[w, m] * basis[m, i, q]
+                aside = abs(aside)
+                ball = tip / max(1.0 + tip * bend[i, q], 1e-3)
+                beyond = max(ends[w, 0] - s[i, q], s[i, q] - ends[w, 1])
+                if beyond >= ball:
+                    continue
+                drop = 0.0
+                if beyond > 0.0:
+                    circle = np.sqrt((ball - beyond) * (ball + beyond))
+                    drop = beyond * beyond / (ball + circle)
+                    ball = circle
+                best = drop
+                if aside <= top:
+                    best = max(best, crest)
+                for k in range(corners):
+                    gap = abs(aside - across[w, k])
+                    if gap < ball:
+                        best = max(best, up[w, k] - gap * gap / (ball + np.sqrt((ball - gap) * (ball + gap))))
+                    if k + 1 < corners:
+                        run, fall = across[w, k + 1] - across[w, k], up[w, k] - up[w, k + 1]
+                        flank = np.sqrt(run * run + fall * fall)
+                        if run > 0.0 and fall > 0.0:
+                            at = aside - ball * fall / flank - across[w, k]
+                            if at >= 0.0 and at <= run:
+                                # R (run / flank - 1) without the difference of near numbers
+                                lift = -ball * fall * fall / (flank * (flank + run))
+                                best = max(best, up[w, k] - at * fall / run + lift)
+                total += best - drop
+            out[w, i] = total / nodes

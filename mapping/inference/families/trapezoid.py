@@ -1,0 +1,100 @@
+"""TrapezoidShape: a line whose section has a flat top and straight flanks, from a bar to a roof."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.inference.curves import Chart, CurveModes
+from mapping.inference.families.hollow import line_nodes
+from mapping.inference.families.problem import Sizes
+from mapping.inference.families.ridge import RidgeShape
+from mapping.inference.likelihood import Prior, Uniform, Window
+
+# Tops and flanks from this share of the disturbance's half-width to that one, all equally probable in their logarithm:
+# under a hundredth of it neither can be felt (an arc drops by 5e-5 of the height there), and wider ones than four times
+# as wide as the disturbance are no fine feature
+NARROWEST_PART, WIDEST_PART = 0.01, 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class TrapezoidShape:
+    """Lines with a flat top: lateral modes, ends (cut square), height, log width of the top, log run of each flank.
+
+    A run of nothing is a bar with upright walls; a roof has no top, and no parameter for it. A flank that is steeper
+    than the ball's own flank at the kink is never touched: all such runs leave one trace.
+    """
+
+    window: Window
+    chart: Chart
+    modes: CurveModes
+    tip_radius: float
+    roof: bool
+    priors: tuple[Prior, ...]
+    start: FloatArray
+    step: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        ends = () if self.chart.closed else ("start", "end")
+        return (*self.modes.names, *ends, "height", *(() if self.roof else ("log top",)), "log run")
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        ends = () if self.chart.closed else ("m", "m")
+        return (*self.modes.units, *ends, "m", *(() if self.roof else ("ln m",)), "ln m")
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights over the base's trace, m."""
+        from mapping.geometry.templates import section_heights
+
+        closed = np.tile([-1e300, 1e300], (len(theta), 1))
+        first = self.modes.count
+        ends = closed if self.chart.closed else np.ascontiguousarray(theta[:, first : first + 2])
+        courses = np.ascontiguousarray(theta[:, : self.modes.count])
+        height, top, run = self.parts(theta)
+        up, half = np.column_stack([height, np.zeros(len(theta))]), 0.5 * top
+        out = np.empty((len(theta), len(self.window)))
+        section_heights(*self._places, courses, ends, np.column_stack([half, half + run]), up, self.tip_radius, out)
+        return out
+
+    def parts(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(W,) heights, widths of the top, and runs of a flank, m."""
+        if self.roof:
+            return theta[:, -2], np.zeros(len(theta)), np.exp(theta[:, -1])
+        return theta[:, -3], np.exp(theta[:, -2]), np.exp(theta[:, -1])
+
+    @cached_property
+    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        return line_nodes(self.window, self.chart, self.modes)
+
+
+def trapezoid_beside(ridge: RidgeShape, sizes: Sizes, *, roof: bool) -> TrapezoidShape:
+    """The family on a ridge's window, with its course, its ends and its height, and their priors."""
+    course = ridge.modes.count
+    # of the ridge's parameters all but the rounding of its ends and the radius
+    shared = [*range(course), *range(course if ridge.chart.closed else course + 1, len(ridge.names) - 1)]
+    wide = Uniform(*np.log(sizes.half_width * np.array([NARROWEST_PART, WIDEST_PART])))
+    parts = 1 if roof else 2
+    priors = (*(ridge.priors[k] for k in shared), *(wide,) * parts)
+    guess = np.full(parts, np.log(0.2 * sizes.half_width))
+    start = np.concatenate([ridge.start[shared], guess])
+    step = np.concatenate([ridge.step[shared], [0.05, 0.1][-parts:]])
+    return TrapezoidShape(ridge.window, ridge.chart, ridge.modes, ridge.tip_radius, roof, priors, start, step)
+
+
+def touched_widths(height: FloatArray, top: FloatArray, run: FloatArray, tip: float) -> tuple[FloatArray, FloatArray]:
+    """(W,) widths of trapezoids that the ball touches, and within which alone there may be more of them, m.
+
+    The second reaches from where the ball leaves the base on the one side to where it does on the other. Where the
+    flanks are so gentle that the ball rolls down on them, both are the width of the foot that they lead to.
+    """
+    foot = top + 2.0 * run
+    # the ball that rests on base and edge stands kink = x_c beside the edge, and falls there by x_c to each r - H
+    kink = np.sqrt(np.clip(height * (2.0 * tip - height), 0.0, None))
+    hidden = height * np.clip(tip - height, 0.0, None) > run * kink
+    hidden |= height >= tip
+    return np.where(hidden, top, foot), np.where(hidden, top + 2.0 * kink, foot)

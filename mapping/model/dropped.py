@@ -1,0 +1,65 @@
+"""What was detected and is no feature of the model: where, how plainly it was seen, and why it was dropped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mapping import Dropped, Feature, length_text
+from mapping.detection import Crossing
+from mapping.geometry.mesh import distances
+from mapping.inference.kinds import sizes_of
+
+
+def dropped_features(features: Sequence[Feature]) -> tuple[Dropped, ...]:
+    """Features that all sweeps together hardly speak for."""
+    return tuple(
+        Dropped(
+            feature.kind,
+            feature.axis[0],
+            feature.height.median,
+            feature.evidence.snr,
+            feature.evidence.crossings,
+            feature.evidence.log_odds,
+            f"all sweeps together hardly speak for it (log odds {feature.evidence.log_odds:.1f})",
+        )
+        for feature in features
+        if feature.evidence.log_odds is not None
+    )
+
+
+def dropped_crossings(
+    crossings: Sequence[Crossing], features: Sequence[Feature], tip_radius: float
+) -> tuple[Dropped, ...]:
+    """Crossings that no feature accounts for: none lies within their disturbance, or within its own.
+
+    Args:
+        crossings: all that was detected.
+        features: all that was made of them, likely or not.
+        tip_radius: radius of the fingertip, m.
+    """
+    if not crossings:
+        return ()
+    points = np.array([crossing.point for crossing in crossings])
+    nearest, away = np.full(len(points), -1), np.full(len(points), np.inf)
+    accounted = np.zeros(len(points), dtype=bool)
+    own = np.array([crossing.half_width for crossing in crossings])
+    for number, feature in enumerate(features):
+        apart = distances(points, feature.axis)
+        accounted |= apart <= np.maximum(own, sizes_of(feature, tip_radius).half_width)
+        nearest, away = np.where(apart < away, number, nearest), np.minimum(apart, away)
+    return tuple(
+        Dropped(
+            crossing.kind,
+            crossing.point,
+            crossing.height,
+            crossing.snr,
+            1,
+            None,
+            "what was felt around it makes neither line nor spot of it"
+            + (f"; the nearest, a {features[k].kind}, is {length_text(gap, 2)} away" if k >= 0 else ""),
+        )
+        for crossing, known, k, gap in zip(crossings, accounted, nearest, away, strict=True)
+        if not known
+    )

@@ -1,0 +1,38 @@
+"""What was detected and is no feature of the model stays in its record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mapping import Dropped, Feature, Interval, Support
+from mapping.detection import Crossing
+from mapping.model import dropped_crossings, dropped_features
+
+
+def crossing(x: float, snr: float = 9.0) -> Crossing:
+    up, along = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    return Crossing(
+        1, 0.0, np.array([x, 0.0, 0.0]), up, along, "convex", 1e-4, 1e-5, 1e-5, 1e-3, 60.0, snr, True, 0, 10
+    )
+
+
+def bump(x: float, log_odds: float) -> Feature:
+    height = Interval(1e-4, 0.9e-4, 1.1e-4)
+    axis, up = np.array([[x, 0.0, 0.0]]), np.array([[0.0, 0.0, 1.0]])
+    evidence = Support(9.0, 1, log_odds=log_odds)
+    return Feature("bump", axis, up, height, height, Interval(0.0, 0.0, 0.0), evidence, True, 1e-5)
+
+
+def test_a_crossing_that_no_feature_accounts_for_is_kept_with_its_place_and_the_reason() -> None:
+    (lone,) = dropped_crossings([crossing(0.0), crossing(8e-3, 30.0)], [bump(1e-4, 50.0)], 10e-3)
+    assert lone.snr == 30.0 and lone.point[0] == 8e-3 and lone.log_odds is None
+    assert lone.reason.endswith("the nearest, a bump, is 7.9 mm away")
+    assert dropped_crossings([], [], 10e-3) == ()
+    assert len(dropped_crossings([crossing(0.0)], [], 10e-3)) == 1
+
+
+def test_a_feature_that_hardly_anything_speaks_for_is_kept_with_its_odds() -> None:
+    (dropped,) = dropped_features([bump(0.0, 0.3), replace(bump(1.0, 0.0), evidence=Support(3.0, 1))])
+    assert isinstance(dropped, Dropped) and dropped.log_odds == 0.3 and "log odds 0.3" in dropped.reason
