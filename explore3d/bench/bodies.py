@@ -73,11 +73,17 @@ def body_run(name: str, seed: int, folder: Path | None, place: Path) -> dict[str
         "planned_seconds": plan.seconds,
         "planned_swept": None if plan.account is None else plan.account.swept,
         "cpu_seconds": cpu,
-    } | judged(analysis, place / "out", Judge(body.object, analysis.trace.tip_radius))
+    } | judged(analysis, place / "out", *(Judge(each, analysis.trace.tip_radius) for each in (body.object, body.base)))
 
 
-def judged(analysis: Analysis, session: Path, judge: Judge) -> dict[str, Any]:
-    """What a run was worth, by its log and its model against the true object."""
+def judged(analysis: Analysis, session: Path, judge: Judge, bare: Judge) -> dict[str, Any]:
+    """What a run was worth, by its log and its model against the true object.
+
+    Args:
+        session: its folder.
+        judge: of the true object.
+        bare: of the body without details: a feature can be reached where the ball can rest on that.
+    """
     log = read_log(next(session.glob("log.*")))
     moves = [event.data for event in log.events if event.kind == "move"]
     trace, account = log.trace, analysis.account
@@ -85,7 +91,7 @@ def judged(analysis: Analysis, session: Path, judge: Judge) -> dict[str, Any]:
     sweeps = [trace.centers[trace.sweep == number] for number in np.unique(trace.sweep)]
     ball, stem = judge.sinking(moves, sweeps)
     rows = analysis.errors
-    known = [row for row in rows if row.true is not None and judge.feature_reachable(row.true)]
+    known = [row for row in rows if row.true is not None and bare.feature_reachable(row.true)]
     found = [row for row in known if row.status == "found"]
     return {
         "finger_seconds": float(trace.t[-1]),

@@ -20,14 +20,20 @@ MOST_TURNED = float(np.radians(41.0))
 PRESSED = 0.5
 # Room between the ball and a wall beside its way, in tip radii: poses and meshes are not better known
 WALL_ROOM = 0.03
+# Room for the stem where there is any: a detail that is not known yet may stand out by as much, in tip radii
+STEM_ROOM = 1.0 / 6.0
 # Waypoints are looked at so close together, and stretches shorter than that are not worth a sweep, in tip radii
 SOUND_SPACING, SHORTEST_PART = 0.2, 0.3
+# How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)
+BACK_OFF_DISTANCE = 0.5
 # Lifted so far the ball has left what it is pressed against (its press is 0.02) but for that room, in tip radii
 LIFTED_PATH = 0.02 + WALL_ROOM
 
 
 def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     """The stretches of a sweep that ball and stem can make, in their order; the sweep itself if all of it is sound.
+
+    The stem is taken to be so much longer as the finger backs off where a sweep ends.
 
     Args:
         move: a sweep.
@@ -37,13 +43,15 @@ def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
         return [move] if ball_is_sound(move.path, move.approach, carrier.base, carrier.tip_radius).all() else []
     path, approach = resampled(move.path, move.approach, SOUND_SPACING * carrier.tip_radius)
     free = ball_is_sound(path, approach, carrier.base, carrier.tip_radius)
-    stems = carrier.clearance(path, approach) >= 0
-    if (free & stems).all():
+    tip = carrier.tip_radius
+    behind = replace(carrier, length=carrier.length + BACK_OFF_DISTANCE * tip)
+    if (free & (behind.clearance(path, approach) >= STEM_ROOM * tip)).all():
         return [move]
-    if not stems[free].all():
+    for room in (STEM_ROOM * tip, 0.0):
+        roomy = replace(behind, radius=behind.radius + room)
         for run in runs(free):
-            approach[run] = carrier.turned(path[run], approach[run], MOST_TURNED)
-        free &= carrier.clearance(path, approach) >= 0
+            approach[run] = roomy.turned(path[run], approach[run], MOST_TURNED)
+    free &= behind.clearance(path, approach) >= 0
     parts = (replace(move, path=path[run], approach=approach[run]) for run in runs(free) if len(run) > 1)
     return [part for part in parts if part.length >= SHORTEST_PART * carrier.tip_radius]
 

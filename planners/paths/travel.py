@@ -15,10 +15,11 @@ from mapping.base import Base
 from mapping.detection import face_samples
 from planners import Outcome, Parted, Plan, Refused
 from planners.paths.carrier import Carrier
-from planners.paths.sound import resampled, sound_parts
+from planners.paths.detour import Detour
+from planners.paths.sound import BACK_OFF_DISTANCE, resampled, sound_parts
 
-# How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)
-BACK_OFF_DISTANCE = 0.5
+# Moves through free space
+FREE = ("travel", "retreat")
 # How far a ball may sink into the base on its way through free space, in tip radii
 MOST_SINKING = 0.05
 # A way that is planned keeps 0.02 free of that limit even between the places that are looked at (0.25^2 / 8 = 0.008)
@@ -37,9 +38,12 @@ WAY_SHARES = (0.5, 0.25, 0.75, 0.125, 0.875, 0.375, 0.625)
 
 
 def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
-    """The way between two moves (2, 3), m: backed off where the one ends, straight, and down where the other begins."""
-    lift = BACK_OFF_DISTANCE * tip_radius
-    return np.stack([before.path[-1] - lift * before.approach[-1], after.path[0] - lift * after.approach[0]])
+    """The way between two moves (2, 3), m: backed off where the one ends, straight, and down where the other begins.
+
+    Travel begins and ends in free space, where nothing is to back off from.
+    """
+    first, last = (0.0 if move.purpose in FREE else BACK_OFF_DISTANCE * tip_radius for move in (before, after))
+    return np.stack([before.path[-1] - first * before.approach[-1], after.path[0] - last * after.approach[0]])
 
 
 def sunk(path: FloatArray, base: Base, tip_radius: float, spacing: float = 0.5) -> float:
@@ -63,7 +67,7 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
     """The plan with travel put before every move that cannot be reached straight, and sweeps split where they offend.
 
     What was made is learnt from what the driver sends back: after a planners.Refused the finger still stands where
-    the last executed move ended. The plan is sent a planners.Parted for a sweep that was made in parts.
+    the last executed move ended. The plan is sent a planners.Parted for a move that was made in parts or after travel.
 
     Args:
         check: what is wrong with a move, wherever it begins, or None; only a sweep with something wrong is split.
@@ -80,26 +84,26 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
             parts = sound_parts(move, ways.carrier) or [move]
         felt, made = [], []
         for part in parts:
-            answer, before = yield from _reached(part, before, ways)
-            if not isinstance(answer, Refused):
+            answer, travelled, done = yield from _reached(part, before, ways)
+            before = done or travelled or before
+            if done is not None:
                 felt.append(answer)
-                made.append(part)
-        if made and parts != [move]:
+                made.extend([done] if travelled is None else [travelled, done])
+        if made and made != [move]:
             answer = Parted.of(felt, made)
 
 
-def _reached(move: Move, before: Move | None, ways: Ways) -> Generator[Move, Trace, tuple[Trace, Move | None]]:
-    """Make a move after the travel to it; what it felt, and the last move that was executed."""
+def _reached(
+    move: Move, before: Move | None, ways: Ways
+) -> Generator[Move, Trace, tuple[Trace, Move | None, Move | None]]:
+    """Make a move after the travel to it; what it felt, and the travel and the move if they were executed."""
     way = None if before is None else ways.round(before, move)
     if way is not None:
         answer = yield way
         if isinstance(answer, Refused):
-            return answer, before
-        before = way
+            return answer, None, None
     answer = yield move
-    if isinstance(answer, Refused):
-        return answer, before
-    return answer, move
+    return answer, way, None if isinstance(answer, Refused) else move
 
 
 def way_between(before: Move, after: Move, tip_radius: float) -> tuple[FloatArray, FloatArray]:
@@ -144,16 +148,43 @@ class Ways:
         stems = self.carrier.clearance(*way_between(before, after, self.tip_radius)).min()
         if self.free(straight) and stems >= 0:
             return None
-        first = self._out(straight[0], -before.approach[-1])
-        last = self._out(straight[1], -after.approach[0])
+        way = self._near(straight, before.approach[-1], after.approach[0])
+        if way is None or not self._sound(way):
+            way = self._far(before, after) or way
+        return way
+
+    def _near(self, straight: FloatArray, begun: FloatArray, ended: FloatArray) -> Move | None:
+        """The shortest way of the ball between two places (2, 3), the stem turned as it goes; None if there is none."""
+        first, last = self._out(straight[0], -begun), self._out(straight[1], -ended)
         between = self._between(first[-1], last[-1])
         if between is None:
             return None
         path = dense(self._shortened(np.concatenate([first, between, last[::-1]])), self.tip_radius)
         wanted = -self.base.foot(path, self.tip_radius).normals
-        wanted[0], wanted[-1] = before.approach[-1], after.approach[0]
+        wanted[0], wanted[-1] = begun, ended
         approach = self.carrier.turned(path, wanted, np.pi)
         return Move(path, approach, speed=self.speed, purpose="travel")
+
+    def _far(self, before: Move, after: Move) -> Move | None:
+        """The way round the hull; from where the move before began, if only there a way leads out. None if none is."""
+        begin, stop = gap(before, after, self.tip_radius)
+        poses = self._detour.between((begin[None], before.approach[-1:]), (stop[None], after.approach[:1]))
+        if poses is None:
+            lift = 0.0 if before.purpose in FREE else BACK_OFF_DISTANCE * self.tip_radius
+            back = (before.path - lift * before.approach)[::-1], before.approach[::-1]
+            poses = self._detour.between((back[0][-1:], back[1][-1:]), (stop[None], after.approach[:1]))
+            poses = poses and (np.concatenate([back[0], poses[0]]), np.concatenate([back[1], poses[1]]))
+        way = None if poses is None else Move(*poses, speed=self.speed, purpose="travel")
+        return way if way is not None and self._sound(way) else None
+
+    def _sound(self, way: Move) -> bool:
+        """True if ball and stem stay free on a way."""
+        path, approach = resampled(way.path, way.approach, FREE_SPACING * self.tip_radius)
+        return self.free(way.path) and bool(self.carrier.clearance(path, approach).min() >= 0)
+
+    @cached_property
+    def _detour(self) -> Detour:
+        return Detour(self.carrier, self.low, self.high)
 
     def _out(self, start: FloatArray, away: FloatArray) -> FloatArray:
         """Where there is room, by the shortest straight way, that along the approach first: (2, 3); (1, 3) if none is.
