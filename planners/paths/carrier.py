@@ -12,6 +12,9 @@ from mapping.base import Base
 
 # Places along the stem's axis that are looked at; the first lies where a stem half as thick leaves the ball's shadow
 STEM_PLACES, STEM_START = 6, 1.5
+# How far a ball may sink into the base on its way through free space, in tip radii; a way that is planned keeps 0.02
+# free of that even between places a quarter of a radius apart (0.25^2 / 8 = 0.008)
+MOST_SINKING, FREE_SINKING = 0.05, 0.02
 # Directions that an approach may be turned to: 162 points of a Fibonacci lattice lie about 16 degrees apart
 TURNED_DIRECTIONS = 162
 # How much turning between neighbouring waypoints costs against standing off the wanted direction
@@ -26,12 +29,14 @@ class Carrier:
         base: the body it must stay out of.
         tip_radius: of the ball, m.
         radius, length: of the stem, m, measured from the ball's centre.
+        backing: so far the ball must be able to draw back along the stem, m.
     """
 
     base: Base
     tip_radius: float
     radius: float
     length: float
+    backing: float = 0.0
 
     @classmethod
     def of(cls, base: Base, tip_radius: float) -> Carrier:
@@ -41,13 +46,15 @@ class Carrier:
     def clearance(self, path: FloatArray, approach: FloatArray) -> FloatArray:
         """(K,) distance of the stem's surface from the body at ball centres (K, 3) and approaches (K, 3), m.
 
+        With `backing` the stem is so much longer, and the room that the ball drawn back has may be less than its own.
+
         No place is nearer to the body than the stem's middle by more than it lies from it: where that leaves a place
         free, the body is not asked, and a free stem's distance is this bound from below. In the open the middle tells
         all six.
         """
         if self.length <= 0:
             return np.full(len(path), np.inf)
-        back = np.linspace(STEM_START * self.tip_radius, self.length, STEM_PLACES)
+        back = np.linspace(STEM_START * self.tip_radius, self.length + self.backing, STEM_PLACES)
         stem = path[:, None, :] - back[None, :, None] * approach[:, None, :]
         middle = STEM_PLACES // 2
         known = self.base.foot(stem[:, middle], self.radius).height
@@ -55,6 +62,9 @@ class Carrier:
         ask = height < 0
         ask[:, middle] = False
         height[ask] = self.base.foot(stem[ask], self.radius).height
+        if self.backing > 0:
+            drawn = self.base.foot(path - self.backing * approach, self.tip_radius).height
+            height[:, 0] = np.minimum(height[:, 0], drawn + FREE_SINKING * self.tip_radius)
         return np.asarray(height.min(axis=1))
 
     def turned(self, path: FloatArray, approach: FloatArray, most: float) -> FloatArray:

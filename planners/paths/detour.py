@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mapping import BoolArray, FloatArray
-from planners.paths.carrier import Carrier
+from planners.paths.carrier import FREE_SINKING, Carrier
 
 # In tip radii: room beyond the hull that a place in the open has, and how far places on a way out lie apart
 HULL_ROOM, LEAVING_SPACING = 1.1, 0.25
@@ -26,8 +26,9 @@ Poses = tuple[FloatArray, FloatArray]
 class Detour:
     """Ways for ball and stem that need no search among the body's parts.
 
-    Outside of the convex hull a stem that points away from it is free wherever the ball goes. A way out of a hollow is
-    straight: with the approach as it is in any direction, or turned in place and then drawn back along the stem.
+    Outside of the planes that touch the body from all sides (its hull, nearly) a stem that points away from it is free
+    wherever the ball goes. A way out of a hollow is straight: with the approach as it is in any direction, or turned in
+    place and then drawn back along the stem.
 
     Args:
         carrier: the stem, and the body.
@@ -54,19 +55,20 @@ class Detour:
         """The shortest straight way of ball and stem into the open, its turns in place included; None if none is."""
         if self._open(place[None])[0]:
             return self._turned_outward(place[None], approach[None])
-        steps = np.arange(0.0, self._longest, LEAVING_SPACING * self.carrier.tip_radius)
         as_it_is = np.concatenate([-approach[None], self.carrier.lattice])
         turned = self._turns(place, approach)
         ways = np.concatenate([as_it_is, -turned])
         approaches = np.concatenate([np.tile(approach, (len(as_it_is), 1)), turned])
-        centers = place + steps[:, None] * ways[:, None]
-        in_open = self._open(centers.reshape(-1, 3)).reshape(len(ways), -1)
-        inside = ((centers >= self.low) & (centers <= self.high)).all(axis=2)
-        last = np.where(in_open.any(axis=1), in_open.argmax(axis=1), len(steps))
-        on_way = np.arange(len(steps)) <= last[:, None]
-        good = (last < len(steps)) & (inside | ~on_way).all(axis=1)
+        spacing = LEAVING_SPACING * self.carrier.tip_radius
+        last = np.ceil(self._distance_out(place, ways) / spacing)
+        ended = place + spacing * np.where(np.isfinite(last), last, 0.0)[:, None] * ways
+        good = np.isfinite(last) & ((ended >= self.low) & (ended <= self.high)).all(axis=1)
+        number = np.arange(1 + int(last[good].max(initial=0.0)))
+        centers = place + spacing * number[:, None] * ways[:, None]
+        on_way = number <= last[:, None]
         good[good] = self._all(centers[good], on_way[good], None)
         good[good] = self._all(centers[good], on_way[good], approaches[good])
+        last = np.where(good, last, 0.0).astype(np.int64)
         for which in np.flatnonzero(good)[np.argsort(last[good], kind="stable")]:
             path = centers[which, : last[which] + 1]
             poses = path, np.tile(approaches[which], (len(path), 1))
@@ -91,7 +93,8 @@ class Detour:
         which, _ = np.nonzero(on_way)
         places = centers[on_way]
         if approach is None:
-            free = self.carrier.base.foot(places, self.carrier.tip_radius).height >= 0.0
+            radius = self.carrier.tip_radius
+            free = self.carrier.base.foot(places, radius).height >= -FREE_SINKING * radius
         else:
             free = self.carrier.clearance(places, approach[which]) >= 0.0
         return np.asarray(np.bincount(which[~free], minlength=len(centers)) == 0)
@@ -151,6 +154,13 @@ class Detour:
         normals, offsets = self._planes
         return np.asarray((places @ normals.T + offsets).max(axis=1) >= HULL_ROOM * self.carrier.tip_radius)
 
+    def _distance_out(self, place: FloatArray, ways: FloatArray) -> FloatArray:
+        """(W,) how far it is into the open along each way (W, 3), m; infinite along those that lead nowhere."""
+        normals, offsets = self._planes
+        missing, rate = HULL_ROOM * self.carrier.tip_radius - normals @ place - offsets, ways @ normals.T
+        rising = rate > 1e-9
+        return np.asarray(np.where(rising, missing / np.where(rising, rate, 1.0), np.inf).min(axis=1))
+
     def _node(self, place: FloatArray) -> int | None:
         nodes, _ = self._graph
         order = np.argsort(np.linalg.norm(nodes - place, axis=1))[:24]
@@ -158,19 +168,10 @@ class Detour:
 
     @cached_property
     def _planes(self) -> tuple[FloatArray, FloatArray]:
-        """Outward normals (H, 3) and offsets (H,) of the hull's planes; a flat body has the thickness of a stem."""
-        from scipy.spatial import ConvexHull
-
-        surface = self.carrier.base.surface
+        """Outward normals (H, 3) and offsets (H,) of the planes that touch the body, one for each of the lattice."""
+        surface, normals = self.carrier.base.surface, self.carrier.lattice
         used = surface.vertices[np.unique(surface.faces)]
-        thick = 0.1 * self.carrier.tip_radius
-        box = thick * (np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3))
-        equations = ConvexHull((used[:, None] + box).reshape(-1, 3)).equations
-        return equations[:, :3], equations[:, 3]
-
-    @cached_property
-    def _longest(self) -> float:
-        return self.carrier.base.surface.size + 4.0 * self.carrier.tip_radius
+        return normals, -(used @ normals.T).max(axis=0)
 
     @cached_property
     def _graph(self) -> tuple[FloatArray, Any]:

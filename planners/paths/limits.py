@@ -9,9 +9,9 @@ import numpy as np
 from hw import Move, Workspace
 from mapping import FloatArray
 from mapping.base import Base
-from planners.paths.carrier import Carrier
+from planners.paths.carrier import MOST_SINKING, Carrier
 from planners.paths.sound import FIELD, PRESSED, resampled
-from planners.paths.travel import MOST_SINKING, gap, sunk, way_between
+from planners.paths.travel import gap, sunk, way_between
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +27,8 @@ STEM_ROOM = 1.0 / 6.0
 SOUND_SPACING, SHORTEST_PART = 0.2, 0.3
 # How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)
 BACK_OFF_DISTANCE = 0.5
+# About a sweep's ends the approach may be turned so that the finger can draw back, over so much, in tip radii
+LEAVING_STRETCH = 1.0
 # Lifted so far the ball has left what it is pressed against (its press is 0.02) but for that room, in tip radii
 LIFTED_PATH = 0.02 + WALL_ROOM
 
@@ -33,7 +36,7 @@ LIFTED_PATH = 0.02 + WALL_ROOM
 def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     """The stretches of a sweep that ball and stem can make, in their order; the sweep itself if all of it is sound.
 
-    The stem is taken to be so much longer as the finger backs off where a sweep ends.
+    At its ends the finger must be able to draw back.
 
     Args:
         move: a sweep.
@@ -44,16 +47,39 @@ def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     path, approach = resampled(move.path, move.approach, SOUND_SPACING * carrier.tip_radius)
     free = ball_is_sound(path, approach, carrier.base, carrier.tip_radius)
     tip = carrier.tip_radius
-    behind = replace(carrier, length=carrier.length + BACK_OFF_DISTANCE * tip)
-    if (free & (behind.clearance(path, approach) >= STEM_ROOM * tip)).all():
+    roomy = replace(carrier, radius=carrier.radius + STEM_ROOM * tip)
+    leaving = replace(carrier, backing=BACK_OFF_DISTANCE * tip)
+    ends = np.array([0, -1])
+    if (free & (roomy.clearance(path, approach) >= 0)).all() and (
+        leaving.clearance(path[ends], approach[ends]) >= 0
+    ).all():
         return [move]
-    for room in (STEM_ROOM * tip, 0.0):
-        roomy = replace(behind, radius=behind.radius + room)
+    for each in (roomy, carrier):
         for run in runs(free):
-            approach[run] = roomy.turned(path[run], approach[run], MOST_TURNED)
-    free &= behind.clearance(path, approach) >= 0
-    parts = (replace(move, path=path[run], approach=approach[run]) for run in runs(free) if len(run) > 1)
-    return [part for part in parts if part.length >= SHORTEST_PART * carrier.tip_radius]
+            approach[run] = each.turned(path[run], approach[run], MOST_TURNED)
+    free &= carrier.clearance(path, approach) >= 0
+    stretches = (part for run in runs(free) for part in _left(path[run], approach[run], leaving))
+    parts = (replace(move, path=part[0], approach=part[1]) for part in stretches if len(part[0]) > 1)
+    return [part for part in parts if part.length >= SHORTEST_PART * tip]
+
+
+def _left(path: FloatArray, approach: FloatArray, leaving: Carrier) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """A stretch's parts between waypoints from which the finger can draw back, turned there if need be.
+
+    Args:
+        path, approach: (K, 3) of a stretch that is sound.
+        leaving: the stem and the ball drawn back.
+    """
+    approach = approach.copy()
+    near = int(np.ceil(LEAVING_STRETCH / SOUND_SPACING))
+    for end in (slice(0, near), slice(-near, None)):
+        approach[end] = leaving.turned(path[end], approach[end], MOST_TURNED)
+    can = leaving.clearance(path, approach) >= 0
+    # what is turned may no longer be pressed against what it was
+    for run in runs(ball_is_sound(path, approach, leaving.base, leaving.tip_radius)):
+        inner = run[can[run]]
+        if len(inner):
+            yield path[inner[0] : inner[-1] + 1], approach[inner[0] : inner[-1] + 1]
 
 
 def ball_is_sound(path: FloatArray, approach: FloatArray, base: Base, tip_radius: float) -> BoolArray:
@@ -69,6 +95,8 @@ def ball_is_sound(path: FloatArray, approach: FloatArray, base: Base, tip_radius
     deep = base.foot(path, tip_radius)
     feet = base.foot(path - LIFTED_PATH * tip_radius * approach, tip_radius)
     against = -np.einsum("ij,ij->i", feet.normals, approach)
+    outward = deep.normals * np.where(deep.height > -tip_radius, 1.0, -1.0)[:, None]
+    against = np.minimum(against, -np.einsum("ij,ij->i", outward, approach))
     return np.asarray((deep.height >= -PRESSED * tip_radius) & (feet.height > -tip_radius) & (against >= np.cos(FIELD)))
 
 

@@ -14,16 +14,14 @@ from mapping import BoolArray, FloatArray, IntArray, Trace
 from mapping.base import Base
 from mapping.detection import face_samples
 from planners import Outcome, Parted, Plan, Refused
-from planners.paths.carrier import Carrier
+from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
 from planners.paths.detour import Detour
 from planners.paths.sound import BACK_OFF_DISTANCE, resampled, sound_parts
 
 # Moves through free space
 FREE = ("travel", "retreat")
-# How far a ball may sink into the base on its way through free space, in tip radii
-MOST_SINKING = 0.05
-# A way that is planned keeps 0.02 free of that limit even between the places that are looked at (0.25^2 / 8 = 0.008)
-FREE_SINKING, FREE_SPACING = 0.02, 0.25
+# Places of a way lie at most so far apart where it is looked whether it is free, in tip radii
+FREE_SPACING = 0.25
 # Of the grid on which ways round the body are looked for, in tip radii; and its most nodes along an axis
 GRID_SPACING, MOST_GRID_NODES = 0.75, 40
 ROOM = 4.0
