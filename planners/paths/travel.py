@@ -19,7 +19,7 @@ from planners.paths.detour import Detour
 from planners.paths.sound import BACK_OFF_DISTANCE, resampled, sound_parts
 
 # Moves through free space
-FREE = ("travel", "retreat")
+THROUGH_SPACE = ("travel", "retreat")
 # Places of a way lie at most so far apart where it is looked whether it is free, in tip radii
 FREE_SPACING = 0.25
 # Of the grid on which ways round the body are looked for, in tip radii; and its most nodes along an axis
@@ -40,7 +40,7 @@ def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
 
     Travel begins and ends in free space, where nothing is to back off from.
     """
-    first, last = (0.0 if move.purpose in FREE else BACK_OFF_DISTANCE * tip_radius for move in (before, after))
+    first, last = (0.0 if move.purpose in THROUGH_SPACE else BACK_OFF_DISTANCE * tip_radius for move in (before, after))
     return np.stack([before.path[-1] - first * before.approach[-1], after.path[0] - last * after.approach[0]])
 
 
@@ -168,7 +168,7 @@ class Ways:
         begin, stop = gap(before, after, self.tip_radius)
         poses = self._detour.between((begin[None], before.approach[-1:]), (stop[None], after.approach[:1]))
         if poses is None:
-            lift = 0.0 if before.purpose in FREE else BACK_OFF_DISTANCE * self.tip_radius
+            lift = 0.0 if before.purpose in THROUGH_SPACE else BACK_OFF_DISTANCE * self.tip_radius
             back = (before.path - lift * before.approach)[::-1], before.approach[::-1]
             poses = self._detour.between((back[0][-1:], back[1][-1:]), (stop[None], after.approach[:1]))
             poses = poses and (np.concatenate([back[0], poses[0]]), np.concatenate([back[1], poses[1]]))
