@@ -73,18 +73,18 @@ def body_run(name: str, seed: int, folder: Path | None, place: Path) -> dict[str
         "planned_seconds": plan.seconds,
         "planned_swept": None if plan.account is None else plan.account.swept,
         "cpu_seconds": cpu,
-    } | judged(analysis, place / "out", *(Judge(each, analysis.trace.tip_radius) for each in (body.object, body.base)))
+    } | judged(analysis, *(Judge(each, analysis.trace.tip_radius) for each in (body.object, body.base)))
 
 
-def judged(analysis: Analysis, session: Path, judge: Judge, bare: Judge) -> dict[str, Any]:
+def judged(analysis: Analysis, judge: Judge, bare: Judge) -> dict[str, Any]:
     """What a run was worth, by its log and its model against the true object.
 
     Args:
-        session: its folder.
         judge: of the true object.
         bare: of the body without details: a feature can be reached where the ball can rest on that.
     """
-    log = read_log(next(session.glob("log.*")))
+    assert analysis.folder is not None  # a run writes one
+    log = read_log(analysis.folder / "log.mcap")
     moves = [event.data for event in log.events if event.kind == "move"]
     trace, account = log.trace, analysis.account
     assert account is not None  # every body's scene says what to inspect

@@ -21,8 +21,8 @@ MOST_TURNED = float(np.radians(41.0))
 PRESSED = 0.5
 # Room between the ball and a wall beside its way, in tip radii: poses and meshes are not better known
 WALL_ROOM = 0.03
-# Room for the stem where there is any: a detail that is not known yet may stand out by as much, in tip radii
-STEM_ROOM = 1.0 / 6.0
+# Room for ball and stem where there is any: a detail that is not known yet may stand out by as much, in tip radii
+DETAIL_ROOM = 1.0 / 6.0
 # Waypoints are looked at so close together, and stretches shorter than that are not worth a sweep, in tip radii
 SOUND_SPACING, SHORTEST_PART = 0.2, 0.3
 # How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)
@@ -47,7 +47,7 @@ def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     path, approach = resampled(move.path, move.approach, SOUND_SPACING * carrier.tip_radius)
     free = ball_is_sound(path, approach, carrier.base, carrier.tip_radius)
     tip = carrier.tip_radius
-    roomy = replace(carrier, radius=carrier.radius + STEM_ROOM * tip)
+    roomy = replace(carrier, radius=carrier.radius + DETAIL_ROOM * tip)
     leaving = replace(carrier, backing=BACK_OFF_DISTANCE * tip)
     ends = np.array([0, -1])
     if (free & (roomy.clearance(path, approach) >= 0)).all() and (
