@@ -10,7 +10,7 @@ from hw import Move, Workspace
 from mapping import FloatArray
 from mapping.base import Base
 from planners.paths.carrier import MOST_SINKING, Carrier
-from planners.paths.sound import FIELD, PRESSED, resampled
+from planners.paths.sound import FIELD, PRESSED, held_up, resampled
 from planners.paths.travel import gap, sunk, way_between
 
 
@@ -80,12 +80,17 @@ class Limits:
 
     def _collision(self, move: Move, base: Base) -> str | None:
         """The ball: a sweep presses a little, any other move stays free."""
-        allowed = PRESSED if move.purpose == "sweep" else MOST_SINKING
-        deepest = sunk(move.path, base, self.tip_radius)
-        if deepest <= allowed * self.tip_radius:
-            return None
         if move.purpose == "sweep":
-            return f"the sweep's path sinks {1e3 * deepest:.3f} mm into another part of the body"
+            path, approach = move.path, move.approach
+            if len(path) > 1:
+                path, approach = resampled(path, approach, 0.5 * self.tip_radius)
+            highest = float(held_up(path, approach, base, self.tip_radius).max())
+            if highest <= PRESSED * self.tip_radius:
+                return None
+            return f"another part of the body is in the sweep's way and holds the ball up by {1e3 * highest:.3f} mm"
+        deepest = sunk(move.path, base, self.tip_radius)
+        if deepest <= MOST_SINKING * self.tip_radius:
+            return None
         return f"the way through free space sinks {1e3 * deepest:.3f} mm into the body"
 
     def _stem(self, move: Move, base: Base) -> str | None:

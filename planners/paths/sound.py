@@ -17,8 +17,11 @@ FIELD = float(np.radians(75.0))
 # An approach is turned at most so far from the normal: over a wire a sixth of the tip's radius high the contact leaves
 # the base's normal by arccos(1 - 1/6) = 34 degrees, and must stay in the field of 75
 MOST_TURNED = float(np.radians(41.0))
-# How far a sweep's commanded path may sink into the base, in tip radii: further in it crosses a wall
+# How far the base may hold a ball up from a sweep's commanded path, in tip radii: round a sharp edge of 90 degrees,
+# whose corner the path cuts, it is 1 - cos(45 degrees) = 0.29, and the press 0.02; more is a wall
 PRESSED = 0.5
+# What a ball is to ride on may be so far off the approach: the field, less what the facets of a round body turn by
+RIDDEN = float(np.radians(65.0))
 # Room between the ball and a wall beside its way, in tip radii: poses and meshes are not better known
 WALL_ROOM = 0.03
 # Room for ball and stem where there is any: a detail that is not known yet may stand out by as much, in tip radii
@@ -97,7 +100,20 @@ def ball_is_sound(path: FloatArray, approach: FloatArray, base: Base, tip_radius
     against = -np.einsum("ij,ij->i", feet.normals, approach)
     outward = deep.normals * np.where(deep.height > -tip_radius, 1.0, -1.0)[:, None]
     against = np.minimum(against, -np.einsum("ij,ij->i", outward, approach))
-    return np.asarray((deep.height >= -PRESSED * tip_radius) & (feet.height > -tip_radius) & (against >= np.cos(FIELD)))
+    sound = (feet.height > -tip_radius) & (against >= np.cos(RIDDEN))
+    return np.asarray(sound & (held_up(path, approach, base, tip_radius) <= PRESSED * tip_radius))
+
+
+def held_up(path: FloatArray, approach: FloatArray, base: Base, tip_radius: float) -> FloatArray:
+    """(K,) how far balls rest above commanded centres (K, 3), back along the approach (K, 3), m; 0 where they are free.
+
+    To first order: the depth over the cosine between the approach and what is sunk into. A ball that sinks a little
+    into a steep wall is held up far.
+    """
+    feet = base.foot(path, tip_radius)
+    outward = feet.normals * np.where(feet.height > -tip_radius, 1.0, -1.0)[:, None]
+    against = -np.einsum("ij,ij->i", outward, approach)
+    return np.asarray(np.maximum(-feet.height, 0.0) / np.maximum(against, np.cos(FIELD)))
 
 
 def resampled(path: FloatArray, approach: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:

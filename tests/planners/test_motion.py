@@ -21,7 +21,7 @@ from planners.paths.carrier import Carrier
 from planners.paths.detour import Detour
 from planners.paths.limits import Limits
 from planners.paths.reach import reachable
-from planners.paths.sound import sound_parts
+from planners.paths.sound import held_up, sound_parts
 from planners.paths.travel import Ways, routed
 from planners.plan import Outcome, Parted, Plan, Refused, executed
 
@@ -183,3 +183,13 @@ def test_a_closed_cavity_has_no_way_out() -> None:
     hollow = Base(Surface(np.concatenate([inner.vertices, outer.vertices]), faces))
     detour = Detour(Carrier(hollow, R, 0.5e-3, 4e-3), np.full(3, -0.05), np.full(3, 0.05))
     assert detour.out(np.zeros(3), DOWN) is None
+
+
+def test_a_steep_wall_holds_a_ball_up_far_though_it_sinks_into_it_a_little() -> None:
+    # against the bracket's wall, pressed down at 10 degrees off it: 0.3 mm into the wall are 1.7 mm up
+    lean = np.array([-np.sin(np.radians(10.0)), -np.cos(np.radians(10.0)), 0.0])
+    place = 1e-3 * np.array([[8.7, 20.0, 20.0], [9.1, 20.0, 20.0]])
+    up = held_up(place, np.tile(lean, (2, 1)), BASE, R)
+    assert up == pytest.approx([0.3e-3 / np.cos(np.radians(75.0)), 0.0], rel=1e-6)
+    gentle = np.array([-np.sin(np.radians(40.0)), -np.cos(np.radians(40.0)), 0.0])
+    assert held_up(place[:1], gentle[None], BASE, R) == pytest.approx([0.3e-3 / np.sin(np.radians(40.0))], rel=1e-6)
