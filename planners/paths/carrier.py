@@ -15,8 +15,10 @@ STEM_PLACES, STEM_START = 6, 1.5
 # How far a ball may sink into the base on its way through free space, in tip radii; a way that is planned keeps 0.02
 # free of that even between places a quarter of a radius apart (0.25^2 / 8 = 0.008)
 MOST_SINKING, FREE_SINKING = 0.05, 0.02
-# Directions that an approach may be turned to: 162 points of a Fibonacci lattice lie about 16 degrees apart
-TURNED_DIRECTIONS = 162
+# Points of a Fibonacci lattice over the sphere: 162 lie about 16 degrees apart; an approach is turned to one of 642, 8
+# degrees apart: half-way between two of them the end of a stem six radii long lies 6 (1 - cos 4 degrees) = 0.015 radii
+# off either's way, where 16 degrees leave 0.06 and two such steps at once 0.2
+LATTICE_DIRECTIONS, TURNED_DIRECTIONS = 162, 642
 # How much turning between neighbouring waypoints costs against standing off the wanted direction
 TURNING_COST = 4.0
 
@@ -80,7 +82,8 @@ class Carrier:
         offends = self.clearance(path, approach) < 0
         if not offends.any():
             return approach
-        lattice = np.broadcast_to(self.lattice, (len(path), *self.lattice.shape))
+        fine = spread_evenly(TURNED_DIRECTIONS)
+        lattice = np.broadcast_to(fine, (len(path), *fine.shape))
         choices = np.concatenate([approach[:, None], lattice], axis=1)
         angle = np.arccos(np.clip(np.einsum("kij,kj->ki", choices, approach), -1.0, 1.0))
         allowed = (angle <= most) & offends[:, None]
@@ -95,21 +98,18 @@ class Carrier:
     @cached_property
     def lattice(self) -> FloatArray:
         """(M, 3) unit vectors spread evenly over the sphere."""
-        number = np.arange(TURNED_DIRECTIONS) + 0.5
-        z, turn = 1.0 - 2.0 * number / TURNED_DIRECTIONS, np.pi * (1.0 + np.sqrt(5.0)) * number
-        flat = np.sqrt(1.0 - z**2)
-        return np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])
+        return spread_evenly(LATTICE_DIRECTIONS)
 
 
 def _course(cost: FloatArray, choices: FloatArray) -> list[int]:
     """Which choice (K,) at every waypoint, of the least sum of costs (K, M) and of squared turns between them."""
     total, came = cost[0], []
     for k in range(1, len(cost)):
-        into = np.flatnonzero(np.isfinite(cost[k]))
-        apart = np.arccos(np.clip(choices[k - 1] @ choices[k, into].T, -1.0, 1.0))
-        sums = total[:, None] + TURNING_COST * apart**2
+        into, out_of = np.flatnonzero(np.isfinite(cost[k])), np.flatnonzero(np.isfinite(total))
+        apart = np.arccos(np.clip(choices[k - 1, out_of] @ choices[k, into].T, -1.0, 1.0))
+        sums = total[out_of, None] + TURNING_COST * apart**2
         step = np.zeros(len(total), dtype=np.int64)
-        step[into] = sums.argmin(axis=0)
+        step[into] = out_of[sums.argmin(axis=0)]
         total = np.full(len(total), np.inf)
         total[into] = sums.min(axis=0) + cost[k, into]
         came.append(step)
@@ -117,3 +117,11 @@ def _course(cost: FloatArray, choices: FloatArray) -> list[int]:
     for step in reversed(came):
         route.append(int(step[route[-1]]))
     return route[::-1]
+
+
+def spread_evenly(count: int) -> FloatArray:
+    """(count, 3) unit vectors spread evenly over the sphere."""
+    number = np.arange(count) + 0.5
+    z, turn = 1.0 - 2.0 * number / count, np.pi * (1.0 + np.sqrt(5.0)) * number
+    flat = np.sqrt(1.0 - z**2)
+    return np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])

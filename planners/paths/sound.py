@@ -10,7 +10,7 @@ import numpy as np
 from hw import Move
 from mapping import BoolArray, FloatArray, IntArray
 from mapping.base import Base
-from planners.paths.carrier import Carrier
+from planners.paths.carrier import FREE_SINKING, Carrier
 
 # The sensor's field about its axis (paper, section 4)
 FIELD = float(np.radians(75.0))
@@ -79,10 +79,16 @@ def _left(path: FloatArray, approach: FloatArray, leaving: Carrier) -> Iterator[
         approach[end] = leaving.turned(path[end], approach[end], MOST_TURNED)
     can = leaving.clearance(path, approach) >= 0
     # what is turned may no longer be pressed against what it was
+    turning = 0.5 * (approach[1:] + approach[:-1])
+    turning /= np.linalg.norm(turning, axis=1, keepdims=True)
+    stem = replace(leaving, backing=0.0).clearance(0.5 * (path[1:] + path[:-1]), turning)
+    between = np.flatnonzero(stem < -FREE_SINKING * leaving.tip_radius)
     for run in runs(ball_is_sound(path, approach, leaving.base, leaving.tip_radius)):
-        inner = run[can[run]]
-        if len(inner):
-            yield path[inner[0] : inner[-1] + 1], approach[inner[0] : inner[-1] + 1]
+        # nor may the stem touch while it turns from one waypoint to the next
+        for part in np.split(run, np.searchsorted(run, between[(between >= run[0]) & (between < run[-1])]) + 1):
+            inner = part[can[part]]
+            if len(inner):
+                yield path[inner[0] : inner[-1] + 1], approach[inner[0] : inner[-1] + 1]
 
 
 def ball_is_sound(path: FloatArray, approach: FloatArray, base: Base, tip_radius: float) -> BoolArray:
