@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mapping import FloatArray
+from mapping import BoolArray, FloatArray
 from mapping.base import Base
 
 # Places along the stem's axis that are looked at; the first lies where a stem half as thick leaves the ball's shadow
@@ -69,7 +69,7 @@ class Carrier:
             height[:, 0] = np.minimum(height[:, 0], drawn + FREE_SINKING * self.tip_radius)
         return np.asarray(height.min(axis=1))
 
-    def turned(self, path: FloatArray, approach: FloatArray, most: float) -> FloatArray:
+    def turned(self, path: FloatArray, approach: FloatArray, most: float, may: BoolArray | None = None) -> FloatArray:
         """The approaches (K, 3), turned where the stem would touch the body, as little and as evenly as will do.
 
         The course of least cost through the directions that are free at each waypoint (Viterbi); where none within
@@ -78,8 +78,12 @@ class Carrier:
         Args:
             path: (K, 3) centres of the ball, m.
             approach: (K, 3) unit directions that are wanted.
+            most: rad.
+            may: (K,) waypoints whose approach may be turned; None: all.
         """
         offends = self.clearance(path, approach) < 0
+        if may is not None:
+            offends &= may
         if not offends.any():
             return approach
         fine = spread_evenly(TURNED_DIRECTIONS)

@@ -73,11 +73,12 @@ def _left(path: FloatArray, approach: FloatArray, leaving: Carrier) -> Iterator[
         path, approach: (K, 3) of a stretch that is sound.
         leaving: the stem and the ball drawn back.
     """
-    approach = approach.copy()
-    near = int(np.ceil(LEAVING_STRETCH / SOUND_SPACING))
-    for end in (slice(0, near), slice(-near, None)):
-        approach[end] = leaving.turned(path[end], approach[end], MOST_TURNED)
+    near, number = int(np.ceil(LEAVING_STRETCH / SOUND_SPACING)), np.arange(len(path))
     can = leaving.clearance(path, approach) >= 0
+    may = ((number < near) & ~can[0]) | ((number >= len(path) - near) & ~can[-1])
+    if may.any():
+        approach = leaving.turned(path, approach, MOST_TURNED, may)
+        can = leaving.clearance(path, approach) >= 0
     # what is turned may no longer be pressed against what it was
     turning = 0.5 * (approach[1:] + approach[:-1])
     turning /= np.linalg.norm(turning, axis=1, keepdims=True)
