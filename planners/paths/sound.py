@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from hw import Move
 from mapping import BoolArray, FloatArray, IntArray
 from mapping.base import Base
+from mapping.geometry.contact import BallContact
 from planners.paths.carrier import FREE_SINKING, Carrier
 
 # The sensor's field about its axis (paper, section 4)
@@ -114,13 +116,16 @@ def ball_is_sound(path: FloatArray, approach: FloatArray, base: Base, tip_radius
 def held_up(path: FloatArray, approach: FloatArray, base: Base, tip_radius: float) -> FloatArray:
     """(K,) how far balls rest above commanded centres (K, 3), back along the approach (K, 3), m; 0 where they are free.
 
-    To first order: the depth over the cosine between the approach and what is sunk into. A ball that sinks a little
-    into a steep wall is held up far.
+    Exact contact with the base: a ball that sinks a little into a steep wall, or into a fold that narrows, is held up
+    far, though the nearest place of the body alone would not tell.
     """
-    feet = base.foot(path, tip_radius)
-    outward = feet.normals * np.where(feet.height > -tip_radius, 1.0, -1.0)[:, None]
-    against = -np.einsum("ij,ij->i", outward, approach)
-    return np.asarray(np.maximum(-feet.height, 0.0) / np.maximum(against, np.cos(FIELD)))
+    felt = _contact(base, tip_radius).press(path, approach)
+    return np.asarray(np.where(felt.count > 0, np.maximum(-felt.distance, 0.0), 0.0))
+
+
+@lru_cache(maxsize=4)
+def _contact(base: Base, tip_radius: float) -> BallContact:
+    return BallContact(base.surface, tip_radius)
 
 
 def resampled(path: FloatArray, approach: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:

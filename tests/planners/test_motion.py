@@ -190,6 +190,6 @@ def test_a_steep_wall_holds_a_ball_up_far_though_it_sinks_into_it_a_little() -> 
     lean = np.array([-np.sin(np.radians(10.0)), -np.cos(np.radians(10.0)), 0.0])
     place = 1e-3 * np.array([[8.7, 20.0, 20.0], [9.1, 20.0, 20.0]])
     up = held_up(place, np.tile(lean, (2, 1)), BASE, R)
-    assert up == pytest.approx([0.3e-3 / np.cos(np.radians(75.0)), 0.0], rel=1e-6)
+    assert up == pytest.approx([0.3e-3 / np.sin(np.radians(10.0)), 0.0], rel=1e-6)
     gentle = np.array([-np.sin(np.radians(40.0)), -np.cos(np.radians(40.0)), 0.0])
     assert held_up(place[:1], gentle[None], BASE, R) == pytest.approx([0.3e-3 / np.sin(np.radians(40.0))], rel=1e-6)
