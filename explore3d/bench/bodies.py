@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from explore3d import count_text
 from explore3d.analysis import Analysis
 from explore3d.bench.body_judge import Judge, anchors_right, refusals
 from explore3d.bench.scenes import any_body
@@ -140,7 +141,7 @@ def body_lines(records: Sequence[dict[str, Any]]) -> Iterator[str]:
         invented, metres = (sum(len(e["invented"]) for e in records), sum(e["sweep_metres"] for e in records))
         yield ""
         yield (
-            f"{len(records)} runs: {found} of {there} features found, {invented} invented on {metres:.0f} m, "
+            f"{count_text(len(records), 'run')}: {found} of {there} features found, {invented} invented on {metres:.0f} m, "
             f"{refused} of {moves + refused} moves refused, "
             f"least swept {100 * min(e['swept'] for e in records):.1f} %"
         )
