@@ -141,7 +141,7 @@ def body_lines(records: Sequence[dict[str, Any]]) -> Iterator[str]:
         invented, metres = (sum(len(e["invented"]) for e in records), sum(e["sweep_metres"] for e in records))
         yield ""
         yield (
-            f"{count_text(len(records), 'run')}: {found} of {there} features found, {invented} invented on {metres:.0f} m, "
-            f"{refused} of {moves + refused} moves refused, "
+            f"{count_text(len(records), 'run')}: {found} of {there} features found, {invented} invented on "
+            f"{metres:.0f} m, {refused} of {moves + refused} moves refused, "
             f"least swept {100 * min(e['swept'] for e in records):.1f} %"
         )
