@@ -9,8 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from solids import Solid, bowl, double_ring, folds, holed_plate, level_set, vase
 from triangles import Mesh, dome, extruded, grid_faces, height_field, together, tube, walls, welded, write_ply
 
+from explore3d.bench.scenes import BODY_BUILDING_SEEDS, Detail, drawn_details, laid_on
+from mapping import Surface
 from mapping.arrays import FloatArray
 
 Sizes = dict[str, Any]
@@ -27,6 +30,7 @@ def main() -> None:
     make_step()
     make_mug()
     make_l_bracket()
+    make_bodies()
 
 
 TILT = np.radians(45.0)
@@ -241,6 +245,34 @@ def bump_below(bump: Sizes) -> Mesh:
     polar = np.linspace(0.0, np.arccos(1.0 - (height + 0.3e-3) / radius), 13)[1:]
     vertices, faces = dome(radius * np.sin(polar), height - radius * (1.0 - np.cos(polar)), height, sides=36)
     return vertices @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]) + bump["place"], faces
+
+
+PLATE_WITH_HOLE: Sizes = {"size": (0.070, 0.050), "thick": 4e-3, "hole": 9e-3}
+# Level sets, and the corners of the boxes that hold them
+SOLIDS: dict[str, tuple[Solid, FloatArray, FloatArray]] = {
+    "vase": (vase, np.array([-0.024, -0.024, -0.040]), np.array([0.050, 0.024, 0.040])),
+    "bowl": (bowl, np.array([-0.035, -0.035, -0.035]), np.array([0.035, 0.035, 0.006])),
+    "double_ring": (double_ring, np.array([-0.046, -0.028, -0.010]), np.array([0.046, 0.028, 0.010])),
+    "folds": (folds, np.array([-0.032, -0.036, -0.038]), np.array([0.037, 0.032, 0.038])),
+}
+LEVEL_SET_SPACING = 2e-3
+BODY_TIP_RADIUS = 3e-3
+
+
+def make_bodies() -> None:
+    """Closed bodies with concave parts, each alone and with details laid on at places of chance."""
+    meshes = {name: level_set(solid, low, high, LEVEL_SET_SPACING) for name, (solid, low, high) in SOLIDS.items()}
+    for name, mesh in (meshes | {"holed_plate": holed_plate(**PLATE_WITH_HOLE)}).items():
+        details = drawn_details(Surface(*mesh), BODY_TIP_RADIUS, np.random.default_rng(BODY_BUILDING_SEEDS[0]))
+        write_mesh(f"bodies/{name}", mesh)
+        write_mesh(f"bodies/{name}_with_details", laid_on(mesh, details))
+        write_truth(name, [laid_truth(each) for each in details])
+
+
+def laid_truth(detail: Detail) -> dict[str, object]:
+    """A detail as a feature; one about a point has no length."""
+    known = {"kind": detail.kind, "axis": detail.course, "height": detail.height, "width": detail.width}
+    return known | ({"length": detail.truth.length} if len(detail.course) > 1 else {})
 
 
 def tilted(points: FloatArray) -> FloatArray:

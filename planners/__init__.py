@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         Plan as Plan,
         Refused as Refused,
         executed as executed,
+        made as made,
     )
     from planners.survey.survey import Survey as Survey
 
@@ -23,7 +24,7 @@ _PUBLIC = {
     "drive": ("drive", "dry_run"),
     "errors": ("PlannerError",),
     "explore.explore": ("Explore",),
-    "plan": ("Outcome", "Parted", "Plan", "Refused", "executed"),
+    "plan": ("Outcome", "Parted", "Plan", "Refused", "executed", "made"),
     "survey.survey": ("Survey",),
 }
 doorway(__name__, _PUBLIC)

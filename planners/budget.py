@@ -9,7 +9,7 @@ import numpy as np
 
 from hw import Move
 from mapping import Trace
-from planners.plan import Outcome, Plan, executed
+from planners.plan import Outcome, Plan, made
 
 
 @dataclass
@@ -52,7 +52,7 @@ def _charged(move: Move, spent: Spent) -> Generator[Move, Trace, Trace]:
     before = replace(spent)
     spent.count(move)
     trace = yield move
-    done = executed(move, trace)
+    done = made(move, trace)
     if done != (move,):
         spent.seconds, spent.metres, spent._end = before.seconds, before.metres, before._end
         for part in done:

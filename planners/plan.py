@@ -45,10 +45,10 @@ class Refused(Trace):
 
 @dataclass(frozen=True, eq=False)
 class Parted(Trace):
-    """What a plan is sent for a sweep that was made in parts: the samples of all of them.
+    """What a plan is sent for a move that was made in parts, or after travel to it: the samples of all of them.
 
     Args:
-        moves: the parts that were made.
+        moves: what was made, the travel included.
     """
 
     moves: tuple[Move, ...] = ()
@@ -61,7 +61,12 @@ class Parted(Trace):
 
 
 def executed(move: Move, answer: Trace) -> tuple[Move, ...]:
-    """What was carried out of a move, by the trace that the plan was sent for it."""
+    """What was carried out of a move, by the trace that the plan was sent for it; not the travel to it."""
+    return tuple(part for part in made(move, answer) if part is move or part.purpose == move.purpose)
+
+
+def made(move: Move, answer: Trace) -> tuple[Move, ...]:
+    """What the finger did for a move, the travel to it included, by the trace that the plan was sent for it."""
     if isinstance(answer, Parted):
         return answer.moves
     return () if isinstance(answer, Refused) else (move,)

@@ -6,6 +6,11 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from explore3d.bench.apparatus import write_apparatus as write_apparatus
+    from explore3d.bench.bodies import (
+        bench_bodies as bench_bodies,
+        body_lines as body_lines,
+        body_records as body_records,
+    )
     from explore3d.bench.curvature import (
         CurvatureAccuracy as CurvatureAccuracy,
         available as available,
@@ -50,6 +55,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "apparatus": ("write_apparatus",),
+    "bodies": ("bench_bodies", "body_lines", "body_records"),
     "curvature": ("CurvatureAccuracy", "available", "bench_curvature", "curvature_table", "write_bench"),
     "dynamics": ("dynamics_curve", "dynamics_table", "wire_trace"),
     "explore_curves": ("write_curves",),

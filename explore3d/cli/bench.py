@@ -204,6 +204,42 @@ def explore(
 
 
 @bench.command()
+def bodies(
+    store: Store,
+    bodies: Annotated[str | None, typer.Option(help="Bodies, separated by commas; all if left out.")] = None,
+    seeds: Annotated[
+        str, typer.Option(help="reported, building (what the planner was built with), or numbers, separated by commas.")
+    ] = "reported",
+    meshes: Annotated[
+        Path | None, typer.Option(help="Folder of bunny.off, spot.obj and fandisk.off, which do not come with us.")
+    ] = None,
+    keep: Annotated[Path | None, typer.Option(help="Keep scenes and sessions there.")] = None,
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+) -> None:
+    """Is all of a body swept that can be reached, safely, and is what lies on it found? By `explore3d run`.
+
+    Example: explore3d bench bodies --store bodies.jsonl --bodies l_bracket,bowl --seeds building
+    """
+    from explore3d.bench import bench_bodies, body_lines, body_records
+    from explore3d.bench.scenes import ANY_BODIES, BODY_BUILDING_SEEDS, BODY_REPORTED_SEEDS, FILED_BODIES
+
+    chosen = _names(bodies, "--bodies", list(ANY_BODIES))
+    there = [name for name in chosen if name not in FILED_BODIES or (meshes and (meshes / FILED_BODIES[name]).exists())]
+    for name in chosen:
+        if name not in there:
+            print(f"{name}: left out, {FILED_BODIES[name]} does not come with the program; give its folder by --meshes")
+    known = {"reported": BODY_REPORTED_SEEDS, "building": BODY_BUILDING_SEEDS}
+    numbers = known[seeds] if seeds in known else tuple(int(number) for number in _numbers(seeds, "--seeds", 1))
+    for each in bench_bodies(there, numbers, store, meshes, keep, seconds):
+        print(
+            f"{each['body']}, {each['seed']}: {100 * each['swept']:.1f} % swept, {each['found']} of "
+            f"{each['reachable_features']} found, {len(each['invented'])} invented, {each['refused']} refused",
+            flush=True,
+        )
+    _print(body_lines(body_records(store)))
+
+
+@bench.command()
 def detect(
     store: Store,
     out: Annotated[Path, typer.Option(help="Folder for the table and the pictures.")],
@@ -388,11 +424,11 @@ def _print(lines: Iterable[str]) -> None:
         print(line, flush=True)
 
 
-def _numbers(text: str) -> list[str]:
+def _numbers(text: str, option: str = "--triangles", least: int = 2) -> list[str]:
     parts = [part.strip() for part in text.split(",") if part.strip()]
-    wrong = [part for part in parts if not part.isdigit() or int(part) < 2]
+    wrong = [part for part in parts if not part.isdigit() or int(part) < least]
     if wrong or not parts:
-        raise UserError(f"--triangles: expected whole numbers from 2, separated by commas; found {text!r}")
+        raise UserError(f"{option}: expected whole numbers from {least}, separated by commas; found {text!r}")
     return parts
 
 

@@ -128,14 +128,16 @@ def _planned(scene: Scene, finger: Finger) -> DryRun:
         spent.count(move)
         return planned.nothing
 
-    survey = None
+    survey, ended = None, ""
     if spent.seconds < budget:
         exploring = planned.explore(base=base, time_budget=budget - spent.seconds).plan()
         exploring = planned.prepared(exploring, base, Spent(spent.travel_speed), np.inf)
         _, outcome = drive(exploring, made, check=check, empty=planned.nothing)
-        survey = outcome.value.survey
+        survey = None if outcome.value is None else outcome.value.survey
+        ended = outcome.detail if outcome.reason != "budget" else ""
     if survey is None:
         short = "the time budget ends before the survey does: raise explore.time_budget or survey.smallest_feature"
+        short = f"the survey does not come to its end: {ended}" if ended else short
         assumed = f"{assumed}; {short}" if assumed else short
     covered, reach = (None, None) if survey is None else (survey.fraction, survey.reach)
     broken = {number - 1: what for number, what in violations}

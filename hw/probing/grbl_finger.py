@@ -336,6 +336,7 @@ class GrblFinger:
             for point, inwards in zip(move.path, move.approach, strict=True):
                 self._away = -inwards
                 stage.go(point, -inwards, lift)
+            self._free = True  # it stands in free space: there is nothing to back off from
             return
         self._sweeps += 1
         stage.go(move.path[0] + lift * away, away, lift)

@@ -15,8 +15,10 @@ from mapping.geometry.mesh import NearestPoint
 YIELDS = 0.05
 # Samples along a way, and along the stem's axis behind the ball, in tip radii
 WAY_SPACING, STEM_SPACING, STEM_START = 0.25, 0.5, 1.5
-# A rise over the commanded path by more than this is looked at again, for the ball may have come down on an overhang
-HIGH_RISE = 1.0
+# A rise over the commanded path by more than this is looked at again, for the ball may have come down on an overhang,
+# or touched in passing what stands beside its way; in tip radii. Sweeps are pressed by 0.02: only details rise so much,
+# and what the ball rides over it is also pressed up by from below
+HIGH_RISE = 0.1
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,13 +7,18 @@ from functools import cached_property
 
 import numpy as np
 
-from mapping import FloatArray
+from mapping import BoolArray, FloatArray
 from mapping.base import Base
 
 # Places along the stem's axis that are looked at; the first lies where a stem half as thick leaves the ball's shadow
 STEM_PLACES, STEM_START = 6, 1.5
-# Directions that an approach may be turned to: 162 points of a Fibonacci lattice lie about 16 degrees apart
-TURNED_DIRECTIONS = 162
+# How far a ball may sink into the base on its way through free space, in tip radii; a way that is planned keeps 0.02
+# free of that even between places a quarter of a radius apart (0.25^2 / 8 = 0.008)
+MOST_SINKING, FREE_SINKING = 0.05, 0.02
+# Points of a Fibonacci lattice over the sphere: 162 lie about 16 degrees apart; an approach is turned to one of 642, 8
+# degrees apart: half-way between two of them the end of a stem six radii long lies 6 (1 - cos 4 degrees) = 0.015 radii
+# off either's way, where 16 degrees leave 0.06 and two such steps at once 0.2
+LATTICE_DIRECTIONS, TURNED_DIRECTIONS = 162, 642
 # How much turning between neighbouring waypoints costs against standing off the wanted direction
 TURNING_COST = 4.0
 
@@ -26,12 +31,14 @@ class Carrier:
         base: the body it must stay out of.
         tip_radius: of the ball, m.
         radius, length: of the stem, m, measured from the ball's centre.
+        backing: so far the ball must be able to draw back along the stem, m.
     """
 
     base: Base
     tip_radius: float
     radius: float
     length: float
+    backing: float = 0.0
 
     @classmethod
     def of(cls, base: Base, tip_radius: float) -> Carrier:
@@ -41,13 +48,15 @@ class Carrier:
     def clearance(self, path: FloatArray, approach: FloatArray) -> FloatArray:
         """(K,) distance of the stem's surface from the body at ball centres (K, 3) and approaches (K, 3), m.
 
+        With `backing` the stem is so much longer, and the room that the ball drawn back has may be less than its own.
+
         No place is nearer to the body than the stem's middle by more than it lies from it: where that leaves a place
         free, the body is not asked, and a free stem's distance is this bound from below. In the open the middle tells
         all six.
         """
         if self.length <= 0:
             return np.full(len(path), np.inf)
-        back = np.linspace(STEM_START * self.tip_radius, self.length, STEM_PLACES)
+        back = np.linspace(STEM_START * self.tip_radius, self.length + self.backing, STEM_PLACES)
         stem = path[:, None, :] - back[None, :, None] * approach[:, None, :]
         middle = STEM_PLACES // 2
         known = self.base.foot(stem[:, middle], self.radius).height
@@ -55,9 +64,12 @@ class Carrier:
         ask = height < 0
         ask[:, middle] = False
         height[ask] = self.base.foot(stem[ask], self.radius).height
+        if self.backing > 0:
+            drawn = self.base.foot(path - self.backing * approach, self.tip_radius).height
+            height[:, 0] = np.minimum(height[:, 0], drawn + FREE_SINKING * self.tip_radius)
         return np.asarray(height.min(axis=1))
 
-    def turned(self, path: FloatArray, approach: FloatArray, most: float) -> FloatArray:
+    def turned(self, path: FloatArray, approach: FloatArray, most: float, may: BoolArray | None = None) -> FloatArray:
         """The approaches (K, 3), turned where the stem would touch the body, as little and as evenly as will do.
 
         The course of least cost through the directions that are free at each waypoint (Viterbi); where none within
@@ -66,11 +78,16 @@ class Carrier:
         Args:
             path: (K, 3) centres of the ball, m.
             approach: (K, 3) unit directions that are wanted.
+            most: rad.
+            may: (K,) waypoints whose approach may be turned; None: all.
         """
         offends = self.clearance(path, approach) < 0
+        if may is not None:
+            offends &= may
         if not offends.any():
             return approach
-        lattice = np.broadcast_to(self.lattice, (len(path), *self.lattice.shape))
+        fine = spread_evenly(TURNED_DIRECTIONS)
+        lattice = np.broadcast_to(fine, (len(path), *fine.shape))
         choices = np.concatenate([approach[:, None], lattice], axis=1)
         angle = np.arccos(np.clip(np.einsum("kij,kj->ki", choices, approach), -1.0, 1.0))
         allowed = (angle <= most) & offends[:, None]
@@ -85,21 +102,18 @@ class Carrier:
     @cached_property
     def lattice(self) -> FloatArray:
         """(M, 3) unit vectors spread evenly over the sphere."""
-        number = np.arange(TURNED_DIRECTIONS) + 0.5
-        z, turn = 1.0 - 2.0 * number / TURNED_DIRECTIONS, np.pi * (1.0 + np.sqrt(5.0)) * number
-        flat = np.sqrt(1.0 - z**2)
-        return np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])
+        return spread_evenly(LATTICE_DIRECTIONS)
 
 
 def _course(cost: FloatArray, choices: FloatArray) -> list[int]:
     """Which choice (K,) at every waypoint, of the least sum of costs (K, M) and of squared turns between them."""
     total, came = cost[0], []
     for k in range(1, len(cost)):
-        into = np.flatnonzero(np.isfinite(cost[k]))
-        apart = np.arccos(np.clip(choices[k - 1] @ choices[k, into].T, -1.0, 1.0))
-        sums = total[:, None] + TURNING_COST * apart**2
+        into, out_of = np.flatnonzero(np.isfinite(cost[k])), np.flatnonzero(np.isfinite(total))
+        apart = np.arccos(np.clip(choices[k - 1, out_of] @ choices[k, into].T, -1.0, 1.0))
+        sums = total[out_of, None] + TURNING_COST * apart**2
         step = np.zeros(len(total), dtype=np.int64)
-        step[into] = sums.argmin(axis=0)
+        step[into] = out_of[sums.argmin(axis=0)]
         total = np.full(len(total), np.inf)
         total[into] = sums.min(axis=0) + cost[k, into]
         came.append(step)
@@ -107,3 +121,11 @@ def _course(cost: FloatArray, choices: FloatArray) -> list[int]:
     for step in reversed(came):
         route.append(int(step[route[-1]]))
     return route[::-1]
+
+
+def spread_evenly(count: int) -> FloatArray:
+    """(count, 3) unit vectors spread evenly over the sphere."""
+    number = np.arange(count) + 0.5
+    z, turn = 1.0 - 2.0 * number / count, np.pi * (1.0 + np.sqrt(5.0)) * number
+    flat = np.sqrt(1.0 - z**2)
+    return np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])

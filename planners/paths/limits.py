@@ -9,9 +9,13 @@ import numpy as np
 from hw import Move, Workspace
 from mapping import FloatArray
 from mapping.base import Base
-from planners.paths.carrier import Carrier
-from planners.paths.sound import FIELD, PRESSED, resampled
-from planners.paths.travel import MOST_SINKING, gap, sunk, way_between
+from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
+from planners.paths.sound import FIELD, PRESSED, held_up, resampled
+from planners.paths.travel import gap, sunk, way_between
+
+# Places along a move are so close together where the stem is asked, in tip radii: half of a sweep's waypoints' spacing,
+# for between two of them the stem turns
+STEM_LOOKED_AT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,24 +84,30 @@ class Limits:
 
     def _collision(self, move: Move, base: Base) -> str | None:
         """The ball: a sweep presses a little, any other move stays free."""
-        allowed = PRESSED if move.purpose == "sweep" else MOST_SINKING
-        deepest = sunk(move.path, base, self.tip_radius)
-        if deepest <= allowed * self.tip_radius:
-            return None
         if move.purpose == "sweep":
-            return f"the sweep's path sinks {1e3 * deepest:.3f} mm into another part of the body"
+            path, approach = move.path, move.approach
+            if len(path) > 1:
+                path, approach = resampled(path, approach, 0.5 * self.tip_radius)
+            highest = float(held_up(path, approach, base, self.tip_radius).max())
+            if highest <= PRESSED * self.tip_radius:
+                return None
+            return f"another part of the body is in the sweep's way and holds the ball up by {1e3 * highest:.3f} mm"
+        deepest = sunk(move.path, base, self.tip_radius)
+        if deepest <= MOST_SINKING * self.tip_radius:
+            return None
         return f"the way through free space sinks {1e3 * deepest:.3f} mm into the body"
 
     def _stem(self, move: Move, base: Base) -> str | None:
         path, approach = move.path, move.approach
         if len(path) > 1:
-            path, approach = resampled(path, approach, 0.5 * self.tip_radius)
+            path, approach = resampled(path, approach, STEM_LOOKED_AT * self.tip_radius)
         return self._stem_sinks("the stem behind the ball", path, approach, base)
 
     def _stem_sinks(self, what: str, path: FloatArray, approach: FloatArray, base: Base) -> str | None:
         carrier = Carrier(base, self.tip_radius, self.stem_radius, self.stem_length)
+        allowed = FREE_SINKING * self.tip_radius
         clearance = float(carrier.clearance(path, approach).min())
-        return f"{what} sinks {-1e3 * clearance:.3f} mm into the body" if clearance < 0 else None
+        return f"{what} sinks {-1e3 * clearance:.3f} mm into the body" if clearance < -allowed else None
 
     def _way(self, before: Move, move: Move, base: Base) -> str | None:
         """Ball and stem on their way from the end of one move to the beginning of the next."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mapping import BoolArray, FloatArray
-from planners.paths.carrier import Carrier
+from planners.paths.carrier import MOST_SINKING, Carrier
 from planners.paths.sound import MOST_TURNED
-from planners.paths.travel import MOST_SINKING
 
 
 def reachable(points: FloatArray, normals: FloatArray, carrier: Carrier) -> BoolArray:

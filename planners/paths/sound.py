@@ -2,32 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from hw import Move
 from mapping import BoolArray, FloatArray, IntArray
 from mapping.base import Base
-from planners.paths.carrier import Carrier
+from mapping.geometry.contact import BallContact
+from planners.paths.carrier import FREE_SINKING, Carrier
 
 # The sensor's field about its axis (paper, section 4)
 FIELD = float(np.radians(75.0))
 # An approach is turned at most so far from the normal: over a wire a sixth of the tip's radius high the contact leaves
 # the base's normal by arccos(1 - 1/6) = 34 degrees, and must stay in the field of 75
 MOST_TURNED = float(np.radians(41.0))
-# How far a sweep's commanded path may sink into the base, in tip radii: further in it crosses a wall
+# How far the base may hold a ball up from a sweep's commanded path, in tip radii: round a sharp edge of 90 degrees,
+# whose corner the path cuts, it is 1 - cos(45 degrees) = 0.29, and the press 0.02; more is a wall
 PRESSED = 0.5
+# What a ball is to ride on may be so far off the approach: the field, less what the facets of a round body turn by
+RIDDEN = float(np.radians(65.0))
 # Room between the ball and a wall beside its way, in tip radii: poses and meshes are not better known
 WALL_ROOM = 0.03
+# Room for ball and stem where there is any: a detail that is not known yet may stand out by as much, in tip radii
+DETAIL_ROOM = 1.0 / 6.0
 # Waypoints are looked at so close together, and stretches shorter than that are not worth a sweep, in tip radii
 SOUND_SPACING, SHORTEST_PART = 0.2, 0.3
+# How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)
+BACK_OFF_DISTANCE = 0.5
+# About a sweep's ends the approach may be turned so that the finger can draw back, over so much, in tip radii
+LEAVING_STRETCH = 1.0
 # Lifted so far the ball has left what it is pressed against (its press is 0.02) but for that room, in tip radii
 LIFTED_PATH = 0.02 + WALL_ROOM
 
 
 def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     """The stretches of a sweep that ball and stem can make, in their order; the sweep itself if all of it is sound.
+
+    At its ends the finger must be able to draw back.
 
     Args:
         move: a sweep.
@@ -37,15 +51,47 @@ def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
         return [move] if ball_is_sound(move.path, move.approach, carrier.base, carrier.tip_radius).all() else []
     path, approach = resampled(move.path, move.approach, SOUND_SPACING * carrier.tip_radius)
     free = ball_is_sound(path, approach, carrier.base, carrier.tip_radius)
-    stems = carrier.clearance(path, approach) >= 0
-    if (free & stems).all():
+    tip = carrier.tip_radius
+    roomy = replace(carrier, radius=carrier.radius + DETAIL_ROOM * tip)
+    leaving = replace(carrier, backing=BACK_OFF_DISTANCE * tip)
+    ends = np.array([0, -1])
+    if (free & (roomy.clearance(path, approach) >= 0)).all() and (
+        leaving.clearance(path[ends], approach[ends]) >= 0
+    ).all():
         return [move]
-    if not stems[free].all():
+    for each in (roomy, carrier):
         for run in runs(free):
-            approach[run] = carrier.turned(path[run], approach[run], MOST_TURNED)
-        free &= carrier.clearance(path, approach) >= 0
-    parts = (replace(move, path=path[run], approach=approach[run]) for run in runs(free) if len(run) > 1)
-    return [part for part in parts if part.length >= SHORTEST_PART * carrier.tip_radius]
+            approach[run] = each.turned(path[run], approach[run], MOST_TURNED)
+    free &= carrier.clearance(path, approach) >= 0
+    stretches = (part for run in runs(free) for part in _left(path[run], approach[run], leaving))
+    parts = (replace(move, path=part[0], approach=part[1]) for part in stretches if len(part[0]) > 1)
+    return [part for part in parts if part.length >= SHORTEST_PART * tip]
+
+
+def _left(path: FloatArray, approach: FloatArray, leaving: Carrier) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """A stretch's parts between waypoints from which the finger can draw back, turned there if need be.
+
+    Args:
+        path, approach: (K, 3) of a stretch that is sound.
+        leaving: the stem and the ball drawn back.
+    """
+    near, number = int(np.ceil(LEAVING_STRETCH / SOUND_SPACING)), np.arange(len(path))
+    can = leaving.clearance(path, approach) >= 0
+    may = ((number < near) & ~can[0]) | ((number >= len(path) - near) & ~can[-1])
+    if may.any():
+        approach = leaving.turned(path, approach, MOST_TURNED, may)
+        can = leaving.clearance(path, approach) >= 0
+    # what is turned may no longer be pressed against what it was
+    turning = 0.5 * (approach[1:] + approach[:-1])
+    turning /= np.linalg.norm(turning, axis=1, keepdims=True)
+    stem = replace(leaving, backing=0.0).clearance(0.5 * (path[1:] + path[:-1]), turning)
+    between = np.flatnonzero(stem < -FREE_SINKING * leaving.tip_radius)
+    for run in runs(ball_is_sound(path, approach, leaving.base, leaving.tip_radius)):
+        # nor may the stem touch while it turns from one waypoint to the next
+        for part in np.split(run, np.searchsorted(run, between[(between >= run[0]) & (between < run[-1])]) + 1):
+            inner = part[can[part]]
+            if len(inner):
+                yield path[inner[0] : inner[-1] + 1], approach[inner[0] : inner[-1] + 1]
 
 
 def ball_is_sound(path: FloatArray, approach: FloatArray, base: Base, tip_radius: float) -> BoolArray:
@@ -61,7 +107,25 @@ def ball_is_sound(path: FloatArray, approach: FloatArray, base: Base, tip_radius
     deep = base.foot(path, tip_radius)
     feet = base.foot(path - LIFTED_PATH * tip_radius * approach, tip_radius)
     against = -np.einsum("ij,ij->i", feet.normals, approach)
-    return np.asarray((deep.height >= -PRESSED * tip_radius) & (feet.height > -tip_radius) & (against >= np.cos(FIELD)))
+    outward = deep.normals * np.where(deep.height > -tip_radius, 1.0, -1.0)[:, None]
+    against = np.minimum(against, -np.einsum("ij,ij->i", outward, approach))
+    sound = (feet.height > -tip_radius) & (against >= np.cos(RIDDEN))
+    return np.asarray(sound & (held_up(path, approach, base, tip_radius) <= PRESSED * tip_radius))
+
+
+def held_up(path: FloatArray, approach: FloatArray, base: Base, tip_radius: float) -> FloatArray:
+    """(K,) how far balls rest above commanded centres (K, 3), back along the approach (K, 3), m; 0 where they are free.
+
+    Exact contact with the base: a ball that sinks a little into a steep wall, or into a fold that narrows, is held up
+    far, though the nearest place of the body alone would not tell.
+    """
+    felt = _contact(base, tip_radius).press(path, approach)
+    return np.asarray(np.where(felt.count > 0, np.maximum(-felt.distance, 0.0), 0.0))
+
+
+@lru_cache(maxsize=4)
+def _contact(base: Base, tip_radius: float) -> BallContact:
+    return BallContact(base.surface, tip_radius)
 
 
 def resampled(path: FloatArray, approach: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:

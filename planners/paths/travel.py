@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,15 +14,16 @@ from mapping import BoolArray, FloatArray, IntArray, Trace
 from mapping.base import Base
 from mapping.detection import face_samples
 from planners import Outcome, Parted, Plan, Refused
-from planners.paths.carrier import Carrier
-from planners.paths.sound import resampled, sound_parts
+from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
+from planners.paths.detour import Detour
+from planners.paths.sound import BACK_OFF_DISTANCE, DETAIL_ROOM, resampled, sound_parts
 
-# How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)
-BACK_OFF_DISTANCE = 0.5
-# How far a ball may sink into the base on its way through free space, in tip radii
-MOST_SINKING = 0.05
-# A way that is planned keeps 0.02 free of that limit even between the places that are looked at (0.25^2 / 8 = 0.008)
-FREE_SINKING, FREE_SPACING = 0.02, 0.25
+# Moves through free space
+THROUGH_SPACE = ("travel", "retreat")
+# Places of a way lie at most so far apart where it is looked whether it is free, in tip radii
+FREE_SPACING = 0.25
+# About its ends a way need not keep off the body: the finger was or will be there, in tip radii
+ENDS = 1.0
 # Of the grid on which ways round the body are looked for, in tip radii; and its most nodes along an axis
 GRID_SPACING, MOST_GRID_NODES = 0.75, 40
 ROOM = 4.0
@@ -30,16 +31,19 @@ ROOM = 4.0
 OUT_DISTANCE = 6.0
 # Places off the surface where the grid is too coarse: how high over contact, in tip radii; how many of each at most;
 # and how many neighbours of each are tried
-NEAR_LIFTS = (0.1, 0.4)
+NEAR_LIFTS = (0.2, 0.5)
 MOST_NEAR_PLACES, NEAR_NEIGHBOURS = 2000, 10
 # Where along a way it is looked whether there is room, the middle first: what is blocked there needs no second look
 WAY_SHARES = (0.5, 0.25, 0.75, 0.125, 0.875, 0.375, 0.625)
 
 
 def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
-    """The way between two moves (2, 3), m: backed off where the one ends, straight, and down where the other begins."""
-    lift = BACK_OFF_DISTANCE * tip_radius
-    return np.stack([before.path[-1] - lift * before.approach[-1], after.path[0] - lift * after.approach[0]])
+    """The way between two moves (2, 3), m: backed off where the one ends, straight, and down where the other begins.
+
+    Travel begins and ends in free space, where nothing is to back off from.
+    """
+    first, last = (0.0 if move.purpose in THROUGH_SPACE else BACK_OFF_DISTANCE * tip_radius for move in (before, after))
+    return np.stack([before.path[-1] - first * before.approach[-1], after.path[0] - last * after.approach[0]])
 
 
 def sunk(path: FloatArray, base: Base, tip_radius: float, spacing: float = 0.5) -> float:
@@ -63,7 +67,7 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
     """The plan with travel put before every move that cannot be reached straight, and sweeps split where they offend.
 
     What was made is learnt from what the driver sends back: after a planners.Refused the finger still stands where
-    the last executed move ended. The plan is sent a planners.Parted for a sweep that was made in parts.
+    the last executed move ended. The plan is sent a planners.Parted for a move that was made in parts or after travel.
 
     Args:
         check: what is wrong with a move, wherever it begins, or None; only a sweep with something wrong is split.
@@ -80,26 +84,26 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
             parts = sound_parts(move, ways.carrier) or [move]
         felt, made = [], []
         for part in parts:
-            answer, before = yield from _reached(part, before, ways)
-            if not isinstance(answer, Refused):
+            answer, travelled, done = yield from _reached(part, before, ways)
+            before = done or travelled or before
+            if done is not None:
                 felt.append(answer)
-                made.append(part)
-        if made and parts != [move]:
+                made.extend([done] if travelled is None else [travelled, done])
+        if made and made != [move]:
             answer = Parted.of(felt, made)
 
 
-def _reached(move: Move, before: Move | None, ways: Ways) -> Generator[Move, Trace, tuple[Trace, Move | None]]:
-    """Make a move after the travel to it; what it felt, and the last move that was executed."""
+def _reached(
+    move: Move, before: Move | None, ways: Ways
+) -> Generator[Move, Trace, tuple[Trace, Move | None, Move | None]]:
+    """Make a move after the travel to it; what it felt, and the travel and the move if they were executed."""
     way = None if before is None else ways.round(before, move)
     if way is not None:
         answer = yield way
         if isinstance(answer, Refused):
-            return answer, before
-        before = way
+            return answer, None, None
     answer = yield move
-    if isinstance(answer, Refused):
-        return answer, before
-    return answer, move
+    return answer, way, None if isinstance(answer, Refused) else move
 
 
 def way_between(before: Move, after: Move, tip_radius: float) -> tuple[FloatArray, FloatArray]:
@@ -129,9 +133,10 @@ class Ways:
     high: FloatArray
     speed: float
 
-    def free(self, path: FloatArray) -> bool:
-        """True if a ball on the polyline (K, 3) stays out of the body."""
-        return sunk(path, self.base, self.tip_radius, FREE_SPACING) <= FREE_SINKING * self.tip_radius
+    def free(self, path: FloatArray, room: float = 0.0) -> bool:
+        """True if a ball on the polyline (K, 3) stays out of the body, so far off it as `room` (m) says."""
+        lowest = self.base.foot(dense(path, FREE_SPACING * self.tip_radius), self.tip_radius).height.min()
+        return bool(lowest >= (room or -FREE_SINKING * self.tip_radius))
 
     @cached_property
     def carrier(self) -> Carrier:
@@ -139,21 +144,62 @@ class Ways:
         return Carrier.of(self.base, self.tip_radius)
 
     def round(self, before: Move, after: Move) -> Move | None:
-        """The travel between two moves; None where the straight way is free, or where no way was found."""
-        straight = gap(before, after, self.tip_radius)
-        stems = self.carrier.clearance(*way_between(before, after, self.tip_radius)).min()
-        if self.free(straight) and stems >= 0:
-            return None
-        first = self._out(straight[0], -before.approach[-1])
-        last = self._out(straight[1], -after.approach[0])
+        """The travel between two moves; None where the straight way is free, or where no way was found.
+
+        What is not known yet may stand out of the body: a way keeps off it where one can.
+        """
+        straight, way = way_between(before, after, self.tip_radius), None
+        for room in (DETAIL_ROOM * self.tip_radius, 0.0):
+            if self._sound(*straight, room):
+                return None
+            for found in (self._near, self._far):
+                way = found(before, after, room)
+                if way is not None and self._sound(way.path, way.approach, room):
+                    return way
+        return self._near(before, after, 0.0)
+
+    def _near(self, before: Move, after: Move, room: float) -> Move | None:
+        """The shortest way of the ball between two moves, the stem turned as it goes; None if there is none."""
+        straight, begun, ended = gap(before, after, self.tip_radius), before.approach[-1], after.approach[0]
+        first, last = self._out(straight[0], -begun), self._out(straight[1], -ended)
         between = self._between(first[-1], last[-1])
         if between is None:
             return None
-        path = dense(self._shortened(np.concatenate([first, between, last[::-1]])), self.tip_radius)
+        path = dense(self._shortened(np.concatenate([first, between, last[::-1]]), room), self.tip_radius)
         wanted = -self.base.foot(path, self.tip_radius).normals
-        wanted[0], wanted[-1] = before.approach[-1], after.approach[0]
-        approach = self.carrier.turned(path, wanted, np.pi)
+        wanted[0], wanted[-1] = begun, ended
+        approach = replace(self.carrier, radius=self.carrier.radius + room).turned(path, wanted, np.pi)
         return Move(path, approach, speed=self.speed, purpose="travel")
+
+    def _far(self, before: Move, after: Move, room: float) -> Move | None:
+        """The way round the hull; from where the move before began, if only there a way leads out. None if none is."""
+        begin, stop = gap(before, after, self.tip_radius)
+        detour = self._detour if room > 0 else self._bare_detour
+        poses = detour.between((begin[None], before.approach[-1:]), (stop[None], after.approach[:1]))
+        if poses is None:
+            lift = 0.0 if before.purpose in THROUGH_SPACE else BACK_OFF_DISTANCE * self.tip_radius
+            back = (before.path - lift * before.approach)[::-1], before.approach[::-1]
+            poses = detour.between((back[0][-1:], back[1][-1:]), (stop[None], after.approach[:1]))
+            poses = poses and (np.concatenate([back[0], poses[0]]), np.concatenate([back[1], poses[1]]))
+        return None if poses is None else Move(*poses, speed=self.speed, purpose="travel")
+
+    def _sound(self, path: FloatArray, approach: FloatArray, room: float) -> bool:
+        """True if ball and stem stay free on a way (K, 3), and so far off the body (m) but for its ends."""
+        path, approach = resampled(path, approach, FREE_SPACING * self.tip_radius)
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+        off = np.where(np.minimum(along, along[-1] - along) > ENDS * self.tip_radius, room, 0.0)
+        height = self.base.foot(path, self.tip_radius).height + FREE_SINKING * self.tip_radius
+        return bool((height >= off).all() and (self.carrier.clearance(path, approach) >= off).all())
+
+    @cached_property
+    def _detour(self) -> Detour:
+        room = DETAIL_ROOM * self.tip_radius
+        carrier = replace(self.carrier, tip_radius=self.tip_radius + room, radius=self.carrier.radius + room)
+        return Detour(carrier, self.low, self.high)
+
+    @cached_property
+    def _bare_detour(self) -> Detour:
+        return Detour(self.carrier, self.low, self.high)
 
     def _out(self, start: FloatArray, away: FloatArray) -> FloatArray:
         """Where there is room, by the shortest straight way, that along the approach first: (2, 3); (1, 3) if none is.
@@ -275,12 +321,12 @@ class Ways:
         order = np.argsort(np.linalg.norm(points - place, axis=1))[:24]
         return next((int(node) for node in order if self.free(np.stack([place, points[node]]))), None)
 
-    def _shortened(self, path: FloatArray) -> FloatArray:
+    def _shortened(self, path: FloatArray, room: float) -> FloatArray:
         """The path without the waypoints that a straight way can leave out."""
         kept, here = [0], 0
         while here < len(path) - 1:
             onward = len(path) - 1
-            while onward > here + 1 and not self.free(path[[here, onward]]):
+            while onward > here + 1 and not self.free(path[[here, onward]], room):
                 onward -= 1
             kept.append(onward)
             here = onward

@@ -21,7 +21,7 @@ from planners.explore.explore import Explore
 from planners.explore.locate import Locate
 from planners.paths.limits import Limits
 from planners.paths.travel import Ways, routed
-from planners.plan import Outcome, Plan
+from planners.plan import Outcome, Parted, Plan
 
 R = 0.005
 MESHES = Path(__file__).resolve().parents[2] / "assets" / "meshes"
@@ -141,22 +141,23 @@ def test_travel_leads_round_the_body_and_is_free() -> None:
 
 def test_a_routed_plan_sends_what_was_felt_to_the_plan_alone() -> None:
     base = ball()
-    sent: list[object] = []
+    sent: list[Trace] = []
 
     def two() -> Plan:
         sent.append((yield at([[0.0, 0.0, 0.045]], -UP)))
         sent.append((yield at([[0.0, 0.001, -0.045]], UP)))
         return Outcome("done")
 
-    answers = iter("abcdef")
+    answers = (Trace([float(k)], np.zeros((1, 3)), [k], R) for k in range(6))
     plan = routed(two(), Ways(base, R, np.array([-1.0] * 3), np.array([1.0] * 3), 0.25))
     moves, trace = [next(plan)], None
     with pytest.raises(StopIteration):
         while True:
             trace = next(answers)
-            moves.append(plan.send(trace))  # type: ignore[arg-type]
+            moves.append(plan.send(trace))
     assert [move.purpose for move in moves] == ["sweep", "travel", "sweep"]
-    assert sent == ["a", "c"]
+    assert [each.t.tolist() for each in sent] == [[0.0], [2.0]]
+    assert isinstance(sent[1], Parted) and sent[1].moves == tuple(moves[1:])
 
 
 def test_no_plan_of_a_closed_body_breaks_a_limit() -> None:

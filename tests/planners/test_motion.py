@@ -13,13 +13,15 @@ from hw.move import Move
 from hw.simulated.finger import SimulatedFinger
 from mapping.arrays import FloatArray
 from mapping.base.base import Base
+from mapping.surface import Surface
 from mapping.trace import Trace
 from planners.budget import Spent, within
 from planners.drive import drive
 from planners.paths.carrier import Carrier
+from planners.paths.detour import Detour
 from planners.paths.limits import Limits
 from planners.paths.reach import reachable
-from planners.paths.sound import sound_parts
+from planners.paths.sound import held_up, sound_parts
 from planners.paths.travel import Ways, routed
 from planners.plan import Outcome, Parted, Plan, Refused, executed
 
@@ -127,3 +129,67 @@ def test_no_travel_passes_through_the_body() -> None:
     with pytest.raises(StoppedError, match="runs into the body"):
         touch.execute(sweep([30, 12, 20], [30, -12, 20], DOWN, "travel"))
     assert len(touch.execute(FLOOR)) > 0  # it has drawn back
+
+
+def test_what_it_cost_to_get_there_is_charged() -> None:
+    touch = finger()
+    speed = touch.workspace.max_speed
+    spent = Spent(speed)
+
+    def plan() -> Plan:
+        yield FLOOR
+        yield UNDERSIDE
+        return Outcome("done")
+
+    limits = Limits.of(touch.workspace, BASE, R)
+    ways = Ways(BASE, R, touch.workspace.low, touch.workspace.high, speed)
+    record, _ = drive(
+        routed(within(plan(), spent, 100.0), ways, limits.violation), touch.execute, check=limits.violation, empty=EMPTY
+    )
+    assert [move.purpose for move, _ in record] == ["sweep", "travel", "sweep"]
+    assert spent.seconds == pytest.approx(touch.clock)
+
+
+def ring(radius: float, thick: float) -> Base:
+    from trimesh.creation import torus
+
+    body = torus(radius, thick, major_sections=48, minor_sections=24)
+    return Base(Surface(body.vertices, body.faces))
+
+
+def test_out_of_a_ring_and_round_it_by_ball_and_stem() -> None:
+    body = ring(0.018, 0.007)  # the hole is 22 mm wide, ball and stem behind it 21 mm long
+    low, high = body.surface.bounds[0] - 6 * R, body.surface.bounds[1] + 6 * R
+    carrier = Carrier.of(body, R)
+    detour = Detour(carrier, low, high)
+    leant = np.array([0.8, 0.0, -0.6])
+    inside, below = np.array([[0.0075, 0.0, 0.0]]), np.array([[-0.018, 0.0, -0.0115]])
+    poses = detour.between((inside, leant[None]), (below, np.array([[0.0, 0.0, 1.0]])))
+    assert poses is not None
+    path, approach = poses
+    np.testing.assert_allclose(path[[0, -1]], np.concatenate([inside, below]), atol=1e-12)
+    np.testing.assert_allclose(approach[[0, -1]], [leant, [0.0, 0.0, 1.0]], atol=1e-9)
+    assert body.foot(path, R).height.min() >= 0.0 and carrier.clearance(path, approach).min() >= 0.0
+    # nothing jumps: neither the ball nor the stem's direction
+    assert np.linalg.norm(np.diff(path, axis=0), axis=1).max() <= 0.5 * R + 1e-12
+    assert np.arccos(np.clip((approach[1:] * approach[:-1]).sum(axis=1), -1, 1)).max() < np.radians(25.0)
+
+
+def test_a_closed_cavity_has_no_way_out() -> None:
+    from trimesh.creation import icosphere
+
+    inner, outer = icosphere(subdivisions=3, radius=0.012), icosphere(subdivisions=3, radius=0.02)
+    faces = np.concatenate([inner.faces[:, ::-1], outer.faces + len(inner.vertices)])
+    hollow = Base(Surface(np.concatenate([inner.vertices, outer.vertices]), faces))
+    detour = Detour(Carrier(hollow, R, 0.5e-3, 4e-3), np.full(3, -0.05), np.full(3, 0.05))
+    assert detour.out(np.zeros(3), DOWN) is None
+
+
+def test_a_steep_wall_holds_a_ball_up_far_though_it_sinks_into_it_a_little() -> None:
+    # against the bracket's wall, pressed down at 10 degrees off it: 0.3 mm into the wall are 1.7 mm up
+    lean = np.array([-np.sin(np.radians(10.0)), -np.cos(np.radians(10.0)), 0.0])
+    place = 1e-3 * np.array([[8.7, 20.0, 20.0], [9.1, 20.0, 20.0]])
+    up = held_up(place, np.tile(lean, (2, 1)), BASE, R)
+    assert up == pytest.approx([0.3e-3 / np.sin(np.radians(10.0)), 0.0], rel=1e-6)
+    gentle = np.array([-np.sin(np.radians(40.0)), -np.cos(np.radians(40.0)), 0.0])
+    assert held_up(place[:1], gentle[None], BASE, R) == pytest.approx([0.3e-3 / np.sin(np.radians(40.0))], rel=1e-6)

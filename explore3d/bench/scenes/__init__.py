@@ -5,6 +5,13 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from explore3d.bench.scenes.any_body import (
+        ANY_BODIES as ANY_BODIES,
+        BODY_BUILDING_SEEDS as BODY_BUILDING_SEEDS,
+        BODY_REPORTED_SEEDS as BODY_REPORTED_SEEDS,
+        FILED_BODIES as FILED_BODIES,
+        any_body as any_body,
+    )
     from explore3d.bench.scenes.bodies import (
         Mesh as Mesh,
         blob as blob,
@@ -23,6 +30,11 @@ if TYPE_CHECKING:
         BODIES_BY_KIND as BODIES_BY_KIND,
         INSPECTED_HALF_SIDE as INSPECTED_HALF_SIDE,
         MIDDLE as MIDDLE,
+    )
+    from explore3d.bench.scenes.laid_on import (
+        Detail as Detail,
+        drawn_details as drawn_details,
+        laid_on as laid_on,
     )
     from explore3d.bench.scenes.long_log import write_long_log as write_long_log
     from explore3d.bench.scenes.noise import SAMPLE_SPACING as SAMPLE_SPACING, simulate_noise as simulate_noise
@@ -55,9 +67,11 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
+    "any_body": ("ANY_BODIES", "BODY_BUILDING_SEEDS", "BODY_REPORTED_SEEDS", "FILED_BODIES", "any_body"),
     "bodies": ("Mesh", "blob", "blob_normals", "cylinder", "joined", "sphere_mesh", "tube"),
     "exploring": ("BENCH_TIP_RADIUS", "BenchScene", "SCENES"),
     "kinds": ("BODIES_BY_KIND", "INSPECTED_HALF_SIDE", "MIDDLE"),
+    "laid_on": ("Detail", "drawn_details", "laid_on"),
     "long_log": ("write_long_log",),
     "noise": ("SAMPLE_SPACING", "simulate_noise"),
     "plate_sweeps": ("DIAMETER", "HALF", "Heights", "TIP_RADIUS", "features", "plate", "scaled", "sweeps", "wire"),

@@ -135,3 +135,19 @@ def test_a_scaled_world_gives_a_scaled_trace() -> None:
 
 def test_noise_of_nothing_is_nothing() -> None:
     assert NoiseSource(white=1.0, correlated=1.0).of_centers(np.random.default_rng(0), 0, 1e-5).shape == (0, 3)
+
+
+def test_what_stands_beside_the_way_does_not_hold_a_ball_up_that_fits_under_it() -> None:
+    # pressed at 40 degrees from outside a ball would meet the bar first, 0.81 radii too high; it slides in from the end
+    into = np.array([np.sin(np.radians(40.0)), 0.0, -np.cos(np.radians(40.0))])
+    beside = np.array([np.cos(np.radians(40.0)), 0.0, np.sin(np.radians(40.0))])
+    middle = np.array([0.05, 0.06, R]) - R * (0.5 * into + 0.95 * beside)
+    corners = middle + 1e-6 * np.array([[-1.0, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
+    along = np.array([0.0, 0.02, 0.0])
+    bar = np.concatenate([corners - along, corners + along])
+    sides = [[k, (k + 1) % 4, 4 + (k + 1) % 4] for k in range(4)] + [[k, 4 + (k + 1) % 4, 4 + k] for k in range(4)]
+    floor = plate()
+    body = Surface(np.concatenate([floor.vertices, bar]), np.concatenate([floor.faces, np.array(sides)[:, ::-1] + 4]))
+    path = np.array([[0.05, 0.02, 0.98 * R], [0.05, 0.098, 0.98 * R]])
+    trace = SimulatedFinger(object=body, tip_radius=R).execute(Move(path, into))
+    assert np.abs(trace.centers[:, 2] - R).max() < 1e-9
