@@ -6,11 +6,6 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from explore3d.bench.apparatus import write_apparatus as write_apparatus
-    from explore3d.bench.bodies import (
-        bench_bodies as bench_bodies,
-        body_lines as body_lines,
-        body_records as body_records,
-    )
     from explore3d.bench.curvature import (
         CurvatureAccuracy as CurvatureAccuracy,
         available as available,
@@ -23,14 +18,17 @@ if TYPE_CHECKING:
         dynamics_table as dynamics_table,
         wire_trace as wire_trace,
     )
-    from explore3d.bench.explore_curves import write_curves as write_curves
-    from explore3d.bench.exploring import (
+    from explore3d.bench.exploration import (
         FINGER_NOISES as FINGER_NOISES,
         STRATEGIES as STRATEGIES,
+        bench_bodies as bench_bodies,
         bench_exploring as bench_exploring,
+        body_lines as body_lines,
+        body_records as body_records,
         one_run as one_run,
         records as records,
         write_bench_scenes as write_bench_scenes,
+        write_curves as write_curves,
     )
     from explore3d.bench.figures import write_figures as write_figures
     from explore3d.bench.scaling import AXES as AXES, bench_scaling as bench_scaling, scaling_lines as scaling_lines
@@ -55,11 +53,20 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "apparatus": ("write_apparatus",),
-    "bodies": ("bench_bodies", "body_lines", "body_records"),
+    "exploration": (
+        "FINGER_NOISES",
+        "STRATEGIES",
+        "bench_bodies",
+        "bench_exploring",
+        "body_lines",
+        "body_records",
+        "one_run",
+        "records",
+        "write_bench_scenes",
+        "write_curves",
+    ),
     "curvature": ("CurvatureAccuracy", "available", "bench_curvature", "curvature_table", "write_bench"),
     "dynamics": ("dynamics_curve", "dynamics_table", "wire_trace"),
-    "explore_curves": ("write_curves",),
-    "exploring": ("FINGER_NOISES", "STRATEGIES", "bench_exploring", "one_run", "records", "write_bench_scenes"),
     "figures": ("write_figures",),
     "scaling": ("AXES", "bench_scaling", "scaling_lines"),
     "touch": ("Answer", "bench_touch", "touch_lines"),

@@ -119,7 +119,9 @@ def _impossible(height: FloatArray, level: FloatArray, step: float, tip_radius: 
         bend = (2 * means[size:-size] - means[: -2 * size] - means[2 * size :]) / level[size : 1 - 2 * size]
         # a few thousand tell the scatter as well as all of them
         every = max(1, size // 2, len(bend) // 2000)
-        sd = max(robust_sd(bend[::every]), np.finfo(float).tiny)
+        sd = robust_sd(bend[::every])
+        if sd * level.max() <= np.finfo(float).eps * tip_radius:
+            continue  # most of the path does not bend but by rounding: there is no scatter to stand out of
         allowed = ALLOWED_BEND * (size * step) ** 2 / tip_radius
         excess = bend / sd
         if excess.max() <= (LEAST_OUT if size == 1 else OUT):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from explore3d.bench.exploring import APPARATUS
+from explore3d.bench.exploration.exploring import APPARATUS
 from explore3d.bench.scenes.exploring import BENCH_TIP_RADIUS as TIP_RADIUS, groove
 from hw.simulated.finger import SimulatedFinger
 from mapping.base.base import Base

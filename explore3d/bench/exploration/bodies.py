@@ -18,7 +18,7 @@ import numpy as np
 
 from explore3d import count_text
 from explore3d.analysis import Analysis
-from explore3d.bench.body_judge import Judge, anchors_right, refusals
+from explore3d.bench.exploration.body_judge import Judge, anchors_right, refusals
 from explore3d.bench.scenes import any_body
 from explore3d.jobs import plan_scene, run
 from explore3d.log import read_log

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from explore3d.bench import body_judge
-from explore3d.bench.bodies import body_run
-from explore3d.bench.body_judge import Judge, refusals
+from explore3d.bench.exploration.bodies import body_run
+from explore3d.bench.exploration.body_judge import Judge, refusals
 from explore3d.bench.scenes.any_body import BODY_BUILDING_SEEDS, BODY_REPORTED_SEEDS, FILED_BODIES, any_body
 from explore3d.bench.scenes.bodies import sphere_mesh
 from explore3d.bench.scenes.laid_on import Detail, drawn_details, laid_on
@@ -18,7 +18,7 @@ from mapping.geometry.mesh.nearest import NearestPoint
 from mapping.surface import Surface
 
 R = 3e-3
-FILES = Path(__file__).resolve().parents[4] / "shared" / "data"
+FILES = Path(__file__).resolve().parents[5] / "shared" / "data"
 
 
 def box(size: float) -> Surface:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from explore3d.bench import exploring as bench_explore
+from explore3d.bench.exploration import exploring as bench_explore
 from explore3d.bench.scenes.bodies import tube
 from explore3d.bench.scenes.exploring import SCENES, misplaced
 from explore3d.jobs.expedition import explorer

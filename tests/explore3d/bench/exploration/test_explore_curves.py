@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from explore3d.bench.explore_curves import Summary, leads, seconds_at, summaries, write_curves
+from explore3d.bench.exploration.explore_curves import Summary, leads, seconds_at, summaries, write_curves
 
 
 def run(strategy: str, seconds: float, error: float | None, **more: Any) -> dict[str, Any]:
