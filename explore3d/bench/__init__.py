@@ -18,18 +18,6 @@ if TYPE_CHECKING:
         dynamics_table as dynamics_table,
         wire_trace as wire_trace,
     )
-    from explore3d.bench.exploration import (
-        FINGER_NOISES as FINGER_NOISES,
-        STRATEGIES as STRATEGIES,
-        bench_bodies as bench_bodies,
-        bench_exploring as bench_exploring,
-        body_lines as body_lines,
-        body_records as body_records,
-        one_run as one_run,
-        records as records,
-        write_bench_scenes as write_bench_scenes,
-        write_curves as write_curves,
-    )
     from explore3d.bench.figures import write_figures as write_figures
     from explore3d.bench.scaling import AXES as AXES, bench_scaling as bench_scaling, scaling_lines as scaling_lines
     from explore3d.bench.sections import (
@@ -53,18 +41,6 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "apparatus": ("write_apparatus",),
-    "exploration": (
-        "FINGER_NOISES",
-        "STRATEGIES",
-        "bench_bodies",
-        "bench_exploring",
-        "body_lines",
-        "body_records",
-        "one_run",
-        "records",
-        "write_bench_scenes",
-        "write_curves",
-    ),
     "curvature": ("CurvatureAccuracy", "available", "bench_curvature", "curvature_table", "write_bench"),
     "dynamics": ("dynamics_curve", "dynamics_table", "wire_trace"),
     "figures": ("write_figures",),

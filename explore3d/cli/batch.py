@@ -66,7 +66,7 @@ def batch(
 
     from explore3d.jobs import Told
     from explore3d.jobs.batch import Limits, batch as carry_out, tasks_of
-    from explore3d.log import load_settings
+    from explore3d.log.table import load_settings
 
     if not out:
         raise UserError("--out is missing: the folder or address of the store")

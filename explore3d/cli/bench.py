@@ -188,7 +188,14 @@ def explore(
     """
     import json
 
-    from explore3d.bench import FINGER_NOISES, STRATEGIES, bench_exploring, records, write_bench_scenes, write_curves
+    from explore3d.bench.exploration import (
+        FINGER_NOISES,
+        STRATEGIES,
+        bench_exploring,
+        records,
+        write_bench_scenes,
+        write_curves,
+    )
     from explore3d.bench.scenes import SCENES
 
     chosen = _names(scenes, "--scenes", list(SCENES)), _names(strategies, "--strategies", list(STRATEGIES))
@@ -220,7 +227,7 @@ def bodies(
 
     Example: explore3d bench bodies --store bodies.jsonl --bodies l_bracket,bowl --seeds building
     """
-    from explore3d.bench import bench_bodies, body_lines, body_records
+    from explore3d.bench.exploration import bench_bodies, body_lines, body_records
     from explore3d.bench.scenes import ANY_BODIES, BODY_BUILDING_SEEDS, BODY_REPORTED_SEEDS, FILED_BODIES
 
     chosen = _names(bodies, "--bodies", list(ANY_BODIES))

@@ -16,14 +16,13 @@ from explore3d.cli.begin import examples, init
 from explore3d.cli.bench import bench
 from explore3d.cli.display import display, vibrate
 from explore3d.cli.doctor import doctor
-from explore3d.cli.figures import figures
+from explore3d.cli.figures import figures, stability
 from explore3d.cli.hardware import calibrate, emulate, reprobe, selftest
 from explore3d.cli.inspect import export, inspect
 from explore3d.cli.interrupted import DISK_ERRORS, InterruptedJobError, is_kept, one_line, told
 from explore3d.cli.later import compare, merge
 from explore3d.cli.options import INCOMPLETE
 from explore3d.cli.run import plan, run
-from explore3d.cli.stability import stability
 from hw import SIGNALS, FingerError, MoveError, end_program
 from mapping import MappingError
 from planners import PlannerError

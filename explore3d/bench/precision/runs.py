@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from explore3d.bench import STRATEGIES, one_run
+from explore3d.bench.exploration import STRATEGIES, one_run
 from explore3d.bench.precision.work_precision import LeftOutMethod, Point, Stage
 from explore3d.bench.scenes import SCENES
 

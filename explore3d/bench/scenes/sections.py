@@ -17,7 +17,7 @@ SECTION_GRID = 1e-6
 # Spacing of the tabled traces, m: what lies between is taken linearly, which is off by (5e-6)^2 / 8r on an arc
 TABLED = 5e-6
 SWEEP_HALF = 20e-3
-SWEEP_PITCH = 3e-3
+SECTION_PITCH = 3e-3
 # Every so many samples of the paper's apparatus one is kept: 18 um
 EVERY = 3
 # How many sweeps cross the line, in turn
@@ -161,7 +161,7 @@ def section_trace(name: str, noise: str, seed: int) -> Trace:
     count = SWEEP_COUNTS[seed % len(SWEEP_COUNTS)]
     slant, place = rng.uniform(-0.35, 0.35), rng.uniform(-1e-3, 1e-3)
     run = np.arange(-SWEEP_HALF, SWEEP_HALF, SAMPLE_SPACING)
-    across = SWEEP_PITCH * (np.arange(count) - 0.5 * (count - 1)) * min(1.0, 20e-3 / (SWEEP_PITCH * (count - 1)))
+    across = SECTION_PITCH * (np.arange(count) - 0.5 * (count - 1)) * min(1.0, 20e-3 / (SECTION_PITCH * (count - 1)))
     feet = np.column_stack([np.repeat(across, len(run)), np.tile(run, count), np.zeros(len(run) * count)])
     distance = -np.sin(slant) * feet[:, 0] + np.cos(slant) * (feet[:, 1] - place)
     along = np.cos(slant) * feet[:, 0] + np.sin(slant) * (feet[:, 1] - place)

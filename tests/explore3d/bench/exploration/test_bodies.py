@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from explore3d.bench import body_judge
+from explore3d.bench.exploration import body_judge
 from explore3d.bench.exploration.bodies import body_run
 from explore3d.bench.exploration.body_judge import Judge, refusals
 from explore3d.bench.scenes.any_body import BODY_BUILDING_SEEDS, BODY_REPORTED_SEEDS, FILED_BODIES, any_body
