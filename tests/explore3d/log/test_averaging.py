@@ -148,6 +148,7 @@ def test_what_does_not_fit_names_the_runs_that_would(tmp_path: Path, monkeypatch
         load_logs([path], tip_radius=TIP)
 
 
+@pytest.mark.slow
 def test_the_command_averages_says_so_and_keeps_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Literal
 
 import pytest
-from explore3d.jobs.reprobe import reprobe
 from in_process import explore3d_main
 from scene_files import MESHES
 
 from explore3d.errors import SceneError
+from explore3d.jobs.machines.reprobe import reprobe
 from explore3d.jobs.run import open_scene
 from explore3d.scene.begin import begin_scene
 from explore3d.scene.finger import FingerTable
