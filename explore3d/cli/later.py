@@ -127,11 +127,8 @@ def _lines(found: Compared, least: float) -> list[str]:
     motion, likely = comparison.registration, comparison.likely(least)
     shift = length_text(float((motion.shift**2).sum() ** 0.5))
     turn = f", turned by {motion.angle:.2g} rad" if motion.angle > 0.0 else ""
-    how = (
-        f"registered by {motion.pairs} features (shifted by {shift}{turn})"
-        if motion.pairs
-        else "frames taken as they are"
-    )
+    by = count_text(motion.pairs, "feature")
+    how = f"registered by {by} (shifted by {shift}{turn})" if motion.pairs else "frames taken as they are"
     pairs = count_text(comparison.pairs, "feature is", "features are")
     lines = [f"{count_text(len(likely), 'change')}; {pairs} in both; {how}"]
     for change in likely[:MOST_LISTED_CHANGES]:
