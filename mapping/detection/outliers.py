@@ -165,7 +165,8 @@ def _run(height: FloatArray, begin: int, size: int) -> tuple[int, int]:
 def _stuck(height: FloatArray, level: FloatArray, resolution: float) -> tuple[BoolArray, int]:
     """(N,) True where the reading did not change, and the number of such runs; rounded readings may repeat."""
     stuck = np.zeros(len(height), dtype=bool)
-    if resolution > 0:
+    # a smooth path has flat places: readings are stuck where others scatter from one to the next
+    if resolution > 0 or robust_sd(np.diff(height, 2)) < UNCHANGED * float(np.median(level)):
         return stuck, 0
     same = np.concatenate([[False], np.abs(np.diff(height)) < UNCHANGED * level[1:], [False]])
     edges = np.flatnonzero(np.diff(same.astype(np.int8)))

@@ -52,6 +52,13 @@ def test_readings_that_do_not_change_are_left_out_and_listed() -> None:
     assert any("do not change" in sentence for sentence in result.left_out)
 
 
+def test_flat_places_of_a_path_without_noise_are_not_stuck() -> None:
+    # bent over more than half of it, so that differences are of the size of the bends, and level for the rest
+    bent = np.where(S < 0.06, 1e-3 * np.cos(2 * np.pi * S / 0.06), 1e-3)
+    result = found(np.tile(bent, (SWEEPS, 1)))
+    assert not result.unfelt and not any("do not change" in sentence for sentence in result.left_out)
+
+
 @pytest.mark.parametrize("height", [0.3e-3, 2e-3])
 def test_crests_and_notches_of_a_ball_are_not_left_out(height: float) -> None:
     # two sharp crests side by side: between them the trace bends up as sharply as can be
