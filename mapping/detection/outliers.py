@@ -29,7 +29,7 @@ ALLOWED_BEND = 3.0
 OUT = 7.0
 # A single sample is out by less where so many more are than a Gaussian law lets: of those left out, it may have made
 # this share (Benjamini and Hochberg 1995). Never by less than LEAST_OUT, for what is nearer costs little and tells
-# much, nor for fewer than MANY_OUT: of a Gaussian law's sweeps, one in 10^5 has so many.
+# much, nor for fewer than MANY_OUT: three beyond where 0.03 are expected have a chance of 0.03^3 / 6, 5 in 10^6 sweeps.
 FALSELY_OUT, LEAST_OUT, MANY_OUT = 0.01, 3.5, 3
 # Samples over which the level of the noise is taken; a burst must not fill half of them.
 LEVEL_SAMPLES = 256

@@ -16,7 +16,8 @@ SD_PER_NESTING_INDEX = math.sqrt(math.log(2.0) / math.pi) / math.sqrt(2.0 * math
 _TRUNCATED = 5.3
 # The standard series of nesting indices of the L-filter (ISO 21920-3), m
 NESTING_INDICES = (0.08e-3, 0.25e-3, 0.8e-3, 2.5e-3, 8e-3)
-# A mean line that rests on less than this share of its weights is not known: features or ends take the rest
+# A mean line that rests on less than this share of its weights is not known: features or ends take the rest. Where one
+# side of the window is missing, the variance of the weighted mean is twice that of the whole window.
 LEAST_WEIGHT = 0.5
 
 
