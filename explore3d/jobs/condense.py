@@ -38,7 +38,7 @@ class Condensed:
         trace: samples near crossings, and every k-th of the others.
         detections: of all samples; `start` and `stop` of its crossings count in `trace`.
         samples: how many there were.
-        events, complete, recovered: of a whole log, as in explore3d.log.record.Log.
+        events, complete, recovered: of a whole log, as in explore3d.log.own.record.Log.
     """
 
     trace: Trace

@@ -1,84 +1,63 @@
-"""Logs: what was recorded, in MCAP or in tables."""
+"""Logs: what was recorded, in files of our own, in tables, or in those of other programs."""
 
 from typing import TYPE_CHECKING
 
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from explore3d.log.averaging import (
-        SAMPLE_GAP as SAMPLE_GAP,
-        about_averaging as about_averaging,
-        averaged_file as averaged_file,
-        averaged_log as averaged_log,
-        averaging_words as averaging_words,
-        lone_steps as lone_steps,
-        step_lengths as step_lengths,
-        unit_vectors as unit_vectors,
-        usual_step as usual_step,
-    )
-    from explore3d.log.format import LOG as LOG, MAGIC as MAGIC
     from explore3d.log.inspect import Inspection as Inspection, inspect as inspect
     from explore3d.log.load import load_logs as load_logs
-    from explore3d.log.memory import must_fit as must_fit, must_fit_analysis as must_fit_analysis
-    from explore3d.log.reader import digest as digest, iter_log as iter_log, read_log as read_log
-    from explore3d.log.record import (
+    from explore3d.log.own import (
         EXPLORATION as EXPLORATION,
         KIND as KIND,
+        LOG as LOG,
         OUTCOME as OUTCOME,
         SURVEY as SURVEY,
         Event as Event,
         Log as Log,
+        LogStream as LogStream,
+        LogWriter as LogWriter,
+        Recorder as Recorder,
         Stop as Stop,
         base_event as base_event,
+        count_samples as count_samples,
+        digest as digest,
+        head as head,
+        iter_log as iter_log,
+        large_log as large_log,
+        must_fit_analysis as must_fit_analysis,
         read_base as read_base,
+        read_log as read_log,
         stop_of as stop_of,
     )
-    from explore3d.log.stream import (
-        LogStream as LogStream,
-        count_samples as count_samples,
-        head as head,
-        large_log as large_log,
-    )
-    from explore3d.log.table import (
-        heights_log as heights_log,
-        load_settings as load_settings,
-        read_table as read_table,
-        sidecar_of as sidecar_of,
-        table_log as table_log,
-    )
-    from explore3d.log.writer import LogWriter as LogWriter, Recorder as Recorder
+    from explore3d.log.table import sidecar_of as sidecar_of
 
 _PUBLIC = {
-    "averaging": (
-        "SAMPLE_GAP",
-        "about_averaging",
-        "lone_steps",
-        "step_lengths",
-        "averaged_file",
-        "averaged_log",
-        "averaging_words",
-        "unit_vectors",
-        "usual_step",
-    ),
-    "format": ("LOG", "MAGIC"),
     "inspect": ("Inspection", "inspect"),
     "load": ("load_logs",),
-    "memory": ("must_fit", "must_fit_analysis"),
-    "reader": ("digest", "iter_log", "read_log"),
-    "record": (
+    "own": (
         "EXPLORATION",
         "Event",
         "KIND",
+        "LOG",
         "Log",
+        "LogStream",
+        "LogWriter",
         "OUTCOME",
+        "Recorder",
         "SURVEY",
         "Stop",
         "base_event",
+        "count_samples",
+        "digest",
+        "head",
+        "iter_log",
+        "large_log",
+        "must_fit_analysis",
         "read_base",
+        "read_log",
         "stop_of",
     ),
-    "stream": ("LogStream", "count_samples", "head", "large_log"),
-    "table": ("heights_log", "load_settings", "read_table", "sidecar_of", "table_log"),
-    "writer": ("LogWriter", "Recorder"),
+    "table": ("sidecar_of",),
 }
 doorway(__name__, _PUBLIC)

@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log.averaging import SAMPLE_GAP
-from explore3d.log.format import LOG
+from explore3d.log.own import LOG, SAMPLE_GAP, Log
 from explore3d.log.readers import Reader, read_recording, reader_of
-from explore3d.log.record import Log
 from explore3d.log.table import (
     EVEN,
     POSITION,

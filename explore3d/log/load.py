@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from explore3d import UnitError, UserError, parse_length
+from explore3d.log.own import Log, merge
 from explore3d.log.readers import read_recording
-from explore3d.log.record import Log, merge
 from mapping.base import Form
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from explore3d.log.record import Log
+from explore3d.log.own.record import Log
 from mapping.trace import Trace
 
 TIP = 10e-6

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from explore3d.log.writer import LogWriter
+from explore3d.log.own.writer import LogWriter
 from hw.move import Move
 from mapping.trace import Trace
 

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log import Log, heights_log, load_settings, table_log
+from explore3d.log.own import Log
 from explore3d.log.readers.own import POINT, TIP
 from explore3d.log.readers.packed import check_sizes
+from explore3d.log.table import heights_log, load_settings, table_log
 from explore3d.log.text import TableText, name_and_unit
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log import Log
+from explore3d.log.own import Log
 from explore3d.log.readers.arrays import few_digits, numbers_log
 from explore3d.log.readers.optional import claimed
 from explore3d.log.readers.own import POINT, TIP

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError, unit_factor
-from explore3d.log import Log, heights_log, load_settings
+from explore3d.log.own import Log
 from explore3d.log.readers.arrays import numbers_log
 from explore3d.log.readers.optional import claimed, decoding, library
 from explore3d.log.readers.own import POINT, TIP
+from explore3d.log.table import heights_log, load_settings
 from explore3d.log.text import length_factor
 
 # The first bytes of a format, its name in the package, and what people call it

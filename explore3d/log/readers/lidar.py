@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log import Log
+from explore3d.log.own import Log
 from explore3d.log.readers.arrays import numbers_log
 from explore3d.log.readers.clouds import ORDER
 from explore3d.log.readers.optional import claimed, decoding, library

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from explore3d import UserError, parse_length
-from explore3d.log import MAGIC, Log, averaged_file, load_settings, read_log, read_table, table_log
+from explore3d.log.own import MAGIC, Log, averaged_file, read_log
+from explore3d.log.table import load_settings, read_table, table_log
 from explore3d.log.text import length_factor, read_text
 
 TIP = "the radius of the fingertip"

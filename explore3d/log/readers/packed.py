@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 from explore3d import UserError
-from explore3d.log import Log
+from explore3d.log.own import Log
 
 MOST_UNPACKED = 8 * 2**30  # bytes: 2e8 rows of text; more is no recording of a finger but a bomb
 MOST_UNPACKING_RATIO = 250  # unpacked to packed: numbers in text stay below 100, zeros reach 1000

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log import Log, heights_log, load_settings
+from explore3d.log.own import Log
 from explore3d.log.readers.arrays import numbers_log
 from explore3d.log.readers.own import TIP
+from explore3d.log.table import heights_log, load_settings
 
 TOUCH = "whether heights are the ball's centre or its lowest point (reference)"
 _NUMBER = rb"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
-from explore3d.log import Log
+from explore3d.log.own import Log
 from mapping import Trace
 
 FIRST_BYTES = 4096  # bytes that a reader sees of a file before it says how sure it is

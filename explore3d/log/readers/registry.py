@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from explore3d import UserError
-from explore3d.log import LOG, Log, averaged_log, digest
+from explore3d.log.own import LOG, Log, averaged_log, digest
 from explore3d.log.readers.arrays import NpyArray, NpzArrays
 from explore3d.log.readers.clouds import ObjPoints, PcdPoints, PlyPoints, StlPoints
 from explore3d.log.readers.instruments import InstrumentFile, X3pFile

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log import Log, load_settings, table_log
+from explore3d.log.own import Log
 from explore3d.log.readers.own import POINT, TIP
+from explore3d.log.table import load_settings, table_log
 from explore3d.log.text import read_text
 
 UNIT_QUATERNION = 5e-3  # by which a length of 1 is missed where orientations have four digits

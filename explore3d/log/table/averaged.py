@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log import (
+from explore3d.log.own import (
     SAMPLE_GAP,
     about_averaging,
     averaging_words,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log import Log
+from explore3d.log.own import Log
 from explore3d.log.table.averaged import averaged
 from explore3d.log.table.columns import find_columns, length_factors, time_factor
 from explore3d.log.table.rows import (

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from explore3d import UserError
-from explore3d.log import must_fit
+from explore3d.log.own import must_fit
 from explore3d.log.text.decode import decoded
 from explore3d.log.text.dialect import COMMENTS, MISSING, Dialect, find_dialect, split
 from explore3d.log.text.header import FEW, read_header, role_of

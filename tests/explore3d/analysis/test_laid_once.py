@@ -12,7 +12,7 @@ from explore3d.analysis.method import Work
 from explore3d.analysis.stages import Stages
 from explore3d.analysis.truth import TrueFeature
 from explore3d.bench.scenes.plate_sweeps import DIAMETER, plate, sweeps, wire
-from explore3d.log.record import Log
+from explore3d.log.own.record import Log
 from mapping.assembly import inspection
 from mapping.base import laid_trace
 from mapping.base.base import Base

@@ -11,7 +11,7 @@ from changed_scans import NOISE, TIP, changed_pair
 from in_process import explore3d_main
 
 from explore3d.analysis import Stages, build_model
-from explore3d.log.record import Log
+from explore3d.log.own.record import Log
 from mapping.trace import Trace
 
 RMS = 30e-9

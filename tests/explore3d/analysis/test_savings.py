@@ -19,8 +19,8 @@ from explore3d.analysis.stages import OPTIONAL_STAGES, Stages
 from explore3d.bench.scenes.plate_sweeps import DIAMETER, TIP_RADIUS, Heights, plate, sweeps, wire
 from explore3d.errors import UserError
 from explore3d.jobs.analyze import analyze
-from explore3d.log.record import KIND, base_event
-from explore3d.log.writer import LogWriter
+from explore3d.log.own.record import KIND, base_event
+from explore3d.log.own.writer import LogWriter
 from explore3d.scene.scene import parse_scene
 from hw.move import Move
 from hw.simulated.finger import SimulatedFinger

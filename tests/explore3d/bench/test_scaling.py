@@ -10,7 +10,7 @@ import pytest
 from explore3d.bench import scaling as bench_scaling
 from explore3d.bench.scaling import Cost, exponents, scaling_lines
 from explore3d.bench.scenes.long_log import wire_axes, write_long_log
-from explore3d.log.reader import read_log
+from explore3d.log.own.reader import read_log
 
 
 def test_exponents_are_those_of_the_costs():

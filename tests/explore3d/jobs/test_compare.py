@@ -15,7 +15,7 @@ from explore3d.analysis import Stages, build_model
 from explore3d.jobs import Told
 from explore3d.jobs.analyze import analyze
 from explore3d.jobs.compare import LOOK_EVERY, compare_scans, watched
-from explore3d.log.record import Log
+from explore3d.log.own.record import Log
 from mapping.model import compare_models
 
 CRESTS, CHANGES = 8, 5

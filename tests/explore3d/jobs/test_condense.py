@@ -12,9 +12,9 @@ from explore3d.analysis.stages import Stages
 from explore3d.bench.scenes.long_log import WIRE_RADIUS, write_long_log
 from explore3d.jobs import condense as module
 from explore3d.jobs.condense import Condensed, condense
-from explore3d.log.reader import read_log
-from explore3d.log.record import read_base
-from explore3d.log.stream import LogStream, count_samples, head, large_log
+from explore3d.log.own.reader import read_log
+from explore3d.log.own.record import read_base
+from explore3d.log.own.stream import LogStream, count_samples, head, large_log
 from mapping.assembly.assemble import assemble
 from mapping.base.base import Base
 from mapping.base.height_profile import arclength

@@ -21,7 +21,7 @@ from explore3d.errors import SceneError
 from explore3d.jobs.expedition import explorer
 from explore3d.jobs.machines.machine_finger import GrblFingerTable
 from explore3d.jobs.run import scene_finger
-from explore3d.log.record import Log
+from explore3d.log.own.record import Log
 from explore3d.scene import scene as scene_file
 from explore3d.scene.finger import FingerTable, SensorTable
 from explore3d.scene.machine import LineSensorTable, OptoForceTable

@@ -12,8 +12,8 @@ from explore3d.analysis.result import Analysis
 from explore3d.errors import UserError
 from explore3d.jobs.analyze import analyze
 from explore3d.jobs.run import run
-from explore3d.log.reader import read_log
-from explore3d.log.record import read_base
+from explore3d.log.own.reader import read_log
+from explore3d.log.own.record import read_base
 from explore3d.scene.mesh_files import load_mesh
 from hw.errors import FingerError
 from hw.move import Move

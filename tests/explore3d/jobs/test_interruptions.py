@@ -24,7 +24,7 @@ from interrupting import Ended, bare_tile, digests, explore3d
 from explore3d.errors import UserError
 from explore3d.jobs.merge import load
 from explore3d.jobs.run import run
-from explore3d.log.reader import read_log
+from explore3d.log.own.reader import read_log
 from hw.errors import LinkError
 from hw.move import Move
 from hw.simulated.finger import SimulatedFinger

@@ -13,8 +13,8 @@ import pytest
 from explore3d.errors import FolderError
 from explore3d.jobs.resume import Replay
 from explore3d.jobs.session import Session
-from explore3d.log.reader import read_log
-from explore3d.log.writer import LogWriter
+from explore3d.log.own.reader import read_log
+from explore3d.log.own.writer import LogWriter
 from hw.move import Move
 from hw.simulated.finger import SimulatedFinger
 from mapping.surface import Surface

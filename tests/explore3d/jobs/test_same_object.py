@@ -12,7 +12,7 @@ from explore3d import UserError
 from explore3d.jobs.analyze import analyze, analyze_each
 from explore3d.jobs.merge import merge
 from explore3d.jobs.objects import not_one_object, unlike
-from explore3d.log.record import KIND, Event, Log, base_event
+from explore3d.log.own.record import KIND, Event, Log, base_event
 from mapping.base.base import Base
 from mapping.surface import Surface
 from mapping.trace import Trace

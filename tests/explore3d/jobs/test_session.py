@@ -18,7 +18,7 @@ import pytest
 
 from explore3d.errors import FolderError, UserError
 from explore3d.jobs.session import Job, Session
-from explore3d.log.reader import read_log
+from explore3d.log.own.reader import read_log
 from hw.move import Move
 from mapping.trace import Trace
 

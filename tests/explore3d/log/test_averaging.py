@@ -14,8 +14,8 @@ from in_process import explore3d_main
 from explore3d.errors import UserError
 from explore3d.log import inspect
 from explore3d.log.load import load_logs
+from explore3d.log.own.writer import LogWriter
 from explore3d.log.text import read_pieces
-from explore3d.log.writer import LogWriter
 from hw.move import Move
 from mapping.trace import Trace
 
@@ -136,7 +136,7 @@ def test_a_log_is_averaged_with_its_moves_and_forces(tmp_path: Path) -> None:
 
 def test_what_does_not_fit_names_the_runs_that_would(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = written(tmp_path / "scan.csv", raster())
-    memory = importlib.import_module("explore3d.log.memory")
+    memory = importlib.import_module("explore3d.log.own.memory")
     monkeypatch.setattr(memory, "free_memory", lambda: 2e6)  # enough to read 12360 rows, not to make a model of them
     with pytest.raises(
         UserError, match=r"the model of about 6,180 samples takes about .* possible: --average 5, which"

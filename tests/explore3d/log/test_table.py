@@ -13,7 +13,7 @@ from hypothesis import given, settings, strategies as st
 from explore3d.errors import UserError
 from explore3d.log import inspect
 from explore3d.log.load import load_logs
-from explore3d.log.record import Log
+from explore3d.log.own.record import Log
 from explore3d.log.table import read_table
 from explore3d.log.text import read_pieces, read_text
 
@@ -379,7 +379,7 @@ def test_a_table_that_memory_cannot_hold_is_refused_before_it_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = long_table(tmp_path / "long.csv")
-    memory = importlib.import_module("explore3d.log.memory")
+    memory = importlib.import_module("explore3d.log.own.memory")
     monkeypatch.setattr(memory, "free_memory", lambda: 1e5)
     monkeypatch.setattr(Path, "read_bytes", lambda self: pytest.fail("it was read"))
     with pytest.raises(

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from explore3d.log.reader import read_log
-from explore3d.log.writer import LogWriter
+from explore3d.log.own.reader import read_log
+from explore3d.log.own.writer import LogWriter
 from hw.emulated.faults import FAULT_KINDS, Fault
 from hw.emulated.force import OptoForceEmulator
 from hw.emulated.grbl import GrblEmulator

@@ -11,8 +11,8 @@ from scene_files import write_scene_file
 from explore3d.errors import UserError
 from explore3d.jobs.machines.reprobe import reprobe
 from explore3d.jobs.run import scene_finger
-from explore3d.log.reader import read_log
-from explore3d.log.writer import LogWriter
+from explore3d.log.own.reader import read_log
+from explore3d.log.own.writer import LogWriter
 from explore3d.scene.scene import load_scene
 from hw.move import Move
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explore3d import UserError
-from explore3d.log.format import LOG, SAMPLES_PER_MESSAGE, TRACE_TOPIC
-from explore3d.log.reader import Reading, _batches, _loss, _trace, is_log
-from explore3d.log.record import Event
+from explore3d.log.own.format import LOG, SAMPLES_PER_MESSAGE, TRACE_TOPIC
+from explore3d.log.own.reader import Reading, _batches, _loss, _trace, is_log
+from explore3d.log.own.record import Event
 from mapping import Trace
 
 # Bytes of a sample in a log with positions alone: only where the log was never closed, and cannot say how many it holds
@@ -28,7 +28,7 @@ class LogStream:
         tip_radius: m; needed only for a log whose beginning is destroyed.
 
     Raises:
-        UserError: (while iterating) as explore3d.log.reader.read_log.
+        UserError: (while iterating) as explore3d.log.own.reader.read_log.
     """
 
     def __init__(self, path: Path | str, tip_radius: float | None = None) -> None:

@@ -17,7 +17,7 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk, McapRecord
 from mcap.stream_reader import breakup_chunk
 
-from explore3d.log.format import LARGEST_RECORD
+from explore3d.log.own.format import LARGEST_RECORD
 
 # opcode, record length, first time, last time, uncompressed size, checksum; then the name of the compression
 _HEADER = struct.Struct("<BQQQQI")

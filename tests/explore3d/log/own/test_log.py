@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 from sample_logs import MOVE, RADIUS, assert_same_samples, trace_of, write_log
 
-from explore3d.log import format as log_format, point_cloud
 from explore3d.log.load import load_logs
-from explore3d.log.reader import iter_log, read_log
-from explore3d.log.writer import LogWriter, Recorder
+from explore3d.log.own import format as log_format, point_cloud
+from explore3d.log.own.reader import iter_log, read_log
+from explore3d.log.own.writer import LogWriter, Recorder
 from hw.move import Move
 from mapping.trace import Trace
 
@@ -221,7 +221,7 @@ def test_streaming_needs_no_more_memory_for_a_longer_log(tmp_path: Path) -> None
     def peak(samples: int) -> int:
         script = f"""
             import sys, resource
-            sys.path.insert(0, {str(Path(__file__).parents[2] / "support")!r})
+            sys.path.insert(0, {str(Path(__file__).parents[3] / "support")!r})
             from sample_logs import MOVE, RADIUS, trace_of
             from explore3d.log import LogWriter
             from explore3d.log import iter_log
@@ -231,7 +231,7 @@ def test_streaming_needs_no_more_memory_for_a_longer_log(tmp_path: Path) -> None
             assert sum(len(trace) for trace in iter_log({str(tmp_path / str(samples))!r})) == {samples}
             print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
         """
-        environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
+        environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[4])}
         run = [sys.executable, "-c", textwrap.dedent(script)]
         return int(subprocess.run(run, env=environment, capture_output=True, check=True).stdout)
 

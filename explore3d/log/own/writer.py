@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explore3d import UserError
-from explore3d.log import format as log_format, point_cloud
-from explore3d.log.reader import Reading, as_log, note
-from explore3d.log.record import Log
+from explore3d.log.own import format as log_format, point_cloud
+from explore3d.log.own.reader import Reading, as_log, note
+from explore3d.log.own.record import Log
 from hw import Move
 from mapping import Trace
 
@@ -288,7 +288,7 @@ class Recorder(LogWriter):
         self._reading.path = path
 
     def recorded(self) -> Log:
-        """What explore3d.log.reader.read_log would read from the closed file."""
+        """What explore3d.log.own.reader.read_log would read from the closed file."""
         trace = Trace.concatenate(self._traces)
         resolution = float(self._reading.start["resolution"])
         stated = trace if trace.resolution == resolution else replace(trace, resolution=resolution)

@@ -17,11 +17,11 @@ import pytest
 from sample_logs import MOVE, RADIUS, assert_same_samples, numbers_of, trace_of, write_log
 
 from explore3d.errors import UserError
-from explore3d.log import point_cloud
-from explore3d.log.chunks import Damage, intact_chunks
-from explore3d.log.reader import read_log
-from explore3d.log.record import Log
-from explore3d.log.writer import LogWriter
+from explore3d.log.own import point_cloud
+from explore3d.log.own.chunks import Damage, intact_chunks
+from explore3d.log.own.reader import read_log
+from explore3d.log.own.record import Log
+from explore3d.log.own.writer import LogWriter
 
 WRITER = textwrap.dedent(
     """
@@ -44,8 +44,8 @@ WRITER = textwrap.dedent(
 
 def kill_writer(path: Path, delay: float) -> int:
     """Start a writer, kill it `delay` seconds after its log exists; the samples that it had acknowledged."""
-    script = WRITER.format(tests=str(Path(__file__).parents[2] / "support"), path=str(path))
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3]), "OMP_NUM_THREADS": "1"}
+    script = WRITER.format(tests=str(Path(__file__).parents[3] / "support"), path=str(path))
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[4]), "OMP_NUM_THREADS": "1"}
     process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, env=environment)
     assert process.stdout is not None
     assert process.stdout.readline() == b"0\n"

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError, count_text
-from explore3d.log.memory import must_fit_analysis
-from explore3d.log.reader import as_log
-from explore3d.log.record import Event, Log
-from explore3d.log.stream import LogStream, count_samples
+from explore3d.log.own.memory import must_fit_analysis
+from explore3d.log.own.reader import as_log
+from explore3d.log.own.record import Event, Log
+from explore3d.log.own.stream import LogStream, count_samples
 from mapping import BoolArray, FloatArray, IntArray, Trace, length_text
 from mapping.instrument import RunMeans
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explore3d import UserError
-from explore3d.log import format as log_format, point_cloud
-from explore3d.log.record import Event, Log, merge
+from explore3d.log.own import format as log_format, point_cloud
+from explore3d.log.own.record import Event, Log, merge
 from mapping import FloatArray, Trace, TraceError
 
 # fixed by LogWriter; needed only where the chunk that states them is damaged
@@ -121,7 +121,7 @@ def _batches(reading: Reading) -> Iterator[NDArray[np.void]]:
     """The messages' samples in order; everything else that is met is noted in `reading`."""
     from mcap.records import Channel, Message
 
-    from explore3d.log.chunks import Damage, intact_chunks
+    from explore3d.log.own.chunks import Damage, intact_chunks
 
     damage, topics, none = Damage(), dict(_TOPICS), True
     begins = is_log(reading.path)
@@ -225,7 +225,7 @@ def _seek_start(reading: Reading) -> None:
     """Take a /start from further on, where the first ones are destroyed."""
     from mcap.records import Channel, Message
 
-    from explore3d.log.chunks import Damage, intact_chunks
+    from explore3d.log.own.chunks import Damage, intact_chunks
 
     topics = dict(_TOPICS)
     with reading.path.open("rb") as file:
