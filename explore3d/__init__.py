@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from explore3d.jobs.merge import load as load, merge as merge
     from explore3d.jobs.run import run as run
     from explore3d.scene.scene import Scene as Scene, load_scene as load_scene
-    from explore3d.units import (
+    from explore3d.scene.units import (
         UNITS as UNITS,
         count_text as count_text,
         parse_angle as parse_angle,
@@ -36,8 +36,7 @@ if TYPE_CHECKING:
         seconds_text as seconds_text,
         unit_factor as unit_factor,
     )
-
-__version__ = "0.2.0"
+    from explore3d.version import __version__ as __version__
 
 _PUBLIC = {
     "errors": ("FolderError", "MeshFileError", "PointCloudError", "SceneError", "UnitError", "UserError"),
@@ -45,7 +44,7 @@ _PUBLIC = {
     "jobs.merge": ("load", "merge"),
     "jobs.run": ("run",),
     "scene.scene": ("Scene", "load_scene"),
-    "units": (
+    "scene.units": (
         "UNITS",
         "count_text",
         "parse_angle",
@@ -57,5 +56,6 @@ _PUBLIC = {
         "seconds_text",
         "unit_factor",
     ),
+    "version": ("__version__",),
 }
 doorway(__name__, _PUBLIC)

@@ -9,7 +9,7 @@ import math
 import re
 from difflib import get_close_matches
 
-from explore3d.errors import UnitError
+from explore3d import UnitError
 from mapping import UNKNOWN_TEXT
 
 UNITS: dict[str, dict[str, float]] = {

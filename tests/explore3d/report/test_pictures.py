@@ -5,7 +5,7 @@ import pytest
 
 from explore3d.pictures.camera import Camera
 from explore3d.pictures.sweep_paths import sweep_paths
-from explore3d.units import count_text, seconds_text
+from explore3d.scene.units import count_text, seconds_text
 from mapping import length_text
 from mapping.base.base import Base
 from mapping.feature import Interval

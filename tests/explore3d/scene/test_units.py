@@ -8,7 +8,7 @@ import re
 import pytest
 
 from explore3d.errors import UnitError
-from explore3d.units import (
+from explore3d.scene.units import (
     UNITS,
     parse_angle,
     parse_force,
