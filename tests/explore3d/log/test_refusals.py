@@ -9,8 +9,8 @@ import pytest
 from sample_logs import MOVE, RADIUS, trace_of, write_log
 
 from explore3d.errors import UserError
-from explore3d.log import format as log_format
 from explore3d.log.load import load_logs
+from explore3d.log.own import format as log_format
 from explore3d.log.own.reader import iter_log, read_log
 from explore3d.log.own.writer import LogWriter
 from mapping.trace import Trace
