@@ -1,8 +1,8 @@
 """Exploration bench: error of the found extents against finger time, for exploring and for blind baselines.
 
 Each body is a scene whose meshes stay in memory; finger and explorer are made from it as `explore3d run` makes them
-(explore3d.jobs.expedition), and the samples go into the model without a log. Every run is one line of a JSONL file;
-what is already in the file is not run again.
+(explore3d.jobs.expedition), and what was felt goes into the model by the same stages (build_model), without a log.
+Every run is one line of a JSONL file; what is already in the file is not run again.
 
     explore3d bench explore --store OUT.jsonl --seeds 3 --scenes straight,empty
 """
@@ -17,17 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from explore3d.analysis import Comparison, TrueFeature, compare
+from explore3d.analysis import Comparison, Stages, TrueFeature, build_model, compare
 from explore3d.bench.scenes import BENCH_TIP_RADIUS, SCENES, BenchScene
 from explore3d.jobs import Explored, Explorer, explorer, scene_finger
-from explore3d.scene import AnalysisSettings, Scene
+from explore3d.log import Event, Log, move_event
+from explore3d.scene import Scene
 from hw import Finger, Move
 from hw.simulated import SimulatedFinger
 from mapping import Trace
-from mapping.assembly import assemble
-from mapping.base import Base, estimate_pose, refined as base_refined
-from mapping.detection import detect
-from mapping.inference import refine_all
+from mapping.base import Base
 from mapping.model import ObjectModel
 from planners import Outcome, Plan
 from planners.survey import Ergodic, RandomSweeps, Raster
@@ -123,10 +121,10 @@ def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus"
     with scene_finger(scene) as finger:
         assert isinstance(finger, SimulatedFinger)  # every bench scene names it
         clock = _Clock(finger)
-        outcome = _swept(strategy, explorer(scene, finger.workspace), body, clock.execute, seed)
+        outcome = _swept(strategy, explorer(scene, finger.workspace), body, clock, seed)
     after = clock.idle
     start = perf_counter()
-    model = modelled(Trace.concatenate(clock.felt), body, scene, outcome.value.base if body.sides else None)
+    model = build_model(clock.log(), scene, outcome.value.base, Stages()).model
     modelling = perf_counter() - start
     return {
         "finger_seconds": finger.clock,
@@ -139,24 +137,13 @@ def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus"
     } | errors(model, body)
 
 
-def _swept(strategy: str, explorer: Explorer, body: BenchScene, execute: Callable[[Move], Trace], seed: int) -> Outcome:
+def _swept(strategy: str, explorer: Explorer, body: BenchScene, clock: _Clock, seed: int) -> Outcome:
     """Explore, or sweep blindly under the same checks; the outcome's value is an Explored."""
     if strategy in EXPLORING:
-        return explorer.go(execute)
+        return explorer.go(clock.execute)
     base = Base(body.base)
-    outcome, _ = explorer.carry_out(BASELINES[strategy](base, np.random.default_rng(seed)), base, execute)
+    outcome, _ = explorer.carry_out(BASELINES[strategy](base, np.random.default_rng(seed)), base, clock.execute)
     return Outcome(outcome.reason, outcome.detail, Explored(base))
-
-
-def modelled(trace: Trace, body: BenchScene, scene: Scene, found: Base | None = None) -> ObjectModel:
-    """The annotated model of all samples, by the stages of `explore3d analyze`, on the base that was found, if any."""
-    base = Base(body.base) if found is None else base_refined(found, trace)
-    if body.misplaced:
-        base = estimate_pose(trace, base).moved(base)
-    detections = detect(trace, base, **AnalysisSettings.of(scene).detection)
-    features = assemble(detections, trace, base)
-    refined = refine_all(features, trace, scene.seed, base=base, noise=detections.noise, confirm=False)
-    return ObjectModel.attach(base, tuple(f for f in refined if f.evidence.likely), provenance={})
 
 
 def errors(model: ObjectModel, body: BenchScene) -> dict[str, Any]:
@@ -189,12 +176,17 @@ def free_end_errors(pair: Comparison, truth: Sequence[TrueFeature]) -> list[floa
 
 
 class _Clock:
-    """Executes moves, and keeps how long the finger waited for each of them: the simulation is no part of planning."""
+    """Executes moves, and keeps how long the finger waited for each of them: the simulation is no part of planning.
+
+    What a log would hold of them is kept in memory.
+    """
 
     def __init__(self, finger: Finger) -> None:
         self.finger = finger
         self.waits: list[float] = []
         self.felt: list[Trace] = []
+        self.moves: list[Event] = []
+        self._samples = 0
         self._idle = perf_counter()
 
     @property
@@ -204,8 +196,15 @@ class _Clock:
 
     def execute(self, move: Move) -> Trace:
         self.waits.append(self.idle)
+        before = float(self.felt[-1].t[-1]) if self.felt else None
         trace = self.finger.execute(move)
+        self.moves.append(move_event(move, before, self._samples, len(trace)))
         if len(trace):
             self.felt.append(trace)
+            self._samples += len(trace)
         self._idle = perf_counter()
         return trace
+
+    def log(self) -> Log:
+        """What was recorded, as the log of a run would give it."""
+        return Log(Trace.concatenate(self.felt), events=tuple(self.moves))

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         Stop as Stop,
         base_event as base_event,
         merge as merge,
+        move_event as move_event,
         read_base as read_base,
         stop_of as stop_of,
     )
@@ -65,6 +66,7 @@ _PUBLIC = {
         "Stop",
         "base_event",
         "merge",
+        "move_event",
         "read_base",
         "stop_of",
     ),

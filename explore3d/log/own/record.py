@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from explore3d import UserError, count_text
+from hw import Move
 from mapping import Surface, SurfaceError, Trace
 from mapping.base import Base, Form
 
@@ -31,6 +32,25 @@ class Event:
     kind: str
     t: float | None
     data: dict[str, Any]
+
+
+def move_event(move: Move, t: float | None, first: int, samples: int) -> Event:
+    """What a log notes of a move.
+
+    Args:
+        move: as it was commanded.
+        t: on the clock of the samples when it began, s; None before the first sample.
+        first: number of samples before it.
+        samples: that it gave.
+    """
+    data = {
+        "purpose": move.purpose,
+        "path": move.path.tolist(),
+        "approach": move.approach.tolist(),
+        "speed": move.speed,
+        "force": move.force,
+    }
+    return Event("move", t, data | {"first": first, "samples": samples})
 
 
 @dataclass(frozen=True, eq=False)

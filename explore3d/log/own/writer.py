@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from explore3d import UserError
 from explore3d.log.own import format as log_format, point_cloud
 from explore3d.log.own.reader import Reading, as_log, note
-from explore3d.log.own.record import Log
+from explore3d.log.own.record import Log, move_event
 from hw import Move
 from mapping import Trace
 
@@ -114,7 +114,8 @@ class LogWriter:
             )
         if len(trace):
             self._t = float(trace.t[0])
-        self._message("move", {"t": self._t, **_move_data(move), "first": self.samples, "samples": len(trace)})
+        noted = move_event(move, self._t, self.samples, len(trace))
+        self._message("move", {"t": noted.t, **noted.data})
         self._message("path", _poses(move, self._log_time(self._t)))
         # moves and samples lie in chunks of their own: who asks for the plan alone fetches no samples
         if len(trace):
@@ -225,16 +226,6 @@ def _pack(trace: Trace, dtype: np.dtype[np.void], optional: tuple[str, ...], pat
         for axis, name in enumerate(names):
             samples[name] = getattr(trace, group)[:, axis]
     return samples
-
-
-def _move_data(move: Move) -> dict[str, Any]:
-    return {
-        "purpose": move.purpose,
-        "path": move.path.tolist(),
-        "approach": move.approach.tolist(),
-        "speed": move.speed,
-        "force": move.force,
-    }
 
 
 def _poses(move: Move, time_ns: int) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from explore3d.bench.scenes.bodies import tube
 from explore3d.bench.scenes.exploring import SCENES, misplaced
 from explore3d.jobs.expedition import explorer
 from explore3d.jobs.plan import plan_scene
-from explore3d.jobs.run import scene_finger
+from explore3d.jobs.run import run, scene_finger
 from explore3d.scene.scene import load_scene
 from mapping.geometry.mesh.nearest import NearestPoint
 
@@ -105,3 +105,14 @@ def test_a_written_bench_scene_explores_as_the_one_in_memory(name: str, tmp_path
         one, two = explorer(scene, finger.workspace), explorer(held, clone.workspace)
     assert {**one.explore.keywords, "region": None} == {**two.explore.keywords, "region": None}
     assert (one.locate is None, one.discover is None) == (two.locate is None, two.discover is None)
+
+
+@pytest.mark.slow
+def test_the_bench_gives_what_the_command_gives(tmp_path: Path) -> None:
+    body = SCENES["o-ring"](np.random.default_rng(0))
+    (scene,) = bench_explore.write_bench_scenes(["o-ring"], 1, tmp_path)
+    analysis = run(scene, tmp_path / "out", report=False)
+    of_the_command = bench_explore.errors(analysis.model, body)
+    of_the_bench = bench_explore.one_run(body, "explore", 0)
+    assert of_the_command["found"] == 1
+    assert {name: of_the_bench[name] for name in of_the_command} == of_the_command
