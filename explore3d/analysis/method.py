@@ -24,7 +24,7 @@ from explore3d.scene import AnalysisSettings, Scene
 from mapping import Dropped, Feature, LeftOut, Trace, length_text
 from mapping.assembly import Inspections, assemble, why_none_sought
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
-from mapping.detection import Detections, detect, recovered
+from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
 from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
 from mapping.estimate.deviation import Deviation, explain
 from mapping.estimate.envelope import estimate_surface
@@ -233,6 +233,8 @@ def why_no_deviation(work: Work) -> str | None:
 def deviated(work: Work, share: Share) -> None:
     """The model corrected where what was felt shows it to be wrong at long wavelengths; parts apart are left out."""
     laid = LaidTrace.of(work.trace, work.base)
+    if len(laid) <= RAW_SAMPLES:
+        laid.feet()  # detection asks for all of so few: the blocks here and whatever else is read follow from them
     swept = [event.data for event in work.log.events if event.kind == "move" and event.data["purpose"] == "sweep"]
     work.deviation = explain(laid, work.base, [np.asarray(data["path"], dtype=np.float64) for data in swept])
     if work.deviation is None:

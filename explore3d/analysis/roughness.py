@@ -147,9 +147,10 @@ def _pieces(sweep: LaidSweep, trace: LaidTrace, features: Sequence[Feature]) -> 
     """A sweep's evenly sampled pieces, and the places (N, 3) of their samples."""
     if len(sweep.trace) < 3:
         return []
-    found = []
+    # a bin holds one sample: where they all stand is known, and between neighbours it is a line
+    found, feet = [], sweep.feet().points.T
     for piece in sweep.heights(float(sweep.arclength[-1]) / (len(sweep.trace) - 1)):
-        under = trace.base.foot(piece.centers, trace.tip_radius).points if piece.feet is None else piece.feet
+        under = np.column_stack([np.interp(piece.s, sweep.arclength, known) for known in feet])
         keep = np.ones(len(piece.height), dtype=bool)
         for feature in features:
             reach = sizes_of(feature, trace.tip_radius).half_width + _PLACE_SDS * feature.position_sd

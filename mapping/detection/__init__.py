@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         curvature_features as curvature_features,
         curvature_profile as curvature_profile,
     )
-    from mapping.detection.quiet_noise import smallest_crest as smallest_crest
+    from mapping.detection.quiet_noise import RAW_SAMPLES as RAW_SAMPLES, smallest_crest as smallest_crest
     from mapping.detection.recovery import recovered as recovered
 
 _PUBLIC = {
@@ -33,7 +33,7 @@ _PUBLIC = {
     "detect": ("SHORTEST_SWEEP_SAMPLES", "Detections", "detect"),
     "filters.matched_filter": ("LADDER",),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
-    "quiet_noise": ("smallest_crest",),
+    "quiet_noise": ("RAW_SAMPLES", "smallest_crest"),
     "recovery": ("recovered",),
 }
 doorway(__name__, _PUBLIC)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from explore3d.analysis.build_model import build_model
-from explore3d.analysis.method import Work
+from explore3d.analysis.method import Work, detected, deviated, kept_over_base, made_sound
+from explore3d.analysis.roughness import roughness_of
 from explore3d.analysis.stages import Stages
 from explore3d.analysis.truth import TrueFeature
 from explore3d.bench.scenes.plate_sweeps import DIAMETER, plate, sweeps, wire
@@ -16,6 +17,38 @@ from explore3d.log.own.record import Log
 from mapping.assembly import inspection
 from mapping.base import laid_trace
 from mapping.base.base import Base
+from mapping.base.laid_trace import LaidTrace
+
+
+def test_of_few_samples_each_is_laid_once_and_hardly_any_mean(monkeypatch):
+    laid, foot = [], Base.foot
+
+    def counted_foot(self, centers, tip_radius):
+        laid.append(len(np.asarray(centers)))
+        return foot(self, centers, tip_radius)
+
+    monkeypatch.setattr(Base, "foot", counted_foot)
+    trace = sweeps(wire(), white=0.02e-3, spacing=0.1e-3)
+    work = Work(Log(trace), None, plate(), Stages())
+    for stage in (deviated, kept_over_base, made_sound, detected):
+        stage(work, lambda share: None)
+    assert len(work.detections.crossings) == len(work.laid.laid_sweeps)
+    assert sum(laid) <= 1.01 * len(trace)
+
+
+def test_roughness_lays_nothing_that_is_laid_already(monkeypatch):
+    trace = sweeps(
+        lambda feet: np.zeros(len(feet)), white=0.02e-3, places=np.array([0.0, 1e-3]), spacing=0.1e-3, half=20e-3
+    )
+    laid = LaidTrace(trace, plate())
+    laid.feet()
+
+    def refused(self, centers, tip_radius):
+        raise AssertionError(f"{len(centers)} places are laid again")
+
+    monkeypatch.setattr(Base, "foot", refused)
+    found = roughness_of(laid, (), 0.02e-3, 2.5e-3, 0.5e-3)
+    assert found is not None and found.profile["Rq"].low < 0.02e-3
 
 
 def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height_twice(monkeypatch):
