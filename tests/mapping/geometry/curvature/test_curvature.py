@@ -11,8 +11,10 @@ from mapping.geometry.templates.bump_of_revolution import BumpOfRevolution
 from mapping.surface import Surface
 
 
-def grid(function, count: int, half: float = 1.0) -> Surface:
-    x, y = (g.ravel() for g in np.meshgrid(*[np.linspace(-half, half, count)] * 2, indexing="ij"))
+def grid(function, count: int, half: float = 1.0, skip: int = 0) -> Surface:
+    """A square of side 2 half with so many vertices a side, without the first few of them on two sides."""
+    x, y = (g.ravel() for g in np.meshgrid(*[np.linspace(-half, half, count)[skip:]] * 2, indexing="ij"))
+    count -= skip
     index = np.arange(count * count).reshape(count, count)
     a, b, c, d = (i.ravel() for i in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
     faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
@@ -38,7 +40,7 @@ def torus(big: float, small: float, around: int, across: int) -> tuple[Surface, 
 
 
 def test_a_jet_knows_the_curvatures_of_a_torus_with_the_outward_sign():
-    surface, k2 = torus(1.0, 0.4, 140, 56)
+    surface, k2 = torus(1.0, 0.4, 100, 40)
     curvature = principal_curvatures(surface)
     assert curvature.valid.all()
     np.testing.assert_allclose(curvature.k1, 2.5, rtol=1e-3)
@@ -46,9 +48,10 @@ def test_a_jet_knows_the_curvatures_of_a_torus_with_the_outward_sign():
 
 
 def crest_errors(counts, **settings) -> np.ndarray:
+    """Errors at the top of a crest, on square grids of so many vertices a side around it, 1 m wide."""
     errors = []
     for count in counts:
-        surface = grid(lambda x, y: 0.4 * np.exp(-3 * (x**2 + y**2)), count)
+        surface = grid(lambda x, y: 0.4 * np.exp(-3 * (x**2 + y**2)), count, 0.5)
         middle = np.argmin(np.linalg.norm(surface.vertices[:, :2], axis=1))
         errors.append(abs(principal_curvatures(surface, noise=0.0, **settings).k1[middle] - 2.4))
     return np.array(errors)
@@ -56,20 +59,24 @@ def crest_errors(counts, **settings) -> np.ndarray:
 
 @pytest.mark.parametrize(("degree", "neighbours"), [(2, 25), (4, 49), (6, 69)])
 def test_a_jet_on_a_symmetric_stencil_converges_with_the_order_of_its_degree(degree, neighbours):
-    errors = crest_errors((41, 81), degree=degree, neighbours=neighbours)
+    errors = crest_errors((21, 41), degree=degree, neighbours=neighbours)
     assert np.log2(errors[0] / errors[1]) == pytest.approx(degree, abs=0.35)
 
 
 def test_the_mean_of_jets_converges_no_slower_than_a_quartic():
-    errors = crest_errors((31, 61))
+    errors = crest_errors((16, 31))
     assert errors[1] < errors[0] / 2**4
 
 
 def bump(count: int, noise: float = 0.0) -> tuple[Surface, np.ndarray, np.ndarray, np.ndarray]:
-    """The paper's bump over a square of side 2, its curvatures, and which vertices are away from the border."""
-    surface = grid(lambda x, y: 1 / (1 + 15 * (x**2 + y**2)), count)
+    """The paper's bump over a square of side 2, its curvatures, and which vertices are away from the border.
+
+    Without noise all quarters are alike: one is looked at, with what lies beside it.
+    """
+    skip = 0 if noise else 35 * count // 100
+    surface = grid(lambda x, y: 1 / (1 + 15 * (x**2 + y**2)), count, skip=skip)
     k = BumpOfRevolution(15.0).curvatures(np.linalg.norm(surface.vertices[:, :2], axis=1))
-    inside = (np.abs(surface.vertices[:, :2]) < 0.85).all(axis=1)
+    inside = ((surface.vertices[:, :2] > (-0.85 if noise else 0.0)) & (surface.vertices[:, :2] < 0.85)).all(axis=1)
     shaken = surface.vertices + 2 * noise * np.random.default_rng(0).standard_normal(surface.vertices.shape)
     return Surface(shaken, surface.faces), np.maximum(*k), np.minimum(*k), inside
 
@@ -213,7 +220,7 @@ def test_degenerate_faces_do_not_spoil_their_neighbours():
 
 
 def test_inconsistent_winding_does_not_turn_a_jets_sign():
-    surface, _ = torus(1.0, 0.4, 100, 40)
+    surface, _ = torus(1.0, 0.4, 60, 24)
     faces = surface.faces.copy()
     faces[::7] = faces[::7, ::-1]
     found = principal_curvatures(Surface(surface.vertices, faces))
@@ -240,8 +247,8 @@ def test_a_last_vertex_of_no_face_does_not_end_the_process_when_libigl_counts_di
 
 
 def test_skinny_triangles_do_not_turn_a_jets_sign():
-    angle, z = (g.ravel() for g in np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(0, 1, 400), indexing="ij"))
-    a = np.arange(24 * 400).reshape(24, 400)
+    angle, z = (g.ravel() for g in np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(0, 0.25, 100), indexing="ij"))
+    a = np.arange(24 * 100).reshape(24, 100)
     b, c, d = np.roll(a, -1, 0)[:, :-1], np.roll(a, -1, 0)[:, 1:], a[:, 1:]
     quads = [q.ravel() for q in (a[:, :-1], b, c, d)]
     faces = np.concatenate([np.column_stack(quads[:3]), np.column_stack([quads[0], *quads[2:]])])
