@@ -9,7 +9,7 @@ import numpy as np
 from hw import Move, StoppedError
 from mapping import BoolArray, FloatArray
 from mapping.geometry.contact import BallContact, Contacts
-from mapping.geometry.mesh import NearestPoint
+from mapping.geometry.mesh import NearestPoint, cores
 
 # How far ball or stem may sink into the body before that is a crash, in tip radii: what a finger yields
 YIELDS = 0.05
@@ -76,7 +76,7 @@ def pressed_from(
 
     A ball that came down on an overhang, or that has no room so far out, is pressed from where it is commanded.
     """
-    felt = ball.first_contact(path - stroke * approach, approach)
+    felt = ball.first_contact(path - stroke * approach, approach, threads=cores())
     over = stroke - felt.distance
     again = np.flatnonzero(felt.overlap | (over > HIGH_RISE * ball.tip_radius))
     if len(again):

@@ -97,7 +97,7 @@ def estimate_surface(
     if smoothed is not None:
         points = _unsmoothed(points, smoothed)
     depth = penetration_below(trace.centers, trace.tip_radius)
-    possible = depth(points.points) <= slack
+    possible = depth(points.points, slack) <= slack
     if not possible.any():
         raise EnvelopeError("every contact lies inside another ball: the trace is no ball's path; give its noise")
     points = points.select(np.flatnonzero(possible))
@@ -179,7 +179,7 @@ def _unsmoothed(points: Estimate, smoothed: Smoothed) -> Estimate:
     return replace(points, labels=labels, sample=np.where(own, smoothed.sample[points.sample], -1))
 
 
-def _meshed(points: Estimate, r: float, slack: float, depth: Callable[[FloatArray], FloatArray]) -> Estimate:
+def _meshed(points: Estimate, r: float, slack: float, depth: Callable[[FloatArray, float], FloatArray]) -> Estimate:
     """The points joined as their centres lie (those never coincide), with resting points in bridged faces."""
     if len(np.unique(points.sweep)) < 2:
         return points
@@ -193,7 +193,7 @@ def _meshed(points: Estimate, r: float, slack: float, depth: Callable[[FloatArra
     corners = points.centers[faces[chosen]]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
     # Samples between the three corners lower the balls' common boundary by up to this sagitta.
-    possible = depth(resting) <= slack + longest**2 / (2 * r)
+    possible = depth(resting, slack) <= slack + longest**2 / (2 * r)
     chosen, resting = chosen[possible], resting[possible]
     joined = points.with_resting(resting, faces[chosen])
     return replace(joined, surface=Surface(joined.points, split(faces, chosen, len(points.points))))

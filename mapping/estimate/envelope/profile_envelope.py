@@ -17,6 +17,9 @@ from mapping import EnvelopeError, FloatArray, IntArray
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
+# Share by which the bound of a search is widened: its rounding, and that of distances, is some 1e-16
+BOUND_ROUNDING = 1e-12
+
 
 def envelope_heights(
     x: ArrayLike, z: ArrayLike, tip_radius: float, at: ArrayLike | None = None
@@ -65,17 +68,14 @@ def _sorted(x: FloatArray, z: FloatArray) -> tuple[IntArray, FloatArray, FloatAr
     return order, x[order], z[order]
 
 
-def penetration(points: FloatArray, centers: FloatArray, tip_radius: float) -> FloatArray:
-    """(N,) depth of points (N, 3) below the surface of the deepest of the balls at `centers` (M, 3), m.
+def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[FloatArray, float], FloatArray]:
+    """What gives the depth of points (N, 3) below the surface of the deepest of the balls at `centers` (M, 3), m.
 
-    Positive inside a ball, where no body can be; negative outside all of them. Points of a profile (all y of
-    one value) are judged by the profile's envelope in O(n), others by a k-d tree.
+    Positive inside a ball, where no body can be; negative outside all of them. Points of a profile (all y of one
+    value) are judged by the profile's envelope in O(n), others by a k-d tree, laid out once. The second argument is the
+    least depth that matters, m: points less deep may be given -inf. A search that knows how near a ball must be looks
+    at few, for most points touch one ball and lie in none.
     """
-    return penetration_below(centers, tip_radius)(points)
-
-
-def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[FloatArray], FloatArray]:
-    """What gives the penetration of points (N, 3) below balls at `centers` (M, 3), m, laid out once."""
     one_row = np.ptp(centers[:, 1]) == 0 and bool((np.diff(centers[:, 0]) > 0).all())
 
     @cache
@@ -84,12 +84,13 @@ def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[Float
 
         return cKDTree(centers, balanced_tree=False)  # distances are the same, and it is built in half the time
 
-    def depth(points: FloatArray) -> FloatArray:
+    def depth(points: FloatArray, least: float) -> FloatArray:
         if len(points) == 0:
             return np.zeros(0)
         if one_row and (points[:, 1] == centers[0, 1]).all():
             return _below_profile(points, centers, tip_radius)
-        return np.asarray(tip_radius - tree().query(points)[0])
+        near = max((tip_radius - least) * (1.0 + BOUND_ROUNDING), 0.0)
+        return np.asarray(tip_radius - tree().query(points, distance_upper_bound=near)[0])
 
     return depth
 

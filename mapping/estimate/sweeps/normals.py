@@ -103,19 +103,30 @@ def _across(
     arm: FloatArray, distance: FloatArray, along: FloatArray, outward: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Tangents across and their doubt from the ways (N, K, 3) to the neighbours of each sample, and their lengths."""
+    from mapping.estimate.sweeps.tangent_kernels import slopes_across
+
     across = unit(np.cross(outward, along))
     up = unit(np.cross(along, across))
     up *= np.where(np.einsum("ij,ij->i", up, outward) < 0, -1.0, 1.0)[:, None]
     scale = np.maximum(distance[:, -1:], 1e-300)
     arm = arm / scale[..., None]
     u, v, w = (np.einsum("nkc,nc->nk", arm, axis) for axis in (along, across, up))
+    weight = np.exp(-2.0 * (distance / scale) ** 2)
+    slope, residual, determined = slopes_across(u, v, w, weight)
+    rest = np.flatnonzero(~determined)
+    if len(rest):
+        slope[rest], residual[rest] = _least_slopes(u[rest], v[rest], w[rest], weight[rest, :, None])
+    width = np.sqrt((weight * v**2).mean(axis=1))
+    doubt = np.where(width > 1e-3, 3 * residual / np.maximum(width, 1e-3), np.pi / 2)
+    return unit(across + slope[:, None] * up), doubt
+
+
+def _least_slopes(u: FloatArray, v: FloatArray, w: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """As `slopes_across` where the neighbours do not determine all terms: the smallest coefficients that fit."""
     columns = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=-1)
-    weight = np.exp(-2.0 * (distance / scale) ** 2)[..., None]
     fit = np.linalg.pinv(columns * weight, rcond=1e-9) @ (w[..., None] * weight)
     residual = np.sqrt((weight * (w[..., None] - columns @ fit) ** 2).mean(axis=(1, 2)))
-    width = np.sqrt((weight[..., 0] * v**2).mean(axis=1))
-    doubt = np.where(width > 1e-3, 3 * residual / np.maximum(width, 1e-3), np.pi / 2)
-    return unit(across + fit[:, 2] * up), doubt
+    return fit[:, 2, 0], residual
 
 
 # Rows to either side that are looked at.

@@ -1,11 +1,11 @@
-"""Tangents along sweeps (numba)."""
+"""Tangents along and across sweeps (numba)."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from mapping import FloatArray, IntArray
+from mapping import BoolArray, FloatArray, IntArray
 
 
 @njit(cache=True)
@@ -58,3 +58,72 @@ def sweep_tangents(
             for c in range(3):
                 result[i, c] += weight[j] * (points[first + j, c] - points[i, c])
     return result
+
+
+QUADRATIC_TERMS = 6  # terms of a quadratic of two variables
+# Ratio of the diagonal of R below which neighbours do not determine all terms: on one line it is rounding, 1e-16, and
+# at 1e-6 the coefficients have ten digits; what lies between is as well left to a singular value decomposition.
+DETERMINED = 1e-6
+
+
+@njit(cache=True)
+def slopes_across(
+    u: FloatArray, v: FloatArray, w: FloatArray, weight: FloatArray
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Slope along v of the weighted least-squares quadratic w(u, v) of each row, by Householder reflections.
+
+    Args:
+        u, v, w: (N, K) coordinates of the neighbours of each sample, of about unit size.
+        weight: (N, K) of each neighbour: heights and terms are multiplied by it.
+
+    Returns:
+        (N,) slopes at the origin, (N,) roots of the mean of weight times squared residual, and (N,) whether the
+        neighbours determine all terms; where they do not, slope and residual mean nothing.
+    """
+    count, near = u.shape
+    slope, residual, determined = np.zeros(count), np.zeros(count), np.zeros(count, np.bool_)
+    columns = np.empty((QUADRATIC_TERMS + 1, near))  # the last holds the heights
+    fit = np.empty(QUADRATIC_TERMS)
+    for i in range(count if near > QUADRATIC_TERMS else 0):
+        for k in range(near):
+            x, y, g = u[i, k], v[i, k], weight[i, k]
+            columns[0, k], columns[1, k], columns[2, k] = g, g * x, g * y
+            columns[3, k], columns[4, k], columns[5, k] = g * x * x, g * x * y, g * y * y
+            columns[QUADRATIC_TERMS, k] = g * w[i, k]
+        largest, smallest = 0.0, np.inf
+        for j in range(QUADRATIC_TERMS):
+            square = 0.0
+            for k in range(j, near):
+                square += columns[j, k] ** 2
+            norm = np.sqrt(square)
+            largest, smallest = max(largest, norm), min(smallest, norm)
+            if norm == 0.0:
+                break
+            head = columns[j, j] + (norm if columns[j, j] > 0.0 else -norm)
+            tau = abs(head) * norm  # half the squared length of the reflected vector
+            diagonal = -norm if columns[j, j] > 0.0 else norm
+            columns[j, j] = head
+            for c in range(j + 1, QUADRATIC_TERMS + 1):
+                dot = 0.0
+                for k in range(j, near):
+                    dot += columns[j, k] * columns[c, k]
+                dot /= tau
+                for k in range(j, near):
+                    columns[c, k] -= dot * columns[j, k]
+            columns[j, j] = diagonal
+        if not smallest > DETERMINED * largest:
+            continue
+        determined[i] = True
+        for j in range(QUADRATIC_TERMS - 1, -1, -1):
+            total = columns[QUADRATIC_TERMS, j]
+            for c in range(j + 1, QUADRATIC_TERMS):
+                total -= columns[c, j] * fit[c]
+            fit[j] = total / columns[j, j]
+        slope[i] = fit[2]
+        square = 0.0
+        for k in range(near):
+            x, y = u[i, k], v[i, k]
+            gap = w[i, k] - (fit[0] + x * (fit[1] + x * fit[3] + y * fit[4]) + y * (fit[2] + y * fit[5]))
+            square += weight[i, k] * gap * gap
+        residual[i] = np.sqrt(square / near)
+    return slope, residual, determined

@@ -10,6 +10,7 @@ import numpy as np
 
 from mapping import FloatArray, SamplerError
 from mapping.inference.likelihood import LogPosterior
+from mapping.inference.sampler.emcee_import import emcee
 from mapping.inference.sampler.proposal import DEGREES, Proposal
 
 # Walkers at least and at most; so many bins a step cost no more than what emcee does beside them, whoever sees them.
@@ -78,13 +79,13 @@ def sample_ensemble(
     Reference: theory section 8.3, with Foreman-Mackey et al. 2013 (emcee), Goodman and Weare 2010 (stretch move),
     ter Braak 2006 (differential evolution) and ter Braak and Vrugt 2008 (snooker) in full.
     """
-    import emcee
+    package = emcee()
 
-    moves = [(emcee.moves.DEMove(), 0.9), (emcee.moves.DEMove(gamma0=1.0), 0.1)]
+    moves = [(package.moves.DEMove(), 0.9), (package.moves.DEMove(gamma0=1.0), 0.1)]
     if proposal is not None:
         moves = [(move, (1.0 - INDEPENDENT) * weight) for move, weight in moves]
-        moves.append((emcee.moves.MHMove(_independent(proposal)), INDEPENDENT))
-    sampler = emcee.EnsembleSampler(*starts.shape, target.log_density, moves=moves, vectorize=True)
+        moves.append((package.moves.MHMove(_independent(proposal)), INDEPENDENT))
+    sampler = package.EnsembleSampler(*starts.shape, target.log_density, moves=moves, vectorize=True)
     _seed(sampler, rng)
     state, tau, look = starts, np.inf, FIRST_LOOK
     while True:
@@ -146,10 +147,10 @@ def _seed(sampler: Any, rng: np.random.Generator) -> None:
 
 def _autocorrelation(chain: FloatArray) -> float:
     """Largest integrated autocorrelation time of (steps, walkers, P), steps, never below 1; NaN if nothing moves."""
-    import emcee
+    package = emcee()
 
     spread = chain.reshape(-1, chain.shape[2]).std(axis=0)
     if not (spread > 0.0).all():
         return float("nan")
-    tau = emcee.autocorr.integrated_time(chain, tol=0, quiet=True)
+    tau = package.autocorr.integrated_time(chain, tol=0, quiet=True)
     return float(max(1.0, np.max(tau)))

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from mapping import FloatArray, Surface, Trace
 from mapping.base import Base, LaidTrace
 from mapping.estimate.deviation import explain
+from mapping.estimate.deviation.explain import FEW_SAMPLES, _unfelt
 
 TIP = 0.01
 NOISE = 20e-6
@@ -245,6 +246,16 @@ def test_a_model_of_another_body_is_beyond_repair() -> None:
     assert found is not None
     assert found.beyond_repair
     assert "mesh" in found.needs()
+
+
+def test_a_place_beside_any_one_sample_was_felt() -> None:
+    places = np.column_stack([np.arange(9) * 10 * TIP, np.zeros((9, 2))])
+    ahead = np.array([[0.0, 0.0, 0.0], [0.4 * TIP, 0.0, 0.0]])
+    paths = [place + ahead for place in places]
+    centers = np.repeat(places[:2], FEW_SAMPLES, axis=0)
+    centers[1], centers[FEW_SAMPLES + 5] = places[4], places[6]  # of these neither is among the few
+    trace = Trace(np.arange(len(centers)) / 1e3, centers, np.zeros(len(centers), dtype=np.int64), TIP)
+    np.testing.assert_array_equal(_unfelt(paths, trace), places[[2, 3, 5, 7, 8]])
 
 
 def test_the_same_in_other_units() -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from mapping.errors import EnvelopeError
-from mapping.estimate.envelope.profile_envelope import envelope_heights
+from mapping.estimate.envelope.profile_envelope import envelope_heights, penetration_below
 
 
 def brute_force(x, z, r, at):
@@ -108,3 +108,15 @@ def test_a_radius_that_is_no_length_is_refused(bad):
 def test_values_that_are_not_finite_are_refused():
     with pytest.raises(EnvelopeError, match="finite"):
         envelope_heights([0.0, np.nan], [0.0, 0.0], 1.0)
+
+
+def test_a_search_for_what_is_deep_enough_finds_it_as_deep_as_a_search_for_everything():
+    rng = np.random.default_rng(4)
+    centers, points = rng.uniform(0, 3, (400, 3)), rng.uniform(0, 3, (3000, 3))
+    depth = penetration_below(centers, 0.4)
+    whole = depth(points, -np.inf)
+    assert np.isfinite(whole).all() and (whole < 0).any()
+    for least in (-0.1, 0.0, 0.05, float(whole.max()), 0.5):
+        bounded = depth(points, least)
+        np.testing.assert_array_equal(bounded > least, whole > least)
+        np.testing.assert_array_equal(bounded[bounded > least], whole[whole > least])
