@@ -28,6 +28,7 @@ def groove_heights(
     lateral: FloatArray,
     basis: FloatArray,
     bend: FloatArray,
+    bend_along: FloatArray,
     courses: FloatArray,
     ends: FloatArray,
     widths: FloatArray,
@@ -35,7 +36,11 @@ def groove_heights(
     tip: float,
     out: FloatArray,
 ) -> None:
-    """Heights (W, n) of W grooves over bins with q nodes; `basis` (m, n, q) of the lateral modes, `ends` (W, 2)."""
+    """Heights (W, n) of W grooves over bins with q nodes; `basis` (m, n, q) of the lateral modes, `ends` (W, 2).
+
+    `bend` and `bend_along` (n, q), curvatures of the base across and along the line, 1/m: the ball dips under a long
+    rim by the first, under the rim at an end by the second, and rests on whichever holds it highest.
+    """
     walkers, bins = out.shape
     modes, nodes = basis.shape[0], s.shape[1]
     for w in range(walkers):
@@ -49,7 +54,8 @@ def groove_heights(
                 aside = lateral[i, q]
                 for m in range(modes):
                     aside -= courses[w, m] * basis[m, i, q]
-                total += _rim(min(half - abs(aside), along), tip, depths[w], bend[i, q])
+                across = _rim(half - abs(aside), tip, depths[w], bend[i, q])
+                total += max(across, _rim(along, tip, depths[w], bend_along[i, q]))
             out[w, i] = total / nodes
 
 
@@ -57,21 +63,27 @@ def groove_heights(
 def pit_heights(
     x: FloatArray,
     y: FloatArray,
-    bend: float,
+    bends: FloatArray,
     places: FloatArray,
     widths: FloatArray,
     depths: FloatArray,
     tip: float,
     out: FloatArray,
 ) -> None:
-    """Heights (W, n) of W round pits over bins with nodes at tangent coordinates x, y (n, q); `places` (W, 2)."""
+    """Heights (W, n) of W round pits over bins with nodes at tangent coordinates x, y (n, q); `places` (W, 2).
+
+    `bends` (2,) are the base's curvatures along x and y, 1/m: the rim nearest to the ball lies in its own direction.
+    """
     walkers, bins = out.shape
     nodes = x.shape[1]
     for w in range(walkers):
         for i in range(bins):
             total = 0.0
             for q in range(nodes):
-                away = np.sqrt((x[i, q] - places[w, 0]) ** 2 + (y[i, q] - places[w, 1]) ** 2)
+                along, across = x[i, q] - places[w, 0], y[i, q] - places[w, 1]
+                away = np.sqrt(along * along + across * across)
+                share = (along / away) ** 2 if away > 0.0 else 0.5
+                bend = share * bends[0] + (1.0 - share) * bends[1]
                 total += _rim(0.5 * widths[w] - away, tip, depths[w], bend)
             out[w, i] = total / nodes
 
@@ -80,13 +92,17 @@ def pit_heights(
 def step_heights(
     lateral: FloatArray,
     basis: FloatArray,
+    bend: FloatArray,
     courses: FloatArray,
     heights: FloatArray,
     high_side: float,
     tip: float,
     out: FloatArray,
 ) -> None:
-    """Heights (W, n) of W steps over bins with nodes at lateral distances (n, q) from the chart."""
+    """Heights (W, n) of W steps over bins with nodes at lateral distances (n, q) from the chart.
+
+    `bend` (n, q) is the curvature of the base across the edge, 1/m.
+    """
     walkers, bins = out.shape
     modes, nodes = basis.shape[0], lateral.shape[1]
     for w in range(walkers):
@@ -97,6 +113,7 @@ def step_heights(
                 for m in range(modes):
                     aside -= courses[w, m] * basis[m, i, q]
                 inside = min(max(-high_side * aside, 0.0), tip)
-                drop = inside * inside / (tip + np.sqrt((tip - inside) * (tip + inside)))
+                square = inside * inside
+                drop = square / (tip + np.sqrt((tip - inside) * (tip + inside))) + 0.5 * bend[i, q] * square
                 total += max(heights[w] - drop, 0.0)
             out[w, i] = total / nodes

@@ -16,6 +16,7 @@ def section_heights(
     lateral: FloatArray,
     basis: FloatArray,
     bend: FloatArray,
+    bend_along: FloatArray,
     courses: FloatArray,
     ends: FloatArray,
     across: FloatArray,
@@ -29,12 +30,12 @@ def section_heights(
     and `up` (W, K), which falls from the crest. The ball rests on the top, on a corner (an arc of its own radius) or on
     a flank (a line parallel to it), whichever holds it highest: dilation distributes over unions. Beyond an end, cut
     square, what touches is the circle in which the ball crosses the end's plane. On a curved base heights over it are
-    felt as a ball of curvature 1/r + k feels them over a plane.
+    felt as a ball of curvature 1/r + k feels them over a plane, k being the base's in that direction.
 
     Args:
         s, lateral: (n, q) places of the nodes along and across the chart, m.
         basis: (m, n, q) lateral modes there.
-        bend: (n, q) curvature of the base across the line, 1/m.
+        bend, bend_along: (n, q) curvatures of the base across and along the line, 1/m.
         courses: (W, m) coefficients of the modes.
         ends: (W, 2) where the line begins and ends along the chart, m.
         across, up: (W, K) corners, m.
@@ -52,15 +53,15 @@ def section_heights(
                 for m in range(modes):
                     aside -= courses[w, m] * basis[m, i, q]
                 aside = abs(aside)
-                ball = tip / max(1.0 + tip * bend[i, q], 1e-3)
                 beyond = max(ends[w, 0] - s[i, q], s[i, q] - ends[w, 1])
-                if beyond >= ball:
-                    continue
-                drop = 0.0
+                circle, drop = tip, 0.0
                 if beyond > 0.0:
-                    circle = np.sqrt((ball - beyond) * (ball + beyond))
-                    drop = beyond * beyond / (ball + circle)
-                    ball = circle
+                    ball = tip / max(1.0 + tip * bend_along[i, q], 1e-3)
+                    if beyond >= min(ball, tip):
+                        continue
+                    drop = beyond * beyond / (ball + np.sqrt((ball - beyond) * (ball + beyond)))
+                    circle = np.sqrt((tip - beyond) * (tip + beyond))
+                ball = circle / max(1.0 + circle * bend[i, q], 1e-3)
                 best = drop
                 if aside <= top:
                     best = max(best, crest)

@@ -21,7 +21,8 @@ class Chart:
         s: (K,) distance along the curve, m.
         points: (K, 3) points of the base, m.
         tangents, laterals, normals: (K, 3) right-handed unit frames: lateral = normal x tangent.
-        bend: (K,) normal curvature of the base across the curve, 1/m, positive where it bulges outward.
+        bend, bend_along: (K,) normal curvatures of the base across and along the curve, 1/m, positive where it bulges
+            outward.
         closed: True if the curve returns to its beginning (last point equals the first).
     """
 
@@ -31,6 +32,7 @@ class Chart:
     laterals: FloatArray
     normals: FloatArray
     bend: FloatArray
+    bend_along: FloatArray
     closed: bool
 
     @property
@@ -97,7 +99,7 @@ def chart_along(
         tip_radius: radius of the fingertip, m: feet are sought from this high above.
         spacing: wanted distance of the chart's points, m.
         extension: length added at both ends of an open curve, m; less where the base ends.
-        reach: lateral distance over which the bend of the base is measured, m.
+        reach: distance over which the bends of the base are measured, m.
         bends: False for a trial of the course alone: the base is not asked how it bends across, and taken for flat.
 
     Raises:
@@ -117,8 +119,11 @@ def chart_along(
     laterals = np.cross(up, tangents)
     laterals /= np.linalg.norm(laterals, axis=1, keepdims=True)
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    bend = _bend(points, laterals, up, base, tip_radius, reach) if bends else np.zeros(len(s))
-    return Chart(s, points, tangents, laterals, up, bend, closed)
+    bend, bend_along = np.zeros((2, len(s)))
+    if bends:
+        bend = _bend(points, laterals, up, base, tip_radius, reach)
+        bend_along = _bend_along(points, s, tangents, up, reach, closed)
+    return Chart(s, points, tangents, laterals, up, bend, bend_along, closed)
 
 
 def _resampled(axis: FloatArray, normals: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
@@ -185,7 +190,30 @@ def _bend(
         drop = -np.einsum("ij,ij->i", aside, up)
         sound = np.abs(across) > 0.5 * reach
         sag[side] = np.where(sound, 2.0 * drop / np.where(sound, across, 1.0) ** 2, np.nan)
-    with np.errstate(invalid="ignore"):
-        known = np.isfinite(sag)
-        mean = np.where(known, sag, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return np.asarray(mean)
+    return _known_mean(sag)
+
+
+def _bend_along(
+    points: FloatArray, s: FloatArray, tangents: FloatArray, up: FloatArray, reach: float, closed: bool
+) -> FloatArray:
+    """(K,) curvature along the curve from the sag of its own points at `reach` on both sides; 0 where it is shorter."""
+    around, places = points, s
+    if closed:
+        around = np.concatenate([points[:-1], points[:-1], points])
+        places = np.concatenate([s[:-1] - s[-1], s[:-1], s + s[-1]])
+    sag = np.full((2, len(points)), np.nan)
+    for side, sign in enumerate((-1.0, 1.0)):
+        at = s + sign * reach
+        inside = (at >= places[0]) & (at <= places[-1])
+        away = np.column_stack([np.interp(at, places, around[:, i]) for i in range(3)]) - points
+        forward = np.einsum("ij,ij->i", away, tangents)
+        sound = inside & (np.abs(forward) > 0.5 * reach)
+        drop = -np.einsum("ij,ij->i", away, up)
+        sag[side, sound] = 2.0 * drop[sound] / forward[sound] ** 2
+    return _known_mean(sag)
+
+
+def _known_mean(values: FloatArray) -> FloatArray:
+    """(K,) mean of what is finite of (2, K) values; 0 where neither is."""
+    known = np.isfinite(values)
+    return np.asarray(np.where(known, values, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))

@@ -47,7 +47,7 @@ class PitShape:
         place[:, : self.free] = theta[:, : self.free]
         out = np.empty((len(theta), len(self.window)))
         width, depth = np.exp(theta[:, -2]), np.exp(theta[:, -1])
-        pit_heights(*self._places, float(self.spot.bends.mean()), place, width, depth, self.tip_radius, out)
+        pit_heights(*self._places, self.spot.bends, place, width, depth, self.tip_radius, out)
         return out
 
     @cached_property
@@ -95,19 +95,20 @@ class GrooveShape:
         return out
 
     @cached_property
-    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         return line_nodes(self.window, self.chart, self.modes)
 
 
 def line_nodes(
     window: Window, chart: Chart, modes: CurveModes
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """(n, nodes) distances along the chart, lateral distances, (m, n, nodes) modes, and bends of the base."""
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """(n, nodes) distances along the chart, lateral distances, (m, n, nodes) modes, and the base's two bends."""
     nodes = bin_nodes(window)
     s, lateral, leg = chart.coordinates(nodes.reshape(-1, 3))
     shape = nodes.shape[:2]
     basis = modes.basis(s).reshape(-1, *shape)
-    return s.reshape(shape), lateral.reshape(shape), basis, chart.bend[leg].reshape(shape)
+    bends = (each[leg].reshape(shape) for each in (chart.bend, chart.bend_along))
+    return s.reshape(shape), lateral.reshape(shape), basis, *bends
 
 
 def bin_nodes(window: Window) -> FloatArray:

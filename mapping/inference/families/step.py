@@ -9,7 +9,7 @@ import numpy as np
 
 from mapping import FloatArray
 from mapping.inference.curves import Chart, CurveModes
-from mapping.inference.families.hollow import bin_nodes
+from mapping.inference.families.hollow import line_nodes
 from mapping.inference.likelihood import Prior, Window
 
 
@@ -48,8 +48,7 @@ class StepShape:
         return out
 
     @cached_property
-    def _places(self) -> tuple[FloatArray, FloatArray]:
-        """(n, nodes) lateral distances from the chart, and the (m, n, nodes) modes there."""
-        nodes = bin_nodes(self.window)
-        s, lateral, _ = self.chart.coordinates(nodes.reshape(-1, 3))
-        return lateral.reshape(nodes.shape[:2]), self.modes.basis(s).reshape(-1, *nodes.shape[:2])
+    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(n, nodes) lateral distances from the chart, the (m, n, nodes) modes there, and bends of the base."""
+        _, lateral, basis, bend, _ = line_nodes(self.window, self.chart, self.modes)
+        return lateral, basis, bend

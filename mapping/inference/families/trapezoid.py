@@ -68,7 +68,7 @@ class TrapezoidShape:
         return theta[:, -3], np.exp(theta[:, -2]), np.exp(theta[:, -1])
 
     @cached_property
-    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         return line_nodes(self.window, self.chart, self.modes)
 
 

@@ -18,7 +18,7 @@ def trace(
     nodes = np.zeros((0, len(u), 1))
     ends = np.array([[-1.0, 0.0]])
     section_heights(
-        s[:, None], u[:, None], nodes, np.full((len(u), 1), bend), np.zeros((1, 0)), ends, across, up, tip, out
+        s[:, None], u[:, None], nodes, *(np.full((len(u), 1), bend),) * 2, np.zeros((1, 0)), ends, across, up, tip, out
     )
     return np.asarray(out[0])
 

@@ -17,7 +17,7 @@ def bent_chart(closed: bool) -> Chart:
     tangents = np.column_stack([-np.sin(angle), np.cos(angle), zero])
     normals = np.tile([0.0, 0.0, 1.0], (len(angle), 1))
     bend = 20.0 + 5.0 * np.sin(angle)
-    return Chart(0.02 * angle, points, tangents, np.cross(normals, tangents), normals, bend, closed)
+    return Chart(0.02 * angle, points, tangents, np.cross(normals, tangents), normals, bend, zero, closed)
 
 
 def lifted(at, aside, lift):
