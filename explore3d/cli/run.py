@@ -26,6 +26,9 @@ def run(
     overwrite: Overwrite = False,
     files_from: FilesFrom = None,
     no_report: NoReport = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Show in the browser what is felt; the view is a program of its own.")
+    ] = False,
 ) -> None:
     """Explore the scene with its finger; write the log, the annotated model and the report.
 
@@ -42,6 +45,11 @@ def run(
     from explore3d.jobs import run as explore
     from explore3d.report import show
 
+    view = None
+    if watch:
+        from explore3d.report.watch import begin_beside
+
+        view = begin_beside(out)  # held until the run is over: its standard input ends then
     with shown(quiet=json) as progress:
         analysis = explore(
             scene,
@@ -55,6 +63,8 @@ def run(
             report=not no_report,
         )
     show(analysis, out, json)
+    if view is not None and not json:
+        print("the view stays as long as a browser looks at it" if view.poll() is None else "the view has ended")
     short = analysis.account is not None and analysis.account.short
     if short or (analysis.stopped is not None and analysis.stopped.incomplete):
         raise typer.Exit(INCOMPLETE)

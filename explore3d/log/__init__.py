@@ -46,6 +46,12 @@ if TYPE_CHECKING:
         sidecar_of as sidecar_of,
         table_log as table_log,
     )
+    from explore3d.log.tail import (
+        LogTail as LogTail,
+        Piece as Piece,
+        is_whole as is_whole,
+        newest_log as newest_log,
+    )
     from explore3d.log.writer import LogWriter as LogWriter, Recorder as Recorder
 
 _PUBLIC = {
@@ -79,6 +85,7 @@ _PUBLIC = {
     ),
     "stream": ("LogStream", "count_samples", "head", "large_log"),
     "table": ("heights_log", "load_settings", "read_table", "sidecar_of", "table_log"),
+    "tail": ("LogTail", "Piece", "is_whole", "newest_log"),
     "writer": ("LogWriter", "Recorder"),
 }
 doorway(__name__, _PUBLIC)
