@@ -81,6 +81,16 @@ def plan(
 
     Example: explore3d plan wire/scene.toml --out out/plan
     """
-    from explore3d.jobs import show_plan
+    from json import dumps
+    from shlex import quote
 
-    show_plan(scene, out, json, overwrite, files_from or ())
+    from explore3d.cli.progress import shown
+    from explore3d.jobs import plan_into
+
+    with shown(quiet=json) as progress:
+        planned = plan_into(scene, out, overwrite, files_from or (), progress)
+    if json:
+        print(dumps(planned.record()))
+        return
+    picture = [] if out is None else [f"picture: {out / 'plan.png'}"]
+    print("\n".join([*planned.lines(), *picture, f"next: explore3d run {quote(str(scene))} --out FOLDER"]))
