@@ -5,8 +5,10 @@
 
 const METRES = { m: 1, mm: 1e-3, "µm": 1e-6, nm: 1e-9, in: 0.0254, mil: 2.54e-5 };
 const NUMBER = "[+−-]?\\d+(?:\\.\\d+)?";
-// One number or several ("0.64 to 0.66 mm", "1.0, 2.0, 3.0 mm") and their unit; no speeds, areas or ends of names
-const LENGTH = new RegExp(`(?<![\\w.,−-])((?:${NUMBER}(?:, | to | and ))*${NUMBER}) (m|mm|µm|nm)(?![\\w/²³])`, "gu");
+const SEVERAL = `(?:${NUMBER}(?:, | to | and ))*${NUMBER}`;
+// One number or several ("0.64 to 0.66 mm", "1.0, 2.0, 3.0 mm") and their unit, with the range that may stand behind it
+// in brackets without one ("0.65 mm (0.64 to 0.66)"); no speeds, areas or ends of names
+const LENGTH = new RegExp(`(?<![\\w.,−-])(${SEVERAL}) (m|mm|µm|nm)(?![\\w/²³])( \\(${NUMBER} to ${NUMBER}\\))?`, "gu");
 
 // A number in another unit, to as many digits as it had, or one more where the units' ratio is no power of ten.
 function converted(number, from, to) {
@@ -20,7 +22,8 @@ const all = (numbers, from, to) => numbers.replace(new RegExp(NUMBER, "gu"), (ea
 // A text with all its lengths in one unit; with `from`, bare numbers of that unit; without `to`, as it is.
 function inUnit(text, to, from) {
   if (!to) return text;
-  return from ? all(text, from, to) : text.replace(LENGTH, (_, numbers, unit) => `${all(numbers, unit, to)} ${to}`);
+  const written = (_, numbers, unit, range) => `${all(numbers, unit, to)} ${to}${range ? all(range, unit, to) : ""}`;
+  return from ? all(text, from, to) : text.replace(LENGTH, written);
 }
 
 // ---- the page ----

@@ -157,6 +157,7 @@ def test_the_view_says_what_the_pointer_feels_only_if_it_knows_the_tip() -> None
     ("text", "unit", "expected"),
     [
         ("ridge-1, 0.650 mm (0.634 to 0.666 mm)", "µm", "ridge-1, 650 µm (634 to 666 µm)"),
+        ("It is 0.650 mm (0.634 to 0.666) high", "µm", "It is 650 µm (634 to 666) high"),
         ("12.50, -3.00, 4.25 mm", "in", "0.4921, -0.1181, 0.1673 in"),
         ("at 30 mm/s over 5 mm² and 1.2 m", "mm", "at 30 mm/s over 5 mm² and 1200 mm"),
         ("−0.25 mm ± 12 µm; +0.1 µm", "mm", "-0.25 mm ± 0.012 mm; +0.0001 mm"),
