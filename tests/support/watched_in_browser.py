@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import shutil
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+
+from browser import PATIENCE, Browser
 
 from explore3d.report.watch.view import Watch
 from explore3d.scene.scene import load_scene
@@ -15,10 +14,10 @@ from mapping.base.base import Base
 from mapping.feature import Feature, Interval, Support
 from mapping.model.object_model import ObjectModel
 
-PATIENCE = 240.0  # s, on a busy machine without a graphics card
 SCENE = Path(__file__).resolve().parents[2] / "assets" / "scenes" / "mug.toml"
-OPTIONS = ("--headless=new", "--no-sandbox", "--window-size=1000,700", "--use-gl=angle", "--use-angle=swiftshader")
-OPTIONS += ("--enable-unsafe-swiftshader", "--disable-background-networking", "--disable-component-update")
+MIDDLE = "(() => { const r = document.querySelector('canvas').getBoundingClientRect();"
+MIDDLE += " return [r.x + r.width / 2, r.y + r.height / 2]; })()"
+HEADING = "(document.querySelector('h3') || {}).textContent"
 
 
 @dataclass(frozen=True)
@@ -41,65 +40,44 @@ def mug_with_features(folder: Path) -> None:
     ObjectModel.attach(base, features).save(folder)
 
 
-def clicked_features(folder: Path) -> Clicked | None:
-    """Click every feature of a session's model where the browser shows it; None without a browser."""
-    if shutil.which("chromedriver") is None or shutil.which("chromium") is None:
-        return None
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
+def clicked_features(folder: Path, picture: Path | None = None) -> Clicked:
+    """Click every feature of a session's model where the browser shows it.
 
-    options = webdriver.ChromeOptions()
-    for each in OPTIONS:
-        options.add_argument(each)
-    options.set_capability("goog:loggingPrefs", {"performance": "ALL"})
+    Args:
+        folder: of the session.
+        picture: PNG to be made of the page with the first feature chosen; None: none.
+    """
     view = Watch(folder, port=0)
-    view.look()
-    driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
     try:
-        driver.set_page_load_timeout(PATIENCE)
-        driver.get(view.url)
-        clicks = [(name, _click(view, driver, name)) for name in view.stage.features]
-        return Clicked(clicks, _outside(driver, view.url))
+        view.look()
+        with Browser() as browser:
+            browser.open(view.url)
+            browser.until("!!document.querySelector('canvas')")
+            clicks = []
+            for name in view.stage.features:
+                clicks.append((name, _click(view, browser, name)))
+                if picture is not None and len(clicks) == 1:
+                    time.sleep(2.0)
+                    picture.write_bytes(browser.picture())
+            own = (view.url, view.url.replace("http", "ws"), "data:", "blob:", "about:")
+            return Clicked(clicks, [each for each in browser.fetched if not each.startswith(own)])
     finally:
-        driver.quit()
         view.close()
 
 
-def _click(view: Watch, driver: Any, name: str) -> str:
-    """Turn the camera to the feature, click where it is seen, and read the panel's heading."""
-    from selenium.webdriver.common.action_chains import ActionChains
-    from selenium.webdriver.common.by import By
+def _click(view: Watch, browser: Browser, name: str) -> str:
+    """Turn the camera to the feature, click where it is seen, and read the panel's heading.
 
-    view.choose(None)
-    _until(lambda: bool(view.server.get_clients()))
-    canvas = driver.find_element(By.TAG_NAME, "canvas")
+    A busy browser turns its camera later than it is told: what it then picks is what it still looks at, so the click is
+    made again until the patience ends.
+    """
+    heading = ""
     deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
+    while heading != name and time.monotonic() < deadline:
+        view.choose(None)
+        browser.until(f"!{HEADING}")  # that of the last one is gone
         view.stage.look_at(name)
         time.sleep(1.0)
-        ActionChains(driver).move_to_element(canvas).click().perform()
-        for _ in range(10):
-            headings = [each.text for each in driver.find_elements(By.TAG_NAME, "h3")]
-            if headings:
-                return str(headings[0])
-            time.sleep(0.3)
-    return ""
-
-
-def _outside(driver: Any, own: str) -> list[str]:
-    """Addresses that the page asked for beside the view's server."""
-    found = []
-    for entry in driver.get_log("performance"):
-        message = json.loads(entry["message"])["message"]
-        if message["method"] == "Network.requestWillBeSent":
-            url = message["params"]["request"]["url"]
-            if not url.startswith((own, "data:", "blob:", "chrome")):
-                found.append(url)
-    return found
-
-
-def _until(holds: Any) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not holds():
-        assert time.monotonic() < deadline, "the browser never came"
-        time.sleep(0.2)
+        browser.click(*browser.ask(MIDDLE))
+        heading = str(browser.until(HEADING, 10.0) or "")
+    return heading

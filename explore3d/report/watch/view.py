@@ -151,6 +151,7 @@ class Watch:
 
     def _tell(self) -> None:
         count = self.stage.count
+        self._time.visible = self._follows.visible = self.tail is not None or self.live
         if count:
             end = float(self.stage.t[count - 1])
             self._time.max = max(end, 1e-3)
