@@ -149,7 +149,8 @@ def watch(
     def tell(view: Watch) -> None:
         names = [] if view.model is None else [each.id for each in view.model]
         record = {"url": view.url, "samples": view.stage.count, "features": names}
-        print(dumps(record) if json else f"watch: {view.url} (Ctrl-C ends it)", flush=True)
+        end = "" if attached else " (Ctrl-C ends it)"
+        print(dumps(record) if json else f"watch: {view.url}{end}", flush=True)
 
     serve(place, live=live, port=port, host=host, attached=attached, told=tell)
 

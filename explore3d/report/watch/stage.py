@@ -22,7 +22,7 @@ NODE_SAMPLES = 5000
 # Samples that there is room for at first; doubled where there are more
 FIRST_ROOM = 250_000
 # A sample is drawn this share of the object's size wide
-SAMPLE_SHARE = 2.5e-3
+SAMPLE_SHARE = 1.2e-3
 # The view is placed anew when the samples reach so many times further than it was placed for
 OUTGROWN = 2.0
 # The object fills this many of the view's units, whose camera sees from 0.01 to 1000

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import math
 import os
 import subprocess
 import sys
@@ -108,7 +109,8 @@ class Watch:
 
     def close(self) -> None:
         """Let go of the port."""
-        self.server.stop()
+        with contextlib.redirect_stdout(io.StringIO()):  # it says so
+            self.server.stop()
 
     # the panel
 
@@ -154,11 +156,11 @@ class Watch:
         self._time.visible = self._follows.visible = self.tail is not None or self.live
         if count:
             end = float(self.stage.t[count - 1])
-            self._time.max = max(end, 1e-3)
+            self._time.max = max(math.ceil(1e3 * end) / 1e3, 1e-3)  # the slider steps by milliseconds
             if self._follows.value:
                 self._show_all()
         title = (self.tail.title if self.tail is not None else "") or self.place.name
-        samples = f"{count_text(count, 'sample')}, {seconds_text(float(self.stage.t[count - 1]))}" if count else WAITING
+        samples = f"{count:,} samples, {seconds_text(float(self.stage.t[count - 1]))}" if count else WAITING
         if self.tail is None:
             samples = f"the model alone: {LOG} is not in this folder"
         elif not self.tail.closed and count:

@@ -71,7 +71,7 @@ def test_a_finished_session_shows_every_sweep_and_feature(view: Watch) -> None:
     assert view.stage.count == len(sweeps())
     assert set(view.stage.features) == {"ridge-1"}
     assert shown(view) == view.stage.drawn > 0
-    assert "5500 samples" in view._state.content and "1 feature" in view._state.content
+    assert "5,500 samples" in view._state.content and "1 feature" in view._state.content
     assert "A \\*wire\\*" in view._state.content  # a title is text, not Markdown
     assert not view.look()  # nothing is new
 
