@@ -269,6 +269,33 @@ class Feature:
         text = ", ".join(f"{name} {size}" for name, size in sizes if name == "height" or size.high > 0.0)
         return f"<{self.id or self.kind}: {text}>"
 
+    def plot(self, axes: Any = None) -> Any:
+        """Draw height, width and length with their 90 % intervals; `posterior.plot()` draws what is behind them.
+
+        Args:
+            axes: of matplotlib, to draw into; None: new ones.
+
+        Returns:
+            The axes.
+        """
+        if axes is None:
+            import matplotlib.pyplot as plt
+
+            _, axes = plt.subplots(figsize=(6.0, 2.4), layout="constrained")
+        sizes = {name: getattr(self, name) for name in ("height", "width", "length")}
+        known = {name: size for name, size in sizes.items() if math.isfinite(size.median) and size.high != size.low}
+        for place, size in enumerate(known.values()):
+            unit = abs(size.median) or 1.0  # each on its own scale: a ridge is a hundred times longer than high
+            axes.plot([size.low / unit, size.high / unit], [place, place], color="#b91c1c", linewidth=6, alpha=0.35)
+            axes.plot([size.median / unit], [place], "o", color="#b91c1c")
+            axes.annotate(str(size), (size.median / unit, place), (0, 9), textcoords="offset points", ha="center")
+        axes.set_yticks(range(len(known)), list(known))
+        axes.set_ylim(-0.6, len(known) - 0.2)
+        axes.margins(x=0.3)
+        axes.set_xlabel("share of the median")
+        axes.set_title(self.id or self.kind)
+        return axes
+
     @property
     def closed(self) -> bool:
         """True for a ridge or groove that returns to its beginning."""

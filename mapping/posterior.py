@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from mapping.arrays import FloatArray
 
+# Panels of a plot that stand beside one another
+PANELS_BESIDE = 4
 POSTERIOR_STATUSES = ("converged", "chain too short", "stuck", "not needed")
 
 
@@ -36,6 +39,33 @@ class Posterior:
     reason: str = ""
     k_hat: float = float("nan")
     ess: float = float("nan")
+
+    def plot(self, figure: Any = None) -> Any:
+        """Draw a histogram of each parameter's draws, with its median and central 90 %.
+
+        Args:
+            figure: of matplotlib, to draw into; None: a new one.
+
+        Returns:
+            The figure.
+        """
+        count = len(self.names)
+        if figure is None:
+            import matplotlib.pyplot as plt
+
+            figure = plt.figure(figsize=(2.4 * min(count, PANELS_BESIDE), 2.0 * -(-count // PANELS_BESIDE)))
+            figure.set_layout_engine("constrained")
+        panels = figure.subplots(-(-count // PANELS_BESIDE), min(count, PANELS_BESIDE), squeeze=False).ravel()
+        for axes, name, unit, draws in zip(panels, self.names, self.units, self.samples.T, strict=False):
+            low, median, high = np.quantile(draws, [0.05, 0.5, 0.95])
+            axes.axvspan(low, high, color="#b91c1c", alpha=0.15)
+            axes.hist(draws, bins="auto", histtype="step", color="#1f2933")
+            axes.axvline(median, color="#b91c1c")
+            axes.set_xlabel(f"{name} ({unit})" if unit else name)
+            axes.set_yticks([])
+        for axes in panels[count:]:
+            axes.remove()
+        return figure
 
     def draws(self, name: str) -> FloatArray:
         """(S,) draws of one parameter; KeyError names the possible ones."""

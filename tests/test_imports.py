@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("mapping", "hw", "planners", "explore3d")  # each imports itself and those before it
 # What takes long to import: the reason that lets an import stand inside a function
 HEAVY = {"numba", "scipy", "open3d", "matplotlib", "igl", "emcee", "trimesh", "plotly", "pydantic", "typer", "rich"}
-HEAVY |= {"mcap", "zstandard", "serial", "arviz"}
+HEAVY |= {"mcap", "zstandard", "serial", "arviz", "viser"}
 # The command line answers before even numpy is loaded, and before what starts processes
 HEAVY_FOR_THE_COMMAND_LINE = HEAVY | {"numpy", "concurrent"}
 # Never loaded by importing a module of ours, the kernels apart

@@ -126,6 +126,35 @@ def vibrate(
     print(dumps(record, allow_nan=False) if json else "\n".join([*found.lines(), f"vibration: {out}"]))
 
 
+def watch(
+    place: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of a session, or a log.")],
+    live: Annotated[
+        bool, typer.Option("--live", help="The run that is under way in that folder, or is about to begin there.")
+    ] = False,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to serve on; the next free one if taken.")] = 8080,
+    host: Annotated[
+        str, typer.Option(help="Address to serve on; 0.0.0.0 lets the whole network look (there is no password).")
+    ] = "127.0.0.1",
+    attached: Annotated[bool, typer.Option("--attached", hidden=True)] = False,
+    json: Json = False,
+) -> None:
+    """Look at a session in the browser, finished or while it grows: scrub through time, click a feature.
+
+    Example: explore3d watch out/wire
+    """
+    from json import dumps
+
+    from explore3d.report.watch import Watch, watch as serve
+
+    def tell(view: Watch) -> None:
+        names = [] if view.model is None else [each.id for each in view.model]
+        record = {"url": view.url, "samples": view.stage.count, "features": names}
+        end = "" if attached else " (Ctrl-C ends it)"
+        print(dumps(record) if json else f"watch: {view.url}{end}", flush=True)
+
+    serve(place, live=live, port=port, host=host, attached=attached, told=tell)
+
+
 def _speed(text: str) -> float:
     from explore3d import parse_speed
 

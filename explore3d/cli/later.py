@@ -30,6 +30,7 @@ def merge(
     part: Part = None,
     frame: Frame = None,
     average: Average = None,
+    json: Json = False,
     overwrite: Overwrite = False,
 ) -> None:
     """Update a model's features by later logs instead of finding them anew; none is removed.
@@ -38,23 +39,31 @@ def merge(
 
     Example: explore3d merge out/wire out/second/log.mcap --out out/both
     """
+    from json import dumps
+
+    from explore3d.cli.progress import shown
     from explore3d.jobs import merge as join
     from explore3d.report import feature_line
 
-    merged = join(
-        model,
-        logs,
-        out,
-        length("--pose-sd", pose_sd),
-        overwrite,
-        tip_radius=tip_radius,
-        units=units,
-        columns=columns,
-        pixel=pixel,
-        part=part,
-        frame=None if frame is None else {"origin": [each.strip() for each in frame.split(",")]},
-        average=average,
-    )
+    with shown(quiet=json) as progress:
+        merged = join(
+            model,
+            logs,
+            out,
+            length("--pose-sd", pose_sd),
+            overwrite,
+            progress=progress,
+            tip_radius=tip_radius,
+            units=units,
+            columns=columns,
+            pixel=pixel,
+            part=part,
+            frame=None if frame is None else {"origin": [each.strip() for each in frame.split(",")]},
+            average=average,
+        )
+    if json:
+        print(dumps(merged.document(), ensure_ascii=False, allow_nan=False))
+        return
     print("\n".join([*map(feature_line, merged.features), f"model: {out / 'model.json'}"]))
 
 

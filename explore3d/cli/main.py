@@ -14,7 +14,7 @@ from explore3d.cli.analyze import analyze, roughness
 from explore3d.cli.batch import batch
 from explore3d.cli.begin import examples, init
 from explore3d.cli.bench import bench
-from explore3d.cli.display import display, vibrate
+from explore3d.cli.display import display, vibrate, watch
 from explore3d.cli.doctor import doctor
 from explore3d.cli.figures import figures, stability
 from explore3d.cli.hardware import calibrate, emulate, reprobe, selftest
@@ -49,6 +49,7 @@ MODEL = (
     inspect,
     export,
     merge,
+    watch,
     display,
     vibrate,
     figures,

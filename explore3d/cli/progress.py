@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from explore3d import seconds_text
 from explore3d.analysis import Progress, silent
 
 
@@ -22,9 +23,17 @@ def shown(quiet: bool = False) -> Iterator[Progress]:
 
 def _bars() -> Iterator[Progress]:
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskID, TextColumn, TimeElapsedColumn
+    from rich.text import Text
 
-    columns = (TextColumn("{task.description:<24}"), BarColumn(), TimeElapsedColumn())
+    class TimeLeft(ProgressColumn):
+        """What a stage will still take at its speed of late; nothing until that is known."""
+
+        def render(self, task: Task) -> Text:
+            left = None if task.finished else task.time_remaining
+            return Text("" if not left else f"{seconds_text(left)} left", style="progress.remaining")
+
+    columns = (TextColumn("{task.description:<24}"), BarColumn(), TimeElapsedColumn(), TimeLeft())
     tasks: dict[str, TaskID] = {}
     with Progress(*columns, console=Console(stderr=True)) as display:
 

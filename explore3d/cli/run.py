@@ -26,6 +26,9 @@ def run(
     overwrite: Overwrite = False,
     files_from: FilesFrom = None,
     no_report: NoReport = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Show in the browser what is felt; the view is a program of its own.")
+    ] = False,
 ) -> None:
     """Explore the scene with its finger; write the log, the annotated model and the report.
 
@@ -42,6 +45,11 @@ def run(
     from explore3d.jobs import run as explore
     from explore3d.report import show
 
+    view = None
+    if watch:
+        from explore3d.report.watch import begin_beside
+
+        view = begin_beside(out)  # held until the run is over: its standard input ends then
     with shown(quiet=json) as progress:
         analysis = explore(
             scene,
@@ -55,6 +63,8 @@ def run(
             report=not no_report,
         )
     show(analysis, out, json)
+    if view is not None and not json:
+        print("the view stays as long as a browser looks at it" if view.poll() is None else "the view has ended")
     short = analysis.account is not None and analysis.account.short
     if short or (analysis.stopped is not None and analysis.stopped.incomplete):
         raise typer.Exit(INCOMPLETE)
@@ -71,6 +81,16 @@ def plan(
 
     Example: explore3d plan wire/scene.toml --out out/plan
     """
-    from explore3d.jobs import show_plan
+    from json import dumps
+    from shlex import quote
 
-    show_plan(scene, out, json, overwrite, files_from or ())
+    from explore3d.cli.progress import shown
+    from explore3d.jobs import plan_into
+
+    with shown(quiet=json) as progress:
+        planned = plan_into(scene, out, overwrite, files_from or (), progress)
+    if json:
+        print(dumps(planned.record()))
+        return
+    picture = [] if out is None else [f"picture: {out / 'plan.png'}"]
+    print("\n".join([*planned.lines(), *picture, f"next: explore3d run {quote(str(scene))} --out FOLDER"]))

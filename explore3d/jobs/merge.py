@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from explore3d import UserError
-from explore3d.analysis import Stages, build_model
+from explore3d.analysis import Progress, Stages, build_model, silent
 from explore3d.jobs.analyze import digest_of, table_words
 from explore3d.jobs.objects import unlike
 from explore3d.jobs.session import Job, Session
@@ -33,6 +33,7 @@ def merge(
     pose_sd: float = 0.0,
     overwrite: bool = False,
     *,
+    progress: Progress = silent,
     tip_radius: str | float | None = None,
     **table: Any,
 ) -> ObjectModel:
@@ -44,6 +45,7 @@ def merge(
         out: folder for the merged model; may be the model's own, whose other files then stay.
         pose_sd: standard deviation of the pose between the logs, m.
         overwrite: replace, once this one is complete, a session of something else in that folder.
+        progress: told the stage and the share of it that is done.
         tip_radius, table: of recordings that do not state it, as for analyze.
 
     Raises:
@@ -58,13 +60,15 @@ def merge(
     words += table_words(tip_radius, table)
     job = Job("merge", subject, again=shlex.join(words))
     with Session(out, job, keep=keep, overwrite=overwrite) as session:
-        known = _merged(model, logs, pose_sd, {"tip_radius": tip_radius} | table)
+        known = _merged(model, logs, pose_sd, {"tip_radius": tip_radius} | table, progress)
         with session.staging() as folder:
             known.save(folder)
     return known
 
 
-def _merged(model: Path | str, logs: Sequence[Path | str], pose_sd: float, settings: dict[str, Any]) -> ObjectModel:
+def _merged(
+    model: Path | str, logs: Sequence[Path | str], pose_sd: float, settings: dict[str, Any], progress: Progress
+) -> ObjectModel:
     known = ObjectModel.load(model)
     for path in logs:
         log = load_logs([path], **settings)
@@ -73,7 +77,7 @@ def _merged(model: Path | str, logs: Sequence[Path | str], pose_sd: float, setti
             raise UserError(f"{path}: this log is in the model {model} already; merged twice it would count twice")
         if complaint := unlike(log, known.base, pose_sd):
             raise UserError(f"{path}: not a log of the object of {model}, or not in its frame: {complaint}")
-        analysis = build_model(log, None, known.base, Stages())
+        analysis = build_model(log, None, known.base, Stages(progress))
         known = merge_model(known, analysis.model.features, "/".join(Path(path).resolve().parts[-2:]), pose_sd)
         hashes = [*known.provenance.get("merged_sha256", []), log.sha256]
         known = replace(known, provenance={**known.provenance, "merged_sha256": hashes})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from explore3d import count_text, seconds_text
-from explore3d.analysis import SurfaceAccount
+from explore3d.analysis import Progress, Stages, SurfaceAccount, silent
 from explore3d.jobs.expedition import Explorer, explorer
 from explore3d.jobs.run import open_scene, scene_digest, scene_finger
 from explore3d.jobs.session import Job, Session
@@ -22,7 +23,7 @@ from hw.simulated import SimulatedFinger
 from mapping import Surface, Trace, length_text
 from mapping.base import Base
 from planners import Spent, drive, dry_run
-from planners.explore import Discover
+from planners.explore import Discover, SurveyCount
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,25 +94,29 @@ class DryRun:
         return plan_picture(self.base, self.moves, self.tip_radius, [number - 1 for number, _ in self.violations])
 
 
-def plan_scene(path: Path | str, files_from: Collection[Path | str] = ()) -> DryRun:
+def plan_scene(path: Path | str, files_from: Collection[Path | str] = (), progress: Progress = silent) -> DryRun:
     """Plan the exploration of a scene, and check every move against the finger's limits.
 
     Args:
         path: the scene's file.
         files_from: folders that it may name files in, beside those near it.
+        progress: told the stage and the share of it that is done.
 
     Raises:
         SceneError: a scene that cannot be used.
     """
-    scene = open_scene(path, files_from)
+    stages = Stages(progress)
+    with stages.stage("setting up"):
+        scene = open_scene(path, files_from)
     with scene_finger(scene) as finger:
-        return _planned(scene, finger)
+        return _planned(scene, finger, stages)
 
 
-def _planned(scene: Scene, finger: Finger) -> DryRun:
+def _planned(scene: Scene, finger: Finger, stages: Stages) -> DryRun:
     """The plan, while the finger is connected: it knows how long its link and its limits make a move."""
-    planned = explorer(scene, finger.workspace)
-    first, base, assumed = _to_know_the_base(planned)
+    with stages.stage("base"):
+        planned = explorer(scene, finger.workspace)
+        first, base, assumed = _to_know_the_base(planned)
     spent, budget = Spent(planned.workspace.max_speed), planned.time_budget
     for move in first:
         spent.count(move)
@@ -130,9 +135,17 @@ def _planned(scene: Scene, finger: Finger) -> DryRun:
 
     survey, ended = None, ""
     if spent.seconds < budget:
-        exploring = planned.explore(base=base, time_budget=budget - spent.seconds).plan()
+        count = SurveyCount()
+        exploring = planned.explore(base=base, time_budget=budget - spent.seconds).plan(count=count)
         exploring = planned.prepared(exploring, base, Spent(spent.travel_speed), np.inf)
-        _, outcome = drive(exploring, made, check=check, empty=planned.nothing)
+        with stages.stage("sweeps and ways") as share:
+
+            def carried(move: Move) -> Trace:
+                if count.planned:
+                    share(min(1.0, count.made / count.planned))
+                return made(move)
+
+            _, outcome = drive(exploring, carried, check=check, empty=planned.nothing)
         survey = None if outcome.value is None else outcome.value.survey
         ended = outcome.detail if outcome.reason != "budget" else ""
     if survey is None:
@@ -143,7 +156,8 @@ def _planned(scene: Scene, finger: Finger) -> DryRun:
     broken = {number - 1: what for number, what in violations}
     sound = [move for number, move in enumerate(moves) if number not in broken]
     refused = [(moves[number], what) for number, what in broken.items()]
-    account = None if survey is None else SurfaceAccount.of_plan(sound, refused, base, scene)
+    with stages.stage("surface swept"):
+        account = None if survey is None else SurfaceAccount.of_plan(sound, refused, base, scene)
     return DryRun(
         base,
         scene.tip.radius,
@@ -186,30 +200,24 @@ def imagined(discover: Discover) -> tuple[list[Move], Base]:
     return [move for move, _ in record], outcome.value
 
 
-def show_plan(
+def plan_into(
     path: Path | str,
     out: Path | None,
-    as_json: bool,
     overwrite: bool = False,
     files_from: Collection[Path | str] = (),
-) -> None:
-    """Plan, and print the plan in words or as JSON; with a folder, write plan.json and plan.png into it.
+    progress: Progress = silent,
+) -> DryRun:
+    """Plan; with a folder, write plan.json and plan.png into it. Arguments as for plan_scene.
 
     Raises:
         SceneError: a scene that cannot be used.
         FolderError: the folder cannot be used; said before anything is planned.
     """
-    import json
-
     if out is None:
-        plan = plan_scene(path, files_from)
-    else:
-        subject = scene_digest(open_scene(path, files_from))
-        with Session(out, Job("plan", subject), overwrite=overwrite) as session:
-            plan = plan_scene(path, files_from)
-            session.write("plan.json", json.dumps(plan.record(), indent=1))
-            session.write("plan.png", plan.picture())
-    if as_json:
-        print(json.dumps(plan.record()))
-    else:
-        print("\n".join(plan.lines() + ([] if out is None else [f"picture: {out / 'plan.png'}"])))
+        return plan_scene(path, files_from, progress)
+    subject = scene_digest(open_scene(path, files_from))
+    with Session(out, Job("plan", subject), overwrite=overwrite) as session:
+        plan = plan_scene(path, files_from, progress)
+        session.write("plan.json", json.dumps(plan.record(), indent=1))
+        session.write("plan.png", plan.picture())
+    return plan

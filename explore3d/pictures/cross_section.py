@@ -19,6 +19,8 @@ from mapping.inference.kinds import kind_of
 SECTION_REACH = 2.4
 SECTION_BINS = 60
 GRID = 241
+# Sine of the angle at which a sweep must cross a line to show its section: 30 degrees
+LEAST_SINE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +123,7 @@ def _nearest_crossing(feature: Feature, tip_radius: float, crossings: Sequence[C
         crossing
         for crossing in crossings
         if np.linalg.norm(crossing.point - nearest_on(crossing.point[None], feature.axis)[0][0]) < half
-        and (len(feature.axis) == 1 or _angle(crossing, feature) > 0.5)
+        and (len(feature.axis) == 1 or _angle(crossing, feature) > LEAST_SINE)
     ]
     return min(close, key=lambda crossing: float(np.linalg.norm(crossing.point - reference)), default=None)
 
@@ -129,13 +131,33 @@ def _nearest_crossing(feature: Feature, tip_radius: float, crossings: Sequence[C
 def _window(feature: Feature, crossing: Crossing | None, trace: Trace) -> IntArray:
     """Samples of the sweep around the crossing; without one, of the sweep that passes nearest to the middle."""
     if crossing is None:
-        above = middle(feature.axis)[0] + trace.tip_radius * feature.normals[len(feature.axis) // 2]
-        nearest = int(np.linalg.norm(trace.centers - above, axis=1).argmin())
-        return np.flatnonzero(trace.sweep == trace.sweep[nearest])
+        return _nearest_passage(feature, trace)
     own = np.flatnonzero(trace.sweep == crossing.sweep)
     # A sweep may cross a feature many times: what is far from this crossing is another one.
     margin = 1.5 * (crossing.stop - crossing.start) + 10
     return own[max(0, int(crossing.start - margin)) : int(crossing.stop + margin)]
+
+
+def _nearest_passage(feature: Feature, trace: Trace) -> IntArray:
+    """Samples of the sweep that passes nearest to the middle of the crest, among those that do not run along it."""
+    half = half_width(feature, trace.tip_radius)
+    number = len(feature.axis) // 2
+    above = middle(feature.axis)[0] + trace.tip_radius * feature.normals[number]
+    away = np.linalg.norm(trace.centers - above, axis=1)
+    close = np.flatnonzero(away < max(2.0 * half, 1.5 * float(away.min())))
+    passages: dict[int, float] = {}
+    for sweep in np.unique(trace.sweep[close]):
+        own = close[trace.sweep[close] == sweep]
+        way = trace.centers[own[-1]] - trace.centers[own[0]]
+        length = float(np.linalg.norm(way))
+        if len(feature.axis) > 1 and length > 0.0:
+            along = directions(feature.axis)[min(number, len(feature.axis) - 1)]
+            if np.linalg.norm(np.cross(way, along)) < LEAST_SINE * length:
+                continue
+        passages[int(sweep)] = float(away[own].min())
+    if not passages:
+        return np.zeros(0, dtype=np.int64)
+    return np.flatnonzero(trace.sweep == min(passages, key=lambda sweep: passages[sweep]))
 
 
 def _interpolated(grid: FloatArray, x: FloatArray, vectors: FloatArray) -> FloatArray:

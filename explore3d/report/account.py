@@ -30,12 +30,12 @@ def what_was_left_out(analysis: Analysis, pictures: Pictures) -> Html:
 
 def _dropped(dropped: Sequence[Dropped]) -> Html:
     """Detections that are no feature, the plainest first."""
-    head = ("detected, and no feature", "at, mm", "height", "signal to noise", "why")
+    head = ("detected, and no feature", "at", "height", "signal to noise", "why")
     plainest = sorted(dropped, key=lambda each: -each.snr)
     rows: list[Row] = [
         (
             element("b", each.kind),
-            ", ".join(f"{1e3 * value:.2f}" for value in each.point),
+            ", ".join(f"{1e3 * value:.2f}" for value in each.point) + " mm",
             length_text(each.height, 2),
             f"{each.snr:.1f}",
             each.reason,

@@ -195,7 +195,9 @@ def _with_range(interval: Interval) -> Html:
     if not interval.high and not interval.low:
         return Html(UNKNOWN_TEXT)  # the kind has no such size: a step has no width
     median, span = interval.text()
-    return Html(element("span", median) + (element("small", span) if span else ""))
+    # the range is written without its unit, which the page's choice of units has to know
+    unit = median.rpartition(" ")[2]
+    return Html(element("span", median) + (element("small", span, data_unit=unit) if span else ""))
 
 
 def _caption(analysis: Analysis) -> str:

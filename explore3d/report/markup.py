@@ -7,8 +7,19 @@ import json
 import re
 from collections.abc import Iterable, Sequence
 from html import escape
+from pathlib import Path
 
 Row = Sequence[str]
+# Units that a reader may choose, "": for each length the one that fits
+READER_UNITS = {
+    "": "fitting units",
+    "m": "m",
+    "mm": "mm",
+    "µm": "µm",
+    "nm": "nm",
+    "in": "inches",
+    "mil": "mil (0.001 in)",
+}
 
 
 class Html(str):
@@ -94,6 +105,17 @@ def data_script(name: str, document: object) -> Html:
     written = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     escaped = written.replace("<", "\\u003c")
     return Html(f'<script type="application/json" id="{escape(name)}">{escaped}</script>')
+
+
+def choice_of_units() -> Html:
+    """A list of units of length, for units_script."""
+    names = [element("option", name, value=unit) for unit, name in READER_UNITS.items()]
+    return element("p", element("label", "lengths in ", element("select", *names, id="unit")), class_="units")
+
+
+def units_script() -> Html:
+    """The code that writes the page's lengths in the unit that was chosen; stands behind all that it writes in."""
+    return script("{\n" + Path(__file__).with_name("units.js").read_text(encoding="utf-8") + "}\n")
 
 
 def badge(content: str, kind: str) -> Html:

@@ -125,6 +125,8 @@ button { font: inherit; color: var(--link); background: none; border: 1px solid 
 td button.feature { border: 0; padding: 0; font-weight: 600; text-align: left; white-space: nowrap; }
 td button.feature:hover { text-decoration: underline; }
 tr.chosen td { background: var(--chosen); }
+.units { margin: .6rem 0 0; font-size: .92rem; color: var(--soft); }
+select { font: inherit; color: inherit; background: var(--paper); border: 1px solid var(--edge); border-radius: 6px; }
 nav { font-size: .92rem; margin-top: 1.1rem; } nav a { margin-right: 1.1rem; display: inline-block; }
 :target { scroll-margin-top: 1rem; }
 .table:focus-visible { outline: 2px solid var(--link); }
@@ -141,6 +143,6 @@ code { font-size: .9em; }
   /* drawn in ink on paper: light becomes dark and the hues stay; what holds pixels keeps its own */
   figure > svg:not(:has(image)) { filter: invert(.9) hue-rotate(180deg); }
 }
-@media print { .view, .hint, .to-look, nav { display: none; } figure, tr, h2 { break-inside: avoid; }
+@media print { .view, .hint, .units, .to-look, nav { display: none; } figure, tr, h2 { break-inside: avoid; }
   h2 { break-after: avoid; } .table { max-height: none; overflow: visible; } }
 """

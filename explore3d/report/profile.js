@@ -105,7 +105,8 @@ function show(root, data) {
     const part = data.features.find((each) => each.id === chosen);
     label.hidden = !part || part.x < span[0] || part.x > span[1];
     if (label.hidden) return;
-    label.textContent = part.text.join("\n");
+    const text = part.text.join("\n");
+    label.textContent = window.explore3dLengths ? window.explore3dLengths.text(text) : text;
     label.style.left = `${Math.min(right(part.x) + 12, canvas.clientWidth - label.offsetWidth - 4)}px`;
     label.style.top = `${edge.top + 4}px`;
   };
@@ -191,7 +192,8 @@ function show(root, data) {
   new ResizeObserver(redraw).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   draw();
-  return { choose, pick };
+  window.addEventListener("explore3d-unit", redraw);
+  return { choose, step, pick };
 }
 
 if (typeof document !== "undefined") {

@@ -17,7 +17,7 @@ from explore3d.report.evidence import (
     roughness_table,
 )
 from explore3d.report.findings_section import against_tolerances, facts, headline, what_was_found
-from explore3d.report.markup import Html, contents, element, text
+from explore3d.report.markup import Html, choice_of_units, contents, element, text, units_script
 from explore3d.report.page import REPORT_CSS
 from explore3d.report.pictures import Pictures, draw_pictures, is_profile
 from explore3d.report.view3d import object_view, profile_view
@@ -70,13 +70,13 @@ def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPa
         account_of_time(analysis),
         provenance(analysis),
     ]
-    content = element("main", headline(analysis), facts(analysis), contents(sections), *sections)
+    content = element("main", headline(analysis), facts(analysis), contents(sections), choice_of_units(), *sections)
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{REPORT_SECURITY_POLICY}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>explore3d: drawing</title><style>{REPORT_CSS}</style></head>"
-        f"<body>{content}{_ready(analysis.title)}</body></html>\n"
+        f"<body>{content}{units_script()}{_ready(analysis.title)}</body></html>\n"
     )
 
 

@@ -72,7 +72,13 @@ def object_view(
         boxes.append(FEEL_BOX)
         scripts.append("touch.js")
     keys = "Drag to turn, shift and drag to move, scroll to zoom, click a feature. Keys: arrows, + −, n and p for the "
-    return _view(boxes, "The object in 3D", keys + "next and previous feature, 0 for the whole.", data, scripts)
+    return _view(
+        boxes,
+        "The object in 3D",
+        keys + "next and previous feature, u for another unit, 0 for the whole.",
+        data,
+        scripts,
+    )
 
 
 def profile_view(trace: Trace, base: Base, features: Sequence[Feature]) -> Html:
@@ -102,7 +108,9 @@ def profile_view(trace: Trace, base: Base, features: Sequence[Feature]) -> Html:
     keys = (
         "Scroll to zoom, drag to move, click a feature. Keys: arrows, + −, n and p for the next and previous feature, "
     )
-    return _view([], "The height along the profile", keys + "0 for the whole.", data, ["profile.js"])
+    return _view(
+        [], "The height along the profile", keys + "u for another unit, 0 for the whole.", data, ["profile.js"]
+    )
 
 
 def hover_text(feature: Feature) -> list[str]:

@@ -210,23 +210,27 @@ function show(root, data) {
       gl.bindVertexArray(part.array);
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, part.count);
     }
+    // the unit that the reader chose, else the one that fits
+    const lengths = window.explore3dLengths, unit = (lengths && lengths.unit) || data.unit;
+    const factor = lengths && lengths.unit ? 1 / lengths.metres : data.factor;
     const perPixel = (2 * Math.tan(0.5 * FIELD) * camera.distance) / height;
-    const length = roundLength(0.2 * width * perPixel * data.factor);
-    bar.style.width = `${length / data.factor / perPixel}px`;
-    bar.textContent = `${+length.toPrecision(3)} ${data.unit}`;
+    const length = roundLength(0.2 * width * perPixel * factor);
+    bar.style.width = `${length / factor / perPixel}px`;
+    bar.textContent = `${+length.toPrecision(3)} ${unit}`;
     place(width, height);
   };
   const redraw = () => {
     if (!waiting) requestAnimationFrame(draw);
     waiting = true;
   };
+  const lengthsOf = (text) => (window.explore3dLengths ? window.explore3dLengths.text(text) : text);
   // The chosen feature's name and sizes, beside it
   const place = (width, height) => {
     const part = features.find((each) => each.id === chosen);
     const at = part && seenAt(part.low.map((each, i) => each + 0.5 * part.span[i]), m(), width, height);
     label.hidden = !at;
     if (!at) return;
-    label.textContent = part.text.join("\n");
+    label.textContent = lengthsOf(part.text.join("\n"));
     label.style.left = `${Math.min(Math.max(at[0] + 14, 4), width - label.offsetWidth - 4)}px`;
     label.style.top = `${Math.min(Math.max(at[1] - label.offsetHeight - 14, 4), height - label.offsetHeight - 4)}px`;
   };
@@ -365,7 +369,8 @@ function show(root, data) {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     return ray(camera, width / height, x / width, y / height);
   };
-  return { choose, pick, ray: looked, base: meshes.find((part) => !part.id), at: (id) => centreOf(features.find((each) => each.id === id)) };
+  window.addEventListener("explore3d-unit", redraw);
+  return { choose, step, pick, ray: looked, base: meshes.find((part) => !part.id), at: (id) => centreOf(features.find((each) => each.id === id)) };
 
   function centreOf(part) {
     const middle = part.low.map((each, i) => each + 0.5 * part.span[i]);

@@ -17,6 +17,9 @@ GLB_BASE_COLOUR = (0.78, 0.80, 0.83, 1.0)
 STANDS_OUT_COLOUR, LIES_UNDER_COLOUR = np.array([0.70, 0.09, 0.17]), np.array([0.13, 0.40, 0.67])
 # glTF allows no NaN in a vertex attribute: this stands for "not known".
 UNKNOWN_ATTRIBUTE = -1.0
+# glTF 2.0 (3.4, coordinate system and units): +Y is up, +Z forward. The node that turns the object's +Z up there
+OBJECT_NODE = "object"
+UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
 def glb_bytes(
@@ -28,15 +31,16 @@ def glb_bytes(
 ) -> bytes:
     """The scene as one GLB file.
 
-    Nodes: "base" and one per feature, named by its id, with the feature's record (docs/model.md) in
-    `extras`. Float32 vertex attributes: `_SIGMA`, standard deviation of the surface there, m; `_REACH`,
-    0 touched, 1 bridged, 2 extrapolated; both -1 where not known. A base that departs from the model that was
-    given has `_DEVIATION` as well, m, and its vertices' colours show it. Vertices are stored relative to the
-    middle of the base, which the nodes' matrices add back: float32 would lose it far from the origin.
+    Nodes: "object", which turns z up to glTF's y up, and below it "base" and one per feature, named by its id, with
+    the feature's record (docs/model.md) in `extras`. Float32 vertex attributes: `_SIGMA`, standard deviation of the
+    surface there, m; `_REACH`, 0 touched, 1 bridged, 2 extrapolated; both -1 where not known. A base that departs from
+    the model that was given has `_DEVIATION` as well, m, and its vertices' colours show it. Vertices are stored
+    relative to the middle of the base, which the nodes' matrices add back: float32 would lose it far from the origin.
     """
     import trimesh
 
     scene = trimesh.Scene()
+    scene.graph.update(OBJECT_NODE, "world", matrix=UPRIGHT)
     origin = base.bounds.mean(axis=0)
     _add(scene, "base", base, origin, GLB_BASE_COLOUR, sigma, reach, deviation)
     for feature in features:
@@ -86,7 +90,7 @@ def _add(
         mesh.vertex_attributes[key] = known.astype(np.float32)
     transform = np.eye(4)
     transform[:3, 3] = origin
-    scene.add_geometry(mesh, node_name=name, geom_name=name, transform=transform)
+    scene.add_geometry(mesh, node_name=name, geom_name=name, parent_node_name=OBJECT_NODE, transform=transform)
 
 
 def deviation_colours(deviation: FloatArray) -> FloatArray:

@@ -27,6 +27,7 @@ from mapping.model.json_record import (
     read_dropped,
     read_feature,
 )
+from mapping.model.plot import plot_model
 from mapping.model.table import dataframe, html_table
 
 __all__ = ["LeftOut", "ObjectModel"]
@@ -110,6 +111,17 @@ class ObjectModel:
             ModelError: pandas is not installed.
         """
         return dataframe(self.features)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw the base and its features, with matplotlib.
+
+        Args:
+            axes: of matplotlib, with projection "3d", to draw into; None: new ones.
+
+        Returns:
+            The axes.
+        """
+        return plot_model(self.base.surface, self.features, axes)
 
     def save(self, folder: Path | str) -> Path:
         """Write model.npz (arrays), model.glb (for viewers) and, last, model.json; returns its path.

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
         unit_vectors as unit_vectors,
         usual_step as usual_step,
     )
-    from explore3d.log.own.format import LOG as LOG, MAGIC as MAGIC
+    from explore3d.log.own.chunks import Damage as Damage, intact_chunks as intact_chunks
+    from explore3d.log.own.format import FRAME as FRAME, LOG as LOG, MAGIC as MAGIC, VERSION as VERSION
     from explore3d.log.own.memory import must_fit as must_fit, must_fit_analysis as must_fit_analysis
     from explore3d.log.own.reader import digest as digest, iter_log as iter_log, read_log as read_log
     from explore3d.log.own.record import (
@@ -39,6 +40,12 @@ if TYPE_CHECKING:
         head as head,
         large_log as large_log,
     )
+    from explore3d.log.own.tail import (
+        LogTail as LogTail,
+        Piece as Piece,
+        is_whole as is_whole,
+        newest_log as newest_log,
+    )
     from explore3d.log.own.writer import LogWriter as LogWriter, Recorder as Recorder
 
 _PUBLIC = {
@@ -53,7 +60,8 @@ _PUBLIC = {
         "unit_vectors",
         "usual_step",
     ),
-    "format": ("LOG", "MAGIC"),
+    "chunks": ("Damage", "intact_chunks"),
+    "format": ("FRAME", "LOG", "MAGIC", "VERSION"),
     "memory": ("must_fit", "must_fit_analysis"),
     "reader": ("digest", "iter_log", "read_log"),
     "record": (
@@ -71,6 +79,7 @@ _PUBLIC = {
         "stop_of",
     ),
     "stream": ("LogStream", "count_samples", "head", "large_log"),
+    "tail": ("LogTail", "Piece", "is_whole", "newest_log"),
     "writer": ("LogWriter", "Recorder"),
 }
 doorway(__name__, _PUBLIC)

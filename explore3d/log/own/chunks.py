@@ -27,18 +27,20 @@ _BLOCK = 1 << 16
 
 @dataclass
 class Damage:
-    """What the search met: `damaged` chunks whose checksum disagrees, `cut` True if the last one is incomplete."""
+    """What the search met: `damaged` chunks whose checksum disagrees, `cut` True if the last one is incomplete, and
+    `end`, the place behind the last intact one."""
 
     damaged: int = 0
     cut: bool = False
+    end: int = 0
 
 
-def intact_chunks(file: BinaryIO, damage: Damage) -> Iterator[list[McapRecord]]:
-    """The schemas, channels and messages of each intact chunk, in order; counts the others in `damage`."""
-    at = 0
+def intact_chunks(file: BinaryIO, damage: Damage, at: int = 0) -> Iterator[list[McapRecord]]:
+    """The schemas, channels and messages of each intact chunk from `at` on, in order; notes the rest in `damage`."""
     while (start := _next_header(file, at)) is not None:
         chunk, end = _read_chunk(file, start, damage)
         if chunk is not None:
+            damage.end = end
             yield chunk
         at = end
 

@@ -150,3 +150,26 @@ def test_the_view_says_what_the_pointer_feels_only_if_it_knows_the_tip() -> None
     (touch,) = data_of(felt)["touch"]
     assert touch["height"] == pytest.approx(0.65e-3, rel=0.1) and touch["half"] > 1e-3
     assert 'class="feel"' in felt and len(felt) - len(silent) < 9_000
+
+
+@node
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("ridge-1, 0.650 mm (0.634 to 0.666 mm)", "µm", "ridge-1, 650 µm (634 to 666 µm)"),
+        ("It is 0.650 mm (0.634 to 0.666) high", "µm", "It is 650 µm (634 to 666) high"),
+        ("12.50, -3.00, 4.25 mm", "in", "0.4921, -0.1181, 0.1673 in"),
+        ("at 30 mm/s over 5 mm² and 1.2 m", "mm", "at 30 mm/s over 5 mm² and 1200 mm"),
+        ("−0.25 mm ± 12 µm; +0.1 µm", "mm", "-0.25 mm ± 0.012 mm; +0.0001 mm"),
+        ("1,362,701 samples of 2 features", "mm", "1,362,701 samples of 2 features"),
+        ("at most 0.254 mm", "mil", "at most 10.00 mil"),
+        ("0.65 mm", "", "0.65 mm"),
+    ],
+)
+def test_lengths_are_written_in_the_unit_that_the_reader_chooses(text: str, unit: str, expected: str) -> None:
+    assert told("units.js", f"v.inUnit({json.dumps(text)}, {json.dumps(unit)})") == expected
+
+
+@node
+def test_a_range_without_a_unit_follows_the_value_beside_it() -> None:
+    assert told("units.js", 'v.inUnit("0.6439 to 0.6538", "µm", "mm")') == "643.9 to 653.8"

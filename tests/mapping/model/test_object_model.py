@@ -152,7 +152,10 @@ def test_the_glb_names_each_feature_and_keeps_its_place(tmp_path: Path, far: flo
     model(far).save(tmp_path)
     scene = trimesh.load(tmp_path / "model.glb", process=False)
     assert set(scene.graph.nodes_geometry) == {"base", "ridge-1", "bump-1", "bump-2"}
-    np.testing.assert_allclose(scene.bounds[0][:2], [far, far], atol=2e-9, rtol=2e-16)
+    turned, _ = scene.graph["object"]  # the object's z is glTF's y, which viewers have upwards
+    np.testing.assert_array_equal(turned[:3, :3], [[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    corners = scene.bounds @ turned[:3, :3]
+    np.testing.assert_allclose(corners.min(axis=0)[:2], [far, far], atol=2e-9, rtol=2e-16)
     mesh = scene.geometry["base"]
     np.testing.assert_array_equal(mesh.faces, model().base.surface.faces)
     np.testing.assert_array_equal(mesh.vertex_attributes["_REACH"].ravel(), [0, 1, 2, 2])
@@ -162,7 +165,7 @@ def test_the_glb_names_each_feature_and_keeps_its_place(tmp_path: Path, far: flo
     _, name = scene.graph["ridge-1"]
     tube = scene.geometry[name]
     assert tube.is_watertight and tube.volume > 0
-    record = scene.graph.transforms.edge_data[("world", "ridge-1")]["metadata"]
+    record = scene.graph.transforms.edge_data[("object", "ridge-1")]["metadata"]
     assert record["height"] == model().document()["features"][0]["height"]
 
 

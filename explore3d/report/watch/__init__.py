@@ -1,0 +1,22 @@
+"""What is felt, while it is felt or afterwards: a view in the browser that grows with the log."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from explore3d.report.watch.feature_panel import feature_panel as feature_panel
+    from explore3d.report.watch.touched import touched as touched
+    from explore3d.report.watch.view import (
+        Watch as Watch,
+        begin_beside as begin_beside,
+        need_viewer as need_viewer,
+        watch as watch,
+    )
+
+_PUBLIC = {
+    "feature_panel": ("feature_panel",),
+    "touched": ("touched",),
+    "view": ("Watch", "begin_beside", "need_viewer", "watch"),
+}
+doorway(__name__, _PUBLIC)

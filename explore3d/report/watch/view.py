@@ -1,0 +1,322 @@
+"""watch: a session in the browser, finished or while it grows, from its log alone; whatever happens here, no run knows.
+
+The view is another program than the run: it reads the log that the run writes anyway, costs the run nothing, and may
+die at any moment.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import math
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from explore3d import UserError, count_text, seconds_text
+from explore3d.log import LOG, LogTail, Piece, digest, is_whole, newest_log, read_base
+from explore3d.report.watch.feature_panel import feature_panel
+from explore3d.report.watch.stage import LAYERS_SHOWN, Stage
+from explore3d.report.watch.touched import touched
+from mapping import MappingError, ObjectModel
+
+# s between two looks at a log that grows: half of the second within which a sample is to be seen
+GROWTH_PERIOD = 0.5
+# s without a browser after which a view that a run began ends, once that run has
+LINGER = 10.0
+# Priority of a view beside a run: the finger goes before it
+NICE = 10
+NO_FEATURE = "none"
+WAITING = "waiting for the first sample"
+
+
+class Watch:
+    """A view of one session, served to browsers on this machine.
+
+    Args:
+        place: folder of a session, or a log; a model beside the log is shown with it.
+        live: the run that is under way in that folder, or is about to begin, rather than the session that is there.
+        port: of the server; the next free one if it is taken.
+        host: address to serve on; others than this machine see the view only if it is one of the network's.
+
+    Raises:
+        UserError: viser is not installed, or there is neither a log nor a model.
+    """
+
+    def __init__(self, place: Path | str, *, live: bool = False, port: int = 8080, host: str = "127.0.0.1") -> None:
+        need_viewer()
+        import viser
+
+        self.place = Path(place)
+        self.live = live
+        self._begun = time.time_ns()
+        self.model: ObjectModel | None = None
+        self.tail: LogTail | None = None
+        self._open_log()
+        if not live and self.tail is None and not (self.place / "model.json").is_file():
+            raise UserError(f"{self.place}: holds neither {LOG} nor a model; explore3d run or analyze makes them")
+        self._lock = threading.RLock()
+        self._pictures: list[Any] = []
+        self._model_time = 0
+        self._under_way = 0  # samples at the end that come again
+        with contextlib.redirect_stdout(io.StringIO()):  # the library greets on stdout, where results belong
+            self.server = viser.ViserServer(host=host, port=port, label="explore3d", verbose=False)
+        self.url = f"http://{host}:{self.server.get_port()}"
+        self.server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
+        self.server.gui.main_panel.dock_right()
+        self.stage = Stage(self.server, self.choose)
+        self._controls()
+
+    def look(self) -> bool:
+        """Show what is new; True if there was anything."""
+        with self._lock:
+            grown = self._look_at_log()
+            if self._look_at_model():
+                grown = True
+            if grown:
+                self._tell()
+            return grown
+
+    def choose(self, name: str | None) -> None:
+        """Mark a feature and tell of it; None marks none."""
+        with self._lock:
+            name = name if name in self.stage.features else None
+            self.stage.choose(name)
+            self._choice.value = name or NO_FEATURE
+            for each in self._pictures:
+                each.remove()
+            self._pictures = []
+            if name is None or self.model is None:
+                self._words.content = "Click a feature: sizes, evidence, profile, posterior."
+                return
+            words, pictures = feature_panel(self.stage.features[name], self.model.base, self.stage.trace())
+            self._words.content = words
+            self._pictures = [self.server.gui.add_html(_fitted(each)) for each in pictures]
+
+    def scrub(self, t: float) -> None:
+        """Show what had been felt until a time of the finger, s."""
+        with self._lock:
+            self.stage.show_until(self.stage.count_at(t))
+
+    def close(self) -> None:
+        """Let go of the port."""
+        with contextlib.redirect_stdout(io.StringIO()):  # it says so
+            self.server.stop()
+
+    # the panel
+
+    def _controls(self) -> None:
+        gui = self.server.gui
+        self._state = gui.add_markdown(WAITING)
+        self._time = gui.add_slider("finger time, s", min=0.0, max=1.0, step=0.001, initial_value=1.0)
+        self._follows = gui.add_checkbox("follow the finger", initial_value=True)
+        self._choice = gui.add_dropdown("feature", options=(NO_FEATURE,), initial_value=NO_FEATURE)
+        gui.add_button("show all").on_click(lambda _: self.stage.look_at(None))
+        with gui.add_folder("layers", expand_by_default=False):
+            for name in LAYERS_SHOWN:
+                box = gui.add_checkbox(name, initial_value=True)
+                box.on_update(lambda event, name=name: self.stage.show_layer(name, event.target.value))
+        self._words = gui.add_markdown("")
+        self._time.on_update(self._scrubbed)
+        self._follows.on_update(lambda _: self._show_all())
+        self._choice.on_update(self._chosen)
+        self.choose(None)
+
+    def _scrubbed(self, event: Any) -> None:
+        if event.client is None:  # set by this program
+            return
+        with self._lock:
+            self._follows.value = self._time.value >= self._time.max
+            self.scrub(self._time.value)
+
+    def _chosen(self, event: Any) -> None:
+        if event.client is None:
+            return
+        name = None if self._choice.value == NO_FEATURE else self._choice.value
+        self.choose(name)
+        self.stage.look_at(name)
+
+    def _show_all(self) -> None:
+        with self._lock:
+            if self._follows.value:
+                self._time.value = self._time.max
+                self.stage.show_until(self.stage.count)
+
+    def _tell(self) -> None:
+        count = self.stage.count
+        self._time.visible = self._follows.visible = self.tail is not None or self.live
+        if count:
+            end = float(self.stage.t[count - 1])
+            self._time.max = max(math.ceil(1e3 * end) / 1e3, 1e-3)  # the slider steps by milliseconds
+            if self._follows.value:
+                self._show_all()
+        title = (self.tail.title if self.tail is not None else "") or self.place.name
+        samples = f"{count:,} samples, {seconds_text(float(self.stage.t[count - 1]))}" if count else WAITING
+        if self.tail is None:
+            samples = f"the model alone: {LOG} is not in this folder"
+        elif not self.tail.closed and count:
+            samples = f"growing: {samples}"
+        found = "" if self.model is None else f"; {count_text(len(self.model), 'feature')}"
+        self._state.content = f"**{_escaped(title)}**\n\n{samples}{found}"
+
+    # what is on the disk
+
+    def _open_log(self) -> None:
+        if self.place.is_file():
+            path: Path | None = self.place
+        elif self.live:
+            path = newest_log(self.place) if self.place.is_dir() else None
+            if path is not None and self.tail is None and path.stat().st_mtime_ns < self._begun and is_whole(path):
+                path = None  # of an earlier run
+        else:
+            own = self.place / LOG
+            path = own if own.is_file() else None if (self.place / "model.json").is_file() else newest_log(self.place)
+        if path is not None and self.tail is None:
+            self.tail = LogTail(path)
+        elif path is not None and self.tail is not None:
+            self.tail.path = path
+
+    def _look_at_log(self) -> bool:
+        if self.tail is None and self.live:
+            self._open_log()
+        if self.tail is None:
+            return False
+        try:
+            pieces, events, anew = self.tail.look()
+        except FileNotFoundError:  # its session took its place in the folder: the same file, elsewhere
+            self._open_log()
+            return False
+        if anew:
+            self.stage.clear()
+            self._under_way = 0
+        base = read_base(events)
+        if base is not None:
+            self.stage.show_base(base.surface)
+        if pieces:
+            self.stage.take_back(self._under_way)
+            self._under_way = 0
+        for piece in pieces:
+            self._add(piece)
+        return bool(pieces or events)
+
+    def _add(self, piece: Piece) -> None:
+        assert self.tail is not None and self.tail.tip_radius is not None
+        self.stage.tip_radius = self.tail.tip_radius
+        samples = piece.samples
+        centers = np.column_stack([samples["x"], samples["y"], samples["z"]])
+        self.stage.add(touched(piece, self.tail.tip_radius), centers, samples["t"], samples["sweep"])
+        if piece.under_way:
+            self._under_way = len(samples)
+
+    def _look_at_model(self) -> bool:
+        """Load the model beside the log where it is new, and, of a run that grows, the model of this very log."""
+        folder = self.place if self.tail is None or not self.place.is_file() else self.place.parent
+        if self.live and self.tail is not None:
+            folder = self.tail.path.parent
+        if self.live and (self.tail is None or not self.tail.closed):
+            return False
+        file = folder / "model.json"
+        try:
+            written = file.stat().st_mtime_ns
+        except FileNotFoundError:
+            return False
+        if written == self._model_time:
+            return False
+        self._model_time = written
+        if self.live and self.tail is not None and _log_of(file) != digest(self.tail.path):
+            return False
+        try:
+            self.model = ObjectModel.load(file)
+        except MappingError:  # arrays and record are written one after the other
+            self._model_time = 0
+            return False
+        self.stage.show_base(self.model.base.surface)
+        self.stage.show_features(self.model.features)
+        self._choice.options = (NO_FEATURE, *(each.id for each in self.model.features))
+        return True
+
+
+def watch(
+    place: Path | str,
+    *,
+    live: bool = False,
+    port: int = 8080,
+    host: str = "127.0.0.1",
+    attached: bool = False,
+    told: Callable[[Watch], None] = lambda view: None,
+) -> None:
+    """Serve a view until Ctrl-C, and keep it up to date; arguments as for Watch.
+
+    Args:
+        attached: end once standard input has ended and no browser looks on any more: of a view that a run began.
+        told: given the view as soon as it shows what there is.
+    """
+    view = Watch(place, live=live, port=port, host=host)
+    ended = _when_input_ends() if attached else None
+    alone = 0.0
+    try:
+        view.look()
+        told(view)
+        while ended is None or not ended.is_set() or alone < LINGER:
+            time.sleep(GROWTH_PERIOD)
+            view.look()
+            alone = 0.0 if view.server.get_clients() else alone + GROWTH_PERIOD
+    finally:
+        view.close()
+
+
+def begin_beside(out: Path | str) -> subprocess.Popen[bytes]:
+    """Begin the view of a run that is about to write into a folder, as a program of its own.
+
+    It says on stderr where it is, outlives the run as long as a browser looks at it, and takes no signal of the run's.
+
+    Raises:
+        UserError: viser is not installed.
+    """
+    need_viewer()
+    command = [sys.executable, "-m", "explore3d", "watch", str(out), "--live", "--attached"]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=sys.stderr, start_new_session=True)
+
+
+def need_viewer() -> None:
+    """Raises UserError: viser is not installed."""
+    if find_spec("viser") is None:
+        raise UserError('the view needs viser: pip install "explore3d[watch]"')
+
+
+def _when_input_ends() -> threading.Event:
+    ended = threading.Event()
+    if hasattr(os, "nice"):
+        os.nice(NICE)
+
+    def wait() -> None:
+        sys.stdin.buffer.read()
+        ended.set()
+
+    threading.Thread(target=wait, daemon=True).start()
+    return ended
+
+
+def _log_of(model: Path) -> str:
+    """Digest of the log that a model was made of."""
+    return str(json.loads(model.read_text("utf-8"))["provenance"].get("log_sha256"))
+
+
+def _fitted(picture: bytes) -> str:
+    """An SVG as wide as the panel, on paper."""
+    source = picture.decode().replace("<svg", '<svg style="width:100%;height:auto;background:#fff"', 1)
+    return f'<div style="padding:0.3em 0.6em">{source}</div>'
+
+
+def _escaped(text: str) -> str:
+    """Text that Markdown takes as it is."""
+    return "".join(f"\\{each}" if each in "\\`*_{}[]<>()#+-.!|" else each for each in text)

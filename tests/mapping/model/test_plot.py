@@ -1,0 +1,48 @@
+"""Models, features and posteriors draw themselves with matplotlib: what is on the axes is what they hold."""
+
+from dataclasses import replace
+
+import matplotlib
+import numpy as np
+import pytest
+from reported_wire import BASE, ridge
+
+from mapping.feature import Interval
+from mapping.model.object_model import ObjectModel
+from mapping.posterior import Posterior
+
+
+@pytest.fixture(autouse=True)
+def without_a_screen() -> None:
+    matplotlib.use("Agg")
+
+
+def test_a_model_names_each_feature_where_it_is() -> None:
+    model = ObjectModel.attach(BASE, (ridge(),))
+    axes = model.plot()
+    (label,) = axes.texts
+    assert label.get_text().strip() == "ridge-1"
+    middle = model["ridge-1"].axis[len(model["ridge-1"].axis) // 2]
+    np.testing.assert_allclose(label.get_position_3d(), 1e3 * middle, atol=1e-9)
+    assert axes.get_xlabel() == "x (mm)"
+    assert len(axes.collections) == 2  # the base and the ridge
+
+
+def test_a_feature_shows_each_size_with_its_interval() -> None:
+    feature = replace(ridge(), id="ridge-7", width=Interval(1e-3, 8e-4, 1.1e-3))
+    axes = feature.plot()
+    assert axes.get_title() == "ridge-7"
+    names = [each.get_text() for each in axes.get_yticklabels()]
+    assert "width" in names
+    bar = axes.lines[2 * names.index("width")]
+    np.testing.assert_allclose(bar.get_xdata(), [0.8, 1.1])
+    assert str(feature.width) in {each.get_text() for each in axes.texts}
+
+
+def test_a_posterior_has_a_panel_for_each_parameter() -> None:
+    draws = np.random.default_rng(1).normal([1.0, 2.0, 3.0, 4.0, 5.0], 0.1, (300, 5))
+    names = ("height", "width", "x", "angle", "end")
+    figure = Posterior(names, ("m", "m", "m", "rad", ""), draws, 1.0, 0.3, "converged").plot()
+    assert [each.get_xlabel() for each in figure.axes] == ["height (m)", "width (m)", "x (m)", "angle (rad)", "end"]
+    median = figure.axes[2].lines[0].get_xdata()[0]
+    assert median == pytest.approx(np.median(draws[:, 2]))
