@@ -38,7 +38,8 @@ def export(
         Path, typer.Argument(metavar="SOURCE", help="Model (folder or model.json); for X3P a log, or its session.")
     ],
     to: Annotated[
-        list[Path], typer.Option("--to", help="NAME.csv, NAME.dxf, NAME.x3p, ro-crate-metadata.json; may be repeated.")
+        list[Path],
+        typer.Option("--to", help="NAME.csv, .dxf, .qif, .mcap, .x3p, or ro-crate-metadata.json; may be repeated."),
     ],
     tip_radius: TipRadius = None,
     units: Units = None,
@@ -46,11 +47,13 @@ def export(
     pixel: Pixel = None,
     part: Part = None,
 ) -> None:
-    """Write crest lines (CSV, DXF), heights over the base beside the features (X3P), or a session's record (RO-Crate).
+    """Write crest lines (CSV, DXF), measured results (QIF), the log with the features drawn in it (MCAP), heights over
+    the base beside the features (X3P), or a session's record (RO-Crate).
 
     Example: explore3d export out/wire --to crests.dxf --to crests.csv
     """
-    from explore3d.jobs import Told, export as write
+    from explore3d.jobs import Told
+    from explore3d.jobs.export import export as write
 
     table = {"units": units, "columns": columns, "pixel": pixel, "part": part}
     told = Told(tip_radius, table={name: value for name, value in table.items() if value is not None})

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
         unit_vectors as unit_vectors,
         usual_step as usual_step,
     )
-    from explore3d.log.format import LOG as LOG, MAGIC as MAGIC
+    from explore3d.log.chunks import Damage as Damage, intact_chunks as intact_chunks
+    from explore3d.log.format import FRAME as FRAME, LOG as LOG, MAGIC as MAGIC
     from explore3d.log.inspect import Inspection as Inspection, inspect as inspect
     from explore3d.log.load import load_logs as load_logs
     from explore3d.log.memory import must_fit as must_fit, must_fit_analysis as must_fit_analysis
@@ -60,7 +61,8 @@ _PUBLIC = {
         "unit_vectors",
         "usual_step",
     ),
-    "format": ("LOG", "MAGIC"),
+    "chunks": ("Damage", "intact_chunks"),
+    "format": ("FRAME", "LOG", "MAGIC"),
     "inspect": ("Inspection", "inspect"),
     "load": ("load_logs",),
     "memory": ("must_fit", "must_fit_analysis"),
