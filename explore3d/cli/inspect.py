@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -11,7 +11,9 @@ from explore3d.cli.options import Average, Columns, Json, Part, Pixel, TipRadius
 
 
 def inspect(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A log, a session folder, a table, a point list.")],
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="A log, a session folder, a table, a point list; or an address.")
+    ],
     tip_radius: TipRadius = None,
     units: Units = None,
     columns: Columns = None,
@@ -27,9 +29,18 @@ def inspect(
     from dataclasses import asdict
     from json import dumps
 
+    from explore3d.jobs.batch import inspect_at
     from explore3d.log import inspect as look
 
-    found = look(file, tip_radius=tip_radius, units=units, columns=columns, pixel=pixel, part=part, average=average)
+    settings: dict[str, Any] = {
+        "tip_radius": tip_radius,
+        "units": units,
+        "columns": columns,
+        "pixel": pixel,
+        "part": part,
+    }
+    settings |= {"average": average}
+    found = inspect_at(file, settings) if "://" in file else look(file, **settings)
     print(dumps(asdict(found), ensure_ascii=False, allow_nan=False) if json else "\n".join(found.lines()))
 
 

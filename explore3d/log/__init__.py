@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         usual_step as usual_step,
     )
     from explore3d.log.chunks import Damage as Damage, intact_chunks as intact_chunks
-    from explore3d.log.format import FRAME as FRAME, LOG as LOG, MAGIC as MAGIC
+    from explore3d.log.format import FRAME as FRAME, LOG as LOG, MAGIC as MAGIC, VERSION as VERSION
     from explore3d.log.inspect import Inspection as Inspection, inspect as inspect
     from explore3d.log.load import load_logs as load_logs
     from explore3d.log.memory import must_fit as must_fit, must_fit_analysis as must_fit_analysis
@@ -62,7 +62,7 @@ _PUBLIC = {
         "usual_step",
     ),
     "chunks": ("Damage", "intact_chunks"),
-    "format": ("FRAME", "LOG", "MAGIC"),
+    "format": ("FRAME", "LOG", "MAGIC", "VERSION"),
     "inspect": ("Inspection", "inspect"),
     "load": ("load_logs",),
     "memory": ("must_fit", "must_fit_analysis"),
