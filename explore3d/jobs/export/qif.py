@@ -10,10 +10,11 @@ import uuid
 import xml.etree.ElementTree as ET
 from decimal import Decimal
 from itertools import count
+from typing import Any
 
 from explore3d import __version__
 from mapping import Feature, Interval
-from mapping.model import ObjectModel, probability
+from mapping.model import DISPROOF, FAIL, PASS, PROOF, ObjectModel, probability
 
 QIF_NAMESPACE = "http://qifstandards.org/xsd/qif3"
 QIF_VERSION = "3.0.0"
@@ -29,9 +30,10 @@ def qif_results(model: ObjectModel) -> bytes:
     """A QIF document (XML) of what was found, in mm.
 
     A bump or pit is a point, all others are curves through the vertices of their axes. Each known size is a
-    characteristic that was measured without a tolerance: its median, with half the 90 % interval over 1.645 as its
-    combined standard uncertainty and the interval's ends as attributes. A size that the data only bound has no value,
-    only those ends. Depths of pits and grooves are positive.
+    characteristic: its median, with half the 90 % interval over 1.645 as its combined standard uncertainty and the
+    interval's ends as attributes. A size that the data only bound has no value, only those ends. Depths of pits and
+    grooves are positive. Where the scene allows a size limits, the characteristic has them, and passes or fails if
+    that is proved (mapping.model.Tolerance); one of each tolerance, where several speak of a size.
     """
     written = _Document(model)
     return written.content()
@@ -130,8 +132,16 @@ class _Document:
             ("Width", feature.width),
             ("Length", feature.length),
         ):
-            if size.low == size.low:  # not NaN: the data say something about it
-                self._size(feature.id, number, name, size)
+            if not (size.low == size.low and (size.low or size.high)):
+                continue  # not known, or none: a step has no width
+            asked = [
+                (of, each["probability"])
+                for of in self.model.provenance.get("tolerances", ())
+                for each in of["features"]
+                if each["id"] == feature.id and of["size"] in (name.lower(), "height" if name == "Depth" else "")
+            ]
+            for tolerance, conforms in asked or [(None, None)]:
+                self._size(feature.id, number, name, size, tolerance, conforms)
 
     def _about(self, measured: ET.Element, feature: Feature) -> None:
         known = {"position_sd": _decimal(float(feature.position_sd) / _MILLIMETRE)}
@@ -140,12 +150,35 @@ class _Document:
         _attributes(measured, {"kind": feature.kind} | known)
         _add(measured, "FeatureName", feature.id)
 
-    def _size(self, feature: str, number: str, name: str, size: Interval) -> None:
-        """A size as definition, nominal, item and measurement, each of which names the one before."""
+    def _size(
+        self,
+        feature: str,
+        number: str,
+        name: str,
+        size: Interval,
+        tolerance: dict[str, Any] | None,
+        conforms: float | None,
+    ) -> None:
+        """A size as definition, nominal, item and measurement, each of which names the one before.
+
+        Args:
+            feature, number: its name and the id of its measurement.
+            name: of the characteristic.
+            size: m.
+            tolerance: a record of mapping.model.Judgement, None if nobody asked for limits.
+            conforms: the probability that the size lies within them, None if it is not known.
+        """
         kind = f"{name}Characteristic"
         definition = ET.Element(f"{kind}Definition", id=self._new())
         _add(definition, "Name", f"{feature} {name.lower()}")
-        _add(definition, "NonTolerance", "MEASURED")
+        if tolerance is None:
+            _add(definition, "NonTolerance", "MEASURED")
+        else:
+            limits = _add(definition, "Tolerance")
+            for bound, limit in (("MaxValue", tolerance["limit"]), ("MinValue", tolerance["least"] or None)):
+                if limit is not None:
+                    _add(limits, bound, _decimal(limit / _MILLIMETRE))
+            _add(limits, "DefinedAsLimit", "true")
         nominal = ET.Element(f"{kind}Nominal", id=self._new())
         _add(nominal, "CharacteristicDefinitionId", definition.attrib["id"])
         item = ET.Element(f"{kind}Item", id=self._new())
@@ -154,7 +187,7 @@ class _Document:
         measurement = ET.Element(f"{kind}Measurement", id=self._new())
         ends = {"low": size.low} if size.censored and not size.bounded else {"low": size.low, "high": size.high}
         _attributes(measurement, {end: _decimal(value / _MILLIMETRE) for end, value in ends.items()})
-        _add(_add(measurement, "Status"), "CharacteristicStatusEnum", "NOT_ANALYZED")
+        _add(_add(measurement, "Status"), "CharacteristicStatusEnum", _status(tolerance, conforms))
         _add(measurement, "CharacteristicItemId", item.attrib["id"])
         _add(_add(measurement, "FeatureMeasurementIds", n="1"), "Id", number)
         if not size.censored:
@@ -175,8 +208,18 @@ class _Document:
             _list(one, "MeasuredFeatures", self.features)
         if self.measurements:
             _list(_add(one, "MeasuredCharacteristics"), "CharacteristicMeasurements", self.measurements)
-        _add(_add(one, "InspectionStatus"), "InspectionStatusEnum", "NOT_CALCULATED")
+        verdicts = {each["verdict"] for each in self.model.provenance.get("tolerances", ())}
+        whole = "FAIL" if FAIL in verdicts else "PASS" if verdicts == {PASS} else "UNKNOWN"
+        _add(_add(one, "InspectionStatus"), "InspectionStatusEnum", whole if verdicts else "NOT_CALCULATED")
         return results
+
+
+def _status(tolerance: dict[str, Any] | None, conforms: float | None) -> str:
+    if tolerance is None:
+        return "NOT_ANALYZED"
+    if conforms is None:
+        return "INDETERMINATE"
+    return "PASS" if conforms >= PROOF else "FAIL" if conforms <= DISPROOF else "INDETERMINATE"
 
 
 def _add(parent: ET.Element, name: str, text: str = "", **attributes: str) -> ET.Element:

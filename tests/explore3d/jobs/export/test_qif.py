@@ -10,7 +10,7 @@ from two_features import two_features
 
 from explore3d.jobs.export.qif import QIF_NAMESPACE, qif_results
 from mapping import Interval
-from mapping.model import ObjectModel
+from mapping.model import ObjectModel, Tolerance, judged
 
 NAMES = {"q": QIF_NAMESPACE}
 
@@ -74,6 +74,44 @@ def test_what_is_only_bounded_has_no_value_and_a_depth_is_positive() -> None:
     assert first.find("q:Value", NAMES) is None
     assert [each.attrib["name"] for each in first.iter(f"{{{QIF_NAMESPACE}}}AttributeStr")] == ["low"]
     assert len(root.findall(".//q:WidthCharacteristicMeasurement", NAMES)) == 1
+
+
+def test_limits_of_the_scene_stand_with_the_size_and_are_judged() -> None:
+    model = two_features()
+    asked = (
+        Tolerance("ridge", "height", limit=0.9e-3),
+        Tolerance("ridge", "width", limit=1.5e-3, least=0.5e-3),
+        Tolerance("bump", "height", limit=1e-3),
+    )
+    found = [each.record() for each in judged(model.features, asked, 0.1e-3, 1.0)]
+    root = document(replace(model, provenance={"tolerances": found}))
+    status = {
+        (root.findtext(f".//*[@id='{each.findtext('q:CharacteristicItemId', '', NAMES)}']/q:Name", "", NAMES)): (
+            each.findtext("q:Status/q:CharacteristicStatusEnum", "", NAMES)
+        )
+        for each in root.iterfind(".//q:CharacteristicMeasurements/*", NAMES)
+    }
+    assert status == {
+        "ridge-1 height": "FAIL",
+        "ridge-1 width": "PASS",
+        "ridge-1 length": "NOT_ANALYZED",
+        "bump-1 height": "INDETERMINATE",
+        "bump-1 width": "NOT_ANALYZED",
+        "bump-1 length": "NOT_ANALYZED",
+    }
+    limits = root.find(".//q:WidthCharacteristicDefinition/q:Tolerance", NAMES)
+    assert limits is not None and [(each.tag.rpartition("}")[2], each.text) for each in limits] == [
+        ("MaxValue", "1.5"),
+        ("MinValue", "0.5"),
+        ("DefinedAsLimit", "true"),
+    ]
+    assert root.findtext(".//q:InspectionStatus/q:InspectionStatusEnum", "", NAMES) == "FAIL"
+
+
+def test_a_size_that_a_feature_does_not_have_is_not_written() -> None:
+    model, none = two_features(), Interval(0.0, 0.0, 0.0)
+    root = document(replace(model, features=(replace(model.features[0], width=none),)))
+    assert root.find(".//q:WidthCharacteristicMeasurement", NAMES) is None
 
 
 def test_numbers_have_no_exponent_and_the_same_model_gives_the_same_bytes() -> None:
