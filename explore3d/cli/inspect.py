@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -11,7 +11,9 @@ from explore3d.cli.options import Average, Columns, Json, Part, Pixel, TipRadius
 
 
 def inspect(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A log, a session folder, a table, a point list.")],
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="A log, a session folder, a table, a point list; or an address.")
+    ],
     tip_radius: TipRadius = None,
     units: Units = None,
     columns: Columns = None,
@@ -27,9 +29,18 @@ def inspect(
     from dataclasses import asdict
     from json import dumps
 
+    from explore3d.jobs.batch import inspect_at
     from explore3d.log import inspect as look
 
-    found = look(file, tip_radius=tip_radius, units=units, columns=columns, pixel=pixel, part=part, average=average)
+    settings: dict[str, Any] = {
+        "tip_radius": tip_radius,
+        "units": units,
+        "columns": columns,
+        "pixel": pixel,
+        "part": part,
+    }
+    settings |= {"average": average}
+    found = inspect_at(file, settings) if "://" in file else look(file, **settings)
     print(dumps(asdict(found), ensure_ascii=False, allow_nan=False) if json else "\n".join(found.lines()))
 
 
@@ -38,7 +49,8 @@ def export(
         Path, typer.Argument(metavar="SOURCE", help="Model (folder or model.json); for X3P a log, or its session.")
     ],
     to: Annotated[
-        list[Path], typer.Option("--to", help="NAME.csv, NAME.dxf, NAME.x3p, ro-crate-metadata.json; may be repeated.")
+        list[Path],
+        typer.Option("--to", help="NAME.csv, .dxf, .qif, .mcap, .x3p, or ro-crate-metadata.json; may be repeated."),
     ],
     tip_radius: TipRadius = None,
     units: Units = None,
@@ -46,11 +58,13 @@ def export(
     pixel: Pixel = None,
     part: Part = None,
 ) -> None:
-    """Write crest lines (CSV, DXF), heights over the base beside the features (X3P), or a session's record (RO-Crate).
+    """Write crest lines (CSV, DXF), measured results (QIF), the log with the features drawn in it (MCAP), heights over
+    the base beside the features (X3P), or a session's record (RO-Crate).
 
     Example: explore3d export out/wire --to crests.dxf --to crests.csv
     """
-    from explore3d.jobs import Told, export as write
+    from explore3d.jobs import Told
+    from explore3d.jobs.export import export as write
 
     table = {"units": units, "columns": columns, "pixel": pixel, "part": part}
     told = Told(tip_radius, table={name: value for name, value in table.items() if value is not None})

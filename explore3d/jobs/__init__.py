@@ -13,22 +13,20 @@ if TYPE_CHECKING:
     )
     from explore3d.jobs.compare import Compared as Compared, compare_scans as compare_scans, watched as watched
     from explore3d.jobs.expedition import Explored as Explored, Explorer as Explorer, explorer as explorer
-    from explore3d.jobs.export import export as export
     from explore3d.jobs.merge import load as load, merge as merge
     from explore3d.jobs.plan import plan_into as plan_into, plan_scene as plan_scene
     from explore3d.jobs.resume import Execute as Execute, Replay as Replay
     from explore3d.jobs.run import cause as cause, open_scene as open_scene, run as run, scene_finger as scene_finger
-    from explore3d.jobs.session import locked as locked, undisturbed as undisturbed
+    from explore3d.jobs.session import MARKER as MARKER, locked as locked, undisturbed as undisturbed
 
 _PUBLIC = {
     "analyze": ("Told", "analyze", "analyze_each", "log_path"),
     "compare": ("Compared", "compare_scans", "watched"),
     "expedition": ("Explored", "Explorer", "explorer"),
-    "export": ("export",),
     "merge": ("load", "merge"),
     "plan": ("plan_into", "plan_scene"),
     "resume": ("Execute", "Replay"),
     "run": ("cause", "open_scene", "run", "scene_finger"),
-    "session": ("locked", "undisturbed"),
+    "session": ("MARKER", "locked", "undisturbed"),
 }
 doorway(__name__, _PUBLIC)

@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from mapping.model.table import SIZES as SIZES, probability as probability, rows as rows
     from mapping.model.tolerance import (
         ANY as ANY,
+        DISPROOF as DISPROOF,
         FAIL as FAIL,
         PASS as PASS,
+        PROOF as PROOF,
         TOLERATED_SIZES as TOLERATED_SIZES,
         UNDECIDED as UNDECIDED,
         Judgement as Judgement,
@@ -38,7 +40,18 @@ _PUBLIC = {
     "object_model": ("ObjectModel",),
     "registration": ("Registration", "register"),
     "table": ("SIZES", "probability", "rows"),
-    "tolerance": ("ANY", "FAIL", "PASS", "TOLERATED_SIZES", "UNDECIDED", "Judgement", "Tolerance", "judged"),
+    "tolerance": (
+        "ANY",
+        "DISPROOF",
+        "FAIL",
+        "PASS",
+        "PROOF",
+        "TOLERATED_SIZES",
+        "UNDECIDED",
+        "Judgement",
+        "Tolerance",
+        "judged",
+    ),
     "touchable": ("touchable",),
 }
 doorway(__name__, _PUBLIC)

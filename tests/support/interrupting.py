@@ -15,6 +15,8 @@ from scene_files import write_scene_file
 
 ROOT = Path(__file__).resolve().parents[2]
 ASSETS = ROOT / "assets"
+# s: a job of ten CPU seconds may be given a twentieth of a core; only what hangs takes longer
+STUCK_AFTER = 900.0
 SCENE = """
 schema = "explore3d/scene/1"
 title = "A bare tile"
@@ -72,13 +74,13 @@ def explore3d(*words: object, after: float | None = None, how: str = "SIGINT", w
         text=True,
     )
     if after is not None:
-        patience = time.monotonic() + 60.0
+        patience = time.monotonic() + STUCK_AFTER
         while when is not None and not when.exists() and process.poll() is None and time.monotonic() < patience:
             time.sleep(0.002)
         time.sleep(after)
         if process.poll() is None:
             process.send_signal(getattr(signal, how))
-    out, err = process.communicate(timeout=120)
+    out, err = process.communicate(timeout=STUCK_AFTER)
     return Ended(process.returncode, out, err)
 
 

@@ -114,6 +114,26 @@ def local(log: str) -> Iterator[Path]:
         yield copy
 
 
+@contextlib.contextmanager
+def open_at(address: str, near: int) -> Iterator[Any]:
+    """A file of an object store or a web server, read by ranges: what is asked for and some bytes around it.
+
+    Args:
+        address: where it lies.
+        near: bytes that are fetched together.
+
+    Raises:
+        UserError: it cannot be opened.
+    """
+    files, path = _filesystem(address)
+    try:
+        opened = files.open(path, "rb", block_size=near, cache_type="blockcache")
+    except OSError as error:
+        raise UserError(f"{address}: cannot be opened: {error.strerror or error}") from error
+    with opened as file:
+        yield file
+
+
 def sha256_of(log: str) -> str:
     """Digest of a log's bytes, wherever it lies. Raises OSError."""
     if not is_remote(log):

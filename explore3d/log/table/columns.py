@@ -134,7 +134,8 @@ def _positions(table: TableText, taken: set[int]) -> dict[str, int]:
 
 def _by_number(table: TableText, free: list[int]) -> dict[str, int]:
     """Positions without names: two columns are a profile, three are x, y, z, if nothing speaks against it."""
-    rows = table.rows[np.isfinite(table.rows[:, free]).all(axis=1)]
+    known = np.isfinite(table.rows[:, free]).all(axis=1)
+    rows = table.rows if known.all() else table.rows[known]
     columns = [rows[:, index] for index in free]
     if len(rows) < LEAST_ROWS:
         if len(free) == 2:
@@ -142,7 +143,7 @@ def _by_number(table: TableText, free: list[int]) -> dict[str, int]:
         if len(free) == 3:
             return dict(zip(POSITION, free, strict=True))
         raise _cannot_tell(table, "")
-    marks = [index for index, column in zip(free, columns, strict=True) if set(np.unique(column)) == {0.0, 1.0}]
+    marks = [index for index, column in zip(free, columns, strict=True) if is_mark(column)]
     if marks and len(free) > 2:
         raise _cannot_tell(table, f"column {marks[0] + 1} holds nothing but 0 and 1: a mark?")
     counter = counts(columns[0])
@@ -171,6 +172,13 @@ def counts(column: FloatArray) -> bool:
     if column[0] not in (0.0, 1.0) or column[-1] != column[0] + len(column) - 1:  # most columns, at no cost
         return False
     return bool(np.array_equal(column, column[0] + np.arange(len(column))))
+
+
+def is_mark(column: FloatArray) -> bool:
+    """True if a column holds both 0 and 1, and nothing else."""
+    if column.min() != 0.0 or column.max() != 1.0:  # most columns, at no cost
+        return False
+    return bool(((column == 0.0) | (column == 1.0)).all())
 
 
 def advances(column: FloatArray) -> bool:

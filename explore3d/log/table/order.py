@@ -14,6 +14,7 @@ _NINES = (999, 9999, 99999, 999999, 999.9, 9999.9, 999.99, 999.999)
 _INTEGERS = (32767, 32768, 65535, 2147483647, 2147483648, 4294967295)
 _HUGE = (1e10, 1e20, 1e30, 1e31, 1e36, 1e37, 1e38, 9.96921e36, 3.4028235e38)
 SENTINELS = np.sort([sign * value for value in (*_NINES, *_INTEGERS, *_HUGE) for sign in (-1, 1)])
+LEAST_SENTINEL = float(np.abs(SENTINELS).min())
 _KNOWN = frozenset(SENTINELS.tolist())
 OUTSIDE = 0.5  # of the range of the others: a sentinel of that kind stands off by more
 LONELY = 5.0  # ranges of the others: a value that repeats and is no known sentinel must stand off by more
@@ -48,26 +49,38 @@ def sentinels(values: FloatArray) -> BoolArray:
     if _plain(values):
         return np.zeros(len(values), dtype=np.bool_)
     finite = np.isfinite(values)
-    near = np.minimum(np.searchsorted(SENTINELS, values), len(SENTINELS) - 1)
-    known = finite & ((SENTINELS[near] == values) | (np.abs(values) >= 1e30))
-    rest = values[finite & ~known]
+    known: BoolArray = np.zeros(len(values), dtype=np.bool_)
+    if np.max(np.abs(values), where=finite, initial=0.0) >= LEAST_SENTINEL:
+        near = np.minimum(np.searchsorted(SENTINELS, values), len(SENTINELS) - 1)
+        known = finite & ((SENTINELS[near] == values) | (np.abs(values) >= 1e30))
+    usual = finite & ~known
+    count = np.count_nonzero(usual)
     found: BoolArray = np.zeros(len(values), dtype=np.bool_)
-    if len(rest) < FEWEST:
+    if count < FEWEST:
         return found
-    low, high = float(rest.min()), float(rest.max())
+    low, high = _range(values, usual)
     room = OUTSIDE * (high - low)
-    found |= known & ((values < low - room) | (values > high + room))
-    if len(rest) < 4 * REPEATS:
+    if known.any():
+        found |= known & ((values < low - room) | (values > high + room))
+    if count < 4 * REPEATS:
         return found
     for extreme, side in ((low, 1.0), (high, -1.0)):
-        same = finite & (values == extreme)
-        others = values[finite & ~known & ~same]
-        if same.sum() < REPEATS or len(others) < len(rest) // 2 or not len(others):
+        same = values == extreme
+        others = usual & ~same
+        left = np.count_nonzero(others)
+        if np.count_nonzero(same) < REPEATS or left < count // 2 or not left:
             continue
-        gap = side * ((others.min() if side > 0 else others.max()) - extreme)
-        if gap > LONELY * np.ptp(others) > 0:
+        least, most = _range(values, others)
+        gap = least - extreme if side > 0 else extreme - most
+        if gap > LONELY * (most - least) > 0:
             found |= same
     return found
+
+
+def _range(values: FloatArray, which: BoolArray) -> tuple[float, float]:
+    """The least and the greatest of some values."""
+    low = float(np.min(values, where=which, initial=np.inf))
+    return low, float(np.max(values, where=which, initial=-np.inf))
 
 
 def _plain(values: FloatArray) -> bool:

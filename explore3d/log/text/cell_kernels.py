@@ -43,7 +43,18 @@ def read_cells(data, start, delimiter, decimal, thousands, textual, rows, lines,
     columns = len(textual)
     at, line, block, row, odds, stranges, full, blank = start, 0, 0, 0, 0, 0, 0, False
     end = len(data)
+    shape, usual = np.zeros((columns, 3), dtype=np.int64), thousands == 0 and not textual.any()
     while at < end:
+        if usual and row < len(rows):
+            stop = _plain_line(data, at, delimiter, decimal, rows[row], shape)
+            if stop >= 0:
+                for column in range(columns):
+                    _mark(marks[column], shape[column, 0], shape[column, 1], shape[column, 2])
+                if blank:
+                    block, blank = block + 1, False
+                lines[row], blocks[row] = line, block
+                at, line, row = stop + 1, line + 1, row + 1
+                continue
         first = at
         while at < end and (data[at] == BLANK or (data[at] == TAB and delimiter != TAB)):
             at += 1
@@ -71,12 +82,7 @@ def read_cells(data, start, delimiter, decimal, thousands, textual, rows, lines,
                     rows[row, column] = np.nan
                 elif kind == NUMBER:
                     rows[row, column] = value
-                    if after < 0:
-                        marks[column, 2 + leading] += 1
-                    elif after == 3 and 1 <= before <= 3 and leading == 0:
-                        marks[column, 0] += 1
-                    else:
-                        marks[column, 1] += 1
+                    _mark(marks[column], before, after, leading)
                 else:
                     rows[row, column] = np.nan
                     if kind == OTHER:
@@ -122,6 +128,70 @@ def read_cells(data, start, delimiter, decimal, thousands, textual, rows, lines,
             stranges += 1
         at, line = at + 1, line + 1
     return np.array([row, odds, stranges, full])
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _mark(marks, before, after, leading):  # type: ignore[no-untyped-def]
+    """Count a number among those of its column (`marks` of read_cells)."""
+    if after < 0:
+        marks[2 + leading] += 1
+    elif after == 3 and 1 <= before <= 3 and leading == 0:
+        marks[0] += 1
+    else:
+        marks[1] += 1
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _plain_line(data, at, delimiter, decimal, values, shape):  # type: ignore[no-untyped-def]
+    """A whole line of plain numbers with nothing but one delimiter between them, as nearly all are.
+
+    Args:
+        values: (C,) the numbers, out.
+        shape: (C, 3) digits before and after each one's decimal sign (-1: none), leading zero (0, 1), out.
+
+    Returns:
+        The place of its newline, or -1: the line holds something else, and `values` is of no use.
+    """
+    columns = len(values)
+    for column in range(columns):
+        byte = np.int64(data[at])
+        negative = byte == 45
+        if negative:
+            at += 1
+            byte = np.int64(data[at])
+        first, zero, number = at, byte == 48, np.int64(0)
+        while 48 <= byte <= 57:
+            number = number * 10 + (byte - 48)
+            at += 1
+            byte = np.int64(data[at])
+        before, after = at - first, -1
+        if byte == decimal and decimal != delimiter:
+            at += 1
+            start = at
+            byte = np.int64(data[at])
+            while 48 <= byte <= 57:
+                number = number * 10 + (byte - 48)
+                at += 1
+                byte = np.int64(data[at])
+            after = at - start
+        digits = before + max(after, 0)
+        # 15 digits are always below 2^53
+        if digits == 0 or digits > 15:
+            return -1
+        if column + 1 < columns:
+            if byte != delimiter and not (delimiter == 0 and byte in (BLANK, TAB)):
+                return -1
+            at += 1
+        else:
+            if byte == RETURN:
+                at += 1
+            if data[at] != NEWLINE:
+                return -1
+        value = float(number) / TENS[after] if after > 0 else float(number)
+        values[column] = -value if negative else value
+        shape[column, 0], shape[column, 1] = before, after
+        shape[column, 2] = 1 if zero and (before > 1 or after >= 0) else 0
+    return at
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

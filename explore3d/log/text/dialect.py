@@ -46,13 +46,16 @@ def find_dialect(lines: Sequence[str], decimal: str | None = None) -> Dialect | 
         decimal: the sign, if somebody says it.
     """
     best: tuple[tuple[float, ...], Dialect] | None = None
-    cells = {delimiter: [split(line, delimiter) for line in lines] for delimiter in _DELIMITERS}
+    cells: dict[str | None, list[list[str]]] = {}
+    most = sum(any(map(str.isdigit, line)) for line in lines)  # no other line is a row
     for order, (sign, thousands) in enumerate(_SIGNS):
         if decimal is not None and sign != decimal:
             continue
         for delimiter in _DELIMITERS:
             if thousands == " " and delimiter is None:
                 continue
+            if delimiter not in cells:
+                cells[delimiter] = [split(line, delimiter) for line in lines]
             if max(map(len, cells[delimiter]), default=0) < 2:
                 continue
             found = _judged(cells[delimiter], sign, thousands)
@@ -62,6 +65,8 @@ def find_dialect(lines: Sequence[str], decimal: str | None = None) -> Dialect | 
             key = (good, share, -order)
             if best is None or key > best[0]:
                 best = key, Dialect(delimiter, sign, thousands, numeric)
+                if good == most and share == 1.0:  # no other can be better, and the first of equals is taken
+                    return best[1]
     return None if best is None else best[1]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -103,14 +104,13 @@ def _sample(data: bytes) -> list[str]:
         parts = [data[:40_000], data[middle : middle + 40_000], data[-40_000:]]
         cuts = [parts[0].rpartition(b"\n")[0], *(part.partition(b"\n")[2].rpartition(b"\n")[0] for part in parts[1:])]
         groups = [cut.decode("utf-8", "replace").split("\n") for cut in cuts]
-    else:
-        groups = [data.decode("utf-8", "replace").split("\n")]
-    kept = [[line for line in g if line.strip() and not line.lstrip().startswith(COMMENTS)] for g in groups]
-    if len(kept) == 1 and len(kept[0]) > 3 * SAMPLE_LINES:
-        lines = kept[0]
+        kept = [(line for line in lines if not _blank_or_comment(line)) for lines in groups]
+        return [line for some in kept for line in islice(some, SAMPLE_LINES)]
+    lines = [line for line in data.decode("utf-8", "replace").split("\n") if not _blank_or_comment(line)]
+    if len(lines) > 3 * SAMPLE_LINES:
         middle = len(lines) // 2
         return lines[:SAMPLE_LINES] + lines[middle : middle + SAMPLE_LINES] + lines[-SAMPLE_LINES:]
-    return [line for lines in kept for line in lines[:SAMPLE_LINES]]
+    return lines[:SAMPLE_LINES]
 
 
 class Reading:
@@ -229,7 +229,7 @@ class Reading:
 
     def _without_counts(self, lines: Sequence[tuple[int, str]], first: int, columns: int) -> int:
         """Skip a first line such as "0 1 2" or "9600 2": written otherwise than all others, and far from the path."""
-        texts = [line for _, line in lines[first:] if self._is_row(line, columns)][:50]
+        texts = list(islice((line for _, line in lines[first:] if self._is_row(line, columns)), 50))
         if len(texts) < LEAST_ROWS:
             return first
         cells = [split(line, self.dialect.delimiter) for line in texts]

@@ -73,7 +73,7 @@ def test_an_answer_of_a_hundred_thousand_rows_takes_less_than_a_tenth_of_a_secon
         (tmp_path / "features" / f"pack-{part}.parquet").write_bytes(content)
     pattern, seconds = f"{tmp_path}/features/*.parquet", []
     for _ in range(3):
-        began = time.perf_counter()
+        began = time.process_time()  # of all threads: a busy machine does not lengthen it as it does the clock's
         if library == "duckdb":
             found = len(module.sql(QUESTIONS[0].replace("store/features/*.parquet", pattern)).fetchall())
         else:
@@ -81,7 +81,7 @@ def test_an_answer_of_a_hundred_thousand_rows_takes_less_than_a_tenth_of_a_secon
                 (module.col("kind") == "ridge") & (module.col("height") > 0.1e-3) & (module.col("probability") > 0.99)
             )
             found = len(module.scan_parquet(pattern).filter(module.col("kept") & tall).select("run", "id").collect())
-        seconds.append(time.perf_counter() - began)
+        seconds.append(time.process_time() - began)
     assert found == sum(row["kind"] == "ridge" and row["height"] > 0.1e-3 for row in rows)
     assert min(seconds) < MOST_SECONDS
     print(library, seconds)

@@ -1,35 +1,28 @@
-"""export: what was found, in the forms of others: crest lines (CSV, DXF), the residual (X3P), a session's record."""
+"""export: what was found, in the forms of others; which one the name of the file says."""
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from explore3d import UserError, __version__
+from explore3d import UserError
 from explore3d.analysis import csv_text, residual
-from explore3d.jobs.analyze import Told, analyze
-from explore3d.jobs.session import MARKER
+from explore3d.jobs import Told, analyze
+from explore3d.jobs.export.crate import CRATE, crate
+from explore3d.jobs.export.features_log import write_features_log
+from explore3d.jobs.export.qif import qif_results
+from explore3d.log import LOG
 from mapping.geometry.mesh import write_whole
 from mapping.inference.kinds import kind_of
 from mapping.model import ObjectModel
 
-CRATE = "ro-crate-metadata.json"
-CRATE_CONTEXT = "https://w3id.org/ro/crate/1.1/context"
 CREST_COLUMNS = {
     "id": "string", "kind": "string", "vertex": "int64", "x": "float64", "y": "float64", "z": "float64",
     "nx": "float64", "ny": "float64", "nz": "float64", "height": "float64", "position_sd": "float64",
 }  # fmt: skip
 # Drawings are in millimetres, as DXF's header says (INSUNITS 4)
 _DXF_MILLIMETRES = 4
-MEDIA_TYPES = {
-    ".json": "application/json", ".csv": "text/csv", ".html": "text/html", ".glb": "model/gltf-binary",
-    ".parquet": "application/vnd.apache.parquet", ".toml": "application/toml", ".svg": "image/svg+xml",
-    ".mcap": "application/octet-stream", ".npz": "application/octet-stream",
-}  # fmt: skip
 
 
 def export(source: Path | str, to: Path | str, told: Told | None = None) -> Path:
@@ -37,8 +30,9 @@ def export(source: Path | str, to: Path | str, told: Told | None = None) -> Path
 
     Args:
         source: a model (folder of a session, or model.json); for `.x3p` a log, or a session's folder with one.
-        to: `.csv` or `.dxf`: the features' axes; `.x3p`: heights over the base, features left out;
-            `ro-crate-metadata.json` in the session's folder: its files, versions and instrument.
+        to: `.csv` or `.dxf`: the features' axes; `.qif`: the features and their sizes as measured results; `.mcap`:
+            the session's log with the features in it, as viewers of MCAP draw them; `.x3p`: heights over the base,
+            features left out; `ro-crate-metadata.json` in the session's folder: its files, versions and instrument.
         told: how to read a log.
 
     Raises:
@@ -53,9 +47,16 @@ def export(source: Path | str, to: Path | str, told: Told | None = None) -> Path
         return write_whole(path, crests_csv(ObjectModel.load(source)))
     if path.suffix == ".dxf":
         return write_whole(path, crests_dxf(ObjectModel.load(source)))
+    if path.suffix == ".qif":
+        return write_whole(path, qif_results(ObjectModel.load(source)))
+    if path.suffix == ".mcap":
+        log = (Path(source) if Path(source).is_dir() else Path(source).parent) / LOG
+        return write_features_log(ObjectModel.load(source), log if log.is_file() else None, path)
     if path.suffix == ".x3p":
         return write_whole(path, residual_x3p(source, told or Told()))
-    raise UserError(f"{path}: its name says no form; possible: NAME.csv, NAME.dxf, NAME.x3p, {CRATE}")
+    raise UserError(
+        f"{path}: its name says no form; possible: NAME.csv, NAME.dxf, NAME.qif, NAME.mcap, NAME.x3p, {CRATE}"
+    )
 
 
 def crests_csv(model: ObjectModel) -> str:
@@ -113,76 +114,3 @@ def residual_x3p(source: Path | str, told: Told) -> bytes:
     else:
         x3pio.write(stream, heights, x_scale=column, y_scale=row)
     return stream.getvalue()
-
-
-def crate(folder: Path) -> dict[str, Any]:
-    """The RO-Crate 1.1 metadata of a session's folder: its files with their digests, and how they came about.
-
-    Raises:
-        UserError: the folder holds no session that is whole.
-    """
-    try:
-        session = json.loads((folder / MARKER).read_text("utf-8"))
-        about: Mapping[str, Any] = json.loads((folder / "model.json").read_text("utf-8"))["provenance"]
-        names = [str(name) for name in session["files"] if name != CRATE]
-        files = [_file(folder, name) for name in names]
-        finished, job = session["finished"], session["job"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise UserError(f"{folder}: is no session with a model that is whole: {error}") from error
-    program = {
-        "@id": "#explore3d",
-        "@type": "SoftwareApplication",
-        "name": "explore3d",
-        "softwareVersion": __version__ if about.get("software") is None else str(about["software"]).rpartition(" ")[2],
-    }
-    tip = {
-        "@id": "#fingertip",
-        "@type": "PropertyValue",
-        "name": "radius of the fingertip",
-        "value": about.get("tip_radius"),
-        "unitCode": "MTR",
-    }
-    recording: dict[str, Any] = {
-        "@id": f"#sha256-{about.get('log_sha256')}",
-        "@type": "CreativeWork",
-        "name": "the recording",
-    }
-    recording |= {"sha256": about.get("log_sha256")}
-    recording |= {"description": "; ".join(map(str, about.get("read_as") or []))}
-    action = {
-        "@id": "#analysis",
-        "@type": "CreateAction",
-        "name": f"explore3d {job}",
-        "endTime": finished,
-        "instrument": [{"@id": "#explore3d"}, {"@id": "#fingertip"}],
-        "object": {"@id": recording["@id"]},
-        "result": [{"@id": each["@id"]} for each in files],
-    }
-    root = {
-        "@id": "./",
-        "@type": "Dataset",
-        "name": str(about.get("scene") or folder.resolve().name),
-        "description": "Fine surface features that a round fingertip found, with their uncertainties",
-        "datePublished": finished,
-        "hasPart": [{"@id": each["@id"]} for each in files],
-        "mentions": {"@id": "#analysis"},
-    }
-    own = {
-        "@id": CRATE,
-        "@type": "CreativeWork",
-        "conformsTo": {"@id": "https://w3id.org/ro/crate/1.1"},
-        "about": {"@id": "./"},
-    }
-    return {"@context": CRATE_CONTEXT, "@graph": [own, root, *files, program, tip, recording, action]}
-
-
-def _file(folder: Path, name: str) -> dict[str, Any]:
-    content = (folder / name).read_bytes()
-    return {
-        "@id": name,
-        "@type": "File",
-        "name": name,
-        "contentSize": str(len(content)),
-        "encodingFormat": MEDIA_TYPES.get(Path(name).suffix, "application/octet-stream"),
-        "sha256": hashlib.sha256(content).hexdigest(),
-    }

@@ -12,36 +12,23 @@ import numpy as np
 import pytest
 from in_process import explore3d_main
 from small_profiles import TIP, write_profile
+from two_features import two_features
 
 from explore3d import load
 from explore3d.jobs.analyze import Told, analyze
-from explore3d.jobs.export import CRATE, crests_csv, crests_dxf, export
-from mapping import Feature, Interval, Support, Surface
-from mapping.base import Base
-from mapping.model import ObjectModel
-
-PLATE = Base(Surface(0.05 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2], [0, 2, 3]]))
-
-
-def model() -> ObjectModel:
-    size, up = Interval.normal(1e-3, 1e-5), np.array([0.0, 0.0, 1.0])
-    axes = {"ridge": np.array([[0.0, 0, 0], [0.01, 0, 0], [0.02, 0.01, 0]]), "bump": np.array([[0.0, 0.02, 0]])}
-    features = [
-        Feature(kind, axis, np.tile(up, (len(axis), 1)), size, size, size, Support(9.0, 3), True, 1e-6)
-        for kind, axis in axes.items()
-    ]
-    return ObjectModel.attach(PLATE, features)
+from explore3d.jobs.export.crate import CRATE
+from explore3d.jobs.export.export import crests_csv, crests_dxf, export
 
 
 def test_crest_lines_as_a_table_hold_every_vertex() -> None:
-    rows = list(csv.DictReader(io.StringIO(crests_csv(model()))))
+    rows = list(csv.DictReader(io.StringIO(crests_csv(two_features()))))
     assert [(row["id"], row["vertex"]) for row in rows] == [*[("ridge-1", str(k)) for k in (1, 2, 3)], ("bump-1", "1")]
     assert (float(rows[2]["x"]), float(rows[2]["y"]), float(rows[2]["height"])) == (0.02, 0.01, 1e-3)
 
 
 def test_a_drawing_has_a_layer_for_each_kind_in_millimetres() -> None:
     ezdxf = pytest.importorskip("ezdxf")
-    drawing = ezdxf.read(io.StringIO(crests_dxf(model()).decode()))
+    drawing = ezdxf.read(io.StringIO(crests_dxf(two_features()).decode()))
     line, point = drawing.modelspace()
     assert not drawing.audit().errors and drawing.units == 4
     assert [tuple(each.dxf.location) for each in line.vertices][2] == (20.0, 10.0, 0.0)
@@ -79,7 +66,7 @@ def test_the_record_of_a_session_names_its_files_by_their_digests(
 def test_what_cannot_be_written_is_refused_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    model().save(tmp_path / "model")
+    two_features().save(tmp_path / "model")
     for target, complaint in (
         ("a.step", "its name says no form; possible: NAME.csv"),
         (CRATE, "stands in that folder"),
