@@ -19,6 +19,7 @@ import mapping
 from explore3d.cli.options import Json
 from explore3d.scene import example
 from hw import FingerError
+from hw.sensors import load_sample_kernels
 from mapping.geometry.mesh import open3d
 
 # This example finds its base, follows a ridge and measures it: all kernels but those of inertia and of walls
@@ -151,6 +152,7 @@ def compile_kernels(quiet: bool) -> None:
 
     with tempfile.TemporaryDirectory(prefix="explore3d-") as folder, shown(quiet) as progress:
         run(example(COMPILES).scene, Path(folder) / "out", progress=progress)
+    load_sample_kernels()
 
 
 def controller(port: str, baudrate: int) -> list[Check]:

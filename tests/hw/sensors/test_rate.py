@@ -13,7 +13,7 @@ import pytest
 
 from hw.framing import Frames
 from hw.sensors.force_sensor import ForceSensor
-from hw.sensors.optoforce import BAUDRATE, FRAME_BYTES, HEADER, OptoForce, encode_frame, is_whole
+from hw.sensors.optoforce import BAUDRATE, FRAME_BYTES, HEADER, OptoForce, are_whole, encode_frame, is_whole
 
 RATE = 5000
 # Frames of noise, in blocks of what a millisecond of a USB adapter holds
@@ -41,8 +41,11 @@ class FastSensor(OptoForce):
     """A sensor with the frames of another, but faster."""
 
     def __init__(self, port: str) -> None:
-        ForceSensor.__init__(self, port, Frames(HEADER, FRAME_BYTES, is_whole), rate=RATE, bits=16, baudrate=BAUDRATE)
+        ForceSensor.__init__(
+            self, port, Frames(HEADER, FRAME_BYTES, is_whole, are_whole), rate=RATE, bits=16, baudrate=BAUDRATE
+        )
         self._scale = (1 / 400, 1 / 400, 1 / 400)
+        self._scales = np.array(self._scale)
 
     def start(self) -> None:
         """It sends from the beginning."""
