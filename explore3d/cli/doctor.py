@@ -19,7 +19,6 @@ import mapping
 from explore3d.cli.options import Json
 from explore3d.scene import example
 from hw import FingerError
-from hw.sensors import load_sample_kernels
 from mapping.geometry.mesh import open3d
 
 # This example finds its base, follows a ridge and measures it: all kernels but those of inertia and of walls
@@ -149,6 +148,7 @@ def compile_kernels(quiet: bool) -> None:
     """Explore an example in a folder of its own, which is thrown away; what was compiled stays in numba's cache."""
     from explore3d.cli.progress import shown
     from explore3d.jobs import run
+    from hw.sensors import load_sample_kernels
 
     with tempfile.TemporaryDirectory(prefix="explore3d-") as folder, shown(quiet) as progress:
         run(example(COMPILES).scene, Path(folder) / "out", progress=progress)

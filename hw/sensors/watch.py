@@ -148,7 +148,9 @@ class SampleWatch:
         limits = np.array(((most + u, most + v, most + w), self._longest, last[1:], zero))
         state = np.array((last[0], *self._equal))
         together = min(int(LOST_TOGETHER * self._ticks), self._wrap // 2)
-        advance, strongest = judge_block(counts, forces, limits, state, self._wrap, together)
+        # of one type and layout: for another the loop would be compiled anew, in the midst of a motion
+        block = np.ascontiguousarray(counts, dtype=np.int64), np.ascontiguousarray(forces, dtype=np.float64)
+        advance, strongest = judge_block(*block, limits, state, self._wrap, together)
         if advance < 0:
             return None
         count, *self._equal = state.tolist()

@@ -3,8 +3,8 @@
 Run by itself it prints one line a case, and then how many of each fault held:
 python tests/support/fault_campaign.py [slide | peck | optoforce | line | all] [seeds] [faults, with commas between]
 
-The device lives in this program's own time: on a host that is busy otherwise run it with a real-time priority
-(chrt -f 1), as a machine has a processor of its own. A case in which the fault never struck is no case: it is made again.
+The device lives in this program, and has no processor of its own: run it on a host with nothing else to do. A case
+whose fault never struck is no case: it is made again.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from hw.emulated.grbl import GrblEmulator
 from hw.emulated.pty_server import PtyServer
 from hw.emulated.stage import PROBE_FAULTS
 from hw.emulated.touched_body import TouchedBody
+from hw.emulated.wire import Wire
 from hw.errors import FingerError
 from hw.grbl.frame import StageFrame
 from hw.move import Move
@@ -55,6 +56,8 @@ SURVIVABLE = (*BYTES, "hold", "door", "bouncing")
 UNSEEN_IN_CONTACT = ("drift",)
 # What must hold: the true force at a limit of 5 N, N; how long giving up may take, and nothing may move before it, s
 MOST, LONGEST = 5.5, 5.0
+# The stage answers at the usual rate of a serial port, bits per second: no faster than a real one
+BAUD = 115200
 # The sensors' rate in this campaign, Hz, and sweeps of a case
 RATE, SWEEPS = 1000.0, 3
 
@@ -178,7 +181,7 @@ def run_case(kind: str, phase: str, touch: str, seed: int = 0, model: bool = Tru
     witness = Witness(stage, phase, strike)
     devices.insert(1, witness)  # the sensor is served before it, and takes its samples at their own times
     said, wrong, kept = "", 0, 0
-    with PtyServer(devices, faults=faults) as server:  # type: ignore[arg-type]
+    with PtyServer(devices, faults=faults, wires={0: Wire(BAUD)}) as server:  # type: ignore[arg-type]
         ports = server.ports
         if touch == "peck":
             feeling: dict[str, object] = {"peck": Peck(5e-4, 5e-4, 0.02, R)}

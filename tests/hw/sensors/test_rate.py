@@ -13,7 +13,9 @@ import pytest
 
 from hw.framing import Frames
 from hw.sensors.force_sensor import ForceSensor
+from hw.sensors.line_sensor import LineSensor, encode_line
 from hw.sensors.optoforce import BAUDRATE, FRAME_BYTES, HEADER, OptoForce, are_whole, encode_frame, is_whole
+from hw.sensors.sample_kernels import judge_block, load_sample_kernels, read_frames, whole_frames
 
 RATE = 5000
 # Frames of noise, in blocks of what a millisecond of a USB adapter holds
@@ -21,6 +23,7 @@ SENDER = """
 import sys, time
 import numpy as np
 from hw.sensors.optoforce import encode_frame
+from hw.sensors.sample_kernels import judge_block, load_sample_kernels, read_frames, whole_frames
 fd, seconds, rate = int(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3])
 import os
 counts = np.random.default_rng(0).integers(-9, 10, (65536, 3)).tolist()
@@ -101,3 +104,18 @@ def test_a_minute_of_five_kilohertz_loses_no_sample() -> None:
     assert sensor.faulty == 0 and sensor.link.counters["garbage"] == 0
     # 8 to 10 % where other programs take both cores: to be woken 400 times a second costs more than what is done then
     assert share < 0.15
+
+
+def test_the_loops_are_compiled_before_a_sensor_is_heard_and_not_again() -> None:
+    load_sample_kernels()
+    known = {loop: len(loop.signatures) for loop in (judge_block, read_frames, whole_frames)}
+    counts = np.random.default_rng(0).integers(-9, 10, (100, 3)).tolist()
+    fast, line = FastSensor("/dev/none"), LineSensor("/dev/none", rate=RATE)
+    frames = [encode_frame(i, 0, tuple(each)) for i, each in enumerate(counts)]
+    lines = [encode_line(200 * i, tuple(each)) for i, each in enumerate(np.array(counts) / 400)]
+    for sensor, told, tick in ((fast, frames, 1.0), (line, lines, 200.0)):
+        sensor.watch.learn(np.array(counts) / 400, tick, 1.0 / RATE)
+        sensor._hear(0.0, sensor.link.framing.feed(told[0]))
+        assert sensor._heard_at_once(0.0, sensor.link.framing.feed(b"".join(told[1:])))
+        assert len(sensor.recorded()[0]) == 100 and sensor.faulty == 0
+    assert {loop: len(loop.signatures) for loop in known} == known
