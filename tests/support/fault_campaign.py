@@ -234,10 +234,10 @@ def kinds(touch: str) -> tuple[str, ...]:
     return (*(PROBE_FAULTS if touch == "peck" else SENSOR_FAULTS), *CONTROLLER_FAULTS, *BYTES)
 
 
-def struck_case(kind: str, phase: str, touch: str, seed: int) -> Iterator[Outcome]:
+def struck_case(kind: str, phase: str, touch: str, seed: int, model: bool = True) -> Iterator[Outcome]:
     """A case, and again if its fault did not strike."""
     for _ in range(MADE):
-        out = run_case(kind, phase, touch, seed)
+        out = run_case(kind, phase, touch, seed, model)
         yield out
         if out.struck:
             return
