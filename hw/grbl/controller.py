@@ -239,7 +239,9 @@ class GrblController:
             if self._fresh(since) or not self.link.is_open:
                 break
         if not self._fresh(since):
-            raise LinkError(self.link.error or f"{self.link.port}: no status report within {within:g} s")
+            raise LinkError(
+                self.link.error or f"{self.link.port}: no status report within {within:g} s{patience.held_up}"
+            )
         return self.reports[-1].status
 
     @property
@@ -660,7 +662,9 @@ class GrblController:
                 patience.at_least(1.0)  # by the operator: the clock stands
             if patience.over() or silence.over():
                 silent = f"{time.monotonic() - self.link.heard:.1f} s of silence while waiting for {what}"
-                raise LinkError(f"{self.link.port}: {silent}; check cable and power, reset the controller")
+                raise LinkError(
+                    f"{self.link.port}: {silent}{patience.held_up}; check cable and power, reset the controller"
+                )
             self._request()
 
     def _trouble(self, restarts: int, alarm: str | None) -> bool:

@@ -360,7 +360,7 @@ class GuardedStage:
             raise StoppedError(sensor.fault)
         if not fresh() and not sensor.wait(fresh, LONGEST_SENSOR_SILENCE):
             self.controller.halt(
-                f"no force sample for {sensor.age:.2f} s; check the sensor's cable and power, run again"
+                f"no force sample for {sensor.age:.2f} s{sensor.held_up}; check the sensor's cable and power, run again"
             )
             raise StoppedError(self.controller.stop_reason or "stopped")
 

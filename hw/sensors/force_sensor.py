@@ -84,6 +84,7 @@ class ForceSensor:
         self._halt: Callable[[str], None] = _nothing
         self._news = threading.Condition()
         self.faulty = 0
+        self.held_up = ""  # words of the last wait in vain, if this program could not look meanwhile
         self.fault: str | None = None
         self._struck = False
         self._touch, self._touched = np.inf, _nothing_more
@@ -196,6 +197,7 @@ class ForceSensor:
         with self._news:
             while not self._news.wait_for(done, timeout=min(0.05, within)):
                 if patience.over():
+                    self.held_up = patience.held_up
                     return False
         return True
 
