@@ -108,8 +108,9 @@ def test_a_minute_of_five_kilohertz_loses_no_sample(kind: str, tick: int) -> Non
     # opening a port throws away what waited there
     assert (np.diff(ticks) == tick).all() and len(ticks) > 59 * RATE
     assert (ticks[-1] // tick + 1) % 2**16 == 60 * RATE % 2**16
-    assert sensor.faulty == 0 and sensor.link.counters["garbage"] == 0
-    # 3.4 % beside 25 other jobs, which wake it later; 9 % where it is never late and others take both caches
+    # the port may be opened in the midst of the first line
+    assert sensor.faulty <= (kind == "line") and sensor.link.counters["garbage"] == 0
+    # OptoForce 1.9 %, lines 5.7 % beside 25 other jobs; a core that is never late is woken more often
     assert share < 0.1
 
 
