@@ -30,7 +30,7 @@ FRAME = StageFrame.of((-0.01, -0.01, -0.012))
 PROGRAMS = [Path(name) for name in os.environ.get("GRBL_SIMULATOR", "").split(os.pathsep) if name]
 # The probe of grblHAL's simulator is a key, looked at every 11 ms of its time, which goes on by jumps of 20 ms; and it
 # is pressed when a report says where the tip is. At 1 mm/s contacts lay 28 to 68 um deep: it is up to 70 ms late
-PROBING, KEY_LATE = 2e-4, 0.07
+PROBING, KEY_LATE = 1e-3, 0.07
 SAFE = {"armed": True, "position_known": True, "over_travel": 4e-4}
 
 pytestmark = [

@@ -30,3 +30,10 @@ def test_after_a_kill_in_contact_resume_ends_what_was_begun(number: int) -> None
         resumed = machine.run("--resume")
     assert resumed.status == 0 and resumed.wrong == 0 and resumed.strongest < 5.5, resumed
     assert resumed.kept > killed.kept
+
+
+@pytest.mark.parametrize("kind", ["alarm 1", "port gone", "open"])
+def test_a_machine_that_is_lost_near_the_end_of_the_plan_is_said_first(kind: str) -> None:
+    with bench("peck") as machine:
+        run = machine.run(strike=(kind, "midway"))
+    assert not broken(kind, run), run
