@@ -44,8 +44,10 @@ class Lines:
         if len(self._rest) > self.longest:
             self.counts.garbage += len(self._rest)
             self._rest = b""
-        good = [line for line in lines if line and len(line) <= self.longest and _printable(line)]
-        bad = [line for line in lines if line and not (len(line) <= self.longest and _printable(line))]
+        good: list[bytes] = []
+        bad: list[bytes] = []
+        for line in filter(None, lines):
+            (good if len(line) <= self.longest and _printable(line) else bad).append(line)
         self.counts.frames += len(good)
         self.counts.bad += len(bad)
         self.counts.garbage += sum(map(len, bad))
@@ -63,17 +65,26 @@ class Frames:
         header: first bytes of every frame.
         length: of a whole frame, header included.
         check: is this frame whole and right?
+        check_all: are all of these frames, one behind another, whole and right, headers included? Told at once, as it
+            nearly always is; else they are looked at one by one. None: they always are.
     """
 
     header: bytes
     length: int
     check: Callable[[bytes], bool]
+    check_all: Callable[[bytes], bool] | None = None
     counts: Counts = field(default_factory=Counts)
     _rest: bytes = b""
 
     def feed(self, data: bytes) -> list[bytes]:
         """The complete frames, headers included."""
         buffer, at, good = self._rest + data, 0, []
+        end = len(buffer) - len(buffer) % self.length
+        if self.check_all is not None and end and self.check_all(buffer[:end]):
+            good = [buffer[first : first + self.length] for first in range(0, end, self.length)]
+            self._rest = buffer[end:]
+            self.counts.frames += len(good)
+            return good
         while True:
             found = at if buffer.startswith(self.header, at) else buffer.find(self.header, at)
             if found < 0:
@@ -98,5 +109,8 @@ class Frames:
         return good
 
 
+_PRINTABLE = bytes((9, *range(32, 127)))
+
+
 def _printable(line: bytes) -> bool:
-    return line.isascii() and all(32 <= byte < 127 or byte == 9 for byte in line)
+    return not line.translate(None, _PRINTABLE)

@@ -34,6 +34,8 @@ class Link:
         still: keep the lines DTR and RTS low on opening and leave them alone: boards of the Arduino kind restart
             when one of them is raised.
 
+    What arrives within `gather` s may be taken together, if the device sends often: it may be set at any time.
+
     Raises:
         LinkError: (on open) no such port, or another program has it.
     """
@@ -48,7 +50,6 @@ class Link:
         write_timeout: float = 0.5,
         lost: Callable[[], None] | None = None,
         still: bool = False,
-        gather: float = 0.0,
     ) -> None:
         self.port, self.framing = port, framing
         self.received = 0
@@ -58,7 +59,7 @@ class Link:
         self._receive, self._lost = receive, lost
         self._baudrate, self._write_timeout, self._still = baudrate, write_timeout, still
         self._writing = threading.RLock()  # a signal may strike while a write goes on, and stop the machine
-        self._gather = gather
+        self.gather = 0.0
         self._serial: Any = None
         self._reader: threading.Thread | None = None
         self._closing = False
@@ -157,7 +158,7 @@ class Link:
         serial = self._serial
         try:
             while not self._closing:
-                if data := _received(serial, self._gather):
+                if data := _received(serial, self.gather):
                     self._take(data)
         except (SerialException, OSError, TypeError) as error:  # pyserial: TypeError if closed while it reads
             if not self._closing:
@@ -188,7 +189,7 @@ class Link:
 
 
 def _received(serial: Any, gather: float) -> bytes:
-    """What has arrived, or arrives before the port's time-out, and within `gather` s of its first byte.
+    """What has arrived after `gather` s, or else arrives before the port's time-out.
 
     Where the port is a file, the file is asked itself: pyserial asks four times, which at 1000 packets a second takes
     ten percent of a core.
@@ -201,14 +202,24 @@ def _received(serial: Any, gather: float) -> bytes:
         data: bytes = serial.read(1)
         waiting = serial.in_waiting if data else 0
         return data + (serial.read(waiting) if waiting else b"")
-    if not select.select([file], [], [], serial.timeout)[0]:
-        return b""
     if gather:
         time.sleep(gather)
-    data = os.read(file, MOST_AT_ONCE)
+    data = _there(file)
+    if not data:
+        if not select.select([file], [], [], serial.timeout)[0]:
+            return b""
+        data = _there(file)  # a device that is gone gives nothing, and says that there is something
     if not data:
         raise OSError("the device is gone")
     return data
+
+
+def _there(file: int) -> bytes:
+    """What has arrived, perhaps nothing: pyserial opens its files so that they wait for nothing."""
+    try:
+        return os.read(file, MOST_AT_ONCE)
+    except BlockingIOError:
+        return b""
 
 
 def _advice(port: str) -> str:

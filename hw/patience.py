@@ -18,11 +18,12 @@ class Patience:
 
     def __init__(self, within: float) -> None:
         self.left = within
-        self._looked = time.monotonic()
+        self._looked, self._longest = time.monotonic(), 0.0
 
     def over(self) -> bool:
         """Look at the clock: is the time up?"""
         now = time.monotonic()
+        self._longest = max(self._longest, now - self._looked)
         self.left -= min(now - self._looked, LONGEST_LOOK)
         self._looked = now
         return self.left <= 0.0
@@ -30,3 +31,10 @@ class Patience:
     def at_least(self, left: float) -> None:
         """From now on there are at least so many seconds left."""
         self.left = max(self.left, left)
+
+    @property
+    def held_up(self) -> str:
+        """Words for the end of a message if this program could not look for long: then the fault may be the host's."""
+        if self._longest <= LONGEST_LOOK:
+            return ""
+        return f" (this program was held up for {self._longest:.1f} s meanwhile: is the host busy?)"

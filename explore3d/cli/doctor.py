@@ -148,9 +148,11 @@ def compile_kernels(quiet: bool) -> None:
     """Explore an example in a folder of its own, which is thrown away; what was compiled stays in numba's cache."""
     from explore3d.cli.progress import shown
     from explore3d.jobs import run
+    from hw.sensors import load_sample_kernels
 
     with tempfile.TemporaryDirectory(prefix="explore3d-") as folder, shown(quiet) as progress:
         run(example(COMPILES).scene, Path(folder) / "out", progress=progress)
+    load_sample_kernels()
 
 
 def controller(port: str, baudrate: int) -> list[Check]:

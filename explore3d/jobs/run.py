@@ -190,7 +190,9 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
         if replay is not None:
             replay.rest(log.write)
         # what the connection counted and learnt of its clocks on the way
-        log.event(OUTCOME, _ended(outcome, watch, scene, cut_short) | {"finger": finger.info})
+        log.event(
+            OUTCOME, _ended(outcome, watch, scene, cut_short, getattr(finger, "lost", None)) | {"finger": finger.info}
+        )
         if not log.samples:
             raise UserError(f"{session.folder}: nothing was felt: {watch.refused or outcome.detail or outcome.reason}")
         session.settle()
@@ -198,8 +200,15 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
         return log.recorded()
 
 
-def _ended(outcome: Outcome, watch: SurveyWatch, scene: Scene, cut_short: Collection[str]) -> dict[str, Any]:
-    """Why an exploration ended, as an event of its log; a sweep that ended before its end leaves it incomplete."""
+def _ended(
+    outcome: Outcome, watch: SurveyWatch, scene: Scene, cut_short: Collection[str], lost: str | None
+) -> dict[str, Any]:
+    """Why an exploration ended, as an event of its log; a sweep that ended before its end leaves it incomplete.
+
+    So does a finger that was lost (why): a plan that has few moves left comes to its end without it.
+    """
+    if lost is not None and outcome.reason != "finger refuses":
+        outcome = Outcome("finger refuses", lost)
     why = outcome.detail or outcome.reason
     if outcome.reason == "budget":
         why = f"the time budget of {seconds_text(scene.explore.time_budget)} was used up"

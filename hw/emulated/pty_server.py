@@ -114,13 +114,15 @@ class PtyServer:
             while not self._stop.is_set():
                 masters = {port[0]: i for i, port in enumerate(self._ports) if port is not None}
                 readable, _, _ = select.select(list(masters), [], [], TICK)
+                # read before the clock is: what is answered was true after it was asked, however busy the host is
+                heard = [(masters[master], _read(master)) for master in readable]
                 wall = time.monotonic() - self._begun
                 self._strike(wall)
                 # all come to the present first: what one is told now must not show in another's past
                 for device in reversed(self.devices):
                     device.advance(wall * self.pace)
-                for master in readable:
-                    self._hear(masters[master], wall)
+                for index, data in heard:
+                    self._hear(index, data, wall)
                 for index, wire in self._to.items():
                     if data := wire.arrived(wall):
                         self.devices[index].receive(data, wall * self.pace)
@@ -130,19 +132,16 @@ class PtyServer:
             self.error = error
             raise
 
-    def _hear(self, index: int, wall: float) -> None:
-        port = self._ports[index]
-        if port is None:
+    def _hear(self, index: int, data: bytes, wall: float) -> None:
+        if self._ports[index] is None or not data:
             return
-        with suppress(BlockingIOError, OSError):  # EIO: nobody has the port open
-            data = os.read(port[0], 65536)
-            fault = self._spoil.get(index)
-            if fault is not None and fault.incoming:
-                data = self._spoiled(index, data)
-            if index in self._to:
-                self._to[index].send(data, wall)
-            elif self._quiet.get(index, 0.0) <= wall:
-                self.devices[index].receive(data, wall * self.pace)
+        fault = self._spoil.get(index)
+        if fault is not None and fault.incoming:
+            data = self._spoiled(index, data)
+        if index in self._to:
+            self._to[index].send(data, wall)
+        elif self._quiet.get(index, 0.0) <= wall:
+            self.devices[index].receive(data, wall * self.pace)
 
     def _speak(self, index: int, device: Device, wall: float) -> None:
         port = self._ports[index]
@@ -190,3 +189,9 @@ class PtyServer:
         if left <= 0:
             del self._spoil[index]
         return spoiled
+
+
+def _read(master: int) -> bytes:
+    with suppress(BlockingIOError, OSError):  # EIO: nobody has the port open
+        return os.read(master, 65536)
+    return b""

@@ -13,6 +13,8 @@ from mapping import FloatArray
 # A probe that never closes, always is, or closes by itself on a third of its ways
 PROBE_FAULTS = ("open", "closed", "bouncing")
 BOUNCES = 1 / 3
+# What Grbl has prepared of its motion: 5 segments of 10 ms (stepper.h), s
+PREPARED = 0.05
 
 
 @dataclass
@@ -36,7 +38,8 @@ class StageMotion:
     """Runs through segments at their speeds; brakes at a constant deceleration when it is stopped.
 
     Between segments the speed changes at once (a look-ahead planner without its ramps); a hold, a jog cancel
-    and a closing probe brake over v^2 / (2 a), as far as a stop takes on the real machine.
+    and a closing probe brake over v^2 / (2 a), as far as a stop takes on the real machine. A closing probe brakes only
+    when what was prepared of the motion has been carried out.
 
     Args:
         position: (3,) m, machine coordinates.
@@ -93,9 +96,11 @@ class StageMotion:
             segment = self.queue[0]
             way = segment.end - self.position
             length = float(np.linalg.norm(way))
-            stop = min(length, segment.speed**2 / (2.0 * self.acceleration))
+            prepared = PREPARED if segment.kind == "probe" else 0.0
+            stop = segment.speed * prepared + segment.speed**2 / (2.0 * self.acceleration)
+            self._brake_speed = stop / (prepared + segment.speed / self.acceleration)  # the mean of both
+            stop = min(length, stop)
             self.braking = self.position + (way / length if length > 0 else way) * stop
-            self._brake_speed = 0.5 * segment.speed
             if segment.trigger is not None and np.linalg.norm(segment.trigger - self.position) <= stop:
                 self.latched = segment.trigger.copy()  # met while braking for another reason
 

@@ -170,6 +170,11 @@ class GrblController:
         """Grbl, grblHAL or FluidNC, with its version, as it says itself."""
         return protocol.firmware_name([self.version]) or "a firmware of the Grbl family that does not say which"
 
+    @property
+    def prepared(self) -> float:
+        """What it has prepared of its motion and carries out before it brakes, s."""
+        return protocol.prepared(self.firmware)
+
     def set_up(self) -> None:
         """Millimetres, absolute, feed per minute; read the work offset."""
         self.command("G21G90G94")
@@ -234,7 +239,9 @@ class GrblController:
             if self._fresh(since) or not self.link.is_open:
                 break
         if not self._fresh(since):
-            raise LinkError(self.link.error or f"{self.link.port}: no status report within {within:g} s")
+            raise LinkError(
+                self.link.error or f"{self.link.port}: no status report within {within:g} s{patience.held_up}"
+            )
         return self.reports[-1].status
 
     @property
@@ -482,13 +489,12 @@ class GrblController:
 
     def _heading_for(self, target: FloatArray, speed: float, anew: bool) -> None:
         """Reports must lie in the box of the places between which it moves; it arrives when its speed says."""
+        # nothing is known yet of where it must be: one report may be garbled, and all true ones off the way from there
+        begun = self.resting_position() if self._way is None or self._sent_to is None else self._sent_to
         with self._news:
             if anew or self._way is None or self._sent_to is None:
-                if not self.reports:
-                    return
-                here = self.machine_position(self.reports[-1].status)
-                # that report may be older than a short way that has ended since
-                there = here if self._way is None or self._sent_to is None else self._sent_to
+                # the last report may be older than a short way that has ended since
+                here, there = self.machine_position(self.reports[-1].status), begun
                 self._way = np.minimum(here, there), np.maximum(here, there)
                 self._sent_to, self._moves_until = here, -np.inf
             self._way = (np.minimum(self._way[0], target), np.maximum(self._way[1], target))
@@ -656,7 +662,9 @@ class GrblController:
                 patience.at_least(1.0)  # by the operator: the clock stands
             if patience.over() or silence.over():
                 silent = f"{time.monotonic() - self.link.heard:.1f} s of silence while waiting for {what}"
-                raise LinkError(f"{self.link.port}: {silent}; check cable and power, reset the controller")
+                raise LinkError(
+                    f"{self.link.port}: {silent}{patience.held_up}; check cable and power, reset the controller"
+                )
             self._request()
 
     def _trouble(self, restarts: int, alarm: str | None) -> bool:

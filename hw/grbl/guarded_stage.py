@@ -43,9 +43,9 @@ TOLD = 2
 FREE_STEP, MOST_FREE_STEPS = 5e-4, 20
 # The latched position lies on the way up to the motors' steps of three axes, and the rounding of the report
 LATCH_STEPS = 3.0
-# The machine may run on after contact by its braking distance, which firmwares keep to 50 %, and by what it moves while
-# the input is looked at: Grbl's segments of 10 ms
-BRAKING_DOUBT, SEGMENT = 1.5, 0.01
+# After contact with a touch probe the machine runs on by what it has prepared of its motion, and by its braking
+# distance, which firmwares keep to 50 %. On grblHAL's simulator 31 um at 1 mm/s, of which 1 um is braking
+BRAKING_DOUBT = 1.5
 
 
 @dataclass(eq=False)
@@ -76,8 +76,15 @@ class GuardedStage:
 
     @property
     def guarded_speed(self) -> float:
-        """Fastest speed whose braking distance stays within half of the over-travel, m/s."""
+        """Fastest speed whose braking distance stays within half of the over-travel, m/s.
+
+        With a touch probe all that it runs on by must stay within the whole; under a force sensor no more is prepared
+        than was queued, which is less.
+        """
         fastest = min(self.speed, np.sqrt(self._acceleration * self.over_travel))
+        if self.sensor is None:
+            late, slowing = self.controller.prepared, BRAKING_DOUBT / self._acceleration
+            fastest = min(fastest, (np.sqrt(late**2 + 2.0 * slowing * self.over_travel) - late) / slowing)
         if self.sensor is not None and self.sensor.watch.blind * self.stiffness > 0:
             fastest = min(fastest, BLIND_SHARE * self.max_force / (self.stiffness * self.sensor.watch.blind))
             if fastest < CRAWL:
@@ -175,7 +182,7 @@ class GuardedStage:
         aside = float(np.linalg.norm(where - start - along * inwards))
         ran_on = float((resting - where) @ inwards)
         slack = LATCH_STEPS * step
-        most = BRAKING_DOUBT * self.stop_within(speed) + SEGMENT * speed + slack
+        most = BRAKING_DOUBT * self.stop_within(speed) + self.controller.prepared * speed + slack
         if aside > slack or not -slack <= along <= way + slack or not -slack <= ran_on <= most:
             raise LinkError(
                 f"the contact reported at {np.round(1e3 * where, 3).tolist()} mm does not fit to where the machine "
@@ -353,7 +360,7 @@ class GuardedStage:
             raise StoppedError(sensor.fault)
         if not fresh() and not sensor.wait(fresh, LONGEST_SENSOR_SILENCE):
             self.controller.halt(
-                f"no force sample for {sensor.age:.2f} s; check the sensor's cable and power, run again"
+                f"no force sample for {sensor.age:.2f} s{sensor.held_up}; check the sensor's cable and power, run again"
             )
             raise StoppedError(self.controller.stop_reason or "stopped")
 

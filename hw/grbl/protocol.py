@@ -16,6 +16,9 @@ from mapping import FloatArray
 MACHINE_STATES = ("Idle", "Run", "Hold", "Jog", "Alarm", "Door", "Check", "Home", "Sleep", "Tool")
 STATUS, HOLD, RESUME, RESET, DOOR, JOG_CANCEL = b"?", b"!", b"~", b"\x18", b"\x84", b"\x85"
 RECEIVE_BUFFER = 128  # bytes
+# Motion is prepared in segments of so long, s (ACCELERATION_TICKS_PER_SECOND), so many at most (SEGMENT_BUFFER_SIZE
+# less one): what is prepared is carried out before a hold, a jog cancel or a closing probe brakes
+SEGMENT, SEGMENTS_OF_GRBL, SEGMENTS_OF_GRBLHAL = 0.01, 5, 9
 
 # Grbl 1.1, doc/csv/error_codes_en_US.csv, alarm_codes_en_US.csv, and grblHAL's additions in errors.h, alarms.h
 ERRORS = {
@@ -249,6 +252,14 @@ def firmware_name(lines: Iterable[str]) -> str:
         hal = "HAL" in text.upper() or "[FIRMWARE:grblHAL]" in text
         return f"{'grblHAL' if hal else 'Grbl'} {match[1].strip()}"
     return ""
+
+
+def prepared(version: str) -> float:
+    """What a firmware of that name (`firmware_name`) has prepared of its motion and carries out before it brakes, s.
+
+    Firmwares other than Grbl are taken to prepare as much as grblHAL. One segment more is under way.
+    """
+    return SEGMENT * (1 + (SEGMENTS_OF_GRBL if version.startswith("Grbl ") else SEGMENTS_OF_GRBLHAL))
 
 
 def words(axes: FloatArray) -> str:

@@ -240,6 +240,11 @@ class GrblFinger:
             "link": controller.link.counters,
         } | sensor
 
+    @property
+    def lost(self) -> str | None:
+        """Why no move can be made any more, None if they can."""
+        return self._lost
+
     def execute(self, move: Move) -> Trace:
         """Carry out one move; the contacts of a sweep, nothing for any other purpose.
 

@@ -14,10 +14,12 @@ if TYPE_CHECKING:
         checksum as checksum,
         encode_frame as encode_frame,
     )
+    from hw.sensors.sample_kernels import load_sample_kernels as load_sample_kernels
 
 _PUBLIC = {
     "force_sensor": ("ForceSensor", "FreeAir"),
     "line_sensor": ("LineSensor", "encode_line"),
     "optoforce": ("CONFIGURE", "OptoForce", "RATE_CODES", "checksum", "encode_frame"),
+    "sample_kernels": ("load_sample_kernels",),
 }
 doorway(__name__, _PUBLIC)

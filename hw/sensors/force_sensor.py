@@ -21,9 +21,10 @@ from mapping import FloatArray, IntArray
 
 # Samples that are kept: a minute at 5 kHz
 KEPT_SAMPLES = 300_000
-# Samples of a fast sensor are taken together for so long, s: to wake up for each packet of 5 kHz takes 4 % of a core
-# more. On a tip of 10 N/mm at 14 mm/s the force rises by 0.3 N meanwhile
-GATHER = 0.002
+# Samples of a fast sensor are taken together for so long, s: to be woken for each packet takes more than what is done
+# then. Longer, where the tip cannot be moved fast enough to reach what the machine is stopped at meanwhile: but a force
+# is steered by every 10 ms as a rule, and should not be older than half of that
+GATHER, LONGEST_GATHER = 0.002, 0.005
 # if they are more than so many
 WORTH_GATHERING = 4
 # Before the samples asked for, the clock is known by those of so many seconds
@@ -70,8 +71,9 @@ class ForceSensor:
     def __init__(
         self, port: str, framing: Framing, *, rate: float, bits: int, tick: float | None = None, baudrate: int
     ) -> None:
-        gather = GATHER if rate * GATHER > WORTH_GATHERING else 0.0
-        self.link = Link(port, framing, self._hear, baudrate=baudrate, lost=self._on_lost, gather=gather)
+        self._gathers = rate * GATHER > WORTH_GATHERING
+        self.link = Link(port, framing, self._hear, baudrate=baudrate, lost=self._on_lost)
+        self.link.gather = GATHER if self._gathers else 0.0
         self.rate, self.bits = rate, bits
         self.tick = 1.0 / rate if tick is None else tick
         self.zero = np.zeros(3)
@@ -82,6 +84,7 @@ class ForceSensor:
         self._halt: Callable[[str], None] = _nothing
         self._news = threading.Condition()
         self.faulty = 0
+        self.held_up = ""  # words of the last wait in vain, if this program could not look meanwhile
         self.fault: str | None = None
         self._struck = False
         self._touch, self._touched = np.inf, _nothing_more
@@ -94,6 +97,18 @@ class ForceSensor:
     def decode(self, frame: bytes) -> tuple[int, float, float, float] | None:
         """Count and force (N) in a frame; None if the sensor says that it is not to be trusted."""
         raise NotImplementedError
+
+    def decode_all(self, frames: list[bytes]) -> tuple[IntArray, FloatArray] | None:
+        """Counts (N,) and forces (N, 3), N, in frames that came together; None if one is not to be trusted.
+
+        A device whose frames can be read at once does better than to decode each of them.
+        """
+        samples = [self.decode(frame) for frame in frames]
+        whole = [sample for sample in samples if sample is not None]
+        if len(whole) < len(samples):
+            return None
+        table = np.array(whole, dtype=np.float64)  # counts of up to 53 bits are exact
+        return table[:, 0].astype(np.int64), table[:, 1:]
 
     def start(self) -> None:
         """Tell the device to send."""
@@ -115,6 +130,9 @@ class ForceSensor:
             self._touch, self._touched = np.inf, _nothing_more
 
     def __enter__(self) -> ForceSensor:
+        from hw.sensors.sample_kernels import load_sample_kernels
+
+        load_sample_kernels()
         self.link.open()
         try:
             self.start()
@@ -179,6 +197,7 @@ class ForceSensor:
         with self._news:
             while not self._news.wait_for(done, timeout=min(0.05, within)):
                 if patience.over():
+                    self.held_up = patience.held_up
                     return False
         return True
 
@@ -237,6 +256,27 @@ class ForceSensor:
         return clock.times(ticks[recent].astype(float)), (forces[recent] - self.zero) @ self.turned.T
 
     def _hear(self, now: float, frames: list[bytes]) -> None:
+        if not self._heard_at_once(now, frames):
+            self._hear_each(now, frames)
+
+    def _heard_at_once(self, now: float, frames: list[bytes]) -> bool:
+        """Whether the frames could be taken together: if they are many, and there is nothing about any of them."""
+        if len(frames) <= WORTH_GATHERING or self.fault is not None:
+            return False
+        told = self.decode_all(frames)
+        u, v, w = self.zero.tolist()
+        judged = None if told is None else self.watch.judge_all(*told, (u, v, w))
+        if told is None or judged is None:
+            return False
+        (counts, forces), (newest, strongest) = told, judged
+        self._heed(strongest)
+        self._stamp(now, newest)
+        with self._news:
+            self._samples.extend(zip([now] * len(counts), counts.tolist(), *forces.T.tolist(), strict=True))
+            self._news.notify_all()
+        return True
+
+    def _hear_each(self, now: float, frames: list[bytes]) -> None:
         kept: list[tuple[float, int, float, float, float]] = []
         newest, taken_back, strongest, watch = None, 0, 0.0, self.watch
         u, v, w = self.zero.tolist()
@@ -277,6 +317,9 @@ class ForceSensor:
             self._strike(
                 f"the force reached {felt:.2f} N, above the limit of {self._limit:g} N; check the path, run again"
             )
+        if self._gathers:
+            spare = (min(self._touch, self._limit) - felt) / self.watch.steepest  # s; 0 where nothing is known yet
+            self.link.gather = min(max(GATHER, spare), LONGEST_GATHER)
 
     def _stamp(self, now: float, count: int) -> None:
         """When was the sample of this running count taken, at the earliest?"""

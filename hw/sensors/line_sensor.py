@@ -9,9 +9,6 @@ Lines that begin with `#` are comments. The board need not listen.
 
 from __future__ import annotations
 
-from functools import reduce
-from operator import xor
-
 from hw import Lines
 from hw.sensors.force_sensor import ForceSensor
 
@@ -19,7 +16,17 @@ from hw.sensors.force_sensor import ForceSensor
 def encode_line(micros: int, force: tuple[float, float, float]) -> bytes:
     """A line, with its end."""
     body = f"F,{micros % 2**32},{force[0]:.5f},{force[1]:.5f},{force[2]:.5f}".encode("ascii")
-    return body + f"*{reduce(xor, body):02X}\n".encode("ascii")
+    return body + f"*{xor_of(body):02X}\n".encode("ascii")
+
+
+def xor_of(body: bytes) -> int:
+    """The exclusive or of all bytes: the upper half onto the lower one, until one byte is left."""
+    folded = int.from_bytes(body, "little")
+    half = 4 << len(body).bit_length()
+    while half >= 8:
+        folded ^= folded >> half
+        half >>= 1
+    return folded & 0xFF
 
 
 def decode(line: bytes) -> tuple[int, float, float, float] | None:
@@ -29,7 +36,7 @@ def decode(line: bytes) -> tuple[int, float, float, float] | None:
     if not star or len(parts) != 5 or parts[0] != b"F":
         return None
     try:
-        if int(check, 16) != reduce(xor, body):
+        if int(check, 16) != xor_of(body):
             return None
         return int(parts[1]) % 2**32, float(parts[2]), float(parts[3]), float(parts[4])
     except ValueError:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from hw import FingerError, Frames
 from hw.sensors.force_sensor import ForceSensor
+from mapping import FloatArray, IntArray
 
 HEADER = bytes((170, 7, 8, 10))
 FRAME_BYTES = 16
@@ -26,6 +27,7 @@ DISTRUST = 0xFC00  # any error of unit or sensor
 OVERLOAD = 0x0380  # of Fx, Fy, Fz: the value is clipped
 
 _BODY = struct.Struct(">4sHHhhhH")
+_HEADER = np.frombuffer(HEADER, np.uint8)
 
 
 def checksum(data: bytes) -> int:
@@ -37,6 +39,13 @@ def is_whole(frame: bytes) -> bool:
     """True if the checksum of a data frame is right."""
     high, low = frame[-2:]
     return sum(frame) - high - low & 0xFFFF == high << 8 | low
+
+
+def are_whole(block: bytes) -> bool:
+    """True if headers and checksums of data frames, one behind another, are right."""
+    from hw.sensors.sample_kernels import whole_frames
+
+    return bool(whole_frames(np.frombuffer(block, np.uint8), _HEADER, FRAME_BYTES))
 
 
 def encode_frame(counter: int, status: int, counts: tuple[int, int, int]) -> bytes:
@@ -73,7 +82,8 @@ class OptoForce(ForceSensor):
         self._setting = configuration(rate, float(low_pass), False)
         x, y, z = np.broadcast_to(np.asarray(counts_per_newton, dtype=np.float64), 3)
         self._scale = (1.0 / float(x), 1.0 / float(y), 1.0 / float(z))
-        super().__init__(port, Frames(HEADER, FRAME_BYTES, is_whole), rate=rate, bits=16, baudrate=BAUDRATE)
+        self._scales = np.array(self._scale)
+        super().__init__(port, Frames(HEADER, FRAME_BYTES, is_whole, are_whole), rate=rate, bits=16, baudrate=BAUDRATE)
 
     def start(self) -> None:
         """Set rate and filter; the zero is taken by `tare`, so that the device's own is left as it is."""
@@ -87,3 +97,12 @@ class OptoForce(ForceSensor):
         if status & OVERLOAD:  # more than it can say, and more than any limit
             return counter, *(np.inf if status & bit else 0.0 for bit in (1 << 9, 1 << 8, 1 << 7))
         return counter, x * self._scale[0], y * self._scale[1], z * self._scale[2]
+
+    def decode_all(self, frames: list[bytes]) -> tuple[IntArray, FloatArray] | None:
+        """Counts and forces in frames; None if the device reports an error or an overload in one of them."""
+        from hw.sensors.sample_kernels import read_frames
+
+        counts, forces = np.empty(len(frames), np.int64), np.empty((len(frames), 3))
+        block = np.frombuffer(b"".join(frames), np.uint8)
+        whole = read_frames(block, DISTRUST | OVERLOAD, self._scales, counts, forces)
+        return (counts, forces) if whole else None

@@ -18,6 +18,7 @@ from hw.emulated.pty_server import PtyServer
 from hw.errors import LinkError
 from hw.framing import Frames, Lines
 from hw.link import Link
+from hw.patience import Patience
 from hw.sensors import line_sensor, optoforce
 
 HEADER = b"\xaa\x07\x08\x22"
@@ -202,3 +203,16 @@ def test_a_port_that_comes_back_is_opened_again_and_that_is_counted(tmp_path: Pa
         assert heard.wait(2.0)
         assert link.counters["reconnections"] == 1
         assert not Link(str(tmp_path / "nowhere"), Lines(), lambda now, lines: None).reopen(0.2)
+
+
+def test_a_pause_of_the_host_hardly_counts_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr("hw.patience.time.monotonic", lambda: now[0])
+    patience = Patience(1.0)
+    for _ in range(9):
+        now[0] += 0.05
+        assert not patience.over()
+    assert patience.held_up == ""
+    now[0] += 3.0
+    assert not patience.over() and patience.left == pytest.approx(0.3)
+    assert "held up for 3.0 s" in patience.held_up

@@ -1,7 +1,10 @@
 """A real firmware's simulator as an emulated device: its own parser, planner and stepper; the body is ours.
 
 Two are known: grblHAL's (github.com/grblHAL/Simulator), whose probe is toggled by a key, and that of classic Grbl 1.1h
-(github.com/grbl/grbl-sim), which has no probe. Both print where their motors stand.
+(github.com/grbl/grbl-sim), which has no probe.
+
+Where the motors of the classic one stand it prints. grblHAL's could, too, but then it counts every tick of a processor
+of 16 MHz, and needs a core of its own: it is asked instead, by one more `?` whenever the host has none under way.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import shutil
 import socket
 import subprocess
 import time
+from collections import deque
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -47,17 +51,23 @@ class Firmware:
         self.has_probe = "-p <port>" in told.stdout + told.stderr
         self._program, self._folder = program, folder
         self._closed, self._printed = False, b""
+        self._steps: int | None = None
+        self._asked: deque[bool] = deque()  # for each report that is to come: was it the host that asked?
+        self._waiting = 0  # the host's questions, while our own is under way: one report would answer both
+        self._rest = b""
 
     def __enter__(self) -> Firmware:
-        steps = self._folder / "steps"
-        os.mkfifo(steps)
-        self._steps = os.open(steps, os.O_RDONLY | os.O_NONBLOCK)
-        words = [str(self._program), "-n", "-r", str(PRINTED), "-s", str(steps), "-b", os.devnull]
+        words = [str(self._program), "-n", "-b", os.devnull]
         if self.has_probe:
+            words += ["-s", os.devnull]
             with socket.create_server(("127.0.0.1", 0)) as free:
                 port = free.getsockname()[1]
             words += ["-p", str(port)]
         else:  # it reads and writes through buffers that a pipe would fill first
+            steps = self._folder / "steps"
+            os.mkfifo(steps)
+            self._steps = os.open(steps, os.O_RDONLY | os.O_NONBLOCK)
+            words += ["-r", str(PRINTED), "-s", str(steps)]
             words = [shutil.which("stdbuf") or "stdbuf", "-i0", "-o0", *words]
         self._process = subprocess.Popen(
             words, cwd=self._folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0
@@ -76,7 +86,8 @@ class Firmware:
     ) -> None:
         self._process.kill()
         self._process.communicate()
-        os.close(self._steps)
+        if self._steps is not None:
+            os.close(self._steps)
         if self._socket is not None:
             self._socket.close()
 
@@ -118,24 +129,57 @@ class Firmware:
 
     def receive(self, data: bytes, now: float) -> None:
         """Bytes from the host."""
-        self._write(data)
+        if self.has_probe:
+            self._waiting += data.count(b"?")
+            data = data.replace(b"?", b"")
+        if data:
+            self._write(data)
 
     def advance(self, now: float) -> None:
-        """Hear what the firmware says, look where its motors stand, and close the probe if the tip touches there."""
+        """Hear what the firmware says, learn where its motors stand, and close the probe if the tip touches there."""
         said = self._read()
-        self.out += said
-        with suppress(BlockingIOError):
-            *lines, self._printed = (self._printed + os.read(self._steps, 65536)).split(b"\n")
-            for line in lines:
-                numbers = line.replace(b",", b" ").split()
-                if len(numbers) >= 4 and not line.startswith(b"#"):
-                    self.position = np.array([float(n) for n in numbers[1:4]]) / (1e3 * STEPS_PER_MM)
+        if self.has_probe:
+            said = self._without_our_own(said)
+            self._ask()
+        elif self._steps is not None:
+            self._look(self._steps)
         # what a block prints ends with the planning of its last 60 ms: then its own reports say where it stands
-        for place in PLACE.findall(said):
-            self.position = np.array([float(number) for number in place]) * 1e-3
+        self._note(said)
+        self.out += said
         force = float(np.linalg.norm(self.body.force(self.position)))
         self.strongest = max(self.strongest, force)
         if self.has_probe and (force > 0.0) != self._closed:
             self._closed = force > 0.0
             assert self._process.stdin is not None
             self._process.stdin.write(b"p")
+
+    def _ask(self) -> None:
+        """One question at a time, the host's before our own: a second one before the answer would get none."""
+        if self._asked:
+            return
+        hosts = self._waiting > 0
+        self._waiting -= hosts
+        self._asked.append(hosts)
+        self._write(b"?")
+
+    def _without_our_own(self, said: bytes) -> bytes:
+        """What the firmware said, in whole lines, but for the reports that the host did not ask for."""
+        *lines, self._rest = (self._rest + said).split(b"\n")
+        told = b""
+        for line in lines:
+            self._note(line)
+            ours = line.startswith(b"<") and bool(self._asked) and not self._asked.popleft()
+            told += b"" if ours else line + b"\n"
+        return told
+
+    def _note(self, said: bytes) -> None:
+        for place in PLACE.findall(said):
+            self.position = np.array([float(number) for number in place]) * 1e-3
+
+    def _look(self, steps: int) -> None:
+        with suppress(BlockingIOError):
+            *lines, self._printed = (self._printed + os.read(steps, 65536)).split(b"\n")
+            for line in lines:
+                numbers = line.replace(b",", b" ").split()
+                if len(numbers) >= 4 and not line.startswith(b"#"):
+                    self.position = np.array([float(n) for n in numbers[1:4]]) / (1e3 * STEPS_PER_MM)

@@ -9,7 +9,7 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
-from fault_campaign import DOWN, FRAME, STIFFNESS, R, plate
+from fault_campaign import BAUD, DOWN, FRAME, STIFFNESS, R, plate
 
 from hw.emulated.force import OptoForceEmulator
 from hw.emulated.grbl import GrblEmulator
@@ -21,7 +21,7 @@ from hw.probing.grbl_finger import GrblFinger
 from hw.probing.slide import Slide
 from hw.sensors.optoforce import OptoForce
 
-BAUD, USB_TIMER = 115200, 0.016
+USB_TIMER = 0.016
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,8 @@ class SwiftController:
 class Spring:
     """A force sensor that feels a plane at z = -1 mm; its samples come `late` s after they are asked for."""
 
+    held_up = ""
+
     def __init__(self, controller: SwiftController, late: float = 0.0) -> None:
         self.controller, self.late, self.heard, self.felt = controller, late, time.monotonic(), np.zeros(3)
         self.fault, self.watch = None, SimpleNamespace(blind=0.0)

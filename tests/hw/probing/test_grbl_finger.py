@@ -11,6 +11,7 @@ import time
 import tty
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from itertools import count
 
 import numpy as np
 import pytest
@@ -462,3 +463,32 @@ def test_a_printers_firmware_is_refused_by_its_name() -> None:
     threading.Thread(target=answer, daemon=True).start()
     with pytest.raises(FingerError, match=r"this is Marlin 2\.1\.2, which gives no Grbl status reports"):
         GrblController(os.ttyname(slave), wake=0.5).open()
+
+
+@pytest.mark.parametrize("phase", range(3))
+def test_a_garbled_report_before_the_first_motion_does_not_say_where_it_begins(phase: int) -> None:
+    with machine(pace=10.0) as (server, stage), pecker(server) as finger:
+        report, told = stage.report, count(phase)
+        stage.report = lambda: report().replace("MPos:-15", "MPos:-18") if next(told) % 3 == 0 else report()
+        assert len(finger.execute(across(x=0.003))) > 20
+
+
+def test_with_a_touch_probe_all_that_the_machine_runs_on_by_stays_within_the_over_travel() -> None:
+    with machine(pace=10.0) as (server, stage), pecker(server, over_travel=4e-4) as finger:
+        speed, late = finger.stage.guarded_speed, finger.stage.controller.prepared
+        assert late * speed + 1.5 * finger.stage.stop_within(speed) == pytest.approx(4e-4)
+        deepest, force = [0.0], stage.body.force
+
+        def watched(center: np.ndarray) -> np.ndarray:
+            found = force(center)
+            deepest[0] = max(deepest[0], float(np.linalg.norm(found)) / stage.body.stiffness)
+            return found
+
+        stage.body.force = watched  # type: ignore[method-assign]
+        assert len(finger.execute(across(x=0.003))) > 20
+        assert 0.1 * 4e-4 < deepest[0] < 4e-4
+
+
+def test_what_firmwares_have_prepared_is_told_by_their_names() -> None:
+    assert protocol.prepared("Grbl 1.1h.20190825") == pytest.approx(0.06)
+    assert protocol.prepared("grblHAL 1.1f.20260817") == protocol.prepared("FluidNC 3.7") == pytest.approx(0.1)

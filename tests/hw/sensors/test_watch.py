@@ -98,3 +98,43 @@ def test_what_goes_on_jumping_is_a_fault() -> None:
 def test_no_number_and_overload_are_faults() -> None:
     assert "no number" in faults(watching(), [(0, 0.0, 0.0, float("nan"))])[0]
     assert "overloaded" in faults(watching(), [(0, 0.0, 0.0, float("inf"))])[0]
+
+
+def spoilt(number: int, seed: int) -> list[Sample]:
+    """Noise over slow presses, with what a bad line or a dying sensor makes of it now and then."""
+    rng = np.random.default_rng(seed)
+    told = noise(number, seed) + 2e-4 * np.arange(number)[:, None]
+    found = [(i % 65536, *map(float, force)) for i, force in enumerate(told)]
+    for at in rng.integers(0, number, 30):
+        count, x, y, z = found[at]
+        found[at] = [
+            (count, x + 3.0, y, z),
+            (count, float("nan"), y, z),
+            (count, x, float("inf"), z),
+            ((count + 20_000) % 65536, x, y, z),
+            found[at - 1],
+        ][int(rng.integers(5))]
+    for at in rng.integers(0, number, 5):
+        del found[at : at + int(rng.integers(1, 20))]
+    return found
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_block_is_judged_as_its_samples_are_one_by_one(seed: int) -> None:
+    rng, told = np.random.default_rng(100 + seed), spoilt(3000, seed)
+    each, together = watching(), watching()
+    taken = 0
+    while told:
+        size = int(rng.integers(1, 30))
+        block, told = told[:size], told[size:]
+        judged = [each.judge(sample) for sample in block]
+        counts, forces = np.array([s[0] for s in block]), np.array([s[1:] for s in block])
+        found = together.judge_all(counts, forces, (0.1, -0.2, 0.3))
+        if found is None:
+            assert [together.judge(sample) for sample in block] == judged
+            continue
+        taken += 1
+        assert all(sound and fault is None for _, sound, fault in judged)
+        assert found[0] == judged[-1][0]
+        assert found[1] == pytest.approx(np.linalg.norm(forces - (0.1, -0.2, 0.3), axis=1).max())
+    assert taken > 50
