@@ -283,17 +283,19 @@ def classify(
     noises: Annotated[str | None, typer.Option(help="none, apparatus or both, separated by a comma.")] = None,
     sweeps: Annotated[str | None, typer.Option(help="Patterns of sweeps, separated by commas.")] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Seeds of the noise and of the sweeps' placement.")] = 5,
+    building: Annotated[bool, typer.Option("--building", help="The seeds and sizes that may be looked into.")] = False,
 ) -> None:
     """Is each kind of feature found and rightly named, and nothing invented? As CSV.
 
     Example: explore3d bench classify --store classify.jsonl --bodies bump,ridge --seeds 100
     """
     from explore3d.bench.detection import NOISE_SOURCES, SWEEP_PATTERNS, bench_classify, classify_table
-    from explore3d.bench.scenes import BODIES_BY_KIND
+    from explore3d.bench.scenes import CLASSIFIED, FIRST_BUILT_WITH
 
-    chosen = _names(bodies, "--bodies", list(BODIES_BY_KIND)), _names(noises, "--noises", list(NOISE_SOURCES))
+    chosen = _names(bodies, "--bodies", list(CLASSIFIED)), _names(noises, "--noises", list(NOISE_SOURCES))
     patterns = _names(sweeps, "--sweeps", list(SWEEP_PATTERNS))
-    print(classify_table(list(bench_classify(*chosen, patterns, seeds, store))), end="")
+    first = FIRST_BUILT_WITH if building else 0
+    print(classify_table(list(bench_classify(*chosen, patterns, range(first, first + seeds), store))), end="")
 
 
 @bench.command()

@@ -1,6 +1,7 @@
 """Classification bench: is each kind of feature found, rightly named, and nothing invented beside it?
 
-Every trial is one line of a JSONL file; what is already in the file is not run again.
+Every trial is one line of a JSONL file; what is already in the file is not run again. What is changed because of a
+trial is judged by others: the seeds from FIRST_BUILT_WITH on, which have sweeps and sizes of their own, are built with.
 
     explore3d bench classify --store OUT.jsonl --seeds 100
 """
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from explore3d.analysis import Comparison, TrueFeature, compare
-from explore3d.bench.scenes import BODIES_BY_KIND, INSPECTED_HALF_SIDE, MIDDLE
+from explore3d.bench.scenes import FIRST_BUILT_WITH, INSPECTED_HALF_SIDE, MIDDLE, classified_body
 from hw import Move
 from hw.simulated import NoiseSource, SimulatedFinger
 from mapping import Feature, FloatArray, Trace
@@ -41,7 +42,7 @@ SWEEP_PATTERNS = ("one way", "two ways", "followed")
 
 
 def bench_classify(
-    bodies: list[str], noises: list[str], sweeps: list[str], seeds: int, out: Path
+    bodies: list[str], noises: list[str], sweeps: list[str], seeds: range, out: Path
 ) -> Iterator[dict[str, Any]]:
     """Run what is not yet in `out` and append it there; yields every record of the request."""
     done = {}
@@ -51,7 +52,7 @@ def bench_classify(
     for body in bodies:
         for noise in noises:
             for pattern in sweeps:
-                for seed in range(seeds if noise != "none" else min(seeds, POSES)):
+                for seed in seeds if noise != "none" else seeds[:POSES]:
                     key = (body, noise, pattern, seed)
                     if key not in done:
                         done[key] = dict(zip(("body", "noise", "sweeps", "seed"), key, strict=True)) | trial(*key)
@@ -62,9 +63,11 @@ def bench_classify(
 
 def trial(body: str, noise: str, pattern: str, seed: int) -> dict[str, Any]:
     """Sweep a body, classify what is on it, and compare with the truth."""
-    scene = BODIES_BY_KIND[body]()
+    pose = seed if seed < FIRST_BUILT_WITH else seed - FIRST_BUILT_WITH
+    pose = seed - pose + pose % POSES
+    scene = classified_body(body, pose)
     base = Base(scene.base)
-    trace = noisy(touched(body, pattern, seed % POSES), NOISE_SOURCES[noise], seed)
+    trace = noisy(touched(body, pattern, pose), NOISE_SOURCES[noise], seed)
     start = perf_counter()
     features = classified(trace, base)
     return verdict(features, base, scene.truth) | {"seconds": perf_counter() - start}
@@ -121,8 +124,8 @@ def noisy(trace: Trace, noise: NoiseSource, seed: int) -> Trace:
 
 @lru_cache(maxsize=2 * POSES)
 def touched(body: str, pattern: str, pose: int) -> Trace:
-    """What the finger feels of a body without noise."""
-    scene = BODIES_BY_KIND[body]()
+    """What the finger feels of a body without noise, swept as the seed `pose` says."""
+    scene = classified_body(body, pose)
     finger = SimulatedFinger(object=scene.object, tip_radius=TIP_RADIUS, rate=SAMPLE_RATE)
     rng = np.random.default_rng(pose)
     strokes = Strokes(Base(scene.base), TIP_RADIUS, SPEED)

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         laid_on as laid_on,
     )
     from explore3d.bench.scenes.long_log import write_long_log as write_long_log
+    from explore3d.bench.scenes.neighbours import CLASSIFIED as CLASSIFIED, classified_body as classified_body
     from explore3d.bench.scenes.noise import SAMPLE_SPACING as SAMPLE_SPACING, simulate_noise as simulate_noise
     from explore3d.bench.scenes.plate_sweeps import (
         DIAMETER as DIAMETER,
@@ -73,6 +74,7 @@ _PUBLIC = {
     "kinds": ("BODIES_BY_KIND", "INSPECTED_HALF_SIDE", "MIDDLE"),
     "laid_on": ("Detail", "drawn_details", "laid_on"),
     "long_log": ("write_long_log",),
+    "neighbours": ("CLASSIFIED", "classified_body"),
     "noise": ("SAMPLE_SPACING", "simulate_noise"),
     "plate_sweeps": ("DIAMETER", "HALF", "Heights", "TIP_RADIUS", "features", "plate", "scaled", "sweeps", "wire"),
     "sections": (

@@ -50,8 +50,8 @@ def test_the_bench_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(classify, "trial", one)
     store = tmp_path / "classify.jsonl"
-    list(bench_classify(["bump"], ["apparatus"], ["two ways"], 2, store))
-    records = list(bench_classify(["bump"], ["apparatus"], ["two ways"], 4, store))
+    list(bench_classify(["bump"], ["apparatus"], ["two ways"], range(2), store))
+    records = list(bench_classify(["bump"], ["apparatus"], ["two ways"], range(4), store))
     assert done == [0, 1, 2, 3] and len(records) == 4
     assert len([json.loads(text) for text in store.read_text().splitlines()]) == 4
     assert classify_table(records).splitlines()[1] == "bump,apparatus,two ways,4,1,1,0,1,0.1"
