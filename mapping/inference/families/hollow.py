@@ -107,8 +107,8 @@ def line_nodes(
     s, lateral, leg = chart.coordinates(nodes.reshape(-1, 3))
     shape = nodes.shape[:2]
     basis = modes.basis(s).reshape(-1, *shape)
-    bends = (each[leg].reshape(shape) for each in (chart.bend, chart.bend_along))
-    return s.reshape(shape), lateral.reshape(shape), basis, *bends
+    bend, bend_along = (each[leg].reshape(shape) for each in (chart.bend, chart.bend_along))
+    return s.reshape(shape), lateral.reshape(shape), basis, bend, bend_along
 
 
 def bin_nodes(window: Window) -> FloatArray:

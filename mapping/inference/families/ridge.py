@@ -81,7 +81,7 @@ class RidgeShape:
         return np.asarray(
             axes_about(
                 chart.s,
-                chart.points,
+                self._crest_points,
                 chart.laterals,
                 chart.normals,
                 chart.bend,
@@ -93,6 +93,21 @@ class RidgeShape:
                 np.zeros((0, 2)) if chart.closed else np.ascontiguousarray(theta[:, -4:-2]),
             )
         )
+
+    @cached_property
+    def _crest_points(self) -> FloatArray:
+        """(K, 3) the chart's points, raised so that the legs between them lie on the base in the mean, m.
+
+        A chord of length c sags by k c^2 / 8 in its middle and by two thirds of that in the mean; unmended, the mug's
+        ridge of 0.8 mm came out 3 um too high.
+        """
+        chart = self.chart
+        legs = np.diff(chart.s)
+        beside = np.concatenate(
+            [legs[-1:] if chart.closed else legs[:1], legs, legs[:1] if chart.closed else legs[-1:]]
+        )
+        square = 0.5 * (beside[:-1] ** 2 + beside[1:] ** 2)
+        return np.asarray(chart.points + (chart.bend_along * square / 12.0)[:, None] * chart.normals)
 
     @cached_property
     def _basis(self) -> FloatArray:
