@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mapping.detection.crossing import Crossing as Crossing
     from mapping.detection.detect import Detections as Detections, detect as detect
     from mapping.errors import (
+        UNKNOWN_TEXT as UNKNOWN_TEXT,
         CalibrationError as CalibrationError,
         ContactError as ContactError,
         CurvatureError as CurvatureError,
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
     from mapping.estimate.envelope.envelope import estimate_surface as estimate_surface
     from mapping.estimate.envelope.estimate import Estimate as Estimate
     from mapping.feature import (
-        UNKNOWN_TEXT as UNKNOWN_TEXT,
         Anchor as Anchor,
         Details as Details,
         Dropped as Dropped,
@@ -77,6 +77,7 @@ _PUBLIC = {
     "detection.crossing": ("Crossing",),
     "detection.detect": ("Detections", "detect"),
     "errors": (
+        "UNKNOWN_TEXT",
         "CalibrationError",
         "ContactError",
         "FormError",
@@ -105,7 +106,6 @@ _PUBLIC = {
         "Interval",
         "LeftOut",
         "Support",
-        "UNKNOWN_TEXT",
         "length_text",
         "length_unit",
     ),

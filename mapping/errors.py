@@ -1,4 +1,7 @@
-"""Errors of the mapping package: bad input, named by what was asked, found and possible."""
+"""Errors of the mapping package: bad input, named by what was asked, found and possible; and what is not known."""
+
+# Written where a value is not known
+UNKNOWN_TEXT = "–"
 
 
 class MappingError(ValueError):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mapping.arrays import FloatArray
+from mapping.errors import UNKNOWN_TEXT
 from mapping.posterior import Posterior
 
 # Log Bayes factor below which evidence is "barely worth mentioning" (Jeffreys, Theory of Probability, 1961, appendix
@@ -18,7 +19,6 @@ SUBSTANTIAL = 0.5 * math.log(10.0)
 
 
 LENGTH_UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
-UNKNOWN_TEXT = "–"
 # A lower bound below this share of the upper one reads as none
 NEXT_TO_NOTHING = 0.02
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from explore3d import UnitError, UserError, count_text, seconds_text
+from explore3d import UnitError, UserError, count_text, parse_time, seconds_text
 from explore3d.cli.options import Columns, Force, Frame, Json, Part, Pixel, TipRadius, Units
 
 if TYPE_CHECKING:
@@ -98,8 +98,6 @@ def batch(
 
 
 def _seconds(text: str | None) -> float | None:
-    from explore3d import parse_time
-
     if text is None:
         return None
     try:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d import UnitError, UserError
+from explore3d import UnitError, UserError, parse_rate, parse_speed
 from explore3d.cli.options import Json, TipRadius, length, point
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL", help="Folder or model.json of an annotated model.")]
@@ -48,7 +48,6 @@ def display(
     import sys
     from json import dumps
 
-    from explore3d import parse_rate
     from explore3d.report.display import feel, live
     from hw.display import Rendering
     from mapping import ObjectModel
@@ -156,8 +155,6 @@ def watch(
 
 
 def _speed(text: str) -> float:
-    from explore3d import parse_speed
-
     return _parsed("--speed", text, parse_speed)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from explore3d import UserError, count_text
+from explore3d import UserError, count_text, parse_time
 from explore3d.cli.options import Average, Columns, Frame, Json, Out, Overwrite, Part, Pixel, TipRadius, Units, length
 
 if TYPE_CHECKING:
@@ -100,7 +100,6 @@ def compare(
     """
     from json import dumps
 
-    from explore3d import parse_time
     from explore3d.cli.progress import shown
     from explore3d.jobs import Told, compare_scans, watched
 

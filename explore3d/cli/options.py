@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from explore3d import UnitError, UserError
+from explore3d import UnitError, UserError, parse_length
 
 
 def length(option: str, text: str, *, positive: bool = False) -> float:
@@ -16,8 +16,6 @@ def length(option: str, text: str, *, positive: bool = False) -> float:
     Raises:
         UserError: one line that names the option.
     """
-    from explore3d import parse_length
-
     try:
         value = parse_length(text)
     except UnitError as error:
@@ -33,8 +31,6 @@ def point(option: str, text: str) -> tuple[float, float, float]:
     Raises:
         UserError: one line that names the option.
     """
-    from explore3d import parse_length
-
     try:
         parts = [parse_length(part.strip()) for part in text.split(",")]
     except UnitError as error:

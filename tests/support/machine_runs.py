@@ -23,11 +23,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from explore3d.log.reader import read_log
 from fault_campaign import BYTE_FAULTS, CONTROLLER_FAULTS, OFF, PHASES, SECOND_PROGRAM
 from interrupting import HONEST, ROOT
 from scene_files import write_scene_file
 
+from explore3d.log.own.reader import read_log
 from hw.emulated.faults import Fault
 from hw.emulated.force import SENSOR_FAULTS, LineSensorEmulator, OptoForceEmulator
 from hw.emulated.grbl import GrblEmulator
