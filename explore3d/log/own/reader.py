@@ -18,8 +18,10 @@ from explore3d.log.own.record import Event, Log, merge
 from mapping import FloatArray, Trace, TraceError
 
 # fixed by LogWriter; needed only where the chunk that states them is damaged
-_TOPICS = {i: topic for i, (topic, _) in enumerate(log_format.EVENTS.values(), 1)}
-_TOPICS |= dict(enumerate((log_format.TRACE_TOPIC, log_format.PATH_TOPIC, log_format.FELT_TOPIC), len(_TOPICS) + 1))
+CHANNEL_TOPICS = {i: topic for i, (topic, _) in enumerate(log_format.EVENTS.values(), 1)}
+CHANNEL_TOPICS |= dict(
+    enumerate((log_format.TRACE_TOPIC, log_format.PATH_TOPIC, log_format.FELT_TOPIC), len(CHANNEL_TOPICS) + 1)
+)
 
 
 @dataclass
@@ -123,7 +125,7 @@ def _batches(reading: Reading) -> Iterator[NDArray[np.void]]:
 
     from explore3d.log.own.chunks import Damage, intact_chunks
 
-    damage, topics, none = Damage(), dict(_TOPICS), True
+    damage, topics, none = Damage(), dict(CHANNEL_TOPICS), True
     begins = is_log(reading.path)
     with reading.path.open("rb") as file:
         for records in intact_chunks(file, damage):
@@ -132,7 +134,7 @@ def _batches(reading: Reading) -> Iterator[NDArray[np.void]]:
                     topics[record.id] = record.topic
                 elif isinstance(record, Message):
                     none = False
-                    batch = _take_checked(topics.get(record.channel_id, ""), record, reading)
+                    batch = take_checked(topics.get(record.channel_id, ""), record, reading)
                     if batch is not None:
                         yield batch
     reading.damaged, reading.cut = damage.damaged, damage.cut
@@ -148,7 +150,7 @@ def _batches(reading: Reading) -> Iterator[NDArray[np.void]]:
         raise UserError(f"{reading.path}: {why}holds no intact message of an explore3d log; nothing can be recovered")
 
 
-def _take_checked(topic: str, message: Any, reading: Reading) -> NDArray[np.void] | None:
+def take_checked(topic: str, message: Any, reading: Reading) -> NDArray[np.void] | None:
     try:
         return _take(topic, message, reading)
     except UserError:
@@ -178,7 +180,7 @@ def _take(topic: str, message: Any, reading: Reading) -> NDArray[np.void] | None
             reading.announced, reading.before = 0, reading.samples
         reading.felt.append(point_cloud.decode(message.data))
         return None
-    if topic in _TOPICS.values() and topic != log_format.PATH_TOPIC:
+    if topic in CHANNEL_TOPICS.values() and topic != log_format.PATH_TOPIC:
         note(topic, message.data, reading)
     return None
 
@@ -227,7 +229,7 @@ def _seek_start(reading: Reading) -> None:
 
     from explore3d.log.own.chunks import Damage, intact_chunks
 
-    topics = dict(_TOPICS)
+    topics = dict(CHANNEL_TOPICS)
     with reading.path.open("rb") as file:
         for records in intact_chunks(file, Damage()):
             for record in records:

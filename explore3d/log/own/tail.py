@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explore3d.log.own.format import LOG, MAGIC
-from explore3d.log.own.reader import _TOPICS, Reading, _take_checked
+from explore3d.log.own.reader import CHANNEL_TOPICS, Reading, take_checked
 from explore3d.log.own.record import Event
 
 
@@ -49,7 +49,7 @@ class LogTail:
 
     def _begin(self) -> None:
         self.reading = Reading(self.path, self._told, events=[])
-        self._topics = dict(_TOPICS)
+        self._topics = dict(CHANNEL_TOPICS)
         self._at, self._seen, self._file = 0, 0, (0, 0)
 
     def look(self) -> tuple[list[Piece], list[Event], bool]:
@@ -87,7 +87,7 @@ class LogTail:
 
     def _take(self, topic: str, message: Any, batches: list[tuple[Event | None, list[NDArray[np.void]]]]) -> None:
         """Note an event, or add samples to those of the same move."""
-        batch = _take_checked(topic, message, self.reading)
+        batch = take_checked(topic, message, self.reading)
         if batch is None:
             return
         move = self._last_move()
