@@ -57,6 +57,7 @@ def export(
     columns: Columns = None,
     pixel: Pixel = None,
     part: Part = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there; never a log.")] = False,
 ) -> None:
     """Write crest lines (CSV, DXF), measured results (QIF), the log with the features drawn in it (MCAP), heights over
     the base beside the features (X3P), or a session's record (RO-Crate).
@@ -69,4 +70,4 @@ def export(
     table = {"units": units, "columns": columns, "pixel": pixel, "part": part}
     told = Told(tip_radius, table={name: value for name, value in table.items() if value is not None})
     for path in to:
-        print(f"written: {write(source, path, told)}")
+        print(f"written: {write(source, path, told, overwrite=overwrite)}")

@@ -17,7 +17,12 @@ if TYPE_CHECKING:
     from explore3d.jobs.plan import plan_into as plan_into, plan_scene as plan_scene
     from explore3d.jobs.resume import Execute as Execute, Replay as Replay
     from explore3d.jobs.run import cause as cause, open_scene as open_scene, run as run, scene_finger as scene_finger
-    from explore3d.jobs.session import MARKER as MARKER, locked as locked, undisturbed as undisturbed
+    from explore3d.jobs.session import (
+        MARKER as MARKER,
+        belongs_to_session as belongs_to_session,
+        locked as locked,
+        undisturbed as undisturbed,
+    )
 
 _PUBLIC = {
     "analyze": ("Told", "analyze", "analyze_each", "log_path"),
@@ -27,6 +32,6 @@ _PUBLIC = {
     "plan": ("plan_into", "plan_scene"),
     "resume": ("Execute", "Replay"),
     "run": ("cause", "open_scene", "run", "scene_finger"),
-    "session": ("MARKER", "locked", "undisturbed"),
+    "session": ("MARKER", "belongs_to_session", "locked", "undisturbed"),
 }
 doorway(__name__, _PUBLIC)

@@ -451,6 +451,15 @@ def _record(place: Path) -> dict[str, Any] | None:
         return None
 
 
+def belongs_to_session(path: Path) -> bool:
+    """True if a session lists the file as its own; sessions have folders for pictures, and none below these."""
+    whole = path.resolve()
+    records = ((folder, _record(folder)) for folder in whole.parents[:2])
+    return any(
+        record is not None and whole.relative_to(place).as_posix() in record["files"] for place, record in records
+    )
+
+
 def unchanged_files(place: Path) -> tuple[Path, ...]:
     """The files that the session in a folder read and that are what they were then.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from explore3d import UserError
 from explore3d.analysis import csv_text, residual
-from explore3d.jobs import Told, analyze
+from explore3d.jobs import Told, analyze, belongs_to_session
 from explore3d.jobs.export.crate import CRATE, crate
 from explore3d.jobs.export.features_log import write_features_log
 from explore3d.jobs.export.qif import qif_results
@@ -25,7 +25,7 @@ CREST_COLUMNS = {
 _DXF_MILLIMETRES = 4
 
 
-def export(source: Path | str, to: Path | str, told: Told | None = None) -> Path:
+def export(source: Path | str, to: Path | str, told: Told | None = None, *, overwrite: bool = False) -> Path:
     """Write what was found in the form that the target's name asks for; returns its path.
 
     Args:
@@ -34,15 +34,19 @@ def export(source: Path | str, to: Path | str, told: Told | None = None) -> Path
             the session's log with the features in it, as viewers of MCAP draw them; `.x3p`: heights over the base,
             features left out; `ro-crate-metadata.json` in the session's folder: its files, versions and instrument.
         told: how to read a log.
+        overwrite: replace a file that is there. The source, and what a session lists as its own, never is; the
+            session's record is always made anew.
 
     Raises:
-        UserError, ModelError: a source that does not hold it, a name that says no form, a package that is missing.
+        UserError, ModelError: a source that does not hold it, a name that says no form, a package that is missing, a
+            file that would be lost.
     """
     path = Path(to)
     if path.name == CRATE:
         if path.parent.resolve() != Path(source).resolve():
             raise UserError(f"{path}: a record of {source} stands in that folder: {Path(source) / CRATE}")
         return write_whole(path, json.dumps(crate(path.parent), indent=1, ensure_ascii=False) + "\n")
+    _nothing_lost(Path(source), path, overwrite)
     if path.suffix == ".csv":
         return write_whole(path, crests_csv(ObjectModel.load(source)))
     if path.suffix == ".dxf":
@@ -50,13 +54,28 @@ def export(source: Path | str, to: Path | str, told: Told | None = None) -> Path
     if path.suffix == ".qif":
         return write_whole(path, qif_results(ObjectModel.load(source)))
     if path.suffix == ".mcap":
-        log = (Path(source) if Path(source).is_dir() else Path(source).parent) / LOG
+        log = _log_of(Path(source))
         return write_features_log(ObjectModel.load(source), log if log.is_file() else None, path)
     if path.suffix == ".x3p":
         return write_whole(path, residual_x3p(source, told or Told()))
     raise UserError(
         f"{path}: its name says no form; possible: NAME.csv, NAME.dxf, NAME.qif, NAME.mcap, NAME.x3p, {CRATE}"
     )
+
+
+def _log_of(source: Path) -> Path:
+    return (source if source.is_dir() else source.parent) / LOG
+
+
+def _nothing_lost(source: Path, path: Path, overwrite: bool) -> None:
+    if not path.exists():
+        return
+    if path.is_dir():
+        raise UserError(f"{path}: is a folder; give a file's name")
+    if belongs_to_session(path) or any(read.exists() and path.samefile(read) for read in (source, _log_of(source))):
+        raise UserError(f"{path}: belongs to what is exported, or to a session, and would be lost; give another name")
+    if not overwrite:
+        raise UserError(f"{path}: is there already; give another name, or --overwrite to replace it")
 
 
 def crests_csv(model: ObjectModel) -> str:

@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -75,3 +76,30 @@ def test_what_cannot_be_written_is_refused_in_one_line(
         assert explore3d_main(monkeypatch, "export", tmp_path / "model", "--to", tmp_path / target) == 2
         assert complaint in capsys.readouterr().err.splitlines()[-1]
         assert not (tmp_path / target).exists()
+
+
+def test_an_export_never_replaces_a_log_a_session_or_what_nobody_gave_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, other = tmp_path / "out", tmp_path / "crests.csv"
+    analyze(write_profile(tmp_path / "a.csv"), out, tip_radius=TIP, quick=True)
+    (tmp_path / "bare").mkdir()
+    for name in ("model.json", "model.npz"):
+        shutil.copy(out / name, tmp_path / "bare")
+    (tmp_path / "bare" / "log.mcap").write_bytes(b"what was recorded")
+    other.write_text("mine")
+    kept = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    lost = [
+        (out, out / "features.csv", "--overwrite"),
+        (tmp_path / "bare", tmp_path / "bare" / "log.mcap", "--overwrite"),
+        (tmp_path / "bare" / "model.json", tmp_path / "bare" / "log.mcap", "--overwrite"),
+        (tmp_path / "a.csv", tmp_path / "a.csv", "--overwrite"),
+        (out, other),
+        (out, tmp_path / "bare"),
+    ]
+    for source, to, *more in lost:
+        assert explore3d_main(monkeypatch, "export", source, "--to", to, *more) == 2
+        assert str(to) in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == kept
+    assert explore3d_main(monkeypatch, "export", out, "--to", other, "--overwrite") == 0
+    assert other.read_text().startswith("id,kind,")
