@@ -10,14 +10,7 @@ if TYPE_CHECKING:
         Comparison as Comparison,
         compare_models as compare_models,
     )
-    from mapping.model.dropped import dropped_crossings as dropped_crossings, dropped_features as dropped_features
-    from mapping.model.feature_mesh import drawn_at_least as drawn_at_least, feature_mesh as feature_mesh
-    from mapping.model.json_record import plain as plain
-    from mapping.model.merging import merge_model as merge_model
-    from mapping.model.object_model import ObjectModel as ObjectModel
-    from mapping.model.registration import Registration as Registration, register as register
-    from mapping.model.table import SIZES as SIZES, probability as probability, rows as rows
-    from mapping.model.tolerance import (
+    from mapping.model.conformity import (
         ANY as ANY,
         DISPROOF as DISPROOF,
         FAIL as FAIL,
@@ -29,18 +22,18 @@ if TYPE_CHECKING:
         Tolerance as Tolerance,
         judged as judged,
     )
+    from mapping.model.dropped import dropped_crossings as dropped_crossings, dropped_features as dropped_features
+    from mapping.model.feature_mesh import drawn_at_least as drawn_at_least, feature_mesh as feature_mesh
+    from mapping.model.json_record import plain as plain
+    from mapping.model.merging import merge_model as merge_model
+    from mapping.model.object_model import ObjectModel as ObjectModel
+    from mapping.model.registration import Registration as Registration, register as register
+    from mapping.model.table import SIZES as SIZES, probability as probability, rows as rows
     from mapping.model.touchable import touchable as touchable
 
 _PUBLIC = {
     "comparison": ("Change", "Comparison", "compare_models"),
-    "dropped": ("dropped_crossings", "dropped_features"),
-    "feature_mesh": ("drawn_at_least", "feature_mesh"),
-    "json_record": ("plain",),
-    "merging": ("merge_model",),
-    "object_model": ("ObjectModel",),
-    "registration": ("Registration", "register"),
-    "table": ("SIZES", "probability", "rows"),
-    "tolerance": (
+    "conformity": (
         "ANY",
         "DISPROOF",
         "FAIL",
@@ -52,6 +45,13 @@ _PUBLIC = {
         "Tolerance",
         "judged",
     ),
+    "dropped": ("dropped_crossings", "dropped_features"),
+    "feature_mesh": ("drawn_at_least", "feature_mesh"),
+    "json_record": ("plain",),
+    "merging": ("merge_model",),
+    "object_model": ("ObjectModel",),
+    "registration": ("Registration", "register"),
+    "table": ("SIZES", "probability", "rows"),
     "touchable": ("touchable",),
 }
 doorway(__name__, _PUBLIC)

@@ -10,7 +10,7 @@ import numpy as np
 from mapping import FloatArray, Surface, Trace
 from mapping.base.profiles.form import AUTO, Form, form_line
 from mapping.base.profiles.frame import ProfileFrame
-from mapping.base.profiles.isolated import Bend, isolated_bends, isolated_rest
+from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_rest
 from mapping.instrument import robust_fit, robust_scale
 
 if TYPE_CHECKING:

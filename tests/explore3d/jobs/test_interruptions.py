@@ -185,8 +185,9 @@ def test_fifty_interruptions_at_random_moments_cost_nothing(
     for number, job in enumerate(jobs):
         how, what = hows[number % 4], "finished"
         share = chance.random()
-        # results of 0.2 MB (a model) to 5.3 MB (a report) must not fit
-        most = {"merge": 1e4, "calibrate": 1e4}.get(job, 5e6 if number % 8 > 3 else 2e5)
+        # results as large as the older ones must not fit beside them, nor a model without its report
+        size = sum(path.stat().st_size for path in older.of(job).rglob("*") if path.is_file())
+        most = {"merge": 1e4, "calibrate": 1e4}.get(job, 0.9 * size if number % 8 > 3 else 0.1 * size)
         free = int(chance.random() * most)
         for attempt in range(4):
             if what != "finished":

@@ -18,8 +18,8 @@ from mapping.detection.detect import Detections
 from mapping.feature import Feature, Interval, LeftOut, Support
 from mapping.geometry.templates.shapes import chain_height
 from mapping.instrument.noise import Noise
+from mapping.model.conformity import Tolerance, judged
 from mapping.model.object_model import ObjectModel
-from mapping.model.tolerance import Tolerance, judged
 from mapping.surface import Surface
 from mapping.trace import Trace
 

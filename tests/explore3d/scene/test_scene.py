@@ -11,7 +11,7 @@ import pytest
 from explore3d.errors import SceneError
 from explore3d.scene.scene import load_scene, parse_scene
 from explore3d.scene.to_toml import scene_text
-from mapping.model.tolerance import Tolerance
+from mapping.model.conformity import Tolerance
 
 SCENES = Path(__file__).parents[3] / "assets" / "scenes"
 TEXT = (SCENES / "wire_on_plate.toml").read_text()

@@ -1,4 +1,4 @@
-"""Tolerance: what a drawing allows of a kind of feature, and with which probability what was found conforms."""
+"""Conformity: what a drawing allows of a kind of feature, and with which probability what was found conforms."""
 
 from __future__ import annotations
 
