@@ -25,6 +25,11 @@ if TYPE_CHECKING:
     )
     from explore3d.analysis.savings import without_needless_dynamics as without_needless_dynamics
     from explore3d.analysis.stages import Progress as Progress, Stages as Stages, silent as silent
+    from explore3d.analysis.standard_heights import (
+        STANDARDS_SENTENCE as STANDARDS_SENTENCE,
+        StandardHeight as StandardHeight,
+        standard_heights as standard_heights,
+    )
     from explore3d.analysis.surface_account import SurfaceAccount as SurfaceAccount, swept_share as swept_share
     from explore3d.analysis.truth import Comparison as Comparison, TrueFeature as TrueFeature, compare as compare
 
@@ -38,6 +43,7 @@ _PUBLIC = {
     "roughness": ("Roughness", "residual", "roughness_of", "why_no_roughness_of"),
     "savings": ("without_needless_dynamics",),
     "stages": ("Progress", "Stages", "silent"),
+    "standard_heights": ("STANDARDS_SENTENCE", "StandardHeight", "standard_heights"),
     "surface_account": ("SurfaceAccount", "swept_share"),
     "truth": ("Comparison", "TrueFeature", "compare"),
 }

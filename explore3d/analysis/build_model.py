@@ -23,6 +23,7 @@ from explore3d.analysis.method import (
     placed,
     refined_all,
     roughness_taken,
+    standard_heights_taken,
     surface_estimated,
     tip_counts,
     why_no_chain,
@@ -37,6 +38,7 @@ from explore3d.analysis.method import (
     why_no_posterior,
     why_no_roughness,
     why_no_smoothing,
+    why_no_standard_heights,
     why_no_surface,
     why_no_time_curve,
 )
@@ -75,6 +77,7 @@ METHOD = (
     MethodStage("roughness", why_no_roughness, roughness_taken, sized=False),
     MethodStage("", None, inspected),
     MethodStage("", None, modelled),
+    MethodStage("standard heights", why_no_standard_heights, standard_heights_taken, sized=False),
     MethodStage("error against time", why_no_time_curve, compared_in_time, possible=_never, sized=False),
 )
 
@@ -123,6 +126,7 @@ def _result(work: Work) -> Analysis:
         deviation=work.deviation,
         judgements=work.judgements,
         roughness=work.roughness,
+        standard_heights=work.standard_heights,
     )
 
 

@@ -16,6 +16,7 @@ from explore3d.analysis.inspected import Inspected, base_reach
 from explore3d.analysis.result import TipCount
 from explore3d.analysis.roughness import Roughness, roughness_of, why_no_roughness_of
 from explore3d.analysis.stages import Stages
+from explore3d.analysis.standard_heights import LINE_KINDS, StandardHeight, standard_heights
 from explore3d.analysis.surface_account import SurfaceAccount, swept_share
 from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature
@@ -94,6 +95,7 @@ class Work:
         judgements: what became of the scene's tolerances.
         apart: samples left out for that.
         roughness: what the surface is like beside the features.
+        standard_heights: what its ridges, grooves and steps measure by the standards.
         asked: whether a stage was asked for, by its name.
     """
 
@@ -119,6 +121,7 @@ class Work:
     deviation: Deviation | None = None
     apart: int = 0
     roughness: Roughness | None = None
+    standard_heights: tuple[StandardHeight, ...] = ()
     time_curve: tuple[tuple[float, float], ...] = ()
     asked: dict[str, bool] = field(default_factory=dict)
 
@@ -453,6 +456,21 @@ def modelled(work: Work, share: Share) -> None:
         work.judgements = judged(work.model.features, work.scene.tolerances, limit, swept)
         record = [each.record() for each in work.judgements]
         work.model = replace(work.model, provenance=work.model.provenance | {"tolerances": record})
+
+
+def why_no_standard_heights(work: Work) -> str | None:
+    """The standards know sections of lines; a log that was searched while it was read has none any more."""
+    if work.log.detections:
+        return None
+    lines = any(feature.kind in LINE_KINDS for feature in work.model.features)
+    return "" if lines else "there is no ridge, groove or step"
+
+
+def standard_heights_taken(work: Work, share: Share) -> None:
+    """What ridges, grooves and steps measure by the standards, beside ours."""
+    work.standard_heights = standard_heights(work.laid, work.model.features)
+    record = [each.record() for each in work.standard_heights]
+    work.model = replace(work.model, provenance=work.model.provenance | {"standard_heights": record})
 
 
 def in_model_frame(features: tuple[Feature, ...], base: Base) -> tuple[Feature, ...]:

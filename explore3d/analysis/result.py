@@ -13,6 +13,7 @@ from mapping.model import Judgement, ObjectModel
 if TYPE_CHECKING:
     from explore3d.analysis.inspected import Inspected
     from explore3d.analysis.roughness import Roughness
+    from explore3d.analysis.standard_heights import StandardHeight
     from explore3d.analysis.surface_account import SurfaceAccount
     from explore3d.analysis.truth import Comparison, TrueFeature
     from explore3d.log import Stop
@@ -69,6 +70,7 @@ class Analysis:
         deviation: what the given model gets wrong at long wavelengths, None if nothing.
         judgements: what became of each tolerance of the scene.
         roughness: what the surface is like beside the features; None where a trace cannot tell.
+        standard_heights: what its ridges, grooves and steps measure by the standards.
     """
 
     title: str
@@ -96,3 +98,4 @@ class Analysis:
     deviation: Deviation | None = None
     judgements: tuple[Judgement, ...] = ()
     roughness: Roughness | None = None
+    standard_heights: tuple[StandardHeight, ...] = ()

@@ -23,6 +23,7 @@ OPTIONAL_STAGES = (
     "long chain",
     "estimated surface",
     "roughness",
+    "standard heights",
     "smoothing",
     "curvature",
     "error against time",

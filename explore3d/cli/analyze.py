@@ -146,7 +146,7 @@ def roughness(
             pixel=pixel,
             part=part,
             quick=True,
-            force=("roughness",),
+            force=("roughness", "standard heights"),
             progress=progress,
             cutoffs=(
                 None if cutoff is None else length("--cutoff", cutoff, positive=True),
@@ -158,8 +158,12 @@ def roughness(
         raise UserError(
             f"{log}: too short, or too full of features, for one section of the filter; a shorter --cutoff may do"
         )
+    heights = analysis.standard_heights
     if json:
-        print(dumps(plain(found.record()), ensure_ascii=False, allow_nan=False))
+        record = found.record() | {"standard_heights": [each.record() for each in heights]}
+        print(dumps(plain(record), ensure_ascii=False, allow_nan=False))
         return
     print("\n".join(f"  {name:<4} {value:<12} {span}".rstrip() for name, value, span in found.rows()))
     print(found.sentence())
+    for name, method, height, wolf in (each.row() for each in heights):
+        print(f"  {name} by {method}: {height}" + (f"; Wolf pruning height {wolf}" if wolf else ""))

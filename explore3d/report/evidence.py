@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from explore3d.analysis import Analysis, Comparison
+from explore3d.analysis import STANDARDS_SENTENCE, Analysis, Comparison
 from explore3d.report.markup import Html, Row, badge, element, figure, folded, paragraph, section, table
 from explore3d.report.pictures import Pictures, shown_features
 from mapping import UNKNOWN_TEXT, length_text
@@ -67,6 +67,16 @@ def roughness_table(analysis: Analysis) -> Html:
     rows: list[Row] = list(rough.rows())
     content = [table(("parameter", "value", "90 % interval"), rows, numeric=(1, 2)), paragraph(rough.sentence())]
     return section("Roughness beside the features", "roughness", *content)
+
+
+def standard_heights_table(analysis: Analysis) -> Html:
+    """What ridges, grooves and steps measure by the standards, where a section of them can be had."""
+    known = analysis.standard_heights
+    if not any(each.height is not None or each.wolf is not None for each in known):
+        return Html("")
+    rows: list[Row] = [each.row() for each in known]
+    columns = ("feature", "method", "height (90 % of the mean)", "Wolf pruning height")
+    return section("Heights by the standards", "standards", table(columns, rows), paragraph(STANDARDS_SENTENCE))
 
 
 def deviation_map(analysis: Analysis, pictures: Pictures) -> Html:

@@ -15,6 +15,7 @@ from explore3d.report.evidence import (
     deviation_map,
     posteriors,
     roughness_table,
+    standard_heights_table,
 )
 from explore3d.report.findings_section import against_tolerances, facts, headline, what_was_found
 from explore3d.report.markup import Html, choice_of_units, contents, element, text, units_script
@@ -62,6 +63,7 @@ def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPa
         against_tolerances(analysis),
         deviation_map(analysis, pictures),
         roughness_table(analysis),
+        standard_heights_table(analysis),
         cross_sections(analysis, pictures),
         posteriors(pictures),
         curvature_maps(pictures),

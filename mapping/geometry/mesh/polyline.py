@@ -6,6 +6,9 @@ import numpy as np
 
 from mapping import FloatArray
 
+# Points against legs that are compared at once: 24 MB for each of the arrays between
+_MOST_PAIRS = 1_000_000
+
 
 def arclengths(points: FloatArray) -> FloatArray:
     """(K,) distance from the first of the points (K, 3) along the polyline, m."""
@@ -52,6 +55,10 @@ def nearest_on(points: FloatArray, polyline: FloatArray) -> tuple[FloatArray, Fl
     """The nearest point (N, 3) of a polyline (K, 3) to each of (N, 3) points, and its arclength (N,), m."""
     if len(polyline) == 1:
         return np.broadcast_to(polyline[0], points.shape).copy(), np.zeros(len(points))
+    block = max(1, _MOST_PAIRS // len(polyline))
+    if len(points) > block:
+        parts = [nearest_on(points[k : k + block], polyline) for k in range(0, len(points), block)]
+        return np.concatenate([on for on, _ in parts]), np.concatenate([along for _, along in parts])
     start, leg = polyline[:-1], np.diff(polyline, axis=0)
     square = np.einsum("ij,ij->i", leg, leg)
     along = np.einsum("nkj,kj->nk", points[:, None] - start, leg)
