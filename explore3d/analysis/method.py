@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from explore3d import UserError, __version__
+from explore3d import UserError, __version__, count_text
 from explore3d.analysis.inspected import Inspected, base_reach
 from explore3d.analysis.result import TipCount
 from explore3d.analysis.roughness import Roughness, roughness_of, why_no_roughness_of
@@ -27,7 +27,7 @@ from mapping.assembly import Inspections, assemble, why_none_sought
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
 from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
-from mapping.estimate.deviation import Deviation, explain
+from mapping.estimate.deviation import Deviation, explain, left_standing
 from mapping.estimate.envelope import estimate_surface
 from mapping.geometry.curvature import principal_curvatures
 from mapping.inference import refine_all
@@ -46,6 +46,9 @@ NOISE_FREE = 2e-8
 
 # What is left out where what may be a feature is none: taken for form, or too wide
 ABSORBED = "part of the form"
+_TOO_WIDE = "stands off the base and is wider than fine features are: only its edges are sought"
+# Of these so many are described one by one
+MOST_STANDING = 5
 
 # Why a stage that does not tell existence, places and sizes was left out
 NOT_IN_QUICK = "quick results were asked for: existence, places and sizes"
@@ -183,8 +186,7 @@ def fitted(work: Work, share: Share) -> None:
         end = "was taken for the base's own form; if it is a feature, say --form line, arc or poly:2, or --mask it"
         work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))
     for bend in _bends(work.base, "left standing"):
-        end = "stands off the base and is wider than fine features are: only its edges are sought"
-        work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))
+        work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {_TOO_WIDE}"))
 
 
 def _bends(base: Base, name: str) -> list[dict[str, Any]]:
@@ -199,6 +201,20 @@ def _described(bend: dict[str, Any]) -> str:
     place = ", ".join(f"{1e3 * value:.4g}" for value in bend["place"])
     height, width = length_text(abs(bend["height"]), 2), length_text(bend["width"], 2)
     return f"a {kind} {height} {sense} and {width} wide at ({place}) mm"
+
+
+def _note_left_standing(work: Work) -> None:
+    """Say what stands off a fitted base and is no fine feature; a given model is judged by the deviation."""
+    if work.base.kind in ("mesh", "profile"):
+        return
+    found = left_standing(work.laid)
+    for each in found[:MOST_STANDING]:
+        seen = count_text(each.sweeps, "sweep")
+        text = f"{_described({'height': each.height, 'width': each.width, 'place': each.place})} in {seen} {_TOO_WIDE}"
+        work.stages.left_out.append(LeftOut(ABSORBED, text))
+    if len(found) > MOST_STANDING:
+        more = count_text(len(found) - MOST_STANDING, "wide hollow or hump stands", "wide hollows and humps stand")
+        work.stages.left_out.append(LeftOut(ABSORBED, f"besides, {more} off the base"))
 
 
 def _was_found(base: Base) -> bool:
@@ -304,6 +320,7 @@ def detected(work: Work, share: Share) -> None:
         work.trace, work.laid = work.trace.select(keep), work.laid.within(keep)
         found = detect(work.laid, work.base, **work.settings.detection)
         work.detections = replace(found, left_out=(*work.detections.left_out, *found.left_out))
+    _note_left_standing(work)
     if work.sound is not None:
         work.path = path_ledger(work.sound, work.detections, beyond, work.apart)
     if work.deviation is not None and work.deviation.beyond_repair:

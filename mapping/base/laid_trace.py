@@ -54,6 +54,10 @@ class LaidSweep:
             )
         return self._heights[spacing]
 
+    def known_heights(self) -> tuple[SweepHeights, ...]:
+        """The finest of the heights that were asked for by now: nothing is laid."""
+        return self._heights[min(self._heights)] if self._heights else ()
+
     def feet(self, index: slice | IntArray = slice(None)) -> Feet:
         """Where some of the samples stand; each sample is laid on the base the first time that it is asked for."""
         which = np.arange(len(self.trace))[index]
@@ -109,8 +113,7 @@ class LaidSweep:
         """Known points of the base under the sweep, and directions from there to the ball, both (M, 3)."""
         if self._feet is not None and self._laid.all():
             return self._feet.points, self._feet.normals
-        finest = min(self._heights, default=None)
-        bins = () if finest is None else self._heights[finest]
+        bins = self.known_heights()
         known = [(each.feet, each.normals) for each in bins if each.feet is not None and each.normals is not None]
         if not known:
             return np.zeros((0, 3)), np.zeros((0, 3))
@@ -120,8 +123,7 @@ class LaidSweep:
         """(M, 3) centres of which it is known what lies under them, in the order of time, and their directions."""
         if self._feet is not None and self._laid.all():
             return self.trace.centers, self._feet.normals
-        finest = min(self._heights, default=None)
-        bins = () if finest is None else self._heights[finest]
+        bins = self.known_heights()
         known = [(each.centers, each.normals) for each in bins if each.normals is not None]
         if not known:
             return np.zeros((0, 3)), np.zeros((0, 3))

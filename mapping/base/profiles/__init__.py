@@ -8,10 +8,12 @@ if TYPE_CHECKING:
     from mapping.base.profiles.fit_profile import SHORTEST_BEND as SHORTEST_BEND, fit_profile as fit_profile
     from mapping.base.profiles.form import AUTO as AUTO, Form as Form
     from mapping.base.profiles.frame import profile_frame as profile_frame
+    from mapping.base.profiles.isolated_bends import isolated_rest as isolated_rest
 
 _PUBLIC = {
     "fit_profile": ("SHORTEST_BEND", "fit_profile"),
     "form": ("AUTO", "Form"),
     "frame": ("profile_frame",),
+    "isolated_bends": ("isolated_rest",),
 }
 doorway(__name__, _PUBLIC)

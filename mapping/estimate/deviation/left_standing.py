@@ -1,0 +1,76 @@
+"""Left standing: what stands off a base that was fitted to many sweeps, and is wider than fine features are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.base import LaidTrace, SweepHeights
+from mapping.base.profiles import SHORTEST_BEND, isolated_rest
+from mapping.instrument import robust_scale
+
+# Places of a sweep that are looked at: the count that the thresholds of isolated bends were simulated with
+PLACES = 480
+# Places across the narrowest that counts
+_PER_WIDTH = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class LeftStanding:
+    """A hollow or a hump: height (signed), m, width at half of it along a sweep, m, place (3,), m, sweeps over it."""
+
+    height: float
+    width: float
+    place: FloatArray
+    sweeps: int
+
+
+def left_standing(trace: LaidTrace) -> list[LeftStanding]:
+    """What fine features are sought on, and is none of them and not of the base's family: the highest first.
+
+    Args:
+        trace: laid on its base, and searched: the heights are those that are known by now.
+    """
+    found: list[tuple[LeftStanding, int]] = []
+    for sweep in trace.laid_sweeps:
+        for piece in sweep.known_heights():
+            found += [(each, sweep.number) for each in _of_piece(piece, trace.tip_radius)]
+    chosen: list[LeftStanding] = []
+    rest = sorted(found, key=lambda each: -abs(each[0].height))
+    while rest:
+        together, grown = [rest.pop(0)], 0
+        while grown < len(together):  # neighbours of neighbours: a long hollow is one
+            near = [each for each in rest if _beside(each[0], together[grown][0])]
+            rest = [each for each in rest if not any(each is other for other in near)]
+            together += near
+            grown += 1
+        top = together[0][0]
+        width = float(np.median([each.width for each, _ in together]))
+        chosen.append(LeftStanding(top.height, width, top.place, len({number for _, number in together})))
+    return chosen
+
+
+def _of_piece(piece: SweepHeights, tip_radius: float) -> list[LeftStanding]:
+    narrowest = SHORTEST_BEND * tip_radius
+    size = max(1, int(min(piece.length / PLACES, narrowest / _PER_WIDTH) / piece.spacing))
+    count = len(piece.height) // size
+    if count < 4:
+        return []
+    x = _means(piece.s, size, count)
+    z = _means(piece.height, size, count)
+    noise = float(robust_scale(np.diff(z, 2)) / np.sqrt(6.0))
+    return [
+        LeftStanding(bend.height, bend.width, piece.centers[int(np.abs(piece.s - bend.place).argmin())], 1)
+        for bend in isolated_rest(x, z, np.zeros_like(z), noise, narrowest)
+    ]
+
+
+def _means(values: FloatArray, size: int, count: int) -> FloatArray:
+    return np.asarray(values[: size * count].reshape(count, size).mean(axis=1))
+
+
+def _beside(one: LeftStanding, other: LeftStanding) -> bool:
+    near = float(np.linalg.norm(one.place - other.place)) < one.width + other.width
+    return near and one.height * other.height > 0.0
