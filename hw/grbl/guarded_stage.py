@@ -292,6 +292,7 @@ class GuardedStage:
             return True, 0
         idle = idle + 1 if status.state == "Idle" else 0
         if idle > TOLD:
+            self.controller.resting_position()  # from where it goes on
             self.controller.jog(self.frame.to_machine(here), speed)
             idle = 0
         return False, idle
@@ -415,8 +416,8 @@ class GuardedStage:
         opened, met = False, 0
         for here in self._pieces(start, target):
             self.controller.jog(self.frame.to_machine(here), self.guarded_speed)
-            left = 0.0 if np.array_equal(here, target) else self._run_out
-            while True:
+            left, stood = STANDING if np.array_equal(here, target) else self._run_out, 0
+            while stood <= TOLD:
                 status = self.controller.status()
                 if sensor is not None:
                     met = TOLD if np.linalg.norm(sensor.force()) > most else 0
@@ -427,8 +428,11 @@ class GuardedStage:
                     self.controller.cancel_jog()
                     raise StoppedError("something was met while the tip was lifted off; free it by hand")
                 place = self.frame.to_object(self.controller.machine_position(status))
-                if status.state != "Jog" or (left and np.linalg.norm(place - here) <= left):
+                if np.linalg.norm(place - here) <= left:
                     break
+                stood += status.state != "Jog"
+            else:
+                self.resting()  # an operator's hold threw the jog away: the next one begins here
         self.controller.wait_idle(LONGEST_STANDSTILL)
 
     def _pieces(self, start: FloatArray, target: FloatArray) -> Iterator[FloatArray]:
