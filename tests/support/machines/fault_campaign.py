@@ -1,8 +1,8 @@
 """A fault campaign: sweeps over a plate with true dynamics, one thing going wrong, and what came of it.
 
 Run by itself it prints one line a case, and then how many of each fault held:
-PYTHONPATH=. python tests/support/machines/fault_campaign.py [slide | peck | optoforce | line | all] [seeds]
-[faults, with commas between]
+PYTHONPATH=. python tests/support/machines/fault_campaign.py [slide | peck | optoforce | line | all]
+[how many seeds, or from-to] [faults, with commas between]
 
 The device lives in this program, and has no processor of its own: run it on a host with nothing else to do. A case
 whose fault never struck is no case: it is made again.
@@ -54,6 +54,8 @@ from hw.sensors.optoforce import OptoForce
 MADE = 3
 # A zero that drifts while the tip presses shows only when it is in free air again, however long the sweep
 UNSEEN_IN_CONTACT = ("drift",)
+# What shows in contact only; until the next one the machine lifts, takes its zero and travels, which is no hang
+SEEN_IN_CONTACT = ("sign", "gain 10", "gain 0.1")
 # What must hold: how long giving up may take, and nothing may move before it, s
 LONGEST = 5.0
 # The sensors' rate in this campaign, Hz, and sweeps of a case
@@ -69,6 +71,7 @@ class Witness:
         self.strongest, self.touched, self.struck, self.armed = 0.0, False, 0.0, False
         self.lifted, self.over = False, False
         self.struck_at, self.stood = 0.0, 0.0
+        self.felt = 0.0  # when the tip was first in contact since the strike
 
     def receive(self, data: bytes, now: float) -> None: ...
 
@@ -80,6 +83,8 @@ class Witness:
         self.strongest = max(self.strongest, force)
         if self.struck and not self.over:
             self.stood = max(self.stood, now - max(self.stage.motion.moved_at, self.struck_at))
+        if self.struck and force > 0.2 and not self.felt:
+            self.felt = time.monotonic()
         if self.struck or not self.armed:
             return
         self.lifted = self.lifted or z > R + 2e-3  # the second sweep begins from above
@@ -103,7 +108,7 @@ class Outcome:
         kind: the fault.
         strongest: largest true force, N.
         wrong, kept: samples of all sweeps.
-        lasted: from the strike until the finger said that it stopped, s; 0 if it went on.
+        lasted: from the strike, or when it could be felt, until the finger said that it stopped, s; 0 if it went on.
         stood: longest stand of the machine between the strike and the end, s.
         moved: after the finger was left, m.
         struck: whether the fault came to pass.
@@ -188,7 +193,8 @@ def run_case(kind: str, phase: str, touch: str, seed: int = 0, model: bool = Tru
         time.sleep(0.2)
         moved = stage.motion.travelled - still
         assert server.error is None, server.error
-    lasted = ended - witness.struck if ended and witness.struck else 0.0
+    since = witness.felt if kind in SEEN_IN_CONTACT else witness.struck
+    lasted = ended - since if ended and since else 0.0
     return Outcome(kind, witness.strongest, wrong, kept, lasted, witness.stood, moved, witness.struck > 0.0, said)
 
 
@@ -206,11 +212,11 @@ def struck_case(kind: str, phase: str, touch: str, seed: int, model: bool = True
             return
 
 
-def main(what: str, seeds: int, chosen: tuple[str, ...]) -> None:
+def main(what: str, seeds: range, chosen: tuple[str, ...]) -> None:
     """Print what came of each case, and the table of all that were struck."""
     table: dict[tuple[str, str], list[Outcome]] = {}
     fingers = {"slide": ("optoforce", "line"), "all": ("optoforce", "line", "peck")}
-    for seed, touch in product(range(seeds), fingers.get(what, (what,))):
+    for seed, touch in product(seeds, fingers.get(what, (what,))):
         for kind, phase in product(chosen or kinds(touch), PHASES):
             for out in struck_case(kind, phase, touch, seed):
                 times = f"{out.lasted:5.1f} s, stood {out.stood:4.1f} s"
@@ -235,4 +241,6 @@ def main(what: str, seeds: int, chosen: tuple[str, ...]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), tuple(sys.argv[3].split(",")) if len(sys.argv) > 3 else ())
+    first, _, last = sys.argv[2].rpartition("-")
+    wanted = range(int(first), int(last) + 1) if first else range(int(last))
+    main(sys.argv[1], wanted, tuple(sys.argv[3].split(",")) if len(sys.argv) > 3 else ())
