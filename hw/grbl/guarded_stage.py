@@ -435,7 +435,7 @@ class GuardedStage:
                 place = self.frame.to_object(self.controller.machine_position(status))
                 if np.linalg.norm(place - here) <= left:
                     break
-                stood += status.state != "Jog"
+                stood = 0 if status.state == "Jog" else stood + 1
             else:
                 self.resting()  # an operator's hold threw the jog away: the next one begins here
         self.controller.wait_idle(LONGEST_STANDSTILL)
