@@ -23,16 +23,18 @@ class Replay:
     """Answers the moves that an earlier log holds from the log, all later ones from the finger.
 
     A plan is a function of what it was sent, so it asks for the same moves again. The last move of a log that
-    was not closed in good order may be cut short: it is made again. What the earlier log holds and the plan does not
-    ask for any more is handed over all the same: nothing that was felt is lost.
+    was not closed in good order may be cut short: it is made again. What it gave before is kept if it gives less now,
+    for the machine may fail again, and sooner. What the earlier log holds and the plan does not ask for any more is
+    handed over all the same: nothing that was felt is lost.
 
     Args:
         log: of the earlier session.
     """
 
     def __init__(self, log: Log) -> None:
-        self._moves = _moves(log)
-        self._doubtful = bool(self._moves) and not _ended_well(log)
+        self._moves, self._begun = _moves(log)
+        # where samples of a later move follow, the last whole one was not cut short
+        self._doubtful = bool(self._moves) and not _ended_well(log) and not len(self._begun)
         self.samples = len(log.trace)
         self.replayed = 0
         self.live = False
@@ -59,16 +61,31 @@ class Replay:
                 if skip is not None:
                     skip(move)
                 return self._passed(self._moves.pop(0)[1])
-            if same:
-                self._moves.clear()  # it is made again
+            before = self._before(same)
             self.rest(keep, skip)  # from the first difference on the plan goes another way
-            trace = execute(move)
+            try:
+                trace = execute(move)
+            except BaseException:
+                if len(before):
+                    keep(move, self._passed(before))
+                raise
             self.live = True
+            if skip is None and len(trace) < len(before):
+                keep(move, self._passed(before))
             if skip is not None:
                 return trace
             return replace(trace, t=trace.t + self._time, sweep=trace.sweep + self._sweeps)
 
         return resumed
+
+    def _before(self, same: bool) -> Trace:
+        """What the earlier log holds of a move that is made now: the doubtful last one if it is the `same`, else what
+        was begun after all that were whole.
+        """
+        before, self._begun = self._begun, self._begun.select(slice(0, 0))
+        if same:
+            return self._moves.pop(0)[1]
+        return self._begun if self._moves else before
 
     def rest(self, keep: Callable[[Move, Trace], None], skip: Callable[[Move], None] | None = None) -> None:
         """Hand over what was not asked for again."""
@@ -86,8 +103,9 @@ class Replay:
         return trace
 
 
-def _moves(log: Log) -> list[tuple[Move, Trace]]:
-    moves = []
+def _moves(log: Log) -> tuple[list[tuple[Move, Trace]], Trace]:
+    """The moves that were made, with what they gave, and what was felt of one that never ended."""
+    moves, known = [], 0
     for event in log.events:
         if event.kind != "move":
             continue
@@ -96,8 +114,9 @@ def _moves(log: Log) -> list[tuple[Move, Trace]]:
         first = int(data["first"])
         if first + int(data["samples"]) > len(log.trace):
             break  # what the log lost
-        moves.append((move, log.trace.select(slice(first, first + int(data["samples"])))))
-    return moves
+        known = first + int(data["samples"])
+        moves.append((move, log.trace.select(slice(first, known))))
+    return moves, log.trace.select(slice(known, None))
 
 
 def _ended_well(log: Log) -> bool:

@@ -48,6 +48,9 @@ NAMING = 1.0
 RESTARTING = 1.0
 # The link's round trip is the median of so many
 RECENT_REPORTS = 15
+# A machine that is asked where it stands does so, and says it twice, within so many s: a line may have been looked at
+# late, and with 1 % of all bytes wrong every second report is
+LONGEST_TO_A_STAND = 4.0
 # Reports that are kept: ten seconds of asking as fast as a port can answer
 KEPT_REPORTS = 50_000
 
@@ -69,7 +72,9 @@ class Report(NamedTuple):
 class GrblController:
     """Connects, identifies, moves, probes, stops. Positions are machine coordinates in metres.
 
-    Nothing here moves anything before `move`, `probe`, `jog` or `home` is called.
+    Nothing here moves anything before `move`, `probe`, `jog` or `home` is called. What is sent is the way from where
+    the motion before it ends (G91), never a place: a controller that restarted, or was told another zero, takes its
+    place for another one, and would drive there through whatever stands between. It goes as far as it was sent at most.
 
     Args:
         port: device name or pyserial URL.
@@ -108,7 +113,8 @@ class GrblController:
         self._seen_off: FloatArray | None = None
         self._new_offset: FloatArray | None = None
         self._way: tuple[FloatArray, FloatArray] | None = None  # box of where it was sent; None: not known yet
-        self._sent_to: FloatArray | None = None
+        self._from: FloatArray | None = None  # where the last motion that was sent ends; None: to be asked
+        self._anew = True  # the next motion begins from a stand
         self._moves_until = -np.inf  # at the latest, if nothing stops it, but for one ramp
 
     # connection
@@ -180,6 +186,7 @@ class GrblController:
         self.command("G21G90G94")
         self.offset = protocol.parse_offset(self._agreed("$#"), self._agreed("$G")) * self.settings.report_scale
         self._way, self._new_offset, self._offset_known = None, None, True
+        self._from, self._anew = None, True
 
     def close(self) -> None:
         """Let go of the port."""
@@ -285,13 +292,28 @@ class GrblController:
         return self.machine_position(self.status())
 
     def resting_position(self) -> FloatArray:
-        """(3,) machine position, m, as two reports of a standing machine in a row tell it. Raises LinkError."""
-        before = self.position()
-        for _ in range(TRIES_OF_A_LINE):
-            here = self.position()
-            if np.abs(here - before).max() < self.settings.resolution:
-                return here
-            before = here
+        """(3,) machine position, m, as two reports of a standing machine in a row tell it. Raises LinkError.
+
+        If it is idle the next motion begins from there, whatever became of those before. A report overtakes lines that
+        are not looked at yet, and a busy host hears reports late: so both are asked for now, the second one when the
+        first has come. By then the controller has looked at all lines that it was sent before.
+        """
+        heard, patience = time.monotonic(), Patience(LONGEST_TO_A_STAND)
+        before: Report | None = None
+        while not patience.over():
+            self.status()
+            after = self.reports[-1]
+            here = self.machine_position(after.status)
+            in_turn = after.at - after.round_trip >= heard
+            if in_turn and before is not None:
+                there = self.machine_position(before.status)
+                if np.abs(here - there).max() < self.settings.resolution:
+                    if before.status.state == after.status.state == "Idle":
+                        self._settle_answers()
+                        self._sent.clear()
+                        self._from, self._anew = here, True
+                    return here
+            before, heard = (after if in_turn else None), after.at
         raise LinkError(f"{self.link.port}: no two reports of where the machine stands agree; use a shielded cable")
 
     def machine_position(self, status: Status) -> FloatArray:
@@ -300,11 +322,22 @@ class GrblController:
         return metres if status.is_machine else metres + self.offset
 
     def move(self, target: FloatArray, speed: float, within: float) -> None:
-        """Straight to a target (3,), m, at a speed, m/s; returns when the machine stands there."""
-        self._heading_for(target, speed, anew=True)
-        self.command(f"G53G1{protocol.words(target)}{protocol.feed_word(speed)}")
-        # a dwell is answered when all motion before it is done: sooner and surer than asking for the state
-        self.command("G4P0.001", within)
+        """Straight to a target (3,), m, at a speed, m/s; returns when the machine stands there.
+
+        A line that was lost, or whose answer was, is said again for what is left of the way.
+        """
+        self.check()
+        for _ in range(TRIES_OF_A_LINE):
+            way = self._way_to(target, speed)
+            with suppress(_Unanswered):
+                self._ask_once(f"G21G91G94G1{protocol.words(way)}{protocol.feed_word(speed)}", within)
+                break
+            self.resting_position()
+        else:
+            raise LinkError(f"{self.link.port}: {TRIES_OF_A_LINE} lines were not answered; use a shielded cable")
+        # a dwell is answered when all motion before it is done: sooner and surer than asking for the state. What other
+        # programs say later is meant as places again
+        self.command("G90G4P0.001", within)
 
     def probe(self, target: FloatArray, speed: float, within: float) -> Probed:
         """Towards a target (3,) until the probe closes; the latched position (m), and whether it closed.
@@ -313,11 +346,13 @@ class GrblController:
         machine came to rest lies further on by its braking distance.
         """
         self.check()
-        self._heading_for(target, speed, anew=True)
-        work = target - self.offset  # probing obeys the work coordinates: G53 is not for G38
+        way = self._way_to(target, speed)
         lines: list[str] = []
-        with suppress(_Unanswered):  # not said again: the probe may be closed now. The result is kept, and read below
-            lines = self._ask_once(f"G38.3{protocol.words(work)}{protocol.feed_word(speed)}", within)
+        try:
+            with suppress(_Unanswered):  # not said again: the probe may be closed now. The result is kept, read below
+                lines = self._ask_once(f"G21G91G94G38.3{protocol.words(way)}{protocol.feed_word(speed)}", within)
+        finally:
+            self._from = None
         found = self._latched(lines)
         return Probed(found.position * self.settings.report_scale, found.hit)
 
@@ -347,8 +382,8 @@ class GrblController:
             StoppedError, LinkError: as for `command`.
         """
         self.check()
-        self._heading_for(target, speed, anew=not self._sent and self._standing())
-        line = f"$J=G53{protocol.words(target)}{protocol.feed_word(speed)}\n".encode("ascii")
+        way = self._way_to(target, speed)
+        line = f"$J=G21G91{protocol.words(way)}{protocol.feed_word(speed)}\n".encode("ascii")
         self._settle_answers()
         if sum(self._sent) + len(line) >= protocol.RECEIVE_BUFFER:
             restarts = self._restarts
@@ -398,6 +433,7 @@ class GrblController:
                 raise LinkError(f"{self.link.port}: still {state} {within:g} s after the jog was cancelled")
             time.sleep(0.1 * POLL)
         self._sent.clear()
+        self._from = None
         self.check()
 
     def wait_idle(self, within: float) -> None:
@@ -413,7 +449,8 @@ class GrblController:
             self._settle_answers()
             idle = idle + 1 if state == "Idle" else 0
             if idle > UNANSWERED:
-                self._sent.clear()  # their answers were lost
+                self._sent.clear()  # their answers were lost, or they were
+                self._from = None
             if self.paused:
                 patience.at_least(1.0)
             if patience.over():
@@ -428,7 +465,7 @@ class GrblController:
 
     def home(self, within: float = 120.0) -> None:
         """$H: find machine zero. MOVES the machine."""
-        self.alarm, self._way = None, None
+        self.alarm, self._way, self._from = None, None, None
         self.link.write(b"$H\n")
         restarts = self._restarts
         with self._news:
@@ -487,19 +524,20 @@ class GrblController:
         self.vouched, self.distrust = False, f"{self.link.port}: {reason}"
         self.halt(self.distrust)
 
-    def _heading_for(self, target: FloatArray, speed: float, anew: bool) -> None:
-        """Reports must lie in the box of the places between which it moves; it arrives when its speed says."""
-        # nothing is known yet of where it must be: one report may be garbled, and all true ones off the way from there
-        begun = self.resting_position() if self._way is None or self._sent_to is None else self._sent_to
+    def _way_to(self, target: FloatArray, speed: float) -> FloatArray:
+        """The way (3,), m, from where the last motion ends, as it is written in a line: what that rounds never adds up.
+
+        Reports must lie in the box of the places between which it moves; it arrives when its speed says.
+        """
+        begun = self.resting_position() if self._from is None else self._from
+        way = protocol.rounded(target - begun)
         with self._news:
-            if anew or self._way is None or self._sent_to is None:
-                # the last report may be older than a short way that has ended since
-                here, there = self.machine_position(self.reports[-1].status), begun
-                self._way = np.minimum(here, there), np.maximum(here, there)
-                self._sent_to, self._moves_until = here, -np.inf
+            if self._anew or self._from is None or self._way is None:
+                self._way, self._moves_until, self._anew = (begun, begun), -np.inf, False
             self._way = (np.minimum(self._way[0], target), np.maximum(self._way[1], target))
-            lasts = float(np.linalg.norm(target - self._sent_to)) / speed
-            self._moves_until, self._sent_to = max(self._moves_until, time.monotonic()) + lasts, target
+            lasts = float(np.linalg.norm(way)) / speed
+            self._moves_until, self._from = max(self._moves_until, time.monotonic()) + lasts, begun + way
+        return way
 
     def run_out(self) -> None:
         """Wait until all that it was told has ended, by the clock: for a machine that can be asked and stopped no more.

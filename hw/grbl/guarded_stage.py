@@ -41,6 +41,9 @@ LONGEST_BLIND = 2.0
 TOLD = 2
 # The tip is free when a step of this length, m, changes the force by less than a touch
 FREE_STEP, MOST_FREE_STEPS = 5e-4, 20
+# A probe that is closed opens within this of the contact, m, or sticks; it is backed off in steps that double: each
+# costs a handful of questions, and 20 equal ones took 5 s
+MOST_STUCK = 1e-2
 # The latched position lies on the way up to the motors' steps of three axes, and the rounding of the report
 LATCH_STEPS = 3.0
 # After contact with a touch probe the machine runs on by what it has prepared of its motion, and by its braking
@@ -219,12 +222,14 @@ class GuardedStage:
     def _open_by_backing_off(self, start: FloatArray, target: FloatArray) -> None:
         """A probe that is closed before probing begins is in contact: back, the way it was to go."""
         back = (start - target) / np.linalg.norm(start - target)
-        for _ in range(MOST_FREE_STEPS):
-            self.move(self._within(self.resting() + FREE_STEP * back), self.guarded_speed)
+        here, step, backed_off = self.resting(), FREE_STEP, 0.0
+        while backed_off < MOST_STUCK:
+            step, backed_off = 2.0 * step, min(backed_off + step, MOST_STUCK)
+            self.move(self._within(here + backed_off * back), self.guarded_speed)
             if not self.closed():
                 return
         raise StoppedError(
-            f"the probe stays closed {1e3 * MOST_FREE_STEPS * FREE_STEP:.0f} mm off the contact: it sticks, is wired "
+            f"the probe stays closed {1e3 * MOST_STUCK:.0f} mm off the contact: it sticks, is wired "
             "for the other sense ($6), or its cable is broken"
         )
 
@@ -292,6 +297,7 @@ class GuardedStage:
             return True, 0
         idle = idle + 1 if status.state == "Idle" else 0
         if idle > TOLD:
+            self.controller.resting_position()  # from where it goes on
             self.controller.jog(self.frame.to_machine(here), speed)
             idle = 0
         return False, idle
@@ -415,8 +421,8 @@ class GuardedStage:
         opened, met = False, 0
         for here in self._pieces(start, target):
             self.controller.jog(self.frame.to_machine(here), self.guarded_speed)
-            left = 0.0 if np.array_equal(here, target) else self._run_out
-            while True:
+            left, stood = STANDING if np.array_equal(here, target) else self._run_out, 0
+            while stood <= TOLD:
                 status = self.controller.status()
                 if sensor is not None:
                     met = TOLD if np.linalg.norm(sensor.force()) > most else 0
@@ -427,8 +433,11 @@ class GuardedStage:
                     self.controller.cancel_jog()
                     raise StoppedError("something was met while the tip was lifted off; free it by hand")
                 place = self.frame.to_object(self.controller.machine_position(status))
-                if status.state != "Jog" or (left and np.linalg.norm(place - here) <= left):
+                if np.linalg.norm(place - here) <= left:
                     break
+                stood = 0 if status.state == "Jog" else stood + 1
+            else:
+                self.resting()  # an operator's hold threw the jog away: the next one begins here
         self.controller.wait_idle(LONGEST_STANDSTILL)
 
     def _pieces(self, start: FloatArray, target: FloatArray) -> Iterator[FloatArray]:

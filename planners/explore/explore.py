@@ -284,12 +284,14 @@ class Explore:
         track = found.tracks[index]
         finder = EndFinder(self.strokes, self.base, found.noise or Noise(0.0))
         crest = Crest.of(track)
-        end = track.ends[which]
+        before = end = track.ends[which]
         for _ in range(SLIDES_AT_ONCE):
             end = yield from finder.slide(end, crest)
             found.slides[index, which] = found.slides.get((index, which), 0) + 1
             if end.reason != "end" or end.sd <= self._enough(track):
                 break
+        if end is before:  # none showed it, nor would any more
+            found.slides[index, which] = MOST_SLIDES
         found.tracks[index] = track.with_end(which, end)
         return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")
 

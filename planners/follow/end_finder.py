@@ -13,7 +13,7 @@ from mapping.base import Base
 from mapping.instrument import Noise
 from planners.follow.axis_track import AxisEnd, AxisTrack, Slides
 from planners.follow.recross import flattening
-from planners.follow.template_fit import ShapeFit, end_shape, fit_shape
+from planners.follow.template_fit import FEWEST_FITTED, ShapeFit, end_shape, fit_shape
 from planners.paths import Strokes, tangential, to_and_fro
 
 # A slide in half-widths of the disturbance: from so far before the end to so far beyond it. The first one must find
@@ -86,7 +86,7 @@ class EndFinder:
         for trace in traces:
             feet = self.base.foot(trace.centers, tip)
             felt = Slides.joined(felt, feet.points, feet.height)
-        if felt is None or sum(len(trace) for trace in traces) < 32:
+        if felt is None or sum(len(trace) for trace in traces) < FEWEST_FITTED:
             return end
         fit = self._fitted(felt, points, normals, along, crest, float(along[-1]) - 0.5 * half)
         inside = 0.02 * tip < fit.place < float(along[-1]) - 0.5 * half - 0.02 * tip

@@ -10,7 +10,7 @@ from mapping import FloatArray, Trace
 from mapping.base import Base
 from mapping.detection import Crossing
 from mapping.instrument import Noise
-from planners.follow.template_fit import ShapeFit, crest_shape, dip_shape, edge_shape, fit_shape
+from planners.follow.template_fit import FEWEST_FITTED, ShapeFit, crest_shape, dip_shape, edge_shape, fit_shape
 
 # Fall of chi-squared below which a sweep shows nothing: five standard deviations
 SEEN_CHI_SQUARE_FALL = 25.0
@@ -56,7 +56,7 @@ def seen_again(
     order = np.argsort(place, kind="stable")
     place, height, normals = place[order], feet.height[order], feet.normals[order]
     window = np.abs(place) <= reach + (2.5 if is_step(like) else 0.9) * like.half_width
-    if window.sum() < 32:
+    if window.sum() < FEWEST_FITTED:
         return None
     wide = flattening(place[window], normals[window], way, trace.tip_radius)
     fit, kind, half_width = _fitted(wide * place[window], height[window], trace.tip_radius, noise, like, wide * reach)

@@ -17,6 +17,8 @@ Shape = Callable[[FloatArray, float], FloatArray]
 # Bins that a sweep is averaged over; every shape is wider than many of them
 SHAPE_FIT_BINS = 160
 STARTS = 81
+# Samples that a sweep must have to be fitted: two in each of the fewest bins. A sweep of pecks has 25
+FEWEST_BINS, FEWEST_FITTED = 8, 16
 # Relative change of place, height and chi-squared below which a fit has converged: far below its uncertainty
 FIT_TOLERANCE = 1e-6
 
@@ -49,7 +51,7 @@ def fit_shape(
     """The best place within an interval and the best height.
 
     Args:
-        s: (N,) arclengths, m, increasing; N >= 8.
+        s: (N,) arclengths, m, increasing; N >= FEWEST_FITTED.
         height: (N,) heights of the trace over the base's, m.
         shape: the closed form.
         sign: +1 for crests, -1 for dips.
@@ -113,7 +115,7 @@ def edge_shape(tip_radius: float) -> Shape:
 
 def _binned(s: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Means of place and height in at most SHAPE_FIT_BINS bins of equal length, and the samples in each."""
-    count = int(min(SHAPE_FIT_BINS, max(8, len(s) // 4)))
+    count = int(min(SHAPE_FIT_BINS, max(FEWEST_BINS, len(s) // 4)))
     cell = np.clip(((s - s[0]) / (s[-1] - s[0]) * count).astype(int), 0, count - 1)
     samples = np.bincount(cell, minlength=count).astype(float)
     used = samples > 0

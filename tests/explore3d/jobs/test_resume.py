@@ -135,6 +135,49 @@ def test_what_the_plan_does_not_ask_for_again_is_handed_over(tmp_path: Path) -> 
     assert (np.diff(Trace.concatenate(everything).t) > 0).all()
 
 
+@pytest.mark.parametrize("ends_better", [False, True])
+def test_what_was_felt_of_a_sweep_is_kept_unless_it_is_felt_again(tmp_path: Path, ends_better: bool) -> None:
+    first, cut_short = finger(), list[Trace]()
+    with LogWriter(tmp_path / "log.mcap", tip_radius=R) as log:
+
+        def killed_in_the_third(move: Move) -> Trace:
+            trace = first.execute(move)
+            if int(trace.sweep[0]) < 3:
+                log.write(move, trace)
+                return trace
+            cut_short.append(trace.select(slice(0, 50)))
+            log.felt(cut_short[0])
+            raise KeyboardInterrupt
+
+        with suppress(KeyboardInterrupt):
+            drive(plan(), killed_in_the_third)
+    replay, kept, live = Replay(read_log(tmp_path / "log.mcap")), list[Trace](), finger()
+
+    def fails(move: Move) -> Trace:
+        if not ends_better:
+            raise KeyboardInterrupt
+        return live.execute(move)
+
+    with suppress(KeyboardInterrupt):
+        drive(plan(), replay.before(fails, keep=lambda move, trace: kept.append(trace)))
+    assert replay.replayed == 2  # the second one was whole, for a third had begun
+    assert len(kept) == (0 if ends_better else 1)
+    assert ends_better or np.array_equal(kept[0].centers, cut_short[0].centers)
+
+
+def test_a_sweep_that_gives_less_than_before_is_kept_both_times(tmp_path: Path) -> None:
+    broken_off(tmp_path / "log.mcap", 3)
+    replay, kept, live = Replay(read_log(tmp_path / "log.mcap")), list[Trace](), finger()
+
+    def cut_short(move: Move) -> Trace:
+        return live.execute(move).select(slice(0, 10))
+
+    record, _ = drive(plan(3), replay.before(cut_short, keep=lambda move, trace: kept.append(trace)))
+    assert len(kept) == 1 and len(record[2][1]) == 10 < len(kept[0])
+    assert [int(trace.sweep[0]) for trace in (kept[0], record[2][1])] == [3, 4]
+    assert record[2][1].t[0] > kept[0].t[-1]
+
+
 def test_a_folder_without_a_log_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FolderError, match="nothing to resume"), Session(tmp_path / "out", resume=True):
         pass

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 
 import pytest
-from fault_campaign import PHASES, kinds, struck_case
+from fault_campaign import kinds, struck_case
+from struck_machine import PHASES
 
 
 def holds(kind: str, phase: str, touch: str, seed: int = 0, model: bool = True) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fault_campaign import DOWN, FRAME, STIFFNESS, R, plate
+from struck_machine import DOWN, FRAME, STIFFNESS, R, plate
 
 from hw.emulated import force
 from hw.emulated.force import OptoForceEmulator

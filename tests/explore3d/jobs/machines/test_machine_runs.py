@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from fault_campaign import PHASES
 from machine_runs import SIGNALS, bench, broken
+from struck_machine import PHASES
 
 FINGERS = ("optoforce", "line", "peck")
 

@@ -44,7 +44,7 @@ WRITER = textwrap.dedent(
 
 def kill_writer(path: Path, delay: float) -> int:
     """Start a writer, kill it `delay` seconds after its log exists; the samples that it had acknowledged."""
-    script = WRITER.format(tests=str(Path(__file__).parents[3] / "support"), path=str(path))
+    script = WRITER.format(tests=str(Path(__file__).parents[3] / "support" / "logs"), path=str(path))
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[4]), "OMP_NUM_THREADS": "1"}
     process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, env=environment)
     assert process.stdout is not None

@@ -221,7 +221,7 @@ def test_streaming_needs_no_more_memory_for_a_longer_log(tmp_path: Path) -> None
     def peak(samples: int) -> int:
         script = f"""
             import sys, resource
-            sys.path.insert(0, {str(Path(__file__).parents[3] / "support")!r})
+            sys.path.insert(0, {str(Path(__file__).parents[3] / "support" / "logs")!r})
             from sample_logs import MOVE, RADIUS, trace_of
             from explore3d.log import LogWriter
             from explore3d.log import iter_log

@@ -1,7 +1,8 @@
 """`explore3d run` of a machine that fails, and of a program that is ended: what a user sees, and what the machine did.
 
 The machine lives in this program, the command line in another: the true force and every motion are seen from outside.
-Run by itself it prints one line a case: python tests/support/machine_runs.py faults | signals | resume | quiet
+Run by itself it prints one line a case:
+PYTHONPATH=.:tests/support python tests/support/machines/machine_runs.py faults | signals | resume | quiet
 [optoforce | line | peck] [how many times]
 """
 
@@ -23,22 +24,30 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from fault_campaign import BYTE_FAULTS, CONTROLLER_FAULTS, OFF, PHASES, SECOND_PROGRAM
 from interrupting import HONEST, ROOT
 from scene_files import write_scene_file
+from struck_machine import (
+    BYTES,
+    CONTROLLER_FAULTS,
+    FRAME,
+    MOST,
+    OFF,
+    PHASES,
+    SENSORS,
+    STIFFNESS,
+    SURVIVABLE,
+    R,
+    case_line,
+    machine_over,
+    own_faults,
+    plate,
+    strike,
+)
 
 from explore3d.log.own.reader import read_log
-from hw.emulated.faults import Fault
-from hw.emulated.force import SENSOR_FAULTS, LineSensorEmulator, OptoForceEmulator
 from hw.emulated.grbl import GrblEmulator
 from hw.emulated.pty_server import PtyServer
-from hw.emulated.stage import PROBE_FAULTS
-from hw.emulated.touched_body import TouchedBody
-from hw.grbl.frame import StageFrame
-from mapping.surface import Surface
 
-R, STIFFNESS, LIMIT = 0.005, 1e4, 5.0
-FRAME = StageFrame.of((-0.15, -0.15, -0.05))
 # Half of the plate, m: with features of 0.4 mm its survey has a handful of sweeps
 HALF = (5e-3, 3e-3)
 SCENE = """
@@ -79,15 +88,8 @@ stiffness = 1e4
 SIGNALS = {"SIGINT": signal.SIGINT, "SIGTERM": signal.SIGTERM, "SIGKILL": signal.SIGKILL, "SIGSTOP 3 s": signal.SIGSTOP}
 # After these the program ends by itself, and well: 0; Ctrl-C and kill by their numbers; else what stopped it is said: 3
 STATUS = {"SIGINT": (130,), "SIGTERM": (143,), "SIGKILL": (-9,), "SIGSTOP 3 s": (0,)}
-GOES_ON = ("hold", "door", "bouncing", *(f"{kind} 1 %" for kind in BYTE_FAULTS))
 # What a user reads first
 FIRST_LINE = re.compile(r"^(explore3d: )?stopped after .+: .+; .*go on with: explore3d run .+ --resume", re.MULTILINE)
-
-
-def plate() -> Surface:
-    x, y = HALF
-    corners = np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
-    return Surface(corners, [[0, 1, 2], [0, 2, 3]])
 
 
 class Witness:
@@ -165,13 +167,12 @@ class Bench:
 
     def __init__(self, folder: Path, touch: str, seed: int = 0) -> None:
         self.folder, self.touch = folder, touch
-        self.stage = GrblEmulator(TouchedBody(plate(), R, FRAME, STIFFNESS), np.array([-0.15, -0.15, -0.035]))
+        self.stage = machine_over(plate(*HALF), 0.015)
         self.witness = Witness(self.stage)
         self.devices: list[object] = [self.stage, self.witness]
         links = [folder / "stage", folder / "witness"]
         if touch != "peck":
-            emulator = OptoForceEmulator if touch == "optoforce" else LineSensorEmulator
-            self.devices.append(emulator(self.stage, noise=0.003, seed=seed))
+            self.devices.append(SENSORS[touch](self.stage, noise=0.003, seed=seed))
             links.append(folder / "sensor")
         self.server = PtyServer(self.devices, links=links)  # type: ignore[arg-type]
         _write_plate(folder / "plate.ply")
@@ -214,39 +215,15 @@ class Bench:
         return Run(process.returncode, said, self.witness.strongest, moved, wrong, kept, struck > 0.0, ended - struck)
 
     def _strike(self, kind: str, process: subprocess.Popen[str]) -> Callable[[], None]:
-        stage = self.stage
+        def act() -> None:
+            if kind not in SIGNALS:
+                strike(kind, self.stage, self.server, self.devices)
+                return
+            process.send_signal(SIGNALS[kind])
+            if kind.startswith("SIGSTOP"):
+                threading.Timer(3.0, lambda: process.send_signal(signal.SIGCONT)).start()
 
-        def strike() -> None:
-            if kind in SIGNALS:
-                process.send_signal(SIGNALS[kind])
-                if kind.startswith("SIGSTOP"):
-                    threading.Timer(3.0, lambda: process.send_signal(signal.SIGCONT)).start()
-            elif kind in SENSOR_FAULTS:
-                self.devices[-1].fault = kind  # type: ignore[attr-defined]
-            elif kind in PROBE_FAULTS:
-                stage.motion.probe_fault = kind
-            elif kind == "reset":
-                stage.power_up(locked=True)
-            elif kind == "power cycle":
-                stage.power_cycle()
-            elif kind == "lost position":
-                stage.lose_position()
-            elif kind == "second program":
-                stage.receive(SECOND_PROGRAM, stage.motion.time)
-            elif kind.startswith("alarm"):
-                stage.trip(int(kind.split()[1]))
-            elif kind in ("hold", "door"):
-                stage.receive(b"!" if kind == "hold" else b"\x84", stage.motion.time)
-                threading.Timer(1.0, lambda: stage.receive(b"~", stage.motion.time)).start()
-            elif kind in ("port gone", "port back"):
-                self.server.faults.append(Fault("disconnect", at=0.0, duration=1.0 if kind == "port back" else 0.0))
-            else:
-                name = kind.split()[0]
-                self.server.faults += [
-                    Fault(name, at=0.0, rate=0.01, device=i) for i in range(len(self.devices)) if i != 1
-                ]
-
-        return strike
+        return act
 
     def _samples(self, out: str) -> tuple[int, int]:
         wrong = kept = 0
@@ -265,7 +242,7 @@ class Bench:
 def _write_plate(path: Path) -> None:
     import trimesh
 
-    surface = plate()
+    surface = plate(*HALF)
     trimesh.Trimesh(surface.vertices, surface.faces, process=False).export(path)
 
 
@@ -281,11 +258,11 @@ def bench(touch: str, seed: int = 0) -> Iterator[Bench]:
 
 def broken(kind: str, run: Run) -> list[str]:
     """What does not hold of a run that was struck."""
-    right = STATUS.get(kind, (0, 3) if kind in GOES_ON else (3,))
+    right = STATUS.get(kind, (0, 3) if kind in SURVIVABLE else (3,))
     stopped = run.status not in (0, -9)
     found = {
         "not struck": not run.struck,
-        "force": run.strongest > 5.5,
+        "force": run.strongest > MOST,
         "moved": run.moved > 0.0,
         "wrong samples": run.wrong > 0,
         "status": run.status not in right,
@@ -299,37 +276,32 @@ def main(what: str, touches: tuple[str, ...], times: int) -> None:
     """Print what came of each case."""
     kinds = {
         "signals": tuple(SIGNALS),
-        "faults": (*CONTROLLER_FAULTS, "port back", *(f"{kind} 1 %" for kind in BYTE_FAULTS)),
+        "faults": (*CONTROLLER_FAULTS, "port back", *BYTES),
     }
     held = made = 0
     for touch, number in itertools.product(touches, range(times)):
-        own = PROBE_FAULTS if touch == "peck" else SENSOR_FAULTS
         cases = {
             "quiet": [("", "")],
             "resume": [("SIGKILL", "midway")],
             "signals": list(itertools.product(kinds["signals"], PHASES)),
-            "faults": [(kind, PHASES[(i + number) % 3]) for i, kind in enumerate((*own, *kinds["faults"]))],
+            "faults": [
+                (kind, PHASES[(i + number) % 3]) for i, kind in enumerate((*own_faults(touch), *kinds["faults"]))
+            ],
         }[what]
         for kind, phase in cases:
             with bench(touch, number) as machine:
                 run = machine.run(strike=(kind, phase) if kind else None)
                 wrong = broken(kind, run) if kind else ["status"] * (run.status != 0) + ["wrong"] * (run.wrong > 0)
-                lasted = run.lasted if run.struck else 0.0
-                print(
-                    f"{touch:9s} {number} {kind:14s} {phase:8s} {run.strongest:5.2f} N  wrong {run.wrong} of "
-                    f"{run.kept:5d}  {lasted:5.1f} s  status {run.status:4d}  {', '.join(wrong) or 'held'}: "
-                    f"{(run.first or run.last)[:170]}",
-                    flush=True,
-                )
+                times = f"{run.lasted if run.struck else 0.0:5.1f} s  status {run.status:4d}"
+                case, samples = (touch, number, kind, phase), (run.wrong, run.kept)
+                print(case_line(case, run.strongest, samples, times, wrong, run.first or run.last), flush=True)
                 if what == "resume" or (kind == "SIGKILL" and run.struck):
                     again = machine.run("--resume")
                     bad = [each for each in broken("SIGSTOP 3 s", again) if each != "not struck"]
                     wrong += [f"resume: {each}" for each in bad]
-                    print(
-                        f"{'':9s}   resumed: {again.strongest:5.2f} N  wrong {again.wrong} of {again.kept:5d}  "
-                        f"status {again.status}  {', '.join(bad) or 'held'}: {again.last[:120]}",
-                        flush=True,
-                    )
+                    case, samples = (touch, number, "resumed", ""), (again.wrong, again.kept)
+                    times = f"        status {again.status:4d}"
+                    print(case_line(case, again.strongest, samples, times, bad, again.last), flush=True)
                 held, made = held + (not wrong), made + 1
     print(f"{held} of {made} held")
 

@@ -1,6 +1,6 @@
 """Slides of 4 mm over a plate, over links of some latency: what they cost and are worth.
 
-Run by itself it prints one line a case: python tests/support/slow_link.py
+Run by itself it prints one line a case: PYTHONPATH=. python tests/support/machines/slow_link.py [latencies, ms]
 """
 
 from __future__ import annotations
@@ -9,12 +9,11 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
-from fault_campaign import BAUD, DOWN, FRAME, STIFFNESS, R, plate
+from struck_machine import BAUD, DOWN, FRAME, STIFFNESS, R, machine_over, plate
 
 from hw.emulated.force import OptoForceEmulator
 from hw.emulated.grbl import GrblEmulator
 from hw.emulated.pty_server import PtyServer
-from hw.emulated.touched_body import TouchedBody
 from hw.emulated.wire import Wire
 from hw.move import Move
 from hw.probing.grbl_finger import GrblFinger
@@ -52,7 +51,7 @@ class Watcher:
 
 def slid(latency: float, timer: float = 0.0, speed: float = 0.01, sweeps: int = 3, period: float = 0.01) -> list[Slid]:
     """Each of some sweeps of 4 mm."""
-    stage = GrblEmulator(TouchedBody(plate(), R, FRAME, STIFFNESS), np.array([-0.15, -0.15, -0.044]))
+    stage = machine_over(plate(), 0.006)
     watcher = Watcher(stage)
     sensor = OptoForceEmulator(stage, noise=0.003)
     found = []
