@@ -24,7 +24,12 @@ if TYPE_CHECKING:
         why_no_roughness_of as why_no_roughness_of,
     )
     from explore3d.analysis.savings import without_needless_dynamics as without_needless_dynamics
-    from explore3d.analysis.stages import Progress as Progress, Stages as Stages, silent as silent
+    from explore3d.analysis.stages import (
+        FINGER_STAGE as FINGER_STAGE,
+        Progress as Progress,
+        Stages as Stages,
+        silent as silent,
+    )
     from explore3d.analysis.surface_account import SurfaceAccount as SurfaceAccount, swept_share as swept_share
     from explore3d.analysis.truth import Comparison as Comparison, TrueFeature as TrueFeature, compare as compare
 
@@ -37,7 +42,7 @@ _PUBLIC = {
     "result": ("Analysis",),
     "roughness": ("Roughness", "residual", "roughness_of", "why_no_roughness_of"),
     "savings": ("without_needless_dynamics",),
-    "stages": ("Progress", "Stages", "silent"),
+    "stages": ("FINGER_STAGE", "Progress", "Stages", "silent"),
     "surface_account": ("SurfaceAccount", "swept_share"),
     "truth": ("Comparison", "TrueFeature", "compare"),
 }
