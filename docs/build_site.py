@@ -28,7 +28,7 @@ SITE = ROOT / "out" / "site"
 FRONT_DOORS = ("explore3d", "mapping", "planners", "hw")
 # Pages of the root that the site has beside those of this folder; the README is its first
 ABOVE = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
-BEGIN = ("scene", "log", "model", "watch", "display", "compare", "roughness", "batch", "hardware")
+BEGIN = ("examples", "scene", "log", "model", "watch", "display", "compare", "roughness", "batch", "hardware")
 UNDERSTAND = ("glossary", "theory", "exploration", "detection", "posterior_calibration", "trust")
 # What a reader looks for first
 ORDER = ("function", "class", "data", "exception")
