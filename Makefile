@@ -9,7 +9,7 @@ DEMO := out/wire_on_plate
 SOURCES := $(shell find explore3d planners mapping hw -name "*.py") $(wildcard assets/meshes/*)
 SETUP := pyproject.toml $(wildcard .ci/*.py)
 
-.PHONY: setup setup-dev demo test test-all lint clean
+.PHONY: setup setup-dev demo test test-all lint docs clean
 
 setup: .venv/.ready
 
@@ -39,6 +39,9 @@ lint: setup-dev
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
+
+docs: setup-dev
+	@$(BIN)/python docs/build_site.py
 
 clean:
 	rm -rf .venv out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

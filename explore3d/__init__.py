@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         UserError as UserError,
     )
     from explore3d.jobs.analyze import analyze as analyze
+    from explore3d.jobs.compare import compare as compare
     from explore3d.jobs.merge import load as load, merge as merge
     from explore3d.jobs.run import run as run
     from explore3d.scene.scene import Scene as Scene, load_scene as load_scene
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "errors": ("FolderError", "MeshFileError", "PointCloudError", "SceneError", "UnitError", "UserError"),
     "jobs.analyze": ("analyze",),
+    "jobs.compare": ("compare",),
     "jobs.merge": ("load", "merge"),
     "jobs.run": ("run",),
     "scene.scene": ("Scene", "load_scene"),

@@ -24,7 +24,12 @@ if TYPE_CHECKING:
         why_no_roughness_of as why_no_roughness_of,
     )
     from explore3d.analysis.savings import without_needless_dynamics as without_needless_dynamics
-    from explore3d.analysis.stages import Progress as Progress, Stages as Stages, silent as silent
+    from explore3d.analysis.stages import (
+        FINGER_STAGE as FINGER_STAGE,
+        Progress as Progress,
+        Stages as Stages,
+        silent as silent,
+    )
     from explore3d.analysis.standard_heights import (
         STANDARDS_SENTENCE as STANDARDS_SENTENCE,
         StandardHeight as StandardHeight,
@@ -42,7 +47,7 @@ _PUBLIC = {
     "result": ("Analysis",),
     "roughness": ("Roughness", "residual", "roughness_of", "why_no_roughness_of"),
     "savings": ("without_needless_dynamics",),
-    "stages": ("Progress", "Stages", "silent"),
+    "stages": ("FINGER_STAGE", "Progress", "Stages", "silent"),
     "standard_heights": ("STANDARDS_SENTENCE", "StandardHeight", "standard_heights"),
     "surface_account": ("SurfaceAccount", "swept_share"),
     "truth": ("Comparison", "TrueFeature", "compare"),

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from explore3d import UserError
 from mapping import LeftOut
 
+# The stage in which a finger moves
+FINGER_STAGE = "exploration"
 # Stages that a job may leave out, and that can be forced back in
 OPTIONAL_STAGES = (
     "dynamics",

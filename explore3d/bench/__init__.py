@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from explore3d.bench.apparatus import write_apparatus as write_apparatus
+    from explore3d.bench.apparatus import findings_table as findings_table, write_apparatus as write_apparatus
     from explore3d.bench.curvature import (
         CurvatureAccuracy as CurvatureAccuracy,
         available as available,
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
-    "apparatus": ("write_apparatus",),
+    "apparatus": ("findings_table", "write_apparatus"),
     "curvature": ("CurvatureAccuracy", "available", "bench_curvature", "curvature_table", "write_bench"),
     "dynamics": ("dynamics_curve", "dynamics_table", "wire_trace"),
     "figures": ("write_figures",),

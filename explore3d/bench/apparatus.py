@@ -145,8 +145,8 @@ def findings_table(found: Sequence[Finding]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_apparatus(out: Path, seeds: int = 20) -> tuple[list[Path], str]:
-    """Write figures 7 and 8 and the table into a folder, which is made if absent; the files, and the table.
+def write_apparatus(out: Path, seeds: int = 20) -> tuple[list[Path], list[Finding]]:
+    """Write figures 7 and 8 and the table into a folder, which is made if absent; the files, and what the table holds.
 
     Raises:
         OSError: the folder cannot be written.
@@ -156,8 +156,8 @@ def write_apparatus(out: Path, seeds: int = 20) -> tuple[list[Path], str]:
     for name, draw in (("figure7_apparatus", recorded), ("figure8_algorithms", compared)):
         with styled():
             written.append(write_whole(out / f"{name}.png", png(draw())))
-    table = findings_table(findings(seeds=seeds))
-    return [*written, write_whole(out / "section_4_2_2.md", _explained(table))], table
+    found = findings(seeds=seeds)
+    return [*written, write_whole(out / "section_4_2_2.md", _explained(findings_table(found)))], found
 
 
 def recorded() -> Any:

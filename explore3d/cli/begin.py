@@ -31,6 +31,7 @@ def init(
     tip_radius: Annotated[str | None, typer.Option("--tip-radius", help='Of your spherical tip, "5 mm".')] = None,
     finger: Annotated[str, typer.Option("--finger", help="simulated or grbl.")] = "simulated",
     port: Annotated[str, typer.Option("--port", help="Serial port of a Grbl machine.")] = "emulator",
+    json: Json = False,
 ) -> None:
     """Write a scene to begin from: an example with its meshes, or one for your own mesh, tip and finger.
 
@@ -38,6 +39,8 @@ def init(
 
     Example: explore3d init wire --example wire_on_plate
     """
+    from json import dumps
+
     from explore3d.scene import FINGER_KINDS, begin_scene
 
     if finger not in FINGER_KINDS:
@@ -56,9 +59,12 @@ def init(
         units = units or _asked(f"Unit of length in {mesh.name} (m, mm, in)", "--units")
         tip_radius = tip_radius or _asked("Radius of the spherical tip, with its unit (5 mm)", "--tip-radius")
         scene = begin_scene(folder, mesh, units, tip_radius, finger, port)
-    print(f"written: {scene}")
-    print(f"the sweeps, before anything moves: explore3d plan {shlex.quote(str(scene))}")
-    print(f"explore: explore3d run {shlex.quote(str(scene))} --out {shlex.quote(str(scene.parent / 'out'))}")
+    plan = shlex.join(["explore3d", "plan", str(scene)])
+    explore = shlex.join(["explore3d", "run", str(scene), "--out", str(scene.parent / "out")])
+    if json:
+        print(dumps({"scene": str(scene), "plan": plan, "run": explore}))
+        return
+    print(f"written: {scene}\nthe sweeps, before anything moves: {plan}\nexplore: {explore}")
 
 
 def _asked(question: str, option: str) -> str:

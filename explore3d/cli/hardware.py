@@ -31,6 +31,7 @@ def emulate(
     locked: Annotated[bool, typer.Option(help="Begin locked, as a machine just switched on.")] = False,
     folder: Annotated[Path, typer.Option(help="Where the ports appear, as links.")] = Path("/tmp/explore3d"),
     seconds: Annotated[float, typer.Option(help="Stop after so long; 0: when interrupted.")] = 0.0,
+    json: Json = False,
 ) -> None:
     """Emulate a Grbl machine with a round tip on a pseudo-terminal, until interrupted.
 
@@ -38,6 +39,7 @@ def emulate(
     """
     import time
     from contextlib import suppress
+    from json import dumps
 
     from explore3d.jobs.machines import Emulation, serve
 
@@ -57,8 +59,8 @@ def emulate(
     )
     folder.mkdir(parents=True, exist_ok=True)
     with serve(emulation, folder) as server, suppress(KeyboardInterrupt):
-        for name, port in zip(("stage", "sensor"), server.ports, strict=False):
-            print(f"{name}: {port}", flush=True)
+        ports = dict(zip(("stage", "sensor"), map(str, server.ports), strict=False))
+        print(dumps(ports) if json else "\n".join(f"{name}: {port}" for name, port in ports.items()), flush=True)
         until = time.monotonic() + seconds if seconds else float("inf")
         while time.monotonic() < until and server.error is None:
             time.sleep(0.1)

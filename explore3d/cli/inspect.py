@@ -58,16 +58,24 @@ def export(
     pixel: Pixel = None,
     part: Part = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there; never a log.")] = False,
+    json: Json = False,
 ) -> None:
     """Write crest lines (CSV, DXF), measured results (QIF), the log with the features drawn in it (MCAP), heights over
     the base beside the features (X3P), or a session's record (RO-Crate).
 
     Example: explore3d export out/wire --to crests.dxf --to crests.csv
     """
+    from json import dumps
+
     from explore3d.jobs import Told
     from explore3d.jobs.export import export as write
 
     table = {"units": units, "columns": columns, "pixel": pixel, "part": part}
     told = Told(tip_radius, table={name: value for name, value in table.items() if value is not None})
+    written = []
     for path in to:
-        print(f"written: {write(source, path, told, overwrite=overwrite)}")
+        written.append(str(write(source, path, told, overwrite=overwrite)))
+        if not json:
+            print(f"written: {written[-1]}")
+    if json:
+        print(dumps({"written": written}, ensure_ascii=False))

@@ -101,7 +101,7 @@ def compare(
     from json import dumps
 
     from explore3d.cli.progress import shown
-    from explore3d.jobs import Told, compare_scans, watched
+    from explore3d.jobs import Told, compare as compare_scans, watched
 
     most = None if shift is None else length("--shift", shift, positive=True)
     table = {"form": form, "units": units, "columns": columns, "pixel": pixel, "part": part}

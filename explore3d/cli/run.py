@@ -46,11 +46,11 @@ def run(
     from explore3d.report import show
 
     view = None
-    if watch:
-        from explore3d.report.watch import begin_beside
-
-        view = begin_beside(out)  # held until the run is over: its standard input ends then
     with shown(quiet=json) as progress:
+        if watch:
+            from explore3d.report.watch import ViewBeside
+
+            progress = view = ViewBeside(out, progress)  # held until the run is over: its standard input ends then
         analysis = explore(
             scene,
             out,
@@ -64,7 +64,7 @@ def run(
         )
     show(analysis, out, json)
     if view is not None and not json:
-        print("the view stays as long as a browser looks at it" if view.poll() is None else "the view has ended")
+        print("the view stays as long as a browser looks at it" if view.is_there else "the view has ended")
     short = analysis.account is not None and analysis.account.short
     if short or (analysis.stopped is not None and analysis.stopped.incomplete):
         raise typer.Exit(INCOMPLETE)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
         analyze_each as analyze_each,
         log_path as log_path,
     )
-    from explore3d.jobs.compare import Compared as Compared, compare_scans as compare_scans, watched as watched
+    from explore3d.jobs.compare import Compared as Compared, compare as compare, watched as watched
     from explore3d.jobs.expedition import Explored as Explored, Explorer as Explorer, explorer as explorer
     from explore3d.jobs.merge import load as load, merge as merge
     from explore3d.jobs.plan import plan_into as plan_into, plan_scene as plan_scene
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "analyze": ("Told", "analyze", "analyze_each", "log_path"),
-    "compare": ("Compared", "compare_scans", "watched"),
+    "compare": ("Compared", "compare", "watched"),
     "expedition": ("Explored", "Explorer", "explorer"),
     "merge": ("load", "merge"),
     "plan": ("plan_into", "plan_scene"),

@@ -66,7 +66,7 @@ class Compared:
         }
 
 
-def compare_scans(
+def compare(
     first: Path | str,
     second: Path | str,
     out: Path | str | None = None,

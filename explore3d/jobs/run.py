@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from explore3d import UserError, __version__, count_text, seconds_text
-from explore3d.analysis import Analysis, Progress, Stages, run_key, silent, without_needless_dynamics
+from explore3d.analysis import FINGER_STAGE, Analysis, Progress, Stages, run_key, silent, without_needless_dynamics
 from explore3d.jobs.analyze import Told
 from explore3d.jobs.conclude import conclude
 from explore3d.jobs.expedition import SurveyWatch, explorer, known_base
@@ -145,7 +145,7 @@ def scene_finger(scene: Scene, arm: bool = False) -> Finger:
 
 def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, replay: Replay | None = None) -> Log:
     """Carry out the exploration; every sample is in the session's log before the next move begins."""
-    with stages.stage("exploration") as share, finger:
+    with stages.stage(FINGER_STAGE) as share, finger:
         about = {"software": f"explore3d {__version__}", "seed": scene.seed, "finger": finger.info} | EXPLORATION
         log = session.open_log(
             tip_radius=scene.tip.radius,

@@ -28,6 +28,8 @@ BLUE_TO_RED = (
 BAR = (16.0, 220.0)  # width and height of the scale of colours, px
 BAR_ROOM = 90.0  # px
 CURVATURE_TITLE = 28.0  # px
+# Views of the object that curvatures are drawn in, two pictures each
+MOST_ROWS = 2
 # An edge of 2 r that spans a body of radius 5 r or more stays nearer to it than this share of r: (2 r)^2 / (8 * 5 r)
 LID_SAGITTA = 0.1
 # Places on the scale that bear a number
@@ -50,7 +52,7 @@ def curvature_picture(
         features: that were found: they are turned to the front.
     """
     areas = surface.face_areas[:, None]
-    directions = view_directions(surface.face_normals * areas / areas.mean(), features)
+    directions = view_directions(surface.face_normals * areas / areas.mean(), features, base)[:MOST_ROWS]
     surface = _without_lids(surface, base, tip_radius)
     scaled = [np.asarray(values) * tip_radius for values in (curvature.k1, curvature.k2)]
     top = _span(scaled, curvature.valid)
@@ -64,7 +66,7 @@ def curvature_picture(
             colours[~curvature.valid] = NOT_VALID
             if not right:
                 content += text_at(left + 4.0, 18.0, f"Principal curvature, {name}", size=1.1 * FONT_SIZE, bold=True)
-            content += shifted(pictured(render([Body(surface, colours)], camera)), left, down)
+            content += shifted(pictured(render([Body(surface, colours)], camera, rims=False)), left, down)
         down, right = down + height, max(right, 2.0 * width)
     bar = min(BAR[1], down - CURVATURE_TITLE)
     marks = [f"{share * top:.2g}" for share in MARKS]
@@ -99,7 +101,8 @@ def deviation_picture(surface: Surface, deviation: FloatArray) -> bytes:
         deviation: (V,) at its vertices, m.
     """
     areas = surface.face_areas[:, None]
-    cameras = cameras_for(surface.vertices, view_directions(surface.face_normals * areas / areas.mean(), ()))
+    directions = view_directions(surface.face_normals * areas / areas.mean(), (), surface)
+    cameras = cameras_for(surface.vertices, directions)
     largest = float(np.abs(deviation).max(initial=0.0)) or 1.0
     factor, unit = length_unit(largest)
     colours, left, content = coloured(0.5 + 0.5 * deviation / largest), 0.0, ""

@@ -12,11 +12,14 @@ from explore3d.pictures.figure import INK
 from explore3d.pictures.render import Body, Picture, render
 from explore3d.pictures.sweep_paths import SweepPath, densified
 from mapping import Feature, FloatArray, Surface, length_text
+from mapping.geometry.contact import BallContact
+from mapping.geometry.mesh import resample
 from mapping.inference.kinds import kind_of
 from mapping.model import drawn_at_least, feature_mesh
 
-# Width of a picture of one panel, and of each of two, pixels; and the most that a panel is high for its width.
+# Width of a picture of one panel, and of each of two in a row, pixels; and the most that a panel is high for its width.
 WIDTHS = {1: 1080, 2: 760}
+PANELS_PER_ROW = 2
 TALLEST = 0.8
 SUPERSAMPLING = 2
 PICTURE_BASE_COLOUR = np.array([0.86, 0.88, 0.91])
@@ -27,23 +30,35 @@ LEAST_FEATURE_PIXELS = 5.0
 # Size of the words in a picture, and how high a label is, px
 LABEL_SIZE = 13.0
 LABEL_HEIGHT = 18.0
+# Views of a closed body: from so many sides, a little from above, steeply from above, from below; at most so many
+AZIMUTHS, MOST_VIEWS = 16, 4
+VIEW_HEIGHTS = (0.45, 1.3, -0.45)
+FIRST_AZIMUTH = -0.25 * np.pi - 0.5
+# Two views beside each other count less, by so much of a feature that is seen squarely; one from an unusual height, too
+BESIDE_EACH_OTHER, LOWERED = 0.2, 0.3
+SEEN_PLACES = 7  # along a line
+# A line of sight is so wide, in sizes of the body; flatter than this cosine nobody makes out a detail
+SIGHT_SHARE, LEAST_FACING = 1e-3, 0.25
 # A body whose outward directions cancel more than this is round: it needs two views.
 ROUND = 0.45
 
 
 def object_picture(base: Surface, features: Sequence[Feature], sweeps: Sequence[SweepPath]) -> bytes:
-    """SVG of the base with sweeps and features; two opposite views of a round body.
+    """SVG of the base with sweeps and features; views round a round body until every feature was in sight.
 
     What the sweeps noticed is drawn in orange.
     """
     normals = np.concatenate([np.zeros((0, 3)), *(path.normals for path in sweeps)])
     shown = _close_up(base, np.concatenate([np.zeros((0, 3)), *(path.points for path in sweeps)]))
-    cameras = cameras_for(shown, view_directions(normals, features))
-    left, content = 0.0, ""
-    for camera in cameras:
-        content += shifted(_drawn(_scene(base, features, camera, sweeps), features), left)
-        left += camera.width / SUPERSAMPLING
-    return drawing(left, max(camera.height for camera in cameras) / SUPERSAMPLING, content)
+    cameras = cameras_for(shown, view_directions(normals, features, base))
+    content, right, down = "", 0.0, 0.0
+    for first in range(0, len(cameras), PANELS_PER_ROW):
+        left, row = 0.0, cameras[first : first + PANELS_PER_ROW]
+        for camera in row:
+            content += shifted(_drawn(_scene(base, features, camera, sweeps), features), left, down)
+            left += camera.width / SUPERSAMPLING
+        right, down = max(right, left), down + max(camera.height for camera in row) / SUPERSAMPLING
+    return drawing(right, down, content)
 
 
 def pixel_size(camera: Camera) -> float:
@@ -53,7 +68,7 @@ def pixel_size(camera: Camera) -> float:
 
 def cameras_for(points: FloatArray, directions: Sequence[FloatArray]) -> list[Camera]:
     """One camera a panel, each against a direction, that show all points (N, 3)."""
-    width = WIDTHS[len(directions)] * SUPERSAMPLING
+    width = WIDTHS[min(len(directions), PANELS_PER_ROW)] * SUPERSAMPLING
     return [Camera.facing(points, each, width, round(TALLEST * width)) for each in directions]
 
 
@@ -62,8 +77,14 @@ def shifted(content: str, left: float, top: float = 0.0) -> str:
     return f'<g transform="translate({number(left)} {number(top)})">{content}</g>'
 
 
-def view_directions(normals: FloatArray, features: Sequence[Feature]) -> list[FloatArray]:
-    """Directions towards the camera: one, oblique, over a flat body; two opposite ones round a closed body."""
+def view_directions(normals: FloatArray, features: Sequence[Feature], base: Surface) -> list[FloatArray]:
+    """Directions towards the camera: one, oblique, over a flat body; two or more round a closed body.
+
+    Args:
+        normals: (N, 3) outward, of the parts that are to be seen.
+        features: as many views are taken, up to MOST_VIEWS, as it needs for each of them to be in sight.
+        base: what may stand before them.
+    """
     mean = normals.mean(axis=0) if len(normals) else np.array([0.0, 0.0, 1.0])
     if np.linalg.norm(mean) > ROUND:
         mean = mean / np.linalg.norm(mean)
@@ -71,10 +92,45 @@ def view_directions(normals: FloatArray, features: Sequence[Feature]) -> list[Fl
         across = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-3 else np.array([1.0, 0.0, 0.0])
         down = np.cross(mean, across)
         return [np.asarray(mean - 0.75 * down * np.sign(down[2] or 1.0) + 0.35 * across)]
-    outward = [feature.normals.mean(axis=0) for feature in features] or [np.array([1.0, -1.0, 0.0])]
-    angle = np.arctan2(outward[0][1], outward[0][0]) - 0.5
-    first = np.array([np.cos(angle), np.sin(angle), 0.45])
-    return [first, first * [-1.0, -1.0, 1.0]]
+    if not features:
+        first = np.array([np.cos(FIRST_AZIMUTH), np.sin(FIRST_AZIMUTH), VIEW_HEIGHTS[0]])
+        return [first, first * [-1.0, -1.0, 1.0]]
+    azimuths = np.linspace(0.0, 2.0 * np.pi, AZIMUTHS, endpoint=False)
+    wishes = np.array([[np.cos(angle), np.sin(angle), height] for height in VIEW_HEIGHTS for angle in azimuths])
+    facing = _facing(wishes, features, base)
+    # of two views: those that show most of the features, then as squarely as may be, from opposite sides, from above
+    both = np.maximum(facing[:, None], facing[None])
+    beside = wishes[:, :2] @ wishes[:, :2].T
+    lower = LOWERED * (wishes[:, 2] != VIEW_HEIGHTS[0])
+    merit = len(features) * (both > 0.0).sum(axis=2) + both.sum(axis=2) - BESIDE_EACH_OTHER * beside
+    chosen = list(np.unravel_index((merit - lower[:, None] - lower[None]).argmax(), merit.shape))
+    while (
+        len(chosen) < MOST_VIEWS and (unseen := (facing[chosen] == 0.0).all(axis=0) & (facing > 0.0).any(axis=0)).any()
+    ):
+        chosen.append(np.lexsort([facing[:, unseen].sum(axis=1), (facing[:, unseen] > 0.0).sum(axis=1)])[-1])
+    return list(wishes[chosen])
+
+
+def _facing(directions: FloatArray, features: Sequence[Feature], base: Surface) -> FloatArray:
+    """(D, F) how squarely features are seen from far away in directions (D, 3): cosines, 0 where they are out of sight.
+
+    Of a line the mean over places along it; it is out of sight where its middle is, which bears its label.
+    """
+    away = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    places = np.concatenate([resample(feature.axis, SEEN_PLACES) for feature in features])
+    nearest = [
+        np.linalg.norm(feature.axis[:, None] - resample(feature.axis, SEEN_PLACES), axis=2).argmin(axis=0)
+        for feature in features
+    ]
+    normals = np.concatenate([feature.normals[each] for feature, each in zip(features, nearest, strict=True)])
+    # a line of sight is the way of a small ball from the place to the camera
+    size = SIGHT_SHARE * base.size
+    origins = np.broadcast_to(places + 2.0 * size * normals, (len(away), *places.shape)).reshape(-1, 3)
+    ways = BallContact(base, size).first_contact(origins, np.repeat(away, len(places), axis=0))
+    cosines = away @ normals.T
+    free = ((ways.count == 0) & ~ways.overlap).reshape(cosines.shape) & (cosines > LEAST_FACING)
+    seen = np.where(free, cosines, 0.0).reshape(len(away), len(features), SEEN_PLACES)
+    return np.where(seen[:, :, SEEN_PLACES // 2] > 0.0, seen.mean(axis=2), 0.0)
 
 
 def _close_up(base: Surface, feet: FloatArray) -> FloatArray:

@@ -42,7 +42,7 @@ def plan_picture(base: Base, moves: Sequence[Move], tip_radius: float, violation
     paths = [move.path for move in moves]
     points = np.concatenate([np.zeros((0, 3)), *paths])
     feet = base.foot(points, tip_radius)
-    views = view_directions(feet.normals, ())
+    views = view_directions(feet.normals, (), base.surface)
     shown = np.concatenate([base.surface.bounds, points]) if len(points) else base.surface.bounds
     corners = np.stack(np.meshgrid(*np.stack([shown.min(axis=0), shown.max(axis=0)]).T), axis=-1).reshape(-1, 3)
     times = np.concatenate([[0.0], np.cumsum([move.duration for move in moves])])

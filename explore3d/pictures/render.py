@@ -59,8 +59,13 @@ class Picture:
         return np.asarray(np.rint(sums * (255.0 / factor**2)), dtype=np.uint8)
 
 
-def render(bodies: Sequence[Body], camera: Camera) -> Picture:
-    """The bodies as the camera sees them, lit from beside the camera, with outlines where the depth jumps."""
+def render(bodies: Sequence[Body], camera: Camera, rims: bool = True) -> Picture:
+    """The bodies as the camera sees them, lit from beside the camera, with outlines where the depth jumps.
+
+    Args:
+        rims: outline what stands before another part, too; False: only what stands before the background. The rims of
+            a measured surface are those of its own roughness, flecks.
+    """
     from explore3d.pictures.render_kernels import outline, see, shade
 
     right, up, forward = camera.frame
@@ -80,7 +85,8 @@ def render(bodies: Sequence[Body], camera: Camera) -> Picture:
     first = forward + camera.pixel * (0.5 * (camera.height - 1) * up - 0.5 * (camera.width - 1) * right)
     rays = np.stack([camera.pixel * right, -camera.pixel * up, first])
     shade(seen, weights, faces, flat, bent, rounded, colours, light, rays, AMBIENT, BRIGHTEST, pixels)
-    outline(depth, OUTLINE_PIXELS * camera.pixel, OUTLINE, pixels)
+    outlined = depth if rims else np.where(depth < np.inf, 1.0, depth).astype(np.float32)
+    outline(outlined, OUTLINE_PIXELS * camera.pixel, OUTLINE, pixels)
     return Picture(camera, pixels, depth)
 
 

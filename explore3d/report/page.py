@@ -72,7 +72,7 @@ REPORT_CSS = """
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--paper); color: var(--ink);
   font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }
-main { max-width: 1140px; margin: 0 auto; padding: 2.2rem 1.4rem 4rem; }
+main { max-width: 1240px; margin: 0 auto; padding: 2.2rem 1.4rem 4rem; }
 header .kind { color: var(--soft); font-size: .85rem; letter-spacing: .06em; text-transform: uppercase; margin: 0; }
 h1 { font-size: 2rem; line-height: 1.2; margin: .2rem 0 .8rem; font-weight: 650; }
 h2 { font-size: 1.25rem; margin: 0 0 .6rem; font-weight: 650; }

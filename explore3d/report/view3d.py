@@ -60,7 +60,7 @@ def object_view(
         "box": [low.tolist(), high.tolist()],
         "unit": unit,
         "factor": 1.0 / factor,
-        "eye": _eye(sweeps, features).tolist(),
+        "eye": _eye(sweeps, features, base).tolist(),
         "meshes": shown,
         "lines": lines,
         "touch": [] if tip_radius is None else [_touch(each, tip_radius) for each in features],
@@ -209,7 +209,8 @@ def lighter(surface: Surface, most: int = MOST_FACES) -> Surface:
     return simpler
 
 
-def _eye(sweeps: Sequence[SweepPath], features: Sequence[Feature]) -> FloatArray:
+def _eye(sweeps: Sequence[SweepPath], features: Sequence[Feature], base: Surface) -> FloatArray:
     """(3,) direction from the object towards the camera: that of the first still picture."""
-    direction = view_directions(np.concatenate([np.zeros((0, 3)), *(path.normals for path in sweeps)]), features)[0]
+    normals = np.concatenate([np.zeros((0, 3)), *(path.normals for path in sweeps)])
+    direction = view_directions(normals, features, base)[0]
     return np.asarray(direction / np.linalg.norm(direction))

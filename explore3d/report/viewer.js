@@ -170,7 +170,7 @@ function show(root, data) {
   });
   const features = meshes.filter((part) => part.id);
   const hidden = new Set();
-  let camera, chosen = null, waiting = false;
+  let camera, chosen = null, waiting = true; // until the page itself is on the screen
 
   const m = () => matrix(camera, canvas.width / canvas.height);
   const meshesOf = (picking) => {
@@ -364,7 +364,7 @@ function show(root, data) {
   new ResizeObserver(redraw).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   reset();
-  draw();
+  requestAnimationFrame(() => setTimeout(draw));
   const looked = (x, y) => {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     return ray(camera, width / height, x / width, y / height);

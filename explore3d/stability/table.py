@@ -14,9 +14,10 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, TimeoutError
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from math import isnan, log10, nan
+from math import isfinite, isnan, log10, nan
 from multiprocessing import get_context
 from time import perf_counter
+from typing import Any
 
 EPS = 2.0**-52
 # Roundings that add up along a computation: a case may lose so many units in the last place.
@@ -101,6 +102,21 @@ class Row:
         """True unless it crashed, took too long, or lost more than is explained."""
         numeric = isnan(self.answer.error) or self.answer.error <= self.allowed
         return not self.fault and self.answer.holds and numeric and self.seconds <= MOST_CASE_SECONDS
+
+    def record(self) -> dict[str, Any]:
+        """As JSON values; errors of an outcome, which is no number, are None."""
+        answer = self.answer
+        numbers = {"error": answer.error, "allowed": self.allowed, "condition": answer.condition, "paper": answer.paper}
+        return {
+            "group": self.group,
+            "name": self.name,
+            "asked": self.asked,
+            "found": self.fault or answer.found,
+            **{name: value if isfinite(value) else None for name, value in numbers.items()},
+            "reason": answer.reason,
+            "seconds": self.seconds,
+            "passed": self.passed,
+        }
 
 
 def cases() -> dict[str, Case]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
+from mapping.geometry.mesh import middle
 from mapping.model.merging import NORMAL_QUANTILE_95
 from mapping.model.object_model import ObjectModel
 from mapping.model.registration import Registration, matched, register, separation
@@ -134,7 +135,7 @@ def _sd(interval: Interval) -> float:
 
 
 def _place(feature: Feature) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in feature.axis[len(feature.axis) // 2])
+    x, y, z = (float(value) for value in middle(feature.axis)[0])
     return x, y, z
 
 

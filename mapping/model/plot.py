@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mapping import Feature, Surface, length_unit
+from mapping.geometry.mesh import middle
 from mapping.inference.kinds import kind_of
 from mapping.model.feature_mesh import drawn_at_least, feature_mesh
 
@@ -29,10 +30,10 @@ def plot_model(base: Surface, features: Sequence[Feature], axes: Any = None) -> 
     for feature in features:
         mesh = feature_mesh(drawn_at_least(feature, PLOTTED_SHARE * base.size))
         axes.plot_trisurf(*(mesh.vertices / factor).T, triangles=mesh.faces, color=kind_of(feature).colour, zorder=2)
-        axes.text(*(feature.axis[len(feature.axis) // 2] / factor), f"  {feature.id}", zorder=3)
+        axes.text(*(middle(feature.axis)[0] / factor), f"  {feature.id}", zorder=3)
     low, high = base.bounds / factor
-    middle, half = 0.5 * (low + high), 0.5 * float(np.max(high - low))
-    for name, centre in zip("xyz", middle, strict=True):
+    half = 0.5 * float(np.max(high - low))
+    for name, centre in zip("xyz", 0.5 * (low + high), strict=True):
         getattr(axes, f"set_{name}lim")(centre - half, centre + half)
         getattr(axes, f"set_{name}label")(f"{name} ({unit})")
     axes.set_box_aspect((1, 1, 1))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import Feature, FloatArray
-from mapping.geometry.mesh import arclengths, nearest_on
+from mapping.geometry.mesh import arclengths, middle, nearest_on
 
 # A rotation of this many radians is a standard deviation of what is expected beforehand: a part put back by hand
 TURN_SD = 0.02
@@ -44,8 +44,7 @@ class Registration:
 
     def applied(self, feature: Feature) -> Feature:
         """A feature of the second scan in the frame of the first; its place carries the doubt of the motion."""
-        middle = feature.axis[len(feature.axis) // 2]
-        rows = _rows(middle - self.centre)
+        rows = _rows(_middle(feature) - self.centre)
         sd = float(np.sqrt(np.trace(rows @ self.covariance @ rows.T) / 3.0))
         return replace(
             feature,
@@ -104,7 +103,7 @@ def register(first: Sequence[Feature], second: Sequence[Feature], most_shift: fl
 
 
 def _middle(feature: Feature) -> FloatArray:
-    return np.asarray(feature.axis[len(feature.axis) // 2])
+    return middle(feature.axis)[0]
 
 
 def _rows(lever: FloatArray) -> FloatArray:

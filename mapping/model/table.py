@@ -8,6 +8,7 @@ from html import escape
 from typing import Any
 
 from mapping import Feature, ModelError
+from mapping.geometry.mesh import middle
 
 SIZES = ("height", "width", "length")
 
@@ -18,9 +19,8 @@ def rows(features: Sequence[Feature]) -> list[dict[str, Any]]:
 
 
 def _row(feature: Feature) -> dict[str, Any]:
-    middle = feature.axis[len(feature.axis) // 2]
     row: dict[str, Any] = {"id": feature.id, "kind": feature.kind}
-    row |= {name: float(value) for name, value in zip("xyz", middle, strict=True)}
+    row |= {name: float(value) for name, value in zip("xyz", middle(feature.axis)[0], strict=True)}
     for name in SIZES:
         size = getattr(feature, name)
         row |= {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from explore3d import UserError, count_text
@@ -30,19 +30,19 @@ class FarLog:
         samples: how many it holds.
         tip_radius: m.
         duration: s, from the first message to the last.
-        ended: why it was closed.
+        ended: why it was closed, "" if it does not say.
         scene: the text of its scene, "" if none.
     """
 
     address: str
     size: int
     fetched: int
-    moves: dict[str, int] = field(default_factory=dict)
-    samples: int = 0
-    tip_radius: float = 0.0
-    duration: float = 0.0
-    ended: str = ""
-    scene: str = ""
+    moves: dict[str, int]
+    samples: int
+    tip_radius: float
+    duration: float
+    ended: str
+    scene: str
 
     def lines(self) -> list[str]:
         """The same for people."""
@@ -109,6 +109,9 @@ def _known(address: str, file: Any, said: list[tuple[str, dict[str, Any]]], dura
     start = next(data for topic, data in said if topic == "/start")
     if start.get("schema") != VERSION:
         raise UserError(f"{address}: field schema is {start.get('schema')!r}; this version reads {VERSION!r}")
+    tip_radius = float(start["tip_radius"])
+    if not tip_radius > 0.0:
+        raise UserError(f"{address}: field tip_radius is {tip_radius:g} m; a fingertip's is greater than 0")
     end: dict[str, Any] = next((data for topic, data in said if topic == "/end"), {})
     return FarLog(
         address=address,
@@ -116,7 +119,7 @@ def _known(address: str, file: Any, said: list[tuple[str, dict[str, Any]]], dura
         fetched=int(file.cache.total_requested_bytes),
         moves=dict(Counter(data["purpose"] for topic, data in said if topic == "/move")),
         samples=int(end.get("samples", 0)),
-        tip_radius=float(start["tip_radius"]),
+        tip_radius=tip_radius,
         duration=duration,
         ended=str(end.get("reason", "")),
         scene=str(start.get("scene", "")),

@@ -15,6 +15,7 @@ from typing import Any
 from explore3d import UserError
 from explore3d.log import FRAME, Damage, intact_chunks
 from mapping import Feature, Surface
+from mapping.geometry.mesh import middle
 from mapping.inference.kinds import kind_of
 from mapping.model import SIZES, ObjectModel, feature_mesh, probability
 
@@ -162,7 +163,7 @@ def _line(feature: Feature, colour: dict[str, float]) -> dict[str, Any]:
 
 
 def _label(feature: Feature) -> dict[str, Any]:
-    place = feature.axis[len(feature.axis) // 2].tolist()
+    place = middle(feature.axis)[0].tolist()
     return {
         "pose": _ORIGIN | {"position": dict(zip("xyz", place, strict=True))},
         "billboard": True,

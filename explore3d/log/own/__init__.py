@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         LogTail as LogTail,
         Piece as Piece,
         is_whole as is_whole,
+        need_log as need_log,
         newest_log as newest_log,
     )
     from explore3d.log.own.writer import LogWriter as LogWriter, Recorder as Recorder
@@ -79,7 +80,7 @@ _PUBLIC = {
         "stop_of",
     ),
     "stream": ("LogStream", "count_samples", "head", "large_log"),
-    "tail": ("LogTail", "Piece", "is_whole", "newest_log"),
+    "tail": ("LogTail", "Piece", "is_whole", "need_log", "newest_log"),
     "writer": ("LogWriter", "Recorder"),
 }
 doorway(__name__, _PUBLIC)

@@ -216,6 +216,8 @@ def _begin(data: dict[str, Any], reading: Reading) -> None:
             f"{reading.path}: field schema is {data.get('schema')!r}; this version reads {log_format.VERSION!r}"
         )
     stated = float(data["tip_radius"])
+    if not stated > 0.0:
+        raise UserError(f"{reading.path}: field tip_radius is {stated:g} m; a fingertip's is greater than 0")
     if reading.tip_radius not in (None, stated):
         raise UserError(
             f"{reading.path}: field tip_radius: {reading.tip_radius:g} m is asked for, but the log states {stated:g} m"

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from explore3d import UserError
 from explore3d.log.own.format import LOG, MAGIC
 from explore3d.log.own.reader import CHANNEL_TOPICS, Reading, take_checked
 from explore3d.log.own.record import Event
@@ -68,6 +69,7 @@ class LogTail:
             status = os.fstat(file.fileno())
             anew = (status.st_dev, status.st_ino) != self._file or status.st_size < self._at
             if anew:
+                need_log(self.path)
                 self._begin()
                 self._file = (status.st_dev, status.st_ino)
             if status.st_size == self._at:
@@ -121,6 +123,21 @@ class LogTail:
             return str(tomllib.loads(str(self.reading.start.get("scene", ""))).get("title", ""))
         except tomllib.TOMLDecodeError:
             return ""
+
+
+def need_log(path: Path) -> None:
+    """A log has to begin as MCAP files do, however little of it is there yet, or to hold an intact piece of one.
+
+    Raises:
+        UserError: the file is something else.
+    """
+    from explore3d.log.own.chunks import Damage, intact_chunks
+
+    with path.open("rb") as file:
+        if MAGIC.startswith(file.read(len(MAGIC))):
+            return
+        if next(intact_chunks(file, Damage()), None) is None:
+            raise UserError(f"{path}: is no log: it does not begin as one does, and holds no intact piece of one")
 
 
 def newest_log(folder: Path) -> Path | None:

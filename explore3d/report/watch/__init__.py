@@ -8,8 +8,8 @@ if TYPE_CHECKING:
     from explore3d.report.watch.feature_panel import feature_panel as feature_panel
     from explore3d.report.watch.touched import touched as touched
     from explore3d.report.watch.view import (
+        ViewBeside as ViewBeside,
         Watch as Watch,
-        begin_beside as begin_beside,
         need_viewer as need_viewer,
         watch as watch,
     )
@@ -17,6 +17,6 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "feature_panel": ("feature_panel",),
     "touched": ("touched",),
-    "view": ("Watch", "begin_beside", "need_viewer", "watch"),
+    "view": ("ViewBeside", "Watch", "need_viewer", "watch"),
 }
 doorway(__name__, _PUBLIC)

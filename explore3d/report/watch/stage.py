@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from explore3d.report import LEAST_FEATURE_SHARE, NOTICED_COLOUR, SWEEP_COLOUR, VIEW_BASE_COLOUR, lighter
 from mapping import Feature, FloatArray, IntArray, Surface, Trace
+from mapping.geometry.mesh import middle
 from mapping.inference.kinds import kind_of
 from mapping.model import drawn_at_least, feature_mesh
 
@@ -158,11 +159,12 @@ class Stage:
             target, direction, far = np.zeros(3), FIRST_EYE, OVERVIEW
         else:
             feature = self.features[name]
-            middle = len(feature.axis) // 2
+            place = middle(feature.axis)[0]
+            normal = feature.normals[np.linalg.norm(feature.axis - place, axis=1).argmin()]
             # a little from the side: relief shows then, and a camera straight above does not know where up is
-            aside = np.cross(feature.normals[middle], [0.31, 0.17, 0.93])
-            target = self._view(feature.axis[middle])
-            direction, far = feature.normals[middle] + 0.35 * aside, CLOSE_UP
+            aside = np.cross(normal, [0.31, 0.17, 0.93])
+            target = self._view(place)
+            direction, far = normal + 0.35 * aside, CLOSE_UP
         eye = target + far * VIEW_SIZE * direction / np.linalg.norm(direction)
         for client in self.server.get_clients().values():
             with client.atomic():

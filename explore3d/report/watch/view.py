@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import json
 import math
 import os
 import subprocess
@@ -23,7 +22,8 @@ from typing import Any
 import numpy as np
 
 from explore3d import UserError, count_text, seconds_text
-from explore3d.log import LOG, LogTail, Piece, digest, is_whole, newest_log, read_base
+from explore3d.analysis import FINGER_STAGE, Progress
+from explore3d.log import LOG, LogTail, Piece, digest, is_whole, need_log, newest_log, read_base
 from explore3d.report.watch.feature_panel import feature_panel
 from explore3d.report.watch.stage import LAYERS_SHOWN, Stage
 from explore3d.report.watch.touched import touched
@@ -49,7 +49,7 @@ class Watch:
         host: address to serve on; others than this machine see the view only if it is one of the network's.
 
     Raises:
-        UserError: viser is not installed, or there is neither a log nor a model.
+        UserError: viser is not installed, there is neither a log nor a model, or the file is no log.
     """
 
     def __init__(self, place: Path | str, *, live: bool = False, port: int = 8080, host: str = "127.0.0.1") -> None:
@@ -67,6 +67,7 @@ class Watch:
         self._lock = threading.RLock()
         self._pictures: list[Any] = []
         self._model_time = 0
+        self._model_trouble = ""  # why the model that is there is not shown
         self._under_way = 0  # samples at the end that come again
         with contextlib.redirect_stdout(io.StringIO()):  # the library greets on stdout, where results belong
             self.server = viser.ViserServer(host=host, port=port, label="explore3d", verbose=False)
@@ -166,7 +167,8 @@ class Watch:
         elif not self.tail.closed and count:
             samples = f"growing: {samples}"
         found = "" if self.model is None else f"; {count_text(len(self.model), 'feature')}"
-        self._state.content = f"**{_escaped(title)}**\n\n{samples}{found}"
+        trouble = f"\n\nThe model is not shown: {_escaped(self._model_trouble)}" if self._model_trouble else ""
+        self._state.content = f"**{_escaped(title)}**\n\n{samples}{found}{trouble}"
 
     # what is on the disk
 
@@ -181,6 +183,7 @@ class Watch:
             own = self.place / LOG
             path = own if own.is_file() else None if (self.place / "model.json").is_file() else newest_log(self.place)
         if path is not None and self.tail is None:
+            need_log(path)
             self.tail = LogTail(path)
         elif path is not None and self.tail is not None:
             self.tail.path = path
@@ -231,14 +234,16 @@ class Watch:
             return False
         if written == self._model_time:
             return False
-        self._model_time = written
-        if self.live and self.tail is not None and _log_of(file) != digest(self.tail.path):
-            return False
         try:
-            self.model = ObjectModel.load(file)
-        except MappingError:  # arrays and record are written one after the other
-            self._model_time = 0
+            model = ObjectModel.load(file)
+        except MappingError as error:
+            # arrays and record are written one after the other: what is damaged now may be whole at the next look
+            told, self._model_trouble = self._model_trouble, str(error)
+            return self._model_trouble != told
+        self._model_time, self._model_trouble = written, ""
+        if self.live and self.tail is not None and model.provenance.get("log_sha256") != digest(self.tail.path):
             return False
+        self.model = model
         self.stage.show_base(self.model.base.surface)
         self.stage.show_features(self.model.features)
         self._choice.options = (NO_FEATURE, *(each.id for each in self.model.features))
@@ -274,17 +279,37 @@ def watch(
         view.close()
 
 
-def begin_beside(out: Path | str) -> subprocess.Popen[bytes]:
-    """Begin the view of a run that is about to write into a folder, as a program of its own.
+class ViewBeside:
+    """Progress of a run that opens a view of it, a program of its own, when the finger begins.
 
-    It says on stderr where it is, outlives the run as long as a browser looks at it, and takes no signal of the run's.
+    Not earlier: a scene or a folder that is refused opens none. The view says on stderr where it is, outlives the run
+    as long as a browser looks at it, and takes no signal of the run's.
+
+    Args:
+        out: folder that the run writes into.
+        progress: told all that this one is told.
 
     Raises:
         UserError: viser is not installed.
     """
-    need_viewer()
-    command = [sys.executable, "-m", "explore3d", "watch", str(out), "--live", "--attached"]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=sys.stderr, start_new_session=True)
+
+    def __init__(self, out: Path | str, progress: Progress) -> None:
+        need_viewer()
+        self._command = [sys.executable, "-m", "explore3d", "watch", str(out), "--live", "--attached"]
+        self._progress = progress
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def __call__(self, stage: str, share: float) -> None:
+        if stage == FINGER_STAGE and self._process is None:
+            self._process = subprocess.Popen(
+                self._command, stdin=subprocess.PIPE, stdout=sys.stderr, start_new_session=True
+            )
+        self._progress(stage, share)
+
+    @property
+    def is_there(self) -> bool:
+        """True while it serves."""
+        return self._process is not None and self._process.poll() is None
 
 
 def need_viewer() -> None:
@@ -304,11 +329,6 @@ def _when_input_ends() -> threading.Event:
 
     threading.Thread(target=wait, daemon=True).start()
     return ended
-
-
-def _log_of(model: Path) -> str:
-    """Digest of the log that a model was made of."""
-    return str(json.loads(model.read_text("utf-8"))["provenance"].get("log_sha256"))
 
 
 def _fitted(picture: bytes) -> str:

@@ -41,7 +41,7 @@ def test_the_table_has_one_line_for_each_case():
 
 @pytest.mark.slow
 def test_figures_and_table_are_written_whole(tmp_path):
-    files, table = apparatus.write_apparatus(tmp_path / "new", seeds=1)
+    files, found = apparatus.write_apparatus(tmp_path / "new", seeds=1)
     assert [path.name[:7] for path in files] == ["figure7", "figure8", "section"]
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in files[:2])
-    assert table in files[2].read_text()
+    assert apparatus.findings_table(found) in files[2].read_text()

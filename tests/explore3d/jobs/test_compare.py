@@ -14,7 +14,7 @@ from explore3d import UserError
 from explore3d.analysis import Stages, build_model
 from explore3d.jobs import Told
 from explore3d.jobs.analyze import analyze
-from explore3d.jobs.compare import LOOK_EVERY, compare_scans, watched
+from explore3d.jobs.compare import LOOK_EVERY, compare, watched
 from explore3d.log.own.record import Log
 from mapping.model import compare_models
 
@@ -103,4 +103,4 @@ def test_two_tips_are_not_compared(logs: Path) -> None:
     for name, radius in (("x", TIP), ("y", 2 * TIP)):
         analyze(logs / "a.csv", logs / name, tip_radius=radius, quick=True)
     with pytest.raises(UserError, match="not comparable"):
-        compare_scans(logs / "x", logs / "y", told=Told(quick=True))
+        compare(logs / "x", logs / "y", told=Told(quick=True))

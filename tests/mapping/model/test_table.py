@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -59,6 +61,12 @@ def test_the_rows_hold_what_the_features_hold(model: ObjectModel) -> None:
     assert first["width_censored"] and not first["height_censored"]
     assert (first["snr"], first["crossings"], first["log_odds"]) == (12.0, 3, 40.0)
     assert first["face"] in (0, 1)
+
+
+def test_a_straight_line_of_two_points_is_placed_half_way(model: ObjectModel) -> None:
+    line = replace(RIDGE, axis=RIDGE.axis[[0, 2]], normals=RIDGE.normals[[0, 2]])
+    (row,) = rows([line])
+    np.testing.assert_allclose([row["x"], row["y"], row["z"]], [0.4, 0.3, 0.0], atol=1e-15)
 
 
 def test_the_table_for_notebooks_shows_text_as_text(model: ObjectModel) -> None:

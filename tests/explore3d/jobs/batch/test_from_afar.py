@@ -14,7 +14,8 @@ from small_profiles import write_profile
 from explore3d import UserError
 from explore3d.jobs.batch.from_afar import look_from_afar
 from explore3d.jobs.batch.places import BLOCK_BYTES, local, sha256_of
-from explore3d.log.own.reader import digest
+from explore3d.log.own.reader import digest, read_log
+from explore3d.log.own.writer import LogWriter
 
 pytest.importorskip("aiohttp")
 
@@ -61,6 +62,14 @@ def test_a_damaged_index_is_one_line(tmp_path: Path) -> None:
     log.write_bytes(content)
     with served(tmp_path) as server, pytest.raises(UserError, match=r"log\.mcap: cannot be read by ranges"):
         look_from_afar(f"{server.address}/log.mcap")
+
+
+def test_a_log_of_a_tip_without_size_is_refused_from_afar_and_here(tmp_path: Path) -> None:
+    LogWriter(tmp_path / "log.mcap", tip_radius=0.0).close()
+    with served(tmp_path) as server, pytest.raises(UserError, match=r"field tip_radius is 0 m"):
+        look_from_afar(f"{server.address}/log.mcap")
+    with pytest.raises(UserError, match=r"field tip_radius is 0 m"):
+        read_log(tmp_path / "log.mcap")
 
 
 def test_a_log_is_fetched_in_ranges_and_is_the_same(tmp_path: Path) -> None:

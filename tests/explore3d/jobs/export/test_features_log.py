@@ -65,7 +65,9 @@ def test_a_ridge_has_its_body_its_axis_and_its_name() -> None:
     assert ridge["timestamp"] == {"sec": 1, "nsec": 500_000_000}
     (line,), (label,), (body,) = ridge["lines"], ridge["texts"], ridge["triangles"]
     assert line["points"][2] == {"x": 0.02, "y": 0.01, "z": 0.0}
-    assert label["text"].startswith("ridge-1: 1.000 mm (") and label["pose"]["position"]["x"] == 0.01
+    assert label["text"].startswith("ridge-1: 1.000 mm (")
+    half_way = 0.5 * (0.01 - 0.01 * np.sqrt(2.0))  # before the second point, seen from the longer leg
+    assert label["pose"]["position"]["x"] == pytest.approx(0.01 - half_way / np.sqrt(2.0))
     assert max(body["indices"]) < len(body["points"]) and len(body["indices"]) % 3 == 0
     assert {each["key"] for each in ridge["metadata"]} == {"kind", "height", "width", "length"}
     assert not bump["lines"] and len(base["triangles"][0]["indices"]) == 6

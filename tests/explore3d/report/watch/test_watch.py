@@ -20,7 +20,7 @@ from explore3d.log.own.writer import LogWriter
 from explore3d.pictures.cross_section import cross_section
 from explore3d.report.watch.feature_panel import feature_panel
 from explore3d.report.watch.touched import touched
-from explore3d.report.watch.view import Watch, need_viewer
+from explore3d.report.watch.view import ViewBeside, Watch, need_viewer
 from hw.move import Move
 from mapping.model.object_model import ObjectModel
 from mapping.trace import Trace
@@ -147,6 +147,47 @@ def test_a_folder_without_a_session_is_refused_and_so_is_a_missing_viewer(
     monkeypatch.setattr("explore3d.report.watch.view.find_spec", lambda name: None)
     with pytest.raises(UserError, match=r"explore3d\[watch\]"):
         need_viewer()
+
+
+def test_a_file_that_is_no_log_is_refused_and_the_rest_of_a_log_is_not(session: Path, tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    page.write_text("<!doctype html><title>report</title>" + "x" * 5000)
+    with pytest.raises(UserError, match=r"report\.html: is no log"):
+        Watch(page, port=0)
+    log = tmp_path / "log.mcap"
+    log.write_bytes(b"\0" * 8 + log.read_bytes()[8:])
+    view = Watch(log, port=0)
+    try:
+        assert view.look() and view.stage.count == 5500
+    finally:
+        view.close()
+
+
+def test_a_damaged_model_is_said_until_it_is_mended(session: Path) -> None:
+    whole = (session / "model.json").read_text("utf-8")
+    (session / "model.json").write_text(whole[: len(whole) // 2], "utf-8")
+    view = Watch(session, port=0)
+    try:
+        assert view.look() and view.stage.count == 5500 and view.model is None
+        assert "model is not shown" in view._state.content and "not a readable model" in view._state.content
+        assert not view.look()  # said once
+        (session / "model.json").write_text(whole, "utf-8")
+        assert view.look() and set(view.stage.features) == {"ridge-1"}
+        assert "not shown" not in view._state.content
+    finally:
+        view.close()
+
+
+def test_a_view_beside_a_run_begins_with_the_finger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[list[str]] = []
+    monkeypatch.setattr("explore3d.report.watch.view.subprocess.Popen", lambda command, **_: begun.append(command))
+    told: list[tuple[str, float]] = []
+    beside = ViewBeside(tmp_path / "out", lambda stage, share: told.append((stage, share)))
+    beside("setting up", 1.0)
+    assert not begun
+    beside("exploration", 0.0)
+    assert begun[0][-4:] == ["watch", str(tmp_path / "out"), "--live", "--attached"]
+    assert told == [("setting up", 1.0), ("exploration", 0.0)]
 
 
 def samples_of(centers: np.ndarray, **more: np.ndarray) -> Any:

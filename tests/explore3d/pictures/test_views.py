@@ -1,0 +1,52 @@
+"""From where a body is drawn: every feature is in sight in one of the views, and labelled there."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from explore3d.pictures.camera import Camera
+from explore3d.pictures.object import MOST_VIEWS, object_picture, view_directions
+from explore3d.pictures.render import Body, render
+from explore3d.pictures.sweep_paths import SweepPath
+from explore3d.scene import examples, load_scene
+from mapping import Feature, Interval, ObjectModel, Support, Surface
+from mapping.base import Base
+
+ROUND_BODY = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])  # normals that cancel
+
+
+def model_of(name: str) -> ObjectModel:
+    """The base of an example with its features as its author made them."""
+    scene = load_scene(examples()[name].scene)
+    base = Base(scene.base_surface())
+    features = []
+    for true in scene.truth:
+        foot = base.foot(true.axis, scene.tip.radius)
+        size = Interval(true.height, true.height, true.height)
+        features.append(Feature(true.kind, foot.points, foot.normals, size, size, size, Support(9.0, 3), True, 1e-5))
+    return ObjectModel.attach(base, features)
+
+
+@pytest.mark.parametrize("name", ["bowl", "holed_plate", "l_bracket", "mug", "vase"])
+def test_every_feature_of_a_closed_body_is_labelled_in_one_of_its_views(name: str) -> None:
+    model = model_of(name)
+    surface = model.base.surface
+    middles = surface.vertices[surface.faces].mean(axis=1)[::20]
+    path = SweepPath(middles, surface.face_normals[::20], np.zeros(len(middles), dtype=bool))
+    drawn = object_picture(surface, model.features, [path]).decode()
+    labels = set(re.findall(r">((?:ridge|groove|bump|pit|step)-\d+)\s", drawn))
+    assert labels == {each.id for each in model}
+    assert 2 <= len(view_directions(ROUND_BODY, model.features, model.base.surface)) <= MOST_VIEWS
+
+
+def test_a_measured_surface_is_outlined_against_the_background_alone() -> None:
+    low, high = (np.array([[-1.0, -1, z], [1, -1, z], [1, 1, z], [-1, 1, z]]) for z in (0.0, 0.5))
+    both = Surface(np.vstack([low, 0.4 * high * [1, 1, 2.5]]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    camera = Camera.facing(both.vertices, np.array([0.0, 0.0, 1.0]), 200, 200)
+    dark = [
+        render([Body(both, np.full(3, 0.9))], camera, rims=rims).pixels[40:-40, 40:-40].min() for rims in (True, False)
+    ]
+    assert dark[0] < 0.7 * dark[1]
