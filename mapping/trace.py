@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mapping.arrays import BoolArray, FloatArray, IntArray
 from mapping.errors import TraceError
+
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,11 +131,11 @@ class Trace:
         parts: dict[str, FloatArray | None] = {}
         for name in ("normals", "contacts", "force"):
             values = [getattr(trace, name) for trace in traces]
-            parts[name] = None if any(v is None for v in values) else np.concatenate(values)
+            parts[name] = None if any(v is None for v in values) else _final(np.concatenate(values))
         return cls(
-            np.concatenate([trace.t for trace in traces]),
-            np.concatenate([trace.centers for trace in traces]),
-            np.concatenate([trace.sweep for trace in traces]),
+            _final(np.concatenate([trace.t for trace in traces])),
+            _final(np.concatenate([trace.centers for trace in traces])),
+            _final(np.concatenate([trace.sweep for trace in traces])),
             traces[0].tip_radius,
             **parts,
             resolution=max(trace.resolution for trace in traces),
@@ -144,12 +146,12 @@ class Trace:
         key = index if isinstance(index, slice) else np.asarray(index)
 
         def pick(array: FloatArray | None) -> FloatArray | None:
-            return None if array is None else array[key]
+            return None if array is None else _final(array[key])
 
         return Trace(
-            self.t[key],
-            self.centers[key],
-            self.sweep[key],
+            _final(self.t[key]),
+            _final(self.centers[key]),
+            _final(self.sweep[key]),
             self.tip_radius,
             pick(self.normals),
             pick(self.contacts),
@@ -177,3 +179,9 @@ class Trace:
         """(N,) distance travelled by the centre since the first sample, m (noise lengthens it)."""
         steps = np.linalg.norm(np.diff(self.centers, axis=0), axis=1)
         return np.concatenate([[0.0], np.cumsum(steps)]) if len(self) else np.zeros(0)
+
+
+def _final(array: NDArray[Scalar]) -> NDArray[Scalar]:
+    """The array, which nobody else holds, read-only: the trace that it is made for keeps it without a copy."""
+    array.setflags(write=False)
+    return array

@@ -14,7 +14,7 @@ import numpy as np
 from explore3d import UserError, __version__, count_text
 from explore3d.analysis.inspected import Inspected, base_reach
 from explore3d.analysis.result import TipCount
-from explore3d.analysis.roughness import Roughness, roughness_of, why_no_roughness_of
+from explore3d.analysis.roughness import Roughness, roughness_of, surely_taken, why_no_roughness_of
 from explore3d.analysis.stages import Stages
 from explore3d.analysis.standard_heights import LINE_KINDS, StandardHeight, standard_heights
 from explore3d.analysis.surface_account import SurfaceAccount, swept_share
@@ -23,7 +23,7 @@ from explore3d.analysis.truth import TrueFeature
 from explore3d.log import Log, stop_of
 from explore3d.scene import AnalysisSettings, Scene
 from mapping import Dropped, Feature, LeftOut, Trace, length_text
-from mapping.assembly import Inspections, assemble, why_none_sought
+from mapping.assembly import Inspections, assemble, inspected_for, why_none_sought
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
 from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
@@ -252,8 +252,8 @@ def why_no_deviation(work: Work) -> str | None:
 def deviated(work: Work, share: Share) -> None:
     """The model corrected where what was felt shows it to be wrong at long wavelengths; parts apart are left out."""
     laid = LaidTrace.of(work.trace, work.base)
-    if len(laid) <= RAW_SAMPLES:
-        laid.feet()  # detection asks for all of so few: the blocks here and whatever else is read follow from them
+    if len(laid) <= RAW_SAMPLES or _all_are_asked_for(work):
+        laid.feet()  # detection asks for all of so few, roughness in any case: the blocks here follow from them
     swept = [event.data for event in work.log.events if event.kind == "move" and event.data["purpose"] == "sweep"]
     work.deviation = explain(laid, work.base, [np.asarray(data["path"], dtype=np.float64) for data in swept])
     if work.deviation is None:
@@ -284,6 +284,14 @@ def kept_over_base(work: Work, share: Share) -> None:
             work.stages.left_out.append(LeftOut("part of the trace", beyond))
             work.laid = work.laid.within(inside)
             work.trace = work.trace.select(inside)
+    if _all_are_asked_for(work):
+        work.laid.feet()  # blocks and bins follow from them
+
+
+def _all_are_asked_for(work: Work) -> bool:
+    """True if the parameters of roughness are going to be taken, of every sample."""
+    asked = not work.log.detections and not work.stages.quick
+    return asked and surely_taken(work.trace, work.stages.cutoffs[0])
 
 
 def made_sound(work: Work, share: Share) -> None:
@@ -359,7 +367,7 @@ def why_no_lines(work: Work) -> str:
 def assembled(work: Work, share: Share) -> None:
     """Features from the crossings."""
     rate = work.settings.false_alarms_per_metre
-    work.inspections = Inspections.of(work.laid, work.base, work.detections.noise)
+    work.inspections = inspected_for(work.detections, work.laid, work.base)
     work.features = assemble(
         work.detections, work.laid, work.base, false_alarms_per_metre=rate, inspections=work.inspections
     )

@@ -104,6 +104,17 @@ def why_no_roughness_of(trace: LaidTrace, cutoff: float | None) -> str:
     return ""
 
 
+def surely_taken(trace: Trace, cutoff: float | None) -> bool:
+    """True if a trace tells of roughness even if its sweeps are no longer than the way between their ends.
+
+    Asked before anything is laid on the base. Every sample is laid for the parameters: then that comes first, and
+    whatever else is asked of the base follows from it.
+    """
+    ways = [float(np.linalg.norm(sweep.centers[-1] - sweep.centers[0])) for _, sweep in trace.sweeps()]
+    index = suited_cutoff(max(ways, default=0.0), EVALUATED_SECTIONS) if cutoff is None else cutoff
+    return index is not None and trace.tip_radius <= index
+
+
 def roughness_of(
     trace: LaidTrace,
     features: Sequence[Feature],

@@ -9,7 +9,7 @@ import numpy as np
 
 from explore3d.analysis.truth import AXIS_SAMPLES, Comparison, TrueFeature, compare
 from mapping import Trace
-from mapping.assembly import Inspections, assemble, place_spacing
+from mapping.assembly import Inspections, assemble, inspected_for, place_spacing
 from mapping.base import LaidTrace
 from mapping.detection import Detections
 from mapping.geometry.mesh import nearest_on, resample
@@ -45,9 +45,9 @@ def time_curve(
         (seconds of finger time, worst distance between a true axis and the found one in m), in the order of time.
     """
     laid = LaidTrace.of(trace, model.base)
-    inspections = inspections or Inspections.of(laid, model.base, detections.noise)
     spacing = place_spacing(detections.crossings, trace.tip_radius)
     faint = any(feature.faint for feature in model.features)
+    inspections = inspections or inspected_for(detections, laid, model.base, faint=faint)
     begun = {sweep.number: float(sweep.trace.t[0]) for sweep in reversed(laid.laid_sweeps)}
     times = np.array([crossing.t for crossing in detections.crossings])
     moments = np.unique(np.quantile(times, np.linspace(0.0, 1.0, MOMENTS), method="nearest"))

@@ -16,8 +16,10 @@ from explore3d.jobs.session import Job, Session
 from explore3d.log import LOG, digest, large_log, load_logs, must_fit_analysis, read_base, sidecar_of
 from explore3d.scene import load_mesh, recorded_scene
 from mapping.base import Base
+from mapping.geometry.mesh import algebra_in_one_thread
 
 
+@algebra_in_one_thread()
 def analyze(
     logs: Sequence[Path | str] | Path | str,
     out: Path | str | None = None,

@@ -22,6 +22,7 @@ from hw.probing import GrblFinger
 from hw.simulated import SimulatedFinger
 from mapping import Surface, Trace, length_text
 from mapping.base import Base
+from mapping.geometry.mesh import algebra_in_one_thread
 from planners import Spent, drive, dry_run
 from planners.explore import Discover, SurveyCount
 
@@ -94,6 +95,7 @@ class DryRun:
         return plan_picture(self.base, self.moves, self.tip_radius, [number - 1 for number, _ in self.violations])
 
 
+@algebra_in_one_thread()
 def plan_scene(path: Path | str, files_from: Collection[Path | str] = (), progress: Progress = silent) -> DryRun:
     """Plan the exploration of a scene, and check every move against the finger's limits.
 

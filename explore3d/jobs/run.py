@@ -24,6 +24,7 @@ from explore3d.log import EXPLORATION, OUTCOME, Log, read_base, read_log, stop_o
 from explore3d.scene import FingerNoise, GivenFingerTable, Scene, load_scene
 from hw import Finger, Move
 from mapping import Trace, length_text
+from mapping.geometry.mesh import algebra_in_one_thread
 from planners import Outcome
 
 # Two statements of one tip's radius may differ by rounding
@@ -34,6 +35,7 @@ CUT_SHORT = "cut short"
 SIGNAL_EXIT = 128
 
 
+@algebra_in_one_thread()
 def run(
     scene: Scene | Path | str,
     out: Path | str,

@@ -5,12 +5,16 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.assembly.assemble import assemble as assemble, place_spacing as place_spacing
+    from mapping.assembly.assemble import (
+        assemble as assemble,
+        inspected_for as inspected_for,
+        place_spacing as place_spacing,
+    )
     from mapping.assembly.faint_features import why_none_sought as why_none_sought, with_faint_lines as with_faint_lines
     from mapping.assembly.inspection import Inspections as Inspections
 
 _PUBLIC = {
-    "assemble": ("assemble", "place_spacing"),
+    "assemble": ("assemble", "inspected_for", "place_spacing"),
     "faint_features": ("why_none_sought", "with_faint_lines"),
     "inspection": ("Inspections",),
 }

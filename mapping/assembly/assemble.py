@@ -8,7 +8,7 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Trace
 from mapping.assembly.edges import edge_features
-from mapping.assembly.faint_features import with_faint_lines
+from mapping.assembly.faint_features import faint_spacing, why_none_sought, with_faint_lines
 from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
 from mapping.assembly.inspection import Inspection, Inspections
 from mapping.assembly.lines import Around, line_features
@@ -55,20 +55,41 @@ def assemble(
         false_alarms_per_metre: expected number of lines found in noise alone, 1/m of inspected path.
         spacing: distance between the places of a sweep whose heights are looked at, m; None: `place_spacing`.
         faint: False to leave out the search for lines too low for any one sweep.
-        inspections: the heights of this trace, if some may have been looked at already; it is not looked at again.
+        inspections: the heights of this trace, if they were looked at already (`inspected_for`).
 
     Reference: paper definitions 2 and 3; theory section 5.
     """
     crossings = detections.crossings
-    if len(np.unique(trace.sweep)) == 1:
-        return _strongest_first([point_feature([c], _name(c), detections, trace.tip_radius) for c in crossings])
     laid = LaidTrace.of(trace, base)
-    inspections = inspections or Inspections.of(laid, base, detections.noise)
+    if _is_profile(laid):
+        return _strongest_first([point_feature([c], _name(c), detections, trace.tip_radius) for c in crossings])
+    inspections = inspections or inspected_for(detections, laid, base, spacing=spacing, faint=faint)
     spacing = place_spacing(crossings, trace.tip_radius) if spacing is None and crossings else spacing
     features = [] if spacing is None or not crossings else _linked(detections, laid, inspections.at(spacing))
     if faint:
         features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre, inspections)
     return _strongest_first(features)
+
+
+def inspected_for(
+    detections: Detections, trace: Trace, base: Base, *, spacing: float | None = None, faint: bool = True
+) -> Inspections:
+    """The heights that features are assembled from: the trace is passed once, whatever they are looked at for.
+
+    Args:
+        detections, trace, base, spacing, faint: as for `assemble`.
+    """
+    laid, needed = LaidTrace.of(trace, base), list[float]()
+    if detections.crossings and not _is_profile(laid):
+        needed.append(place_spacing(detections.crossings, trace.tip_radius) if spacing is None else spacing)
+    if faint and not why_none_sought(detections, laid, base):
+        needed.append(faint_spacing(detections, trace.tip_radius))
+    return Inspections.of(laid, base, detections.noise, needed)
+
+
+def _is_profile(laid: LaidTrace) -> bool:
+    """True of a single sweep: nothing beside it tells how long a detail is."""
+    return len({sweep.number for sweep in laid.laid_sweeps}) == 1
 
 
 def place_spacing(crossings: Sequence[Crossing], tip_radius: float) -> float:

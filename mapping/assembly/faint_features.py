@@ -42,8 +42,9 @@ def with_faint_lines(
     features = list(features)
     if why_none_sought(detections, trace, base):
         return features
-    half_width, spacing = _scales(detections, trace.tip_radius)
-    inspection = (inspections or Inspections.of(trace, base, detections.noise)).at(spacing)
+    half_width = _least_half_width(detections, trace.tip_radius)
+    spacing = faint_spacing(detections, trace.tip_radius)
+    inspection = (inspections or Inspections.of(trace, base, detections.noise, [spacing])).at(spacing)
     weak = [f for f in features if _is_weak(f, detections)]
     # what one place alone shows is not faint
     masked = np.abs(inspection.height) > PLAIN_PLACE_SDS * inspection.sd
@@ -70,16 +71,20 @@ def why_none_sought(detections: Detections, trace: Trace, base: Base) -> str:
         return f"there are fewer than {FEWEST_AGREEING_SWEEPS} sweeps"
     if not np.isfinite(detections.detection_limit):
         return "the sweeps are too short"
-    places = detections.inspected_length / _scales(detections, trace.tip_radius)[1]
+    places = detections.inspected_length / faint_spacing(detections, trace.tip_radius)
     if places > len(trace) / LEAST_SAMPLES:
         return "there is hardly any noise to average away"
     return "there is more path than can be looked through in seconds" if places > MOST_PLACES else ""
 
 
-def _scales(detections: Detections, tip_radius: float) -> tuple[float, float]:
-    """Half-width of the smallest crest that a single sweep detects, and distance between places to look at, m."""
-    half_width = float(np.sqrt(2 * tip_radius * detections.detection_limit))
-    return half_width, min(SECTIONS) * half_width / PLACES_PER_HALF_WIDTH
+def faint_spacing(detections: Detections, tip_radius: float) -> float:
+    """Distance between the places of a sweep whose heights are looked at for faint lines, m."""
+    return min(SECTIONS) * _least_half_width(detections, tip_radius) / PLACES_PER_HALF_WIDTH
+
+
+def _least_half_width(detections: Detections, tip_radius: float) -> float:
+    """Half-width of the smallest crest that a single sweep detects, m."""
+    return float(np.sqrt(2 * tip_radius * detections.detection_limit))
 
 
 def _is_weak(feature: Feature, detections: Detections) -> bool:

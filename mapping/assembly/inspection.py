@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from mapping import FloatArray, IntArray, Trace
-from mapping.base import Base, LaidTrace
+from mapping.base import Base, LaidTrace, SweepHeights
 from mapping.instrument import Noise
 
 # Sweeps that tell the typical distance between neighbours.
@@ -117,42 +117,57 @@ class Inspection:
 
 
 class Inspections:
-    """Heights at whatever spacing (m) `at` is asked for; each is looked at once, also for parts of the trace."""
+    """The inspections that one model needs, by their spacing: those of a trace, or of some of its sweeps.
 
-    def __init__(self, look: Callable[[float], Inspection]) -> None:
-        self.at = cache(look)
+    Args:
+        each: by spacing, m.
+    """
+
+    def __init__(self, each: Mapping[float, Inspection]) -> None:
+        self._each = dict(each)
 
     @classmethod
-    def of(cls, trace: Trace, base: Base, noise: Noise) -> Inspections:
-        """Those of all sweeps of a trace."""
-        return cls(lambda spacing: inspect(trace, base, noise, spacing))
+    def of(cls, trace: Trace, base: Base, noise: Noise, spacings: Collection[float]) -> Inspections:
+        """Those of all sweeps of a trace, at all spacings in one pass."""
+        return cls(inspect(trace, base, noise, spacings))
+
+    def at(self, spacing: float) -> Inspection:
+        """The one of a spacing that it was made for, m."""
+        return self._each[spacing]
 
     def of_sweeps(self, numbers: Collection[int]) -> Inspections:
         """Those of the sweeps with these numbers alone."""
-        return Inspections(lambda spacing: self.at(spacing).of_sweeps(numbers))
+        return Inspections({spacing: whole.of_sweeps(numbers) for spacing, whole in self._each.items()})
 
 
-def inspect(trace: Trace, base: Base, noise: Noise, spacing: float) -> Inspection:
-    """Mean heights over stretches of the given length along every sweep of the trace."""
-    points, normals, height, sweep, count = [], [], [], [], []
+def inspect(trace: Trace, base: Base, noise: Noise, spacings: Collection[float]) -> dict[float, Inspection]:
+    """Mean heights over stretches of the given lengths (m) along every sweep of the trace, which is passed once."""
+    profiles: dict[float, list[SweepHeights]] = {spacing: [] for spacing in spacings}
     for own in LaidTrace.of(trace, base).laid_sweeps:
-        if len(own.trace) < 2 or not own.arclength[-1] > 0:
-            continue
-        for profile in own.heights(spacing):
-            under, up = profile.feet, profile.normals
-            if under is None or up is None:
-                feet = base.foot(profile.centers, trace.tip_radius)
-                under, up = feet.points, feet.normals
-            points.append(under)
-            normals.append(up)
-            height.append(profile.height)
-            sweep.append(np.full(len(profile.height), own.number))
-            count.append(np.diff(profile.first))
-    if not points:
+        if len(own.trace) > 1 and own.arclength[-1] > 0:
+            for spacing, found in profiles.items():
+                found.extend(own.heights(spacing))
+    return {spacing: _joined(found, base, noise, trace.tip_radius, spacing) for spacing, found in profiles.items()}
+
+
+def _joined(
+    profiles: Sequence[SweepHeights], base: Base, noise: Noise, tip_radius: float, spacing: float
+) -> Inspection:
+    """The inspection of some profiles in bins of one width."""
+    if not profiles:
         return Inspection(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), spacing)
-    sd = _sd_of_means(noise, spacing, np.concatenate(count))
-    found = np.concatenate(points), np.concatenate(height), sd, np.concatenate(sweep)
-    return Inspection(*found, spacing, np.concatenate(normals))
+    points, normals = [], []
+    for profile in profiles:
+        under, up = profile.feet, profile.normals
+        if under is None or up is None:
+            feet = base.foot(profile.centers, tip_radius)
+            under, up = feet.points, feet.normals
+        points.append(under)
+        normals.append(up)
+    height = np.concatenate([profile.height for profile in profiles])
+    sd = _sd_of_means(noise, spacing, np.concatenate([np.diff(profile.first) for profile in profiles]))
+    sweep = np.repeat([profile.sweep for profile in profiles], [len(profile.height) for profile in profiles])
+    return Inspection(np.concatenate(points), height, sd, sweep, spacing, np.concatenate(normals))
 
 
 def _sd_of_means(noise: Noise, spacing: float, count: IntArray) -> FloatArray:

@@ -191,11 +191,13 @@ class LaidTrace(Trace):
         return LaidTrace(whole, self.base, (*self.laid_sweeps, *more.laid_sweeps))
 
     def of_sweeps(self, numbers: Collection[int]) -> LaidTrace:
-        """The sweeps with these numbers, as they lie."""
-        wanted = set(numbers)
-        keep = np.isin(self.sweep, list(wanted))
-        laid = tuple(sweep for sweep in self.laid_sweeps if sweep.number in wanted)
-        return LaidTrace(self._view(keep), self.base, laid)
+        """The sweeps with these numbers, as they lie; of sweeps in a row nothing is copied."""
+        wanted, starts = set(numbers), self.__dict__["_starts"]
+        picked = [k for k, sweep in enumerate(self.laid_sweeps) if sweep.number in wanted]
+        laid = tuple(self.laid_sweeps[k] for k in picked)
+        if picked and picked[-1] - picked[0] + 1 == len(picked):
+            return LaidTrace(self._view(slice(int(starts[picked[0]]), int(starts[picked[-1] + 1]))), self.base, laid)
+        return LaidTrace(self._view(np.isin(self.sweep, list(wanted))), self.base, laid)
 
     def within(self, keep: BoolArray) -> LaidTrace:
         """The samples that a mask picks, with those of their feet that are known by now."""

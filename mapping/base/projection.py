@@ -10,6 +10,8 @@ from mapping.base.base import Base
 # Each round leaves of a sideways error the share by which facet and smooth normal differ: 1e-2 for 1 degree, but a
 # third beside a fold of 40 degrees, where rounds go on until a point moves by less than this share of the tip's radius.
 FEWEST_PROJECTION_ROUNDS, MOST_PROJECTION_ROUNDS, SETTLED_POINT_MOVE = 2, 12, 1e-4
+# A sideways error of less than this share of the tip's radius is rounding, as over a plane: no round takes it out
+SIDEWAYS_ROUNDING = 1e-12
 
 
 def onto_base(
@@ -31,17 +33,19 @@ def onto_base(
     feet = base.foot(points + tip_radius * normals, tip_radius)
     sign = np.where(np.einsum("ij,ij->i", feet.normals, normals) < 0.0, -1.0, 1.0)
     up = averaged(feet.normals * sign[:, None], smooth)
-    found = feet.points
+    found = feet.points.copy()
     for done in range(MOST_PROJECTION_ROUNDS):
-        before, gap = found, points - found
-        aim = found + gap - np.einsum("ij,ij->i", gap, up)[:, None] * up
-        found = base.foot(aim + 1e-3 * tip_radius * up, tip_radius).points
-        if (
-            done + 1 >= FEWEST_PROJECTION_ROUNDS
-            and np.abs(found - before).max(initial=0.0) < SETTLED_POINT_MOVE * tip_radius
-        ):
+        gap = points - found
+        sideways = gap - np.einsum("ij,ij->i", gap, up)[:, None] * up
+        left = np.flatnonzero(np.abs(sideways).max(axis=1, initial=0.0) > SIDEWAYS_ROUNDING * tip_radius)
+        if not len(left):
             break
-    return found.copy(), up
+        before = found[left]
+        found[left] = base.foot(before + sideways[left] + 1e-3 * tip_radius * up[left], tip_radius).points
+        move = float(np.abs(found[left] - before).max())
+        if done + 1 >= FEWEST_PROJECTION_ROUNDS and move < SETTLED_POINT_MOVE * tip_radius:
+            break
+    return found, up
 
 
 def averaged(normals: FloatArray, neighbours: int) -> FloatArray:

@@ -17,6 +17,9 @@ from mapping import EnvelopeError, FloatArray, IntArray
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
+# Centres to a leaf of the tree: of 16 to 512, the fewest instructions on the paper's wire (136k centres, a third of
+# scipy's own 16); most are looked at only because they lie hardly beyond the bound, and rows are cheaper than boxes
+CENTERS_PER_LEAF = 128
 # Share by which the bound of a search is widened: its rounding, and that of distances, is some 1e-16
 BOUND_ROUNDING = 1e-12
 
@@ -82,7 +85,8 @@ def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[Float
     def tree() -> cKDTree:
         from scipy.spatial import cKDTree
 
-        return cKDTree(centers, balanced_tree=False)  # distances are the same, and it is built in half the time
+        # distances are the same whatever the tree, and this one is built in half the time
+        return cKDTree(centers, leafsize=CENTERS_PER_LEAF, balanced_tree=False)
 
     def depth(points: FloatArray, least: float) -> FloatArray:
         if len(points) == 0:

@@ -17,7 +17,11 @@ if TYPE_CHECKING:
         nearest_on as nearest_on,
         resample as resample,
     )
-    from mapping.geometry.mesh.threads import by_shares as by_shares, cores as cores
+    from mapping.geometry.mesh.threads import (
+        algebra_in_one_thread as algebra_in_one_thread,
+        by_shares as by_shares,
+        cores as cores,
+    )
     from mapping.geometry.mesh.tree import TriangleTree as TriangleTree
     from mapping.geometry.mesh.triangle_kernels import (
         closest_on_triangle as closest_on_triangle,
@@ -44,7 +48,7 @@ _PUBLIC = {
     "nearest": ("MovedNearestPoint", "NearestPoint"),
     "open3d_import": ("open3d",),
     "polyline": ("arclengths", "directions", "distances", "middle", "nearest_on", "resample"),
-    "threads": ("by_shares", "cores"),
+    "threads": ("algebra_in_one_thread", "by_shares", "cores"),
     "tree": ("TriangleTree",),
     "triangle_kernels": ("closest_on_triangle", "enter_triangle", "leave_triangle"),
     "triangle_row_kernels": ("QUERIES_PER_BLOCK", "closest", "corners"),

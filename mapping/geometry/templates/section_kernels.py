@@ -9,6 +9,9 @@ from numba import njit
 
 from mapping import FloatArray
 
+# Share by which a bound is widened that leaves places out: what it leaves out is zero to the last digit
+BOUND_MARGIN = 1e-9
+
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def section_heights(
@@ -44,34 +47,53 @@ def section_heights(
     """
     walkers, bins = out.shape
     modes, nodes, corners = basis.shape[0], s.shape[1], across.shape[1]
+    nearest, widest, sway = np.empty(bins), np.empty(bins), np.zeros((bins, modes))
+    runs, falls, flanks = np.empty(corners), np.empty(corners), np.empty(corners)
+    for i in range(bins):
+        nearest[i], lowest = np.inf, np.inf
+        for q in range(nodes):
+            nearest[i], lowest = min(nearest[i], abs(lateral[i, q])), min(lowest, bend[i, q])
+            for m in range(modes):
+                sway[i, m] = max(sway[i, m], abs(basis[m, i, q]))
+        widest[i] = tip / max(1.0 + tip * lowest, 1e-3)
     for w in range(walkers):
         top, crest = across[w, 0], up[w, 0]
+        least = (1.0 + BOUND_MARGIN) * 2.0 * crest
+        for k in range(corners - 1):
+            runs[k], falls[k] = across[w, k + 1] - across[w, k], up[w, k] - up[w, k + 1]
+            flanks[k] = np.sqrt(runs[k] * runs[k] + falls[k] * falls[k])
         for i in range(bins):
+            # a ball of radius R at x beside all corners stands x^2 / 2 R lower than on the crest, at least
+            gap = nearest[i] - across[w, corners - 1]
+            for m in range(modes):
+                gap -= abs(courses[w, m]) * sway[i, m]
+            if gap > 0.0 and gap * gap > least * widest[i]:
+                out[w, i] = 0.0
+                continue
             total = 0.0
             for q in range(nodes):
-                aside = lateral[i, q]
-                for m in range(modes):
-                    aside -= courses[w, m] * basis[m, i, q]
-                aside = abs(aside)
                 beyond = max(ends[w, 0] - s[i, q], s[i, q] - ends[w, 1])
                 circle, drop = tip, 0.0
                 if beyond > 0.0:
                     ball = tip / max(1.0 + tip * bend_along[i, q], 1e-3)
-                    if beyond >= min(ball, tip):
+                    if beyond >= min(ball, tip) or beyond * beyond > least * ball:
                         continue
                     drop = beyond * beyond / (ball + np.sqrt((ball - beyond) * (ball + beyond)))
                     circle = np.sqrt((tip - beyond) * (tip + beyond))
+                aside = lateral[i, q]
+                for m in range(modes):
+                    aside -= courses[w, m] * basis[m, i, q]
+                aside = abs(aside)
                 ball = circle / max(1.0 + circle * bend[i, q], 1e-3)
                 best = drop
                 if aside <= top:
                     best = max(best, crest)
                 for k in range(corners):
                     gap = abs(aside - across[w, k])
-                    if gap < ball:
+                    if gap < ball and gap * gap <= least * ball:
                         best = max(best, up[w, k] - gap * gap / (ball + np.sqrt((ball - gap) * (ball + gap))))
                     if k + 1 < corners:
-                        run, fall = across[w, k + 1] - across[w, k], up[w, k] - up[w, k + 1]
-                        flank = np.sqrt(run * run + fall * fall)
+                        run, fall, flank = runs[k], falls[k], flanks[k]
                         if run > 0.0 and fall > 0.0:
                             at = aside - ball * fall / flank - across[w, k]
                             if at >= 0.0 and at <= run:

@@ -8,7 +8,15 @@ from typing import Protocol
 import numpy as np
 
 from mapping import Feature, FloatArray
-from mapping.inference.curves import HIGHEST_DEGREE, Chart, CurveModes, chart_along, normals_along, smooth_on_base
+from mapping.inference.curves import (
+    HIGHEST_DEGREE,
+    Chart,
+    CurveModes,
+    chart_along,
+    normals_along,
+    smooth_axis,
+    smooth_on_base,
+)
 from mapping.inference.families import MEETING_REACH, PosteriorProblem, Sizes, Surroundings, touches, window_for
 from mapping.inference.kinds.kind import Kind, sizes_of
 from mapping.inference.kinds.posing import pose
@@ -100,14 +108,18 @@ class LineKind(Kind):
         tip = around.trace.tip_radius
         sizes = sizes_of(feature, tip)
         axis, normals, crossings = _axis_of(feature, sizes, around)
-        course = self._chart(axis, normals, sizes, crossings, HIGHEST_DEGREE, around)
+        course = self._chart(axis, normals, sizes, crossings, HIGHEST_DEGREE, around, bends=False)
         window = window_for(_crest(course, tip, sizes), sizes, around)
 
         def posed(most: int, least: int = 1) -> tuple[PosteriorProblem, int]:
-            line, degree = smooth_on_base(
-                axis, normals, sizes.position_sd, most, least, around.base, tip, sizes.half_width
-            )
-            chart = self._chart(line, normals_along(line, axis, normals), sizes, crossings, degree, around)
+            if window.flat:  # nothing to unroll, and nothing bends
+                line, degree = smooth_axis(axis, sizes.position_sd, most, least)
+            else:
+                line, degree = smooth_on_base(
+                    axis, normals, sizes.position_sd, most, least, around.base, tip, sizes.half_width
+                )
+            lift = normals_along(line, axis, normals)
+            chart = self._chart(line, lift, sizes, crossings, degree, around, bends=not window.flat)
             ends = chart.coordinates(axis[[0, -1]])[0]
             modes = _modes(chart, ends, degree, crossings, sizes)
             laterals, along = _laterals(modes, crossings, sizes), Parameters()
@@ -138,22 +150,24 @@ class LineKind(Kind):
         crossings: int,
         degree: int,
         around: Surroundings,
+        *,
+        bends: bool,
     ) -> Chart:
         """The chart along the line, extended to where the ends may be, its legs as long as its curvature allows."""
         length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
         extension = max(6.0 * sizes.half_width, 1.5 * length / max(crossings - 1, 1)) if self.has_ends else 0.0
         tip = around.trace.tip_radius
 
-        def build(spacing: float, bends: bool = True) -> Chart:
+        def build(spacing: float, bends: bool) -> Chart:
             return chart_along(line, lift, around.base, tip, spacing, extension, sizes.half_width, bends=bends)
 
-        trial = build((length + 2.0 * extension) / 64.0, bends=False)
+        trial = build((length + 2.0 * extension) / 64.0, False)
         turn = np.linalg.norm(np.diff(trial.tangents, axis=0), axis=1).max(initial=0.0)
         curvature = turn / (trial.length / max(len(trial.s) - 1, 1))
         if curvature * trial.length < 1e-6 and degree == 1:
-            return build(length + extension)
+            return build(length + extension, bends)
         spacing = float(np.sqrt(8.0 * SAG * sizes.height / max(curvature, 1e-12)))
-        return build(min(max(spacing, trial.length / MOST_LEGS), trial.length / 16.0))
+        return build(min(max(spacing, trial.length / MOST_LEGS), trial.length / 16.0), bends)
 
     def _beginnings(self, shape: LineShape, sizes: Sizes) -> FloatArray:
         """Starts that differ in the section, and in the ends."""

@@ -9,6 +9,10 @@ from numba import njit
 
 from mapping import FloatArray, IntArray
 
+# Templates that are whitened side by side: a filter waits for its own last state, others need not wait with it. Of 4, 8
+# and 16 the fastest, by 1.5 against one after the other
+LANES = 8
+
 
 @njit(cache=True, nogil=True)
 def whiten(
@@ -47,25 +51,31 @@ def chi_square(
     |e|^2 - sum_j g_j^2 (u_j . e)^2 with the orthonormal columns u_j of `basis` (n, Q) within each run and
     `shrink` (runs, Q) holding g_j^2. `whiten` and this in one pass, which keeps no whitened series.
     """
-    walkers = templates.shape[0]
-    count = basis.shape[1]
+    walkers, count = templates.shape[0], basis.shape[1]
     total = np.zeros(walkers)
-    dots = np.empty(count)
-    for w in range(walkers):
-        square = 0.0
+    below, state, white, square = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    dots = np.empty((count, LANES))
+    for first in range(0, walkers, LANES):
+        square[:] = 0.0
         for run in range(len(starts) - 1):
             dots[:] = 0.0
-            state = 0.0
+            state[:] = 0.0
             for i in range(starts[run], starts[run + 1]):
-                innovation = height[i] - templates[w, i] - observe[i] * state
-                state = carry[i] * state + gain[i] * innovation
-                white = innovation * scale[i]
-                square += white * white
+                for lane in range(LANES):  # the last template fills the lanes that are left over
+                    below[lane] = templates[min(first + lane, walkers - 1), i]
+                for lane in range(LANES):
+                    innovation = height[i] - below[lane] - observe[i] * state[lane]
+                    state[lane] = carry[i] * state[lane] + gain[i] * innovation
+                    white[lane] = innovation * scale[i]
+                    square[lane] += white[lane] * white[lane]
                 for j in range(count):
-                    dots[j] += white * basis[i, j]
+                    for lane in range(LANES):
+                        dots[j, lane] += white[lane] * basis[i, j]
             for j in range(count):
-                square -= shrink[run, j] * dots[j] * dots[j]
-        total[w] = square
+                for lane in range(LANES):
+                    square[lane] -= shrink[run, j] * dots[j, lane] * dots[j, lane]
+        for lane in range(min(LANES, walkers - first)):
+            total[first + lane] = square[lane]
     return total
 
 

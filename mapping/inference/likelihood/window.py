@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,8 @@ from mapping.base import Base, Feet, LaidTrace
 
 # Samples are looked at in blocks of this many: the cost of the rest of a long log is that of its boxes.
 SAMPLES_PER_BLOCK = 64
+# Rounding of a plane's faces: by how much their normals may differ, and the feet on them rise off it for their reach
+PLANE_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +32,7 @@ class Window:
         half: (n,) half of the bin's extent, m.
         starts: (runs + 1,) first bin of each run, and n.
         samples: number of raw samples behind the bins.
+        flat: True if all of them stand on one plane of the base: it neither bends nor folds between them.
     """
 
     feet: FloatArray
@@ -42,6 +45,7 @@ class Window:
     half: FloatArray
     starts: IntArray
     samples: int
+    flat: bool = False
 
     def __len__(self) -> int:
         return len(self.height)
@@ -73,10 +77,12 @@ def samples_near(trace: Trace, points: FloatArray, reach: float) -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """The raw samples near a feature: feet on the base, and the first sample of each run after the first."""
+    """The raw samples near a feature: feet on the base, the first sample of each run after the first, and whether all
+    of them stand on one plane."""
 
     feet: Feet
     breaks: IntArray
+    flat: bool
 
 
 def gather(trace: Trace, base: Base, points: FloatArray, reach: float) -> Samples:
@@ -98,7 +104,15 @@ def gather(trace: Trace, base: Base, points: FloatArray, reach: float) -> Sample
             f"{np.array2string(points.mean(axis=0), precision=6)} m"
         )
     index, breaks = _whole_runs(index, trace.sweep)
-    return Samples(LaidTrace.of(trace, base).feet(index), breaks)
+    feet = LaidTrace.of(trace, base).feet(index)
+    return Samples(feet, breaks, _on_one_plane(feet, base))
+
+
+def _on_one_plane(feet: Feet, base: Base) -> bool:
+    normals = base.surface.face_normals[np.unique(feet.face)]
+    turned = float(np.ptp(normals, axis=0).max())
+    off, reach = np.ptp((feet.points - feet.points[0]) @ normals[0]), np.ptp(feet.points, axis=0).max()
+    return bool(turned <= PLANE_ROUNDING and off <= PLANE_ROUNDING * reach)
 
 
 def bin_samples(samples: Samples, width: float, noise_level: float, scale: float) -> Window:
@@ -117,7 +131,7 @@ def bin_samples(samples: Samples, width: float, noise_level: float, scale: float
         own = slice(int(start), int(stop))
         path = distance_along(feet.points[own], noise_level)
         runs.append(_bin(feet.points[own], feet.normals[own], feet.height[own], path, width, noise_level, scale))
-    return _join(runs)
+    return replace(_join(runs), flat=samples.flat)
 
 
 def _whole_runs(index: IntArray, sweep: IntArray) -> tuple[IntArray, IntArray]:

@@ -12,12 +12,13 @@ from explore3d.analysis.method import Work, detected, deviated, kept_over_base, 
 from explore3d.analysis.roughness import roughness_of
 from explore3d.analysis.stages import Stages
 from explore3d.analysis.truth import TrueFeature
-from explore3d.bench.scenes.plate_sweeps import DIAMETER, plate, sweeps, wire
+from explore3d.bench.scenes.plate_sweeps import DIAMETER, plate, scaled, sweeps, wire
 from explore3d.log.own.record import Log
 from mapping.assembly import inspection
 from mapping.base import laid_trace
 from mapping.base.base import Base
 from mapping.base.laid_trace import LaidTrace
+from mapping.detection import RAW_SAMPLES
 
 
 def test_of_few_samples_each_is_laid_once_and_hardly_any_mean(monkeypatch):
@@ -51,8 +52,23 @@ def test_roughness_lays_nothing_that_is_laid_already(monkeypatch):
     assert found is not None and found.profile["Rq"].low < 0.02e-3
 
 
+def test_what_is_measured_for_roughness_too_is_laid_sample_by_sample_once(monkeypatch):
+    laid, foot = [], Base.foot
+
+    def counted_foot(self, centers, tip_radius):
+        laid.append(len(np.asarray(centers)))
+        return foot(self, centers, tip_radius)
+
+    monkeypatch.setattr(Base, "foot", counted_foot)
+    trace = scaled(sweeps(wire(), white=0.02e-3, spacing=10e-6, half=80e-3), 0.5)
+    assert len(trace) > RAW_SAMPLES
+    analysis = build_model(Log(trace), None, plate(), Stages())
+    assert analysis.roughness is not None
+    assert sum(laid) <= 1.05 * len(trace)
+
+
 def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height_twice(monkeypatch):
-    laid, profiles, inspected = [], Counter(), Counter()
+    laid, profiles, inspected = [], Counter(), []
     foot, heights, looked = Base.foot, laid_trace.height_profiles, inspection.inspect
 
     def counted_foot(self, centers, tip_radius):
@@ -63,9 +79,9 @@ def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height
         profiles[number, spacing] += 1
         return heights(number, trace, s, base, spacing, *kept)
 
-    def counted_look(trace, base, noise, spacing):
-        inspected[spacing] += 1
-        return looked(trace, base, noise, spacing)
+    def counted_look(trace, base, noise, spacings):
+        inspected.append(list(spacings))
+        return looked(trace, base, noise, spacings)
 
     monkeypatch.setattr(inspection, "inspect", counted_look)
     monkeypatch.setattr(Base, "foot", counted_foot)
@@ -79,7 +95,7 @@ def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height
     assert ridge.height.median == pytest.approx(DIAMETER, rel=0.03)
     assert len(analysis.time_curve) > 1  # the curve looks at the features eight times over
     assert sum(laid) <= 1.05 * len(trace)
-    assert max(profiles.values()) == 1 and max(inspected.values()) == 1
+    assert max(profiles.values()) == 1 and len(inspected) == 1
     # one width of bins for detection, one for lines of crossings, one for lines that no sweep shows, and one for the
     # blocks that the model itself is held against
     assert len({spacing for _, spacing in profiles}) <= 4

@@ -122,6 +122,6 @@ def test_slow_sweeps_are_known_better_than_fast_ones():
         x = np.arange(-0.02, 0.02, step)
         centers = np.column_stack([x, np.full(len(x), 1e-3 * number), np.full(len(x), 5e-3)])
         parts.append(Trace(number + x, centers, np.full(len(x), number), 5e-3))
-    both = inspect(Trace.concatenate(parts), base, Noise(1e-5), 1e-3)
+    both = inspect(Trace.concatenate(parts), base, Noise(1e-5), [1e-3])[1e-3]
     assert np.median(both.sd[both.sweep == 0]) == pytest.approx(1e-5 / np.sqrt(10), rel=1e-6)
     assert np.median(both.sd[both.sweep == 1]) == pytest.approx(1e-5 / np.sqrt(100), rel=1e-6)

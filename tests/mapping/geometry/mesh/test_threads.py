@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mapping.geometry.mesh import threads as row_shares
-from mapping.geometry.mesh.threads import by_shares
+from mapping.geometry.mesh.threads import algebra_in_one_thread, by_shares
 
 
 def squares(rows: np.ndarray) -> np.ndarray:
@@ -57,3 +57,16 @@ def test_no_share_is_larger_than_the_memory_is_asked_for(number: int, monkeypatc
     rows = np.random.default_rng(2).normal(size=(4000, 3))
     assert np.array_equal(by_shares(work, rows, 15_000), squares(rows))
     assert max(seen) * 15_000 <= row_shares.MOST_VALUES
+
+
+def test_algebra_takes_one_thread_within_and_as_many_as_before_afterwards() -> None:
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    def threads() -> set[int]:
+        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+    with threadpool_limits(limits=2, user_api="blas"):
+        assert threads() == {2}
+        assert algebra_in_one_thread()(threads)() == {1}
+        assert threads() == {2}
