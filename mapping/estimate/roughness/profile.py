@@ -63,11 +63,12 @@ def profile_parameters(
         if short_cutoff is not None:
             primary = np.where(stretch.keep, gaussian_mean(primary, stretch.spacing, short_cutoff), np.nan)
         mean = gaussian_mean(primary, stretch.spacing, cutoff)
+        above = primary - mean
         size, end = round(cutoff / stretch.spacing), round(0.5 * cutoff / stretch.spacing)
         for first in range(end, len(primary) - end - size + 1, size):
             part = slice(first, first + size)
-            if np.isfinite(primary[part] - mean[part]).mean() >= LEAST_SECTION_SHARE:
-                rough.append((primary - mean)[part])
+            if np.isfinite(above[part]).mean() >= LEAST_SECTION_SHARE:
+                rough.append(above[part])
                 wavy.append(np.where(np.isfinite(primary[part]), mean[part], np.nan))
                 spans.append(stretch.spacing)
     if not rough:
