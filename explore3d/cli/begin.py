@@ -12,7 +12,7 @@ import typer
 from explore3d import UserError
 from explore3d.cli.options import Json
 from explore3d.cli.run import run
-from explore3d.scene import copy_example, example as find, examples as all_examples
+from explore3d.scene import copy_example, example as find, examples as all_examples, programs
 
 DEMO = "wire_on_plate"
 
@@ -100,3 +100,6 @@ def examples(
     for each in known:
         print(f"{each.name:<20}{each.title}")
     print("run one: explore3d examples NAME --out FOLDER; change one: explore3d init FOLDER --example NAME")
+    folder = programs()
+    if folder is not None:
+        print(f"programs for a robot, a CNC probe, a stylus, a detector of your own: {folder}")

@@ -61,6 +61,7 @@ REQUIRED_PACKAGES = {
     "pyserial": ("serial", "fingers on a serial port"),
 }
 OPTIONAL_PACKAGES = {
+    "viser": ("viser", "watching in the browser: pip install explore3d[watch]"),
     "opencamlib": ("opencamlib", "comparison with its drop cutter: pip install explore3d[peers]"),
     "pymeshlab": ("pymeshlab", "comparison with its curvatures: pip install explore3d[peers]"),
     "arviz": ("arviz", "further diagnostics of the posteriors: pip install explore3d[arviz]"),

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import UserError
+from explore3d import UserError, count_text
 from explore3d.log.own import LOG, SAMPLE_GAP, Log
 from explore3d.log.readers import Reader, read_recording, reader_of
 from explore3d.log.table import (
@@ -85,7 +85,7 @@ class Inspection:
         if self.samples:
             extent = " x ".join(map(length, self.extent))
             unit = "" if self.metres else " (unit not stated)"
-            lines.append(f"samples: {self.samples:,} in {self.sweeps} sweeps; extent {extent}{unit}")
+            lines.append(f"samples: {self.samples:,} in {count_text(self.sweeps, 'sweep')}; extent {extent}{unit}")
             lines.append(
                 f"spacing: {length(self.spacing)}; {self.gaps} gaps longer than {SAMPLE_GAP:g} spacings, "
                 f"{self.duplicates} repeated positions"

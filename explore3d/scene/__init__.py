@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         copy_example as copy_example,
         example as example,
         examples as examples,
+        programs as programs,
     )
     from explore3d.scene.finger import (
         FINGER_GROUP as FINGER_GROUP,
@@ -56,7 +57,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "begin": ("FINGER_KINDS", "begin_scene"),
     "complaint": ("complaint",),
-    "examples": ("Example", "SCENE_FILE", "copy_example", "example", "examples"),
+    "examples": ("Example", "SCENE_FILE", "copy_example", "example", "examples", "programs"),
     "finger": (
         "FINGER_GROUP",
         "SENSOR_GROUP",

@@ -53,6 +53,13 @@ def example(name: str) -> Example:
     return known[name]
 
 
+def programs() -> Path | None:
+    """The folder of the programs to begin from, docs/examples.md; None if the installation lacks them."""
+    place = _place()
+    folder = (place.parent if place.name == "assets" else place) / "examples"
+    return folder if folder.is_dir() else None
+
+
 def copy_example(name: str, folder: Path) -> list[Path]:
     """Copy an example to change it: its scene as scene.toml, and its meshes beside that.
 

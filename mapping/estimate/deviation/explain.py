@@ -29,6 +29,8 @@ ROUNDING = 1e-9
 CELL, AGREEING_SHARE, AGREEING_SQUARE, AS_EXPECTED = 2.0, 0.8, 1.642, 4.0
 # Of a turn at the body's edge, a shift, a scale, an offset, in tip radii: what is expected before anything is felt
 EXPECTED_SHARE = 0.1
+# Heights without noise scatter so little, in expected departures: its square still counts beside 1 in float64
+LEAST_SCATTER = 1e-6
 # Lengths of smooth fields: the shortest in tip radii, its bumps being 4.7 of them wide at half height, where the widest
 # fine feature is 8; their ratio; the longest as a share of the body
 SHORTEST_FIELD, FIELD_RATIO, LONGEST_FIELD = 2.0, 1.5, 1.0
@@ -227,7 +229,7 @@ def _robust(columns: FloatArray, height: FloatArray, keep: BoolArray, prior: flo
     found = np.zeros(columns.shape[1])
     for _ in range(ROBUST_ROUNDS):
         left = np.abs(y - a @ found)
-        sd = max(MAD_TO_SD * float(np.median(left)), 1e-12 * prior)
+        sd = max(MAD_TO_SD * float(np.median(left)), LEAST_SCATTER * prior)
         weighted = a / np.maximum(left / sd, LEAST_ROBUST)[:, None]
         found[:] = np.linalg.solve(weighted.T @ a + np.eye(a.shape[1]) * (sd / prior) ** 2, weighted.T @ y)
     return np.asarray(columns @ found)

@@ -65,10 +65,12 @@ def root_mean_square(sums: FloatArray) -> FloatArray:
 
 
 def skewness(sums: FloatArray) -> FloatArray:
-    """Rsk, Ssk."""
-    return np.asarray(sums[..., 3] / sums[..., 0] / root_mean_square(sums) ** 3)
+    """Rsk, Ssk; NaN of heights that are all zero."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(sums[..., 3] / sums[..., 0] / root_mean_square(sums) ** 3)
 
 
 def kurtosis(sums: FloatArray) -> FloatArray:
-    """Rku, Sku."""
-    return np.asarray(sums[..., 4] / sums[..., 0] / root_mean_square(sums) ** 4)
+    """Rku, Sku; NaN of heights that are all zero."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(sums[..., 4] / sums[..., 0] / root_mean_square(sums) ** 4)

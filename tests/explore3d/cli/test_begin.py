@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
 from in_process import explore3d_main
 
+from explore3d import MeshFileError
 from explore3d.jobs import plan_scene
 from explore3d.scene import begin_scene, copy_example, examples, load_scene
 
@@ -19,9 +22,11 @@ def test_the_examples_are_listed_with_their_titles(
 ) -> None:
     assert explore3d_main(monkeypatch, "examples") == 0
     lines = capsys.readouterr().out.splitlines()
+    folder = Path(lines[-1].partition(": ")[2])
+    assert (folder / "robot_fingertip.py").is_file()
     assert "wire_on_plate       A 0.65 mm wire on a tilted plate" in lines
     assert explore3d_main(monkeypatch, "examples", "--json") == 0
-    assert [each["name"] for each in json.loads(capsys.readouterr().out)] == [line.split()[0] for line in lines[:-1]]
+    assert [each["name"] for each in json.loads(capsys.readouterr().out)] == [line.split()[0] for line in lines[:-2]]
     assert explore3d_main(monkeypatch, "examples", "nonsense") == 2
     assert "example 'nonsense': there is none of that name; possible: " in capsys.readouterr().err
 
@@ -52,6 +57,24 @@ def test_a_scene_for_an_own_mesh_can_be_planned(finger: str, tmp_path: Path) -> 
     assert scene.finger.kind == finger and scene.tip.radius == 5e-3
     assert (tmp_path / "mine" / "tile.ply").read_bytes() == (MESHES / "tile.ply").read_bytes()
     assert plan_scene(path).moves
+
+
+def test_a_machine_is_given_what_it_touches_from_above(tmp_path: Path) -> None:
+    box = trimesh.creation.box((60.0, 40.0, 8.0))
+    box.export(tmp_path / "part.stl")
+    path = begin_scene(tmp_path / "mine", tmp_path / "part.stl", "mm", "3 mm", "grbl")
+    model = load_scene(path).base_surface()
+    assert model is not None
+    np.testing.assert_allclose(model.bounds, [[-0.03, -0.02, 0.004], [0.03, 0.02, 0.004]], atol=1e-9)
+    assert load_scene(path).object_surface().bounds[0, 2] == pytest.approx(-0.004)  # the emulated one is whole
+    assert {tuple(each.approach[0]) for each in plan_scene(path).moves if each.purpose == "sweep"} == {(0.0, 0.0, -1.0)}
+
+
+def test_a_body_that_no_machine_can_touch_from_above_is_refused(tmp_path: Path) -> None:
+    trimesh.Trimesh([[0, 0, 0], [9, 0, 0], [0, 9, 0]], [[0, 2, 1]], process=False).export(tmp_path / "under.stl")
+    with pytest.raises(MeshFileError, match="no face of it can be touched from above"):
+        begin_scene(tmp_path / "mine", tmp_path / "under.stl", "mm", "3 mm", "grbl")
+    assert not (tmp_path / "mine").exists()
 
 
 def test_a_port_of_ones_own_has_no_simulated_object(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from mapping import FloatArray, Surface, Trace
 from mapping.base import Base, LaidTrace
 from mapping.estimate.deviation import explain
-from mapping.estimate.deviation.explain import FEW_SAMPLES, _unfelt
+from mapping.estimate.deviation.explain import FEW_SAMPLES, _robust, _unfelt
 
 TIP = 0.01
 NOISE = 20e-6
@@ -294,3 +294,8 @@ def test_the_skirt_of_a_tall_feature_on_a_small_plate_is_no_deviation() -> None:
     trace = felt(height=bump, body=plane)
     lifted = trace.centers + np.array([0.0, 0.0, large - TIP])
     assert explain(Trace(trace.t, lifted, trace.sweep, large), model(plane)) is None
+
+
+def test_heights_without_noise_do_not_tell_two_like_causes_apart_and_need_not() -> None:
+    found = _robust(np.ones((40, 2)), np.zeros(40), np.ones(40, dtype=bool), 3e-4)
+    np.testing.assert_array_equal(found, np.zeros(40))
