@@ -165,7 +165,9 @@ def _pieces(sweep: LaidSweep, trace: LaidTrace, features: Sequence[Feature]) -> 
         keep = np.ones(len(piece.height), dtype=bool)
         for feature in features:
             reach = sizes_of(feature, trace.tip_radius).half_width + _PLACE_SDS * feature.position_sd
-            keep &= distances(under, feature.axis) > reach
+            low, high = feature.axis.min(axis=0) - reach, feature.axis.max(axis=0) + reach
+            near = np.flatnonzero(((under >= low) & (under <= high)).all(axis=1))
+            keep[near] &= distances(under[near], feature.axis) > reach
         found.append((Stretch(piece.height, keep, piece.spacing), np.asarray(piece.centers)))
     return found
 
