@@ -144,11 +144,11 @@ class _Jets:
         self.normals = _smoothed_normals(place, rough, self.tree)
         self.bends = np.zeros(len(place))
 
-    def fit(self, chosen: IntArray, sizes: IntArray) -> _Candidates:
-        """Every candidate at the chosen points."""
+    def fit(self, chosen: IntArray, sizes: IntArray, near: IntArray | None = None) -> _Candidates:
+        """Every candidate at the chosen points; `near` as of the method, if it is known."""
         from mapping.geometry.curvature.jet_kernels import fit_jets
 
-        near = self.near(chosen, int(sizes[-1]))
+        near = self.near(chosen, int(sizes[-1])) if near is None else near
         return _Candidates(*fit_jets(self.place, self.normals, near, chosen, self.bends[chosen], sizes, self.degree))
 
     def near(self, chosen: IntArray, count: int) -> IntArray:
@@ -208,10 +208,11 @@ class _Jets:
         parts = np.array_split(np.arange(count), max(4, count * int(sizes[-1]) // CHUNK_VALUES))
 
         def fill(part: IntArray) -> None:
-            found = self.fit(part, sizes)
+            near = self.near(part, max(int(sizes[-1]), POOL))
+            found = self.fit(part, sizes, near)
             every.operators[part], every.factors[part] = found.operators, found.factors
             every.rests[part], every.slopes[part] = found.rests, found.slopes
-            pools[part] = np.minimum(self.near(part, POOL)[:, ::POOL_STEP], count - 1)
+            pools[part] = np.minimum(near[:, :POOL:POOL_STEP], count - 1)
 
         def mean(part: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
             weights, error = self._weights(every, own, part, pools[part], sizes, noise)
