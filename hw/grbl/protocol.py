@@ -16,7 +16,7 @@ from mapping import FloatArray
 MACHINE_STATES = ("Idle", "Run", "Hold", "Jog", "Alarm", "Door", "Check", "Home", "Sleep", "Tool")
 STATUS, HOLD, RESUME, RESET, DOOR, JOG_CANCEL = b"?", b"!", b"~", b"\x18", b"\x84", b"\x85"
 RECEIVE_BUFFER = 128  # bytes
-DIGITS = 4  # of a length in mm: a fortieth of a step of 4 um
+LENGTH_DIGITS = 4  # of a length in mm: a fortieth of a step of 4 um
 # Motion is prepared in segments of so long, s (ACCELERATION_TICKS_PER_SECOND), so many at most (SEGMENT_BUFFER_SIZE
 # less one): what is prepared is carried out before a hold, a jog cancel or a closing probe brakes
 SEGMENT, SEGMENTS_OF_GRBL, SEGMENTS_OF_GRBLHAL = 0.01, 5, 9
@@ -265,12 +265,12 @@ def prepared(version: str) -> float:
 
 def words(axes: FloatArray) -> str:
     """Axis words of a position or displacement in metres, as millimetres to the tenth of a micrometre."""
-    return "".join(f"{axis}{value:.{DIGITS}f}" for axis, value in zip("XYZ", 1e3 * axes + 0.0, strict=True))
+    return "".join(f"{axis}{value:.{LENGTH_DIGITS}f}" for axis, value in zip("XYZ", 1e3 * axes + 0.0, strict=True))
 
 
 def rounded(axes: FloatArray) -> FloatArray:
     """A position or displacement, m, as its axis words say it."""
-    return np.asarray(np.round(1e3 * axes, DIGITS) * 1e-3)
+    return np.asarray(np.round(1e3 * axes, LENGTH_DIGITS) * 1e-3)
 
 
 def feed_word(speed: float) -> str:

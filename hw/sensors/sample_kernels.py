@@ -13,7 +13,7 @@ from mapping import FloatArray, IntArray
 # A whole number of so many digits, and the power of ten below it, are exact: their quotient is the float nearest to the
 # decimal, as Python reads it
 PLAIN_DIGITS = 15
-TENS = 10.0 ** np.arange(PLAIN_DIGITS + 1)
+DECIMAL_POWERS = 10.0 ** np.arange(PLAIN_DIGITS + 1)
 
 
 @njit(cache=True)
@@ -89,7 +89,7 @@ def read_lines(block: NDArray[np.uint8], counts: IntArray, forces: FloatArray) -
                 return False
             at += 1
             if field > 0:
-                force = value / TENS[decimals]
+                force = value / DECIMAL_POWERS[decimals]
                 forces[row, field - 1] = -force if negative else force
             elif negative or fraction:
                 return False

@@ -18,7 +18,7 @@ Shape = Callable[[FloatArray, float], FloatArray]
 SHAPE_FIT_BINS = 160
 STARTS = 81
 # Samples that a sweep must have to be fitted: two in each of the fewest bins. A sweep of pecks has 25
-FEWEST_BINS, FEWEST_FITTED = 8, 16
+FEWEST_FIT_BINS, FEWEST_FITTED = 8, 16
 # Relative change of place, height and chi-squared below which a fit has converged: far below its uncertainty
 FIT_TOLERANCE = 1e-6
 
@@ -115,7 +115,7 @@ def edge_shape(tip_radius: float) -> Shape:
 
 def _binned(s: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Means of place and height in at most SHAPE_FIT_BINS bins of equal length, and the samples in each."""
-    count = int(min(SHAPE_FIT_BINS, max(FEWEST_BINS, len(s) // 4)))
+    count = int(min(SHAPE_FIT_BINS, max(FEWEST_FIT_BINS, len(s) // 4)))
     cell = np.clip(((s - s[0]) / (s[-1] - s[0]) * count).astype(int), 0, count - 1)
     samples = np.bincount(cell, minlength=count).astype(float)
     used = samples > 0
