@@ -13,6 +13,7 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from explore3d.errors import (
+        EmptyLogError as EmptyLogError,
         FolderError as FolderError,
         MeshFileError as MeshFileError,
         PointCloudError as PointCloudError,
@@ -40,7 +41,15 @@ if TYPE_CHECKING:
     from explore3d.version import __version__ as __version__
 
 _PUBLIC = {
-    "errors": ("FolderError", "MeshFileError", "PointCloudError", "SceneError", "UnitError", "UserError"),
+    "errors": (
+        "EmptyLogError",
+        "FolderError",
+        "MeshFileError",
+        "PointCloudError",
+        "SceneError",
+        "UnitError",
+        "UserError",
+    ),
     "jobs.analyze": ("analyze",),
     "jobs.compare": ("compare",),
     "jobs.merge": ("load", "merge"),

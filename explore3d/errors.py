@@ -21,5 +21,9 @@ class FolderError(UserError):
     """An output folder that cannot be written."""
 
 
+class EmptyLogError(UserError):
+    """A log of ours without a sample."""
+
+
 class PointCloudError(ValueError):
     """Bytes that are not a foxglove.PointCloud message."""

@@ -207,6 +207,7 @@ def _ends_well(rig: Rig, fault: str, share: float, anew: Callable[[], AbstractCo
         except FingerError as found:
             error = found
             break
+        timer.join()  # a busy host may strike too late for the first sweep, never for the second one
     timer.join()
     _aside(lambda: finger.__exit__(None, None, None), LONGEST_ENDING, f"leaving while {_told(fault)}")
     for trace in kept:

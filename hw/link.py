@@ -13,6 +13,7 @@ from typing import Any
 
 from hw.errors import LinkError
 from hw.framing import Framing
+from hw.patience import Patience
 
 # Read in one go, bytes: what a port's buffer in the system holds
 MOST_AT_ONCE = 65536
@@ -118,7 +119,7 @@ class Link:
             if not self.is_open:
                 raise LinkError(self.error or f"{self.port} is not open")
             try:
-                self._serial.write(data)
+                _send(self._serial, data, self._write_timeout)
             except (SerialException, OSError) as error:
                 self._break(f"{self.port}: cannot write ({error})")
                 raise LinkError(self.error or str(error)) from error
@@ -212,6 +213,28 @@ def _received(serial: Any, gather: float) -> bytes:
     if not data:
         raise OSError("the device is gone")
     return data
+
+
+def _send(serial: Any, data: bytes, within: float) -> None:
+    """Hand bytes to the system; where the port is a file, a pause of this program is no fault of the device's.
+
+    pyserial looks at the clock after it wrote, too: a program that was held up in between had its port closed.
+
+    Raises:
+        OSError, SerialException: the connection is lost, or no bytes are taken within so many s.
+    """
+    file = getattr(serial, "fd", None)
+    if file is None:
+        serial.write(data)
+        return
+    patience = Patience(within)
+    while data:
+        try:
+            data = data[os.write(file, data) :]
+        except BlockingIOError:
+            if patience.over():
+                raise OSError(f"it takes no bytes{patience.held_up}") from None
+            select.select([], [file], [], serial.timeout)
 
 
 def _there(file: int) -> bytes:

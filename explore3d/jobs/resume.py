@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from explore3d.log import OUTCOME, Log
+from explore3d import EmptyLogError
+from explore3d.log import OUTCOME, Log, read_log
 from hw import Move
 from mapping import Trace
 
@@ -101,6 +103,18 @@ class Replay:
             self._sweeps = max(self._sweeps, int(trace.sweep.max()))
             self._time = max(self._time, float(trace.t[-1]) + PAUSE)
         return trace
+
+
+def replay_of(path: Path) -> Replay | None:
+    """The moves of the session whose log that is; None if it was killed before it felt anything: all are made anew.
+
+    Raises:
+        UserError: it cannot be read.
+    """
+    try:
+        return Replay(read_log(path))
+    except EmptyLogError:
+        return None
 
 
 def _moves(log: Log) -> tuple[list[tuple[Move, Trace]], Trace]:

@@ -18,9 +18,9 @@ from explore3d.analysis import FINGER_STAGE, Analysis, Progress, Stages, run_key
 from explore3d.jobs.analyze import Told
 from explore3d.jobs.conclude import conclude
 from explore3d.jobs.expedition import SurveyWatch, explorer, known_base
-from explore3d.jobs.resume import BROKEN_OFF, Replay
+from explore3d.jobs.resume import BROKEN_OFF, Replay, replay_of
 from explore3d.jobs.session import Job, Session, unchanged_files
-from explore3d.log import EXPLORATION, OUTCOME, Log, read_base, read_log, stop_of
+from explore3d.log import EXPLORATION, OUTCOME, Log, read_base, stop_of
 from explore3d.scene import FingerNoise, GivenFingerTable, Scene, load_scene
 from hw import Finger, Move
 from mapping import Trace, length_text
@@ -85,7 +85,7 @@ def run(
     go_on = f"{again} --resume"
     job = Job("run", scene_digest(scene), ("plan",), go_on, again, scene.files)
     with Session(out, job, resume=resume, overwrite=overwrite) as session:
-        replay = None if session.source is None else Replay(read_log(session.source))
+        replay = None if session.source is None else replay_of(session.source)
         session.write("scene.toml", scene.resolved)
         log = _explore(scene, finger, session, stages, replay)
         stop = stop_of(log)
@@ -155,6 +155,8 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
             metadata=about,
             resolution=finger.info.get("resolution", 0.0),
         )
+        if replay is None:
+            session.settle()  # there is no earlier log, or nothing in it
         if hasattr(finger, "notice"):
             finger.notice = log.felt  # a slow sweep's samples are on disk before it ends
         touch: Callable[[Move], Trace] = finger.execute

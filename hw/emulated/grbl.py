@@ -269,6 +269,9 @@ class GrblEmulator:
             if self.state == "Alarm":
                 self._say("[MSG:Caution: Unlocked]")
                 self.state = "Idle"
+        elif text == "$G":  # in any state
+            words = f"{self._motion} {self.modes['system']} G17 {self.modes['unit']} {self.modes['distance']} G94"
+            self._say(f"[GC:{words} M5 M9 T0 F{self._feed:.0f} S0]")
         elif self.state not in ("Idle", "Alarm"):
             raise GcodeError(8)
         elif text == "$$":
@@ -276,9 +279,6 @@ class GrblEmulator:
                 self._say(f"${number}={value:.0f}" if number in INTEGERS else f"${number}={value:.3f}")
         elif text == "$#":
             self._parameters()
-        elif text == "$G":
-            words = f"{self._motion} {self.modes['system']} G17 {self.modes['unit']} {self.modes['distance']} G94"
-            self._say(f"[GC:{words} M5 M9 T0 F{self._feed:.0f} S0]")
         elif text == "$I":
             self._say("[VER:1.1h.20190825:]")
             self._say("[OPT:V,15,128]")

@@ -115,6 +115,7 @@ class GrblController:
         self._way: tuple[FloatArray, FloatArray] | None = None  # box of where it was sent; None: not known yet
         self._from: FloatArray | None = None  # where the last motion that was sent ends; None: to be asked
         self._anew = True  # the next motion begins from a stand
+        self._jogged = False  # jogs were sent that it may not have looked at
         self._moves_until = -np.inf  # at the latest, if nothing stops it, but for one ramp
 
     # connection
@@ -186,7 +187,7 @@ class GrblController:
         self.command("G21G90G94")
         self.offset = protocol.parse_offset(self._agreed("$#"), self._agreed("$G")) * self.settings.report_scale
         self._way, self._new_offset, self._offset_known = None, None, True
-        self._from, self._anew = None, True
+        self._from, self._anew, self._jogged = None, True, False
 
     def close(self) -> None:
         """Let go of the port."""
@@ -294,27 +295,35 @@ class GrblController:
     def resting_position(self) -> FloatArray:
         """(3,) machine position, m, as two reports of a standing machine in a row tell it. Raises LinkError.
 
-        If it is idle the next motion begins from there, whatever became of those before. A report overtakes lines that
-        are not looked at yet, and a busy host hears reports late: so both are asked for now, the second one when the
-        first has come. By then the controller has looked at all lines that it was sent before.
+        If it is idle the next motion begins from there, whatever became of those before: none of them waits any more.
         """
-        heard, patience = time.monotonic(), Patience(LONGEST_TO_A_STAND)
-        before: Report | None = None
+        self._catch_up()
+        before, patience = self.status(), Patience(LONGEST_TO_A_STAND)
         while not patience.over():
-            self.status()
-            after = self.reports[-1]
-            here = self.machine_position(after.status)
-            in_turn = after.at - after.round_trip >= heard
-            if in_turn and before is not None:
-                there = self.machine_position(before.status)
-                if np.abs(here - there).max() < self.settings.resolution:
-                    if before.status.state == after.status.state == "Idle":
-                        self._settle_answers()
-                        self._sent.clear()
-                        self._from, self._anew = here, True
-                    return here
-            before, heard = (after if in_turn else None), after.at
+            after = self.status()
+            here = self.machine_position(after)
+            if np.abs(here - self.machine_position(before)).max() < self.settings.resolution:
+                if before.state == after.state == "Idle":
+                    self._from, self._anew = here, True
+                return here
+            before = after
         raise LinkError(f"{self.link.port}: no two reports of where the machine stands agree; use a shielded cable")
+
+    def _catch_up(self) -> None:
+        """Wait until the controller has looked at all jogs that it was sent.
+
+        A report overtakes lines, and a busy host hears it late: it does not tell. Lines are looked at in turn, so an
+        answer that no jog has comes after all of theirs, and what is reported after it is true of them.
+        """
+        if not self._jogged:
+            return
+        self._settle_answers()
+        for _ in range(TRIES_OF_A_LINE):
+            if any(line.startswith("[GC:") for line in self._ask("$G")):
+                self._sent.clear()
+                self._jogged = False
+                return
+        raise LinkError(f"{self.link.port}: {TRIES_OF_A_LINE} lines were not answered; use a shielded cable")
 
     def machine_position(self, status: Status) -> FloatArray:
         """(3,) machine position in a report, m."""
@@ -392,6 +401,7 @@ class GrblController:
                 self._wait(lambda: self._room(room), within, "room in the receive buffer", restarts, None)
             self._settle_answers()
         self._sent.append(len(line))
+        self._jogged = True
         self.link.write(line)
 
     def _room(self, room: int) -> bool:

@@ -9,8 +9,11 @@ Lines that begin with `#` are comments. The board need not listen.
 
 from __future__ import annotations
 
+import numpy as np
+
 from hw import Lines
 from hw.sensors.force_sensor import ForceSensor
+from mapping import FloatArray, IntArray
 
 
 def encode_line(micros: int, force: tuple[float, float, float]) -> bytes:
@@ -60,3 +63,12 @@ class LineSensor(ForceSensor):
     def decode(self, frame: bytes) -> tuple[int, float, float, float] | None:
         """Microseconds and force in a line."""
         return decode(frame)
+
+    def decode_all(self, frames: list[bytes]) -> tuple[IntArray, FloatArray] | None:
+        """Microseconds and forces in lines; None if one is not whole."""
+        from hw.sensors.sample_kernels import read_lines
+
+        counts, forces = np.empty(len(frames), np.int64), np.empty((len(frames), 3))
+        if read_lines(np.frombuffer(b"\n".join(frames) + b"\n", np.uint8), counts, forces):
+            return counts, forces
+        return super().decode_all(frames)

@@ -10,6 +10,11 @@ from numpy.typing import NDArray
 
 from mapping import FloatArray, IntArray
 
+# A whole number of so many digits, and the power of ten below it, are exact: their quotient is the float nearest to the
+# decimal, as Python reads it
+PLAIN_DIGITS = 15
+DECIMAL_POWERS = 10.0 ** np.arange(PLAIN_DIGITS + 1)
+
 
 @njit(cache=True)
 def whole_frames(block: NDArray[np.uint8], header: NDArray[np.uint8], length: int) -> bool:
@@ -49,6 +54,63 @@ def read_frames(
             at = first + 8 + 2 * axis
             value = int(block[at]) << 8 | int(block[at + 1])
             forces[row, axis] = (value - 65536 if value > 32767 else value) * scale[axis]
+    return True
+
+
+@njit(cache=True)
+def read_lines(block: NDArray[np.uint8], counts: IntArray, forces: FloatArray) -> bool:
+    """Counts and forces of lines F,<count>,<fx>,<fy>,<fz>*<hh> into `counts` (N,) and `forces` (N, 3), N.
+
+    False, if one is not whole, or has a number that is no plain decimal of at most PLAIN_DIGITS.
+
+    Args:
+        block: the lines, each with an LF behind it, which ends every loop.
+    """
+    at = 0
+    for row in range(len(counts)):
+        first = at
+        if block[at] != ord("F") or block[at + 1] != ord(","):
+            return False
+        at += 2
+        for field in range(4):
+            negative = block[at] == ord("-")
+            at += int(negative)
+            value, digits, decimals, fraction = 0, 0, 0, False
+            while True:
+                byte = int(block[at])
+                if ord("0") <= byte <= ord("9"):
+                    value, digits, decimals = 10 * value + byte - ord("0"), digits + 1, decimals + int(fraction)
+                elif byte == ord(".") and not fraction:
+                    fraction = True
+                else:
+                    break
+                at += 1
+            if digits == 0 or digits > PLAIN_DIGITS or byte != (ord("*") if field == 3 else ord(",")):
+                return False
+            at += 1
+            if field > 0:
+                force = value / DECIMAL_POWERS[decimals]
+                forces[row, field - 1] = -force if negative else force
+            elif negative or fraction:
+                return False
+            else:
+                counts[row] = value % 2**32
+        check = 0
+        for each in range(first, at - 1):
+            check ^= int(block[each])
+        told = 0
+        for _ in range(2):
+            byte = int(block[at])
+            if ord("0") <= byte <= ord("9"):
+                told = 16 * told + byte - ord("0")
+            elif ord("A") <= byte <= ord("F"):
+                told = 16 * told + byte - ord("A") + 10
+            else:
+                return False
+            at += 1
+        if told != check or block[at] != ord("\n"):
+            return False
+        at += 1
     return True
 
 
@@ -99,4 +161,5 @@ def load_sample_kernels() -> None:
     block = np.frombuffer(bytes(16), np.uint8)  # one that cannot be written to is another type
     whole_frames(block, np.frombuffer(bytes(4), np.uint8), 16)
     read_frames(block, 0, np.ones(3), counts, forces)
+    read_lines(np.frombuffer(b"\n\n", np.uint8), counts, forces)
     judge_block(counts, forces, np.zeros((4, 3)), np.zeros(4, np.int64), 65536, 8)

@@ -121,6 +121,36 @@ def test_a_vanished_port_is_noticed_and_let_go_of() -> None:
     assert name not in handles
 
 
+def test_a_program_held_up_while_it_writes_keeps_its_port(monkeypatch: pytest.MonkeyPatch) -> None:
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    write = os.write
+
+    def held_up(file: int, data: bytes) -> int:
+        count = write(file, data)
+        time.sleep(0.3)
+        return count
+
+    with Link(os.ttyname(slave), Lines(), lambda now, frames: None, write_timeout=0.2) as link:
+        monkeypatch.setattr(os, "write", held_up)
+        link.write(b"?")
+        monkeypatch.undo()
+        assert link.is_open and os.read(master, 10) == b"?"
+    os.close(master)
+    os.close(slave)
+
+
+def test_a_device_that_takes_no_bytes_is_left() -> None:
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    with Link(os.ttyname(slave), Lines(), lambda now, frames: None, write_timeout=0.2) as link:
+        with pytest.raises(LinkError, match="takes no bytes"):
+            link.write(b"x" * 1_000_000)
+        assert not link.is_open
+    os.close(master)
+    os.close(slave)
+
+
 def test_a_port_belongs_to_one_program() -> None:
     master, slave = os.openpty()
     with Link(os.ttyname(slave), Lines(), lambda now, lines: None), pytest.raises(LinkError, match="another program"):

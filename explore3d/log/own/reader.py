@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from explore3d import UserError
+from explore3d import EmptyLogError, UserError
 from explore3d.log.own import format as log_format, point_cloud
 from explore3d.log.own.record import Event, Log, merge
 from mapping import FloatArray, Trace, TraceError
@@ -74,7 +74,7 @@ def read_log(path: Path | str | Sequence[Path | str], tip_radius: float | None =
     reading = Reading(Path(path), tip_radius, events=[])
     batches = list(_batches(reading))
     if not batches:
-        raise UserError(f"{path}: field samples: the log holds none{_loss(reading, ', ')}")
+        raise EmptyLogError(f"{path}: field samples: the log holds none{_loss(reading, ', ')}")
     return as_log(_trace(batches, reading), reading)
 
 
@@ -116,7 +116,7 @@ def iter_log(path: Path | str, samples: int = 100_000, tip_radius: float | None 
     if batches:
         yield _trace(batches, reading)
     if not reading.samples:
-        raise UserError(f"{path}: field samples: the log holds none{_loss(reading, ', ')}")
+        raise EmptyLogError(f"{path}: field samples: the log holds none{_loss(reading, ', ')}")
 
 
 def _batches(reading: Reading) -> Iterator[NDArray[np.void]]:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from explore3d.errors import FolderError
-from explore3d.jobs.resume import Replay
+from explore3d.jobs.resume import Replay, replay_of
 from explore3d.jobs.session import Session
 from explore3d.log.own.reader import read_log
 from explore3d.log.own.writer import LogWriter
@@ -176,6 +176,16 @@ def test_a_sweep_that_gives_less_than_before_is_kept_both_times(tmp_path: Path) 
     assert len(kept) == 1 and len(record[2][1]) == 10 < len(kept[0])
     assert [int(trace.sweep[0]) for trace in (kept[0], record[2][1])] == [3, 4]
     assert record[2][1].t[0] > kept[0].t[-1]
+
+
+def test_a_session_that_was_killed_before_it_felt_anything_begins_anew(tmp_path: Path) -> None:
+    with LogWriter(tmp_path / "log.mcap", tip_radius=R) as log:
+        travel = Move(np.array([[0.02, 0.02, 3 * R]]), np.array([0.0, 0.0, -1.0]), purpose="travel")
+        log.write(travel, finger().execute(travel))
+    assert replay_of(tmp_path / "log.mcap") is None
+    broken_off(tmp_path / "felt.mcap", 3)
+    replay = replay_of(tmp_path / "felt.mcap")
+    assert replay is not None and replay.samples > 0
 
 
 def test_a_folder_without_a_log_is_refused(tmp_path: Path) -> None:

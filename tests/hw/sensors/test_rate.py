@@ -13,9 +13,15 @@ import pytest
 
 from hw.framing import Frames
 from hw.sensors.force_sensor import ForceSensor
-from hw.sensors.line_sensor import LineSensor, encode_line
+from hw.sensors.line_sensor import LineSensor, decode, encode_line, xor_of
 from hw.sensors.optoforce import BAUDRATE, FRAME_BYTES, HEADER, OptoForce, are_whole, encode_frame, is_whole
-from hw.sensors.sample_kernels import judge_block, load_sample_kernels, read_frames, whole_frames
+from hw.sensors.sample_kernels import (
+    judge_block,
+    load_sample_kernels,
+    read_frames,
+    read_lines,
+    whole_frames,
+)
 
 RATE = 5000
 # Frames of noise, in blocks of what a millisecond of a USB adapter holds
@@ -110,13 +116,33 @@ def test_a_minute_of_five_kilohertz_loses_no_sample(kind: str, tick: int) -> Non
     assert (ticks[-1] // tick + 1) % 2**16 == 60 * RATE % 2**16
     # the port may be opened in the midst of the first line
     assert sensor.faulty <= (kind == "line") and sensor.link.counters["garbage"] == 0
-    # OptoForce 1.9 %, lines 5.7 % beside 25 other jobs; a core that is never late is woken more often
+    # beside other jobs; a core that is never late is woken more often
     assert share < 0.1
+
+
+@pytest.mark.parametrize(
+    "number", ["0", "-0.00000", "1.1", "-123.456789", "0.1234567890123", "12345.", ".5", "1e-3", "+2", "9" * 17]
+)
+def test_lines_are_read_at_once_as_they_are_one_by_one(number: str) -> None:
+    lines = []
+    for micros in (7, 2**32 - 1):
+        body = f"F,{micros},{number},-2.25,{number}".encode()
+        lines.append(body + f"*{xor_of(body):02X}".encode())
+    sensor = LineSensor("/dev/none", rate=RATE)
+    told = sensor.decode_all(lines)
+    assert told is not None
+    for line, count, force in zip(lines, *told, strict=True):
+        assert decode(line) == (count, *force)
+    for at in range(len(lines[0])):  # one bit is wrong
+        broken = lines[0][:at] + bytes([lines[0][at] ^ 1]) + lines[0][at + 1 :]
+        alone = decode(broken)
+        at_once = sensor.decode_all([lines[1], broken])
+        assert (at_once is None) == (alone is None)
 
 
 def test_the_loops_are_compiled_before_a_sensor_is_heard_and_not_again() -> None:
     load_sample_kernels()
-    known = {loop: len(loop.signatures) for loop in (judge_block, read_frames, whole_frames)}
+    known = {loop: len(loop.signatures) for loop in (judge_block, read_frames, read_lines, whole_frames)}
     counts = np.random.default_rng(0).integers(-9, 10, (100, 3)).tolist()
     fast, line = FastSensor("/dev/none"), LineSensor("/dev/none", rate=RATE)
     frames = [encode_frame(i, 0, tuple(each)) for i, each in enumerate(counts)]

@@ -55,7 +55,7 @@ MADE = 3
 # A zero that drifts while the tip presses shows only when it is in free air again, however long the sweep
 UNSEEN_IN_CONTACT = ("drift",)
 # What shows in contact only; until the next one the machine lifts, takes its zero and travels, which is no hang
-SEEN_IN_CONTACT = ("sign", "gain 10", "gain 0.1")
+SEEN_IN_CONTACT = ("sign", "gain 10", "gain 0.1", "open")
 # What must hold: how long giving up may take, and nothing may move before it, s
 LONGEST = 5.0
 # The sensors' rate in this campaign, Hz, and sweeps of a case
