@@ -16,7 +16,7 @@ from explore3d.analysis.inspected import Inspected, base_reach
 from explore3d.analysis.result import TipCount
 from explore3d.analysis.roughness import Roughness, roughness_of, surely_taken, why_no_roughness_of
 from explore3d.analysis.stages import Stages
-from explore3d.analysis.standard_heights import LINE_KINDS, StandardHeight, standard_heights
+from explore3d.analysis.standard_heights import StandardHeight, has_sections, standard_heights
 from explore3d.analysis.surface_account import SurfaceAccount, swept_share
 from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature
@@ -487,7 +487,7 @@ def why_no_standard_heights(work: Work) -> str | None:
     """The standards know sections of lines; a log that was searched while it was read has none any more."""
     if work.log.detections:
         return None
-    lines = any(feature.kind in LINE_KINDS for feature in work.model.features)
+    lines = any(has_sections(feature) for feature in work.model.features)
     return "" if lines else "there is no ridge, groove or step"
 
 

@@ -15,10 +15,8 @@ from mapping.base import LaidTrace, SweepHeights
 from mapping.estimate.roughness import flat_height, level_difference, round_height, wolf_height
 from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.geometry.templates import contact_half_width
-from mapping.inference.kinds import sizes_of
+from mapping.inference.kinds import kind_of, sizes_of
 
-# Kinds that the standards have sections of
-LINE_KINDS = ("ridge", "groove", "step")
 # Bins in a third of a width, or in a portion beside a step: twice what a portion must hold
 _BINS = 12
 # A section that meets its line at less than this angle (its sine) is none: the standard's is taken at a right angle
@@ -72,6 +70,11 @@ class StandardHeight:
         return self.id, self.method, height, str(self.wolf) if self.wolf else ""
 
 
+def has_sections(feature: Feature) -> bool:
+    """True of what the standards have sections of: ridges, grooves and steps."""
+    return kind_of(feature).line and kind_of(feature).sampled
+
+
 def standard_heights(trace: LaidTrace, features: Sequence[Feature]) -> tuple[StandardHeight, ...]:
     """The ridges, grooves and steps of a trace by the standards, in their order, then what pairs of steps bound.
 
@@ -79,7 +82,7 @@ def standard_heights(trace: LaidTrace, features: Sequence[Feature]) -> tuple[Sta
         trace: laid on its base.
         features: found on it, with their ids.
     """
-    lines = [_Line.of(feature, trace) for feature in features if feature.kind in LINE_KINDS]
+    lines = [_Line.of(feature, trace) for feature in features if has_sections(feature)]
     wanted = [line for line in lines if not line.why_not]
     bounded: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for sweep in trace.laid_sweeps if wanted else ():
@@ -132,14 +135,14 @@ class _Line:
 
     @property
     def is_step(self) -> bool:
-        return self.feature.kind == "step"
+        return kind_of(self.feature).sided
 
     @classmethod
     def of(cls, feature: Feature, trace: LaidTrace) -> _Line:
         width, tip = feature.width.median, trace.tip_radius
         # so far from an edge of that height the ball does not lie on what is beside it
         reach = float(contact_half_width(min(abs(feature.height.median), tip), 0.0, tip))
-        if feature.kind == "step":
+        if kind_of(feature).sided:
             edge = max(reach + 0.5 * width, _BINS / _SIDE_PER_EDGE * _spacing(trace))
             side = _SIDE_PER_EDGE * edge
             return cls(feature, "parallel lines", edge, edge + side, side / _BINS)
@@ -235,7 +238,7 @@ def _between(piece: SweepHeights, start: int, stop: int, features: Sequence[Feat
     return any(
         (distances(places, each.axis) < sizes_of(each, tip_radius).half_width).any()
         for each in features
-        if each.kind != "step"
+        if not kind_of(each).sided
     )
 
 
