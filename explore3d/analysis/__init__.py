@@ -15,7 +15,7 @@ if TYPE_CHECKING:
         run_key as run_key,
     )
     from explore3d.analysis.forecast import Forecast as Forecast, forecast as forecast, worst_errors as worst_errors
-    from explore3d.analysis.method import ABSORBED as ABSORBED
+    from explore3d.analysis.method import ABSORBED as ABSORBED, FAILED as FAILED
     from explore3d.analysis.result import Analysis as Analysis
     from explore3d.analysis.roughness import (
         Roughness as Roughness,
@@ -43,7 +43,7 @@ _PUBLIC = {
     "build_model": ("build_model",),
     "feature_table": ("FEATURE_COLUMNS", "csv_text", "feature_rows", "parquet_bytes", "run_key"),
     "forecast": ("Forecast", "forecast", "worst_errors"),
-    "method": ("ABSORBED",),
+    "method": ("ABSORBED", "FAILED"),
     "result": ("Analysis",),
     "roughness": ("Roughness", "residual", "roughness_of", "why_no_roughness_of"),
     "savings": ("without_needless_dynamics",),

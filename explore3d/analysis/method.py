@@ -22,7 +22,7 @@ from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature
 from explore3d.log import Log, stop_of
 from explore3d.scene import AnalysisSettings, Scene
-from mapping import Dropped, Feature, LeftOut, Trace, length_text
+from mapping import Dropped, EnvelopeError, Feature, LeftOut, Trace, length_text
 from mapping.assembly import Inspections, assemble, inspected_for, why_none_sought
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
@@ -46,6 +46,8 @@ NOISE_FREE = 2e-8
 
 # What is left out where what may be a feature is none: taken for form, or too wide
 ABSORBED = "part of the form"
+# What a stage could not do although it was needed
+FAILED = "could not be done"
 _TOO_WIDE = "stands off the base and is wider than fine features are: only its edges are sought"
 # Of these so many are described one by one
 MOST_STANDING = 5
@@ -428,7 +430,10 @@ def why_no_surface(work: Work) -> str:
 def surface_estimated(work: Work, share: Share) -> None:
     """The body's surface under the path of the ball's centre."""
     noise = work.detections.noise if work.wants("smoothing") else None
-    work.estimate = estimate_surface(work.laid, base=work.base, noise=noise)
+    try:
+        work.estimate = estimate_surface(work.laid, base=work.base, noise=noise)
+    except EnvelopeError as error:  # sweeps that contradict each other cost the surface, not the features
+        work.stages.left_out.append(LeftOut(FAILED, f"there is no estimated surface: {error}"))
 
 
 def why_no_curvature(work: Work) -> str:

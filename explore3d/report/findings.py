@@ -6,7 +6,7 @@ from math import isfinite
 from pathlib import Path
 
 from explore3d import count_text
-from explore3d.analysis import ABSORBED, Analysis, swept_share
+from explore3d.analysis import ABSORBED, FAILED, Analysis, swept_share
 from mapping import Feature, length_text
 from mapping.detection.path import PathLedger
 
@@ -92,9 +92,10 @@ def deviation_warning(analysis: Analysis) -> list[str]:
 
 
 def form_warnings(analysis: Analysis) -> list[str]:
-    """What was taken for form, and what was assumed of the tip."""
+    """What was taken for form, what could not be had, and what was assumed of the tip."""
     absorbed = [f"{each.reason[0].upper()}{each.reason[1:]}." for each in analysis.left_out if each.stage == ABSORBED]
-    return [*absorbed, *tip_sentence(analysis)]
+    failed = [f"Warning: {each.reason}." for each in analysis.left_out if each.stage == FAILED]
+    return [*failed, *absorbed, *tip_sentence(analysis)]
 
 
 def misfit_warnings(analysis: Analysis) -> list[str]:
