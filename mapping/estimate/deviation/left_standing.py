@@ -12,7 +12,7 @@ from mapping.base.profiles import SHORTEST_BEND, isolated_rest
 from mapping.instrument import robust_scale
 
 # Places of a sweep that are looked at: the count that the thresholds of isolated bends were simulated with
-PLACES = 480
+_PLACES = 480
 # Places across the narrowest that counts
 _PER_WIDTH = 4.0
 
@@ -33,28 +33,34 @@ def left_standing(trace: LaidTrace) -> list[LeftStanding]:
     Args:
         trace: laid on its base, and searched: the heights are those that are known by now.
     """
-    found: list[tuple[LeftStanding, int]] = []
+    found: list[LeftStanding] = []
+    numbers: list[int] = []
     for sweep in trace.laid_sweeps:
         for piece in sweep.known_heights():
-            found += [(each, sweep.number) for each in _of_piece(piece, trace.tip_radius)]
-    chosen: list[LeftStanding] = []
-    rest = sorted(found, key=lambda each: -abs(each[0].height))
-    while rest:
-        together, grown = [rest.pop(0)], 0
-        while grown < len(together):  # neighbours of neighbours: a long hollow is one
-            near = [each for each in rest if _beside(each[0], together[grown][0])]
-            rest = [each for each in rest if not any(each is other for other in near)]
-            together += near
-            grown += 1
-        top = together[0][0]
-        width = float(np.median([each.width for each, _ in together]))
-        chosen.append(LeftStanding(top.height, width, top.place, len({number for _, number in together})))
+            found += _of_piece(piece, trace.tip_radius)
+            numbers += [sweep.number] * (len(found) - len(numbers))
+    if not found:
+        return []
+    places = np.array([each.place for each in found])
+    heights, widths = (np.array([getattr(each, name) for each in found]) for name in ("height", "width"))
+    chosen, left = [], np.ones(len(found), dtype=bool)
+    for top in np.argsort(-np.abs(heights), kind="stable"):
+        if not left[top]:
+            continue
+        together, left[top] = [top], False
+        for one in together:  # which grows: neighbours of neighbours make a long hollow one
+            beside = left & (heights * heights[one] > 0.0)
+            beside[beside] = np.linalg.norm(places[beside] - places[one], axis=1) < widths[beside] + widths[one]
+            left[beside] = False
+            together += np.flatnonzero(beside).tolist()
+        over = len({numbers[k] for k in together})
+        chosen.append(LeftStanding(found[top].height, float(np.median(widths[together])), found[top].place, over))
     return chosen
 
 
 def _of_piece(piece: SweepHeights, tip_radius: float) -> list[LeftStanding]:
     narrowest = SHORTEST_BEND * tip_radius
-    size = max(1, int(min(piece.length / PLACES, narrowest / _PER_WIDTH) / piece.spacing))
+    size = max(1, int(min(piece.length / _PLACES, narrowest / _PER_WIDTH) / piece.spacing))
     count = len(piece.height) // size
     if count < 4:
         return []
@@ -69,8 +75,3 @@ def _of_piece(piece: SweepHeights, tip_radius: float) -> list[LeftStanding]:
 
 def _means(values: FloatArray, size: int, count: int) -> FloatArray:
     return np.asarray(values[: size * count].reshape(count, size).mean(axis=1))
-
-
-def _beside(one: LeftStanding, other: LeftStanding) -> bool:
-    near = float(np.linalg.norm(one.place - other.place)) < one.width + other.width
-    return near and one.height * other.height > 0.0
