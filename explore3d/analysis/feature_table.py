@@ -43,6 +43,8 @@ FEATURE_COLUMNS: dict[str, str] = {
     "kept": "bool",
     "why_dropped": "string",
 }
+# Bytes that are read at once, as pyarrow does by itself
+_JSON_BLOCK = 2**20
 
 
 def run_key(sha256: str, settings: Mapping[str, Any]) -> str:
@@ -99,9 +101,12 @@ def parquet_bytes(columns: Mapping[str, str], table: Sequence[Row]) -> bytes:
 
     schema = pa.schema([(name, getattr(pa, "bool_" if kind == "bool" else kind)()) for name, kind in columns.items()])
     # by way of JSON: from lists pyarrow makes arrays with the help of pandas, whose import takes a third of a second
-    lines = "\n".join(json.dumps(row, default=lambda value: value.item()) for row in table)
+    lines = [json.dumps(row, default=lambda value: value.item()).encode() for row in table]
     known = pj.ParseOptions(explicit_schema=schema, unexpected_field_behavior="ignore")
-    made = pj.read_json(io.BytesIO(lines.encode()), parse_options=known) if lines else schema.empty_table()
+    # a row lies in two blocks at most
+    blocks = pj.ReadOptions(block_size=max([_JSON_BLOCK, *(len(line) + 1 for line in lines)]))
+    text = io.BytesIO(b"\n".join(lines))
+    made = pj.read_json(text, read_options=blocks, parse_options=known) if lines else schema.empty_table()
     stream = io.BytesIO()
     pq.write_table(made, stream, compression="zstd")
     return stream.getvalue()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -91,3 +92,13 @@ def test_the_command_names_the_table_where_there_is_no_report(
     words = ["analyze", out / "a.csv", "--tip-radius", "2 um", "--quick", "--out", out / "told"]
     assert explore3d_main(monkeypatch, *words) == 0
     assert capsys.readouterr().out.splitlines()[-1] == f"features: {out / 'told' / 'features.csv'}"
+
+
+def test_a_table_keeps_what_is_odd_in_it_and_a_reason_of_megabytes() -> None:
+    columns = {"value": "float64", "text": "string", "count": "int64"}
+    rows = [
+        {"value": 0.1 + 0.2, "text": "line\nbreak, \u2028, \u00b5", "count": 2**60},
+        {"value": None, "text": "2026-11-23T10:00:00", "count": None},
+        {"value": 1e-300, "text": "x" * 2_000_000, "count": 0},
+    ]
+    assert pq.read_table(io.BytesIO(parquet_bytes(columns, rows))).to_pylist() == rows
