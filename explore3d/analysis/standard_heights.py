@@ -17,13 +17,15 @@ from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.geometry.templates import contact_half_width
 from mapping.inference.kinds import kind_of, sizes_of
 
-# Bins in a third of a width, or in a portion beside a step: twice what a portion must hold
+# Bins in a third of a width, or in a portion beside a step: more than twice what a portion must hold
 _BINS = 12
-# A section that meets its line at less than this angle (its sine) is none: the standard's is taken at a right angle
+# A section that meets its line at a sine below this is none: it is stretched to more than twice the width, and the
+# portions, six half-widths long at a right angle, reach over other details
 _ACROSS = 0.5
-# A flat top that is at least this share of the width fills the standard's middle portion
+# A flat top that is at least this share of the width fills the standard's middle portion, its middle third
 _FLAT_SHARE = 1.0 / 3.0
-# The parts beside a step, of which the standard knows none, are so many times as long as what is left out at its edge
+# The parts beside a step are so many times as long as what is left out at its edge: the standard leaves out a third of
+# the width beside an edge, and takes two thirds
 _SIDE_PER_EDGE = 2.0
 
 STANDARDS_SENTENCE = (

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
         profile_parameters as profile_parameters,
     )
     from mapping.estimate.roughness.section_height import (
-        FEWEST_IN_PORTION as FEWEST_IN_PORTION,
         flat_height as flat_height,
         level_difference as level_difference,
         round_height as round_height,
@@ -29,7 +28,7 @@ _PUBLIC = {
     "areal": ("AREAL_NAMES", "areal_parameters"),
     "filters": ("NESTING_INDICES", "gaussian_mean", "suited_cutoff"),
     "profile": ("PROFILE_NAMES", "Stretch", "profile_parameters"),
-    "section_height": ("FEWEST_IN_PORTION", "flat_height", "round_height", "level_difference", "wolf_height"),
+    "section_height": ("flat_height", "round_height", "level_difference", "wolf_height"),
     "sections": ("EVALUATED_SECTIONS",),
 }
 doorway(__name__, _PUBLIC)

@@ -7,8 +7,9 @@ import numpy as np
 from mapping import BoolArray, FloatArray
 from mapping.estimate.roughness.filters import gaussian_mean
 
-# Samples that each of the standard's portions must hold: a line through fewer says nothing of its own scatter
-FEWEST_IN_PORTION = 5
+# Samples that each of the standard's portions must hold: two more than the parabola has coefficients that is laid
+# through the middle one
+_FEWEST_IN_PORTION = 5
 # S-filter before pruning, in parts of the felt half-width: of a round crest it takes (sd / half-width)^2 of its height,
 # with sd = 0.187 of the nesting index 0.4 %, and noise of neighbouring samples with it
 _PRUNED_FILTER = 1.0 / 3.0
@@ -89,7 +90,7 @@ def _portions(u: FloatArray, width: float) -> tuple[BoolArray, BoolArray, BoolAr
 
 
 def _filled(*portions: BoolArray) -> bool:
-    return all(portion.sum() >= FEWEST_IN_PORTION for portion in portions)
+    return all(portion.sum() >= _FEWEST_IN_PORTION for portion in portions)
 
 
 def _parallel(u: FloatArray, z: FloatArray, portions: tuple[BoolArray, BoolArray]) -> float:
