@@ -17,12 +17,12 @@ from mapping.geometry.mesh import (
     STACK,
     WIDTH,
     closest,
-    closest_on_triangle,
+    closing_step,
     corners,
     cross,
     dot,
+    enter_face,
     enter_triangle,
-    leave_triangle,
     moved,
     push_lanes,
     scaled,
@@ -47,19 +47,17 @@ def stays_above(rows, i, end, d, reach):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def meet(rows, i, o, d, ball):  # type: ignore[no-untyped-def]
-    """When a ball free at o meets the triangle: t >= 0, inf if never, -1 if it overlaps it at the start."""
-    radius, _, graze = ball
+def meet(rows, i, o, d, ball, start, far):  # type: ignore[no-untyped-def]
+    """When a ball free at o meets the triangle: 0 <= t < far, inf if never, -1 if it overlaps it at o.
+
+    `start`: see `enter_triangle`.
+    """
     a, b, c, n = corners(rows, i, o)
-    enter = enter_triangle(a, b, c, n, d, radius, graze)
-    if enter >= 0.0:
-        return enter
-    if leave_triangle(a, b, c, n, d, radius, graze) < 0.0:
-        return inf
-    p = closest_on_triangle(a, b, c, n)
-    if sqrt(dot(p, p)) < radius * (1.0 - CONTACT_TOLERANCE) - graze:
-        return -1.0
-    return 0.0 if dot(p, d) > 0.0 else inf  # resting on it: pressed in, or moving away
+    if abs(dot(d, n)) > GLANCING:
+        enter = enter_face(a, b, c, n, d, ball[0])
+        if 0.0 <= enter < inf:  # the whole triangle lies behind that plane: nothing of it is met before
+            return enter
+    return enter_triangle(a, b, c, n, d, ball, start, far)
 
 
 @njit(cache=True, error_model="numpy")
@@ -72,7 +70,7 @@ def first_touch(rows, leaves, boxes, links, ball, o, d, far, guess, near, stack,
     radius, reach, graze = ball
     best, hit, kept = far, -1, 0
     if guess >= 0:
-        t = meet(rows, guess, o, d, ball)
+        t = meet(rows, guess, o, d, ball, 0.0, best)
         if t < best:
             best, hit = t, guess
     end = moved(o, best, d)
@@ -87,12 +85,15 @@ def first_touch(rows, leaves, boxes, links, ball, o, d, far, guess, near, stack,
         if stays_above(rows, i, end, d, reach):
             continue
         p = closest(rows, i, end)
-        gap = sqrt(dot(p, p))
-        ahead = dot(p, d) >= 0.0
+        gap, closing = sqrt(dot(p, p)), dot(p, d)
+        ahead = closing >= 0.0
         if ahead and gap > reach:
             continue
         if not (ahead and gap >= radius - graze):  # else it is only just touched, or less
-            t = meet(rows, i, o, d, ball)
+            start = best + closing_step(gap, closing, radius) if closing > 0.0 else 0.0
+            if start * closing <= graze * gap:  # else the gap at o is larger by more than that: it does not rest there
+                start = 0.0
+            t = meet(rows, i, o, d, ball, start, best)
             if t < best:
                 best, hit = t, i
                 end = moved(o, best, d)
@@ -118,10 +119,7 @@ def settle(rows, order, near, kept, hit, o, d, ball):  # type: ignore[no-untyped
     """
     radius, reach, graze = ball
     least = further(closest(rows, hit, o), d, radius)
-    if least == inf:
-        a, b, c, n = corners(rows, hit, o)
-        again = enter_triangle(a, b, c, n, d, radius, 0.0)
-        least = again if abs(again) <= 1e-6 * radius else 0.0
+    least = 0.0 if least == inf else least
     stay = 0
     for i in range(kept):
         p = closest(rows, near[i], o)

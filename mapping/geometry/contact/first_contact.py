@@ -62,12 +62,14 @@ class Contacts:
 class BallContact:
     """A ball and a body prepared for contact queries, exact to float64.
 
-    The body is any triangle mesh: open or closed, welded or not, its faces touched from both sides. It is
-    dilated by the ball without ever being built: offset faces, cylinders around edges and spheres around
-    vertices are met in closed form, and a tree of boxes leaves out those that the ball surely misses.
+    The body is any triangle mesh: open or closed, welded or not, its faces touched from both sides. A ball's
+    gap to a triangle is a convex function of its way, so tangents to it lead to the contact and never beyond:
+    there is no crack between faces, edges and vertices to slip through (theory 4.7). A tree of boxes leaves
+    out those that the ball surely misses.
 
     Positions are exact to a few 1e-16 of the larger of body, ball and distance from the coordinates'
-    origin. A ball that would sink in by less than 2e-15 of body and ball merely grazes, and passes.
+    origin. A ball that would sink in by less than 2e-15 of body and ball merely grazes, and passes; it never
+    sinks in by more than 2e-14.
 
     Args:
         surface: the body.

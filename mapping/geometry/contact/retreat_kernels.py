@@ -12,9 +12,10 @@ from mapping.geometry.mesh import (
     STACK,
     WIDTH,
     closest_on_triangle,
+    closing_step,
     corners,
     dot,
-    leave_triangle,
+    enter_triangle,
     moved,
     push_lanes,
     scaled,
@@ -70,8 +71,14 @@ def overlap_ahead(rows, leaves, boxes, links, ball, o, d, stack, apart, late):  
         waiting -= 1
         a, b, c, n = corners(rows, i, o)
         p = closest_on_triangle(a, b, c, n)
-        if sqrt(dot(p, p)) < radius - graze:
-            step = max(step, leave_triangle(a, b, c, n, d, radius, graze))
+        gap = sqrt(dot(p, p))
+        if gap < radius - graze:
+            beyond = max(dot(a, d), dot(b, d), dot(c, d)) + radius  # free there: it comes back until it touches
+            a, b, c = moved(a, -beyond, d), moved(b, -beyond, d), moved(c, -beyond, d)
+            back = scaled(-1.0, d)
+            closing = dot(p, back)
+            start = max(beyond + closing_step(gap, closing, radius), 0.0) if closing > 0.0 else 0.0
+            step = max(step, beyond - enter_triangle(a, b, c, n, back, ball, start, inf))
     return step
 
 

@@ -25,8 +25,9 @@ if TYPE_CHECKING:
     from mapping.geometry.mesh.tree import TriangleTree as TriangleTree
     from mapping.geometry.mesh.triangle_kernels import (
         closest_on_triangle as closest_on_triangle,
+        closing_step as closing_step,
+        enter_face as enter_face,
         enter_triangle as enter_triangle,
-        leave_triangle as leave_triangle,
     )
     from mapping.geometry.mesh.triangle_row_kernels import (
         QUERIES_PER_BLOCK as QUERIES_PER_BLOCK,
@@ -50,7 +51,7 @@ _PUBLIC = {
     "polyline": ("arclengths", "directions", "distances", "middle", "nearest_on", "resample"),
     "threads": ("algebra_in_one_thread", "by_shares", "cores"),
     "tree": ("TriangleTree",),
-    "triangle_kernels": ("closest_on_triangle", "enter_triangle", "leave_triangle"),
+    "triangle_kernels": ("closest_on_triangle", "closing_step", "enter_face", "enter_triangle"),
     "triangle_row_kernels": ("QUERIES_PER_BLOCK", "closest", "corners"),
     "vector_kernels": ("cross", "dot", "moved", "scaled", "sub", "vector"),
 }

@@ -12,7 +12,8 @@ from numba import njit
 
 from mapping.geometry.mesh.vector_kernels import cross, dot, moved, scaled, sub
 
-PARALLEL_COSINE = 1e-15  # cosine below which a ray runs along a plane: rounding alone tilts it by this much
+# A gap that closes to a tangent shrinks fourfold a step, from 1 to 1e-16 in 27 steps; any other faster.
+MOST_STEPS = 64
 SLIVER = 1e-14  # height over longest side below which a triangle is a segment: narrower than rounding
 
 
@@ -73,67 +74,47 @@ def closest_on_triangle(a, b, c, n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def enter_vertex(a, d, radius, graze):  # type: ignore[no-untyped-def]
-    """When a ball moving from the origin along the unit vector d comes to touch the point a; inf if never."""
-    middle = dot(a, d)
-    lateral = moved(a, -middle, d)
-    miss = sqrt(dot(lateral, lateral))
-    if miss >= radius - graze:
-        return inf
-    return middle - sqrt((radius - miss) * (radius + miss))
-
-
-@njit(cache=True, error_model="numpy")
-def enter_edge(a, b, d, radius, graze):  # type: ignore[no-untyped-def]
-    """When the ball comes to touch the edge ab between its ends; inf if never."""
-    e = sub(b, a)
-    length = sqrt(dot(e, e))
-    if length == 0.0:
-        return inf
-    e = scaled(1.0 / length, e)
-    d_along, a_along = dot(d, e), dot(a, e)
-    across, start = moved(d, -d_along, e), moved(a, -a_along, e)
-    speed = dot(across, across)
-    if speed == 0.0:
-        return inf
-    middle = dot(start, across) / speed
-    lateral = moved(start, -middle, across)
-    miss = sqrt(dot(lateral, lateral))
-    if miss >= radius - graze:
-        return inf
-    t = middle - sqrt((radius - miss) * (radius + miss) / speed)
-    return t if 0.0 <= t * d_along - a_along <= length else inf
-
-
-@njit(cache=True, error_model="numpy")
 def enter_face(a, b, c, n, d, radius):  # type: ignore[no-untyped-def]
-    """When the ball comes to touch the inside of the triangle, from whichever side it comes; inf if never."""
+    """When a ball from the origin along d comes to touch the inside of the triangle, from either side; inf if never."""
     cosine = dot(d, n)
-    if abs(cosine) <= PARALLEL_COSINE:
-        return inf
     side = -radius if cosine > 0.0 else radius
     t = (dot(a, n) + side) / cosine
     return t if holds(a, b, c, n, moved(scaled(t, d), -side, n)) else inf
 
 
 @njit(cache=True, error_model="numpy")
-def enter_triangle(a, b, c, n, d, radius, graze):  # type: ignore[no-untyped-def]
-    """When a ball moving from the origin along the unit vector d comes to touch the triangle; inf if never.
+def enter_triangle(a, b, c, n, d, ball, start, far):  # type: ignore[no-untyped-def]
+    """When a ball at the origin comes to touch the triangle on its way along the unit vector d, 0 <= t < far.
 
-    The triangle dilated by the ball is convex and bounded by two offset faces, cylinders and spheres; the
-    earliest entry through any of them is its own. Nothing is entered before the offset faces' planes. A
-    ball that would sink in by less than `graze` passes. Times may be negative: when it entered.
+    inf if it does not, or sinks in by less than a graze; -1 if it overlaps the triangle at the origin by more than its
+    reach exceeds its radius. At `start` it is not yet so far: 0, or a `closing_step` from where it overlaps.
+    ball: (radius, reach, graze).
+
+    The gap, the distance of the triangle from the ball's centre, is a convex function of t. A tangent of a convex
+    function lies below it: the step that would close the gap at the present rate never goes beyond the contact, and
+    where the gap no longer closes there is none. So there is no crack to slip through, whatever the direction and
+    the triangle: the answer is as exact as a gap (theory 4.7).
     """
-    t = enter_face(a, b, c, n, d, radius)
-    if t < inf:
-        return t
-    t = min(enter_vertex(a, d, radius, graze), enter_vertex(b, d, radius, graze), enter_vertex(c, d, radius, graze))
-    return min(
-        t, enter_edge(a, b, d, radius, graze), enter_edge(b, c, d, radius, graze), enter_edge(c, a, d, radius, graze)
-    )
+    radius, reach, graze = ball
+    t, touched = start, inf
+    for _ in range(MOST_STEPS):
+        p = closest_on_triangle(moved(a, -t, d), moved(b, -t, d), moved(c, -t, d), n)
+        gap, closing = sqrt(dot(p, p)), dot(p, d)
+        if t == 0.0 and gap < radius - (reach - radius):
+            return -1.0
+        if gap <= radius + 0.5 * graze:
+            touched = min(touched, t)
+        if not closing > 0.0:
+            return touched if gap < radius - graze and t > 0.0 else inf
+        if gap < radius - graze:
+            return touched
+        t += closing_step(gap, closing, radius if touched == inf else radius - 1.5 * graze)
+        if t >= far:
+            return inf
+    return min(touched, t)
 
 
 @njit(cache=True, error_model="numpy")
-def leave_triangle(a, b, c, n, d, radius, graze):  # type: ignore[no-untyped-def]
-    """When the ball leaves the triangle again; -inf if it never touches it."""
-    return -enter_triangle(a, b, c, n, scaled(-1.0, d), radius, graze)
+def closing_step(gap, closing, radius):  # type: ignore[no-untyped-def]
+    """How far along d the gap to the closest point p is the radius at the present rate; closing = p d > 0."""
+    return (gap - radius) * (gap / closing)
