@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mapping import BoolArray, ContactError, FloatArray, IntArray, Surface
 from mapping.geometry.contact.commanded_path import CommandedPath, checked_points, unit_directions
+from mapping.geometry.contact.query_order import morton_order
 from mapping.geometry.mesh import TriangleTree
 
 NONE, FACE, EDGE, VERTEX = 0, 1, 2, 3
@@ -114,6 +115,9 @@ class BallContact:
         start = checked_points(origins, "origins")
         way = unit_directions(directions, len(start))
         local, tree = self._tree.into(start), self._tree
+        order = morton_order(local)
+        if order is not None:
+            local, way = local[order], way[order] if len(way) == len(start) else way
         where, feature = np.empty((len(start), 3, 3)), np.empty(len(start), np.int8)
         count, distance, state = np.empty(len(start), np.int64), np.empty(len(start)), np.empty(len(start), np.int8)
 
@@ -125,6 +129,10 @@ class BallContact:
             )  # fmt: skip
 
         _in_parts(some, len(start), QUERIES_PER_BLOCK, threads)
+        if order is not None:
+            back = np.empty_like(order)
+            back[order] = np.arange(len(order))
+            where, feature, count, distance, state = (a[back] for a in (where, feature, count, distance, state))
         return Contacts(
             tree.out(where[:, 0]),
             tree.out(where[:, 1]),

@@ -1,0 +1,33 @@
+"""The order in which queries are answered: each near the one before, whose part of the tree is at hand still."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapping import FloatArray, IntArray
+
+BITS = 10  # of each coordinate: 1024 cells along the longest extent, some 30 bits in all
+# Rows of a square grid of N points step by 2 extents / sqrt(N) on average, the way back to the next row included;
+# twice that lets grids of 1:4 keep their order. Points at random step by half an extent.
+IN_ROWS = 4.0
+
+
+def morton_order(points: FloatArray) -> IntArray | None:
+    """(N,) the points (N, 3) along a Morton curve (Morton 1966); None where they follow one another closely already."""
+    if len(points) < 2:
+        return None
+    low = points.min(axis=0)
+    extent = float((points.max(axis=0) - low).max())
+    step = float(np.linalg.norm(np.diff(points, axis=0), axis=1).mean())
+    if not np.isfinite(extent) or step * np.sqrt(len(points)) <= IN_ROWS * extent:
+        return None
+    cells = np.minimum((points - low) * (2**BITS / extent), 2**BITS - 1).astype(np.uint32)
+    codes = _spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint32(1) | _spread(cells[:, 2]) << np.uint32(2)
+    return np.argsort(codes, kind="stable")
+
+
+def _spread(bits: np.ndarray) -> np.ndarray:
+    """The ten low bits, each with two zeros before it."""
+    for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
+        bits = (bits | bits << np.uint32(shift)) & np.uint32(mask)
+    return bits
