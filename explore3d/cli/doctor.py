@@ -52,7 +52,7 @@ REQUIRED_PACKAGES = {
     "numba": ("numba", "contact of the simulated finger, envelopes"),
     "libigl": ("igl", "curvature of meshes"),
     "emcee": ("emcee", "posterior distributions of a feature's size and place"),
-    "trimesh": ("trimesh", "reading meshes, writing model.glb"),
+    "trimesh": ("trimesh", "reading meshes"),
     "matplotlib": ("matplotlib", "the pictures of plans and of benches"),
     "pyarrow": ("pyarrow.parquet", "the table of features, stores of many logs"),
     "mcap": ("mcap.writer", "logs"),
