@@ -83,7 +83,7 @@ def profile_parameters(
         "Ra": with_interval(sums, mean_size),
         "Rq": with_interval(sums, root_mean_square),
         "Rz": with_interval(tall, lambda total: total[..., 1] / total[..., 0]),
-        "Rsk": with_interval(sums, skewness),
+        "Rsk": with_interval(sums, skewness, signed=True),
         "Rku": with_interval(sums, kurtosis),
         "Rsm": with_interval(elements, _mean_spacing),
         "Wa": with_interval(waves, mean_size),

@@ -84,6 +84,17 @@ def test_intervals_cover_as_often_as_they_say() -> None:
     assert 0.82 < covered < 0.96, covered
 
 
+def test_no_size_may_be_negative_where_one_section_holds_most_of_the_height() -> None:
+    """A groove, wide but no feature, in one of eight sections of fine noise."""
+    heights = 1e-8 * np.random.default_rng(4).standard_normal(9 * 500)
+    heights[2100:2300] -= 2e-6
+    values, sections = profile_parameters([stretch(heights)], CUTOFF)
+    assert sections == 8
+    for name in ("Ra", "Rq", "Rz", "Rku", "Wa"):
+        assert 0.0 < values[name].low < values[name].median < values[name].high, name
+    assert values["Ra"].low < 0.1 * values["Ra"].median  # most sections have less than that
+
+
 def test_a_raster_has_the_parameters_of_its_profiles() -> None:
     rng = np.random.default_rng(2)
     heights = 1e-7 * rng.standard_normal((120, 400))
