@@ -21,7 +21,7 @@ from explore3d.scene import example
 from hw import FingerError
 from mapping.geometry.mesh import open3d
 
-# This example finds its base, follows a ridge and measures it: all kernels but those of inertia and of walls
+# This example finds its base, follows a ridge and measures it: all kernels but those of inertia, of walls and of tables
 COMPILES = "unknown_plate"
 STATES = ("ok", "missing", "note")
 
@@ -52,7 +52,7 @@ REQUIRED_PACKAGES = {
     "numba": ("numba", "contact of the simulated finger, envelopes"),
     "libigl": ("igl", "curvature of meshes"),
     "emcee": ("emcee", "posterior distributions of a feature's size and place"),
-    "trimesh": ("trimesh", "reading meshes, writing model.glb"),
+    "trimesh": ("trimesh", "reading meshes"),
     "matplotlib": ("matplotlib", "the pictures of plans and of benches"),
     "pyarrow": ("pyarrow.parquet", "the table of features, stores of many logs"),
     "mcap": ("mcap.writer", "logs"),
@@ -146,14 +146,16 @@ def _failure(load: Callable[[], object]) -> str:
 
 
 def compile_kernels(quiet: bool) -> None:
-    """Explore an example in a folder of its own, which is thrown away; what was compiled stays in numba's cache."""
+    """Explore an example and analyse tables in folders of their own; what was compiled stays in numba's cache."""
     from explore3d.cli.progress import shown
     from explore3d.jobs import run
+    from explore3d.jobs.batch import rehearse
     from hw.sensors import load_sample_kernels
 
     with tempfile.TemporaryDirectory(prefix="explore3d-") as folder, shown(quiet) as progress:
         run(example(COMPILES).scene, Path(folder) / "out", progress=progress)
     load_sample_kernels()
+    rehearse(quick=False)
 
 
 def controller(port: str, baudrate: int) -> list[Check]:

@@ -12,6 +12,7 @@ from mapping import FloatArray, IntArray, Surface, Trace
 from mapping.base.base import FitValue
 from mapping.base.cells import Cells
 from mapping.base.profiles import SHORTEST_BEND
+from mapping.geometry.mesh import spline_design
 from mapping.instrument import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_fit, robust_scale
 
 # Upward part of the mean direction from a round body's middle of what was felt inside it, without contact normals
@@ -199,8 +200,6 @@ def quadric(cloud: Cloud) -> Fitted:
 
 def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
     """A bicubic spline sheet; its pieces are no shorter than so many tip radii."""
-    from scipy.interpolate import BSpline
-
     low, high = cloud.extent
     pieces = [int(min(8, (high[i] - low[i]) / (shortest * cloud.tip_radius))) for i in range(2)]
     if min(pieces) < 1 or len(cloud.points) < 4 * (pieces[0] + 3) * (pieces[1] + 3):
@@ -210,9 +209,7 @@ def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
     ]
 
     def design(x: FloatArray, y: FloatArray) -> FloatArray:
-        bx, by = (
-            BSpline.design_matrix(np.clip(c, k[0], k[-1]), k, 3).toarray() for c, k in ((x, knots[0]), (y, knots[1]))
-        )
+        bx, by = (spline_design(np.clip(c, k[0], k[-1]), k, 3) for c, k in ((x, knots[0]), (y, knots[1])))
         return np.asarray((bx[:, :, None] * by[:, None, :]).reshape(len(x), -1))
 
     count = [pieces[i] + 3 for i in range(2)]

@@ -9,6 +9,7 @@ import numpy as np
 from mapping import FloatArray, IntArray, Surface
 from mapping.base.quadrics import Cloud, Fitted, cylinder, outside, pieces_of, ring_faces
 from mapping.base.star import SLOPE_STEP_ANGLE, bears, fitted, one_sided, touched
+from mapping.geometry.mesh import spline_design
 
 # Corners of the mesh around the body, and its rings along it if nobody asks for a spacing
 CORNERS_AROUND, RINGS = 512, 128
@@ -61,11 +62,9 @@ def tube(cloud: Cloud, waves: int, shortest: float) -> Fitted | None:
 
 def _rings(angle: FloatArray, height: FloatArray, each: IntArray, knots: FloatArray) -> FloatArray:
     """(N, P) products of Fourier waves of the angle (in turn cosine and sine) and splines of the height."""
-    from scipy.interpolate import BSpline
-
     turn = each * angle[:, None]
     waves = np.where(np.arange(len(each)) % 2 == 0, np.cos(turn), np.sin(turn))
-    along = BSpline.design_matrix(np.clip(height, knots[0], knots[-1]), knots, 3).toarray()
+    along = spline_design(np.clip(height, knots[0], knots[-1]), knots, 3)
     return np.asarray((waves[:, :, None] * along[:, None, :]).reshape(len(angle), -1))
 
 

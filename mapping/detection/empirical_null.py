@@ -249,13 +249,16 @@ def _cell_levels(z: FloatArray, cells: int, bank: Bank, k: int) -> tuple[FloatAr
     edges = np.linspace(0, len(z), cells + 1).astype(np.int64)
     level, variance = np.full(cells, np.nan), np.full(cells, np.inf)
     step = bank.filters[k].coarse * bank.spacing
-    for c in range(cells):
-        part = z[edges[c] : edges[c + 1]]
-        part = part[np.isfinite(part)]
-        width = len(part) * step / bank.filters[k].half_width
+    known = np.isfinite(z)
+    ends = np.concatenate([[0], np.cumsum(known)])[edges]
+    counts, values = np.diff(ends), z[known]
+    for count in np.unique(counts):  # cells with as many values at once: there are thousands of cells
+        width = count * step / bank.filters[k].half_width
         if width >= 1.0:
-            level[c] = 2 * np.log(max(robust_sd(part), 1e-12))
-            variance[c] = LOG_VARIANCE_PER_WIDTH / width
+            alike = counts == count
+            rows = values[ends[:-1][alike, None] + np.arange(count)]
+            level[alike] = 2 * np.log(np.maximum(MAD_TO_SD * np.median(np.abs(rows), axis=1), 1e-12))
+            variance[alike] = LOG_VARIANCE_PER_WIDTH / width
     return level, variance
 
 

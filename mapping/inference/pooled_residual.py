@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from mapping import Feature, FloatArray, length_text
+from mapping.geometry.mesh import spline_design
 from mapping.inference.families import PRECISE, PosteriorProblem, with_nominal_tip
 from mapping.inference.kinds import kind_of
 from mapping.inference.likelihood import LogPosterior
@@ -111,8 +112,6 @@ def _section(problem: PosteriorProblem, theta: FloatArray) -> tuple[FloatArray, 
 
     Bins that the ball reaches over an end of the line, or where a neighbour stands out as well, say nothing here.
     """
-    from scipy.interpolate import BSpline
-
     shape: Any = with_nominal_tip(problem).target.shape
     window, kind = problem.window, kind_of(problem.feature)
     beside = problem.target.beside
@@ -141,7 +140,7 @@ def _section(problem: PosteriorProblem, theta: FloatArray) -> tuple[FloatArray, 
     step = (reach - low) / (count - 3)
     knots = low + step * np.arange(-3.0, count + 1.0)
     values = np.zeros((count, len(window)))
-    values[:, inside] = BSpline.design_matrix(away[inside], knots, 3).toarray().T
+    values[:, inside] = spline_design(away[inside], knots, 3).T
     return values[values.any(axis=1)], places
 
 

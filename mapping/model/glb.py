@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapping import Feature, FloatArray, Surface
 from mapping.inference.kinds import kind_of
@@ -20,6 +23,10 @@ UNKNOWN_ATTRIBUTE = -1.0
 # glTF 2.0 (3.4, coordinate system and units): +Y is up, +Z forward. The node that turns the object's +Z up there
 OBJECT_NODE = "object"
 UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+# Numbers of the standard: a primitive's mode, what a view is for, the types of components; chunks and views are aligned
+TRIANGLES, VERTICES, FACES, ALIGNED = 4, 34962, 34963, 4
+COMPONENTS = {"|u1": 5121, "<u4": 5125, "<f4": 5126}
 
 
 def glb_bytes(
@@ -37,60 +44,101 @@ def glb_bytes(
     the model that was given has `_DEVIATION` as well, m, and its vertices' colours show it. Vertices are stored
     relative to the middle of the base, which the nodes' matrices add back: float32 would lose it far from the origin.
     """
-    import trimesh
-
-    scene = trimesh.Scene()
-    scene.graph.update(OBJECT_NODE, "world", matrix=UPRIGHT)
-    origin = base.bounds.mean(axis=0)
-    _add(scene, "base", base, origin, GLB_BASE_COLOUR, sigma, reach, deviation)
+    scene, origin = _Scene(), base.bounds.mean(axis=0)
+    scene.add("base", base, origin, GLB_BASE_COLOUR, sigma, reach, deviation)
+    scene.nodes[-1]["extras"] = {"schema": MODEL_SCHEMA, "units": "m"}
     for feature in features:
         mesh = feature_mesh(feature)
         # The central 90 % of a Gaussian is 2 * 1.645 standard deviations wide.
         spread = np.full(len(mesh.vertices), (feature.height.high - feature.height.low) / 3.29)
         touched = np.zeros(len(mesh.vertices))
-        _add(scene, feature.id, mesh, origin, kind_of(feature).colour, spread, touched)
-    extras: dict[str, Any] = {feature.id: feature_record(feature) for feature in features}
-    extras["base"] = {"schema": MODEL_SCHEMA, "units": "m"}
-
-    def annotate(tree: dict[str, Any]) -> None:
-        for node in tree["nodes"]:
-            if node["name"] in extras:
-                node["extras"] = extras[node["name"]]
-
-    return bytes(trimesh.exchange.gltf.export_glb(scene, tree_postprocessor=annotate))
+        scene.add(feature.id, mesh, origin, kind_of(feature).colour, spread, touched)
+        scene.nodes[-1]["extras"] = feature_record(feature)
+    return scene.glb()
 
 
-def _add(
-    scene: Any,
-    name: str,
-    surface: Surface,
-    origin: FloatArray,
-    colour: tuple[float, float, float, float],
-    sigma: FloatArray | None,
-    reach: FloatArray | None,
-    deviation: FloatArray | None = None,
-) -> None:
-    import trimesh
+class _Scene:
+    """A glTF tree and its buffer: written here, for importing trimesh takes longer than all else about a model."""
 
-    mesh = trimesh.Trimesh(surface.vertices - origin, surface.faces, process=False)
-    if deviation is None:
-        material = trimesh.visual.material.PBRMaterial(
-            name=name, baseColorFactor=colour, metallicFactor=0.0, roughnessFactor=0.7, doubleSided=True
-        )
-        mesh.visual = trimesh.visual.TextureVisuals(material=material)
-    else:
-        mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=deviation_colours(deviation))
-        mesh.vertex_attributes["_DEVIATION"] = deviation.astype(np.float32)
-    for key, values in (("_SIGMA", sigma), ("_REACH", reach)):
-        known = (
-            np.full(len(surface.vertices), UNKNOWN_ATTRIBUTE)
-            if values is None
-            else np.nan_to_num(values, nan=UNKNOWN_ATTRIBUTE)
-        )
-        mesh.vertex_attributes[key] = known.astype(np.float32)
-    transform = np.eye(4)
-    transform[:3, 3] = origin
-    scene.add_geometry(mesh, node_name=name, geom_name=name, parent_node_name=OBJECT_NODE, transform=transform)
+    def __init__(self) -> None:
+        self.nodes: list[dict[str, Any]] = []
+        self._meshes: list[dict[str, Any]] = []
+        self._materials: list[dict[str, Any]] = []
+        self._accessors: list[dict[str, Any]] = []
+        self._views: list[dict[str, int]] = []
+        self._buffer = bytearray()
+        self._known: dict[tuple[str, str, bytes], int] = {}
+
+    def add(
+        self,
+        name: str,
+        surface: Surface,
+        origin: FloatArray,
+        colour: tuple[float, float, float, float],
+        sigma: FloatArray | None,
+        reach: FloatArray | None,
+        deviation: FloatArray | None = None,
+    ) -> None:
+        """A node with a mesh of its own, moved by the origin that its vertices are relative to."""
+        attributes = {"POSITION": self._accessor((surface.vertices - origin).astype("<f4"))}
+        for key, values in (("_SIGMA", sigma), ("_REACH", reach)):
+            known = np.full(len(surface.vertices), np.nan) if values is None else values
+            attributes[key] = self._accessor(np.nan_to_num(known, nan=UNKNOWN_ATTRIBUTE).astype("<f4"))
+        primitive: dict[str, Any] = {"attributes": attributes, "mode": TRIANGLES}
+        primitive["indices"] = self._accessor(surface.faces.ravel().astype("<u4"), FACES)
+        if deviation is None:
+            surfaced = {"baseColorFactor": list(colour), "metallicFactor": 0.0, "roughnessFactor": 0.7}
+            primitive["material"] = len(self._materials)
+            self._materials.append({"name": name, "pbrMetallicRoughness": surfaced, "doubleSided": True})
+        else:
+            opaque = np.column_stack([deviation_colours(deviation), np.ones(len(deviation))])
+            attributes["COLOR_0"] = self._accessor(np.round(255.0 * opaque).astype("u1"))
+            attributes["_DEVIATION"] = self._accessor(deviation.astype("<f4"))
+        matrix = np.eye(4)
+        matrix[:3, 3] = origin
+        self.nodes.append({"name": name, "mesh": len(self._meshes), "matrix": matrix.T.ravel().tolist()})
+        self._meshes.append({"name": name, "primitives": [primitive]})
+
+    def _accessor(self, values: NDArray[Any], target: int = VERTICES) -> int:
+        """The number of an accessor of (N,) or (N, 3 or 4) values; one that is there already is taken again."""
+        content = values.tobytes()
+        key = values.dtype.str, str(values.shape[1:]), content
+        if key not in self._known:
+            self._known[key] = len(self._accessors)
+            record: dict[str, Any] = {"bufferView": len(self._views), "count": len(values)}
+            record |= {"componentType": COMPONENTS[values.dtype.str]}
+            record["type"] = "SCALAR" if values.ndim == 1 else f"VEC{values.shape[1]}"
+            if values.dtype == np.uint8:
+                record["normalized"] = True
+            if len(values):
+                record |= {"min": np.atleast_1d(values.min(axis=0)).tolist()}
+                record |= {"max": np.atleast_1d(values.max(axis=0)).tolist()}
+            self._accessors.append(record)
+            view = {"buffer": 0, "byteOffset": len(self._buffer), "byteLength": len(content), "target": target}
+            self._views.append(view)
+            self._buffer += content + bytes(-len(content) % ALIGNED)
+        return self._known[key]
+
+    def glb(self) -> bytes:
+        """The container: its head, the tree as JSON, the buffer."""
+        upright = {"name": OBJECT_NODE, "matrix": UPRIGHT.T.ravel().tolist()}
+        tree: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "explore3d"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [upright | {"children": list(range(1, len(self.nodes) + 1))}, *self.nodes],
+            "meshes": self._meshes,
+            "accessors": self._accessors,
+            "bufferViews": self._views,
+            "buffers": [{"byteLength": len(self._buffer)}],
+        }
+        if self._materials:  # an empty list is not allowed
+            tree["materials"] = self._materials
+        text = json.dumps(tree, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % ALIGNED)
+        length = 12 + 8 + len(text) + 8 + len(self._buffer)
+        head = struct.pack("<4sIII4s", b"glTF", 2, length, len(text), b"JSON")
+        return head + text + struct.pack("<I4s", len(self._buffer), b"BIN\0") + bytes(self._buffer)
 
 
 def deviation_colours(deviation: FloatArray) -> FloatArray:

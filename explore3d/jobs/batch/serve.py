@@ -14,15 +14,11 @@ import resource
 import select
 import signal
 import sys
-import tempfile
 import time
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from explore3d.jobs import analyze
 from explore3d.jobs.batch.one_log import Job, carried_out
+from explore3d.jobs.batch.rehearsal import rehearse
 
 # Ends of a copy that a fault of its own causes; any other signal was sent to it
 FAULT_SIGNALS = (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL)
@@ -37,26 +33,10 @@ def serve() -> None:
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)  # whatever a library prints is no answer
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the batch's affair
-    _rehearse()
+    rehearse(quick=True)  # what that loads and compiles, every copy has
     for line in sys.stdin:
         order = json.loads(line)
         answers.write(json.dumps(_answer(order)) + "\n")
-
-
-def _rehearse() -> None:
-    """Analyse a small profile with a crest and an empty raster: what they load and compile, every copy has."""
-    rng, radius = np.random.default_rng(0), 1e-3
-    x = np.linspace(-0.01, 0.01, 400)
-    crest, noise = np.maximum(0.0, 50e-6 - x**2 / (2.0 * radius)), 1e-6 * rng.standard_normal((5, len(x)))
-    profile = np.column_stack([x, radius + crest + noise[0]])
-    across = enumerate(np.linspace(-2e-3, 2e-3, len(noise)))
-    raster = np.concatenate([np.column_stack([x, np.full_like(x, y), radius + noise[k]]) for k, y in across])
-    with tempfile.TemporaryDirectory(prefix="explore3d-") as folder:
-        for name, table in (("profile", profile), ("raster", raster)):
-            header = "x [m],z [m]" if table.shape[1] == 2 else "x [m],y [m],z [m]"
-            path = Path(folder) / f"{name}.csv"
-            np.savetxt(path, table, delimiter=",", header=header, comments="")
-            analyze([path], tip_radius=radius, quick=True)
 
 
 def _answer(order: dict[str, Any]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +11,8 @@ from mapping import FloatArray, Surface, Trace
 from mapping.base.profiles.form import AUTO, Form, form_line
 from mapping.base.profiles.frame import ProfileFrame
 from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_rest
+from mapping.geometry.mesh import Spline, spline_design
 from mapping.instrument import robust_fit, robust_scale
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
 
 # A base bends over no less than this many tip radii: shorter details are features.
 SHORTEST_BEND = 8.0
@@ -63,11 +61,9 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
         knots = np.concatenate([[start] * degree, np.linspace(start, stop, pieces + 1), [stop] * degree])
         if form.masks and np.histogram(x, knots[degree : len(knots) - degree])[0].min() < CELLS_PER_PIECE:
             continue
-        fits.append((robust_fit(_design(x, knots, degree), z, scale), knots, degree, pieces))
+        fits.append((robust_fit(spline_design(x, knots, degree), z, scale), knots, degree, pieces))
     best, knots, degree, pieces = min(fits, key=lambda choice: choice[0].cost)
-    from scipy.interpolate import BSpline
-
-    curve, places = BSpline(knots, best.coefficients, degree), np.linspace(start, stop, 64 * pieces + 1)
+    curve, places = Spline(knots, best.coefficients, degree), np.linspace(start, stop, 64 * pieces + 1)
     ribbon = _ribbon(trace.tip_radius, frame, places, curve(places), curve.derivative()(places))
     fitted: dict[str, Any] = {"degree": float(degree), "pieces": float(pieces), "piece_length": (stop - start) / pieces}
     bends = isolated_bends(x, z, curve(x), scale) if pieces > 1 else []
@@ -75,7 +71,7 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
     return ribbon, fitted | _listed("absorbed", bends, frame, curve) | _listed("left standing", rest, frame, curve)
 
 
-def _listed(name: str, bends: list[Bend], frame: ProfileFrame, curve: BSpline) -> dict[str, Any]:
+def _listed(name: str, bends: list[Bend], frame: ProfileFrame, curve: Spline) -> dict[str, Any]:
     """Height, width and place [x, y, z] of each on the line of centres, m; nothing where there is none."""
     listed = [
         {"height": bend.height, "width": bend.width}
@@ -90,12 +86,6 @@ def _roughness(z: FloatArray) -> float:
     if len(z) < 4:
         return 0.0
     return float(robust_scale(np.diff(z, 2)) / np.sqrt(6.0))
-
-
-def _design(x: FloatArray, knots: FloatArray, degree: int) -> FloatArray:
-    from scipy.interpolate import BSpline
-
-    return np.asarray(BSpline.design_matrix(x, knots, degree).toarray())
 
 
 def _cell_medians(x: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:

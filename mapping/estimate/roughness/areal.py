@@ -56,7 +56,7 @@ def areal_parameters(
         "Sa": with_interval(sums, mean_size),
         "Sq": with_interval(sums, root_mean_square),
         "Sz": Interval(span, nan, nan),
-        "Ssk": with_interval(sums, skewness),
+        "Ssk": with_interval(sums, skewness, signed=True),
         "Sku": with_interval(sums, kurtosis),
     }
     return values, len(squares)

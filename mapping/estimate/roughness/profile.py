@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -57,7 +58,8 @@ def profile_parameters(
     Returns:
         PROFILE_NAMES with their values (m; Rsk and Rku are numbers), empty if not one section fits; and the sections.
     """
-    rough, wavy, spans = [], [], []
+    rough, wavy = [], []
+    runs: list[tuple[FloatArray, int, float]] = []  # heights of adjoining sections, how many they are, spacing
     for stretch in stretches:
         primary = np.where(stretch.keep, stretch.heights, np.nan)
         if short_cutoff is not None:
@@ -65,12 +67,16 @@ def profile_parameters(
         mean = gaussian_mean(primary, stretch.spacing, cutoff)
         above = primary - mean
         size, end = round(cutoff / stretch.spacing), round(0.5 * cutoff / stretch.spacing)
-        for first in range(end, len(primary) - end - size + 1, size):
-            part = slice(first, first + size)
-            if np.isfinite(above[part]).mean() >= LEAST_SECTION_SHARE:
+        begun = None
+        for first in [*range(end, len(primary) - end - size + 1, size), None]:
+            part = slice(0, 0) if first is None else slice(first, first + size)
+            if first is not None and np.isfinite(above[part]).mean() >= LEAST_SECTION_SHARE:
                 rough.append(above[part])
                 wavy.append(np.where(np.isfinite(primary[part]), mean[part], np.nan))
-                spans.append(stretch.spacing)
+                begun, stop = (first if begun is None else begun), first + size
+            elif begun is not None:
+                runs.append((above[begun:stop], (stop - begun) // size, stretch.spacing))
+                begun = None
     if not rough:
         return {}, 0
     sums = np.array([moments(part[np.isfinite(part)]) for part in rough])
@@ -78,12 +84,12 @@ def profile_parameters(
     waves = np.array([moments(part[np.isfinite(part)] - level) for part in wavy])
     tall = np.array([[1.0, np.nanmax(part) - np.nanmin(part)] for part in rough])
     limit = HEIGHT_DISCRIMINATION * tall[:, 1].mean()
-    elements = np.array([_elements(part, span, limit) for part, span in zip(rough, spans, strict=True)])
+    elements = np.concatenate([_elements(*run, limit) for run in runs])
     values = {
         "Ra": with_interval(sums, mean_size),
         "Rq": with_interval(sums, root_mean_square),
         "Rz": with_interval(tall, lambda total: total[..., 1] / total[..., 0]),
-        "Rsk": with_interval(sums, skewness),
+        "Rsk": with_interval(sums, skewness, signed=True),
         "Rku": with_interval(sums, kurtosis),
         "Rsm": with_interval(elements, _mean_spacing),
         "Wa": with_interval(waves, mean_size),
@@ -95,13 +101,18 @@ def _mean_spacing(total: FloatArray) -> FloatArray:
     return np.asarray(np.where(total[..., 0] > 0.0, total[..., 1] / np.maximum(total[..., 0], 1.0), np.nan))
 
 
-def _elements(heights: FloatArray, spacing: float, limit: float) -> FloatArray:
-    """(2,) number and summed length (m) of whole profile elements in a section: a peak and the valley beside it.
+def _elements(heights: FloatArray, sections: int, spacing: float, limit: float) -> FloatArray:
+    """(S, 2) number and summed length (m) of the profile elements, a peak and the valley beside it, in each section.
+
+    They are sought in all adjoining sections together: of those that one section holds whole, long ones are rare, and a
+    stylus trace with two elements a section came out with a seventh of its spacing. Each counts where its middle lies;
+    one that a feature interrupts does not.
 
     Elements begin where the profile crosses the mean line, upwards and, counted apart, downwards; what stays within
     `limit` of the mean line ends none.
     """
-    number, length = 0.0, 0.0
+    table, size = np.zeros((sections, 2)), len(heights) // sections
+    missing = np.concatenate([[0], np.cumsum(~np.isfinite(heights))])
     for sign in (1.0, -1.0):
         z = sign * heights
         side = np.where(z > limit, 1, np.where(z < -limit, -1, 0))
@@ -113,7 +124,8 @@ def _elements(heights: FloatArray, spacing: float, limit: float) -> FloatArray:
             while z[below] > 0.0:  # the last crossing before the peak
                 below -= 1
             if np.isfinite(z[below : below + 2]).all():
-                places.append((below + z[below] / (z[below] - z[below + 1])) * spacing)
-        if len(places) > 1:
-            number, length = number + len(places) - 1, length + places[-1] - places[0]
-    return np.array([number, length])
+                places.append(below + z[below] / (z[below] - z[below + 1]))
+        for begin, end in pairwise(places):
+            if missing[int(begin)] == missing[int(end) + 1]:
+                table[min(int(0.5 * (begin + end)) // size, sections - 1)] += 1.0, (end - begin) * spacing
+    return table

@@ -16,15 +16,18 @@ DRAWS = 2000
 _MOST_DRAWN = 1_000_000
 
 
-def with_interval(table: FloatArray, value: Callable[[FloatArray], FloatArray]) -> Interval:
+def with_interval(table: FloatArray, value: Callable[[FloatArray], FloatArray], *, signed: bool = False) -> Interval:
     """A parameter and its 90 % interval, by the bootstrap over sections.
 
     The spread of the draws is widened to that of Student's t with as many sections as there are: of five, a bootstrap
-    alone covers 80 %. One section knows no interval: its ends are NaN.
+    alone covers 80 %. It is the spread of the logarithm where the parameter cannot be negative: of a scale all errors
+    are ratios, and where one section of many holds most of the height an interval about the value began below zero.
+    One section knows no interval: its ends are NaN.
 
     Args:
         table: (S, K) sums over each section that the parameter is a function of.
         value: of the sums (..., K) of all sections, the parameter (...).
+        signed: True of a parameter that may be negative.
     """
     from scipy.stats import t
 
@@ -34,7 +37,9 @@ def with_interval(table: FloatArray, value: Callable[[FloatArray], FloatArray]) 
         return Interval(middle, float("nan"), float("nan"))
     low, high = np.nanquantile(value(_drawn(table)), [0.05, 0.95])
     wider = float(np.sqrt(count / (count - 1.0)) * t.ppf(0.95, count - 1) / 1.6448536)
-    return Interval(middle, middle - wider * (middle - float(low)), middle + wider * (float(high) - middle))
+    if signed or middle <= 0.0:
+        return Interval(middle, middle - wider * (middle - float(low)), middle + wider * (float(high) - middle))
+    return Interval(middle, middle * (float(low) / middle) ** wider, middle * (float(high) / middle) ** wider)
 
 
 def _drawn(table: FloatArray) -> FloatArray:

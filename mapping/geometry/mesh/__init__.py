@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         nearest_on as nearest_on,
         resample as resample,
     )
+    from mapping.geometry.mesh.spline import Spline as Spline, spline_design as spline_design
     from mapping.geometry.mesh.threads import (
         algebra_in_one_thread as algebra_in_one_thread,
         by_shares as by_shares,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
+    "spline": ("Spline", "spline_design"),
     "atomic_write": ("write_whole",),
     "bvh_kernels": ("STACK", "WIDTH", "push_lanes"),
     "nearest": ("MovedNearestPoint", "NearestPoint"),

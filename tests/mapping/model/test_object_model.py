@@ -1,6 +1,7 @@
 """The annotated model keeps every value on its way to disk and back, and refuses what it cannot keep."""
 
 import json
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -167,6 +168,27 @@ def test_the_glb_names_each_feature_and_keeps_its_place(tmp_path: Path, far: flo
     assert tube.is_watertight and tube.volume > 0
     record = scene.graph.transforms.edge_data[("object", "ridge-1")]["metadata"]
     assert record["height"] == model().document()["features"][0]["height"]
+
+
+def test_the_glb_is_laid_out_as_the_standard_says(tmp_path: Path) -> None:
+    deviation = np.array([0.0, 1e-4, -2e-4, 5e-5])
+    replace(model(), deviation=deviation).save(tmp_path)
+    content = (tmp_path / "model.glb").read_bytes()
+    magic, version, length, size, kind = struct.unpack("<4sII I4s", content[:20])
+    assert (magic, version, length, kind) == (b"glTF", 2, len(content), b"JSON") and size % 4 == 0
+    tree, rest = json.loads(content[20 : 20 + size]), content[20 + size :]
+    assert struct.unpack("<I4s", rest[:8]) == (tree["buffers"][0]["byteLength"], b"BIN\0")
+    kinds = {5121: np.uint8, 5125: np.uint32, 5126: np.float32}
+    for accessor in tree["accessors"]:
+        view = tree["bufferViews"][accessor["bufferView"]]
+        assert view["byteOffset"] % 4 == 0
+        values = np.frombuffer(rest[8:][view["byteOffset"] :][: view["byteLength"]], kinds[accessor["componentType"]])
+        rows = values.reshape(accessor["count"], -1)
+        assert rows.shape[1] == {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+        assert (accessor["min"], accessor["max"]) == (rows.min(axis=0).tolist(), rows.max(axis=0).tolist())
+    attributes = tree["meshes"][0]["primitives"][0]["attributes"]
+    colours = tree["accessors"][attributes["COLOR_0"]]
+    assert "_DEVIATION" in attributes and (colours["type"], colours["normalized"]) == ("VEC4", True)
 
 
 def test_features_without_names_are_not_saved(tmp_path: Path) -> None:

@@ -34,10 +34,9 @@ SAID = Told(TIP, quick=True)
 
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """Workers of our own find this program and the reader of mischief; Dask is left out."""
+    """Workers find this program and the reader of mischief."""
     path = os.pathsep.join([str(ROOT), str(installed(tmp_path / "package"))])
     monkeypatch.setenv("PYTHONPATH", path)
-    monkeypatch.setattr(sys.modules["explore3d.jobs.batch.batch"], "is_installed", lambda: False)
     return tmp_path
 
 
@@ -163,6 +162,27 @@ def test_a_worker_that_is_lost_is_begun_again(here: Path) -> None:
         assert worker._process is not None
         os.kill(worker._process.pid, signal.SIGKILL)
         assert worker.carry_out(Job.of(task), Limits())["run"]["status"] == "done"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")
+def test_neither_a_worker_nor_its_copies_grow_with_the_logs(here: Path) -> None:
+    paths = [write_profile(here / f"{number:03d}.csv", 300 + number) for number in range(60)]
+    with Worker() as worker:
+        copies, kept = [], []
+        for task in tasks_of([str(path) for path in paths], SAID):
+            copies.append(worker.carry_out(Job.of(task), Limits())["run"]["memory"])
+            assert worker._process is not None
+            kept.append(resident(worker._process.pid))
+        again = worker.carry_out(Job.of(task), Limits())["run"]["memory"]
+    assert max(kept[40:]) < 1.01 * max(kept[:20])
+    assert abs(again / copies[-1] - 1.0) < 0.02 and sum(copies[40:]) < 1.02 * sum(copies[:20])
+
+
+def resident(pid: int) -> int:
+    """Bytes that a process has in memory."""
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
 
 
 # A campaign of 200 logs, 20 of them bad in ten ways

@@ -84,6 +84,36 @@ def test_intervals_cover_as_often_as_they_say() -> None:
     assert 0.82 < covered < 0.96, covered
 
 
+def test_spacing_is_that_of_the_whole_profile_where_few_elements_fit_a_section() -> None:
+    """Waves of 0.2 and 0.6 cut-offs in turn: their mean is 0.4, but of a section's whole elements most are short."""
+    lengths = np.tile([0.2, 0.6], 20) * CUTOFF
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    x = STEP * np.arange(int(ends[-1] / STEP))
+    wave = np.searchsorted(ends, x, side="right") - 1
+    heights = 1e-6 * lengths[wave] / CUTOFF * np.sin(2.0 * np.pi * (x - ends[wave]) / lengths[wave])
+    values, sections = profile_parameters([stretch(heights)], CUTOFF)
+    assert sections == 15 and values["Rsm"].median == pytest.approx(0.4 * CUTOFF, rel=0.02)
+
+
+def test_an_element_that_a_feature_interrupts_does_not_count() -> None:
+    wavelength = CUTOFF / 5.0
+    heights = 1e-6 * np.sin(2.0 * np.pi * STEP * np.arange(11 * 500) / wavelength)
+    keep = np.ones(len(heights), dtype=bool)
+    keep[2000:2170] = False
+    assert profile_parameters([stretch(heights, keep)], CUTOFF)[0]["Rsm"].median == pytest.approx(wavelength, rel=0.01)
+
+
+def test_no_size_may_be_negative_where_one_section_holds_most_of_the_height() -> None:
+    """A groove, wide but no feature, in one of eight sections of fine noise."""
+    heights = 1e-8 * np.random.default_rng(4).standard_normal(9 * 500)
+    heights[2100:2300] -= 2e-6
+    values, sections = profile_parameters([stretch(heights)], CUTOFF)
+    assert sections == 8
+    for name in ("Ra", "Rq", "Rz", "Rku", "Wa"):
+        assert 0.0 < values[name].low < values[name].median < values[name].high, name
+    assert values["Ra"].low < 0.1 * values["Ra"].median  # most sections have less than that
+
+
 def test_a_raster_has_the_parameters_of_its_profiles() -> None:
     rng = np.random.default_rng(2)
     heights = 1e-7 * rng.standard_normal((120, 400))
