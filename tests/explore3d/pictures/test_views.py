@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from explore3d.pictures.camera import Camera
-from explore3d.pictures.object import MOST_VIEWS, object_picture, view_directions
+from explore3d.pictures.object import MOST_VIEWS, VIEW_HEIGHTS, object_picture, view_directions
 from explore3d.pictures.render import Body, render
 from explore3d.pictures.sweep_paths import SweepPath
 from explore3d.scene import examples, load_scene
@@ -50,3 +50,13 @@ def test_a_measured_surface_is_outlined_against_the_background_alone() -> None:
         render([Body(both, np.full(3, 0.9))], camera, rims=rims).pixels[40:-40, 40:-40].min() for rims in (True, False)
     ]
     assert dark[0] < 0.7 * dark[1]
+
+
+def test_what_is_turned_down_is_lit_where_it_is_seen_from_below() -> None:
+    plate = Surface([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]], [[0, 1, 2], [0, 2, 3]])
+    brightness = []
+    for height in (VIEW_HEIGHTS[0], -VIEW_HEIGHTS[0]):
+        camera = Camera.facing(plate.vertices, np.array([0.8, 0.6, height]), 200, 200)
+        seen = render([Body(plate, np.full(3, 0.9))], camera, rims=False).pixels
+        brightness.append(float(np.median(seen[seen[:, :, 0] < 1.0])))
+    assert brightness[1] == pytest.approx(brightness[0], abs=0.01) and brightness[0] > 0.75
