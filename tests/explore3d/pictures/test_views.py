@@ -60,3 +60,13 @@ def test_what_is_turned_down_is_lit_where_it_is_seen_from_below() -> None:
         seen = render([Body(plate, np.full(3, 0.9))], camera, rims=False).pixels
         brightness.append(float(np.median(seen[seen[:, :, 0] < 1.0])))
     assert brightness[1] == pytest.approx(brightness[0], abs=0.01) and brightness[0] > 0.75
+
+
+def test_a_level_plate_is_seen_from_one_side_however_a_step_leans_it() -> None:
+    plate = Surface([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]], [[0, 1, 2], [0, 2, 3]])
+    ways = [
+        view_directions(np.array([[np.sin(lean) * np.cos(turn), np.sin(lean) * np.sin(turn), np.cos(lean)]]), (), plate)
+        for lean in (0.0, 0.017)
+        for turn in (0.0, 2.0, 4.0)
+    ]
+    np.testing.assert_allclose(np.array(ways), np.broadcast_to(ways[0], np.shape(ways)), atol=1e-12)
