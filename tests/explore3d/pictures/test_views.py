@@ -42,6 +42,15 @@ def test_every_feature_of_a_closed_body_is_labelled_in_one_of_its_views(name: st
     assert 2 <= len(view_directions(ROUND_BODY, model.features, model.base.surface)) <= MOST_VIEWS
 
 
+def test_a_line_that_one_view_can_show_does_not_end_at_a_bodys_rim() -> None:
+    model = model_of("mug")
+    directions = np.array(view_directions(ROUND_BODY, model.features, model.base.surface))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    (ridge,) = (each for each in model.features if each.kind == "ridge")  # 80 mm round a mug of 40 mm radius
+    facing = directions @ ridge.normals.T
+    assert len(directions) == 2 and facing.min(axis=1).max() > 0.2
+
+
 def test_a_measured_surface_is_outlined_against_the_background_alone() -> None:
     low, high = (np.array([[-1.0, -1, z], [1, -1, z], [1, 1, z], [-1, 1, z]]) for z in (0.0, 0.5))
     both = Surface(np.vstack([low, 0.4 * high * [1, 1, 2.5]]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
