@@ -58,8 +58,9 @@ def _rounded(value: float, digits: int) -> str:
 class Interval:
     """A value with its central 90 % interval: 5 %, 50 % and 95 % quantiles (SI units).
 
-    `censored` is True where the data only bound the value from below ("at least low"); with `bounded`, too, from above
-    as well ("between low and high"): any value within is as good, and the median is none of its own.
+    `censored` is True where the data only bound the value's size from below: "at least low", of a depth, which is
+    negative, "high or deeper". With `bounded`, too, it is bounded from above as well ("between low and high"): any
+    value within is as good, and the median is none of its own.
 
     As a number it is its median: `interval > 1e-3` compares that, and so does sorting; `interval.low > 1e-3` asks for
     95 % certainty. As text it reads "0.65 mm (0.64 to 0.66)"; `f"{interval:um}"` chooses the unit.
@@ -83,7 +84,8 @@ class Interval:
         return cls(float(mean), float(mean - 1.6448536 * sd), float(mean + 1.6448536 * sd))
 
     def text(self, unit: str = "") -> tuple[str, str]:
-        """The median with its unit, and the 90 % range ("0.64 to 0.66", or ""); censored ones read "at least".
+        """The median with its unit, and the 90 % range ("0.64 to 0.66", or ""); a bound has none: "at least 0.64 mm",
+        and of a depth, which is negative, "-0.64 mm or deeper".
 
         Args:
             unit: of length; "": the one that fits.
@@ -96,8 +98,10 @@ class Interval:
         factor, name = _unit(unit) if unit else length_unit(self.high if self.bounded else self.median)
         if self.bounded:
             high = f"{_rounded(self.high / factor, 2)} {name}"
-            nothing = self.low < NEXT_TO_NOTHING * self.high
+            nothing = abs(self.low) < NEXT_TO_NOTHING * self.high
             return (f"at most {high}" if nothing else f"between {_rounded(self.low / factor, 2)} and {high}"), ""
+        if self.censored and self.median < 0.0:
+            return f"{_rounded(self.high / factor, 3)} {name} or deeper", ""
         if self.censored:
             return f"at least {_rounded(self.low / factor, 3)} {name}", ""
         spread = self.high - self.low

@@ -156,10 +156,10 @@ def _end_error(found: Feature, true: TrueFeature) -> float:
 
 
 def _against(interval: Interval, true: float | None) -> tuple[float, bool | None]:
-    """Error of the median, and whether the truth lies in the interval (for lower bounds: above its low end)."""
+    """Error of the median, and whether the truth lies in the interval (a bound: on its side of it)."""
     if true is None or not np.isfinite(interval.median):
         return nan, None
-    above = true >= interval.low
-    return interval.median - true, bool(
-        above if interval.censored and not interval.bounded else above and true <= interval.high
-    )
+    above, below = true >= interval.low, true <= interval.high
+    if interval.censored and not interval.bounded:
+        return interval.median - true, bool(below if interval.median < 0.0 else above)
+    return interval.median - true, bool(above and below)

@@ -10,11 +10,15 @@ from typing import Annotated
 import typer
 
 from explore3d import UserError
+from explore3d.cli.doctor import compile_kernels, must_compile
 from explore3d.cli.options import Json
 from explore3d.cli.run import run
 from explore3d.scene import copy_example, example as find, examples as all_examples, programs
 
 DEMO = "wire_on_plate"
+COMPILING = (
+    "compiling, once: an example is explored for it (a minute or two; after Ctrl-C the first runs do it instead)"
+)
 
 
 def init(
@@ -35,7 +39,8 @@ def init(
 ) -> None:
     """Write a scene to begin from: an example with its meshes, or one for your own mesh, tip and finger.
 
-    On a terminal, what is missing is asked for.
+    On a terminal, what is missing is asked for. The first time after an installation all is compiled, too, for a minute
+    or two, so that the first run is as quick as the second.
 
     Example: explore3d init wire --example wire_on_plate
     """
@@ -61,6 +66,10 @@ def init(
         scene = begin_scene(folder, mesh, units, tip_radius, finger, port)
     plan = shlex.join(["explore3d", "plan", str(scene)])
     explore = shlex.join(["explore3d", "run", str(scene), "--out", str(scene.parent / "out")])
+    if must_compile():
+        if not json:
+            print(f"written: {scene}\n{COMPILING}", file=sys.stderr, flush=True)
+        compile_kernels(quiet=json)
     if json:
         print(dumps({"scene": str(scene), "plan": plan, "run": explore}))
         return

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from explore3d import UserError
+from explore3d.cli.options import Json
 
 if TYPE_CHECKING:
     from explore3d.bench.precision import Measured
@@ -28,21 +29,30 @@ def all_stages(
     peers: Annotated[
         bool, typer.Option("--peers", help="Measure other programs too, where they are installed.")
     ] = False,
+    json: Json = False,
 ) -> None:
     """Measure error against run time: all stages, or one of them by a command of its own.
 
     Example: explore3d bench --quick --out out/bench
     """
     if context.invoked_subcommand is not None:
+        if json:
+            raise UserError(f"--json: is of all stages together; bench {context.invoked_subcommand} has its own output")
         return
-    from explore3d.bench.precision import bench as run, summary, write
+    from json import dumps
+
+    from explore3d.bench.precision import as_record, bench as run, summary, write
 
     def told(each: Measured) -> None:
-        print(f"{each.stage.name:20}{len(each.points):4} points{each.seconds:8.1f} s", flush=True)
+        if not json:
+            print(f"{each.stage.name:20}{len(each.points):4} points{each.seconds:8.1f} s", flush=True)
 
     measured = run(quick, peers, told)
-    print(f"page: {write(measured, out, quick)}")
-    print(summary(measured))
+    page = write(measured, out, quick)
+    if json:
+        print(dumps(as_record(measured, quick) | {"page": str(page), "summary": summary(measured)}))
+    else:
+        print(f"page: {page}\n{summary(measured)}")
 
 
 @bench.command()
@@ -362,6 +372,7 @@ def trust(
         _print(str(path) for path in write_trust(records, of, out))
 
 
+@bench.command()
 def sections(
     store: Store,
     bodies: Annotated[str | None, typer.Option(help="Sections, separated by commas; all if left out.")] = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
@@ -10,6 +11,7 @@ import typer
 
 from explore3d import UnitError, UserError, parse_rate, parse_speed
 from explore3d.cli.options import Json, TipRadius, length, point
+from explore3d.report.watch import asked, over, when_input_ends
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL", help="Folder or model.json of an annotated model.")]
 Exaggeration = Annotated[
@@ -141,6 +143,9 @@ def watch(
 
     Example: explore3d watch out/wire
     """
+    if attached:
+        _watch_beside(place, port)
+        return
     from json import dumps
 
     from explore3d.report.watch import Watch, watch as serve
@@ -148,10 +153,23 @@ def watch(
     def tell(view: Watch) -> None:
         names = [] if view.model is None else [each.id for each in view.model]
         record = {"url": view.url, "samples": view.stage.count, "features": names}
-        end = "" if attached else " (Ctrl-C ends it)"
-        print(dumps(record) if json else f"watch: {view.url}{end}", flush=True)
+        print(dumps(record) if json else f"watch: {view.url} (Ctrl-C ends it)", flush=True)
 
-    serve(place, live=live, port=port, host=host, attached=attached, told=tell)
+    serve(place, live=live, port=port, host=host, told=tell)
+
+
+def _watch_beside(place: Path, port: int) -> None:
+    """The view that a run began: the viewer is loaded once a browser asks."""
+
+    def tell(url: str) -> None:
+        print(f"watch: {url}", flush=True)
+
+    begun, ended = time.time_ns(), when_input_ends()
+    found = asked(port, tell, over(ended))
+    if found is not None:
+        from explore3d.report.watch import watch_beside
+
+        watch_beside(place, found, begun, ended, tell)
 
 
 def _speed(text: str) -> float:

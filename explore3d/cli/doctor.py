@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
 import sys
@@ -108,9 +109,13 @@ def _open3d() -> Check:
     return Check("open3d", "ok", str(open3d().__version__), needed_for)
 
 
-def _cache() -> Check:
+def _kernel_folder() -> str:
     """Compiled kernels are kept beside the sources, or where NUMBA_CACHE_DIR says."""
-    folder = os.environ.get("NUMBA_CACHE_DIR") or os.path.dirname(mapping.__file__ or "")
+    return os.environ.get("NUMBA_CACHE_DIR") or os.path.dirname(mapping.__file__ or "")
+
+
+def _cache() -> Check:
+    folder = _kernel_folder()
     needed_for = "keeping compiled kernels, else each start compiles them anew"
     if os.access(folder, os.W_OK):
         return Check("kernel cache", "ok", folder, needed_for)
@@ -156,6 +161,36 @@ def compile_kernels(quiet: bool) -> None:
         run(example(COMPILES).scene, Path(folder) / "out", progress=progress)
     load_sample_kernels()
     rehearse(quick=False)
+    with contextlib.suppress(OSError):  # where it cannot be written nothing was kept, either
+        stamp = _compiled_stamp()
+        stamp.parent.mkdir(exist_ok=True)
+        stamp.write_text(_compiled_for())
+
+
+def must_compile() -> bool:
+    """True if kernels of this installation can be kept, and were not compiled yet.
+
+    Those of a checkout are its `make setup`'s business, and of whoever changes them.
+    """
+    if (Path(mapping.__file__ or "").parents[1] / "pyproject.toml").is_file() or not os.access(
+        _kernel_folder(), os.W_OK
+    ):
+        return False
+    try:
+        return _compiled_stamp().read_text() != _compiled_for()
+    except OSError:
+        return True
+
+
+def _compiled_stamp() -> Path:
+    return Path(_kernel_folder()) / "__pycache__" / "explore3d-compiled"
+
+
+def _compiled_for() -> str:
+    """What makes numba compile anew: another installation, Python, or numba."""
+    from importlib.metadata import version
+
+    return f"{sys.version} {version('numba')} {os.stat(mapping.__file__ or '').st_mtime_ns}"
 
 
 def controller(port: str, baudrate: int) -> list[Check]:

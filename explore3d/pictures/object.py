@@ -39,6 +39,9 @@ BESIDE_EACH_OTHER, LOWERED = 0.2, 0.3
 SEEN_PLACES = 7  # along a line
 # A line of sight is so wide, in sizes of the body; flatter than this cosine nobody makes out a detail
 SIGHT_SHARE, LEAST_FACING = 1e-3, 0.25
+# A body that leans less than this, 3 degrees, is looked at as a level one: a step of 1 mm leans the estimated surface
+# of a plate of 60 mm by 0.017 in the mean, and its maps would be seen from another side than the body
+LEANING = 0.05
 # A body whose outward directions cancel more than this is round: it needs two views.
 ROUND = 0.45
 
@@ -88,8 +91,10 @@ def view_directions(normals: FloatArray, features: Sequence[Feature], base: Surf
     mean = normals.mean(axis=0) if len(normals) else np.array([0.0, 0.0, 1.0])
     if np.linalg.norm(mean) > ROUND:
         mean = mean / np.linalg.norm(mean)
+        if np.hypot(*mean[:2]) < LEANING:
+            mean = np.array([0.0, 0.0, np.sign(mean[2])])
         across = np.cross(np.array([0.0, 0.0, 1.0]), mean)
-        across = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-3 else np.array([1.0, 0.0, 0.0])
+        across = across / np.linalg.norm(across) if across.any() else np.array([1.0, 0.0, 0.0])
         down = np.cross(mean, across)
         return [np.asarray(mean - 0.75 * down * np.sign(down[2] or 1.0) + 0.35 * across)]
     if not features:
@@ -97,12 +102,14 @@ def view_directions(normals: FloatArray, features: Sequence[Feature], base: Surf
         return [first, first * [-1.0, -1.0, 1.0]]
     azimuths = np.linspace(0.0, 2.0 * np.pi, AZIMUTHS, endpoint=False)
     wishes = np.array([[np.cos(angle), np.sin(angle), height] for height in VIEW_HEIGHTS for angle in azimuths])
-    facing = _facing(wishes, features, base)
-    # of two views: those that show most of the features, then as squarely as may be, from opposite sides, from above
+    facing, whole = _facing(wishes, features, base)
+    # of two views: those that show most of the features, and most of each in one of them, then as squarely as may be,
+    # from opposite sides, from above
     both = np.maximum(facing[:, None], facing[None])
+    shown = np.maximum(whole[:, None], whole[None]).sum(axis=2)
     beside = wishes[:, :2] @ wishes[:, :2].T
     lower = LOWERED * (wishes[:, 2] != VIEW_HEIGHTS[0])
-    merit = len(features) * (both > 0.0).sum(axis=2) + both.sum(axis=2) - BESIDE_EACH_OTHER * beside
+    merit = len(features) * ((both > 0.0).sum(axis=2) + shown) + both.sum(axis=2) - BESIDE_EACH_OTHER * beside
     chosen = list(np.unravel_index((merit - lower[:, None] - lower[None]).argmax(), merit.shape))
     while (
         len(chosen) < MOST_VIEWS and (unseen := (facing[chosen] == 0.0).all(axis=0) & (facing > 0.0).any(axis=0)).any()
@@ -111,10 +118,11 @@ def view_directions(normals: FloatArray, features: Sequence[Feature], base: Surf
     return list(wishes[chosen])
 
 
-def _facing(directions: FloatArray, features: Sequence[Feature], base: Surface) -> FloatArray:
-    """(D, F) how squarely features are seen from far away in directions (D, 3): cosines, 0 where they are out of sight.
+def _facing(directions: FloatArray, features: Sequence[Feature], base: Surface) -> tuple[FloatArray, FloatArray]:
+    """(D, F) how squarely features are seen from far away in directions (D, 3), and what share of each is in sight.
 
-    Of a line the mean over places along it; it is out of sight where its middle is, which bears its label.
+    Cosines, 0 where a feature is out of sight: of a line the mean over places along it; it is out of sight where its
+    middle is, which bears its label.
     """
     away = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     places = np.concatenate([resample(feature.axis, SEEN_PLACES) for feature in features])
@@ -130,7 +138,8 @@ def _facing(directions: FloatArray, features: Sequence[Feature], base: Surface) 
     cosines = away @ normals.T
     free = ((ways.count == 0) & ~ways.overlap).reshape(cosines.shape) & (cosines > LEAST_FACING)
     seen = np.where(free, cosines, 0.0).reshape(len(away), len(features), SEEN_PLACES)
-    return np.where(seen[:, :, SEEN_PLACES // 2] > 0.0, seen.mean(axis=2), 0.0)
+    in_sight = seen[:, :, SEEN_PLACES // 2] > 0.0
+    return np.where(in_sight, seen.mean(axis=2), 0.0), np.where(in_sight, (seen > 0.0).mean(axis=2), 0.0)
 
 
 def _close_up(base: Surface, feet: FloatArray) -> FloatArray:

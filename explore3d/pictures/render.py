@@ -14,6 +14,9 @@ from mapping import FloatArray, Surface
 # Creases sharper than this keep their edge; flatter ones are shaded round.
 CREASE_COSINE = np.cos(np.radians(35.0))
 AMBIENT = 0.55
+# The light stands to the left of the camera and above it, seen from below beneath it: a face turned down would lie in
+# the shadow, and what is drawn on it with it. So far aside, for a distance of one; in full where a camera rises by 0.4
+BESIDE_CAMERA, ABOVE_CAMERA, RISEN = 0.45, 0.65, 0.4
 BRIGHTEST = 1.06
 OUTLINE = 0.55
 # The depth bends at a silhouette by more than so many footprints of a pixel
@@ -80,7 +83,7 @@ def render(bodies: Sequence[Body], camera: Camera, rims: bool = True) -> Picture
     depth, seen = np.full(shape, np.inf, dtype=np.float32), np.full(shape, -1, dtype=np.int32)
     weights, pixels = np.empty((*shape, 2), dtype=np.float32), np.ones((*shape, 3), dtype=np.float32)
     see(corners, faces, camera.pixel, depth, seen, weights)
-    light = -forward - 0.45 * right + 0.65 * up
+    light = -forward - BESIDE_CAMERA * right + ABOVE_CAMERA * np.clip(-forward[2] / RISEN, -1.0, 1.0) * up
     light = light / np.linalg.norm(light)
     first = forward + camera.pixel * (0.5 * (camera.height - 1) * up - 0.5 * (camera.width - 1) * right)
     rays = np.stack([camera.pixel * right, -camera.pixel * up, first])

@@ -178,7 +178,9 @@ function show(root, data) {
     gl.useProgram(solid());
     gl.uniformMatrix4fv(solid("m"), false, m());
     gl.uniform3fv(solid("back"), back);
-    gl.uniform3fv(solid("light"), unit(back.map((each, i) => each - 0.45 * right[i] + 0.65 * up[i])));
+    // from above, seen from below from below: else what is turned down lies in the shadow (as in pictures/render.py)
+    const above = 0.65 * Math.min(Math.max(back[2] / 0.4, -1), 1);
+    gl.uniform3fv(solid("light"), unit(back.map((each, i) => each - 0.45 * right[i] + above * up[i])));
     gl.uniform1f(solid("flat_"), picking ? 1 : 0);
     for (const part of meshes.filter((each) => !hidden.has(each.layer))) {
       const number = 1 + features.indexOf(part);

@@ -9,7 +9,9 @@ import numpy as np
 from mapping import FloatArray, Surface
 from mapping.geometry.contact import BallContact
 
-# Ways are looked at from so many tip radii before their beginning: a tip in a dent, or in contact, overlaps the model
+# The way of a tip that overlaps the model where it begins, in a dent or in contact, is looked at from so many tip radii
+# before. One that is free there is not: what it has passed, a wire that it leaves sideways, does not lie in its way. A
+# tip that is less than two radii beyond a surface overlaps it
 BACK = 2.0
 
 
@@ -37,6 +39,8 @@ class ExpectedSurface:
 
         inf where no body is expected, or where the tip would be inside of it all the way.
         """
+        ahead = self._ball.first_contact(points, directions)
         back = BACK * self.tip_radius
         found = self._ball.first_contact(points - back * directions, directions)
-        return np.where(found.overlap, np.inf, found.distance - back + self.beyond)
+        behind = np.where(found.overlap, np.inf, found.distance - back)
+        return np.where(ahead.overlap, behind, ahead.distance) + self.beyond

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from explore3d.bench.precision import inference as bench_inference, runs as bench_runs, surfaces as bench_surfaces
 from explore3d.bench.precision.bench_page import bench_page
@@ -49,7 +50,7 @@ def write(measured: Sequence[Measured], out: Path, quick: bool) -> Path:
         for kind, content in kinds.items():
             write_whole(out / f"{name.replace(' ', '_')}.{kind}", content)
     write_whole(out / "bench.csv", as_csv(measured))
-    write_whole(out / "bench.json", as_json(measured, quick))
+    write_whole(out / "bench.json", json.dumps(as_record(measured, quick), indent=1, ensure_ascii=False) + "\n")
     page = bench_page(measured, {name: kinds["png"] for name, kinds in pictures.items()}, quick)
     return write_whole(out / PAGE, page)
 
@@ -64,9 +65,9 @@ def as_csv(measured: Sequence[Measured]) -> str:
     return text.getvalue()
 
 
-def as_json(measured: Sequence[Measured], quick: bool) -> str:
-    """Everything: machine, points, omissions."""
-    record = {
+def as_record(measured: Sequence[Measured], quick: bool) -> dict[str, Any]:
+    """Everything, as JSON values: machine, points, omissions."""
+    return {
         "schema": "explore3d/bench/1",
         "quick": quick,
         "machine": machine(),
@@ -79,7 +80,6 @@ def as_json(measured: Sequence[Measured], quick: bool) -> str:
             for each in measured
         ],
     }  # fmt: skip
-    return json.dumps(record, indent=1, ensure_ascii=False) + "\n"
 
 
 def summary(measured: Sequence[Measured]) -> str:

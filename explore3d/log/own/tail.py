@@ -84,7 +84,7 @@ class LogTail:
             self._at = damage.end
         events = list(self.reading.events or ())[self._seen :]
         self._seen += len(events)
-        pieces = [Piece(np.concatenate(parts), move) for move, parts in batches]
+        pieces = [Piece(_joined(parts), move) for move, parts in batches]
         return [*pieces, *self._under_way()], events, anew
 
     def _take(self, topic: str, message: Any, batches: list[tuple[Event | None, list[NDArray[np.void]]]]) -> None:
@@ -104,7 +104,7 @@ class LogTail:
         return None
 
     def _under_way(self) -> list[Piece]:
-        return [Piece(np.concatenate(self.reading.felt), None, under_way=True)] if self.reading.felt else []
+        return [Piece(_joined(self.reading.felt), None, under_way=True)] if self.reading.felt else []
 
     @property
     def closed(self) -> bool:
@@ -123,6 +123,11 @@ class LogTail:
             return str(tomllib.loads(str(self.reading.start.get("scene", ""))).get("title", ""))
         except tomllib.TOMLDecodeError:
             return ""
+
+
+def _joined(parts: list[NDArray[np.void]]) -> NDArray[np.void]:
+    """Batches of one layout after one another, read-only; numpy's own way compares every field of every batch."""
+    return np.frombuffer(b"".join(part.data for part in parts), parts[0].dtype)
 
 
 def need_log(path: Path) -> None:

@@ -20,8 +20,10 @@ DRAWN_SPACING = 5e-4
 STEP_SAMPLES = 50
 # Drawn samples of one node of the view: a step through time sends at most two nodes again, 0.1 MB
 NODE_SAMPLES = 5000
-# Samples that there is room for at first; doubled where there are more
-FIRST_ROOM = 250_000
+# Samples that there is room for at first, doubled where there are more: 33 minutes of a finger that reports 1000 a
+# second. Memory that is not written to is not taken: room costs nothing, and making it larger copies all that is there
+# (a third of the time that 1.4e6 samples took when it began at 250,000)
+FIRST_ROOM = 2_000_000
 # A sample is drawn this share of the object's size wide
 SAMPLE_SHARE = 1.2e-3
 # The view is placed anew when the samples reach so many times further than it was placed for
@@ -63,10 +65,10 @@ class Stage:
     def clear(self) -> None:
         """Forget every sample: another log begins."""
         self.t: FloatArray = np.zeros(0)
-        self._points: FloatArray = np.zeros((0, 3))
         self._centers: FloatArray = np.zeros((0, 3))
-        self._sweep: IntArray = np.zeros(0, dtype=np.int64)
+        self._sweep: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
         self._drawn: IntArray = np.zeros(0, dtype=np.int64)
+        self._points: FloatArray = np.zeros((0, 3))  # of the drawn samples alone
         self.count = self.drawn = 0
         self._trace: Trace | None = None
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -80,38 +82,56 @@ class Stage:
 
     # what is known
 
-    def add(self, points: FloatArray, centers: FloatArray, t: FloatArray, sweep: IntArray) -> None:
-        """Samples that follow those that are there: places of contact (N, 3) m, centres (N, 3) m, times s, sweeps."""
-        if not len(points):
+    def add(
+        self, points: Callable[[IntArray], FloatArray], centers: FloatArray, t: FloatArray, sweep: NDArray[np.integer]
+    ) -> None:
+        """Samples that follow those that are there.
+
+        Args:
+            points: gives the places of contact (K, 3), m, of the samples (K,) that are drawn, numbered within these.
+            centers: (N, 3) of the ball, m.
+            t: (N,) s.
+            sweep: (N,) numbers of the sweeps.
+        """
+        if not len(centers):
             return
-        needed = self.count + len(points)
+        needed = self.count + len(centers)
         if needed > len(self.t):
             room = max(needed, 2 * len(self.t), FIRST_ROOM)
-            self.t, self._points, self._centers, self._sweep = (
-                _grown(each, room) for each in (self.t, self._points, self._centers, self._sweep)
-            )
+            self.t, self._centers, self._sweep = (_grown(each, room) for each in (self.t, self._centers, self._sweep))
         place = slice(self.count, needed)
         # a clock that jumps back would leave samples that no moment shows
         earlier = self.t[self.count - 1] if self.count else -np.inf
         self.t[place] = np.maximum.accumulate(np.maximum(t, earlier))
-        self._points[place], self._centers[place], self._sweep[place] = points, centers, sweep
+        self._centers[place], self._sweep[place] = centers, sweep
+        chosen = self._chosen_of(centers)
+        self._draw_some(chosen + self.count, points(chosen))
         self.count = needed
-        self._low = np.minimum(self._low, points.min(axis=0))
-        self._high = np.maximum(self._high, points.max(axis=0))
+
+    def _chosen_of(self, centers: FloatArray) -> IntArray:
+        """Which of those samples are drawn."""
+        steps = min(STEP_SAMPLES, max(1, len(centers) - 1))
+        coarse = centers[::steps]
+        self._reach(coarse)
+        length = float(np.linalg.norm(np.diff(coarse, axis=0), axis=1).sum())
+        every = max(1, int(DRAWN_SPACING * self._size * len(centers) / max(length, DRAWN_SPACING * self._size)))
+        return np.arange(0, len(centers), every)
+
+    def _reach(self, places: FloatArray) -> None:
+        """Place the view anew where the finger went further than it was placed for."""
+        self._low = np.minimum(self._low, places.min(axis=0))
+        self._high = np.maximum(self._high, places.max(axis=0))
         if not self._base_placed and np.linalg.norm(self._high - self._low) > OUTGROWN * self._size:
             self._place(self._low, self._high)
-        self._draw_some(points)
 
-    def _draw_some(self, points: FloatArray) -> None:
-        """Note which of the last samples are drawn."""
-        coarse = points[:: min(STEP_SAMPLES, max(1, len(points) - 1))]
-        length = float(np.linalg.norm(np.diff(coarse, axis=0), axis=1).sum())
-        every = max(1, int(DRAWN_SPACING * self._size * len(points) / max(length, DRAWN_SPACING * self._size)))
-        chosen = np.arange(self.count - len(points), self.count, every)
-        if self.drawn + len(chosen) > len(self._drawn):
-            self._drawn = _grown(self._drawn, max(self.drawn + len(chosen), 2 * len(self._drawn), FIRST_ROOM))
-        self._drawn[self.drawn : self.drawn + len(chosen)] = chosen
-        self.drawn += len(chosen)
+    def _draw_some(self, chosen: IntArray, points: FloatArray) -> None:
+        """Note samples that are drawn, by their numbers, and where they touched."""
+        drawn = self.drawn + len(chosen)
+        if drawn > len(self._drawn):
+            room = max(drawn, 2 * len(self._drawn), FIRST_ROOM)
+            self._drawn, self._points = _grown(self._drawn, room), _grown(self._points, room)
+        self._drawn[self.drawn : drawn], self._points[self.drawn : drawn] = chosen, points
+        self.drawn = drawn
 
     def take_back(self, count: int) -> None:
         """Forget the last samples: they come again."""
@@ -126,7 +146,9 @@ class Stage:
             return None
         if self._trace is None or len(self._trace) != self.count:
             whole = slice(0, self.count)
-            self._trace = Trace(self.t[whole], self._centers[whole], self._sweep[whole], self.tip_radius)
+            self._trace = Trace(
+                self.t[whole], self._centers[whole], self._sweep[whole].astype(np.int64), self.tip_radius
+            )
         return self._trace
 
     def show_base(self, surface: Surface) -> None:
@@ -229,7 +251,7 @@ class Stage:
             if number in self._nodes:
                 self._nodes[number].visible = False
             return
-        points = self._view(self._points[self._drawn[first : first + wanted]]).astype(np.float32)
+        points = self._view(self._points[first : first + wanted]).astype(np.float32)
         if number in self._nodes:
             self._nodes[number].points = points
             self._nodes[number].visible = True
@@ -246,9 +268,9 @@ class Stage:
         """The fingertip at the last sample that is shown, and the sweep that it is on."""
         if count == 0:
             return
-        recent = self._drawn[max(0, drawn - NODE_SAMPLES) : drawn]
-        others = np.flatnonzero(self._sweep[recent] != self._sweep[count - 1])
-        points = self._view(self._points[recent[others[-1] + 1 if len(others) else 0 :]]).astype(np.float32)
+        first = max(0, drawn - NODE_SAMPLES)
+        others = np.flatnonzero(self._sweep[self._drawn[first:drawn]] != self._sweep[count - 1])
+        points = self._view(self._points[first + (others[-1] + 1 if len(others) else 0) : drawn]).astype(np.float32)
         place = self._view(self._centers[count - 1])
         if self._sweeping is None:
             self._sweeping = self._cloud("/samples/sweep", points, NOTICED_COLOUR, 1.6 * SAMPLE_SHARE)

@@ -1,7 +1,7 @@
 """watch: a session in the browser, finished or while it grows, from its log alone; whatever happens here, no run knows.
 
 The view is another program than the run: it reads the log that the run writes anyway, costs the run nothing, and may
-die at any moment.
+die at any moment. While no browser looks, nothing is read.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import io
 import math
-import os
 import subprocess
 import sys
 import threading
@@ -24,6 +23,7 @@ import numpy as np
 from explore3d import UserError, count_text, seconds_text
 from explore3d.analysis import FINGER_STAGE, Progress
 from explore3d.log import LOG, LogTail, Piece, digest, is_whole, need_log, newest_log, read_base
+from explore3d.report.watch.asked import HOST, address, over
 from explore3d.report.watch.feature_panel import feature_panel
 from explore3d.report.watch.stage import LAYERS_SHOWN, Stage
 from explore3d.report.watch.touched import touched
@@ -31,10 +31,6 @@ from mapping import MappingError, ObjectModel
 
 # s between two looks at a log that grows: half of the second within which a sample is to be seen
 GROWTH_PERIOD = 0.5
-# s without a browser after which a view that a run began ends, once that run has
-LINGER = 10.0
-# Priority of a view beside a run: the finger goes before it
-NICE = 10
 NO_FEATURE = "none"
 WAITING = "waiting for the first sample"
 
@@ -47,18 +43,27 @@ class Watch:
         live: the run that is under way in that folder, or is about to begin, rather than the session that is there.
         port: of the server; the next free one if it is taken.
         host: address to serve on; others than this machine see the view only if it is one of the network's.
+        begun: time since when a run that is `live` is under way, ns since the epoch; None: now.
 
     Raises:
         UserError: viser is not installed, there is neither a log nor a model, or the file is no log.
     """
 
-    def __init__(self, place: Path | str, *, live: bool = False, port: int = 8080, host: str = "127.0.0.1") -> None:
+    def __init__(
+        self,
+        place: Path | str,
+        *,
+        live: bool = False,
+        port: int = 8080,
+        host: str = HOST,
+        begun: int | None = None,
+    ) -> None:
         need_viewer()
         import viser
 
         self.place = Path(place)
         self.live = live
-        self._begun = time.time_ns()
+        self._begun = time.time_ns() if begun is None else begun
         self.model: ObjectModel | None = None
         self.tail: LogTail | None = None
         self._open_log()
@@ -71,7 +76,7 @@ class Watch:
         self._under_way = 0  # samples at the end that come again
         with contextlib.redirect_stdout(io.StringIO()):  # the library greets on stdout, where results belong
             self.server = viser.ViserServer(host=host, port=port, label="explore3d", verbose=False)
-        self.url = f"http://{host}:{self.server.get_port()}"
+        self.url = address(host, self.server.get_port())
         self.server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         self.server.gui.main_panel.dock_right()
         self.stage = Stage(self.server, self.choose)
@@ -213,10 +218,10 @@ class Watch:
 
     def _add(self, piece: Piece) -> None:
         assert self.tail is not None and self.tail.tip_radius is not None
-        self.stage.tip_radius = self.tail.tip_radius
+        radius = self.stage.tip_radius = self.tail.tip_radius
         samples = piece.samples
         centers = np.column_stack([samples["x"], samples["y"], samples["z"]])
-        self.stage.add(touched(piece, self.tail.tip_radius), centers, samples["t"], samples["sweep"])
+        self.stage.add(lambda chosen: touched(piece, radius, chosen), centers, samples["t"], samples["sweep"])
         if piece.under_way:
             self._under_way = len(samples)
 
@@ -255,26 +260,42 @@ def watch(
     *,
     live: bool = False,
     port: int = 8080,
-    host: str = "127.0.0.1",
-    attached: bool = False,
+    host: str = HOST,
     told: Callable[[Watch], None] = lambda view: None,
 ) -> None:
-    """Serve a view until Ctrl-C, and keep it up to date; arguments as for Watch.
+    """Serve a view until Ctrl-C, and keep it up to date while a browser looks; arguments as for Watch.
 
     Args:
-        attached: end once standard input has ended and no browser looks on any more: of a view that a run began.
         told: given the view as soon as it shows what there is.
     """
     view = Watch(place, live=live, port=port, host=host)
-    ended = _when_input_ends() if attached else None
-    alone = 0.0
+    view.look()
+    told(view)
+    _serve(view, lambda: False)
+
+
+def watch_beside(place: Path | str, port: int, begun: int, ended: threading.Event, told: Callable[[str], None]) -> None:
+    """Serve a view of a run, for the program that the run began and that a browser has asked.
+
+    Args:
+        place: folder of the session.
+        port: where the browser waits.
+        begun: when the run began, ns since the epoch.
+        ended: set once the run is over; the view ends when nobody looks on any more.
+        told: given the address if it had to change: another program took the port.
+    """
+    view = Watch(place, live=True, port=port, begun=begun)
+    if view.url != address(HOST, port):
+        told(view.url)
+    _serve(view, over(ended, lambda: bool(view.server.get_clients())))
+
+
+def _serve(view: Watch, is_over: Callable[[], bool]) -> None:
     try:
-        view.look()
-        told(view)
-        while ended is None or not ended.is_set() or alone < LINGER:
+        while not is_over():
             time.sleep(GROWTH_PERIOD)
-            view.look()
-            alone = 0.0 if view.server.get_clients() else alone + GROWTH_PERIOD
+            if view.server.get_clients():
+                view.look()
     finally:
         view.close()
 
@@ -316,19 +337,6 @@ def need_viewer() -> None:
     """Raises UserError: viser is not installed."""
     if find_spec("viser") is None:
         raise UserError('the view needs viser: pip install "explore3d[watch]"')
-
-
-def _when_input_ends() -> threading.Event:
-    ended = threading.Event()
-    if hasattr(os, "nice"):
-        os.nice(NICE)
-
-    def wait() -> None:
-        sys.stdin.buffer.read()
-        ended.set()
-
-    threading.Thread(target=wait, daemon=True).start()
-    return ended
 
 
 def _fitted(picture: bytes) -> str:

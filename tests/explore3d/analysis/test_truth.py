@@ -90,3 +90,11 @@ def test_a_censored_length_contains_every_longer_truth() -> None:
     seen = found("ridge", [[0.02, 0.05, 0], [0.06, 0.05, 0]])
     object.__setattr__(seen, "length", Interval(0.04, 0.0398, float("inf"), censored=True))
     assert rows([seen], [WIRE])[0].length_inside is True
+
+
+def test_a_depth_that_is_only_bounded_contains_every_deeper_truth() -> None:
+    line = [[0.02, 0.05, 0], [0.08, 0.05, 0]]
+    hanging = found("groove", line, -4.25e-4)
+    object.__setattr__(hanging, "height", Interval(-4.25e-4, -4.31e-4, -4.23e-4, censored=True))
+    kept = {depth: rows([hanging], [TrueFeature("groove", line, -depth)])[0].height_inside for depth in (1e-3, 2e-4)}
+    assert kept == {1e-3: True, 2e-4: False}

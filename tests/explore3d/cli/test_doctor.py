@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 
 import pytest
 
+import explore3d.jobs
 from explore3d.cli import doctor
 from explore3d.cli.doctor import STATES, examine
 from explore3d.jobs.machines.emulate import Emulation
@@ -111,3 +113,20 @@ def test_it_asks_the_controller_on_a_port_and_moves_nothing(tmp_path: Path) -> N
     assert stage.motion.travelled == 0.0  # type: ignore[union-attr]
     (gone,) = doctor.controller(str(tmp_path / "no port"), 115200)
     assert gone.state == "missing" and "cannot open" in gone.found
+
+
+def test_all_is_compiled_once_for_an_installation(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    package = tmp_path / "site-packages" / "mapping" / "__init__.py"
+    package.parent.mkdir(parents=True)
+    package.write_text("")
+    explored: list[Path] = []
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(doctor.mapping, "__file__", str(package))
+    monkeypatch.setattr(explore3d.jobs, "run", lambda scene, out, progress: explored.append(scene))
+    assert doctor.must_compile()
+    doctor.compile_kernels(quiet=True)
+    assert len(explored) == 1 and not doctor.must_compile()
+    os.utime(package, (1.0, 1.0))  # installed anew: its kernels do not count any more
+    assert doctor.must_compile()
+    (package.parents[1] / "pyproject.toml").write_text("")
+    assert not doctor.must_compile()  # a checkout, which make setup compiles

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import pytest
 from in_process import explore3d_main
 from two_features import two_features
 
+from explore3d.bench.precision import bench
+from explore3d.bench.precision.work_precision import LeftOutMethod, Point, Stage
 from explore3d.cli.main import app
 
 MESHES = Path(__file__).parents[3] / "assets" / "meshes"
@@ -66,3 +69,16 @@ def test_figures_list_their_files_and_what_the_algorithms_found(told: Any, tmp_p
     assert len(found["written"]) > 5 and all(Path(each).is_file() for each in found["written"])
     assert {each["motion"] for each in found["findings"]} == {"rolling", "sliding"}
     assert all(0.0 <= each["convex"] <= 1.0 for each in found["findings"])
+
+
+def test_bench_says_all_that_it_measured(told: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def measure(quick: bool, peers: bool) -> list[Point | LeftOutMethod]:
+        return [Point("contact", "ours", "1", 2.0, 3e-6), LeftOutMethod("contact", "theirs", "not installed")]
+
+    stages = (Stage("contact", "m", "none", "", measure),)
+    monkeypatch.setattr(sys.modules[bench.__module__], "stages", lambda: stages)
+    found = told("bench", "--quick", "--out", tmp_path)
+    (stage,) = found["stages"]
+    assert stage["points"][0]["error"] == 3e-6 and stage["omissions"][0]["method"] == "theirs"
+    assert Path(found["page"]).is_file() and found["summary"].startswith("bench: 1 stages, 1 points")
+    assert explore3d_main(monkeypatch, "bench", "--json", "dynamics") == 2

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from explore3d.pictures.camera import Camera
-from explore3d.pictures.object import MOST_VIEWS, object_picture, view_directions
+from explore3d.pictures.object import MOST_VIEWS, VIEW_HEIGHTS, object_picture, view_directions
 from explore3d.pictures.render import Body, render
 from explore3d.pictures.sweep_paths import SweepPath
 from explore3d.scene import examples, load_scene
@@ -42,6 +42,15 @@ def test_every_feature_of_a_closed_body_is_labelled_in_one_of_its_views(name: st
     assert 2 <= len(view_directions(ROUND_BODY, model.features, model.base.surface)) <= MOST_VIEWS
 
 
+def test_a_line_that_one_view_can_show_does_not_end_at_a_bodys_rim() -> None:
+    model = model_of("mug")
+    directions = np.array(view_directions(ROUND_BODY, model.features, model.base.surface))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    (ridge,) = (each for each in model.features if each.kind == "ridge")  # 80 mm round a mug of 40 mm radius
+    facing = directions @ ridge.normals.T
+    assert len(directions) == 2 and facing.min(axis=1).max() > 0.2
+
+
 def test_a_measured_surface_is_outlined_against_the_background_alone() -> None:
     low, high = (np.array([[-1.0, -1, z], [1, -1, z], [1, 1, z], [-1, 1, z]]) for z in (0.0, 0.5))
     both = Surface(np.vstack([low, 0.4 * high * [1, 1, 2.5]]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
@@ -50,3 +59,23 @@ def test_a_measured_surface_is_outlined_against_the_background_alone() -> None:
         render([Body(both, np.full(3, 0.9))], camera, rims=rims).pixels[40:-40, 40:-40].min() for rims in (True, False)
     ]
     assert dark[0] < 0.7 * dark[1]
+
+
+def test_what_is_turned_down_is_lit_where_it_is_seen_from_below() -> None:
+    plate = Surface([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]], [[0, 1, 2], [0, 2, 3]])
+    brightness = []
+    for height in (VIEW_HEIGHTS[0], -VIEW_HEIGHTS[0]):
+        camera = Camera.facing(plate.vertices, np.array([0.8, 0.6, height]), 200, 200)
+        seen = render([Body(plate, np.full(3, 0.9))], camera, rims=False).pixels
+        brightness.append(float(np.median(seen[seen[:, :, 0] < 1.0])))
+    assert brightness[1] == pytest.approx(brightness[0], abs=0.01) and brightness[0] > 0.75
+
+
+def test_a_level_plate_is_seen_from_one_side_however_a_step_leans_it() -> None:
+    plate = Surface([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]], [[0, 1, 2], [0, 2, 3]])
+    ways = [
+        view_directions(np.array([[np.sin(lean) * np.cos(turn), np.sin(lean) * np.sin(turn), np.cos(lean)]]), (), plate)
+        for lean in (0.0, 0.017)
+        for turn in (0.0, 2.0, 4.0)
+    ]
+    np.testing.assert_allclose(np.array(ways), np.broadcast_to(ways[0], np.shape(ways)), atol=1e-12)

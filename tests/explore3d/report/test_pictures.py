@@ -84,6 +84,10 @@ def test_an_interval_has_no_more_digits_than_are_known() -> None:
     assert Interval(6.513e-4, 6.463e-4, 6.561e-4).text() == ("0.6513 mm", "0.6463 to 0.6561")
     assert Interval(6.5e-4, 3.1e-4, 8.2e-4).text() == ("0.65 mm", "0.31 to 0.82")
     assert Interval(0.05, 0.0498, np.inf, censored=True).text() == ("at least 49.8 mm", "")
+    # a groove in which the ball hangs between the rims, 0.42 to 0.43 mm below the base: its bottom lies there or deeper
+    assert Interval(-4.25e-4, -4.31e-4, -4.23e-4, censored=True).text() == ("-0.423 mm or deeper", "")
+    depth = Interval(-4.25e-4, -4.31e-4, -4.23e-4, censored=True, bounded=True)
+    assert depth.text() == ("between -0.43 and -0.42 mm", "")
 
 
 def test_durations_and_counts_read_as_speech() -> None:

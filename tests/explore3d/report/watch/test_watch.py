@@ -200,12 +200,15 @@ def test_places_of_contact_are_felt_or_follow_the_pressing() -> None:
     outward = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
     waypoints = outward[::20]
     move = SimpleNamespace(data={"path": (1.1 * waypoints).tolist(), "approach": (-waypoints).tolist()})
-    found = touched(Piece(samples_of(1.1 * outward), move), 0.1)
+    every = np.arange(len(outward))
+    found = touched(Piece(samples_of(1.1 * outward), move), 0.1, every)
     # 50 samples share one direction, 20 one waypoint: the ball is 0.1 long, turned by half of both at most
     np.testing.assert_allclose(found, outward, atol=0.1 * 0.5 * (50 + 20) * 2.0 * np.pi / 4000)
-    np.testing.assert_array_equal(touched(Piece(samples_of(outward), None, under_way=True), 0.1), outward)
+    some = touched(Piece(samples_of(1.1 * outward), move), 0.1, every[::7])
+    np.testing.assert_allclose(some, outward[::7], atol=0.1 * 0.5 * (50 + 20) * 2.0 * np.pi / 4000)
+    np.testing.assert_array_equal(touched(Piece(samples_of(outward), None, under_way=True), 0.1, every), outward)
     felt = dict(zip(("nx", "ny", "nz"), outward.T, strict=True))
-    np.testing.assert_allclose(touched(Piece(samples_of(1.1 * outward, **felt), None), 0.1), outward, atol=1e-12)
+    np.testing.assert_allclose(touched(Piece(samples_of(1.1 * outward, **felt), None), 0.1, every), outward, atol=1e-12)
 
 
 def test_without_crossings_the_section_is_of_a_sweep_across_the_line_not_along_it() -> None:
