@@ -44,6 +44,9 @@ def time_curve(
     Returns:
         (seconds of finger time, worst distance between a true axis and the found one in m), in the order of time.
     """
+    if not detections.crossings:  # there is no moment at which anything was known, but the last
+        worst = _worst(model, truth, trace.tip_radius)
+        return () if worst is None else ((float(trace.t[-1] - trace.t[0]), worst),)
     laid = LaidTrace.of(trace, model.base)
     spacing = place_spacing(detections.crossings, trace.tip_radius)
     faint = any(feature.faint for feature in model.features)

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
         section_lines as section_lines,
         section_trial as section_trial,
     )
-    from explore3d.bench.touch import Answer as Answer, bench_touch as bench_touch, touch_lines as touch_lines
     from explore3d.bench.trace import (
         bench_trace as bench_trace,
         bump_mesh as bump_mesh,
@@ -45,7 +44,6 @@ _PUBLIC = {
     "dynamics": ("dynamics_curve", "dynamics_table", "wire_trace"),
     "figures": ("write_figures",),
     "scaling": ("AXES", "bench_scaling", "scaling_lines"),
-    "touch": ("Answer", "bench_touch", "touch_lines"),
     "sections": ("bench_sections", "section_lines", "section_trial"),
     "trace": ("bench_trace", "bump_mesh", "by_opencamlib", "trace_table"),
     "wrong_models": ("bench_wrong_models", "wrong_model_lines", "wrong_model_records", "wrong_model_run"),

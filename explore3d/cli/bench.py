@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from explore3d import UserError
+from explore3d import UserError, parse_length
 from explore3d.cli.options import Json
 
 if TYPE_CHECKING:
@@ -408,19 +408,50 @@ def dynamics() -> None:
 def touch(
     trials: Annotated[int, typer.Option(min=1, help="Pairs of strokes for each stimulus, noise and height.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Of the noise.")] = 0,
+    correlation: Annotated[str, typer.Option(help="Length over which correlated noise is, with unit.")] = "1 mm",
+    noises: Annotated[str | None, typer.Option(help="white, correlated, range, separated by commas; all.")] = None,
 ) -> None:
-    """LaMotte's task: which of two strokes went over something? The detector's answers beside people's.
+    """LaMotte's task: which of two strokes went over something? Answers of the detector, the best possible, people's.
 
     Example: explore3d bench touch --trials 20
     """
-    from explore3d.bench import bench_touch, touch_lines
+    from explore3d.bench.display import HEAD_NOISES, bench_touch, touch_lines
 
+    length = parse_length(correlation)
+    if not length > 0.0:
+        raise UserError(f"--correlation: expected a length above 0; found {correlation!r}")
     answers = []
-    for each in bench_touch(trials, seed):
+    for each in bench_touch(trials, seed, length, _names(noises, "--noises", list(HEAD_NOISES))):
         answers.append(each)
         told = f"{each.stimulus}, {each.noise}, {1e6 * each.height:.2f} um: {100.0 * each.right:.0f} % right"
-        print(told, flush=True)
+        best = f"{100.0 * each.place_unknown:.0f} % possible, {100.0 * each.place_known:.0f} % where its place is known"
+        print(f"{told}; {best}", flush=True)
     _print(touch_lines(answers))
+
+
+@bench.command()
+def circle(
+    store: Store,
+    bodies: Annotated[str | None, typer.Option(help="Kinds, separated by commas; all if left out.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds of sizes, places and noise.")] = 3,
+    building: Annotated[bool, typer.Option("--building", help="The seeds that may be looked into.")] = False,
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+) -> None:
+    """Explored, displayed, and explored again through the display: are the features the same?
+
+    Example: explore3d bench circle --store circle.jsonl --bodies bump,pit --seeds 2
+    """
+    from explore3d.bench.display import bench_circle, circle_lines
+    from explore3d.bench.scenes import DRAWN_KINDS, FIRST_BUILT_WITH
+
+    first = FIRST_BUILT_WITH if building else 0
+    records = []
+    chosen = _names(bodies, "--bodies", list(DRAWN_KINDS))
+    for each in bench_circle(chosen, range(first, first + seeds), store, seconds):
+        records.append(each)
+        inside = sum(size["inside"] for size in each["sizes"])
+        print(f"{each['body']}, {each['seed']}: {inside} of {len(each['sizes'])} sizes", flush=True)
+    _print(circle_lines(records))
 
 
 @bench.command()

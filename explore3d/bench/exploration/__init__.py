@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     )
     from explore3d.bench.exploration.explore_curves import write_curves as write_curves
     from explore3d.bench.exploration.exploring import (
+        FAST as FAST,
         FINGER_NOISES as FINGER_NOISES,
+        PRECISION as PRECISION,
         STRATEGIES as STRATEGIES,
         bench_exploring as bench_exploring,
         one_run as one_run,
@@ -23,6 +25,15 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "bodies": ("bench_bodies", "body_lines", "body_records"),
     "explore_curves": ("write_curves",),
-    "exploring": ("FINGER_NOISES", "STRATEGIES", "bench_exploring", "one_run", "records", "write_bench_scenes"),
+    "exploring": (
+        "FAST",
+        "FINGER_NOISES",
+        "PRECISION",
+        "STRATEGIES",
+        "bench_exploring",
+        "one_run",
+        "records",
+        "write_bench_scenes",
+    ),
 }
 doorway(__name__, _PUBLIC)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         sphere_mesh as sphere_mesh,
         tube as tube,
     )
+    from explore3d.bench.scenes.drawn_kinds import DRAWN_KINDS as DRAWN_KINDS
     from explore3d.bench.scenes.exploring import (
         BENCH_TIP_RADIUS as BENCH_TIP_RADIUS,
         SCENES as SCENES,
@@ -70,6 +71,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "any_body": ("ANY_BODIES", "BODY_BUILDING_SEEDS", "BODY_REPORTED_SEEDS", "FILED_BODIES", "any_body"),
     "bodies": ("Mesh", "blob", "blob_normals", "cylinder", "joined", "sphere_mesh", "tube"),
+    "drawn_kinds": ("DRAWN_KINDS",),
     "exploring": ("BENCH_TIP_RADIUS", "BenchScene", "SCENES"),
     "kinds": ("BODIES_BY_KIND", "INSPECTED_HALF_SIDE", "MIDDLE"),
     "laid_on": ("Detail", "drawn_details", "laid_on"),

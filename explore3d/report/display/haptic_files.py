@@ -22,6 +22,9 @@ FULL_SCALE_16_BIT = 32767
 CURVE_RATE = 200.0
 # Points of one AHAP parameter curve: Core Haptics takes no more
 MOST_AHAP_POINTS = 16
+# Number of the body that is touched: 0 is kept for bodies that are not described (ISO/IEC 23090-31; its reference
+# software refuses an avatar of that number)
+AVATAR = 1
 # s; continuous events of Core Haptics last no longer
 LONGEST_AHAP_EVENT = 30.0
 
@@ -121,7 +124,7 @@ def hjif_bytes(vibration: Vibration, full_scale: float | None = None) -> bytes:
         }
         for time, size in _events(vibration)
     ]
-    curve = {"effect_type": "Basis", "position": 0, "phase": 0.0, "base_signal": "Sine", "keyframes": keyframes}
+    curve = {"effect_type": "Basis", "position": 0, "keyframes": keyframes}  # a wave's phase and form are no curve's
     bands: list[dict[str, Any]] = [
         {
             "band_type": "Curve",
@@ -140,8 +143,9 @@ def hjif_bytes(vibration: Vibration, full_scale: float | None = None) -> bytes:
         "body_part_mask": 0, "bands": bands,
     }  # fmt: skip
     perception = {
-        "id": 0, "avatar_id": 0, "description": "crossing", "perception_modality": "Vibrotactile", "unit_exponent": -3,
-        "perception_unit_exponent": 0, "reference_devices": [], "effect_library": [], "channels": [channel],
+        "id": 0, "avatar_id": AVATAR, "description": "crossing", "perception_modality": "Vibrotactile",
+        "unit_exponent": -3, "perception_unit_exponent": 0,
+        "reference_devices": [], "effect_library": [], "channels": [channel],
     }  # fmt: skip
     return _json(
         {
@@ -151,7 +155,7 @@ def hjif_bytes(vibration: Vibration, full_scale: float | None = None) -> bytes:
             "date": "1970-01-01",
             "description": _about(vibration),
             "timescale": round(ticks),
-            "avatars": [{"id": 0, "lod": 0, "type": "Vibration"}],
+            "avatars": [{"id": AVATAR, "lod": 0, "type": "Vibration"}],
             "perceptions": [perception],
             "syncs": [{"timestamp": 0}],
         }

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mapping import BoolArray, ContactError, FloatArray, Surface
-from mapping.geometry.mesh import NearestPoint, TriangleTree, distances
+from mapping.geometry.mesh import NearestPoint, TriangleTree, arclengths, distances
 from mapping.geometry.proxy.draping import CHORD_ERROR, followed, joined, terrace_mesh, trench_mesh
 from mapping.geometry.proxy.parts import Bell, Chain, Part, Terrace, Trench
 
@@ -18,6 +18,11 @@ LEGS_PER_GROUP = 16
 # A low cap is part of a large sphere, which on a bent base comes out again elsewhere: it is there up to this many
 # half-widths of its own chord, as in `mapping.inference.kinds`
 CAP_REACH = 1.5
+# A ridge ends where its crest does. Whether it is cut square there (0) or goes on as a half ball (1) a finger often
+# cannot tell, and the model's length is the middle of both: so is what is displayed, rounded by half the section's
+# radius. Half balls are as square ends 0.05 mm further out (the paper's wire), so displayed ones were found half of
+# that too far out: wires 0.05 mm too long (four of them: 0.07 mm)
+END_ROUNDING = 0.5
 # A bell ends where it is hardly higher than the base: this share of its height
 BELL_END = 1e-4
 
@@ -111,17 +116,34 @@ class ProxyBody:
         return _rows(rows, 15), _rows([np.array(table)] if table else [], 6)
 
     def _capsules(self, chain: Chain) -> FloatArray:
-        """(K - 1, 15) or, of a bump, (1, 15): ends, radius, normal, least cosine to it, kind."""
-        line = self.into(chain.axis + (chain.height - chain.radius) * chain.normals)
+        """(K - 1, 15) or, of a bump, (1, 15), and one for each end: ends, radius, normal, least cosine to it, kind."""
+        axis, normals = chain.axis, chain.normals
+        if len(axis) == 1 or np.array_equal(axis[0], axis[-1]):
+            return self._legs_of(chain, axis, normals, chain.radius)
+        rounded = END_ROUNDING * chain.radius
+        s = arclengths(axis)
+        back = min(chain.radius - rounded, 0.25 * s[-1])
+        places = np.concatenate([[back], s[(s > back) & (s < s[-1] - back)], [s[-1] - back]])
+        middle, up = (np.column_stack([np.interp(places, s, each[:, k]) for k in range(3)]) for each in (axis, normals))
+        up /= np.linalg.norm(up, axis=1, keepdims=True)
+        rows = [self._legs_of(chain, middle, up, chain.radius)]
+        for end in (0, -1):
+            foot, way = np.array([axis[end], middle[end]]), np.array([normals[end], up[end]])
+            rows.append(self._legs_of(chain, foot, way, rounded))
+        return np.concatenate(rows)
+
+    def _legs_of(self, chain: Chain, axis: FloatArray, normals: FloatArray, radius: float) -> FloatArray:
+        """(K - 1, 15) or (1, 15) capsules of a radius, m, whose crest is as high as the chain's over an axis (K, 3)."""
+        line = self.into(axis + (chain.height - radius) * normals)
         legs = max(len(line) - 1, 1)
         rows = np.zeros((legs, 15))
         rows[:, 0:3], rows[:, 3:6] = line[:legs], line[-legs:]
-        rows[:, 6] = self.scale * chain.radius
-        up = chain.normals[:legs] + chain.normals[-legs:]
+        rows[:, 6] = self.scale * radius
+        up = normals[:legs] + normals[-legs:]
         rows[:, 7:10] = up / np.linalg.norm(up, axis=1, keepdims=True)
         rows[:, 10] = -2.0
-        if chain.height < chain.radius:
-            share = 1.0 - chain.height / chain.radius
+        if chain.height < radius:
+            share = 1.0 - chain.height / radius
             sine = CAP_REACH * np.sqrt((1.0 - share) * (1.0 + share))
             rows[:, 10] = np.sqrt(1.0 - sine**2) if sine < 1.0 else -2.0
         return rows

@@ -11,6 +11,9 @@ from mapping import FloatArray
 class Chain:
     """A ridge or a round bump: a chain of capsules whose crest stands over the base.
 
+    Where a ridge ends it is rounded by half its radius: the middle of one that is cut square and one that goes on as a
+    half ball.
+
     Args:
         axis: (K, 3) points of the base under the crest, m; one of a bump.
         normals: (K, 3) outward unit normals there.

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import io
 import json
+import os
+import re
 import wave
+from datetime import date
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -92,6 +96,48 @@ def test_an_ahap_file_is_what_core_haptics_reads() -> None:
             assert all(0.0 <= each["ParameterValue"] <= 1.0 for each in points)
     half = float(contact_half_width(HEIGHT, 0.5 * HEIGHT, R))
     assert np.abs(np.array(times) - np.array([6e-3 - half, 6e-3 + half]) / SPEED).max() < 1.0 / 48_000
+
+
+def test_an_hjif_file_keeps_the_rules_of_the_reference_software() -> None:
+    """What MPEG's reference software (RM, March 2024) refuses: missing keys, wrong types, numbers out of range."""
+    document = json.loads(hjif_bytes(crossing()))
+    assert re.fullmatch(r"20(2[3-9]|[3-9]\d)(-[1-9])?", document["version"])
+    assert document["profile"] == "Main" and document["level"] in (1, 2)
+    assert isinstance(document["timescale"], int) and 0 < document["timescale"] <= 48_000
+    assert date.fromisoformat(document["date"])
+    for avatar in document["avatars"]:
+        assert avatar["id"] >= 1  # 0 is kept for bodies that are not described
+        assert avatar["lod"] >= 0 and avatar["type"] in ("Vibration", "Pressure", "Temperature", "Custom")
+    assert all(sync["timestamp"] >= 0 for sync in document["syncs"])
+    for band in document["perceptions"][0]["channels"][0]["bands"]:
+        assert 0 <= band["lower_frequency_limit"] <= band["upper_frequency_limit"] <= 1000
+        assert ("curve_type" in band) == (band["band_type"] == "Curve")
+        waves = band["band_type"] in ("Transient", "VectorialWave")
+        for effect in band["effects"]:
+            assert effect["position"] >= 0
+            assert ("phase" in effect) == ("base_signal" in effect) == waves
+            for each in effect["keyframes"]:
+                assert isinstance(each["relative_position"], int) and each["relative_position"] >= 0
+
+
+def test_an_hjif_file_validates_against_the_schemas_of_the_standard() -> None:
+    """They are not free to copy: EXPLORE3D_HJIF_SCHEMAS names the folder that holds MPEG_haptics.schema.json."""
+    folder = os.environ.get("EXPLORE3D_HJIF_SCHEMAS")
+    if folder is None:
+        pytest.skip("EXPLORE3D_HJIF_SCHEMAS names no folder with the schemas of ISO/IEC 23090-31")
+    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema is not installed")
+    referencing = pytest.importorskip("referencing", reason="referencing is not installed")
+    schemas = {path.name: json.loads(path.read_text()) for path in Path(folder).glob("*.json")}
+
+    def named(uri: str) -> Any:
+        return referencing.Resource.from_contents(
+            schemas[uri.rsplit("/", 1)[-1]], default_specification=referencing.jsonschema.DRAFT202012
+        )
+
+    registry = referencing.Registry(retrieve=named)  # type: ignore[call-arg]
+    whole = schemas["MPEG_haptics.schema.json"]
+    validator = jsonschema.validators.validator_for(whole)(whole, registry=registry)
+    assert [error.message for error in validator.iter_errors(json.loads(hjif_bytes(crossing())))] == []
 
 
 def test_an_hjif_file_has_what_the_reference_reader_asks_for() -> None:

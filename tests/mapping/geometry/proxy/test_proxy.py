@@ -131,6 +131,20 @@ def test_the_force_jumps_nowhere_by_more_than_people_notice(name: str) -> None:
         assert jump.max() < 0.07
 
 
+@pytest.mark.parametrize("end", [-1.0, 1.0])
+@pytest.mark.parametrize(("height", "radius"), [(0.2e-3, 0.1e-3), (0.3e-3, 0.2e-3), (0.1e-3, 1e-3)])
+def test_a_ridge_ends_between_square_and_round(end: float, height: float, radius: float) -> None:
+    r, half = 5e-3, 10e-3
+    body = ProxyBody(PLATE, (Chain(*along((-half, 0.0, 0.0), (half, 0.0, 0.0)), height, radius),), r)
+    x = np.linspace(-1e-3, 3e-3, 801)  # beyond the end
+    device = np.column_stack([end * (half + x), np.zeros_like(x), np.full_like(x, r - 1e-6)])
+    felt = Proxy(body).follow(np.vstack([[[end * half, 0.0, 2.0 * r]], device])).centers[1:]
+    off = end * felt[:, 0] - half
+    whole = r + 0.5 * radius
+    fall = whole - np.sqrt(whole**2 - np.maximum(off, 0.0) ** 2)
+    assert np.abs(felt[:, 2] - r - np.maximum(height - fall, 0.0)).max() < 1e-9
+
+
 def test_random_jumps_never_bring_it_inside() -> None:
     bump = BumpOfRevolution(15.0).mesh(3.0, rings=40, sectors=60)
     body = Surface(1e-3 * bump.vertices, bump.faces)

@@ -1,0 +1,22 @@
+"""What is felt of a display, and of the smallest things that people feel."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from explore3d.bench.display.circle import bench_circle as bench_circle, circle_lines as circle_lines
+    from explore3d.bench.display.ideal_observer import best_shares as best_shares
+    from explore3d.bench.display.touch import (
+        HEAD_NOISES as HEAD_NOISES,
+        Answer as Answer,
+        bench_touch as bench_touch,
+        touch_lines as touch_lines,
+    )
+
+_PUBLIC = {
+    "circle": ("bench_circle", "circle_lines"),
+    "ideal_observer": ("best_shares",),
+    "touch": ("Answer", "HEAD_NOISES", "bench_touch", "touch_lines"),
+}
+doorway(__name__, _PUBLIC)
