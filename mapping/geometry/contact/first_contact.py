@@ -130,9 +130,8 @@ class BallContact:
 
         _in_parts(some, len(start), QUERIES_PER_BLOCK, threads)
         if order is not None:
-            back = np.empty_like(order)
-            back[order] = np.arange(len(order))
-            where, feature, count, distance, state = (a[back] for a in (where, feature, count, distance, state))
+            for array in (where, feature, count, distance, state):
+                array[order] = array.copy()
         return Contacts(
             tree.out(where[:, 0]),
             tree.out(where[:, 1]),
