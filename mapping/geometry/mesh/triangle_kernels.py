@@ -13,7 +13,7 @@ from numba import njit
 from mapping.geometry.mesh.vector_kernels import cross, dot, moved, scaled, sub
 
 # A gap that closes to a tangent shrinks fourfold a step, from 1 to 1e-16 in 27 steps; any other faster.
-MOST_STEPS = 64
+MOST_TANGENTS = 64
 SLIVER = 1e-14  # height over longest side below which a triangle is a segment: narrower than rounding
 
 
@@ -97,7 +97,7 @@ def enter_triangle(a, b, c, n, d, ball, start, far):  # type: ignore[no-untyped-
     """
     radius, reach, graze = ball
     t, touched = start, inf
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_TANGENTS):
         p = closest_on_triangle(moved(a, -t, d), moved(b, -t, d), moved(c, -t, d), n)
         gap, closing = sqrt(dot(p, p)), dot(p, d)
         if t == 0.0 and gap < radius - (reach - radius):
