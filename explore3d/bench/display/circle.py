@@ -25,7 +25,7 @@ from explore3d.bench.scenes import BENCH_TIP_RADIUS, DRAWN_KINDS
 from explore3d.jobs import scene_finger
 from hw.display import DisplayFinger
 from hw.simulated import SimulatedFinger
-from mapping import Feature, Interval
+from mapping import Feature
 from mapping.geometry.proxy import Chain, Part
 from mapping.geometry.templates import width_of_cap
 from mapping.inference.kinds import kind_named
@@ -126,13 +126,6 @@ def _sizes(pair: Comparison) -> Iterator[dict[str, Any]]:
         if displayed is None:
             continue
         felt = None if pair.found is None else getattr(pair.found, name)
-        inside = felt is not None and _holds(felt, displayed)
+        inside = bool(getattr(pair, f"{name}_inside"))
         interval = None if felt is None else [felt.low, felt.median, felt.high, felt.censored]
         yield {"kind": true.kind, "size": name, "displayed": displayed, "felt": interval, "inside": inside}
-
-
-def _holds(interval: Interval, displayed: float) -> bool:
-    """Whether a size is one that the interval allows; of a bound from below, whatever is larger."""
-    if interval.censored and not interval.bounded:
-        return abs(displayed) >= min(abs(interval.low), abs(interval.high))
-    return interval.low <= displayed <= interval.high
