@@ -6,9 +6,12 @@ import numpy as np
 
 from mapping import FloatArray, IntArray
 
-BITS = 10  # of each coordinate: 1024 cells along the longest extent, some 30 bits in all
-# Rows of a square grid of N points step by 2 extents / sqrt(N) on average, the way back to the next row included;
-# twice that lets grids of 1:4 keep their order. Points at random step by half an extent.
+# Bits of each coordinate: three times ten fill a number of 32. A cell is a thousandth of the longest extent; points of
+# one cell, and of its neighbours, meet the same few leaves of the tree, in whatever order
+BITS = 10
+# A grid of N points, a in a row, steps by 1 / a of its extent, and as much again on the mean for the ways back to the
+# next row: 2 extents / sqrt(N) where it is square, 4 where rows have a quarter as many points as there are rows. More
+# than that is no order: points at random step by half an extent
 IN_ROWS = 4.0
 
 
