@@ -18,7 +18,17 @@ bench = typer.Typer(invoke_without_command=True)
 
 SAMPLING_METHODS = ("importance", "emcee")
 
-Store = Annotated[Path, typer.Option("--store", help="JSONL file of finished runs; what it holds is not run again.")]
+
+def _store(path: Path | None) -> Path | None:
+    """A file that the first finished run can be written to: else hours would be lost at their end."""
+    if path is not None and (path.is_dir() or not path.parent.is_dir()):
+        found = "a folder" if path.is_dir() else f"no folder {path.parent}"
+        raise UserError(f"--store {path}: expected a file in a folder that is there; found {found}")
+    return path
+
+
+_STORED = typer.Option("--store", callback=_store, help="JSONL file of finished runs; what it holds is not run again.")
+Store = Annotated[Path, _STORED]
 
 
 @bench.callback()
@@ -178,9 +188,7 @@ def odds(
 
 @bench.command()
 def explore(
-    store: Annotated[
-        Path | None, typer.Option("--store", help="JSONL file of finished runs; what it holds is not run again.")
-    ] = None,
+    store: Annotated[Path | None, _STORED] = None,
     scenes: Annotated[str | None, typer.Option(help="Scenes, separated by commas; all if left out.")] = None,
     strategies: Annotated[str | None, typer.Option(help="Strategies, separated by commas; all if left out.")] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Seeds of the features' places and of the noise.")] = 3,

@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import re
+from inspect import signature
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,22 @@ def test_the_help_lists_every_command(monkeypatch: pytest.MonkeyPatch, capsys: p
     assert explore3d_main(monkeypatch, "--help") == 0
     out = capsys.readouterr().out
     assert all(re.search(rf"^ +{command} ", out, re.M) for command in COMMANDS)
+
+
+STORED = [
+    command.callback.__name__
+    for command in bench.registered_commands
+    if "store" in signature(command.callback).parameters
+]
+
+
+@pytest.mark.parametrize("name", STORED)
+def test_a_bench_refuses_a_store_that_cannot_be_written_before_it_begins(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str
+) -> None:
+    for store, found in ((tmp_path / "absent" / "x.jsonl", f"no folder {tmp_path / 'absent'}"), (tmp_path, "a folder")):
+        assert explore3d_main(monkeypatch, "bench", name, "--store", str(store)) == 2
+        assert capsys.readouterr().err.strip().endswith(f"found {found}")
 
 
 def variant(folder: Path, old: str, new: str) -> Path:
