@@ -25,6 +25,9 @@ BLOCKS = (1, 3, 9, 27, 81)
 LONGEST_RUN = 0.5
 # Bends of the trace, in those of the ball, that the body's own curvature and the sampling allow.
 ALLOWED_BEND = 3.0
+# Tip radii over which the slope beside a sample is taken, within which the ball's own arc turns by as many radians,
+# and the standard deviations by which it must be there
+SLOPE_SPAN, SLOPE_SDS = 0.05, 3.0
 # Standard deviations beyond that: at 5 kHz a Gaussian law has one such sample in 10^6 hours.
 OUT = 7.0
 # A single sample is out by less where so many more are than a Gaussian law lets: of those left out, it may have made
@@ -122,7 +125,12 @@ def _impossible(height: FloatArray, level: FloatArray, step: float, tip_radius: 
         sd = robust_sd(bend[::every])
         if sd * level.max() <= np.finfo(float).eps * tip_radius:
             continue  # most of the path does not bend but by rounding: there is no scatter to stand out of
-        allowed = ALLOWED_BEND * (size * step) ** 2 / tip_radius
+        span = max(size, int(SLOPE_SPAN * tip_radius / step))
+        slope = _slopes(means, level[: len(means)] / np.sqrt(size), span, step)[size:-size]
+        allowed = ALLOWED_BEND * (size * step) ** 2 / tip_radius * (1.0 + slope**2) ** 1.5
+        # where the arc is upright within the block, the ball comes up a wall: there is no bound
+        turned = 2.0 * (size + 0.5 * span) * step / tip_radius
+        allowed[slope / np.sqrt(1.0 + slope**2) + turned >= 1.0] = np.inf
         excess = bend / sd
         if excess.max() <= (LEAST_OUT if size == 1 else OUT):
             continue
@@ -134,6 +142,23 @@ def _impossible(height: FloatArray, level: FloatArray, step: float, tip_radius: 
                 runs += not off[low:high].any()
                 off[low:high] = True
     return off, runs
+
+
+def _slopes(means: FloatArray, sd: FloatArray, span: int, step: float) -> FloatArray:
+    """(N,) slope of the means at each, over a span on the side that is less steep; 0 on tops, in dips, and in noise.
+
+    A height bends by (1 + slope^2)^1.5 of what the path does: on the flank of a crest the ball's arc bends the heights
+    the more the steeper it is, while a run that was not felt is flat, or turns back, on one side at least.
+    """
+    slope = np.zeros(len(means))
+    if len(means) <= 2 * span:
+        return slope
+    rise = (means[span:] - means[:-span]) / (span * step)
+    before, behind = rise[:-span], rise[span:]
+    gentler = np.minimum(np.abs(before), np.abs(behind))
+    least = SLOPE_SDS * sd[span:-span] / (span * step)
+    slope[span:-span] = np.where(before * behind > 0.0, np.maximum(gentler - least, 0.0), 0.0)
+    return slope
 
 
 def _out(excess: FloatArray) -> float:

@@ -137,12 +137,16 @@ def _jumps(part: Trace, base: Base, reach: float) -> list[int]:
     long = long[~_told(part)[long - 1]]
     if not len(long):
         return []
-    before = np.maximum(long[:, None] - 1 - np.arange(BESIDE_JUMP), 0)
-    after = np.minimum(long[:, None] + np.arange(BESIDE_JUMP), len(part) - 1)
-    middles = np.concatenate([np.median(part.centers[index], axis=1) for index in (before, after)])
-    feet = base.foot(middles, part.tip_radius)
-    places = (feet.points + part.tip_radius * feet.normals).reshape(2, -1, 3)
-    return [int(k) for k in long[np.linalg.norm(places[1] - places[0], axis=1) > reach]]
+    # middles of five samples each: of the ten before the step and of the ten behind it
+    first = long[:, None] + np.arange(BESIDE_JUMP)
+    index = np.stack([first + k * BESIDE_JUMP for k in (-2, -1, 0, 1)]).clip(0, len(part) - 1)
+    middles = np.median(part.centers[index], axis=2)
+    feet = base.foot(middles.reshape(-1, 3), part.tip_radius)
+    places = (feet.points + part.tip_radius * feet.normals).reshape(4, -1, 3)
+    # a path that goes on, up a wall for instance, advances over the base as it did before or as it does behind
+    before, over, behind = np.diff(places, axis=0)
+    elsewhere = np.minimum(*(np.linalg.norm(over - usual, axis=1) for usual in (before, behind)))
+    return [int(k) for k in long[elsewhere > reach]]
 
 
 def _told(part: Trace) -> BoolArray:

@@ -112,8 +112,9 @@ def step_heights(
                 aside = lateral[i, q]
                 for m in range(modes):
                     aside -= courses[w, m] * basis[m, i, q]
-                inside = min(max(-high_side * aside, 0.0), tip)
-                square = inside * inside
-                drop = square / (tip + np.sqrt((tip - inside) * (tip + inside))) + 0.5 * bend[i, q] * square
-                total += max(heights[w] - drop, 0.0)
+                inside = max(-high_side * aside, 0.0)
+                if inside < tip:  # farther off the ball does not touch the edge, however high it is
+                    square = inside * inside
+                    drop = square / (tip + np.sqrt((tip - inside) * (tip + inside))) + 0.5 * bend[i, q] * square
+                    total += max(heights[w] - drop, 0.0)
             out[w, i] = total / nodes

@@ -55,13 +55,14 @@ def cap_height(x: ArrayLike, height: ArrayLike, radius: ArrayLike, tip_radius: f
 
 
 def step_height(x: ArrayLike, height: ArrayLike, tip_radius: float) -> FloatArray:
-    """Trace of an upward step of height 0 <= h <= r with its edge at x = 0, low side at x < 0, m.
+    """Trace of an upward step of height h >= 0 with its edge at x = 0, low side at x < 0, m.
 
-    0 up to the kink at -sqrt(2 r h - h^2), then an arc of radius r about the edge, then h.
+    0 up to the kink at -sqrt(2 r h - h^2), then an arc of radius r about the edge, then h. Up a wall of h > r the ball
+    goes straight, at x = -r, until its middle is as high as the edge.
     """
     _require_tip(tip_radius)
     inside = np.clip(-np.asarray(x, dtype=np.float64), 0.0, None)
-    return cap_height(inside, height, 0.0, tip_radius)
+    return np.where(inside < tip_radius, cap_height(inside, height, 0.0, tip_radius), 0.0)
 
 
 def groove_height(

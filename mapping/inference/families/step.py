@@ -15,7 +15,7 @@ from mapping.inference.likelihood import Prior, Window
 
 @dataclass(frozen=True, eq=False)
 class StepShape:
-    """Steps of height h < r: lateral modes of the edge, and the height.
+    """Steps of any height: lateral modes of the edge, and the height.
 
     `high_side` is +1 if the chart's lateral side is the high one, else -1. Whether the base lies low or high does
     not matter: the height of the base under each run is marginalised.

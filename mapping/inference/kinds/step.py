@@ -17,7 +17,7 @@ from mapping.inference.likelihood import Shape
 
 
 class Step(LineKind):
-    """Steps lower than the tip's radius: course and height; the higher side is the one that fits better."""
+    """Steps, up to walls: course and height; the higher side is the one that fits better."""
 
     def sizes(self, feature: Feature, tip_radius: float) -> Sizes:
         """A step has no width: its disturbance is that of a sharp edge of its height."""

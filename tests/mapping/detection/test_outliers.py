@@ -9,6 +9,7 @@ from mapping.arrays import FloatArray
 from mapping.base.base import Base
 from mapping.detection.detect import Detections, detect
 from mapping.detection.outliers import LEAST_OUT, OUT, _out
+from mapping.geometry.templates import step_height
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -67,6 +68,16 @@ def test_crests_and_notches_of_a_ball_are_not_left_out(height: float) -> None:
     result = found(sweeps(2, np.maximum(np.max(arcs, axis=0), 0.0)))
     assert result.unfelt == ()
     assert {c.sweep for c in result.crossings} == {1}
+
+
+@pytest.mark.parametrize("height", [0.5, 0.8, 2.0])
+def test_steps_as_high_as_the_ball_are_felt_from_end_to_end(height: float) -> None:
+    # hardly any noise and samples far apart: the arc about the edge bends the heights the more the steeper it is
+    x = np.arange(-30e-3, 30e-3, 0.05 * TIP)
+    heights = step_height(x - 3e-3, height * TIP, TIP) + 0.0005 * TIP * np.random.default_rng(4).standard_normal(len(x))
+    centers = np.column_stack([x, np.zeros_like(x), TIP + heights])
+    result = detect(Trace(np.arange(len(x)) * 1e-3, centers, np.zeros(len(x), dtype=np.int64), TIP), PLATE)
+    assert result.unfelt == ()
 
 
 def test_places_of_crossings_count_all_samples() -> None:

@@ -12,6 +12,7 @@ from mapping import Feature, FloatArray, IntArray, Trace
 from mapping.assembly import assemble
 from mapping.detection import detect
 from mapping.detection.path import PathLedger, path_ledger, sound_sweeps
+from mapping.geometry.templates import step_height
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -137,6 +138,16 @@ def test_sweeps_that_are_numbered_well_are_the_very_same_trace() -> None:
     base = plate()
     laid = sound_sweeps(traced(places, BUILT_ON, number), base).trace
     assert sound_sweeps(laid, base).trace is laid
+
+
+@pytest.mark.parametrize("height", [0.7, 3.0])
+def test_a_wall_that_the_ball_is_lifted_over_cuts_no_sweep(height: float) -> None:
+    x = np.arange(-30e-3, 30e-3, 0.05 * TIP_RADIUS)
+    centers = np.column_stack(
+        [x, np.zeros_like(x), TIP_RADIUS + step_height(x - 3e-3, height * TIP_RADIUS, TIP_RADIUS)]
+    )
+    trace = Trace(np.arange(len(x)) * 1e-3, centers, np.zeros(len(x), dtype=np.int64), TIP_RADIUS)
+    assert sound_sweeps(trace, plate()).cuts == ()
 
 
 def test_a_finger_set_down_elsewhere_begins_another_sweep() -> None:
