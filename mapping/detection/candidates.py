@@ -19,9 +19,10 @@ from mapping.instrument import Noise
 # A stretch reaches as far as the smoothed height exceeds this share of the crest, or 2.5 standard deviations.
 SKIRT_SHARE = 0.03
 SKIRT_SDS = 2.5
-# A crest beside a higher one counts if the valley between them is deeper than this share of the lower, or 5 sds.
+# A crest beside a higher one counts if the valley between them is deeper than this share of the lower, and than noise
+# digs anywhere on one in so many flat tops.
 PROMINENCE = 0.2
-PROMINENCE_SDS = 5.0
+DUG_BY_NOISE = 1e-3
 # What is left beside a disturbance and lower than this share of it belongs to it: no feature is exactly a cap.
 SIDE_LOBE = 0.12
 # Share of the threshold that the fitted height must reach too: at the ends of a sweep the fit knows less.
@@ -304,12 +305,13 @@ def _crests(
     """Bounds of the crests of a stretch: split at valleys deep against the noise and the lower crest beside."""
     size, sd = _smoothing(crest, (end - begin) / 2, profile, noise, tip_radius)
     smooth = np.sign(crest) * _running_mean(height, size)[begin:end]
+    dug = _dug_by_noise(max(2.0, (end - begin) / (2 * size + 1))) * sd
     valleys = []
     top = lowest = 0
     for i in range(1, len(smooth)):
         if smooth[i] < smooth[lowest]:
             lowest = i
-        needed = max(PROMINENCE * min(smooth[top], smooth[i]), PROMINENCE_SDS * sd)
+        needed = max(PROMINENCE * min(smooth[top], smooth[i]), dug)
         deep = lowest > top and smooth[i] - smooth[lowest] > needed and smooth[top] - smooth[lowest] > needed
         if deep:
             valleys.append(lowest)
@@ -317,6 +319,17 @@ def _crests(
             top = lowest = i
     bounds = [begin, *(begin + v for v in valleys), end]
     return list(itertools.pairwise(bounds))
+
+
+def _dug_by_noise(places: float) -> float:
+    """Standard deviations by which the lowest of so many independent places lies under the highest, at most.
+
+    A top and a valley may be any two of n places, n^2 / 2 pairs, and their difference scatters by sqrt(2): the long
+    top of a plateau needs more than a crest does.
+    """
+    from scipy.special import ndtri
+
+    return float(-np.sqrt(2.0) * ndtri(DUG_BY_NOISE / (0.5 * places**2)))
 
 
 def _side_lobe(new: Disturbance, found: list[Disturbance], drift: bool) -> bool:
