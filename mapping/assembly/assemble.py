@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -103,11 +104,12 @@ def _linked(detections: Detections, trace: LaidTrace, inspection: Inspection) ->
     around = Around(inspection, base, detections, tip)
     edges, crossings = edge_features(detections.crossings, around)
     crests, steps = _crests_and_steps(crossings, around, scale)
-    certain, doubtful = _grouped(crests, around.inspection, scale)
-    details = [feature for group in certain for feature in _details(group, around)]
+    fine = replace(around, inspection=inspection.over_terraces)
+    certain, doubtful = _grouped(crests, fine.inspection, scale)
+    details = [feature for group in certain for feature in _details(group, fine)]
     stepped = step_features(steps, _without_shadows(details, tip), around, scale)
     for group in doubtful:
-        details += _details([c for c in group if not on_a_step(c, steps, stepped)], around)
+        details += _details([c for c in group if not on_a_step(c, steps, stepped)], fine)
     return [*_without_shadows(details, tip), *stepped, *edges]
 
 
@@ -116,12 +118,13 @@ def _crests_and_steps(
 ) -> tuple[list[Crossing], list[Crossing]]:
     """Crests and hollows, with places along those that a sweep ran along, and the steps that are not such runs."""
     crests = [c for c in crossings if not c.is_step]
-    wrong = [c for c in crests if is_plateau_end(c, around.inspection) or is_unseen(c, around.inspection)]
+    fine = around.inspection.over_terraces
+    wrong = [c for c in crests if is_plateau_end(c, fine) or is_unseen(c, fine)]
     crossings = [c for c in crossings if c not in wrong]
     crests = [c for c in crests if c not in wrong]
     for slanted in [along(c, scale, around.base, around.tip_radius) for c in crests]:
-        crests += told_crests(slanted, around.inspection, around.tip_radius)
-    runs, steps = split_runs([c for c in crossings if c not in crests and comes_down(c, around.inspection)])
+        crests += told_crests(slanted, fine, around.tip_radius)
+    runs, steps = split_runs([c for c in crossings if c not in crests and comes_down(c, fine)])
     edges = [c for run in runs for c in (run.first, run.last)] + steps
     pitch = around.inspection.pitch
     for run in runs:
@@ -134,7 +137,7 @@ def _crests_and_steps(
 
 def _on_crest(places: Sequence[Crossing], around: Around) -> list[Crossing]:
     """Places on a run, or the crests beside them where other sweeps tell these."""
-    told = told_crests(places, around.inspection, around.tip_radius)
+    told = told_crests(places, around.inspection.over_terraces, around.tip_radius)
     return told if len(told) >= 0.5 * len(places) else list(places)
 
 

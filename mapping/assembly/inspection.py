@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from mapping import FloatArray, IntArray, Trace
 from mapping.base import Base, LaidTrace, SweepHeights
+from mapping.detection import terraced
 from mapping.instrument import Noise
 
 # Sweeps that tell the typical distance between neighbours.
@@ -30,6 +31,7 @@ class Inspection:
         sweep: (M,) number of the sweep.
         spacing: distance between neighbouring places of a sweep, m.
         normals: (M, 3) outward directions at the places; (0, 3) where they are not known.
+        lowered: (M,) mean heights over the base's own level there, where it has several, m; (0,) if it has one.
     """
 
     points: FloatArray
@@ -38,6 +40,12 @@ class Inspection:
     sweep: IntArray
     spacing: float
     normals: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    lowered: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+    @cached_property
+    def over_terraces(self) -> Inspection:
+        """The same places as what is fine sees them, which stands on whichever level: all but steps."""
+        return replace(self, height=self.lowered) if len(self.lowered) else self
 
     @cached_property
     def _tree(self) -> Any:
@@ -113,7 +121,9 @@ class Inspection:
         """The places of the sweeps with these numbers."""
         keep = np.isin(self.sweep, list(numbers))
         normals = self.normals[keep] if len(self.normals) else self.normals
-        return Inspection(self.points[keep], self.height[keep], self.sd[keep], self.sweep[keep], self.spacing, normals)
+        lowered = self.lowered[keep] if len(self.lowered) else self.lowered
+        columns = self.points[keep], self.height[keep], self.sd[keep], self.sweep[keep]
+        return Inspection(*columns, self.spacing, normals, lowered)
 
 
 class Inspections:
@@ -167,7 +177,10 @@ def _joined(
     height = np.concatenate([profile.height for profile in profiles])
     sd = _sd_of_means(noise, spacing, np.concatenate([np.diff(profile.first) for profile in profiles]))
     sweep = np.repeat([profile.sweep for profile in profiles], [len(profile.height) for profile in profiles])
-    return Inspection(np.concatenate(points), height, sd, sweep, spacing, np.concatenate(normals))
+    lowered = np.zeros(0)
+    if len(base.levels) > 1:
+        lowered = np.concatenate([terraced(profile, base, tip_radius).profile.height for profile in profiles])
+    return Inspection(np.concatenate(points), height, sd, sweep, spacing, np.concatenate(normals), lowered)
 
 
 def _sd_of_means(noise: Noise, spacing: float, count: IntArray) -> FloatArray:

@@ -75,6 +75,13 @@ class Base:
         """True of a given mesh and of a base that predicted further sweeps: what it does not explain is a feature."""
         return self.kind == "mesh" or self.missed is not None
 
+    @property
+    def levels(self) -> FloatArray:
+        """(L,) heights of the parallels that the body stands on as well, m, the first of them 0: itself."""
+        told = self.parameters.get("levels")
+        above = told[1:] if isinstance(told, list) else []
+        return np.array([0.0, *(value for value in above if isinstance(value, float))])
+
     def record(self) -> dict[str, Any]:
         """JSON values of all but the surface and the kind: the "parameters" of model.json and of a log's base."""
         missed = {} if self.missed is None else {"missed": self.missed}

@@ -10,12 +10,14 @@ import numpy as np
 
 from mapping import FloatArray, FormError, Trace, TraceError
 from mapping.base.base import Base
+from mapping.base.cells import Cells
 from mapping.base.polyhedron import polyhedron
 from mapping.base.profiles import AUTO, Form, fit_profile, profile_frame
-from mapping.base.quadrics import FAMILIES, Cloud, Family, Fitted, cylinder, plane, sheet, sphere
+from mapping.base.quadrics import FAMILIES, Cloud, Family, Fitted, cylinder, plane, quadric, sheet, sphere
 from mapping.base.star import star
+from mapping.base.terraces import terraced_plane, terraced_quadric
 from mapping.base.tube import tube
-from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_scale
+from mapping.instrument import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_scale
 
 MOST_BASE_CELLS = 4000
 # Families for what no simple one explains
@@ -29,8 +31,22 @@ FREE: tuple[Family, ...] = (
 EXPLAINED, EXACTLY = 5.0, 1.0
 
 
+# Families of few parameters, by their kind: what is fitted to half of the sweeps foretells the others
+SIMPLE: dict[str, tuple[Family, ...]] = {
+    "plane": (plane, terraced_plane),
+    "quadric": (quadric, terraced_quadric),
+    "cylinder": (cylinder,),
+    "sphere": (sphere,),
+}
+# Sweeps of each half, at least, and by how many times the scatter of neighbouring cells may be missed: that scatter is
+# of single cells, and what is missed has the fit's own error besides
+FEWEST_HALF, FORETOLD = 3, 2.0
 # Families that a form admits over an area
-AREAL_FORMS: dict[str, tuple[Family, ...]] = {"auto": FAMILIES, "line": (plane,), "arc": (cylinder, sphere)}
+AREAL_FORMS: dict[str, tuple[Family, ...]] = {
+    "auto": (*FAMILIES, terraced_plane, terraced_quadric),
+    "line": (plane, terraced_plane),
+    "arc": (cylinder, sphere),
+}
 
 
 def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO) -> Base:
@@ -76,7 +92,32 @@ def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO) -> B
             fits += _last_resort(FREE, cloud)
     scale, share = _noise_of(min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual, cloud.floor)
     best = min(fits, key=lambda fitted: fitted.cost(scale, share))
-    return Base(best.surface(cloud, spacing), best.kind, best.parameters)
+    return Base(best.surface(cloud, spacing), best.kind, best.parameters, missed=_foretold(best, trace))
+
+
+def _foretold(best: Fitted, trace: Trace) -> float | None:
+    """By how much a simple body fitted to every other sweep misses those between, m, if that is no more than noise.
+
+    None if it misses them by more, as where noise wanders or the body is none of these, and of free bodies, which
+    follow what they are fitted to.
+    """
+    family = SIMPLE.get(best.kind)
+    numbers = np.unique(trace.sweep)
+    if family is None or len(numbers) < 2 * FEWEST_HALF:
+        return None
+    half = np.isin(trace.sweep, numbers[::2])
+    cloud = Cloud.of(trace.select(half), MOST_BASE_CELLS)
+    fits = _fits(family, cloud)
+    if not fits:
+        return None
+    fit = min(fits, key=lambda fitted: fitted.cost(cloud.floor))
+    centers = Cells.of(trace.select(~half), MOST_BASE_CELLS).centers
+    base = Base(fit.surface(cloud, None), fit.kind, fit.parameters)
+    height = base.foot(centers, trace.tip_radius).height
+    noise = robust_scale(np.diff(height, 2)) / np.sqrt(6.0)
+    own = np.abs(height[:, None] - base.levels).min(axis=1)
+    missed = MAD_TO_SD * float(np.median(own))
+    return missed if missed <= FORETOLD * noise else None
 
 
 def _fits(families: Iterable[Family], cloud: Cloud) -> list[Fitted]:

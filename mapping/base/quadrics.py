@@ -21,6 +21,10 @@ BELOW = -0.6
 BENT_SCATTER_SHARE = 0.5
 
 
+# Columns (N, P) of a field that is linear in its coefficients, at x and y (N,)
+Design = Callable[[FloatArray, FloatArray], FloatArray]
+
+
 @dataclass(frozen=True, eq=False)
 class Cloud:
     """Ball centres thinned to cell medians, in the principal frame of the cloud.
@@ -131,9 +135,7 @@ class Fitted:
         return self.mesh(cloud, spacing)
 
 
-def height_field(
-    design: Callable[[FloatArray, FloatArray], FloatArray], kind: str, cloud: Cloud, bends: FloatArray | None = None
-) -> Fitted:
+def height_field(design: Design, kind: str, cloud: Cloud, bends: FloatArray | None = None) -> Fitted:
     """A height field z = design(x, y) @ coefficients over the principal plane.
 
     Args:
@@ -188,14 +190,24 @@ def _grid_faces(rows: int, columns: int) -> IntArray:
     return np.concatenate([np.column_stack([corner, right, up]), np.column_stack([right, right + 1, up])])
 
 
+def plane_design(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Columns (N, 3) of c0 + c1 x + c2 y."""
+    return np.column_stack([np.ones_like(x), x, y])
+
+
+def quadric_design(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Columns (N, 6) of a quadratic polynomial of x and y."""
+    return np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y])
+
+
 def plane(cloud: Cloud) -> Fitted:
-    """z = c0 + c1 x + c2 y."""
-    return height_field(lambda x, y: np.column_stack([np.ones_like(x), x, y]), "plane", cloud)
+    """A plane over the principal plane."""
+    return height_field(plane_design, "plane", cloud)
 
 
 def quadric(cloud: Cloud) -> Fitted:
-    """z = a quadratic polynomial of x and y."""
-    return height_field(lambda x, y: np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y]), "quadric", cloud)
+    """A quadratic polynomial over the principal plane."""
+    return height_field(quadric_design, "quadric", cloud)
 
 
 def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     )
     from mapping.detection.quiet_noise import RAW_SAMPLES as RAW_SAMPLES, smallest_crest as smallest_crest
     from mapping.detection.recovery import recovered as recovered
+    from mapping.detection.terraces import terraced as terraced
 
 _PUBLIC = {
     "coverage": ("Coverage", "FoundHeights", "coverage", "face_samples", "found_heights"),
@@ -35,5 +36,6 @@ _PUBLIC = {
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
     "quiet_noise": ("RAW_SAMPLES", "smallest_crest"),
     "recovery": ("recovered",),
+    "terraces": ("terraced",),
 }
 doorway(__name__, _PUBLIC)

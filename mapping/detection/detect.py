@@ -20,11 +20,13 @@ from mapping.detection.quiet_noise import (
     CONTACT_ROUNDING,
     RAW_SAMPLES,
     SMALLEST_CREST_SNR,
+    Stretch,
     background,
     first_noise,
     floored,
     raw_stretches,
 )
+from mapping.detection.terraces import Terraced, terraced
 from mapping.instrument import Noise, StatedNoise
 
 # Half-width of the widest disturbance that counts as fine, in tip radii.
@@ -157,7 +159,9 @@ def detect(
             largest=largest,
         )
         return _in_all(felt, keep, laid, unfelt)
-    profiles = [profile for each in of_sweeps for profile in each]
+    over = [terraced(profile, base, tip) for each in of_sweeps for profile in each]
+    profiles = [each.profile for each in over]
+    stretches = [_over_terraces(stretch, over) for stretch in stretches]
     behind = background(profiles, base, noise, stretches, first, tip, widest, stated)
     level = behind.noise
     thresholds = {
@@ -185,12 +189,14 @@ def detect(
                 found, level = weighed, effective_noise(bank, told) if told else level
                 bank = scaled
     crossings = []
-    for profile, each in zip(profiles, found, strict=True):
+    for one, each in zip(over, found, strict=True):
         disturbances = each.disturbances
         if base.kind == "profile":
-            disturbances = tuple(d for d in disturbances if _stands_out(d, profile, level, tip))
-        for disturbance in sorted(disturbances, key=lambda d: d.place):
-            crossings += _crossings(disturbance, profile, base, tip)
+            disturbances = tuple(d for d in disturbances if _stands_out(d, one.profile, level, tip))
+        own = [c for d in disturbances for c in _crossings(d, one.profile, base, tip)]
+        for edge in one.edges:
+            own += [c for c in _crossings(edge.step(level, tip), edge.piece, base, tip) if c.kind in STEP_CROSSINGS]
+        crossings += sorted(own, key=lambda c: c.t)
     crossings, unresolved = _resolved(crossings, trace.resolution)
     left_out += unresolved
     if algorithm != 3:
@@ -209,6 +215,14 @@ def detect(
         of_each,
         remarks,
     )
+
+
+def _over_terraces(stretch: Stretch, over: Sequence[Terraced]) -> Stretch:
+    """A stretch of samples over the levels that its sweep runs on."""
+    height = stretch.height
+    for each in (each for each in over if each.profile.sweep == stretch.sweep):
+        height = each.lower(stretch.s, height)
+    return replace(stretch, height=height)
 
 
 def _inspected(profiles: list[SweepHeights], banks: dict[float, Bank]) -> tuple[tuple[int, float], ...]:

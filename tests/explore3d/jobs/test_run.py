@@ -67,9 +67,10 @@ def wire(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Analysis]:
 
 
 def record(folder: Path) -> dict[str, Any]:
-    """model.json without the timings, and without what a run's finger left out, which no log knows."""
+    """model.json without the timings, without what a run's finger left out, which no log knows, and without the hash of
+    the log, which names the scene's folder."""
     document: dict[str, Any] = json.loads((folder / "model.json").read_text())
-    del document["timings"]
+    del document["timings"], document["provenance"]["log_sha256"]
     document["left_out"] = [stage for stage in document["left_out"] if stage["stage"] != "dynamics"]
     return document
 

@@ -1,0 +1,141 @@
+"""Terraces: a height field that stands on several levels, as a plate with a step or a wide groove does.
+
+Half of what is felt of such a body lies off any smooth surface. Taken for outliers it costs so much that a freer
+family, which bends over the edges, would explain the trace better, and hide the step or leave ghosts beside it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapping import FloatArray, IntArray
+from mapping.base.quadrics import Cloud, Design, Fitted, height_field, plane_design, quadric_design
+from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit
+
+# Cells whose heights are compared lie this share of the cloud's extent apart: near enough that most pairs stand on one
+# level, a staircase's too, and far enough that their differences tell the slope
+PAIRS_APART = 1 / 8
+# Of all cells so many must have a partner: with lines as far apart as that, a third of them has none
+FEWEST_PAIRS = 0.4
+# A place is a parameter that only one cell in n fits: it costs twice what a level does (2 log n against log n)
+EDGE_FREEDOM = 2
+MOST_LEVELS, LEVEL_ROUNDS = 8, 6
+
+
+@dataclass(frozen=True, eq=False)
+class _Levels:
+    """Heights (L,) over the field, m, the first of them 0, and the level (C,) of each cell; -1: on none of them."""
+
+    heights: FloatArray
+    level: IntArray
+
+    @property
+    def freedom(self) -> int:
+        """Of the levels beyond the first and of the places on the path where one gives way to another."""
+        standing = self.level[self.level >= 0]
+        edges = int((np.diff(standing) != 0).sum())
+        return len(self.heights) - 1 + EDGE_FREEDOM * edges
+
+
+def terraced_plane(cloud: Cloud) -> Fitted | None:
+    """A plane and its parallels: see `terraced`."""
+    return terraced(plane_design, "plane", cloud)
+
+
+def terraced_quadric(cloud: Cloud) -> Fitted | None:
+    """A quadric and its parallels: see `terraced`."""
+    return terraced(quadric_design, "quadric", cloud)
+
+
+def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
+    """A height field z = design(x, y) @ coefficients + one of a few levels, or None where one level is enough.
+
+    The field's slopes come from differences of heights of cells that lie apart, of which most stand on one level. A
+    level counts if the cells on it gain more than its height and the places of its edges cost. The field of the level
+    with the most cells is the base; the others are what detection finds as steps.
+    """
+    x, y, z = cloud.points.T
+    columns = design(x, y)
+    pairs = _pairs(cloud)
+    if pairs is None:
+        return None
+    one, other = pairs
+    # what differences cannot tell, the constant, comes out as zero: the levels hold it
+    slopes = robust_fit(columns[one] - columns[other], z[one] - z[other], np.sqrt(2.0) * cloud.scale).coefficients
+    rest = z - columns @ slopes
+    levels = _levels(rest, cloud.floor)
+    for _ in range(LEVEL_ROUNDS):
+        if len(levels.heights) < 2:
+            return None
+        on = np.maximum(levels.level, 0)
+        fit = robust_fit(columns, z - levels.heights[on], cloud.scale)
+        before, rest = levels, z - columns @ fit.coefficients
+        levels = _levels(rest, cloud.floor)
+        if np.array_equal(before.level, levels.level):
+            break
+    if len(levels.heights) < 2:
+        return None
+    on = np.maximum(levels.level, 0)
+    lowered = replace(cloud, points=np.column_stack([x, y, z - levels.heights[on]]))
+    flat = height_field(design, kind, lowered)
+    # along the field's normal in the middle, not along the axis of a cloud that the step itself tilts
+    slope = np.asarray(flat.parameters["coefficients"], dtype=np.float64)[1:3]
+    heights = levels.heights / np.sqrt(1.0 + slope @ slope)
+    return replace(
+        flat, parameters=flat.parameters | {"levels": heights.tolist()}, freedom=flat.freedom + levels.freedom
+    )
+
+
+def _pairs(cloud: Cloud) -> tuple[IntArray, IntArray] | None:
+    """Cells (P,) and those (P,) that lie PAIRS_APART of the extent from them, along x and along y, or as near as lines allow.
+
+    None if there are too few of them along one of the two: then each line could stand on a level of its own.
+    """
+    from scipy.spatial import cKDTree
+
+    flat = cloud.points[:, :2]
+    tree, extent = cKDTree(flat), np.ptp(flat, axis=0)
+    one, other = [], []
+    for axis in range(2):
+        for share in (PAIRS_APART, 2 * PAIRS_APART, 4 * PAIRS_APART):
+            away = np.zeros(2)
+            away[axis] = share * extent[axis]
+            distance, found = tree.query(flat + away)
+            near = np.flatnonzero(distance < 0.5 * away[axis])
+            if len(near) > FEWEST_PAIRS * len(flat):
+                break
+        else:
+            return None
+        one.append(near)
+        other.append(np.asarray(found, dtype=np.int64)[near])
+    return np.concatenate(one), np.concatenate(other)
+
+
+def _levels(rest: FloatArray, scale: float) -> _Levels:
+    """Levels of what is left (C,) of the heights, the one with the most cells first, as long as each pays."""
+    reach = FEATURE_RESIDUAL_SDS * scale
+    heights: list[float] = []
+    level = np.full(len(rest), -1, dtype=np.int64)
+    price = float(np.log(len(rest)))
+    while len(heights) < MOST_LEVELS and (level < 0).any():
+        height = _densest(np.sort(rest[level < 0]), reach)
+        here = (level < 0) & (np.abs(rest - height) < reach)
+        new = np.where(here, len(heights), level)
+        gain = float((FEATURE_RESIDUAL_SDS**2 - ((rest[here] - height) / scale) ** 2).sum())
+        before = _Levels(np.array(heights), level).freedom if heights else 0
+        cost = price * (_Levels(np.array([*heights, height]), new).freedom - before)
+        if heights and gain <= cost:
+            break
+        heights.append(height)
+        level = new
+    return _Levels(np.array(heights) - heights[0], level)
+
+
+def _densest(ordered: FloatArray, reach: float) -> float:
+    """The middle of the window of twice the reach that holds the most of ordered values."""
+    stop: IntArray = np.searchsorted(ordered, ordered + 2 * reach, side="right").astype(np.int64)
+    count = stop - np.arange(len(ordered))
+    begin = int(count.argmax())
+    return float(np.median(ordered[begin : begin + count[begin]]))

@@ -1,0 +1,139 @@
+"""Terraces under a profile: heights over the level that a sweep runs on, and the edges between two levels.
+
+A base that stands on several levels (mapping.base) is one of them; over the others every sweep stands off it for a
+long way. What is fine on a terrace is sought over its own level, and an edge in a piece of its own, as on any plate.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapping import BoolArray, FloatArray, IntArray
+from mapping.base import Base, SweepHeights
+from mapping.detection.cap_fit import Disturbance, fit_cap
+from mapping.instrument import FEATURE_RESIDUAL_SDS, Noise, robust_scale
+
+# A sweep runs on a level if it keeps to it for so many tip radii: what is narrower is a detail on the level below. On
+# either side of an edge as much is looked at, and an arc about an edge is at most one radius wide.
+TERRACE = 4.0
+# Half of the stretch (tip radii) over which means tell the level: single bins of noise tell none, and the arc about an
+# edge of a hundredth of the radius, sqrt(2 / 100) wide, is as wide as the stretch
+MEAN = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """The two terraces about an edge: heights over the lower one, and the bins (first, past-last) that stand off it."""
+
+    piece: SweepHeights
+    high: tuple[int, int]
+
+    def step(self, noise: Noise, tip_radius: float) -> Disturbance:
+        """The higher terrace as a plateau, which goes on beyond the piece on its other side."""
+        return fit_cap(self.piece.height, self.high, 1.0, self.piece, noise, 0, tip_radius)
+
+
+@dataclass(frozen=True, eq=False)
+class Terraced:
+    """A profile over its own terraces.
+
+    Args:
+        profile: heights over the level that the sweep runs on; where it goes from one to the other, those
+            of the terrace behind, mirrored.
+        edges: of each such place.
+        level: (n,) of each bin, m, NaN on the way from one to another; None of a profile that is as it was.
+    """
+
+    profile: SweepHeights
+    edges: tuple[Edge, ...] = ()
+    level: FloatArray | None = None
+
+    def lower(self, s: FloatArray, height: FloatArray) -> FloatArray:
+        """Heights (N,) at arclengths s (N,) of the same sweep over the level there, NaN on the way between two, m."""
+        if self.level is None:
+            return height
+        index = np.floor((s - self.profile.start) / self.profile.spacing + 0.5).astype(np.int64)
+        inside = (index >= 0) & (index < len(self.level))
+        return np.asarray(height - np.where(inside, self.level[np.clip(index, 0, len(self.level) - 1)], 0.0))
+
+
+def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
+    """The profile over its terraces; as it is if the base has one level, or the sweep runs on none for long."""
+    levels = base.levels
+    if len(levels) < 2:
+        return Terraced(profile)
+    reach = int(TERRACE * tip_radius / profile.spacing)
+    # single bins of noise change no level: means over a stretch that an edge's arc is still wider than
+    smooth = _means(profile.height, int(MEAN * tip_radius / profile.spacing))
+    own = np.abs(smooth[:, None] - levels)
+    noise = float(robust_scale(np.diff(profile.height, 2)) / np.sqrt(6.0))
+    runs = _runs(own.argmin(axis=1), own.min(axis=1) < FEATURE_RESIDUAL_SDS * noise, reach)
+    # a long way from one level to the next is no edge, and the base's levels are none of this sweep's
+    if not runs or any(onward - end > reach for (_, end, _), (onward, _, _) in itertools.pairwise(runs)):
+        return Terraced(profile)
+    # an arc is higher than the noise only so far from its end, and the means come a little nearer
+    beside = int((MEAN * tip_radius + np.sqrt(2 * tip_radius * FEATURE_RESIDUAL_SDS * noise)) / profile.spacing) + 1
+    height, edges = profile.height - levels[runs[0][2]], []
+    level = np.full(len(height), levels[runs[-1][2]])
+    for (begin, end, here), (onward, last, there) in itertools.pairwise(runs):
+        height[onward:] += levels[here] - levels[there]
+        # the way from one to the other is no path over a base: the terrace behind it stands in, with its noise
+        way = np.arange(max(begin, end - beside), min(last, onward + beside))
+        level[0 if begin == runs[0][0] else begin : end] = levels[here]
+        level[way] = np.nan
+        height[way] = height[np.clip(2 * way[-1] + 1 - way, 0, last - 1)]
+        # details of the two terraces are none of the edge's
+        plain = profile.height.copy()
+        for ground, detail in ((here, slice(begin, end - reach)), (there, slice(onward + reach, last))):
+            stands = np.abs(plain[detail] - levels[ground]) >= FEATURE_RESIDUAL_SDS * noise
+            plain[detail][stands] = levels[ground]
+        piece = _piece(replace(profile, height=plain - min(levels[here], levels[there])), begin, last)
+        up = levels[there] > levels[here]
+        edges.append(Edge(piece, (end - begin, last - begin) if up else (0, onward - begin)))
+    return Terraced(replace(profile, height=height), tuple(edges), level)
+
+
+def _runs(level: IntArray, on: BoolArray, shortest: float) -> list[tuple[int, int, int]]:
+    """(first bin, past-last bin, level) of the stretches on one level; details interrupt none of them."""
+    at = np.flatnonzero(on)
+    if not len(at):
+        return []
+    cuts = np.flatnonzero(np.diff(level[at]) != 0) + 1
+    bounds = zip([0, *cuts], [*cuts, len(at)], strict=True)
+    pieces = [(int(at[b]), int(at[e - 1]) + 1, int(level[at[b]])) for b, e in bounds]
+    runs: list[tuple[int, int, int]] = []
+    for begin, end, own in (piece for piece in pieces if piece[1] - piece[0] > shortest):
+        if runs and runs[-1][2] == own:
+            runs[-1] = (runs[-1][0], end, own)
+        else:
+            runs.append((begin, end, own))
+    return runs
+
+
+def _means(height: FloatArray, half: int) -> FloatArray:
+    """(n,) means over 2 half + 1 bins, over fewer at the ends."""
+    sums = np.concatenate([[0.0], np.cumsum(height)])
+    index = np.arange(len(height))
+    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(height))
+    return np.asarray((sums[high] - sums[low]) / (high - low))
+
+
+def _piece(profile: SweepHeights, low: int, high: int) -> SweepHeights:
+    own = slice(low, high)
+
+    def cut(rows: FloatArray | None) -> FloatArray | None:
+        return None if rows is None else rows[own]
+
+    return replace(
+        profile,
+        start=profile.start + low * profile.spacing,
+        height=profile.height[own],
+        first=profile.first[low : high + 1],
+        t=profile.t[own],
+        centers=profile.centers[own],
+        feet=cut(profile.feet),
+        normals=cut(profile.normals),
+    )
