@@ -16,9 +16,6 @@ from mapping.geometry.mesh import NearestPoint
 if TYPE_CHECKING:
     from mapping.geometry.curvature import Curvature
 
-# Values within so many standard deviations of zero are drawn flat: their colour would be noise.
-SIGNIFICANT = 3.0
-FLAT_COLOUR = np.array([0.93, 0.93, 0.93])
 NOT_VALID = np.array([0.75, 0.75, 0.75])
 # ColorBrewer's RdBu from blue over white to red, evenly spaced: red and blue of equal weight, told apart by everybody
 # (Brewer, Hatchard and Harrower, ColorBrewer in print, 2003)
@@ -39,8 +36,8 @@ MARKS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 def curvature_picture(
     surface: Surface, curvature: Curvature, tip_radius: float, base: Surface, features: Sequence[Feature]
 ) -> bytes:
-    """SVG of k1 and k2 in units of 1/r: red bulges out, blue bends in; pale where
-    the value is within three standard deviations of zero, grey where none is valid.
+    """SVG of k1 and k2 in units of 1/r: red bulges out, blue bends in; the paler, the less sure
+    it is which of both, grey where no value is valid.
 
     A row for each view of the object's own picture; what merely closes an opening of the object is not drawn.
 
@@ -54,15 +51,14 @@ def curvature_picture(
     areas = surface.face_areas[:, None]
     directions = view_directions(surface.face_normals * areas / areas.mean(), features, base)[:MOST_ROWS]
     surface = _without_lids(surface, base, tip_radius)
-    scaled = [np.asarray(values) * tip_radius for values in (curvature.k1, curvature.k2)]
+    scaled, sd = [np.asarray(values) * tip_radius for values in (curvature.k1, curvature.k2)], curvature.sd * tip_radius
     top = _span(scaled, curvature.valid)
     content, down, right = "", CURVATURE_TITLE, 0.0
     for direction in directions:
         camera = cameras_for(surface.vertices, [direction, direction])[0]
         width, height = camera.width / SUPERSAMPLING, camera.height / SUPERSAMPLING
         for left, values, name in zip((0.0, width), scaled, ("larger, k₁", "smaller, k₂"), strict=True):
-            colours = coloured(0.5 + 0.5 * values / top)
-            colours[np.abs(values) < SIGNIFICANT * curvature.sd * tip_radius] = FLAT_COLOUR
+            colours = coloured(0.5 + 0.5 * faded(values / top, sd / top))
             colours[~curvature.valid] = NOT_VALID
             if not right:
                 content += text_at(left + 4.0, 18.0, f"Principal curvature, {name}", size=1.1 * FONT_SIZE, bold=True)
@@ -73,6 +69,23 @@ def curvature_picture(
     middle = 0.5 * (CURVATURE_TITLE + down - bar)
     content += shifted(_bar(marks, "curvature × tip radius", bar), right + 14.0, middle)
     return drawing(right + BAR_ROOM, down + 10.0, content)
+
+
+def faded(shares: FloatArray, sd: FloatArray) -> FloatArray:
+    """(N,) shares of the scale, -1 to 1, drawn towards 0 by how unsure their signs are.
+
+    By the probability of the sign less that of the other one. A limit instead, such as three standard deviations, makes
+    flecks: by the wire of wire_on_plate 5 % of the values are beyond three and a half, half from one to two and a half.
+
+    Args:
+        shares: (N,) values as shares of the scale's end; beyond it they count as its end.
+        sd: (N,) their standard deviations; NaN where nobody knows, whose values are taken for sure.
+    """
+    from scipy.special import ndtr
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sure = 2.0 * ndtr(np.abs(shares) / sd) - 1.0
+    return np.clip(shares, -1.0, 1.0) * np.where(np.isnan(sure), 1.0, sure)
 
 
 def _without_lids(surface: Surface, base: Surface, tip_radius: float) -> Surface:

@@ -53,7 +53,7 @@ def object_picture(base: Surface, features: Sequence[Feature], sweeps: Sequence[
     """
     normals = np.concatenate([np.zeros((0, 3)), *(path.normals for path in sweeps)])
     shown = _close_up(base, np.concatenate([np.zeros((0, 3)), *(path.points for path in sweeps)]))
-    cameras = cameras_for(shown, view_directions(normals, features, base))
+    cameras = cameras_for(shown, view_directions(normals, features, base, shown))
     content, right, down = "", 0.0, 0.0
     for first in range(0, len(cameras), PANELS_PER_ROW):
         left, row = 0.0, cameras[first : first + PANELS_PER_ROW]
@@ -80,13 +80,16 @@ def shifted(content: str, left: float, top: float = 0.0) -> str:
     return f'<g transform="translate({number(left)} {number(top)})">{content}</g>'
 
 
-def view_directions(normals: FloatArray, features: Sequence[Feature], base: Surface) -> list[FloatArray]:
+def view_directions(
+    normals: FloatArray, features: Sequence[Feature], base: Surface, shown: FloatArray | None = None
+) -> list[FloatArray]:
     """Directions towards the camera: one, oblique, over a flat body; two or more round a closed body.
 
     Args:
         normals: (N, 3) outward, of the parts that are to be seen.
         features: as many views are taken, up to MOST_VIEWS, as it needs for each of them to be in sight.
         base: what may stand before them.
+        shown: (P, 3) what the pictures have room for, m; None: the base.
     """
     mean = normals.mean(axis=0) if len(normals) else np.array([0.0, 0.0, 1.0])
     if np.linalg.norm(mean) > ROUND:
@@ -102,7 +105,8 @@ def view_directions(normals: FloatArray, features: Sequence[Feature], base: Surf
         return [first, first * [-1.0, -1.0, 1.0]]
     azimuths = np.linspace(0.0, 2.0 * np.pi, AZIMUTHS, endpoint=False)
     wishes = np.array([[np.cos(angle), np.sin(angle), height] for height in VIEW_HEIGHTS for angle in azimuths])
-    facing, whole = _facing(wishes, features, base)
+    room = base.vertices[np.unique(base.faces)] if shown is None else shown
+    facing, whole = _facing(np.array([camera.eye for camera in cameras_for(room, list(wishes))]), features, base)
     # of two views: those that show most of the features, and most of each in one of them, then as squarely as may be,
     # from opposite sides, from above
     both = np.maximum(facing[:, None], facing[None])
@@ -118,13 +122,15 @@ def view_directions(normals: FloatArray, features: Sequence[Feature], base: Surf
     return list(wishes[chosen])
 
 
-def _facing(directions: FloatArray, features: Sequence[Feature], base: Surface) -> tuple[FloatArray, FloatArray]:
-    """(D, F) how squarely features are seen from far away in directions (D, 3), and what share of each is in sight.
+def _facing(eyes: FloatArray, features: Sequence[Feature], base: Surface) -> tuple[FloatArray, FloatArray]:
+    """(E, F) how squarely features are seen from eyes (E, 3), and what share of each is in sight.
+
+    Eyes, not directions: a picture is taken from some two sizes of the body away, where a near part of it hides what
+    would be seen past it from afar, such as a bump in the hole of a ring.
 
     Cosines, 0 where a feature is out of sight: of a line the mean over places along it; it is out of sight where its
     middle is, which bears its label.
     """
-    away = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     places = np.concatenate([resample(feature.axis, SEEN_PLACES) for feature in features])
     nearest = [
         np.linalg.norm(feature.axis[:, None] - resample(feature.axis, SEEN_PLACES), axis=2).argmin(axis=0)
@@ -133,11 +139,13 @@ def _facing(directions: FloatArray, features: Sequence[Feature], base: Surface) 
     normals = np.concatenate([feature.normals[each] for feature, each in zip(features, nearest, strict=True)])
     # a line of sight is the way of a small ball from the place to the camera
     size = SIGHT_SHARE * base.size
-    origins = np.broadcast_to(places + 2.0 * size * normals, (len(away), *places.shape)).reshape(-1, 3)
-    ways = BallContact(base, size).first_contact(origins, np.repeat(away, len(places), axis=0))
-    cosines = away @ normals.T
-    free = ((ways.count == 0) & ~ways.overlap).reshape(cosines.shape) & (cosines > LEAST_FACING)
-    seen = np.where(free, cosines, 0.0).reshape(len(away), len(features), SEEN_PLACES)
+    starts = places + 2.0 * size * normals
+    ways = eyes[:, None] - starts
+    ways = ways / np.linalg.norm(ways, axis=2, keepdims=True)
+    found = BallContact(base, size).first_contact(np.tile(starts, (len(eyes), 1)), ways.reshape(-1, 3))
+    cosines = np.einsum("epk,pk->ep", ways, normals)
+    free = ((found.count == 0) & ~found.overlap).reshape(cosines.shape) & (cosines > LEAST_FACING)
+    seen = np.where(free, cosines, 0.0).reshape(len(eyes), len(features), SEEN_PLACES)
     in_sight = seen[:, :, SEEN_PLACES // 2] > 0.0
     return np.where(in_sight, seen.mean(axis=2), 0.0), np.where(in_sight, (seen > 0.0).mean(axis=2), 0.0)
 

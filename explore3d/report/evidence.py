@@ -53,7 +53,7 @@ def curvature_maps(pictures: Pictures) -> Html:
         return Html("")
     caption = (
         "Principal curvatures of the estimated surface in units of the tip's own curvature 1/r. Red bulges out, blue "
-        "bends in; pale: within three standard deviations of zero; grey: no valid value. "
+        "bends in; the paler, the less sure it is which of both; grey: no valid value. "
         "A fillet of exactly −1 is the tip's own shape, left where it could not reach."
     )
     return section("Curvature", "curvature", figure(pictures.files["curvature"], "Maps of curvature", caption))

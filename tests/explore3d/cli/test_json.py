@@ -13,7 +13,7 @@ from two_features import two_features
 
 from explore3d.bench.precision import bench
 from explore3d.bench.precision.work_precision import LeftOutMethod, Point, Stage
-from explore3d.cli.main import app
+from explore3d.cli.main import command_line
 
 MESHES = Path(__file__).parents[3] / "assets" / "meshes"
 
@@ -30,7 +30,7 @@ def told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_every_command_has_it() -> None:
-    for command in app.registered_commands:
+    for command in command_line().registered_commands:
         assert command.callback is not None
         assert "json" in command.callback.__annotations__, command.callback.__name__
 

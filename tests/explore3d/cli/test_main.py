@@ -12,13 +12,14 @@ from pathlib import Path
 import pytest
 from in_process import explore3d_main
 from scene_files import write_scene_file
+from typer.testing import CliRunner
 
 from explore3d import __version__
 from explore3d.cli.bench import bench
-from explore3d.cli.main import app
+from explore3d.cli.main import command_line
 
 SCENES = Path(__file__).parents[3] / "assets" / "scenes"
-COMMANDS = [command.callback.__name__ for command in app.registered_commands if command.callback]
+COMMANDS = [command.callback.__name__ for command in command_line().registered_commands if command.callback]
 BENCHES = [command.callback.__name__ for command in bench.registered_commands if command.callback]
 
 
@@ -39,6 +40,15 @@ def test_the_help_lists_every_command(monkeypatch: pytest.MonkeyPatch, capsys: p
     assert explore3d_main(monkeypatch, "--help") == 0
     out = capsys.readouterr().out
     assert all(re.search(rf"^ +{command} ", out, re.M) for command in COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_loaded_alone_is_the_one_among_all(command: str) -> None:
+    alone = command_line(command)
+    assert [each.callback.__name__ for each in alone.registered_commands if each.callback] == [command]
+    assert not alone.registered_groups
+    helps = [CliRunner().invoke(line, [command, "--help"], prog_name="explore3d") for line in (alone, command_line())]
+    assert helps[0].output == helps[1].output != ""
 
 
 STORED = [

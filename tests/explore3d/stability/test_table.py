@@ -8,7 +8,7 @@ from math import inf, nan
 import pytest
 from typer.testing import CliRunner
 
-from explore3d.cli.main import app
+from explore3d.cli.main import command_line
 from explore3d.stability import table as table
 from explore3d.stability.exact_decimal import arctan, condition, exact, relative_error
 from explore3d.stability.table import EPS, SLACK, Answer, Case, Row, cells, digits, summary
@@ -74,7 +74,7 @@ def test_no_quick_case_fails(group):
 
 
 def test_the_command_writes_page_and_table_and_ends_with_a_summary(tmp_path):
-    result = CliRunner().invoke(app, ["stability", "--only", "kink beside", "--out", str(tmp_path)])
+    result = CliRunner().invoke(command_line(), ["stability", "--only", "kink beside", "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
     assert result.output.splitlines()[-1].startswith("stability: 1 cases, 0 failed")
     assert "printed form" in (tmp_path / "stability.html").read_text()

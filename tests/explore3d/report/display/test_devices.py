@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from explore3d import UserError
-from explore3d.cli.main import app
+from explore3d.cli.main import command_line
 from explore3d.report.display import devices, display_device
 from hw.display import SimulatedDisplay
 from mapping import Feature, Interval, ObjectModel, Support, Surface
@@ -61,7 +61,9 @@ def test_an_installed_device_is_loaded_when_it_is_asked_for(monkeypatch: pytest.
 
 
 def test_display_says_what_was_felt(folder: Path) -> None:
-    told = CliRunner().invoke(app, ["display", str(folder), "--fast", "--json", "--log", str(folder / "felt.mcap")])
+    told = CliRunner().invoke(
+        command_line(), ["display", str(folder), "--fast", "--json", "--log", str(folder / "felt.mcap")]
+    )
     assert told.exit_code == 0
     record = json.loads(told.stdout)
     assert record["reason"] == "done" and record["samples"] > 1000 and record["least_energy"] >= 0.0
@@ -72,7 +74,7 @@ def test_vibrate_writes_each_format(folder: Path) -> None:
     for ending in ("wav", "ahap", "hjif"):
         out = folder / f"crossing.{ending}"
         path = "-6 mm, 0 mm, 0 mm; 6 mm, 0 mm, 0 mm"
-        told = CliRunner().invoke(app, ["vibrate", str(folder), "--path", path, "--out", str(out)])
+        told = CliRunner().invoke(command_line(), ["vibrate", str(folder), "--path", path, "--out", str(out)])
         assert told.exit_code == 0 and "2 events" in told.stdout
         assert out.stat().st_size > 1000
 
@@ -89,5 +91,5 @@ def test_vibrate_writes_each_format(folder: Path) -> None:
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(folder: Path, words: list[str], message: str) -> None:
-    told = CliRunner().invoke(app, [words[0], str(folder), *words[1:]])
+    told = CliRunner().invoke(command_line(), [words[0], str(folder), *words[1:]])
     assert told.exit_code != 0 and message in str(told.exception)
