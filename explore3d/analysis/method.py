@@ -447,6 +447,8 @@ def curvature_taken(work: Work, share: Share) -> None:
     """Principal curvatures at the vertices of the estimated surface."""
     if work.estimate is not None and work.estimate.surface is not None:
         work.curvature = principal_curvatures(work.estimate.surface, noise=work.estimate.sd)
+        for remark in work.curvature.remarks:
+            work.stages.left_out.append(LeftOut("curvature by libigl", remark))
 
 
 def why_no_roughness(work: Work) -> str | None:
@@ -471,10 +473,17 @@ def modelled(work: Work, share: Share) -> None:
     path = {} if work.path is None else {"path": work.path.record()}
     rough = {} if work.roughness is None else {"roughness": work.roughness.record()}
     deviation = {} if work.deviation is None else {"deviation": work.deviation.record()}
+    curved = {} if work.curvature is None else {"curvature": work.curvature.record()}
     work.model = ObjectModel.attach(
         work.base,
         in_model_frame(work.features, work.base),
-        provenance=_provenance(work) | {"inspection": work.inspected.record()} | surface | path | deviation | rough,
+        provenance=_provenance(work)
+        | {"inspection": work.inspected.record()}
+        | surface
+        | path
+        | deviation
+        | curved
+        | rough,
         inspected=work.inspected.height,
         reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
         dropped=work.dropped,

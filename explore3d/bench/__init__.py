@@ -7,11 +7,17 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from explore3d.bench.apparatus import findings_table as findings_table, write_apparatus as write_apparatus
     from explore3d.bench.curvature import (
+        CURVATURE_SEEDS as CURVATURE_SEEDS,
         CurvatureAccuracy as CurvatureAccuracy,
+        CurvatureCell as CurvatureCell,
         available as available,
+        bench_cells as bench_cells,
         bench_curvature as bench_curvature,
+        cell_table as cell_table,
+        cell_verdicts as cell_verdicts,
         curvature_table as curvature_table,
         write_bench as write_bench,
+        write_cells as write_cells,
     )
     from explore3d.bench.dynamics import (
         dynamics_curve as dynamics_curve,
@@ -40,7 +46,19 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "apparatus": ("findings_table", "write_apparatus"),
-    "curvature": ("CurvatureAccuracy", "available", "bench_curvature", "curvature_table", "write_bench"),
+    "curvature": (
+        "CURVATURE_SEEDS",
+        "CurvatureAccuracy",
+        "CurvatureCell",
+        "available",
+        "bench_cells",
+        "bench_curvature",
+        "cell_table",
+        "cell_verdicts",
+        "curvature_table",
+        "write_bench",
+        "write_cells",
+    ),
     "dynamics": ("dynamics_curve", "dynamics_table", "wire_trace"),
     "figures": ("write_figures",),
     "scaling": ("AXES", "bench_scaling", "scaling_lines"),

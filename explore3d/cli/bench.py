@@ -85,6 +85,10 @@ def curvature(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for table and picture.")] = Path("out/curvature"),
     largest: Annotated[int, typer.Option(min=10_000, help="Most vertices; tenfold steps from 10 000.")] = 100_000,
     peers: Annotated[bool, typer.Option(help="Measure libigl, pymeshlab and a plain jet too.")] = True,
+    cells: Annotated[
+        bool, typer.Option(help="Five bodies, three samplings, four noises: errors, apex and coverage; not the speed.")
+    ] = False,
+    seeds: Annotated[int, typer.Option(min=1, max=3, help="Seeds of each cell.")] = 3,
 ) -> None:
     """Error, speed and memory of principal curvatures on bodies that have them in closed form.
 
@@ -95,6 +99,9 @@ def curvature(
     methods, missing = available()
     if peers:
         _print(missing)
+    if cells:
+        _curvature_cells(["explore3d", "jets alone", *methods[1:]] if peers else methods[:1], seeds, out)
+        return
     sizes = [count for count in (10_000, 100_000, 1_000_000) if count <= largest]
     lines: list[CurvatureAccuracy] = []
 
@@ -105,6 +112,21 @@ def curvature(
 
     _print(curvature_table(kept()))
     _print(map(str, write_bench(lines, out)))
+
+
+def _curvature_cells(methods: list[str], seeds: int, out: Path) -> None:
+    from explore3d.bench import CURVATURE_SEEDS, CurvatureCell, bench_cells, cell_table, cell_verdicts, write_cells
+
+    lines: list[CurvatureCell] = []
+
+    def kept() -> Iterable[CurvatureCell]:
+        for line in bench_cells(methods, CURVATURE_SEEDS[:seeds]):
+            lines.append(line)
+            yield line
+
+    _print(cell_table(kept()))
+    _print(cell_verdicts(lines))
+    _print(map(str, write_cells(lines, out)))
 
 
 @bench.command()

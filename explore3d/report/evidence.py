@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import isfinite
 
 from explore3d.analysis import STANDARDS_SENTENCE, Analysis, Comparison
+from explore3d.report.findings import curvature_lines
 from explore3d.report.markup import Html, Row, badge, element, figure, folded, paragraph, section, table
 from explore3d.report.pictures import Pictures, shown_features
 from mapping import UNKNOWN_TEXT, length_text
@@ -47,7 +48,7 @@ def posteriors(pictures: Pictures) -> Html:
     return section("Posteriors", "posteriors", *content) if content else Html("")
 
 
-def curvature_maps(pictures: Pictures) -> Html:
+def curvature_maps(analysis: Analysis, pictures: Pictures) -> Html:
     """Principal curvatures of the estimated surface."""
     if "curvature" not in pictures.files:
         return Html("")
@@ -56,7 +57,8 @@ def curvature_maps(pictures: Pictures) -> Html:
         "bends in; the paler, the less sure it is which of both; grey: no valid value. "
         "A fillet of exactly −1 is the tip's own shape, left where it could not reach."
     )
-    return section("Curvature", "curvature", figure(pictures.files["curvature"], "Maps of curvature", caption))
+    maps = figure(pictures.files["curvature"], "Maps of curvature", caption)
+    return section("Curvature", "curvature", maps, *(paragraph(line) for line in curvature_lines(analysis)))
 
 
 def roughness_table(analysis: Analysis) -> Html:

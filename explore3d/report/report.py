@@ -66,7 +66,7 @@ def report_page(analysis: Analysis, pictures: Pictures, sweeps: Sequence[SweepPa
         standard_heights_table(analysis),
         cross_sections(analysis, pictures),
         posteriors(pictures),
-        curvature_maps(pictures),
+        curvature_maps(analysis, pictures),
         compared_with_truth(analysis, pictures),
         what_was_left_out(analysis, pictures),
         account_of_time(analysis),

@@ -21,6 +21,12 @@ if TYPE_CHECKING:
         sphere_mesh as sphere_mesh,
         tube as tube,
     )
+    from explore3d.bench.scenes.curved_bodies import (
+        CURVED_BODIES as CURVED_BODIES,
+        SAMPLINGS as SAMPLINGS,
+        CurvedBody as CurvedBody,
+        curved_body as curved_body,
+    )
     from explore3d.bench.scenes.drawn_kinds import DRAWN_KINDS as DRAWN_KINDS
     from explore3d.bench.scenes.exploring import (
         BENCH_TIP_RADIUS as BENCH_TIP_RADIUS,
@@ -71,6 +77,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "any_body": ("ANY_BODIES", "BODY_BUILDING_SEEDS", "BODY_REPORTED_SEEDS", "FILED_BODIES", "any_body"),
     "bodies": ("Mesh", "blob", "blob_normals", "cylinder", "joined", "sphere_mesh", "tube"),
+    "curved_bodies": ("CURVED_BODIES", "SAMPLINGS", "CurvedBody", "curved_body"),
     "drawn_kinds": ("DRAWN_KINDS",),
     "exploring": ("BENCH_TIP_RADIUS", "BenchScene", "SCENES"),
     "kinds": ("BODIES_BY_KIND", "INSPECTED_HALF_SIDE", "MIDDLE"),

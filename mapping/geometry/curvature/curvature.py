@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapping import BoolArray, FloatArray
+
+# Who may have answered a vertex
+METHOD_NAMES = ("jet", "libigl")
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,6 +24,9 @@ class Curvature:
             have no direction) or have no value.
         sd: (V,) standard deviation of the curvatures, 1/m; NaN where the method does not know.
         valid: (V,) True where the values can be trusted.
+        answered_by: (V,) "jet" or "libigl", "" where there is no value; empty if only one method was asked.
+        apart: (V,) larger difference of both methods' k1 and k2, 1/m, NaN where one has no value; empty as above.
+        remarks: sentences on what could not be asked, and why.
     """
 
     k1: FloatArray
@@ -27,6 +35,34 @@ class Curvature:
     d2: FloatArray
     sd: FloatArray
     valid: BoolArray
+    answered_by: NDArray[np.str_] = field(default_factory=lambda: np.zeros(0, dtype="<U6"))
+    apart: FloatArray = field(default_factory=lambda: np.zeros(0))
+    remarks: tuple[str, ...] = ()
+
+    def record(self) -> dict[str, Any]:
+        """How many vertices each method answered, and how far they are apart (median, p95, 1/m) where both did."""
+        both = self.apart[np.isfinite(self.apart)]
+        apart = {"median": float(np.median(both)), "p95": float(np.quantile(both, 0.95))} if len(both) else None
+        return {
+            "vertices": len(self.k1),
+            "valid": int(self.valid.sum()),
+            "answered_by": {name: int((self.answered_by == name).sum()) for name in METHOD_NAMES},
+            "compared": len(both),
+            "apart": apart,
+            "remarks": list(self.remarks),
+        }
+
+    def sentence(self, tip_radius: float) -> str:
+        """Which method answered, and how far the methods are apart where both did, over the tip's own curvature 1/r."""
+        record = self.record()
+        by = record["answered_by"]
+        said = f"Curvature at {record['valid']} of {record['vertices']} vertices: {by['jet']} by local jets, "
+        said += f"{by['libigl']} by libigl's quadratic fits"
+        if record["apart"] is None:
+            return f"{said}; the two could not be compared."
+        median, p95 = (record["apart"][name] * tip_radius for name in ("median", "p95"))
+        compared = f"at {record['compared']} vertices where both were asked"
+        return f"{said}; {compared} they differ by {median:.2g}/r (median) and {p95:.2g}/r (95th percentile)."
 
     @property
     def largest(self) -> FloatArray:

@@ -9,6 +9,9 @@ MONOMIALS = 28  # monomials of two variables up to degree 6
 TERMS_OF_DEGREE = np.array([6, 15, 28])  # those of degree 2, 4 and 6
 SPARE_POINTS = np.array([2, 4, 4])  # points that a fit needs beyond its terms
 CONDITION = 1e5  # ratio of the diagonal of R beyond which the stencil does not determine the jet
+# Squared gap at one point over its expectation that noise does not make: half of the expectation is the mean
+# curvature's, and five standard deviations of it are 25 / 2.
+CERTAIN_GAP = 12.5
 
 LEAST_SQUARED_ERROR = 1e-28  # squared error of a curvature that is never undercut, for bodies of about unit size
 
@@ -263,8 +266,9 @@ def pooled_bias(operators, deviations, pools, sizes, certainty, out):  # type: i
                         # one size wider serves as a judge only if its degree is higher
                         if higher == d and other >= s:
                             continue
-                        excess, weight, members = 0.0, 0.0, 0
+                        excess, weight, members, here = 0.0, 0.0, 0, True
                         for y in pools[m]:
+                            first, here = here, False
                             own, its = deviations[y, s, d], deviations[y, other, higher]
                             if not (np.isfinite(own) and np.isfinite(its)) or (other <= s and its <= own):
                                 continue
@@ -277,9 +281,35 @@ def pooled_bias(operators, deviations, pools, sizes, certainty, out):  # type: i
                             excess += (gap - expected) / (expected * expected)
                             weight += 1.0 / (expected * expected)
                             members += 1
+                            if first:  # beyond what noise does at one point, its own gap needs no company
+                                worst = max(worst, gap - CERTAIN_GAP * expected)
                         if members:
                             # neighbourhoods overlap: the pool holds fewer independent values than points
                             independent = 1.0 + 3.0 * members / sizes[other]
                             allowance = certainty * np.sqrt(2.0 * members / (3.0 * independent * weight))
                             worst = max(worst, excess / weight - allowance)
                 out[m, s, d] = worst
+
+
+@njit(cache=True, nogil=True)
+def variance_of_means(weights, variances, out):  # type: ignore[no-untyped-def]
+    """Variance of a weighed mean of nested fits.
+
+    The fits share their points: the more exact of two nested least-squares fits is the better one with less of the
+    other's noise in it, and their covariance is its variance (Hausman; theory equation 9.4). So this is the sum over
+    all pairs of w_i w_j min(v_i, v_j).
+
+    Args:
+        weights: (M, K) of the mean.
+        variances: (M, K), finite wherever the weight is not zero.
+        out: (M,) written.
+    """
+    for m in range(len(weights)):
+        order = np.argsort(variances[m])
+        behind, total = 0.0, 0.0
+        for i in range(len(order) - 1, -1, -1):
+            w = weights[m, order[i]]
+            if w > 0.0:
+                total += w * variances[m, order[i]] * (w + 2.0 * behind)
+                behind += w
+        out[m] = total

@@ -10,6 +10,8 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
+import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +29,9 @@ import sys
 import igl
 import numpy as np
 data = np.load(sys.argv[1])
-d1, d2, k1, k2, bad = igl.principal_curvature(data["v"], data["f"], int(data["radius"]), bool(data["rings"]))
-np.savez(sys.argv[2], d1=d1, d2=d2, k1=k1, k2=k2, bad=np.asarray(bad, dtype=np.int64))
+for radius in data["radii"]:
+    d1, d2, k1, k2, bad = igl.principal_curvature(data["v"], data["f"], int(radius), bool(data["rings"]))
+    np.savez(f"{sys.argv[2]}/{radius}.npz", d1=d1, d2=d2, k1=k1, k2=k2, bad=np.asarray(bad, dtype=np.int64))
 """
 
 
@@ -43,26 +46,48 @@ def libigl_curvature(surface: Surface, radius: int = 5, rings: bool = True) -> C
     Raises:
         CurvatureError: a radius under 2 (libigl would silently take 2).
     """
-    if radius < 2:
-        raise CurvatureError(f"libigl fits over at least 2 rings of neighbours; found radius {radius}")
+    return libigl_curvatures(surface, (radius,), rings)[0]
+
+
+def libigl_curvatures(surface: Surface, radii: Sequence[int], rings: bool = True) -> tuple[Curvature, ...]:
+    """The same for several radii, all in one process; what is lost with it at one radius is NaN, and a remark says so.
+
+    Args:
+        surface: any mesh.
+        radii: rings of neighbours, or average edge lengths if `rings` is False; each at least 2.
+        rings: count rings rather than distance.
+
+    Raises:
+        CurvatureError: a radius under 2.
+    """
+    for radius in radii:
+        if radius < 2:
+            raise CurvatureError(f"libigl fits over at least 2 rings of neighbours; found radius {radius}")
     faces = _sound_faces(surface)
     used, faces = np.unique(faces, return_inverse=True)
     faces = faces.reshape(-1, 3).astype(np.int64)
+    if not len(faces):
+        none = _spread(surface, used, None, "no part of the mesh is sound enough for libigl")
+        return tuple(none for _ in radii)
+    results, why = _in_own_process(surface.vertices[used], faces, radii, rings)
+    return tuple(_spread(surface, used, results.get(radius), why) for radius in radii)
+
+
+def _spread(surface: Surface, used: IntArray, result: dict[str, FloatArray] | None, why: str) -> Curvature:
+    """Curvature at all vertices from what libigl said of the used ones, None if nothing."""
     count = len(surface.vertices)
     k1, k2 = np.full(count, np.nan), np.full(count, np.nan)
     d1, d2 = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
-    if len(faces):
-        vertices = surface.vertices[used]
-        result = _in_own_process(vertices, faces, radius, rings)
-        if result is not None:
-            trusted = np.isfinite(result["k1"]) & np.isfinite(result["k2"])
-            trusted[result["bad"]] = False
-            trusted &= (np.abs(result["d1"]).sum(axis=1) > 0) & (np.abs(result["d2"]).sum(axis=1) > 0)
-            keep = used[trusted]
-            k1[keep], k2[keep] = result["k1"][trusted], result["k2"][trusted]
-            d1[keep], d2[keep] = result["d1"][trusted], result["d2"][trusted]
-    valid = np.isfinite(k1)
-    return Curvature(k1, k2, d1, d2, np.full(count, np.nan), valid)
+    if result is not None:
+        trusted = np.isfinite(result["k1"]) & np.isfinite(result["k2"])
+        trusted[result["bad"]] = False
+        trusted &= (np.abs(result["d1"]).sum(axis=1) > 0) & (np.abs(result["d2"]).sum(axis=1) > 0)
+        keep = used[trusted]
+        k1[keep], k2[keep] = result["k1"][trusted], result["k2"][trusted]
+        d1[keep], d2[keep] = result["d1"][trusted], result["d2"][trusted]
+    return Curvature(
+        k1, k2, d1, d2, np.full(count, np.nan), np.isfinite(k1), remarks=(why,) if result is None and why else ()
+    )
 
 
 def _sound_faces(surface: Surface) -> IntArray:
@@ -101,19 +126,35 @@ def _turned(faces: IntArray) -> IntArray:
     return np.asarray(np.unique(unique[times > 1]))
 
 
-def _in_own_process(vertices: FloatArray, faces: IntArray, radius: int, rings: bool) -> dict[str, FloatArray] | None:
-    """What libigl says, or None if it did not survive."""
+def _in_own_process(
+    vertices: FloatArray, faces: IntArray, radii: Sequence[int], rings: bool
+) -> tuple[dict[int, dict[str, FloatArray]], str]:
+    """What libigl says of each radius until it ends, and a sentence if it did not survive all of them."""
+    found, why = {}, ""
     with tempfile.TemporaryDirectory() as folder:
-        question, answer = Path(folder) / "question.npz", Path(folder) / "answer.npz"
-        np.savez(question, v=vertices, f=faces, radius=radius, rings=rings)
-        subprocess.run(
-            [sys.executable, "-c", _CALL, str(question), str(answer)],
-            check=False,
-            timeout=LIBIGL_TIMEOUT,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        if not answer.exists():
-            return None
-        with np.load(answer) as found:
-            return {name: found[name] for name in found.files}
+        question = Path(folder) / "question.npz"
+        np.savez(question, v=vertices, f=faces, radii=np.asarray(radii, dtype=np.int64), rings=rings)
+        try:
+            ended = subprocess.run(
+                [sys.executable, "-c", _CALL, str(question), folder],
+                check=False,
+                timeout=LIBIGL_TIMEOUT,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+                errors="replace",
+            )
+            if ended.returncode:
+                said = ended.stderr.strip().splitlines()[-1:] or [f"it ended with status {ended.returncode}"]
+                why = f"libigl could not be asked: {said[0]}"
+        except subprocess.TimeoutExpired:
+            why = f"libigl took longer than {LIBIGL_TIMEOUT} s"
+        for radius in radii:
+            answer = Path(folder) / f"{radius}.npz"
+            if answer.exists():
+                try:
+                    with np.load(answer) as values:
+                        found[radius] = {name: values[name] for name in values.files}
+                except (ValueError, OSError, zipfile.BadZipFile):  # it ended while writing
+                    why = why or "libigl ended while it answered"
+    return found, why

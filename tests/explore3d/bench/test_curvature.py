@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from explore3d.bench import curvature as bench
+from explore3d.bench.scenes import CURVED_BODIES, SAMPLINGS, curved_body
 
 
 @pytest.mark.parametrize("body", bench.BODIES_OF_KNOWN_CURVATURE)
@@ -54,3 +55,37 @@ def test_a_torus_is_as_exact_at_every_noise(noise, median):
     found = bench.measure("explore3d", "torus", 10_000, noise)
     assert found.median <= median
     assert found.valid > 0.999
+
+
+@pytest.mark.parametrize("body", CURVED_BODIES)
+@pytest.mark.parametrize("sampling", SAMPLINGS)
+def test_a_curved_body_lies_on_its_surface_and_faces_outward(body, sampling):
+    still = curved_body(body, sampling, 0.0, 3)
+    value, outward, _ = CURVED_BODIES[body](still.surface.vertices)
+    assert np.abs(value).max() < 1e-12
+    corner = still.surface.faces[:, 0]
+    assert (np.einsum("fk,fk->f", still.surface.face_normals, outward[corner]) > 0).mean() > 0.99
+    assert len(np.unique(still.surface.faces)) == len(still.surface.vertices)
+    largest = {"sphere": 1.0, "ellipsoid": 4.0, "torus": 3.5, "saddle": 1.0, "bump": 30.0}[body]
+    assert np.maximum(still.k1, -still.k2).max() <= largest * (1 + 1e-6)
+    shaken = curved_body(body, sampling, 1e-3, 3)
+    assert np.abs(shaken.k1 - still.k1).max() < 0.2 * largest
+
+
+def test_the_seeds_that_are_reported_are_not_those_of_tuning():
+    assert not set(bench.CURVATURE_SEEDS) & set(bench.CURVATURE_TUNING_SEEDS)
+
+
+def test_a_cell_compares_all_methods_at_the_same_vertices(tmp_path):
+    cells = bench.measure_cell("saddle", "thin", 1e-3, ["explore3d", "jets alone", "libigl, 2 rings"], [1, 5])
+    ours, jets, libigl = cells
+    assert ours.median < libigl.median
+    assert ours.p95 < libigl.p95
+    assert 0.8 < ours.coverage < 1.0
+    assert 0.0 < bench.measure_cell("bump", "thin", 1e-4, ["explore3d"], [1])[0].by_libigl < 0.3
+    assert jets.by_libigl == 0.0
+    assert np.isnan(libigl.coverage)
+    assert len(list(bench.cell_table(cells))) == 4
+    assert "p95 at most the best peer's: 1 of 1 cells" in list(bench.cell_verdicts(cells))
+    files = bench.write_cells(cells, tmp_path)
+    assert json.loads(files[1].read_text())[2]["coverage"] is None
