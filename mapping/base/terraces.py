@@ -89,7 +89,7 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
 
 
 def _pairs(cloud: Cloud) -> tuple[IntArray, IntArray] | None:
-    """Cells (P,) and those (P,) that lie PAIRS_APART of the extent from them, along x and along y, or as near as lines allow.
+    """Cells (P,) and those (P,) that lie PAIRS_APART of the extent from them along x and along y, or farther.
 
     None if there are too few of them along one of the two: then each line could stand on a level of its own.
     """

@@ -37,7 +37,9 @@ def smooth_weights(log_ratios: FloatArray) -> tuple[FloatArray, float]:
     k, sigma = _fit_pareto(exceed)
     if np.isfinite(k):
         p = (np.arange(tail) + 0.5) / tail
-        smoothed = cutoff + (sigma * np.expm1(-k * np.log1p(-p)) / k if k != 0.0 else -sigma * np.log1p(-p))
+        # where one draw makes the tail its shape is in the hundreds, and the last quantiles overflow: 1 bounds them
+        with np.errstate(over="ignore"):
+            smoothed = cutoff + (sigma * np.expm1(-k * np.log1p(-p)) / k if k != 0.0 else -sigma * np.log1p(-p))
         weights[order[-tail:]] = np.minimum(smoothed, 1.0)
     return weights / weights.sum(), float(k)
 

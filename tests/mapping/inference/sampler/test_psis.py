@@ -45,3 +45,9 @@ def test_draws_that_all_miss_the_support_are_even_and_not_trusted() -> None:
     weights, k_hat = smooth_weights(np.full(40, -np.inf))
     assert np.allclose(weights, 1.0 / 40)
     assert k_hat == np.inf
+
+
+def test_a_tail_of_all_magnitudes_is_not_trusted_and_does_not_overflow() -> None:
+    weights, k_hat = smooth_weights(np.append(np.full(900, -707.0), np.linspace(-706.0, 0.0, 100)))
+    assert np.isfinite(weights).all() and weights.sum() == pytest.approx(1.0)
+    assert k_hat > 1.0
