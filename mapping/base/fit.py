@@ -86,7 +86,8 @@ def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO) -> B
     fits = _fits(AREAL_FORMS[form.kind], cloud)
     if not fits:
         raise FormError(f"form {form.kind!r}: none of its bodies can be fitted to this trace; possible: auto, line")
-    if form.kind == "auto" and all(_missed(fit, cloud) > EXPLAINED for fit in fits):
+    # levels explain the top of a block and of the table beneath it: its sides ask for a body
+    if form.kind == "auto" and all(_missed(fit, cloud) > EXPLAINED for fit in fits if "levels" not in fit.parameters):
         fits += _last_resort((polyhedron,), cloud)
         if all(_missed(fit, cloud) > EXACTLY for fit in fits):
             fits += _last_resort(FREE, cloud)
