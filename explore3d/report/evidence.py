@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import isfinite
 
 from explore3d.analysis import STANDARDS_SENTENCE, Analysis, Comparison
-from explore3d.report.findings import curvature_lines
 from explore3d.report.markup import Html, Row, badge, element, figure, folded, paragraph, section, table
 from explore3d.report.pictures import Pictures, shown_features
 from mapping import UNKNOWN_TEXT, length_text
@@ -58,7 +57,9 @@ def curvature_maps(analysis: Analysis, pictures: Pictures) -> Html:
         "A fillet of exactly −1 is the tip's own shape, left where it could not reach."
     )
     maps = figure(pictures.files["curvature"], "Maps of curvature", caption)
-    return section("Curvature", "curvature", maps, *(paragraph(line) for line in curvature_lines(analysis)))
+    who = analysis.curvature
+    answered = [] if who is None else [paragraph(who.sentence(analysis.trace.tip_radius))]
+    return section("Curvature", "curvature", maps, *answered)
 
 
 def roughness_table(analysis: Analysis) -> Html:

@@ -67,15 +67,7 @@ def summary(analysis: Analysis) -> list[str]:
         limit_sentence(analysis),
         *warnings(analysis),
         *([account.sentence()] if account is not None else []),
-        *curvature_lines(analysis),
     ]
-
-
-def curvature_lines(analysis: Analysis) -> list[str]:
-    """Which method took the curvature of how many vertices, in units of the tip's own curvature 1/r."""
-    if analysis.curvature is None:
-        return []
-    return [analysis.curvature.sentence(analysis.trace.tip_radius)]
 
 
 def warnings(analysis: Analysis) -> list[str]:

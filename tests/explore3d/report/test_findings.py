@@ -34,7 +34,6 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
         inspected=SimpleNamespace(untouched=untouched),
         base=SimpleNamespace(kind="mesh"),
         account=None,
-        curvature=None,
         deviation=None,
         path=None,
         left_out=(),
