@@ -11,6 +11,7 @@ import numpy as np
 from explore3d import UserError, count_text
 from mapping import BoolArray, Feature, FloatArray, Interval, Trace, length_text
 from mapping.base import Base, LaidSweep, LaidTrace
+from mapping.detection import terraced
 from mapping.estimate.roughness import (
     EVALUATED_SECTIONS,
     NESTING_INDICES,
@@ -138,7 +139,7 @@ def roughness_of(
     index = cutoff or suited_cutoff(longest, EVALUATED_SECTIONS)
     if index is None:
         return None
-    pieces = [piece for sweep in trace.laid_sweeps for piece in _pieces(sweep, trace, features)]
+    pieces = [piece for sweep in trace.laid_sweeps for piece in _pieces(sweep, trace, features, over_terraces=True)]
     spacing = float(np.median([piece.spacing for piece, _ in pieces])) if pieces else np.inf
     short = short_cutoff or SHORT_INDICES.get(index, index / 300.0)
     usable = None if spacing * FEWEST_IN_SHORT > short * (1.0 + SPACING_ROUNDING) else short
@@ -154,7 +155,9 @@ def roughness_of(
     return Roughness(index, usable, profile, sections, areal, squares, why_not, noise)
 
 
-def _pieces(sweep: LaidSweep, trace: LaidTrace, features: Sequence[Feature]) -> list[tuple[Stretch, FloatArray]]:
+def _pieces(
+    sweep: LaidSweep, trace: LaidTrace, features: Sequence[Feature], over_terraces: bool = False
+) -> list[tuple[Stretch, FloatArray]]:
     """A sweep's evenly sampled pieces, and the places (N, 3) of their samples."""
     if len(sweep.trace) < 3:
         return []
@@ -168,7 +171,9 @@ def _pieces(sweep: LaidSweep, trace: LaidTrace, features: Sequence[Feature]) -> 
             low, high = feature.axis.min(axis=0) - reach, feature.axis.max(axis=0) + reach
             near = np.flatnonzero(((under >= low) & (under <= high)).all(axis=1))
             keep[near] &= distances(under[near], feature.axis) > reach
-        found.append((Stretch(piece.height, keep, piece.spacing), np.asarray(piece.centers)))
+        # a body's levels are none of its roughness
+        level = terraced(piece, trace.base, trace.tip_radius).profile.height if over_terraces else piece.height
+        found.append((Stretch(level, keep, piece.spacing), np.asarray(piece.centers)))
     return found
 
 

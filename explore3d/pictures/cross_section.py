@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import BoolArray, Feature, FloatArray, IntArray, Interval, Trace
-from mapping.base import Base
+from mapping.base import Base, over_levels
 from mapping.detection import Crossing
 from mapping.estimate.envelope import Estimate
 from mapping.estimate.sweeps import BRIDGED
@@ -30,7 +30,7 @@ class CrossSection:
     Args:
         feature: whose crest it is.
         sweep: number of the sweep.
-        x, height: (N,) samples: distance across the feature, and height of the trace over the base's trace, m.
+        x, height: (N,) samples: distance across the feature, and height over the base, or its level, m.
         bin_x, bin_height, bin_sd: (M,) means over equal bins, and their standard errors, m.
         grid, predicted, low, high: (G,) places, and the trace of the recorded feature there: median, and the
             5 % and 95 % quantiles of its height.
@@ -88,21 +88,23 @@ def cross_section(
     points, normals = (_interpolated(grid, x, getattr(feet, name)[index]) for name in ("points", "normals"))
     sizes = [feature.height.median, feature.height.low, feature.height.high]
     curves = [_trace_of(feature, size, grid, points, normals, trace.tip_radius) for size in sizes]
-    bins = _binned(x, feet.height[index])
+    height = over_levels(feet.height[index], np.zeros(0, dtype=np.int64), base.levels)
+    level = float(feet.height[index][0] - height[0])
+    bins = _binned(x, height)
     if kind_of(feature).sided:
-        curves = _aligned(curves, np.interp(grid, x, feet.height[index]))
+        curves = _aligned(curves, np.interp(grid, x, height))
     sweep = int(trace.sweep[window[0]])
     return CrossSection(
         feature,
         sweep,
         x,
-        feet.height[index],
+        height,
         *bins,
         grid,
         curves[0],
         np.minimum(curves[1], curves[2]),
         np.maximum(curves[1], curves[2]),
-        *_body(feature, sweep, half, estimate, base, trace.tip_radius),
+        *_body(feature, sweep, half, estimate, base, trace.tip_radius, level),
         len(feature.axis) > 1,
     )
 
@@ -236,9 +238,9 @@ def _binned(x: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def _body(
-    feature: Feature, sweep: int, half: float, estimate: Estimate | None, base: Base, tip_radius: float
+    feature: Feature, sweep: int, half: float, estimate: Estimate | None, base: Base, tip_radius: float, level: float
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """The estimated surface along the sweep: places, heights over the base, and where it was bridged."""
+    """The estimated surface along the sweep: places, heights over the base's level, and where it was bridged."""
     if estimate is None:
         return np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool)
     own = np.flatnonzero(estimate.sweep == sweep)
@@ -248,4 +250,4 @@ def _body(
     x, beside = _place(feature, foot.points, foot.normals)
     keep = np.flatnonzero((np.abs(x) < SECTION_REACH * half) & (beside < half))
     order = keep[np.argsort(x[keep], kind="stable")]
-    return x[order], foot.height[order] + tip_radius, estimate.labels[own][order] == BRIDGED
+    return x[order], foot.height[order] + tip_radius - level, estimate.labels[own][order] == BRIDGED

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mapping.base.pose import Pose as Pose, estimate_pose as estimate_pose
     from mapping.base.profiles import Form as Form
     from mapping.base.projection import onto_base as onto_base
+    from mapping.base.terraces import over_levels as over_levels
 
 _PUBLIC = {
     "anchor": ("anchor", "tangent_frame"),
@@ -33,5 +34,6 @@ _PUBLIC = {
     "pose": ("Pose", "estimate_pose"),
     "profiles": ("Form",),
     "projection": ("onto_base",),
+    "terraces": ("over_levels",),
 }
 doorway(__name__, _PUBLIC)

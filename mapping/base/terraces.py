@@ -19,6 +19,8 @@ from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit
 PAIRS_APART = 1 / 8
 # Of all cells so many must have a partner: with lines as far apart as that, a third of them has none
 FEWEST_PAIRS = 0.4
+# Of a run's samples, the share that is its end: the detail itself lies in the middle
+END_SHARE = 8
 # A place is a parameter that only one cell in n fits: it costs twice what a level does (2 log n against log n)
 EDGE_FREEDOM = 2
 MOST_LEVELS, LEVEL_ROUNDS = 8, 6
@@ -139,3 +141,19 @@ def _densest(ordered: FloatArray, reach: float) -> float:
     count = stop - np.arange(len(ordered))
     begin = int(count.argmax())
     return float(np.median(ordered[begin : begin + count[begin]]))
+
+
+def over_levels(height: FloatArray, breaks: IntArray, levels: FloatArray) -> FloatArray:
+    """Heights (N,) of each run of samples over the level of the base's that its ends stand on, m.
+
+    Args:
+        height: over the base, m.
+        breaks: where runs begin but for the first, ascending.
+        levels: (L,) of the base, m; of a run whose ends stand on two of them the lower one counts.
+    """
+    lowered = height.copy()
+    for start, stop in zip([0, *breaks], [*breaks, len(height)], strict=True):
+        end = max(1, (stop - start) // END_SHARE)
+        ends = (np.median(height[start : start + end]), np.median(height[stop - end : stop]))
+        lowered[start:stop] -= min(float(levels[np.abs(levels - place).argmin()]) for place in ends)
+    return lowered

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping import EmptyWindowError, FloatArray, IntArray, Trace
-from mapping.base import Base, Feet, LaidTrace
+from mapping.base import Base, Feet, LaidTrace, over_levels
 
 # Samples are looked at in blocks of this many: the cost of the rest of a long log is that of its boxes.
 SAMPLES_PER_BLOCK = 64
@@ -85,10 +85,6 @@ class Samples:
     flat: bool
 
 
-# Of a run's samples, the share that is its end: the detail itself lies in the middle
-END_SHARE = 8
-
-
 def gather(trace: Trace, base: Base, points: FloatArray, reach: float) -> Samples:
     """The samples near a feature; the cost of the rest of the trace is one look at the boxes of its blocks.
 
@@ -110,18 +106,8 @@ def gather(trace: Trace, base: Base, points: FloatArray, reach: float) -> Sample
     index, breaks = _whole_runs(index, trace.sweep)
     feet = LaidTrace.of(trace, base).feet(index)
     if len(base.levels) > 1:
-        feet = replace(feet, height=_over_levels(feet.height, breaks, base.levels))
+        feet = replace(feet, height=over_levels(feet.height, breaks, base.levels))
     return Samples(feet, breaks, _on_one_plane(feet, base))
-
-
-def _over_levels(height: FloatArray, breaks: IntArray, levels: FloatArray) -> FloatArray:
-    """Heights (N,) of each run over the level of the base's that its ends stand on; the lower one if they differ."""
-    lowered = height.copy()
-    for start, stop in zip([0, *breaks], [*breaks, len(height)], strict=True):
-        end = max(1, (stop - start) // END_SHARE)
-        ends = (np.median(height[start : start + end]), np.median(height[stop - end : stop]))
-        lowered[start:stop] -= min(float(levels[np.abs(levels - place).argmin()]) for place in ends)
-    return lowered
 
 
 def _on_one_plane(feet: Feet, base: Base) -> bool:
