@@ -93,6 +93,9 @@ def bump(count: int, noise: float = 0.0) -> tuple[Surface, np.ndarray, np.ndarra
 def test_one_method_is_as_exact_at_every_noise_as_the_best_of_many(noise, median, p95, wrong):
     surface, k1, k2, inside = bump(100, noise)
     found = principal_curvatures(surface)
+    # a vertex that the sampling and the noise leave without a curvature says so
+    assert found.valid[inside].mean() > (0.99 if noise > 1e-3 else 0.999)
+    inside = inside & found.valid
     error = np.maximum(np.abs(found.k1 - k1), np.abs(found.k2 - k2))[inside] / 30
     assert np.median(error) <= median
     assert np.quantile(error, 0.95) <= p95
