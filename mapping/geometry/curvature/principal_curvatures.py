@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from mapping import CurvatureError, FloatArray, Surface
 from mapping.geometry.curvature.auto import auto_curvature
 from mapping.geometry.curvature.curvature import Curvature
-from mapping.geometry.curvature.jet import jet_curvature
+from mapping.geometry.curvature.jet import jets_and_noise
 from mapping.geometry.curvature.libigl_fits import libigl_curvature
 
 
@@ -52,7 +52,7 @@ def _auto(body: Any, normals: FloatArray | None, **settings: Any) -> Curvature:
 
 
 def _jet(body: Any, normals: FloatArray | None, **settings: Any) -> Curvature:
-    return jet_curvature(body, normals, **settings)
+    return jets_and_noise(body, normals, **settings)[0]
 
 
 def _libigl(body: Any, normals: FloatArray | None, **settings: Any) -> Curvature:

@@ -54,7 +54,7 @@ def test_a_peer_that_is_not_installed_is_named_with_the_way_to_get_it(monkeypatc
 def test_a_torus_is_as_exact_at_every_noise(noise, median):
     found = bench.measure("explore3d", "torus", 10_000, noise)
     assert found.median <= median
-    assert found.valid > (0.995 if noise > 1e-3 else 0.999)
+    assert found.valid > 0.999
 
 
 @pytest.mark.parametrize("body", CURVED_BODIES)
@@ -82,7 +82,7 @@ def test_a_cell_compares_all_methods_at_the_same_vertices(tmp_path):
     assert ours.median < libigl.median
     assert ours.p95 < libigl.p95
     assert 0.8 < ours.coverage < 1.0
-    assert 0.0 < bench.measure_cell("bump", "thin", 1e-4, ["explore3d"], [1])[0].by_libigl < 0.3
+    assert 0.0 < bench.measure_cell("torus", "thin", 1e-2, ["explore3d"], [1])[0].by_libigl < 0.3
     assert jets.by_libigl == 0.0
     assert np.isnan(libigl.coverage)
     assert len(list(bench.cell_table(cells))) == 4

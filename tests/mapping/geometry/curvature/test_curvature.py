@@ -43,7 +43,7 @@ def test_a_jet_knows_the_curvatures_of_a_torus_with_the_outward_sign():
     surface, k2 = torus(1.0, 0.4, 100, 40)
     curvature = principal_curvatures(surface)
     assert curvature.valid.all()
-    np.testing.assert_allclose(curvature.k1, 2.5, rtol=1.2e-3)
+    np.testing.assert_allclose(curvature.k1, 2.5, rtol=1e-3)
     np.testing.assert_allclose(curvature.k2, k2, atol=3e-3)
 
 
@@ -93,9 +93,6 @@ def bump(count: int, noise: float = 0.0) -> tuple[Surface, np.ndarray, np.ndarra
 def test_one_method_is_as_exact_at_every_noise_as_the_best_of_many(noise, median, p95, wrong):
     surface, k1, k2, inside = bump(100, noise)
     found = principal_curvatures(surface)
-    # a vertex that the sampling and the noise leave without a curvature says so
-    assert found.valid[inside].mean() > (0.99 if noise > 1e-3 else 0.999)
-    inside = inside & found.valid
     error = np.maximum(np.abs(found.k1 - k1), np.abs(found.k2 - k2))[inside] / 30
     assert np.median(error) <= median
     assert np.quantile(error, 0.95) <= p95
@@ -124,8 +121,8 @@ def test_a_million_metres_from_the_origin_cost_only_their_rounding():
     far = principal_curvatures(Surface(surface.vertices + np.array([1e6, -1e6, 1e6]), surface.faces))
     inside = (np.abs(surface.vertices[:, :2]) < 0.7).all(axis=1)
     near = principal_curvatures(surface)
-    # 1.2e-10 m of rounding over the square of a neighbourhood of 0.2 m, times the condition of a quartic fit
-    np.testing.assert_allclose(far.k2[inside], near.k2[inside], atol=2e-6)
+    # 1.2e-10 m of rounding over the square of a neighbourhood of 0.25 m, times the condition of a quartic fit
+    np.testing.assert_allclose(far.k2[inside], near.k2[inside], atol=1e-6)
 
 
 def test_noise_widens_the_neighbourhood_and_the_standard_deviation_is_honest():
@@ -138,7 +135,7 @@ def test_noise_widens_the_neighbourhood_and_the_standard_deviation_is_honest():
     truth = 0.5 * (0.5 / (1 + 0.25 * radius2) ** 1.5 + 0.5 / np.sqrt(1 + 0.25 * radius2))
     error = (0.5 * (curvature.k1 + curvature.k2) - truth)[inside]
     assert np.abs(error).max() < 0.1
-    assert 0.5 < np.sqrt(np.mean((error / curvature.sd[inside]) ** 2)) < 1.7
+    assert 0.3 < np.sqrt(np.mean((error / curvature.sd[inside]) ** 2)) < 1.5
 
 
 def test_a_sphere_has_curvature_but_no_principal_directions():
