@@ -82,7 +82,7 @@ class FingerTable(Table):
 
     def finger(self, setting: Setting) -> Finger:
         """The finger, not yet connected: entering it opens its ports. Raises SceneError, FingerError."""
-        raise NotImplementedError
+        raise NotImplementedError(f"[finger] of kind {self.kind!r} makes no finger")
 
     @property
     def is_real(self) -> bool:
@@ -139,7 +139,7 @@ class SensorTable(Table):
 
     def sensor(self, emulated_port: str | None) -> ForceSensor:
         """The sensor, not yet connected; on the port of its emulator, if there is one."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} makes no sensor")
 
 
 @cache

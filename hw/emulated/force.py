@@ -90,7 +90,7 @@ class ForceEmulator:
 
     def frame(self, index: int, force: FloatArray) -> bytes:
         """The bytes of one sample."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} gives no bytes")
 
     def power_up(self, locked: bool = False) -> None:
         """Start again; `locked` means nothing to a sensor."""

@@ -96,7 +96,7 @@ class ForceSensor:
 
     def decode(self, frame: bytes) -> tuple[int, float, float, float] | None:
         """Count and force (N) in a frame; None if the sensor says that it is not to be trusted."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} reads no frames")
 
     def decode_all(self, frames: list[bytes]) -> tuple[IntArray, FloatArray] | None:
         """Counts (N,) and forces (N, 3), N, in frames that came together; None if one is not to be trusted.

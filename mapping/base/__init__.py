@@ -15,7 +15,7 @@ if TYPE_CHECKING:
         rolled_off as rolled_off,
         touched_part as touched_part,
     )
-    from mapping.base.fit import fit_base as fit_base
+    from mapping.base.fit import FORETOLD as FORETOLD, fit_base as fit_base
     from mapping.base.height_profile import UNEVEN as UNEVEN, SweepHeights as SweepHeights
     from mapping.base.laid_trace import LaidSweep as LaidSweep, LaidTrace as LaidTrace
     from mapping.base.pose import Pose as Pose, estimate_pose as estimate_pose
@@ -28,7 +28,7 @@ _PUBLIC = {
     "base": ("Base", "Feet"),
     "cells": ("Cells",),
     "extent": ("BASE_TRIANGLE_SIZE", "over_base", "refined", "rolled_off", "touched_part"),
-    "fit": ("fit_base",),
+    "fit": ("FORETOLD", "fit_base"),
     "height_profile": ("UNEVEN", "SweepHeights"),
     "laid_trace": ("LaidSweep", "LaidTrace"),
     "pose": ("Pose", "estimate_pose"),

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from mapping import FloatArray, IntArray, Surface
 from mapping.geometry.mesh import MovedNearestPoint, NearestPoint
+from mapping.instrument import neighbour_scatter, robust_sd
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +126,15 @@ class Base:
         moved = replace(self, surface=self.surface.moved(rotation, translation), pose=pose)
         moved.__dict__["nearest"] = MovedNearestPoint(moved.surface, self.nearest, rotation, translation)
         return moved
+
+    def misses(self, centers: FloatArray, tip_radius: float) -> tuple[float, float]:
+        """By how much it misses ball centres (N, 3) that it was not fitted to, and their scatter along the path, m.
+
+        The former is the standard deviation of the bulk of their heights over the nearest level: what stands out on the
+        base does not count.
+        """
+        height = self.foot(centers, tip_radius).height
+        return robust_sd(np.abs(height[:, None] - self.levels).min(axis=1)), neighbour_scatter(height)
 
     def foot(self, centers: ArrayLike, tip_radius: float) -> Feet:
         """Foot points and heights of ball centres (N, 3), m.

@@ -17,7 +17,7 @@ from mapping.base.quadrics import FAMILIES, Cloud, Family, Fitted, cylinder, pla
 from mapping.base.star import star
 from mapping.base.terraces import terraced_plane, terraced_quadric
 from mapping.base.tube import tube
-from mapping.instrument import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_scale
+from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_scale
 
 MOST_BASE_CELLS = 4000
 # Families for what no simple one explains
@@ -38,9 +38,11 @@ SIMPLE: dict[str, tuple[Family, ...]] = {
     "cylinder": (cylinder,),
     "sphere": (sphere,),
 }
-# Sweeps of each half, at least, and by how many times the scatter of neighbouring cells may be missed: that scatter is
-# of single cells, and what is missed has the fit's own error besides
-FEWEST_HALF, FORETOLD = 3, 2.0
+# Sweeps of each half, at least: a bend across them takes three
+FEWEST_HALF = 3
+# A base foretells a path if it misses it by no more than so many times the scatter from cell to cell, that is if of the
+# variance at most three quarters are of something else: of the fit's own error, and of noise that wanders
+FORETOLD = 2.0
 # Families that a form admits over an area
 AREAL_FORMS: dict[str, tuple[Family, ...]] = {
     "auto": (*FAMILIES, terraced_plane, terraced_quadric),
@@ -113,12 +115,8 @@ def _foretold(best: Fitted, trace: Trace) -> float | None:
         return None
     fit = min(fits, key=lambda fitted: fitted.cost(cloud.floor))
     centers = Cells.of(trace.select(~half), MOST_BASE_CELLS).centers
-    base = Base(fit.surface(cloud, None), fit.kind, fit.parameters)
-    height = base.foot(centers, trace.tip_radius).height
-    noise = robust_scale(np.diff(height, 2)) / np.sqrt(6.0)
-    own = np.abs(height[:, None] - base.levels).min(axis=1)
-    missed = MAD_TO_SD * float(np.median(own))
-    return missed if missed <= FORETOLD * noise else None
+    missed, scatter = Base(fit.surface(cloud, None), fit.kind, fit.parameters).misses(centers, trace.tip_radius)
+    return missed if missed <= FORETOLD * scatter else None
 
 
 def _fits(families: Iterable[Family], cloud: Cloud) -> list[Fitted]:

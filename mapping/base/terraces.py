@@ -14,16 +14,21 @@ from mapping import FloatArray, IntArray
 from mapping.base.quadrics import Cloud, Design, Fitted, height_field, plane_design, quadric_design
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit
 
-# Cells whose heights are compared lie this share of the cloud's extent apart: near enough that most pairs stand on one
-# level, a staircase's too, and far enough that their differences tell the slope
+# Cells whose heights are compared lie this share of the cloud's extent apart. Of a staircase of n edges, n eighths of
+# the pairs stand on two levels: the sum of absolute residuals finds the slope as long as these are less than half, that
+# is up to three edges one way; nearer pairs tell less of the slope
 PAIRS_APART = 1 / 8
-# Of all cells so many must have a partner: with lines as far apart as that, a third of them has none
+# Of all cells so many must have a partner. Where lines are so far apart that it must be half the extent away, half of
+# the cells can have one at most; a fifth of these may lie off the path
 FEWEST_PAIRS = 0.4
-# Of a run's samples, the share that is its end: the detail itself lies in the middle
+# Of a run's samples, the share that is its end: the detail itself lies in the middle, and a median minds nothing that
+# reaches into less than half of an end
 END_SHARE = 8
 # A place is a parameter that only one cell in n fits: it costs twice what a level does (2 log n against log n)
 EDGE_FREEDOM = 2
-MOST_LEVELS, LEVEL_ROUNDS = 8, 6
+# More levels than that have no two cells PAIRS_APART of the extent from each other on one of them
+MOST_LEVELS = 8
+LEVEL_ROUNDS = 6
 
 
 @dataclass(frozen=True, eq=False)

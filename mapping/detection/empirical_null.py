@@ -24,7 +24,7 @@ from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
 from mapping.detection.filters import Bank
 from mapping.detection.local_level import LOG_VARIANCE_PER_BIN, excess, local_levels
-from mapping.instrument import MAD_TO_SD, Noise, robust_sd
+from mapping.instrument import MAD_TO_SD, Noise, robust_sd, running_mean
 
 # The scale of unit outputs is read from their median absolute value, which what is no noise in less than half of a cell
 # shifts little. Variance of the logarithm of the variance so read in a cell of one half-width; simulated with white and
@@ -215,19 +215,11 @@ def _cells(profile: SweepHeights, width: float) -> int:
     return max(1, int(profile.length / (CELL_WIDTHS * width)))
 
 
-def _running_mean(values: FloatArray, bins: int) -> FloatArray:
-    """Mean over 2 bins + 1 values, shorter at the ends."""
-    sums = np.concatenate([[0.0], np.cumsum(values)])
-    index = np.arange(len(values))
-    low, high = np.maximum(index - bins, 0), np.minimum(index + bins + 1, len(values))
-    return np.asarray((sums[high] - sums[low]) / (high - low))
-
-
 def _seen(local: FloatArray, bins: float) -> FloatArray:
     """(n,) by which the sd of a filter of so many bins' half-width differs where bins have these variances (n,)."""
     if (local == local[0]).all():
         return np.full(len(local), np.sqrt(local[0]))
-    return np.sqrt(_running_mean(local, max(1, int(0.5 * bins))))
+    return np.sqrt(running_mean(local, max(1, int(0.5 * bins))))
 
 
 def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank, k: int) -> FloatArray:
@@ -240,7 +232,7 @@ def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank
     if not (local == 1.0).all():
         z /= _seen(local, bins)[places]
     if not quiet.all():
-        z[_running_mean((~quiet).astype(np.float64), max(1, int(bins)))[places] > MISSING_SHARE] = np.nan
+        z[running_mean((~quiet).astype(np.float64), max(1, int(bins)))[places] > MISSING_SHARE] = np.nan
     return np.asarray(z)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray
 from mapping.base import LaidSweep, SweepHeights
-from mapping.instrument import MAD_TO_SD, robust_sd
+from mapping.instrument import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_sd
 
 # Blocks in which the bend is looked for, in samples: a run between two of them loses less than half of its bend.
 BLOCKS = (1, 3, 9, 27, 81)
@@ -25,9 +25,9 @@ BLOCKS = (1, 3, 9, 27, 81)
 LONGEST_RUN = 0.5
 # Bends of the trace, in those of the ball, that the body's own curvature and the sampling allow.
 ALLOWED_BEND = 3.0
-# Tip radii over which the slope beside a sample is taken, within which the ball's own arc turns by as many radians,
-# and the standard deviations by which it must be there
-SLOPE_SPAN, SLOPE_SDS = 0.05, 3.0
+# Tip radii over which the slope beside a sample is taken: where the ball's own arc is at 45 degrees its slope changes
+# by 0.1, and the bound by a tenth, within
+SLOPE_SPAN = 0.05
 # Standard deviations beyond that: at 5 kHz a Gaussian law has one such sample in 10^6 hours.
 OUT = 7.0
 # A single sample is out by less where so many more are than a Gaussian law lets: of those left out, it may have made
@@ -156,7 +156,7 @@ def _slopes(means: FloatArray, sd: FloatArray, span: int, step: float) -> FloatA
     rise = (means[span:] - means[:-span]) / (span * step)
     before, behind = rise[:-span], rise[span:]
     gentler = np.minimum(np.abs(before), np.abs(behind))
-    least = SLOPE_SDS * sd[span:-span] / (span * step)
+    least = FEATURE_RESIDUAL_SDS * sd[span:-span] / (span * step)
     slope[span:-span] = np.where(before * behind > 0.0, np.maximum(gentler - least, 0.0), 0.0)
     return slope
 

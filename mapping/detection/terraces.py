@@ -14,14 +14,17 @@ import numpy as np
 from mapping import BoolArray, FloatArray, IntArray
 from mapping.base import Base, SweepHeights
 from mapping.detection.cap_fit import Disturbance, fit_cap
-from mapping.instrument import FEATURE_RESIDUAL_SDS, Noise, robust_scale
+from mapping.instrument import FEATURE_RESIDUAL_SDS, Noise, neighbour_scatter, running_mean
 
-# A sweep runs on a level if it keeps to it for so many tip radii: what is narrower is a detail on the level below. On
-# either side of an edge as much is looked at, and an arc about an edge is at most one radius wide.
+# A sweep runs on a level if it keeps to it for so many tip radii, the half-width of the widest detail that is sought:
+# what is narrower is one on the level below. On either side of an edge as much is looked at, of which the arc about it
+# is a quarter at most.
 TERRACE = 4.0
 # Half of the stretch (tip radii) over which means tell the level: single bins of noise tell none, and the arc about an
 # edge of a hundredth of the radius, sqrt(2 / 100) wide, is as wide as the stretch
 MEAN = 0.1
+# Bins of a terrace, at least: fewer tell neither its level nor its noise
+TERRACE_BINS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,25 +69,31 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
     if len(levels) < 2:
         return Terraced(profile)
     reach = int(TERRACE * tip_radius / profile.spacing)
+    if reach < TERRACE_BINS:
+        return Terraced(profile)
     # single bins of noise change no level: means over a stretch that an edge's arc is still wider than
-    smooth = _means(profile.height, int(MEAN * tip_radius / profile.spacing))
+    smooth = running_mean(profile.height, int(MEAN * tip_radius / profile.spacing))
     own = np.abs(smooth[:, None] - levels)
-    noise = float(robust_scale(np.diff(profile.height, 2)) / np.sqrt(6.0))
+    # bins finer than the sampling are filled in: these scatter by nothing
+    noise = neighbour_scatter(profile.height[np.diff(profile.first) > 0])
     runs = _runs(own.argmin(axis=1), own.min(axis=1) < FEATURE_RESIDUAL_SDS * noise, reach)
     # a long way from one level to the next is no edge, and the base's levels are none of this sweep's
     if not runs or any(onward - end > reach for (_, end, _), (onward, _, _) in itertools.pairwise(runs)):
         return Terraced(profile)
     # an arc is higher than the noise only so far from its end, and the means come a little nearer
     beside = int((MEAN * tip_radius + np.sqrt(2 * tip_radius * FEATURE_RESIDUAL_SDS * noise)) / profile.spacing) + 1
+    # a part of every terrace is left, however coarse the bins and strong the noise
+    beside = min(beside, reach // 2)
     height, edges = profile.height - levels[runs[0][2]], []
     level = np.full(len(height), levels[runs[-1][2]])
     for (begin, end, here), (onward, last, there) in itertools.pairwise(runs):
         height[onward:] += levels[here] - levels[there]
         # the way from one to the other is no path over a base: the terrace behind it stands in, with its noise
-        way = np.arange(max(begin, end - beside), min(last, onward + beside))
+        behind = min(last, onward + beside)
+        way = np.arange(max(begin, end - beside), behind)
         level[0 if begin == runs[0][0] else begin : end] = levels[here]
         level[way] = np.nan
-        height[way] = height[np.clip(2 * way[-1] + 1 - way, 0, last - 1)]
+        height[way] = np.pad(height[behind:last], (len(way), 0), mode="symmetric")[: len(way)]
         # details of the two terraces are none of the edge's
         plain = profile.height.copy()
         for ground, detail in ((here, slice(begin, end - reach)), (there, slice(onward + reach, last))):
@@ -111,14 +120,6 @@ def _runs(level: IntArray, on: BoolArray, shortest: float) -> list[tuple[int, in
         else:
             runs.append((begin, end, own))
     return runs
-
-
-def _means(height: FloatArray, half: int) -> FloatArray:
-    """(n,) means over 2 half + 1 bins, over fewer at the ends."""
-    sums = np.concatenate([[0.0], np.cumsum(height)])
-    index = np.arange(len(height))
-    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(height))
-    return np.asarray((sums[high] - sums[low]) / (high - low))
 
 
 def _piece(profile: SweepHeights, low: int, high: int) -> SweepHeights:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.instrument.averaging import Means as Means, RunMeans as RunMeans
+    from mapping.instrument.averaging import Means as Means, RunMeans as RunMeans, running_mean as running_mean
     from mapping.instrument.fit import (
         Blocks as Blocks,
         NoiseFit as NoiseFit,
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         FEATURE_RESIDUAL_SDS as FEATURE_RESIDUAL_SDS,
         MAD_TO_SD as MAD_TO_SD,
         RobustFit as RobustFit,
+        neighbour_scatter as neighbour_scatter,
         robust_fit as robust_fit,
         robust_scale as robust_scale,
         robust_sd as robust_sd,
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from mapping.instrument.tip_calibration import TipCalibration as TipCalibration, calibrate_tip as calibrate_tip
 
 _PUBLIC = {
-    "averaging": ("Means", "RunMeans"),
+    "averaging": ("Means", "RunMeans", "running_mean"),
     "fit": ("Blocks", "NoiseFit", "fit_noise", "perturbed", "relative_sd"),
     "noise": ("Noise", "estimate_noise"),
     "robust": (
@@ -35,6 +36,7 @@ _PUBLIC = {
         "FEATURE_RESIDUAL_SDS",
         "MAD_TO_SD",
         "RobustFit",
+        "neighbour_scatter",
         "robust_fit",
         "robust_scale",
         "robust_sd",

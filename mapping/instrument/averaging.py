@@ -17,6 +17,14 @@ LOOK_AHEAD = 2
 SECOND_DIFFERENCE = float(np.sqrt(12.0 / np.pi))
 
 
+def running_mean(values: FloatArray, half: int) -> FloatArray:
+    """(N,) means over 2 half + 1 values (N,), over fewer at the ends."""
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    index = np.arange(len(values))
+    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
+    return np.asarray((sums[high] - sums[low]) / (high - low))
+
+
 @dataclass(frozen=True, eq=False)
 class Means:
     """What became of some samples.

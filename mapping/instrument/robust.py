@@ -40,6 +40,16 @@ def robust_scale(residual: FloatArray) -> float:
     return float(MAD_TO_SD * np.median(np.abs(residual - np.median(residual))))
 
 
+def neighbour_scatter(values: FloatArray) -> float:
+    """Standard deviation of values (N,) from one to the next, from second differences; 0 of fewer than four.
+
+    A slope does not count, nor does a bend that many values share; what is rare, as features are, hardly does.
+    """
+    if len(values) < 4:
+        return 0.0
+    return robust_scale(np.diff(values, 2)) / float(np.sqrt(6.0))
+
+
 def robust_fit(design: FloatArray, values: FloatArray, scale: float) -> RobustFit:
     """Least squares that ignores what stands out by more than a few times `scale`.
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from hw import Move
 from mapping import FloatArray, SurfaceError, Trace, TraceError
-from mapping.base import BASE_TRIANGLE_SIZE, Base, Cells, fit_base, rolled_off, touched_part
-from mapping.instrument import MAD_TO_SD, robust_scale
+from mapping.base import BASE_TRIANGLE_SIZE, FORETOLD, Base, Cells, fit_base, rolled_off, touched_part
 from planners import Outcome, Plan, PlannerError
 from planners.explore.feel_line import Felt, FeltLine, empty_at, facing
 from planners.survey import Survey
@@ -19,7 +18,7 @@ APPROACH_SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
 # Lines along and across each side of the box, and sweeps that test a fit
 LINES_ALONG, LINES_ACROSS, TESTING = 5, 3, 8
 MOST_DISCOVERY_ROUNDS = 4
-# A base is good if it misses the next sweeps by less than this share of the smallest feature, or by twice the noise
+# A base is good if it misses the next sweeps by less than this share of the smallest feature, or than noise explains
 GOOD = 0.1
 MOST_DISCOVERY_CELLS = 4000
 
@@ -129,9 +128,8 @@ class Discover:
 
     def _miss(self, trace: Trace, base: Base) -> tuple[float, float]:
         """Standard deviation of the heights over the base, m, without what stands out; and what is allowed."""
-        height = base.foot(Cells.of(trace, MOST_DISCOVERY_CELLS).centers, self.tip_radius).height
-        noise = robust_scale(np.diff(height, 2)) / np.sqrt(6.0)
-        return float(MAD_TO_SD * np.median(np.abs(height))), float(max(2.0 * noise, GOOD * self.smallest))
+        missed, scatter = base.misses(Cells.of(trace, MOST_DISCOVERY_CELLS).centers, self.tip_radius)
+        return missed, max(FORETOLD * scatter, GOOD * self.smallest)
 
 
 def _outward(side: str) -> FloatArray:

@@ -12,7 +12,7 @@ from mapping.base.profiles.form import AUTO, Form, form_line
 from mapping.base.profiles.frame import ProfileFrame
 from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_rest
 from mapping.geometry.mesh import Spline, spline_design
-from mapping.instrument import robust_fit, robust_scale
+from mapping.instrument import neighbour_scatter, robust_fit
 
 # A base bends over no less than this many tip radii: shorter details are features.
 SHORTEST_BEND = 8.0
@@ -48,7 +48,7 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
     start, stop = float(along.min()), float(along.max())
     keep = form.unmasked(trace)
     x, z = _cell_medians(along[keep], offset[keep] @ frame.outward)
-    scale = _roughness(z)
+    scale = neighbour_scatter(z)
     if form.kind != "auto":
         # the filter needs more places than cells
         places, line = form_line(x, z, form, scale, (start, stop))
@@ -79,13 +79,6 @@ def _listed(name: str, bends: list[Bend], frame: ProfileFrame, curve: Spline) ->
         for bend in bends
     ]
     return {name: listed} if listed else {}
-
-
-def _roughness(z: FloatArray) -> float:
-    """Standard deviation of values from one cell to the next, from second differences (features are rare)."""
-    if len(z) < 4:
-        return 0.0
-    return float(robust_scale(np.diff(z, 2)) / np.sqrt(6.0))
 
 
 def _cell_medians(x: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -9,7 +9,7 @@ import numpy as np
 from mapping import FloatArray
 from mapping.base import LaidTrace, SweepHeights
 from mapping.base.profiles import SHORTEST_BEND, isolated_rest
-from mapping.instrument import robust_scale
+from mapping.instrument import neighbour_scatter
 
 # Places of a sweep that are looked at: the count that the thresholds of isolated bends were simulated with
 _PLACES = 480
@@ -66,7 +66,7 @@ def _of_piece(piece: SweepHeights, tip_radius: float) -> list[LeftStanding]:
         return []
     x = _means(piece.s, size, count)
     z = _means(piece.height, size, count)
-    noise = float(robust_scale(np.diff(z, 2)) / np.sqrt(6.0))
+    noise = neighbour_scatter(z)
     return [
         LeftStanding(bend.height, bend.width, piece.centers[int(np.abs(piece.s - bend.place).argmin())], 1)
         for bend in isolated_rest(x, z, np.zeros_like(z), noise, narrowest)
