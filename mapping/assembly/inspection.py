@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray, IntArray, Trace
-from mapping.base import Base, LaidTrace, SweepHeights
+from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights
 from mapping.detection import terraced
 from mapping.instrument import Noise
 
@@ -153,15 +153,46 @@ class Inspections:
 def inspect(trace: Trace, base: Base, noise: Noise, spacings: Collection[float]) -> dict[float, Inspection]:
     """Mean heights over stretches of the given lengths (m) along every sweep of the trace, which is passed once."""
     profiles: dict[float, list[SweepHeights]] = {spacing: [] for spacing in spacings}
+    lowered: dict[float, list[FloatArray]] = {spacing: [] for spacing in spacings}
     for own in LaidTrace.of(trace, base).laid_sweeps:
         if len(own.trace) > 1 and own.arclength[-1] > 0:
             for spacing, found in profiles.items():
-                found.extend(own.heights(spacing))
-    return {spacing: _joined(found, base, noise, trace.tip_radius, spacing) for spacing, found in profiles.items()}
+                pieces = own.heights(spacing)
+                found.extend(pieces)
+                if len(base.levels) > 1:
+                    lowered[spacing] += _over_terraces(own, pieces, base, trace.tip_radius)
+    return {
+        spacing: _joined(found, lowered[spacing], base, noise, trace.tip_radius, spacing)
+        for spacing, found in profiles.items()
+    }
+
+
+def _over_terraces(sweep: LaidSweep, pieces: Sequence[SweepHeights], base: Base, tip_radius: float) -> list[FloatArray]:
+    """Heights of each piece over the base's levels that the sweep runs on there, m."""
+    sampled = float(sweep.arclength[-1]) / (len(sweep.trace) - 1)
+    if all(piece.spacing >= sampled for piece in pieces):
+        return [terraced(piece, base, tip_radius).profile.height for piece in pieces]
+    # bins finer than the sampling are pieces of one bin each: the samples themselves tell the levels
+    over = [terraced(whole, base, tip_radius) for whole in sweep.heights(sampled)]
+    lowered = []
+    for piece in pieces:
+        height = piece.height
+        for each in over:
+            inside = (piece.s >= each.profile.s[0]) & (piece.s <= each.profile.s[-1])
+            low = each.lower(piece.s, piece.height)
+            between = np.interp(piece.s, each.profile.s, each.profile.height)
+            height = np.where(inside, np.where(np.isnan(low), between, low), height)
+        lowered.append(height)
+    return lowered
 
 
 def _joined(
-    profiles: Sequence[SweepHeights], base: Base, noise: Noise, tip_radius: float, spacing: float
+    profiles: Sequence[SweepHeights],
+    lowered: Sequence[FloatArray],
+    base: Base,
+    noise: Noise,
+    tip_radius: float,
+    spacing: float,
 ) -> Inspection:
     """The inspection of some profiles in bins of one width."""
     if not profiles:
@@ -177,10 +208,8 @@ def _joined(
     height = np.concatenate([profile.height for profile in profiles])
     sd = _sd_of_means(noise, spacing, np.concatenate([np.diff(profile.first) for profile in profiles]))
     sweep = np.repeat([profile.sweep for profile in profiles], [len(profile.height) for profile in profiles])
-    lowered = np.zeros(0)
-    if len(base.levels) > 1:
-        lowered = np.concatenate([terraced(profile, base, tip_radius).profile.height for profile in profiles])
-    return Inspection(np.concatenate(points), height, sd, sweep, spacing, np.concatenate(normals), lowered)
+    over = np.concatenate(lowered) if lowered else np.zeros(0)
+    return Inspection(np.concatenate(points), height, sd, sweep, spacing, np.concatenate(normals), over)
 
 
 def _sd_of_means(noise: Noise, spacing: float, count: IntArray) -> FloatArray:

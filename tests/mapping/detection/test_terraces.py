@@ -8,21 +8,27 @@ import numpy as np
 import pytest
 
 from mapping import FloatArray, Trace
-from mapping.base import fit_base
-from mapping.detection import Detections, detect
+from mapping.assembly import assemble
+from mapping.base import LaidTrace, fit_base
+from mapping.detection import Detections, detect, terraced
 from mapping.geometry.templates import cap_height, groove_height, step_height
 
 TIP, NOISE, LINES = 1e-3, 5e-6, 12
 
 
-def found(height: Callable[[FloatArray], FloatArray], seed: int = 0) -> Detections:
-    """What a raster of lines to and fro across what lies along y shows, over the base that is fitted to it."""
+def raster(height: Callable[[FloatArray], FloatArray], seed: int = 0, spacing: float = 5e-5) -> Trace:
+    """Lines to and fro across what lies along y."""
     rng = np.random.default_rng(seed)
-    x = np.arange(-30e-3, 30e-3, 5e-5)
+    x = np.arange(-30e-3, 30e-3, spacing)
     ways = [x if k % 2 == 0 else x[::-1] for k in range(LINES)]
     u, v = np.concatenate(ways), np.repeat(3e-3 * np.arange(LINES), len(x))
     z = TIP + height(u) + rng.normal(0.0, NOISE, len(u))
-    trace = Trace(np.arange(len(u)) * 1e-3, np.column_stack([u, v, z]), np.repeat(np.arange(LINES), len(x)), TIP)
+    return Trace(np.arange(len(u)) * 1e-3, np.column_stack([u, v, z]), np.repeat(np.arange(LINES), len(x)), TIP)
+
+
+def found(height: Callable[[FloatArray], FloatArray], seed: int = 0) -> Detections:
+    """What a raster shows, over the base that is fitted to it."""
+    trace = raster(height, seed)
     return detect(trace, fit_base(trace))
 
 
@@ -72,3 +78,38 @@ def test_a_plateau_too_narrow_for_a_terrace_has_two_edges_however_it_is_noisy(se
     for line in places(detections, "step up", "step down"):
         assert line == pytest.approx([-2.3e-3, 2.3e-3], abs=0.4e-3)
     assert len(detections.crossings) == 2 * LINES
+
+
+@pytest.mark.parametrize("spacing", [0.3, 0.5, 0.9])
+def test_a_step_of_a_coarse_raster_is_one_step(spacing: float) -> None:
+    trace = raster(lambda x: step_height(x - 3.3e-3, 0.6e-3, TIP), spacing=spacing * TIP)
+    base = fit_base(trace)
+    detections = detect(trace, base)
+    assert len(detections.crossings) == LINES
+    (step,) = assemble(detections, trace, base)
+    assert step.kind == "step"
+    assert step.height.median == pytest.approx(0.6e-3, rel=0.05)
+
+
+@pytest.mark.parametrize("spacing", [2.0, 5.0])
+def test_bins_too_coarse_for_a_level_leave_the_profile_as_it_is(spacing: float) -> None:
+    trace = raster(lambda x: step_height(x - 3.3e-3, 0.6e-3, TIP), spacing=spacing * TIP)
+    base = fit_base(trace)
+    assert len(base.levels) == 2
+    (profile,) = next(iter(LaidTrace.of(trace, base).laid_sweeps)).heights(spacing * TIP)
+    as_it_is = terraced(profile, base, TIP)
+    assert as_it_is.profile is profile and not as_it_is.edges
+    detect(trace, base)
+
+
+def test_the_terrace_behind_stands_in_however_short_it_is() -> None:
+    """Its end is mirrored again and again: heights that repeat one value would have no noise."""
+    edge = 24e-3
+    trace = raster(lambda x: step_height(x - edge, 0.6e-3, TIP), spacing=0.2 * TIP)
+    base = fit_base(trace)
+    (profile,) = next(iter(LaidTrace.of(trace, base).laid_sweeps)).heights(0.2 * TIP)
+    over = terraced(profile, base, TIP)
+    assert over.level is not None and len(over.edges) == 1
+    way = np.isnan(over.level)
+    assert len(np.unique(over.profile.height[way])) > 0.5 * way.sum()
+    assert np.abs(over.profile.height).max() < 10 * NOISE
