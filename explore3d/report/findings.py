@@ -8,6 +8,7 @@ from pathlib import Path
 from explore3d import count_text
 from explore3d.analysis import ABSORBED, FAILED, Analysis, swept_share
 from mapping import Feature, length_text
+from mapping.detection import CLEAR
 from mapping.detection.path import PathLedger
 
 # One and several of each reason for which a sweep is cut
@@ -77,6 +78,7 @@ def warnings(analysis: Analysis) -> list[str]:
         *path_warning(analysis),
         *form_warnings(analysis),
         *misfit_warnings(analysis),
+        *dropped_warning(analysis),
         *warning_lines(analysis),
     ]
 
@@ -103,6 +105,21 @@ def misfit_warnings(analysis: Analysis) -> list[str]:
     wrong = [feature for feature in analysis.model.features if feature.details.misfit]
     more = [f"... and {len(wrong) - MOST_REMARKS} features more."] if len(wrong) > MOST_REMARKS else []
     return [*(f"Warning: {feature.id}: {feature.details.misfit}." for feature in wrong[:MOST_REMARKS]), *more]
+
+
+def dropped_warning(analysis: Analysis) -> list[str]:
+    """What is no noise whatever its law, and yet in no feature: something is there that the model does not have."""
+    least = CLEAR * analysis.detections.threshold
+    plain = sorted((each for each in analysis.model.dropped if each.snr > least), key=lambda each: -each.snr)
+    if not plain:
+        return []
+    number = count_text(len(plain), "detection")
+    top = plain[0]
+    at = ", ".join(f"{1e3 * value:.1f}" for value in top.point)
+    return [
+        f"Warning: {number} clear of the noise became no feature, the plainest a {top.kind} "
+        f"{length_text(top.height, 2)} high at ({at}) mm: {top.reason}."
+    ]
 
 
 def tip_sentence(analysis: Analysis) -> list[str]:

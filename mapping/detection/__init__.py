@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from mapping.detection.candidates import CLEAR as CLEAR
     from mapping.detection.coverage import (
         Coverage as Coverage,
         FoundHeights as FoundHeights,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from mapping.detection.terraces import terraced as terraced
 
 _PUBLIC = {
+    "candidates": ("CLEAR",),
     "coverage": ("Coverage", "FoundHeights", "coverage", "face_samples", "found_heights"),
     "crossing": ("Crossing",),
     "detect": ("SHORTEST_SWEEP_SAMPLES", "Detections", "detect"),

@@ -6,7 +6,10 @@ from math import inf
 from types import SimpleNamespace
 from typing import Any
 
-from explore3d.report.findings import summary
+import numpy as np
+
+from explore3d.report.findings import summary, warnings
+from mapping import Dropped
 from mapping.detection.path import PathLedger
 from mapping.feature import Interval
 
@@ -24,8 +27,10 @@ def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
 
 
 def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.12e-3, untouched: float = 0.0) -> Any:
-    model, trace = SimpleNamespace(features=features, provenance={}), SimpleNamespace(tip_radius=0.01)
-    detections = SimpleNamespace(detection_limit=limit, probability=0.95, remarks=(), injected=0, recovered=0)
+    model, trace = SimpleNamespace(features=features, provenance={}, dropped=()), SimpleNamespace(tip_radius=0.01)
+    detections = SimpleNamespace(
+        detection_limit=limit, probability=0.95, remarks=(), injected=0, recovered=0, threshold=5.0
+    )
     return SimpleNamespace(
         model=model,
         trace=trace,
@@ -95,6 +100,18 @@ def test_a_path_that_was_left_out_is_said_from_two_per_cent_on() -> None:
     )
     found.path = PathLedger(0.216, 0.215, (("gaps", 0.001),))
     assert not any("path recorded" in line for line in summary(found))
+
+
+def test_what_is_clear_of_the_noise_and_in_no_feature_is_said() -> None:
+    found = analysis()
+    assert warnings(found) == []
+    lost = [
+        Dropped("step up", np.array([0.02, 0.0, 0.001]), 6e-4, snr, 1, None, "no line") for snr in (6.0, 40.0, 700.0)
+    ]
+    found.model.dropped = tuple(lost)
+    (said,) = warnings(found)
+    assert said.startswith("Warning: 2 detections clear of the noise became no feature, the plainest a step up 0.6 mm")
+    assert "(20.0, 0.0, 1.0) mm: no line." in said
 
 
 def test_a_doubt_of_the_tip_that_was_assumed_is_said() -> None:
