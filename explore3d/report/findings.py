@@ -158,7 +158,7 @@ def limit_sentence(analysis: Analysis) -> str:
     """What would have been seen."""
     detections = analysis.detections
     if not isfinite(detections.detection_limit):
-        return "The trace is too short to say what would have been seen."
+        return "The trace is too short, or its samples too far apart, to say what would have been seen."
     return (
         f"A sharp crest {length_text(detections.detection_limit, 2)} high or higher is seen with "
         f"{100 * detections.probability:.0f} % probability where a sweep crosses it{swept_part(analysis)}"

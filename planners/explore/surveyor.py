@@ -138,10 +138,10 @@ class Surveyor:
         smallest = self.survey.smallest
         limit = detect(first, self.survey.base, noise=self.found.noise, stated=self.stated).detection_limit
         if limit > smallest:
-            self.found.unseen.append(
-                f"features lower than {1e3 * limit:.2g} mm: a single sweep does not show them through the noise, "
-                f"though {1e3 * smallest:.2g} mm were asked for"
-            )
+            shown = f"features lower than {1e3 * limit:.2g} mm: a single sweep does not show them through the noise"
+            if not np.isfinite(limit):
+                shown = "some features of any height: samples lie too far apart for a single sweep to show them all"
+            self.found.unseen.append(f"{shown}, though {1e3 * smallest:.2g} mm were asked for")
         self.visible = float(
             np.clip(VISIBLE_HEIGHT_MARGIN * limit / smallest, LEAST_VISIBLE_SHARE, self.survey.visible)
         )

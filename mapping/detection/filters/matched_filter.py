@@ -88,9 +88,30 @@ class Bank:
             return float(needed[-1])
         first = int(enough.argmax())
         if first == 0:
-            return float(needed[0])
+            return self._between_samples(float(needed[0]), tip_radius)
         excess = np.log(available / needed)[first - 1 : first + 1]
         return float(np.exp(np.interp(0.0, excess, np.log(available)[first - 1 : first + 1])))
+
+    def _between_samples(self, needed: float, tip_radius: float) -> float:
+        """Smallest height of a sharp crest that is seen though it is narrower than the narrowest filter, m.
+
+        That is 1.5 bins: the crest may lie on one bin, whose neighbours then hardly feel it, or between two, which then
+        feel the ball's arc beside it. The filter's estimate of its height must reach what is needed at the worse of the
+        two. Infinite where bins are wider than the ball: between two of them it may feel nothing.
+
+        Args:
+            needed: estimate that is above the threshold with 95 % probability, m.
+        """
+        widest = float(self.filters[0].half_width)
+        heights = np.geomspace(needed, 2 * needed + tip_radius, 400)
+        worst = np.full(len(heights), np.inf)
+        for phase in (0.0, 0.5):
+            away2 = ((np.arange(-2, 3) + phase) * self.spacing) ** 2
+            template = np.maximum(1 - away2 / widest**2, 0.0)
+            below = tip_radius - np.sqrt(np.maximum(tip_radius**2 - away2, 0.0))
+            felt = np.where(away2 < tip_radius**2, np.maximum(heights[:, None] - below, 0.0), 0.0)
+            worst = np.minimum(worst, felt @ template / (template @ template))
+        return float(np.min(heights, where=worst >= needed, initial=np.inf))
 
 
 def build_bank(noise: Noise, spacing: float, samples: float, smallest: float, largest: float, drift: int = 0) -> Bank:

@@ -57,7 +57,9 @@ def test_what_would_have_been_seen_is_said_with_every_result() -> None:
     assert summary(analysis())[-1] == seen
     found = analysis(feature("bump-1", True, Interval(0.0, 0.0, 0.0)))
     assert summary(found)[-1] == seen
-    assert summary(analysis(limit=inf))[-1] == "The trace is too short to say what would have been seen."
+    assert summary(analysis(limit=inf))[-1] == (
+        "The trace is too short, or its samples too far apart, to say what would have been seen."
+    )
 
 
 def test_no_sentence_speaks_of_a_surface_that_was_not_swept() -> None:
