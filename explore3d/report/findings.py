@@ -118,7 +118,7 @@ def dropped_warning(analysis: Analysis) -> list[str]:
     at = ", ".join(f"{1e3 * value:.1f}" for value in top.point)
     return [
         f"Warning: {number} clear of the noise became no feature, the plainest a {top.kind} "
-        f"{length_text(top.height, 2)} high at ({at}) mm: {top.reason}."
+        f"of {length_text(abs(top.height), 2)} at ({at}) mm: {top.reason}."
     ]
 
 

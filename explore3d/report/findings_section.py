@@ -10,6 +10,7 @@ from explore3d import count_text
 from explore3d.analysis import Analysis
 from explore3d.report.findings import (
     deviation_warning,
+    dropped_warning,
     form_warnings,
     limit_sentence,
     misfit_warnings,
@@ -99,6 +100,7 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
         content.append(paragraph(analysis.account.sentence()))
     content.extend(element("p", each, class_="warning") for each in form_warnings(analysis))
     content.extend(element("p", each, class_="warning") for each in misfit_warnings(analysis))
+    content.extend(element("p", each, class_="warning") for each in dropped_warning(analysis))
     if analysis.path is not None:
         kind = "warning" if path_warning(analysis) else ""
         content.append(element("p", path_sentence(analysis.path), class_=kind))

@@ -112,7 +112,9 @@ def test_what_is_clear_of_the_noise_and_in_no_feature_is_said() -> None:
     ]
     found.model.dropped = tuple(lost)
     (said,) = warnings(found)
-    assert said.startswith("Warning: 2 detections clear of the noise became no feature, the plainest a step up 0.6 mm")
+    assert said.startswith(
+        "Warning: 2 detections clear of the noise became no feature, the plainest a step up of 0.6 mm"
+    )
     assert "(20.0, 0.0, 1.0) mm: no line." in said
 
 
