@@ -25,8 +25,8 @@ BLOCKS = (1, 3, 9, 27, 81)
 LONGEST_RUN = 0.5
 # Bends of the trace, in those of the ball, that the body's own curvature and the sampling allow.
 ALLOWED_BEND = 3.0
-# Tip radii over which the slope beside a sample is taken: where the ball's own arc is at 45 degrees its slope changes
-# by 0.1, and the bound by a tenth, within
+# Tip radii over which the slope beside a sample is taken: where the ball's own arc is at 45 degrees, the slope changes
+# by 0.14 within (0.05 / cos^3), so that its mean is off by 0.07 and the bound by a tenth
 SLOPE_SPAN = 0.05
 # Standard deviations beyond that: at 5 kHz a Gaussian law has one such sample in 10^6 hours.
 OUT = 7.0

@@ -23,7 +23,7 @@ TERRACE = 4.0
 # Half of the stretch (tip radii) over which means tell the level: single bins of noise tell none, and the arc about an
 # edge of a hundredth of the radius, sqrt(2 / 100) wide, is as wide as the stretch
 MEAN = 0.1
-# Bins of a terrace, at least: fewer tell neither its level nor its noise
+# Bins of a terrace, at least: a scatter from second differences takes four values
 TERRACE_BINS = 4
 
 

@@ -39,8 +39,8 @@ PATCH_RINGS = 3
 NOISE_FLOOR = 1e-3
 # Variance of a mean over what nested fits of white noise have: the weights follow the noise, too. And the share of the
 # misfit beyond the noise that is the curvature's own error, the rest being of higher terms. Over the cells of
-# `explore3d bench curvature` with the seeds 1 and 5 the deviation of the coverage from 90 % is least and flat (0.060 to
-# 0.062) from 1.13 to 1.45 and at 0.46; of these the largest leaves the fewest cells below 84 % (6; 8 at the smallest).
+# `explore3d bench curvature` by jets alone with the seeds 1 and 5 the deviation of the coverage from 90 % is least and
+# flat (0.060 to 0.062) from 1.13 to 1.45 and at 0.46; of these the largest leaves the fewest cells below 84 % (6; 8).
 NOISE_SHARE, MISFIT_SHARE = 1.45, 0.46
 # Least share of the next size's residual that a jet with hardly more points than terms is credited with.
 LUCK = 1.0

@@ -217,7 +217,7 @@ def test_a_real_stylus_profile_shows_its_bumps_and_no_pits(order):
 def test_places_on_a_real_stylus_profile_do_not_depend_on_how_it_was_sampled(order):
     one, other = real("as recorded"), real(order)
     # a single sample on the crest shows it; the limits are higher, for crests between two samples
-    certain = 1.1 * max((found.threshold + 1.0) * found.noise.white for found in (one, other))
+    certain = max((found.threshold + 1.645) * found.noise.white for found in (one, other))
     places = np.array([c.point[0] for c in other.crossings])
     off = [np.abs(places - c.point[0]).min() for c in one.crossings if c.height > certain]
     assert len(off) >= 20

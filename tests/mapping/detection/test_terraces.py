@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mapping import FloatArray, Trace
+from mapping import FloatArray, Surface, Trace
 from mapping.assembly import assemble
-from mapping.base import LaidTrace, fit_base
+from mapping.base import Base, LaidTrace, fit_base
 from mapping.detection import Detections, detect, terraced
 from mapping.geometry.templates import cap_height, groove_height, step_height
 
@@ -103,13 +103,15 @@ def test_bins_too_coarse_for_a_level_leave_the_profile_as_it_is(spacing: float) 
 
 
 def test_the_terrace_behind_stands_in_however_short_it_is() -> None:
-    """Its end is mirrored again and again: heights that repeat one value would have no noise."""
-    edge = 24e-3
-    trace = raster(lambda x: step_height(x - edge, 0.6e-3, TIP), spacing=0.2 * TIP)
-    base = fit_base(trace)
+    """The way to it is longer: it is mirrored again and again, heights that repeat one value would have no noise."""
+    ramp = (21.6e-3, 25.5e-3)
+    trace = raster(lambda x: 0.6e-3 * np.interp(x, ramp, (0.0, 1.0)), spacing=0.2 * TIP)
+    plate = Surface(0.1 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2], [0, 2, 3]])
+    base = Base(plate, "plane", {"levels": [0.0, 0.6e-3]})
     (profile,) = next(iter(LaidTrace.of(trace, base).laid_sweeps)).heights(0.2 * TIP)
     over = terraced(profile, base, TIP)
     assert over.level is not None and len(over.edges) == 1
     way = np.isnan(over.level)
+    assert way.sum() > len(way) - np.flatnonzero(way)[-1] - 1
     assert len(np.unique(over.profile.height[way])) > 0.5 * way.sum()
     assert np.abs(over.profile.height).max() < 10 * NOISE
