@@ -32,6 +32,7 @@ def known(name: str) -> Surface:
     return surface
 
 
+@pytest.mark.slow
 def test_the_script_makes_exactly_what_is_shipped(tmp_path: Path) -> None:
     shutil.copytree(ASSETS, tmp_path / "assets", ignore=shutil.ignore_patterns("*.ply", "__pycache__"))
     (tmp_path / "assets" / "meshes" / "bodies").mkdir(parents=True, exist_ok=True)

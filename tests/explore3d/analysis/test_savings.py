@@ -131,6 +131,7 @@ def test_where_nothing_is_detected_nothing_follows_and_forcing_it_finds_nothing(
     assert forced.detections.threshold == bare.detections.threshold
 
 
+@pytest.mark.slow
 def test_without_a_crossing_a_wire_that_only_many_sweeps_show_is_found_all_the_same(record):
     faint = analyze(record(wire(), 2.9e-3, count=12))
     assert faint.detections.crossings == ()

@@ -46,7 +46,7 @@ def test_a_peer_that_is_not_installed_is_named_with_the_way_to_get_it(monkeypatc
     ("noise", "median"),
     [
         pytest.param(0.0, 6e-4, marks=pytest.mark.slow),
-        (1e-4, 3.7e-3),
+        pytest.param(1e-4, 3.7e-3, marks=pytest.mark.slow),
         pytest.param(1e-3, 3e-2, marks=pytest.mark.slow),
         pytest.param(1e-2, 0.13, marks=pytest.mark.slow),
     ],

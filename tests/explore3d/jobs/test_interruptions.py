@@ -156,7 +156,12 @@ def fill(older: Older, job: str, free: int, folder: Path) -> str:
 
 
 @pytest.mark.parametrize(
-    ("job", "how"), [("run", "SIGINT"), pytest.param("merge", "SIGTERM", marks=pytest.mark.slow), ("run", "SIGKILL")]
+    ("job", "how"),
+    [
+        ("run", "SIGINT"),
+        pytest.param("merge", "SIGTERM", marks=pytest.mark.slow),
+        pytest.param("run", "SIGKILL", marks=pytest.mark.slow),
+    ],
 )
 def test_a_job_that_a_signal_ends_leaves_the_older_session(older: Older, tmp_path: Path, job: str, how: str) -> None:
     for attempt in range(4):

@@ -26,6 +26,7 @@ def test_the_simulated_display_keeps_to_the_contract() -> None:
     assert isinstance(SimulatedDisplay(pressed(1e-3)), Display)
 
 
+@pytest.mark.slow
 def test_a_pressing_hand_is_held_by_springs_in_series() -> None:
     display = SimulatedDisplay(pressed(2e-3), hand=Hand(stiffness=400.0), max_force=5.0)
     with display:

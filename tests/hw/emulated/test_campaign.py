@@ -22,8 +22,8 @@ def holds(kind: str, phase: str, touch: str, seed: int = 0, model: bool = True) 
         ("frozen", "optoforce", "the same . value"),
         pytest.param("nan", "line", "no number", marks=pytest.mark.slow),
         pytest.param("sign", "optoforce", "jumped|pulls", marks=pytest.mark.slow),
-        ("open", "peck", "nothing was felt|open again"),
-        ("power cycle", "peck", "restarted"),
+        pytest.param("open", "peck", "nothing was felt|open again", marks=pytest.mark.slow),
+        pytest.param("power cycle", "peck", "restarted", marks=pytest.mark.slow),
     ],
 )
 def test_what_lies_midway_stops_the_machine_and_is_named(kind: str, touch: str, why: str) -> None:

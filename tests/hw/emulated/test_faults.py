@@ -102,7 +102,9 @@ def survive(fault: Fault, slide: bool, folder: Path) -> str:
     return said
 
 
-@pytest.mark.parametrize("kind", ["reset", "disconnect", "alarm"])
+@pytest.mark.parametrize(
+    "kind", ["disconnect", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("reset", "alarm"))]
+)
 def test_one_fault_of_each_kind_is_survived(kind: str, tmp_path: Path) -> None:
     said = survive(Fault(kind, at=0.9, duration=3.0, count=40, seed=1), False, tmp_path)
     if kind in ("reset", "disconnect", "alarm", "stall"):

@@ -36,7 +36,7 @@ def machine(latency: float = 0.0) -> Iterator[tuple[GrblEmulator, GrblController
     assert server.error is None, server.error
 
 
-@pytest.mark.parametrize("latency", [0.0, 5e-3])
+@pytest.mark.parametrize("latency", [0.0, pytest.param(5e-3, marks=pytest.mark.slow)])
 def test_a_thousand_jogs_arrive_where_the_last_was_to_end(latency: float) -> None:
     with machine(latency) as (stage, controller):
         begun = controller.resting_position()
@@ -70,7 +70,7 @@ def test_a_jog_whose_line_was_lost_is_made_up_for_and_no_more(monkeypatch: pytes
         assert stage.motion.travelled < 2.1e-4
 
 
-@pytest.mark.parametrize("how", ["move", "jog", "probe"])
+@pytest.mark.parametrize("how", ["move", *(pytest.param(how, marks=pytest.mark.slow) for how in ("jog", "probe"))])
 def test_a_machine_that_restarts_before_a_motion_goes_no_further_than_it_was_sent(how: str) -> None:
     """The restart is not heard of: the motion is written before the greeting arrives."""
     with machine(latency=0.2) as (stage, controller):

@@ -465,7 +465,7 @@ def test_a_printers_firmware_is_refused_by_its_name() -> None:
         GrblController(os.ttyname(slave), wake=0.5).open()
 
 
-@pytest.mark.parametrize("phase", range(3))
+@pytest.mark.parametrize("phase", [0, *(pytest.param(phase, marks=SLOW) for phase in (1, 2))])
 def test_a_garbled_report_before_the_first_motion_does_not_say_where_it_begins(phase: int) -> None:
     with machine(pace=10.0) as (server, stage), pecker(server) as finger:
         report, told = stage.report, count(phase)

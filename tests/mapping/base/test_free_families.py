@@ -76,7 +76,9 @@ def missed(base: Base, lines: list[FloatArray]) -> FloatArray:
     return np.abs(base.foot(np.concatenate(lines), TIP).height)
 
 
-@pytest.mark.parametrize(("lines", "kind"), [(egg(), "star body"), (vase(), "tube")])
+@pytest.mark.parametrize(
+    ("lines", "kind"), [pytest.param(egg(), "star body", marks=pytest.mark.slow), (vase(), "tube")]
+)
 def test_a_round_body_of_no_family_is_fitted_to_the_noise(lines: list[FloatArray], kind: str) -> None:
     base = fit_base(swept(lines))
     assert base.kind == kind

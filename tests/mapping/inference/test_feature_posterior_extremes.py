@@ -41,6 +41,7 @@ def test_spikes_do_not_move_the_answer():
     assert b.height.median == pytest.approx(a.height.median, abs=8e-6)
 
 
+@pytest.mark.slow
 def test_the_rest_of_a_long_log_costs_next_to_nothing():
     near = record(CROSSINGS, wire(ENDS))
     rng = np.random.default_rng(0)

@@ -74,7 +74,7 @@ def judged(seed: int, underrated: float = 1.0) -> list[tuple[float, bool]]:
     return told
 
 
-@pytest.mark.parametrize("underrated", [1.0, 2.0])
+@pytest.mark.parametrize("underrated", [1.0, pytest.param(2.0, marks=pytest.mark.slow)])
 def test_probabilities_of_changes_mean_what_they_say(underrated: float) -> None:
     told = np.array([each for seed in range(5) for each in judged(seed, underrated)], dtype=np.float64)
     for low, high in ((0.0, 0.1), (0.1, 0.9), (0.9, 1.01)):

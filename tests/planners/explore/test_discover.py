@@ -53,6 +53,7 @@ def test_a_plate_smaller_than_the_box_ends_where_it_ends() -> None:
     assert np.allclose(ends, [-0.03, 0.03], atol=1.5 * R)
 
 
+@pytest.mark.slow
 def test_the_top_of_a_cylinder_is_a_cylinder() -> None:
     base = found(tube(0.03, 0.2), [-0.03, -0.018, 0.0], [0.03, 0.018, 0.035])
     assert base is not None and base.kind == "cylinder"

@@ -59,7 +59,7 @@ def test_the_question_in_polars_is_answered(store: Path, capsys: pytest.CaptureF
     assert "ridge-1" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("library", ["duckdb", "polars"])
+@pytest.mark.parametrize("library", ["polars", pytest.param("duckdb", marks=pytest.mark.slow)])
 def test_an_answer_of_a_hundred_thousand_rows_takes_less_than_a_tenth_of_a_second(library: str, tmp_path: Path) -> None:
     module = pytest.importorskip(library)
     rng = np.random.default_rng(0)

@@ -52,7 +52,7 @@ def test_a_wide_hollow_across_a_raster_is_one_with_its_depth_and_width() -> None
     assert found.width == pytest.approx(70.7e-6, rel=0.05)
 
 
-@pytest.mark.parametrize("reach", [1, 20])
+@pytest.mark.parametrize("reach", [1, pytest.param(20, marks=pytest.mark.slow)])
 def test_of_noise_alone_nothing_is_told(reach: int) -> None:
     told = [len(standing(raster(bare, np.random.default_rng(seed), reach))) for seed in range(2)]
     assert told == [0, 0]

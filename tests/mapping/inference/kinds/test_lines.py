@@ -61,6 +61,7 @@ def test_a_crossing_that_was_pulled_aside_bends_nothing() -> None:
     assert [name for name in names if name.startswith("bend")] == []
 
 
+@pytest.mark.slow
 def test_an_arm_that_meets_another_line_ends_where_they_meet() -> None:
     arm = np.linspace([0.0, 0.0, 0.0], [0.02, 0.0, 0.0], 30)
     bar = np.linspace([0.0, -0.02, 0.0], [0.0, 0.02, 0.0], 30)
