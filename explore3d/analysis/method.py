@@ -30,6 +30,7 @@ from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_s
 from mapping.estimate.deviation import Deviation, explain, left_standing
 from mapping.estimate.envelope import estimate_surface
 from mapping.geometry.curvature import principal_curvatures
+from mapping.geometry.mesh import distances
 from mapping.inference import refine_all
 from mapping.model import Judgement, ObjectModel, dropped_crossings, dropped_features, judged
 
@@ -187,8 +188,6 @@ def fitted(work: Work, share: Share) -> None:
     for bend in _bends(work.base, "absorbed"):
         end = "was taken for the base's own form; if it is a feature, say --form line, arc or poly:2, or --mask it"
         work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {end}"))
-    for bend in _bends(work.base, "left standing"):
-        work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)} {_TOO_WIDE}"))
 
 
 def _bends(base: Base, name: str) -> list[dict[str, Any]]:
@@ -203,20 +202,6 @@ def _described(bend: dict[str, Any]) -> str:
     place = ", ".join(f"{1e3 * value:.4g}" for value in bend["place"])
     height, width = length_text(abs(bend["height"]), 2), length_text(bend["width"], 2)
     return f"a {kind} {height} {sense} and {width} wide at ({place}) mm"
-
-
-def _note_left_standing(work: Work) -> None:
-    """Say what stands off a fitted base and is no fine feature; a given model is judged by the deviation."""
-    if work.base.kind in ("mesh", "profile"):
-        return
-    found = left_standing(work.laid)
-    for each in found[:MOST_STANDING]:
-        seen = count_text(each.sweeps, "sweep")
-        text = f"{_described({'height': each.height, 'width': each.width, 'place': each.place})} in {seen} {_TOO_WIDE}"
-        work.stages.left_out.append(LeftOut(ABSORBED, text))
-    if len(found) > MOST_STANDING:
-        more = count_text(len(found) - MOST_STANDING, "wide hollow or hump stands", "wide hollows and humps stand")
-        work.stages.left_out.append(LeftOut(ABSORBED, f"besides, {more} off the base"))
 
 
 def _was_found(base: Base) -> bool:
@@ -330,7 +315,6 @@ def detected(work: Work, share: Share) -> None:
         work.trace, work.laid = work.trace.select(keep), work.laid.within(keep)
         found = detect(work.laid, work.base, **work.settings.detection)
         work.detections = replace(found, left_out=(*work.detections.left_out, *found.left_out))
-    _note_left_standing(work)
     if work.sound is not None:
         work.path = path_ledger(work.sound, work.detections, beyond, work.apart)
     if work.deviation is not None and work.deviation.beyond_repair:
@@ -412,6 +396,29 @@ def believed(work: Work, share: Share) -> None:
         x, y, z = np.round(1e3 * each.point, 2)
         work.stages.left_out.append(LeftOut(f"a {each.kind} at ({x:g}, {y:g}, {z:g}) mm", each.reason))
     work.features = tuple(feature for feature in work.features if feature.evidence.likely)
+
+
+def standing_told(work: Work, share: Share) -> None:
+    """What stands off a fitted base and no feature accounts for; a given model is judged by the deviation."""
+    if work.base.kind == "profile":
+        found = _bends(work.base, "left standing")
+    else:
+        felt = work.base.kind != "mesh" and not work.log.detections
+        found = [asdict(each) for each in left_standing(work.laid)] if felt else []
+    found = [bend for bend in found if not any(_accounts_for(each, bend) for each in work.features)]
+    for bend in found[:MOST_STANDING]:
+        seen = f" in {count_text(bend['sweeps'], 'sweep')}" if "sweeps" in bend else ""
+        work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)}{seen} {_TOO_WIDE}"))
+    if len(found) > MOST_STANDING:
+        more = count_text(len(found) - MOST_STANDING, "wide hollow or hump stands", "wide hollows and humps stand")
+        work.stages.left_out.append(LeftOut(ABSORBED, f"besides, {more} off the base"))
+
+
+def _accounts_for(feature: Feature, bend: dict[str, Any]) -> bool:
+    """True if a feature overlaps with what stands off the base, on the same side and as high."""
+    as_high = max(np.sign(bend["height"]) * np.array([feature.height.low, feature.height.high])) >= abs(bend["height"])
+    apart = float(distances(np.asarray(bend["place"])[None], feature.axis)[0])
+    return bool(as_high and apart <= 0.5 * (feature.width.high + bend["width"]))
 
 
 def why_no_smoothing(work: Work) -> str | None:

@@ -9,7 +9,13 @@ import numpy as np
 
 from mapping import EmptyWindowError, Feature, FloatArray, Posterior, Trace
 from mapping.base import Base, fit_base
-from mapping.inference.evidence import better_section, log_evidence_of_nothing
+from mapping.inference.evidence import (
+    ROUGH_EVIDENCE,
+    at_optima,
+    better_section,
+    log_evidence_of_nothing,
+    rough_evidence,
+)
 from mapping.inference.families import PosteriorProblem, Surroundings, with_free_tip, with_nominal_tip
 from mapping.inference.kinds import kind_of
 from mapping.inference.model_error import account_for_misfit
@@ -33,9 +39,6 @@ from mapping.instrument import Noise
 KEPT_DRAWS = 1000
 # Draws of which the best begins the search for the optimum
 FEW_BEGINNINGS = 200
-# The Gaussian approximation of a log evidence was off by -2.0 to +2.9 (33 families of 11 lines of explore3d bench
-# sections --building): what it takes for less likely by more than both of these is
-ROUGH_EVIDENCE = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,11 +144,16 @@ def solve(
     base = base or _fitted(trace)
     noise = (noise or noise_of_trace(trace, base)).rounded(trace.resolution)
     around = Surroundings(trace, base, noise, others, tip_sd)
-    solution = _likeliest(_rough(pose_problem(feature, around), around), around, rng, confirm)
-    if solution.problem.misfit == 0.0:
-        return solution
-    better = better_section(solution.problem, around, rng)
-    return solution if better is None else solve_problem(better, rng, confirm=confirm)
+    problems = _rough(pose_problem(feature, around), around)
+    first, optima = account_for_misfit(problems[0], list(problems[0].beginnings))
+    first = replace(first, beginnings=np.array(optima))
+    if first.misfit == 0.0:
+        return _likeliest([first, *problems[1:]], rng, confirm)
+    # None of them fits: what the others would say is no better founded
+    better = better_section(first, around, rng)
+    if better is None:
+        return solve_problem(first, rng, confirm=confirm, adapt=False)
+    return solve_problem(better, rng, confirm=confirm)
 
 
 def _rough(first: PosteriorProblem, around: Surroundings) -> list[PosteriorProblem]:
@@ -153,17 +161,13 @@ def _rough(first: PosteriorProblem, around: Surroundings) -> list[PosteriorProbl
 
     All are weighed under the noise of the trace: noise that is raised until one of them fits would speak for none.
     """
-    optima = find_optima(first.target, first.beginnings)
+    first = at_optima(first)
     nominal = with_nominal_tip(first)
-    rivals = kind_of(first.feature).rivals(nominal, optima[0][: len(nominal.target.shape.names)])
+    rivals = kind_of(first.feature).rivals(nominal, first.beginnings[0, : len(nominal.target.shape.names)])
     if not rivals:
         return [first]
-    weighed = []
-    for problem in (first, *(_felt(each, around) for each in rivals)):
-        found = optima if problem is first else find_optima(problem.target, problem.beginnings)
-        evidence = max(laplace(problem.target, optimum).log_evidence for optimum in found)
-        weighed.append((evidence, replace(problem, beginnings=np.array(found))))
-    weighed.sort(key=lambda each: -each[0])
+    families = [first, *(at_optima(_felt(each, around)) for each in rivals)]
+    weighed = sorted(((rough_evidence(each), each) for each in families), key=lambda each: -each[0])
     least = weighed[0][0] + np.log(UNLIKELY_FAMILY) - ROUGH_EVIDENCE
     return [problem for evidence, problem in weighed if evidence > least]
 
@@ -173,13 +177,12 @@ def _felt(problem: PosteriorProblem, around: Surroundings) -> PosteriorProblem:
     return with_free_tip(problem, around.tip_sd, around.base.kind != "mesh") if around.tip_sd > 0.0 else problem
 
 
-def _likeliest(
-    problems: Sequence[PosteriorProblem], around: Surroundings, rng: np.random.Generator, confirm: bool | None
-) -> Solution:
-    """The most probable of some problems on one window, solved, with those that remain likely beside it."""
-    best = solve_problem(problems[0], rng, confirm=confirm)
-    if best.problem.misfit > 0.0:  # none fits: what the others would say is no better founded
-        return best
+def _likeliest(problems: Sequence[PosteriorProblem], rng: np.random.Generator, confirm: bool | None) -> Solution:
+    """The most probable of some problems on one window, solved, with those that remain likely beside it.
+
+    The first of them begins at its optima, under the noise that it was left with.
+    """
+    best = solve_problem(problems[0], rng, confirm=confirm, adapt=False)
     solved = [best]
     for problem in problems[1:]:
         target = problem.target.with_likelihood(best.problem.target.likelihood)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -71,11 +72,16 @@ class FreeTipShape:
         if self.tip.sd > NARROW_PRIOR * self.tip.mean:
             rows = [self._with_tip(float(row[-1])).templates(row[None, :-1]) for row in theta]
             return np.concatenate(rows) + higher
-        node = NODE_SDS * self.tip.sd
-        below, at, above = (self._with_tip(self.tip.mean + d).templates(theta[:, :-1]) for d in (-node, 0.0, node))
-        u = off / node
+        below, at, above = (shape.templates(theta[:, :-1]) for shape in self._nodes)
+        u = off / (NODE_SDS * self.tip.sd)
         felt: FloatArray = at + 0.5 * u * (above - below) + 0.5 * u**2 * (above - 2.0 * at + below)
         return felt + higher
+
+    @cached_property
+    def _nodes(self) -> tuple[Shape, Shape, Shape]:
+        """The shape felt by tips of the three radii that a narrow prior's parabola goes through."""
+        node = NODE_SDS * self.tip.sd
+        return self._with_tip(self.tip.mean - node), self.felt, self._with_tip(self.tip.mean + node)
 
     def _with_tip(self, radius: float) -> Shape:
         # A copy keeps what the shape has cached of its window, which does not depend on the tip.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 import time
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from explore3d.log.load import load_logs
 from explore3d.log.own.record import Log
 from explore3d.log.table import read_table
 from explore3d.log.text import read_pieces, read_text
+from explore3d.log.text.cell_kernels import read_cells
 
 STYLUS = Path(__file__).parents[4] / "shared" / "data" / "stylus_profile_mm.csv"
 
@@ -392,3 +394,26 @@ def test_a_table_that_memory_cannot_hold_is_refused_before_it_is_read(
         UserError, match=r"long\.csv: to read its .* takes about .* GB are free; possible: --average 50, "
     ):
         read_text(path)
+
+
+@pytest.mark.parametrize("form", ["%.18e", "%.17g", "%.16e", "%r", "%.3f000000000000000"])
+def test_long_numbers_are_read_as_python_reads_them(form: str, tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    cells = [form % value for value in (rng.normal(size=4000) * 10.0 ** rng.uniform(-9, 5, 4000)).tolist()]
+    lines = (f"{1e-3 * k:.18e},{cell}" for k, cell in enumerate(cells))
+    read_as = read(tmp_path, "x [mm],z [mm]\n" + "\n".join(lines) + "\n").trace.centers[:, 2]
+    assert np.array_equal(read_as, 1e-3 * np.array([float(cell) for cell in cells]))
+
+
+def test_a_number_beside_the_middle_of_two_is_rounded_to_the_nearer() -> None:
+    rng = np.random.default_rng(4)
+    middle = (2 * int(rng.integers(2**52, 2**53)) + 1 for _ in range(2000))
+    cells = [f"{round(Fraction(m, 2**50) * 10**17) + k}e-17" for m in middle for k in (-1, 0, 1)]
+    data = np.frombuffer(("\n".join(cells) + "\n").encode(), dtype=np.uint8)
+    rows, odd = np.empty((len(cells), 1)), np.empty((len(cells), 4), dtype=np.int64)
+    places = np.empty((2, len(cells)), dtype=np.int32)
+    spans, strange, marks = (np.zeros(shape, dtype=np.int64) for shape in ((0, 0, 2), (9, 4), (1, 4)))
+    *_, full = read_cells(data, 0, 44, 46, 0, np.zeros(1, bool), rows, *places, spans, odd, strange, marks)
+    known = np.isfinite(rows[:, 0])
+    assert not full and known.mean() > 0.5
+    assert np.array_equal(rows[known, 0], np.array([float(cell) for cell in cells])[known])
