@@ -23,7 +23,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from hw import Finger, FingerError, Move
+from hw import THROUGH_SPACE, Finger, FingerError, Move
 from mapping import FloatArray, Trace
 
 # A finger gives up this soon after its device failed, and lets go this soon when it is left, s
@@ -149,7 +149,7 @@ def _feels_the_body(rig: Rig) -> None:
 def _feels_nothing_on_its_way(rig: Rig) -> None:
     above = rig.sweep.path[:1] - 2e-3 * rig.sweep.approach[:1]
     with rig.open() as finger:
-        for purpose in ("travel", "retreat"):
+        for purpose in THROUGH_SPACE:
             felt = finger.execute(replace(rig.sweep, path=above, approach=rig.sweep.approach[0], purpose=purpose))
             _demand(len(felt) == 0, f"a {purpose} gave samples")
 

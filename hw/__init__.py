@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hw.finger import Finger as Finger, Workspace as Workspace
     from hw.framing import Frames as Frames, Framing as Framing, Lines as Lines
     from hw.link import Link as Link
-    from hw.move import Move as Move
+    from hw.move import THROUGH_SPACE as THROUGH_SPACE, Move as Move
     from hw.patience import Patience as Patience
     from hw.safety import SIGNALS as SIGNALS, StopOnSignal as StopOnSignal, end_program as end_program
     from hw.simulated.finger import SimulatedFinger as SimulatedFinger
@@ -26,7 +26,7 @@ _PUBLIC = {
     "finger": ("Finger", "Workspace"),
     "framing": ("Frames", "Framing", "Lines"),
     "link": ("Link",),
-    "move": ("Move",),
+    "move": ("THROUGH_SPACE", "Move"),
     "patience": ("Patience",),
     "safety": ("SIGNALS", "StopOnSignal", "end_program"),
     "simulated.finger": ("SimulatedFinger",),

@@ -10,6 +10,8 @@ from hw.errors import MoveError
 from mapping import FloatArray
 
 PURPOSES = ("travel", "approach", "sweep", "retreat")
+# These begin and end in free space, where nothing is to back off from
+THROUGH_SPACE = ("travel", "retreat")
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hw import FingerError, LinkError, Move, Patience, StopOnSignal, StoppedError, Workspace
+from hw import THROUGH_SPACE, FingerError, LinkError, Move, Patience, StopOnSignal, StoppedError, Workspace
 from hw.grbl import ExpectedSurface, GrblController, GuardedStage, StageFrame
 from hw.probing.lag import measured_delay
 from hw.probing.peck import Peck, Touched
@@ -337,7 +337,7 @@ class GrblFinger:
         elif not self._free:
             self._lift(stage, lift)
         self._away, self._free = away, False
-        if move.purpose in ("travel", "retreat"):
+        if move.purpose in THROUGH_SPACE:
             for point, inwards in zip(move.path, move.approach, strict=True):
                 self._away = -inwards
                 stage.go(point, -inwards, lift)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hw import Move
+from hw import THROUGH_SPACE, Move
 from mapping import BoolArray, FloatArray, IntArray, Trace
 from mapping.base import Base
 from mapping.detection import face_samples
@@ -18,8 +18,6 @@ from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
 from planners.paths.detour import Detour
 from planners.paths.sound import BACK_OFF_DISTANCE, DETAIL_ROOM, resampled, sound_parts
 
-# Moves through free space
-THROUGH_SPACE = ("travel", "retreat")
 # Places of a way lie at most so far apart where it is looked whether it is free, in tip radii
 FREE_SPACING = 0.25
 # About its ends a way need not keep off the body: the finger was or will be there, in tip radii

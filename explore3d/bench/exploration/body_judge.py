@@ -16,6 +16,7 @@ import numpy as np
 
 from explore3d.analysis import Analysis, TrueFeature
 from explore3d.log import Event
+from hw import THROUGH_SPACE
 from mapping import BoolArray, FloatArray, IntArray, Surface
 from mapping.geometry.mesh import nearest_on
 
@@ -23,6 +24,8 @@ from mapping.geometry.mesh import nearest_on
 ASKED_SPACING, FREE_SPACE_SPACING = 0.25, 0.5
 # How deep something may sink, in tip radii
 MAY_SINK = 0.05
+# A finger backs off so far from what it touched, in tip radii
+BACKED_OFF = 0.5
 # The stem: half as thick as the ball, from where it leaves the ball to six radii behind the ball's centre, tip radii
 STEM_THICK, STEM_FROM, STEM_TO, STEM_ASKED = 0.5, 1.5, 6.0, 10
 # The carrier leans from the normal by as much as the sensor's field of 75 degrees leaves over a detail a sixth of a tip
@@ -112,7 +115,9 @@ class Judge:
             stem_parts = [(path, approach)]
             if before is not None:
                 ends = np.stack([np.asarray(before["approach"]).reshape(-1, 3)[-1], approach[0]])
-                way = np.stack([np.asarray(before["path"])[-1], path[0]]) - 0.5 * radius * ends
+                # fingers back off from what was touched; travel begins and ends in free space
+                off = np.array([[0.0 if move["purpose"] in THROUGH_SPACE else BACKED_OFF] for move in (before, after)])
+                way = np.stack([np.asarray(before["path"])[-1], path[0]]) - off * radius * ends
                 parts.append((way, ends))
                 stem_parts.append((way, ends))
             for centers, _ in (_dense(*part, 0.1 * radius) for part in parts):
