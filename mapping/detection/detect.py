@@ -186,7 +186,7 @@ def detect(
             # over a base that was fitted to one profile, small features and roughness are the same thing: what
             # speaks against the law is said, and decides nothing (see _stands_out)
             if base.kind != "profile":
-                found, level = weighed, effective_noise(bank, told) if told else level
+                found, level = weighed, floored(effective_noise(bank, told), tip) if told else level
                 bank = scaled
     crossings = []
     for one, each in zip(over, found, strict=True):
@@ -261,7 +261,7 @@ def _weighed(
         tails = None
         for _ in range(NULL_ROUNDS):
             heights = [without(p.height, mask, bank.drift > 0) for p, mask in zip(group, masks, strict=True)]
-            scales = null_scales(group, heights, masks, bank, threshold, tails)
+            scales = null_scales(group, heights, masks, bank, threshold, CONTACT_ROUNDING * tip, tails)
             # what is found, but not clear, stays out of the tails: they tell of noise that is nowhere found
             tails = scales[0].tails
             if all(scale.as_fitted for scale in scales):

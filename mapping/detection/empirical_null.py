@@ -58,6 +58,7 @@ class NullScale:
         tails: (F,) by which it must rise for the tails alone.
         spacing: width of a profile bin, m.
         widths: (F,) half-widths of the filters, m.
+        least: (F,) what rounding alone leaves: no path is quieter.
     """
 
     pooled: FloatArray
@@ -67,6 +68,7 @@ class NullScale:
     tails: FloatArray
     spacing: float
     widths: FloatArray
+    least: FloatArray
 
     @property
     def as_fitted(self) -> bool:
@@ -83,7 +85,7 @@ class NullScale:
         own = np.full(len(self.local), self.pooled[k] * self.own[k, 0])
         if self.own.shape[1] > 1:
             own = self.pooled[k] * np.exp(np.interp(np.arange(len(own)), self._middles, np.log(self.own[k])))
-        return np.asarray(own * _seen(self.local, self.widths[k] / self.spacing))
+        return np.asarray(np.maximum(own * _seen(self.local, self.widths[k] / self.spacing), self.least[k]))
 
     def along(self, k: int) -> FloatArray:
         """(n,) of the k-th filter in each bin, doubt included: what the threshold is a multiple of."""
@@ -101,6 +103,7 @@ def null_scales(
     quiet: Sequence[BoolArray],
     bank: Bank,
     threshold: float,
+    rounding: float,
     tails: FloatArray | None = None,
 ) -> list[NullScale]:
     """The scale of each profile.
@@ -111,6 +114,7 @@ def null_scales(
         quiet: (n,) of each: False where something was taken out.
         bank: filters for the fitted noise.
         threshold: signal-to-noise ratio at which the scale must serve.
+        rounding: standard deviation that every sample has at least, m.
         tails: (F,) factors for heavier tails, from where nothing exceeds the threshold; None: measured here.
 
     Method:
@@ -153,8 +157,10 @@ def null_scales(
             each[k] = np.exp(0.5 * deviation)
     pooled, doubt, heavier = (_between(each, measured) for each in (pooled, doubt, heavier))
     own = [_between(each, measured) for each in own]
+    least = np.array([_output_variance(bank, k, Noise(rounding)) / f.sd**2 for k, f in enumerate(bank.filters)]) ** 0.5
     return [
-        NullScale(pooled, each, v, doubt, heavier, bank.spacing, widths) for each, v in zip(own, local, strict=True)
+        NullScale(pooled, each, v, doubt, heavier, bank.spacing, widths, least)
+        for each, v in zip(own, local, strict=True)
     ]
 
 

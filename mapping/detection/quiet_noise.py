@@ -29,6 +29,7 @@ UNLIKELY = 10.0
 RAW_SAMPLES = 40_000
 NOISE_FIT_BLOCKS = 8000
 QUIET_NOISE_ROUNDS = 3
+GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +63,11 @@ class Background:
 
 
 def raw_stretches(usable: Sequence[LaidSweep]) -> list[Stretch]:
-    """The middles of the sweeps, together no more than about RAW_SAMPLES."""
+    """A piece of each sweep, together no more than about RAW_SAMPLES."""
     share = max(64, RAW_SAMPLES // len(usable))
     stretches = []
-    for sweep in usable:
-        cut = _middle(len(sweep.trace), share)
+    for number, sweep in enumerate(usable):
+        cut = _piece(len(sweep.trace), share, number)
         stretches.append(Stretch(sweep.number, sweep.feet(cut).height, sweep.arclength[cut]))
     return stretches
 
@@ -80,16 +81,20 @@ def smallest_crest(laid: LaidTrace, step: float) -> float:
     """
     share = max(64, RAW_SAMPLES // len(laid.laid_sweeps))
     stretches = []
-    for sweep in laid.laid_sweeps:
-        height = sweep.feet(_middle(len(sweep.trace), share)).height
+    for number, sweep in enumerate(laid.laid_sweeps):
+        height = sweep.feet(_piece(len(sweep.trace), share, number)).height
         # arclengths go by the sweeps' numbers, which may be wrong
         stretches.append(Stretch(sweep.number, height, step * np.arange(float(len(height)))))
     noise = first_noise(stretches, step, laid.tip_radius)
     return smallest_half_width(noise, step, 1.0, laid.tip_radius, SMALLEST_CREST_SNR)
 
 
-def _middle(count: int, share: int) -> slice:
-    begin = max(0, (count - share) // 2)
+def _piece(count: int, share: int, number: int) -> slice:
+    """So many samples of a sweep, elsewhere in each: the middles of all are where what is explored lies.
+
+    The places are as even as a sequence can make them (multiples of the golden ratio), the first in the middle.
+    """
+    begin = int(max(0, count - share) * ((0.5 + number * GOLDEN_RATIO) % 1.0))
     return slice(begin, begin + share)
 
 

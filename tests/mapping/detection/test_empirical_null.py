@@ -10,6 +10,7 @@ from scipy.special import ndtr, ndtri, stdtrit
 
 from mapping.arrays import FloatArray
 from mapping.base.base import Base
+from mapping.detection import quiet_noise
 from mapping.detection.detect import Detections, detect
 from mapping.detection.empirical_null import _heavier_tail
 from mapping.detection.filters.matched_filter import build_bank
@@ -52,6 +53,27 @@ def found(law: Callable[[np.random.Generator], FloatArray], seed: int, height: f
     centers = np.column_stack([np.tile(S - 0.5 * LENGTH, SWEEPS), y, TIP + z.ravel()])
     trace = Trace(np.arange(len(y)) * 2e-4, centers, np.repeat(np.arange(SWEEPS), len(S)), TIP)
     return detect(trace, PLATE, false_alarms_per_metre=1.0)
+
+
+def test_a_path_without_noise_is_no_quieter_than_rounding() -> None:
+    def every_other_silent(rng: np.random.Generator) -> FloatArray:
+        return white(rng) * (np.arange(SWEEPS) % 2)[:, None]
+
+    crossings = found(every_other_silent, 0, WIRE).crossings
+    assert len(crossings) >= SWEEPS
+    # a crest of 0.1 mm over the rounding of 0.1 nm of all the samples under it
+    assert max(crossing.snr for crossing in crossings) < 1e6 * np.sqrt(2 * np.sqrt(2 * TIP * WIRE) / STEP)
+
+
+def test_what_lies_in_the_middle_of_every_sweep_is_not_taken_for_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(quiet_noise, "RAW_SAMPLES", 500 * SWEEPS)
+
+    def wide(rng: np.random.Generator) -> FloatArray:
+        crest = 0.5e-3 * np.maximum(0.0, 1.0 - ((S - 0.5 * LENGTH) / (0.1 * LENGTH)) ** 2)
+        return np.tile(crest, (SWEEPS, 1))
+
+    noise = found(wide, 0).noise
+    assert noise.white < 1e-6 * TIP and noise.correlated == 0.0
 
 
 def test_white_noise_needs_no_scale_of_its_own_and_nothing_is_said() -> None:
