@@ -18,6 +18,7 @@ from scene_files import write_scene_file
 from explore3d.analysis.result import Analysis
 from explore3d.jobs.analyze import analyze
 from explore3d.jobs.run import run
+from explore3d.log import Log, Recorder
 
 ASSETS = Path(__file__).resolve().parents[3] / "assets"
 
@@ -130,6 +131,18 @@ def test_a_bare_tile_has_no_feature_and_costs_no_chain(tmp_path: Path) -> None:
     stages = {left.stage for left in analysis.left_out}
     assert {"grammar", "posterior", "estimated surface", "curvature", "error against time"} <= stages
     assert "posterior" not in analysis.timings
+
+
+def test_whatever_ends_a_run_after_its_sweeps_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(log: Recorder) -> Log:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Recorder, "recorded", interrupted)
+    with pytest.raises(KeyboardInterrupt) as ended:
+        run(write_scene(tmp_path, "tile", truth=""), tmp_path / "out")
+    said, kept = ended.value.__notes__
+    assert said == "stopped after all sweeps, before the report: interrupted (Ctrl-C)"
+    assert kept.startswith(f"kept: {tmp_path / 'out' / 'log.mcap'}; go on with: ")
 
 
 @pytest.mark.slow
