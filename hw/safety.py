@@ -10,22 +10,23 @@ from types import FrameType, TracebackType
 from typing import Any
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-# Packages that call back into Python from compiled code, where an exception is lost or ends the process
-_NOT_TO_BE_BROKEN_OFF = ("numba", "llvmlite")
+# Packages that call back into Python from compiled code, where an exception is lost, takes another name or ends the
+# process
+_NOT_TO_BE_BROKEN_OFF = ("numba", "llvmlite", "pydantic")
 _AGAIN = 0.002  # s until a signal that met them is sent again: kernels may follow each other that closely
 
 
 def end_program(number: int, frame: FrameType | None) -> None:
     """The handler of a signal that ends the program in order: every `with` block is left by an exception.
 
-    A compiler at work is not broken off, for it would lose the exception or crash; the same signal comes again until
-    the compiler is done (a kernel takes some seconds, once).
+    A compiler or serialiser at work is not broken off, for it would lose or rename the exception, or crash; the same
+    signal comes again until it is done (a kernel takes some seconds, once).
 
     Raises:
         KeyboardInterrupt: Ctrl-C.
         SystemExit: another signal, with 128 + its number.
     """
-    if _is_compiling(frame):
+    if _calls_back(frame):
         again = threading.Timer(_AGAIN, _send, (number,))
         again.daemon = True
         again.start()
@@ -42,7 +43,7 @@ def _send(number: int) -> None:
         _thread.interrupt_main(signal.Signals(number))
 
 
-def _is_compiling(frame: FrameType | None) -> bool:
+def _calls_back(frame: FrameType | None) -> bool:
     while frame is not None:
         if frame.f_globals.get("__name__", "").partition(".")[0] in _NOT_TO_BE_BROKEN_OFF:
             return True

@@ -1,4 +1,4 @@
-"""A signal ends the program in order, also where it meets a compiler that calls back into Python."""
+"""A signal ends the program in order, also where it meets compiled code that calls back into Python."""
 
 from __future__ import annotations
 
@@ -42,3 +42,35 @@ def test_a_signal_that_meets_a_compiler_is_neither_lost_nor_deadly(name: str) ->
     command = [sys.executable, "-c", COMPILES, name]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100)
     assert (ended.returncode, ended.stdout) == (0, "12 came\n"), ended.stderr
+
+
+# Without care some of 20 come as a PydanticSerializationError
+SERIALISES = """
+import random, signal, sys, time
+from pathlib import Path
+from hw import end_program
+number = getattr(signal, sys.argv[1])
+signal.signal(number, end_program)
+signal.signal(signal.SIGALRM, lambda _, frame: end_program(number, frame))
+from pydantic import BaseModel
+class Table(BaseModel):
+    paths: list[Path]
+table, chance, came = Table(paths=[Path(str(k)) for k in range(1000)]), random.Random(1), 0
+for _ in range(20):
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.001 + 0.05 * chance.random())
+        while True:
+            table.model_dump(mode="json")
+            time.sleep(0.001)
+    except (KeyboardInterrupt, SystemExit):
+        came += 1
+print(came, "came")
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there is no timer that sends signals")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_that_meets_a_serialiser_keeps_its_name(name: str) -> None:
+    command = [sys.executable, "-c", SERIALISES, name]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout) == (0, "20 came\n"), ended.stderr
