@@ -58,6 +58,8 @@ def resample(rng: np.random.Generator, weights: FloatArray, size: int) -> IntArr
 
 def _fit_pareto(exceed: FloatArray) -> tuple[float, float]:
     """Shape k and scale of a generalised Pareto distribution by Zhang & Stephens' quasi-posterior mean."""
+    from scipy.special import softmax
+
     x = np.sort(exceed)
     n = len(x)
     grid = 30 + int(np.sqrt(n))
@@ -66,7 +68,7 @@ def _fit_pareto(exceed: FloatArray) -> tuple[float, float]:
     b = b / (3.0 * quarter) + 1.0 / x[-1]
     k = np.mean(np.log1p(-b[:, None] * x), axis=1)
     profile = n * (np.log(-b / k) - k - 1.0)
-    weight = 1.0 / np.exp(profile[None, :] - profile[:, None]).clip(max=1e300).sum(axis=1)
+    weight = softmax(profile)
     weight = np.where(weight >= 10 * np.finfo(float).eps, weight, 0.0)
     mean = float(np.sum(b * weight) / weight.sum())
     shape = float(np.mean(np.log1p(-mean * x)))

@@ -35,6 +35,13 @@ def test_equal_weights_are_left_alone():
     assert k_hat == -np.inf and effective_size(weights) == pytest.approx(1000)
 
 
+def test_one_draw_that_outweighs_all_others_is_told_and_no_number_overflows():
+    ratios = -np.linspace(530.0, 560.0, 4000)
+    ratios[[0, 1]] = [0.0, -2.8]
+    weights, k_hat = smooth_weights(ratios)
+    assert k_hat > 0.7 and effective_size(weights) < 3 and weights.sum() == pytest.approx(1.0)
+
+
 def test_resampling_keeps_the_weights():
     weights = np.array([0.1, 0.2, 0.7])
     counts = np.bincount(resample(np.random.default_rng(0), weights, 1000))
