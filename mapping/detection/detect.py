@@ -416,7 +416,10 @@ def _crossings(found: Disturbance, profile: SweepHeights, base: Base, tip: float
         kind = "convex" if found.height > 0 else "concave"
         return [_crossing(found, kind, found.place, found.start, found.stop, profile, base, tip)]
     kinds = ("step up", "step down") if found.height > 0 else ("step down", "step up")
-    edges = (found.place - found.flat, found.place + found.flat)
+    # the ball stands over an edge of the body where its trace leaves the higher level: at the ends of a plateau's flat
+    # top, but at the outer ends of the flanks of a dip's flat floor
+    rim = found.flat if found.height > 0 else found.half_width
+    edges = (found.place - rim, found.place + rim)
     low, high = profile.start + profile.spacing, profile.start + profile.length - 2 * profile.spacing
     bounds = ((found.start, found.place), (found.place, found.stop))
     return [

@@ -115,3 +115,13 @@ def test_the_terrace_behind_stands_in_however_short_it_is() -> None:
     assert way.sum() > len(way) - np.flatnonzero(way)[-1] - 1
     assert len(np.unique(over.profile.height[way])) > 0.5 * way.sum()
     assert np.abs(over.profile.height).max() < 10 * NOISE
+
+
+def test_a_slot_too_narrow_for_a_terrace_has_its_edges_at_its_rims() -> None:
+    # the trace falls from the rim on, by an arc that ends, steep, on the floor: an edge of the body is its upper end
+    detections = found(
+        lambda x: np.maximum(step_height(x - 2.5e-3, 0.5e-3, TIP), step_height(-2.5e-3 - x, 0.5e-3, TIP)) - 0.5e-3
+    )
+    for line in places(detections, "step up", "step down"):
+        assert line == pytest.approx([-2.5e-3, 2.5e-3], abs=0.45e-3)
+    assert len(detections.crossings) == 2 * LINES
