@@ -25,7 +25,7 @@ from recorded_features import (
 
 from mapping.base.base import Base
 from mapping.base.projection import onto_base
-from mapping.feature import Details
+from mapping.feature import Details, Interval
 from mapping.geometry.templates.shapes import cap_height, groove_height, rim_height, step_height
 from mapping.inference.feature_posterior import Solution, _from_importance, refine, sample_posterior, solve
 from mapping.inference.sampler.psis import resample
@@ -178,6 +178,21 @@ def test_a_pit_with_a_bottom_has_its_depth():
     guess = feature("pit", (0.2e-3, 0.1e-3, 0), -0.1e-3, 3e-3)
     found = refine(guess, trace, np.random.default_rng(0), base=plate(), noise=Noise(10e-6), confirm=False)
     assert not found.height.censored and inside(found.height, -0.1e-3, 1e-6) and inside(found.width, 4e-3, 20e-6)
+
+
+def test_a_high_step_felt_finely_is_found_from_beside_it():
+    # between single samples the steep foot of the arc makes hollows in the density, and a doubtful tip goes with them
+    noise = Noise(25e-6)
+    paths = [line((x, -25e-3), (x, 25e-3), 0.25e-3) for x in np.linspace(-10e-3, 10e-3, 11)]
+    trace = record(paths, lambda feet: step_height(-feet[:, 1], 5e-3, TIP), noise)
+    for beside in (-2e-3, 3e-3, 5e-3):
+        guess = feature("step", [(-10e-3, beside, 0), (10e-3, beside, 0)], 5e-3, 0.0)
+        guess = replace(guess, height=Interval.normal(5.02e-3, 5e-6), position_sd=5e-6)
+        rng = np.random.default_rng(0)
+        found = refine(guess, trace, rng, base=plate(), noise=noise, tip_sd=0.1e-3, confirm=False)
+        assert abs(found.axis[:, 1]).max() < 0.05e-3
+        assert inside(found.height, 5e-3, 5e-6) and found.height.high - found.height.low < 20e-6
+        assert not any("no ideal" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
