@@ -27,11 +27,12 @@ from mapping.assembly import Inspections, assemble, inspected_for, why_none_soug
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
 from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
-from mapping.estimate.deviation import Deviation, explain, left_standing
+from mapping.estimate.deviation import Deviation, UnclimbedLevel, explain, left_standing, unclimbed_levels
 from mapping.estimate.envelope import estimate_surface
 from mapping.geometry.curvature import principal_curvatures
 from mapping.geometry.mesh import distances
 from mapping.inference import refine_all
+from mapping.inference.kinds import kind_of
 from mapping.model import Judgement, ObjectModel, dropped_crossings, dropped_features, judged
 
 if TYPE_CHECKING:
@@ -406,12 +407,29 @@ def standing_told(work: Work, share: Share) -> None:
         felt = work.base.kind != "mesh" and not work.log.detections
         found = [asdict(each) for each in left_standing(work.laid)] if felt else []
     found = [bend for bend in found if not any(_accounts_for(each, bend) for each in work.features)]
+    for level in unclimbed_levels(work.laid):
+        if not any(kind_of(each).sided and _stands_between(each, level) for each in work.features):
+            work.stages.left_out.append(LeftOut(ABSORBED, _unclimbed_text(level)))
     for bend in found[:MOST_STANDING]:
         seen = f" in {count_text(bend['sweeps'], 'sweep')}" if "sweeps" in bend else ""
         work.stages.left_out.append(LeftOut(ABSORBED, f"{_described(bend)}{seen} {_TOO_WIDE}"))
     if len(found) > MOST_STANDING:
         more = count_text(len(found) - MOST_STANDING, "wide hollow or hump stands", "wide hollows and humps stand")
         work.stages.left_out.append(LeftOut(ABSORBED, f"besides, {more} off the base"))
+
+
+def _unclimbed_text(level: UnclimbedLevel) -> str:
+    side = "above" if level.height > 0.0 else "below"
+    return (
+        f"from sweep {level.behind} on the surface stands {length_text(abs(level.height), 2)} {side} that of sweep "
+        f"{level.before}, and no sweep climbs between them: a step along the sweeps, or the instrument's own; sweeps "
+        "across would tell, and none is counted as a feature"
+    )
+
+
+def _stands_between(step: Feature, level: UnclimbedLevel) -> bool:
+    """True of a step about as high as the levels are apart: sweeps across have found it."""
+    return 0.5 < abs(step.height.median / level.height) < 2.0
 
 
 def _accounts_for(feature: Feature, bend: dict[str, Any]) -> bool:

@@ -8,10 +8,15 @@ if TYPE_CHECKING:
     from mapping.estimate.deviation.explain import explain as explain
     from mapping.estimate.deviation.left_standing import LeftStanding as LeftStanding, left_standing as left_standing
     from mapping.estimate.deviation.result import CAUSES as CAUSES, Deviation as Deviation, Part as Part
+    from mapping.estimate.deviation.unclimbed import (
+        UnclimbedLevel as UnclimbedLevel,
+        unclimbed_levels as unclimbed_levels,
+    )
 
 _PUBLIC = {
     "explain": ("explain",),
     "left_standing": ("LeftStanding", "left_standing"),
     "result": ("CAUSES", "Deviation", "Part"),
+    "unclimbed": ("UnclimbedLevel", "unclimbed_levels"),
 }
 doorway(__name__, _PUBLIC)
