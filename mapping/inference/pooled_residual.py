@@ -102,7 +102,10 @@ def with_remark(feature: Feature, pooled: PooledResidual, *, raised: bool) -> Fe
     if formed:
         what = "its height varies along it" if pooled.along else "its section is another"
         misfit = f"{closest} ({what}: all crossings together are off by up to {length_text(pooled.worst, 2)})"
-        height = replace(height, low=height.low - pooled.worst, high=height.high + pooled.worst)
+        low, high = height.low - pooled.worst, height.high + pooled.worst
+        # on which side it stands is no question of its form
+        low, high = max(low, 0.0) if height.low >= 0.0 else low, min(high, 0.0) if height.high <= 0.0 else high
+        height = replace(height, low=low, high=high)
     details = replace(feature.details, misfit=misfit)
     return replace(feature, height=height, details=details, notes=(*feature.notes, misfit))
 

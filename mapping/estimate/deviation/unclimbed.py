@@ -1,4 +1,4 @@
-"""Unclimbed levels: sweeps side by side that run on different levels of a fitted base, with none that climbs between."""
+"""Unclimbed levels: sweeps side by side that run on different levels of a fitted base, and none climbs between."""
 
 from __future__ import annotations
 

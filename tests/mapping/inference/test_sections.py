@@ -12,6 +12,7 @@ from mapping import Feature, FloatArray, Interval, Support, Surface, Trace
 from mapping.base import Base
 from mapping.geometry.templates import cap_height
 from mapping.inference import refine, refine_all
+from mapping.inference.pooled_residual import PooledResidual, with_remark
 from mapping.inference.sections import probabilities
 from mapping.instrument import Noise
 
@@ -88,3 +89,12 @@ def test_two_edges_that_face_each_other_are_one_bar() -> None:
 
 def test_probabilities_are_those_of_evidences() -> None:
     np.testing.assert_allclose(probabilities([-1000.0, -1000.0 - np.log(3.0)]), [0.75, 0.25])
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_height_that_no_form_explains_stays_on_its_side(side: float) -> None:
+    size = Interval.normal(side * 0.4e-3, 10e-6)
+    found = with_remark(replace(ridge(), height=size), PooledResidual(1e-9, 0.9e-3, False, 50.0), raised=True)
+    ends = sorted(abs(end) for end in (found.height.low, found.height.high))
+    assert ends[0] == 0.0 and ends[1] == pytest.approx(1.3e-3, abs=0.05e-3)
+    assert side * found.height.low >= 0.0 and side * found.height.high >= 0.0
