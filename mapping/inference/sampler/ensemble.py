@@ -146,11 +146,16 @@ def _seed(sampler: Any, rng: np.random.Generator) -> None:
 
 
 def _autocorrelation(chain: FloatArray) -> float:
-    """Largest integrated autocorrelation time of (steps, walkers, P), steps, never below 1; NaN if nothing moves."""
+    """Largest integrated autocorrelation time of (steps, walkers, P), steps, never below 1; NaN if nothing moves.
+
+    A walker that has not moved yet is correlated over the whole chain: emcee divides by its variance.
+    """
     package = emcee()
 
-    spread = chain.reshape(-1, chain.shape[2]).std(axis=0)
+    spread = np.ptp(chain.reshape(-1, chain.shape[2]), axis=0)
     if not (spread > 0.0).all():
         return float("nan")
+    if not (np.ptp(chain, axis=0) > 0.0).all():
+        return float(len(chain))
     tau = package.autocorr.integrated_time(chain, tol=0, quiet=True)
     return float(max(1.0, np.max(tau)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from mapping.inference.sampler.ensemble import sample_ensemble
+from mapping.inference.sampler.ensemble import _autocorrelation, sample_ensemble
 from mapping.inference.sampler.importance import importance_sample
 from mapping.inference.sampler.laplace import Laplace
 
@@ -53,6 +53,13 @@ def test_a_chain_cut_short_says_so():
     target, rng = Gaussian(np.ones(4)), np.random.default_rng(0)
     chain = sample_ensemble(target, rng.standard_normal((20, 4)), rng, max_steps=300)
     assert chain.status == "chain too short"
+
+
+def test_a_walker_that_has_not_moved_is_not_taken_for_independent_draws():
+    chain = np.random.default_rng(0).standard_normal((400, 20, 2))
+    assert _autocorrelation(chain) < 2.0
+    chain[:, 7] = chain[0, 7]
+    assert _autocorrelation(chain) == len(chain)
 
 
 def test_the_same_generator_gives_the_same_chain():
