@@ -120,7 +120,8 @@ def _without_tears(surface: Surface, tip_radius: float) -> tuple[Surface, list[I
     """
     sides = np.concatenate([surface.faces, np.roll(surface.faces, -1, axis=1)]).reshape(2, -1).T
     _, which, times = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    vertices, faces, rims = [surface.vertices], [surface.faces], []
+    vertices, faces = [surface.vertices], [surface.faces]
+    rims: list[IntArray] = []
     for rim in _rims(sides[times[which.ravel()] == 1]):
         ends = surface.vertices[rim]
         if np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum() < 2.0 * np.pi * tip_radius:
