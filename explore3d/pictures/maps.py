@@ -10,7 +10,7 @@ import numpy as np
 from explore3d.pictures.chart import FONT_SIZE, drawing, image, pixels_png, text_at
 from explore3d.pictures.object import SUPERSAMPLING, cameras_for, pictured, shifted, view_directions
 from explore3d.pictures.render import Body, render
-from mapping import BoolArray, Feature, FloatArray, Surface, length_unit
+from mapping import BoolArray, Feature, FloatArray, IntArray, Surface, length_unit
 from mapping.geometry.mesh import NearestPoint
 
 if TYPE_CHECKING:
@@ -39,7 +39,8 @@ def curvature_picture(
     """SVG of k1 and k2 in units of 1/r: red bulges out, blue bends in; the paler, the less sure
     it is which of both, grey where no value is valid.
 
-    A row for each view of the object's own picture; what merely closes an opening of the object is not drawn.
+    A row for each view of the object's own picture; what merely closes an opening of the object is not drawn, and a
+    tear of the mesh that the ball does not pass is closed in the colour of its rim.
 
     Args:
         surface: the estimated surface.
@@ -50,7 +51,10 @@ def curvature_picture(
     """
     areas = surface.face_areas[:, None]
     directions = view_directions(surface.face_normals * areas / areas.mean(), features, base)[:MOST_ROWS]
-    surface = _without_lids(surface, base, tip_radius)
+    highest = max((max(abs(each.height.low), abs(each.height.high)) for each in features), default=0.0)
+    near = NearestPoint(base)
+    surface = _without_spikes(_without_lids(surface, near, tip_radius), near, highest + LID_SAGITTA * tip_radius)
+    closed, rims = _without_tears(surface, tip_radius)
     scaled, sd = [np.asarray(values) * tip_radius for values in (curvature.k1, curvature.k2)], curvature.sd * tip_radius
     top = _span(scaled, curvature.valid)
     content, down, right = "", CURVATURE_TITLE, 0.0
@@ -62,7 +66,8 @@ def curvature_picture(
             colours[~curvature.valid] = NOT_VALID
             if not right:
                 content += text_at(left + 4.0, 18.0, f"Principal curvature, {name}", size=1.1 * FONT_SIZE, bold=True)
-            content += shifted(pictured(render([Body(surface, colours)], camera, rims=False)), left, down)
+            colours = np.vstack([colours, *(colours[rim].mean(axis=0) for rim in rims)])
+            content += shifted(pictured(render([Body(closed, colours)], camera, rims=False)), left, down)
         down, right = down + height, max(right, 2.0 * width)
     bar = min(BAR[1], down - CURVATURE_TITLE)
     marks = [f"{share * top:.2g}" for share in MARKS]
@@ -88,15 +93,60 @@ def faded(shares: FloatArray, sd: FloatArray) -> FloatArray:
     return np.clip(shares, -1.0, 1.0) * np.where(np.isnan(sure), 1.0, sure)
 
 
-def _without_lids(surface: Surface, base: Surface, tip_radius: float) -> Surface:
+def _without_lids(surface: Surface, near: NearestPoint, tip_radius: float) -> Surface:
     """The faces that a ball can rest on: one wider than the ball whose longest edge leaves the base closes a hole."""
     corners = surface.vertices[surface.faces]
     others = np.roll(corners, 1, axis=1)
     edges = np.linalg.norm(corners - others, axis=2)
     wide, longest = np.flatnonzero(edges.max(axis=1) > 2.0 * tip_radius), edges.argmax(axis=1)
     middles = 0.5 * (corners + others)[wide, longest[wide]]
-    off = NearestPoint(base).query(middles).distance > LID_SAGITTA * tip_radius
+    off = near.query(middles).distance > LID_SAGITTA * tip_radius
     return Surface(surface.vertices, np.delete(surface.faces, wide[off], axis=0))
+
+
+def _without_spikes(surface: Surface, near: NearestPoint, allowed: float) -> Surface:
+    """The faces none of whose corners is further off the base than any feature: where sweeps end, balls far apart meet
+    beside the body."""
+    off = near.query(surface.vertices).distance > allowed
+    kept = ~off[surface.faces].any(axis=1)
+    return Surface(surface.vertices, surface.faces[kept]) if kept.any() else surface
+
+
+def _without_tears(surface: Surface, tip_radius: float) -> tuple[Surface, list[IntArray]]:
+    """A fan over each hole whose rim is shorter than the ball's girth, which the ball does not pass.
+
+    Returns:
+        The surface, with one more vertex for each hole, and the vertices of their rims.
+    """
+    sides = np.concatenate([surface.faces, np.roll(surface.faces, -1, axis=1)]).reshape(2, -1).T
+    _, which, times = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
+    vertices, faces = [surface.vertices], [surface.faces]
+    rims: list[IntArray] = []
+    for rim in _rims(sides[times[which.ravel()] == 1]):
+        ends = surface.vertices[rim]
+        if np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum() < 2.0 * np.pi * tip_radius:
+            faces.append(np.column_stack([rim[:, ::-1], np.full(len(rim), len(surface.vertices) + len(rims))]))
+            vertices.append(ends[:, 0].mean(axis=0, keepdims=True))
+            rims.append(rim[:, 0])
+    return Surface(np.concatenate(vertices), np.concatenate(faces)), rims
+
+
+def _rims(sides: IntArray) -> list[IntArray]:
+    """The closed ones among directed sides (N, 2) that have a face to one hand only, each in its order."""
+    after: dict[int, list[int]] = {}
+    for begin, end in sides.tolist():
+        after.setdefault(begin, []).append(end)
+    rims = []
+    for first in list(after):
+        while after[first]:
+            path, place = [], first
+            while after.get(place):
+                path.append((place, after[place].pop()))
+                place = path[-1][1]
+                if place == first:
+                    rims.append(np.array(path))
+                    break
+    return rims
 
 
 def coloured(share: FloatArray) -> FloatArray:

@@ -87,6 +87,8 @@ def begin_scene(
         UnitError, SceneError, MeshFileError: a value, or the mesh, is none, or no face of it can be touched from above.
         FolderError: a scene, or another mesh of that name, is there already; nothing is written then.
     """
+    if not mesh.is_file():
+        raise MeshFileError(f"{mesh}: {'a folder, not a mesh file' if mesh.is_dir() else 'no such mesh file'}")
     path = folder / SCENE_FILE
     smallest = SMALLEST[finger] * parse_length(tip_radius)
     values = {"mesh": _quoted(mesh.name), "units": _quoted(units), "white": _quoted(f"{1e6 * smallest / 10.0:.3g} um")}
@@ -106,7 +108,7 @@ def begin_scene(
     refuse_to_replace([path] if is_beside else [path, copy])
     # read where it will stand, with the mesh where it is: nothing is written that cannot be used
     where_it_is = text(mesh.name, units).replace(values["mesh"], _quoted(mesh.resolve().as_posix()))
-    body = parse_scene(where_it_is, path, files_from=[mesh] if mesh.exists() else ()).base_surface()
+    body = parse_scene(where_it_is, path, files_from=[mesh]).base_surface()
     assert body is not None  # its model is a mesh
     above = body.face_normals[:, 2] > FROM_ABOVE
     if finger == "grbl" and not above.any():

@@ -15,6 +15,8 @@ from mapping.instrument import robust_fit, robust_scale
 # (which costs a note); lone bumps as wide at half height as a fifth of the length keep all of their height
 # beside the robust parabola, and as wide as a quarter 66 to 91 %: wider ones are the parabola's.
 ALONE_SDS, LONGEST_BEND_SHARE = 6.0, 0.25
+# Places that a parabola through a bend must hold: two more than it has coefficients
+_FEWEST_OF_CREST = 5
 
 
 @dataclass(frozen=True)
@@ -75,10 +77,25 @@ def _alone(x: FloatArray, told: FloatArray, off: FloatArray, usual: float) -> li
 
 
 def _measured(x: FloatArray, off: FloatArray, begin: int, end: int, sign: float) -> Bend:
-    """What the profile itself shows there: the line has rounded it."""
+    """What the profile itself shows there: the line has rounded it.
+
+    The height is that of a parabola through all that reaches half of it: the highest place alone is high by its noise.
+    """
     top = begin + int(np.argmax(sign * off[begin:end]))
-    low = sign * off < 0.5 * sign * off[top]
-    before, after = np.flatnonzero(low[:top]), np.flatnonzero(low[top:])
-    first = int(before[-1]) if len(before) else 0
-    last = top + int(after[0]) if len(after) else len(x) - 1
-    return Bend(float(off[top]), float(x[last] - x[first]), float(x[top]))
+    height = float(sign * off[top])
+    for _ in range(2):
+        low = sign * off < 0.5 * height
+        before, after = np.flatnonzero(low[:top]), np.flatnonzero(low[top:])
+        first = int(before[-1]) if len(before) else 0
+        last = top + int(after[0]) if len(after) else len(x) - 1
+        top = first + 1 + int(np.argmax(sign * off[first + 1 : last]))
+        height = _crest(sign * off[first + 1 : last])
+    return Bend(sign * height, float(x[last] - x[first]), float(x[top]))
+
+
+def _crest(z: FloatArray) -> float:
+    """The highest of the parabola through all heights of a bend; of the heights themselves where they are few."""
+    if len(z) < _FEWEST_OF_CREST:
+        return float(z.max())
+    u = np.linspace(-1.0, 1.0, len(z))
+    return float(np.polyval(np.polyfit(u, z, 2), u).max())

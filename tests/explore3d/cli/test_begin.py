@@ -86,7 +86,8 @@ def test_a_port_of_ones_own_has_no_simulated_object(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--mesh", "absent.ply", "--units", "mm", "--tip-radius", "5 mm"], "model.mesh: "),
+        (["--mesh", "absent.ply", "--units", "mm", "--tip-radius", "5 mm"], "absent.ply: no such mesh file"),
+        (["--mesh", MESHES, "--units", "mm", "--tip-radius", "5 mm"], "a folder, not a mesh file"),
         (["--mesh", MESHES / "tile.ply", "--units", "furlong", "--tip-radius", "5 mm"], "unknown unit of length"),
         (["--mesh", MESHES / "tile.ply", "--units", "m", "--tip-radius", "5"], "unit missing"),
         (["--mesh", MESHES / "tile.ply", "--units", "m", "--tip-radius", "5 mm", "--finger", "toe"], "no such finger"),

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from explore3d.pictures.maps import coloured, faded
+from explore3d.pictures.maps import _without_tears, coloured, faded
+from mapping import Surface
 
 
 def test_a_sure_value_has_its_colour_and_an_unsure_one_none() -> None:
@@ -26,3 +28,17 @@ def test_what_is_twice_as_sure_is_never_paler() -> None:
     for sd in (0.03, 0.3, 3.0):
         assert (np.abs(faded(shares, np.full(301, sd))) >= np.abs(faded(shares, np.full(301, 2.0 * sd)))).all()
         assert (np.diff(faded(shares, np.full(301, sd))) >= 0.0).all()  # order stays order
+
+
+def test_a_tear_that_the_ball_does_not_pass_is_closed_and_an_opening_is_not() -> None:
+    places = 1e-3 * np.array([[x, y, 0.0] for y in range(6) for x in range(6)])
+    corner = np.array([6 * y + x for y in range(5) for x in range(5)])
+    halves = [np.column_stack([corner, corner + 1, corner + 7]), np.column_stack([corner, corner + 7, corner + 6])]
+    faces = np.concatenate(halves)
+    middle = (faces == 14).any(axis=1)  # six faces about one vertex: their rim is 4 + 2 sqrt 2 mm long
+    torn = Surface(places, faces[~middle])
+    closed, rims = _without_tears(torn, 1.1e-3)  # girth 6.91 mm
+    assert len(closed.faces) == len(faces) and closed.face_areas.sum() == pytest.approx(25e-6)
+    assert (closed.face_normals[:, 2] > 0.99).all() and len(closed.vertices) == 37
+    assert [sorted(rim.tolist()) for rim in rims] == [[7, 8, 13, 15, 20, 21]]
+    assert len(_without_tears(torn, 1.0e-3)[0].faces) == len(faces) - 6  # girth 6.28 mm

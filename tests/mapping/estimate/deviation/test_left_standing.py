@@ -69,3 +69,13 @@ def test_the_command_says_it_of_a_raster_as_of_a_profile(
     assert explore3d_main(monkeypatch, *words) == 0
     text = capsys.readouterr().out
     assert "A hollow 1.5 µm deep and 7" in text and "in 11 sweeps stands off the base" in text
+
+
+def test_a_hollow_is_not_as_deep_as_its_noisiest_place() -> None:
+    """Its deepest place, of eleven sweeps, came out a quarter too deep where noise is a twelfth of the depth."""
+
+    def shallow(x: FloatArray) -> FloatArray:
+        return hollow(x) / 25.0
+
+    (found,) = standing(raster(shallow, np.random.default_rng(2)))
+    assert found.height == pytest.approx(-0.06e-6, rel=0.06)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from gwyddion import gwyddion, spacing_of_peaks
 
 from mapping.estimate.roughness.areal import areal_parameters
 from mapping.estimate.roughness.filters import gaussian_mean, suited_cutoff
 from mapping.estimate.roughness.profile import Stretch, profile_parameters
 
 STEP, CUTOFF = 0.5e-6, 0.25e-3
+STYLUS = Path(__file__).parents[5] / "shared" / "data" / "stylus_profile_mm.csv"
 
 
 def stretch(heights: np.ndarray, keep: np.ndarray | None = None) -> Stretch:
@@ -137,3 +140,22 @@ def test_the_root_mean_square_is_that_of_surface_topography() -> None:
     line = topography.UniformLineScan(part - part.mean(), STEP * len(part))
     values, _ = profile_parameters([stretch(heights)], CUTOFF)
     assert values["Rq"].median == pytest.approx(math.hypot(line.rms_height_from_profile(), part.mean()), rel=1e-6)
+
+
+@pytest.mark.parametrize("cutoff", [0.25e-3, 0.8e-3])
+def test_the_spacing_of_a_measured_profile_is_what_gwyddion_counts(cutoff: float) -> None:
+    """Peaks and valleys of more than a tenth of Rz by another program's count, over the same sections."""
+    library = gwyddion()
+    if library is None or not STYLUS.is_file():
+        pytest.skip("Gwyddion's library (Debian: libgwyddion20) or the stylus profile is not there")
+    x, z, valid = np.genfromtxt(STYLUS, delimiter=";", skip_header=2).T
+    even = np.linspace(x[valid == 1].min(), x[valid == 1].max(), int(valid.sum()))
+    heights = 1e-3 * np.interp(even, x[valid == 1], z[valid == 1])
+    heights -= np.polyval(np.polyfit(even - even.mean(), heights, 2), even - even.mean())
+    step = 1e-3 * float(even[1] - even[0])
+    values, sections = profile_parameters([Stretch(heights, np.ones(len(heights), dtype=bool), step)], cutoff)
+    size, end = round(cutoff / step), round(0.5 * cutoff / step)
+    rough = (heights - gaussian_mean(heights, step, cutoff))[end : end + sections * size]
+    told = [spacing_of_peaks(library, sign * rough, 0.1 * values["Rz"].median) for sign in (1.0, -1.0)]
+    spacing = step * sum(length for length, _ in told) / sum(count for _, count in told)
+    assert values["Rsm"].median == pytest.approx(spacing, rel=1e-3)
