@@ -36,6 +36,9 @@ RING_NEWTON_STEPS = (
 )
 FEW_NEIGHBOURS = 32  # with fewer it looks twice as far the next time
 MOST_PROJECTIONS = 24  # projections in one step; what is left of the way is gone in the next
+# Projections after those, which only lead out of what the ball is in: a bell's skirt bends towards a ball, which on its
+# way along the tangent plane gets in by the square of the way over the skirt's radius; out again it is Newton's method
+MOST_WAYS_OUT = 8
 # Of the radius: a shorter move ends the step. The error is its square over twice the radius: 1e-14 radii
 STILL = 1e-7
 SHORTEST_REACH = 1e-3  # of the radius: how far the ball may move beyond the device's own motion
@@ -213,18 +216,21 @@ def follow(body, radius, o, x, reach, work):  # type: ignore[no-untyped-def]
 
     Every round is the projection on the half-spaces of the elements nearby, so the distance from x only falls. With
     one element active the wish is its own projection, which makes the rounds Newton's: the error is cubed by each.
+    Where they do not suffice, it stays where it came to, but outside.
     """
     found, normals, bounds, numbers, active, weight = work[0], work[1], work[2], work[3], work[4], work[5]
-    rounds, held = 0, 0
-    while rounds < MOST_PROJECTIONS:
+    rounds, held, touching = 0, 0, False
+    while rounds < MOST_PROJECTIONS + MOST_WAYS_OUT:
         near = gather(body, radius, o, reach, work)
         if near < 0:
             rounds += 1
             reach *= 0.5
             continue
         room = reach
-        while rounds < MOST_PROJECTIONS and room > 0.0:
+        while rounds < MOST_PROJECTIONS + MOST_WAYS_OUT and room > 0.0:
             rounds += 1
+            if rounds > MOST_PROJECTIONS:
+                x = o
             count = 0
             for i in range(near):
                 gap, n = support(body, radius, found[i], o)
@@ -243,16 +249,17 @@ def follow(body, radius, o, x, reach, work):  # type: ignore[no-untyped-def]
                     left, now = sub(wish, other), wish
                     if dot(left, left) <= dot(now, now):
                         step, held = other, max(also, 1)
+            touching = held > 0 or (touching and rounds > MOST_PROJECTIONS)
             way = length(step)
             if way <= STILL * radius:
-                return moved(o, 1.0, step), held > 0
+                return moved(o, 1.0, step), touching
             if way >= room:
                 o = moved(o, room / way, step)
                 reach, room = (2.0 if near < FEW_NEIGHBOURS else 1.0) * reach, 0.0
             else:
                 o = moved(o, 1.0, step)
                 room -= way
-    return o, held > 0
+    return o, touching
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -43,7 +43,7 @@ def every_kind() -> ProxyBody:
 
 
 def bell() -> ProxyBody:
-    """A bump with a skirt, which is a table of rings, in the middle of the plate."""
+    """A bump with a skirt, which bends towards the ball, in the middle of the plate."""
     return ProxyBody(PLATE, [Bell(np.zeros(3), UP, 1e-3, 1e-3, 2.0)], 2e-3)
 
 
@@ -57,11 +57,10 @@ def bunny() -> ProxyBody:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("build", "jumps", "deepest"),
-    [(every_kind, 300_000, 1e-9), (bell, 100_000, 1e-4), (mug, 300_000, 1e-9), (bunny, 300_000, 1e-9)],
+    ("build", "jumps"), [(every_kind, 300_000), (bell, 100_000), (mug, 300_000), (bunny, 300_000)]
 )
-def test_a_million_random_jumps_are_survived(build, jumps: int, deepest: float) -> None:  # type: ignore[no-untyped-def]
-    """Finite, never above the force limit, never inside by more than 1e-9 r; on a bell, by what its chords may miss."""
+def test_a_million_random_jumps_are_survived(build, jumps: int) -> None:  # type: ignore[no-untyped-def]
+    """Finite, never above the force limit, never inside by more than 1e-9 r."""
     body, rng = build(), np.random.default_rng(2026)
     low, high = body.base.surface.bounds
     wide = high - low + 4.0 * body.radius
@@ -78,7 +77,7 @@ def test_a_million_random_jumps_are_survived(build, jumps: int, deepest: float) 
             # the device jumped: each place is one that was wished, but for what the force moves the hand
             apart = [run.records[1000:2000, 1:4] - wishes[1000 + late : 2000 + late] for late in (-1, 0, 1)]
             assert min(np.abs(each).max() for each in apart) < 10e-6
-            assert body.gaps(run.centers, body.radius).min() > -deepest * body.radius
+            assert body.gaps(run.centers, body.radius).min() > -1e-9 * body.radius
             assert np.linalg.norm(run.forces, axis=1).max() <= 3.0 * (1.0 + 1e-12)
             assert (run.column("touching") > 0).mean() > 0.1
 

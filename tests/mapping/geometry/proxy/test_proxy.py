@@ -159,6 +159,14 @@ def test_random_jumps_never_bring_it_inside() -> None:
     assert built.gaps(felt.centers, r).min() > -1e-9 * r
 
 
+def test_a_skirt_that_bends_towards_the_ball_lets_it_in_nowhere() -> None:
+    r, rng = 0.3e-3, np.random.default_rng(11)
+    body = ProxyBody(PLATE, (Bell(np.zeros(3), UP, 3e-3, 0.5e-3, 1.0),), r)
+    jumps = rng.uniform([-6e-3, -6e-3, -2e-3], [6e-3, 6e-3, 6e-3], (4000, 3))
+    felt = Proxy(body).follow(np.vstack([[[0.0, 0.0, 20e-3]], jumps]))
+    assert body.gaps(felt.centers, r).min() > -1e-9 * r
+
+
 def test_friction_holds_within_its_cone_and_slips_on_its_border() -> None:
     body = ProxyBody(PLATE, (), 1e-3)
     lateral = np.concatenate([np.linspace(0, 0.04e-3, 50), np.linspace(0.04e-3, 1e-3, 500)])
