@@ -5,8 +5,9 @@ outside as long as its centre keeps to the side of the tangent plane at the near
 the wish on the half-spaces of the elements nearby; no motion within them can pass an element, however long it is.
 
 Lengths are in the frame of the body's TriangleTree. `body` is the tuple that ProxyBody.arrays gives:
-rows, leaves, boxes, links (the tree), open (F,) 1 where a triangle may be cut open, rounds (M, 15), groups (G, 6),
-legs (C, 11) of the axes that triangles are cut open along (last column: 1 a first leg, 2 a last one), trenches (H, 6).
+rows, leaves, boxes, links (the tree), depths (F,) of triangles that deeper trenches cut open (inf: none does),
+rounds (M, 15), groups (G, 6), legs (C, 11) of the axes that triangles are cut open along (last column: 1 a first leg,
+2 a last one), trenches (H, 7; last column: depth).
 """
 
 from __future__ import annotations
@@ -75,10 +76,12 @@ def on_segment(a, b, o):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def is_cut_away(body, point, normal):  # type: ignore[no-untyped-def]
-    """True if a point of the base, whose face has that normal, lies over a trench or a pit."""
+def is_cut_away(body, point, normal, depth):  # type: ignore[no-untyped-def]
+    """True if a point of the base lies over a trench that is deeper than a depth, of which its face has the normal."""
     legs, trenches = body[7], body[8]
     for h in range(len(trenches)):
+        if trenches[h, 6] <= depth:
+            continue
         away = sub(point, vector(trenches, h))
         if dot(away, away) > trenches[h, 3] * trenches[h, 3]:
             continue
@@ -139,8 +142,12 @@ def support(body, radius, code, o):  # type: ignore[no-untyped-def]
         rows = body[0]
         q = closest(rows, code, o)
         d = sqrt(dot(q, q))
-        if body[4][code] and is_cut_away(body, moved(o, 1.0, q), (rows[code, 9], rows[code, 10], rows[code, 11])):
-            return -1e9, nowhere
+        depth = body[4][code]
+        if depth < np.inf:
+            normal = (rows[code, 9], rows[code, 10], rows[code, 11])
+            over = moved(moved(o, 1.0, q), depth, normal)  # of a floor's point, the base's over it
+            if is_cut_away(body, over, normal, depth):
+                return -1e9, nowhere
         return d - radius, scaled(-1.0 / d, q)
     rounds, j = body[5], -1 - code
     if rounds[j, 11] == RING:

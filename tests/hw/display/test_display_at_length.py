@@ -11,7 +11,7 @@ from contact_bodies import shared
 from explore3d.scene import load_mesh
 from hw.display import DisplayLoop, Hand, Rendering, SimulatedDisplay
 from mapping import FloatArray, Surface
-from mapping.geometry.proxy import Bell, Chain, Part, ProxyBody, Terrace, Trench
+from mapping.geometry.proxy import Bar, Bell, Chain, Part, ProxyBody, Terrace, Trench
 
 MESHES = Path(__file__).parents[3] / "assets" / "meshes"
 PLATE = Surface(0.03 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2], [0, 2, 3]])
@@ -26,7 +26,7 @@ def line(*places: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
 
 
 def every_kind() -> ProxyBody:
-    """A plate with a ridge, a ring, round bumps, a groove, a pit and a step, some of which meet."""
+    """A plate with ridges, bars, a ring, round bumps, grooves, a pit and a step, some of which meet."""
     turn = np.linspace(0.0, 2.0 * np.pi, 61)
     ring = np.column_stack([6.0 * np.cos(turn) - 15.0, 6.0 * np.sin(turn) + 15.0])
     parts: list[Part] = [
@@ -35,7 +35,10 @@ def every_kind() -> ProxyBody:
         Chain(*line(*map(tuple, ring)), 0.5e-3, 0.3e-3),
         Chain(*line((0, 0)), 0.8e-3, 0.4e-3),
         Chain(*line((-20, 0)), 0.2e-3, 2e-3),
+        Bar(*line((-28, -10), (-15, -5), (-14, 5)), 0.4e-3, 1e-3, 0.3e-3),
+        Bar(*line((-28, 10), (-26, -12)), 0.3e-3, 0.0, 0.8e-3),
         Trench(*line((0, 8), (18, 8)), 4e-3, 0.5e-3),
+        Trench(*line((8, -2), (9, 20)), 2e-3, 0.8e-3),
         Trench(*line((20, 20)), 5e-3, 1e-3),
         Terrace(*line((15, -25), (15, -5)), 0.5e-3, -1.0),
     ]
@@ -56,9 +59,7 @@ def bunny() -> ProxyBody:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("build", "jumps"), [(every_kind, 300_000), (bell, 100_000), (mug, 300_000), (bunny, 300_000)]
-)
+@pytest.mark.parametrize(("build", "jumps"), [(every_kind, 300_000), (bell, 100_000), (mug, 300_000), (bunny, 300_000)])
 def test_a_million_random_jumps_are_survived(build, jumps: int) -> None:  # type: ignore[no-untyped-def]
     """Finite, never above the force limit, never inside by more than 1e-9 r."""
     body, rng = build(), np.random.default_rng(2026)
