@@ -42,6 +42,9 @@ MOST_PROJECTIONS = 24  # projections in one step; what is left of the way is gon
 MOST_WAYS_OUT = 8
 # Of the radius: a shorter move ends the step. The error is its square over twice the radius: 1e-14 radii
 STILL = 1e-7
+# Of the device's motion: the ball goes about as far, and looks again where it goes further. By simulation (a hand at 0.1
+# m/s over 20 features, 1 kHz) a step takes 16.8 us with 1.2, 19.0 with 1.5 and 23.5 with 2
+REACH_OF_MOTION = 1.2
 SHORTEST_REACH = 1e-3  # of the radius: how far the ball may move beyond the device's own motion
 FIRST_REACH = 0.25  # of the radius: how far it looks at first at most; further where nothing is near
 ALLOWED = 1e-13  # of the radius: a half-space that is violated by less is kept
@@ -281,7 +284,7 @@ def proxy_step(body, radius, friction, o, last, x, work):  # type: ignore[no-unt
         radius: of the ball; friction: coefficient; o, last, x: (3,) tuples, all in the frame of the body.
     """
     moved_by = sub(x, last)
-    reach = min(2.0 * length(moved_by) + SHORTEST_REACH * radius, FIRST_REACH * radius)
+    reach = min(REACH_OF_MOTION * length(moved_by) + SHORTEST_REACH * radius, FIRST_REACH * radius)
     end, touching = follow(body, radius, o, x, reach, work)
     if friction == 0.0 or not touching:
         return end, touching
