@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from explore3d import UserError, parse_length, parse_rate
+from explore3d import UserError, parse_length, parse_rate, parse_speed
 from explore3d.cli.options import Json
 
 if TYPE_CHECKING:
@@ -463,6 +463,7 @@ def touch(
 def display(
     seconds: Annotated[float, typer.Option(help="By the clock, at each rate.")] = 30.0,
     rates: Annotated[str, typer.Option(help="Steps per second, with unit, separated by commas.")] = "1 kHz,10 kHz",
+    speed: Annotated[str, typer.Option(help="Of the hand, with unit.")] = "30 mm/s",
 ) -> None:
     """Time of a step, and jitter of the loop, of a display with 20,000 triangles and 20 features.
 
@@ -470,10 +471,12 @@ def display(
     """
     from explore3d.bench.display import bench_stepping, stepping_lines
 
-    asked = [parse_rate(each) for each in rates.split(",")]
-    if not (0.0 < seconds < float("inf") and min(asked) > 0.0):
-        raise UserError(f"--seconds, --rates: expected numbers above 0; found {seconds:g} and {rates!r}")
-    _print(stepping_lines(list(bench_stepping(asked, seconds))))
+    asked, fast = [parse_rate(each) for each in rates.split(",")], parse_speed(speed)
+    if not (0.0 < seconds < float("inf") and min(asked) > 0.0 and fast > 0.0):
+        raise UserError(
+            f"--seconds, --rates, --speed: expected numbers above 0; found {seconds:g}, {rates!r} and {speed!r}"
+        )
+    _print(stepping_lines(list(bench_stepping(asked, seconds, fast))))
 
 
 @bench.command()

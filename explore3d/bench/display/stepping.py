@@ -17,8 +17,8 @@ from mapping.geometry.proxy import Bar, Bell, Chain, Part, ProxyBody, Terrace, T
 
 # The body: a waved plate of 20,000 triangles, its half side, m, and height of its waves, m
 GRID_SIDE, PLATE_HALF, WAVE = 101, 30e-3, 0.5e-3
-# The ball, m, and the hand that leads it: speed, m/s, depth below the base, m, lines there and back
-STEPPING_TIP, HAND_SPEED, HAND_DEPTH, HAND_LINES = 3e-3, 0.1, 1e-3, 40
+# The ball, m, and the hand that leads it: depth below the base, m, and lines over all features
+STEPPING_TIP, HAND_DEPTH, HAND_LINES = 3e-3, 1e-3, 12
 STEPPING_STIFFNESS = 500.0
 
 
@@ -69,12 +69,13 @@ def stepping_body() -> ProxyBody:
     return ProxyBody(base, parts, STEPPING_TIP)
 
 
-def bench_stepping(rates: Sequence[float], seconds: float) -> Iterator[Stepping]:
+def bench_stepping(rates: Sequence[float], seconds: float, speed: float = 30e-3) -> Iterator[Stepping]:
     """A simulated hand rubs over the body, by the clock, at each rate for so long.
 
     Args:
         rates: steps per second.
         seconds: of each.
+        speed: of the hand, m/s.
     """
     body = stepping_body()
     turns = 0.9 * PLATE_HALF * np.linspace(-1.0, 1.0, HAND_LINES)
@@ -84,7 +85,7 @@ def bench_stepping(rates: Sequence[float], seconds: float) -> Iterator[Stepping]
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     for rate in rates:
         steps = max(1, round(seconds * rate))
-        at = np.mod(np.arange(steps) * HAND_SPEED / rate, along[-1])
+        at = np.mod(np.arange(steps) * speed / rate, along[-1])
         wishes = np.column_stack([*(np.interp(at, along, corners[:, k]) for k in range(2)), np.zeros(steps)])
         wishes[:, 2] = STEPPING_TIP - HAND_DEPTH
         fall = min(steps, round(0.1 * rate))

@@ -42,8 +42,8 @@ MOST_PROJECTIONS = 24  # projections in one step; what is left of the way is gon
 MOST_WAYS_OUT = 8
 # Of the radius: a shorter move ends the step. The error is its square over twice the radius: 1e-14 radii
 STILL = 1e-7
-# Of the device's motion: the ball goes about as far, and looks again where it goes further. By simulation (a hand at 0.1
-# m/s over 20 features, 1 kHz) a step takes 16.8 us with 1.2, 19.0 with 1.5 and 23.5 with 2
+# Of the device's motion: the ball goes about as far, and looks again where it goes further. By simulation (a hand at
+# 0.1 m/s over 20 features, 1 kHz) a step takes 16.8 us with 1.2, 19.0 with 1.5 and 23.5 with 2
 REACH_OF_MOTION = 1.2
 SHORTEST_REACH = 1e-3  # of the radius: how far the ball may move beyond the device's own motion
 FIRST_REACH = 0.25  # of the radius: how far it looks at first at most; further where nothing is near

@@ -139,7 +139,9 @@ def test_over_a_bell_the_force_is_along_its_normal(r: float) -> None:
     assert np.abs(-force[:, 0] / force[:, 2] - there).max() < 1e-6
 
 
-@pytest.mark.parametrize("name", ["ridge", "bar", "roof", "trapezoid", "bump", "step", "groove", "pit"])
+@pytest.mark.parametrize(
+    "name", ["ridge", "bar", "roof", "trapezoid", "bump", "bell", "step", "groove", "pit", "junction"]
+)
 def test_the_force_jumps_nowhere_by_more_than_people_notice(name: str) -> None:
     parts, _ = CASES[name]
     for r in TIPS[1:]:
