@@ -185,6 +185,8 @@ def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
     found = crossing()
     with pytest.raises(UserError, match=r"possible endings: \.wav, \.ahap, \.hjif"):
         haptic_file(found, tmp_path / "crossing.mp3")
+    with pytest.raises(UserError, match="there is no folder"):
+        haptic_file(found, tmp_path / "absent" / "crossing.wav")
     with pytest.raises(UserError, match="--full-scale"):
         haptic_file(found, tmp_path / "crossing.wav", 1e-6)
     assert not list(tmp_path.iterdir())
