@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from explore3d import UserError, parse_length
+from explore3d import UserError, parse_length, parse_rate, parse_speed
 from explore3d.cli.options import Json
 
 if TYPE_CHECKING:
@@ -457,6 +457,26 @@ def touch(
         best = f"{100.0 * each.place_unknown:.0f} % possible, {100.0 * each.place_known:.0f} % where its place is known"
         print(f"{told}; {best}", flush=True)
     _print(touch_lines(answers))
+
+
+@bench.command()
+def display(
+    seconds: Annotated[float, typer.Option(help="By the clock, at each rate.")] = 30.0,
+    rates: Annotated[str, typer.Option(help="Steps per second, with unit, separated by commas.")] = "1 kHz,10 kHz",
+    speed: Annotated[str, typer.Option(help="Of the hand, with unit.")] = "30 mm/s",
+) -> None:
+    """Time of a step, and jitter of the loop, of a display with 20,000 triangles and 20 features.
+
+    Example: explore3d bench display --seconds 10
+    """
+    from explore3d.bench.display import bench_stepping, stepping_lines
+
+    asked, fast = [parse_rate(each) for each in rates.split(",")], parse_speed(speed)
+    if not (0.0 < seconds < float("inf") and min(asked) > 0.0 and fast > 0.0):
+        raise UserError(
+            f"--seconds, --rates, --speed: expected numbers above 0; found {seconds:g}, {rates!r} and {speed!r}"
+        )
+    _print(stepping_lines(list(bench_stepping(asked, seconds, fast))))
 
 
 @bench.command()

@@ -10,12 +10,16 @@ from typing import Annotated
 import typer
 
 from explore3d import UnitError, UserError, parse_rate, parse_speed
-from explore3d.cli.options import Json, TipRadius, length, point
+from explore3d.cli.options import Json, length, point
 from explore3d.report.watch import asked, over, when_input_ends
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL", help="Folder or model.json of an annotated model.")]
 Exaggeration = Annotated[
     float, typer.Option(help="Make the features' heights and widths so many times larger, 1 to 100.")
+]
+BallRadius = Annotated[
+    str | None,
+    typer.Option("--tip-radius", help="Radius of the ball that touches it; else of the tip that explored it."),
 ]
 Speed = Annotated[str, typer.Option(help="Speed of the crossing.")]
 
@@ -24,9 +28,9 @@ def display(
     model: Model,
     device: Annotated[str, typer.Option(help="simulated, or one of an installed package.")] = "simulated",
     log: Annotated[Path | None, typer.Option("--log", help="Record what is felt: an MCAP log for analyze.")] = None,
-    tip_radius: TipRadius = None,
+    tip_radius: BallRadius = None,
     stiffness: Annotated[float, typer.Option(help="Of the surface, N/m.")] = 500.0,
-    friction: Annotated[float, typer.Option(help="Coefficient of friction.")] = 0.0,
+    friction: Annotated[float, typer.Option(help="Coefficient of friction of the surface.")] = 0.0,
     damping: Annotated[float, typer.Option(help="Virtual damping while it touches, N s/m.")] = 0.0,
     exaggeration: Exaggeration = 1.0,
     scale: Annotated[float, typer.Option(help="Millimetres on the model for each millimetre of the device.")] = 1.0,
@@ -87,7 +91,7 @@ def vibrate(
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="File: .wav, .ahap (Apple) or .hjif (MPEG).")],
     speed: Speed = "30 mm/s",
-    tip_radius: TipRadius = None,
+    tip_radius: BallRadius = None,
     exaggeration: Exaggeration = 1.0,
     full_scale: Annotated[
         str | None, typer.Option(help="Height that full scale stands for, of the actuator; else the crossing's own.")

@@ -26,7 +26,7 @@ from explore3d.jobs import scene_finger
 from hw.display import DisplayFinger
 from hw.simulated import SimulatedFinger
 from mapping import Feature
-from mapping.geometry.proxy import Chain, Part
+from mapping.geometry.proxy import Bar, Chain, Part
 from mapping.geometry.templates import width_of_cap
 from mapping.inference.kinds import kind_named
 from mapping.model import touchable
@@ -110,7 +110,11 @@ def circle_lines(records: Sequence[dict[str, Any]]) -> Iterator[str]:
 def _displayed(feature: Feature, part: Part) -> TrueFeature:
     """The feature with the sizes of the body that was displayed of it."""
     # of sections that leave one trace the model says between which widths; the body has one of them
-    width = float(width_of_cap(part.height, part.radius)) if isinstance(part, Chain) else feature.width.median
+    width = feature.width.median
+    if isinstance(part, Chain):
+        width = float(width_of_cap(part.height, part.radius))
+    elif isinstance(part, Bar):
+        width = part.top + 2.0 * part.run
     sized = feature.width.median > 0.0
     length = feature.length.median if len(feature.axis) > 1 else None
     return TrueFeature(feature.kind, feature.axis, feature.height.median, width if sized else None, length)

@@ -173,7 +173,7 @@ def haptic_file(vibration: Vibration, out: Path | str, full_scale: float | None 
     """Write a vibration in the format that the file's name ends with.
 
     Raises:
-        UserError: another ending, or a vibration larger than full scale.
+        UserError: another ending, a folder that is not there, or a vibration larger than full scale.
         OSError: the file cannot be written.
     """
     place = Path(out)
@@ -182,6 +182,8 @@ def haptic_file(vibration: Vibration, out: Path | str, full_scale: float | None 
         raise UserError(
             f"--out: {place.name} names no format of a vibration; possible endings: {', '.join(VIBRATION_FORMATS)}"
         )
+    if not place.parent.is_dir():
+        raise UserError(f"--out {place}: there is no folder {place.parent}; make it first")
     return write_whole(place, make(vibration, full_scale))
 
 

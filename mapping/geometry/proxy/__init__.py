@@ -7,6 +7,7 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from mapping.geometry.proxy.body import ProxyBody as ProxyBody
     from mapping.geometry.proxy.parts import (
+        Bar as Bar,
         Bell as Bell,
         Chain as Chain,
         Part as Part,
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "body": ("ProxyBody",),
-    "parts": ("Bell", "Chain", "Part", "Terrace", "Trench"),
+    "parts": ("Bar", "Bell", "Chain", "Part", "Terrace", "Trench"),
     "proxy": ("Followed", "Proxy", "free_place", "pressed_along"),
     "proxy_kernels": ("proxy_step", "workspace"),
 }

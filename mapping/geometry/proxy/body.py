@@ -8,10 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from mapping import BoolArray, ContactError, FloatArray, Surface
+from mapping import BoolArray, ContactError, FloatArray, IntArray, Surface
 from mapping.geometry.mesh import NearestPoint, TriangleTree, arclengths, distances
-from mapping.geometry.proxy.draping import CHORD_ERROR, followed, joined, terrace_mesh, trench_mesh
-from mapping.geometry.proxy.parts import Bell, Chain, Part, Terrace, Trench
+from mapping.geometry.proxy.draping import (
+    CHORD_ERROR,
+    bar_mesh,
+    followed,
+    is_closed,
+    joined,
+    terrace_mesh,
+    trench_meshes,
+)
+from mapping.geometry.proxy.parts import Bar, Bell, Chain, Part, Terrace, Trench
 
 # Legs of a chain, and rings of a bell, that share a bounding sphere
 LEGS_PER_GROUP = 16
@@ -23,6 +31,8 @@ CAP_REACH = 1.5
 # radius. Half balls are as square ends 0.05 mm further out (the paper's wire), so displayed ones were found half of
 # that too far out: wires 0.05 mm too long (four of them: 0.07 mm)
 END_ROUNDING = 0.5
+# In place of its depth: a triangle that no trench cuts open
+NEVER_OPEN = np.inf
 # A bell ends where it is hardly higher than the base: this share of its height
 BELL_END = 1e-4
 
@@ -49,17 +59,25 @@ class ProxyBody:
         parts = [each if isinstance(each, Bell) else self._laid(each) for each in parts]
         self.parts = tuple(parts)
         trenches = [part for part in parts if isinstance(part, Trench)]
-        meshes = [(base.vertices, base.faces), *(trench_mesh(each, self.base) for each in trenches)]
+        meshes = [(base.vertices, base.faces)]
+        depths = [np.where(_touched(*meshes[0], trenches), 0.0, NEVER_OPEN)]
+        for trench in trenches:
+            others = [each for each in trenches if each is not trench]
+            floor, walls = trench_meshes(trench, self.base, others)
+            deeper = _touched(*floor, [each for each in others if each.depth > trench.depth])
+            meshes += [floor, walls]
+            depths += [np.where(deeper, trench.depth, NEVER_OPEN), np.full(len(walls[1]), NEVER_OPEN)]
+        meshes += [bar_mesh(each, self.base) for each in parts if isinstance(each, Bar)]
         meshes += [terrace_mesh(each, self.base) for each in parts if isinstance(each, Terrace)]
         whole = joined(meshes)
         self._tree = TriangleTree(Surface(*whole), 2.0 * radius)
-        is_open = np.zeros(len(whole[1]), dtype=np.uint8)
-        is_open[: len(base.faces)] = _touched(base, trenches)
+        depth = np.full(len(whole[1]), NEVER_OPEN)
+        depth[: sum(map(len, depths))] = self.scale * np.concatenate(depths)
         rounds, groups = self._rounds([part for part in parts if isinstance(part, Chain | Bell)])
         legs, hulls = self._legs(trenches)
         tree = self._tree
         self.arrays: tuple[Any, ...] = (
-            tree.rows, tree.leaves, tree.boxes, tree.links, np.ascontiguousarray(is_open[tree.order]),
+            tree.rows, tree.leaves, tree.boxes, tree.links, np.ascontiguousarray(depth[tree.order]),
             rounds, groups, legs, hulls,
         )  # fmt: skip
 
@@ -95,7 +113,7 @@ class ProxyBody:
         proxy_kernels.least_gaps(self.arrays, scale * self.radius, self.into(centers), scale * reach, out)
         return out / scale
 
-    def _laid(self, part: Chain | Trench | Terrace) -> Chain | Trench | Terrace:
+    def _laid(self, part: Chain | Bar | Trench | Terrace) -> Chain | Bar | Trench | Terrace:
         axis, normals = followed(part.axis, part.normals, self.base)
         return replace(part, axis=axis, normals=normals)
 
@@ -118,7 +136,7 @@ class ProxyBody:
     def _capsules(self, chain: Chain) -> FloatArray:
         """(K - 1, 15) or, of a bump, (1, 15), and one for each end: ends, radius, normal, least cosine to it, kind."""
         axis, normals = chain.axis, chain.normals
-        if len(axis) == 1 or np.array_equal(axis[0], axis[-1]):
+        if len(axis) == 1 or is_closed(axis):
             return self._legs_of(chain, axis, normals, chain.radius)
         rounded = END_ROUNDING * chain.radius
         s = arclengths(axis)
@@ -169,15 +187,15 @@ class ProxyBody:
             block = np.zeros((legs, 11))
             block[:, 0:3], block[:, 3:6], block[:, 9] = axis[:legs], axis[-legs:], half
             block[:, 6:9] = up / np.linalg.norm(up, axis=1, keepdims=True)
-            if len(axis) > 1 and not np.array_equal(axis[0], axis[-1]):
+            if len(axis) > 1 and not is_closed(axis):
                 block[0, 10] += 1.0
                 block[-1, 10] += 2.0
             center = 0.5 * (axis.min(axis=0) + axis.max(axis=0))
             reach = np.linalg.norm(axis - center, axis=1).max() + half
-            hulls.append(np.concatenate([center, [reach, first, first + legs]]))
+            hulls.append(np.concatenate([center, [reach, first, first + legs, self.scale * trench.depth]]))
             rows.append(block)
             first += legs
-        return _rows(rows, 11), _rows([np.array(hulls)] if hulls else [], 6)
+        return _rows(rows, 11), _rows([np.array(hulls)] if hulls else [], 7)
 
 
 def meridian(bell: Bell) -> FloatArray:
@@ -212,9 +230,9 @@ def _rows(blocks: Sequence[FloatArray], width: int) -> FloatArray:
     return np.ascontiguousarray(np.concatenate(blocks)) if blocks else np.zeros((0, width))
 
 
-def _touched(base: Surface, trenches: Sequence[Trench]) -> BoolArray:
+def _touched(vertices: FloatArray, faces: IntArray, trenches: Sequence[Trench]) -> BoolArray:
     """(F,) True of faces that a trench may open."""
-    corners = base.vertices[base.faces]
+    corners = vertices[faces]
     middle = corners.mean(axis=1)
     reach = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
     touched = np.zeros(len(middle), dtype=bool)
@@ -225,6 +243,12 @@ def _touched(base: Surface, trenches: Sequence[Trench]) -> BoolArray:
 
 def _check(part: Part) -> None:
     """Raises ContactError for sizes that no part can have."""
+    if isinstance(part, Bar):
+        for name, size in (("top", part.top), ("run", part.run)):
+            if not (np.isfinite(size) and size >= 0.0):
+                raise ContactError(f"a bar's {name} must be finite and at least 0; found {size!r}")
+        if part.top + part.run == 0.0:
+            raise ContactError("a bar needs a top or flanks that run; found both 0")
     for name in ("height", "radius", "scale", "exponent", "width", "depth"):
         size = getattr(part, name, 1.0)
         if not (np.isfinite(size) and size > 0.0):
@@ -235,5 +259,7 @@ def _check(part: Part) -> None:
         raise ContactError(
             f"an axis and its normals must be finite and of one shape (K, 3); found {axis.shape} and {normals.shape}"
         )
-    if isinstance(part, Terrace) and (len(axis) < 2 or np.array_equal(axis[0], axis[-1])):
+    if isinstance(part, Bar) and len(axis) < 2:
+        raise ContactError("a bar runs along an axis of two points at least; found one")
+    if isinstance(part, Terrace) and (len(axis) < 2 or is_closed(axis)):
         raise ContactError("a step's edge needs two ends; a closed one, or a single point, says no higher side")

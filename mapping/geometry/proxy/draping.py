@@ -1,12 +1,14 @@
-"""Draping: outlines, walls and floors of hollows and steps, as triangles that follow a base."""
+"""Draping: what has straight sections (hollows, bars, steps) as triangles that follow a base."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from mapping import FloatArray, IntArray
-from mapping.geometry.mesh import NearestPoint, arclengths, directions
-from mapping.geometry.proxy.parts import Terrace, Trench
+from mapping import BoolArray, FloatArray, IntArray
+from mapping.geometry.mesh import NearestPoint, arclengths, directions, distances
+from mapping.geometry.proxy.parts import Bar, Terrace, Trench
 
 # By how much chords of an outline, and facets of a floor, may miss the curve that they stand for, m: less than a third
 # of the smallest edge that people feel (0.85 um, LaMotte and Whitehouse 1986)
@@ -23,29 +25,69 @@ RAMP = 50.0
 Mesh = tuple[FloatArray, IntArray]
 
 
-def trench_mesh(trench: Trench, base: NearestPoint) -> Mesh:
-    """(vertices, faces) of walls and floor, m; the mouth is left open."""
+def trench_meshes(trench: Trench, base: NearestPoint, others: Sequence[Trench] = ()) -> tuple[Mesh, Mesh]:
+    """(floor, walls) of a trench, m; the mouth is left open, and so are the walls where another trench takes them away.
+
+    The floor is whole, its faces turned outwards.
+    """
     half, axis = 0.5 * trench.width, trench.axis
     if len(axis) == 1:
         turn = np.linspace(0.0, 2.0 * np.pi, _chords(half) + 1)[:-1]
         across, along = _plane(trench.normals[0])
         ring = _even(half, len(turn)) * (np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * along)
+        ring = np.vstack([ring, ring[:1]])
         shares = _shares(draped(axis + ring, base)[0].mean(axis=0) - axis[0])
-        rows = [axis + share * np.vstack([ring, ring[:1]]) for share in shares]
-        return _hollow([draped(row, base) for row in rows], trench.depth, sides=(False, True))
-    closed = np.array_equal(axis[0], axis[-1])
-    laterals = _laterals(axis, trench.normals)
-    reach = half * _mitres(axis, closed)[:, None] * laterals
-    sag = 0.5 * (draped(axis + reach, base)[0] + draped(axis - reach, base)[0]) - axis
-    rows = [axis + (2.0 * share - 1.0) * reach for share in _shares(sag)]
-    mesh = _hollow([draped(row, base) for row in rows], trench.depth, sides=(True, True))
-    if closed:
+        rows = [draped(axis + share * ring, base) for share in shares[::-1]]
+        rims = [rows[0][0]]
+    else:
+        reach = half * _mitres(axis)[:, None] * _laterals(axis, trench.normals)
+        sag = 0.5 * (draped(axis + reach, base)[0] + draped(axis - reach, base)[0]) - axis
+        rows = [draped(axis + (2.0 * share - 1.0) * reach, base) for share in _shares(sag)]
+        rims = [rows[0][0], rows[-1][0]]
+        if not is_closed(axis):
+            rims += [np.array([points[end] for points, _ in rows]) for end in (0, -1)]
+    floor = _strips([points - trench.depth * normals for points, normals in rows])
+    return floor, joined([_walls(rim, trench.depth, base, others) for rim in rims])
+
+
+def _walls(rim: FloatArray, depth: float, base: NearestPoint, others: Sequence[Trench]) -> Mesh:
+    """Upright walls below a rim (K, 3), but for what lies in other trenches, and not below their floors."""
+    for other in others:
+        rim = crossed(rim, other)
+    points, normals = draped(rim, base)
+    middles = 0.5 * (rim[1:] + rim[:-1])
+    inside = [within(middles, other) for other in others]
+    levels = sorted({0.0, *(other.depth for other in others if other.depth < depth)})
+    walls = []
+    for upper, lower in zip(levels, [*levels[1:], depth], strict=True):
+        taken = [there for there, other in zip(inside, others, strict=True) if other.depth > upper]
+        vertices, faces = _strips([points - upper * normals, points - lower * normals])
+        walls.append((vertices, faces[np.tile(~np.any(taken, axis=0), 2)] if taken else faces))
+    return joined(walls)
+
+
+def bar_mesh(bar: Bar, base: NearestPoint) -> Mesh:
+    """(vertices, faces) of the flanks, the top and the square ends of a bar, m; the foot is left open."""
+    laterals = _mitres(bar.axis)[:, None] * _laterals(bar.axis, bar.normals)
+    half = 0.5 * bar.top
+    offsets, rises = np.zeros(1), np.ones(1)  # from the middle outwards
+    for inner, outer, falls in ((0.0, half, False), (half, half + bar.run, True)):
+        ends = [draped(bar.axis + side * away * laterals, base)[0] for side in (-1, 1) for away in (inner, outer)]
+        middles = [draped(bar.axis + side * 0.5 * (inner + outer) * laterals, base)[0] for side in (-1, 1)]
+        sag = np.concatenate([middles[0] - 0.5 * (ends[0] + ends[1]), middles[1] - 0.5 * (ends[2] + ends[3])])
+        shares = _shares(sag)[1:]
+        if outer > inner or falls:
+            offsets = np.append(offsets, inner + shares * (outer - inner))
+            rises = np.append(rises, 1.0 - shares if falls else np.ones(len(shares)))
+    offsets, rises = np.append(-offsets[:0:-1], offsets), np.append(rises[:0:-1], rises)
+    feet = [draped(bar.axis + away * laterals, base) for away in offsets]
+    rows = [points + rise * bar.height * normals for (points, normals), rise in zip(feet, rises, strict=True)]
+    mesh = _strips(rows)
+    if is_closed(bar.axis):
         return mesh
-    ends = []
-    for end in (0, -1):
-        rim, outward = draped(np.array([row[end] for row in rows]), base)
-        ends.append(_strips([rim, rim - trench.depth * outward]))
-    return joined([mesh, *ends])
+    caps = [_strips([np.array([points[end] for points, _ in feet]), np.array([row[end] for row in rows])])
+            for end in (0, -1)]  # fmt: skip
+    return joined([mesh, *caps])
 
 
 def terrace_mesh(terrace: Terrace, base: NearestPoint) -> Mesh:
@@ -91,17 +133,6 @@ def joined(meshes: list[Mesh]) -> Mesh:
     return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces)
 
 
-def _hollow(rows: list[tuple[FloatArray, FloatArray]], depth: float, sides: tuple[bool, bool]) -> Mesh:
-    """Floor below rows of draped points, with walls at the first and the last row."""
-    floor = [points - depth * normals for points, normals in rows]
-    meshes = [_strips(floor)]
-    if sides[0]:
-        meshes.append(_strips([rows[0][0], floor[0]]))
-    if sides[1]:
-        meshes.append(_strips([floor[-1], rows[-1][0]]))
-    return joined(meshes)
-
-
 def _strips(rows: list[FloatArray]) -> Mesh:
     """Triangles between rows of as many points each."""
     count, corner = len(rows[0]), np.arange(len(rows[0]) - 1)
@@ -142,8 +173,9 @@ def _laterals(axis: FloatArray, normals: FloatArray) -> FloatArray:
     return np.asarray(laterals / np.linalg.norm(laterals, axis=1, keepdims=True))
 
 
-def _mitres(axis: FloatArray, closed: bool) -> FloatArray:
+def _mitres(axis: FloatArray) -> FloatArray:
     """(K,) by how much an offset grows at each corner of an axis."""
+    closed = is_closed(axis)
     legs = np.diff(axis, axis=0)
     legs /= np.linalg.norm(legs, axis=1, keepdims=True)
     before, after = (
@@ -152,6 +184,57 @@ def _mitres(axis: FloatArray, closed: bool) -> FloatArray:
     )
     cosine = np.sqrt(np.clip(0.5 * (1.0 + np.einsum("ij,ij->i", before, after)), LONGEST_MITRE**-2, 1.0))
     return np.asarray(1.0 / cosine)
+
+
+def is_closed(axis: FloatArray) -> bool:
+    """True of a ring: its first point is its last."""
+    return len(axis) > 1 and np.array_equal(axis[0], axis[-1])
+
+
+def within(points: FloatArray, trench: Trench) -> BoolArray:
+    """(N,) True of points (N, 3) of the base that lie over a trench, m: what `is_cut_away` asks of single ones."""
+    half, axis = 0.5 * trench.width, trench.axis
+    if len(axis) == 1:
+        return np.asarray(np.linalg.norm(points - axis[0], axis=1) < half)
+    legs = np.diff(axis, axis=0)
+    squares = (legs**2).sum(axis=1)
+    from_first = points[:, None] - axis[:-1]
+    along = (from_first * legs).sum(axis=2)
+    off = from_first - np.clip(along / squares, 0.0, 1.0)[..., None] * legs
+    there = (off**2).sum(axis=2) < half**2
+    if not is_closed(axis):
+        there[:, 0] &= along[:, 0] >= 0.0
+        there[:, -1] &= along[:, -1] <= squares[-1]
+    return np.asarray(there.any(axis=1))
+
+
+def crossed(line: FloatArray, trench: Trench) -> FloatArray:
+    """A line (K, 3) with further points where it crosses the outline of a trench, m."""
+    half, axis = 0.5 * trench.width, trench.axis
+    starts, ways = line[:-1, None], np.diff(line, axis=0)[:, None]
+    # the outline is made of spheres about the axis' points, of cylinders about its legs, and of planes at its ends
+    rounds = [(starts - axis, np.broadcast_to(ways, (len(ways), len(axis), 3)))]
+    cuts = []
+    if len(axis) > 1:
+        legs = np.diff(axis, axis=0)
+        legs /= np.linalg.norm(legs, axis=1, keepdims=True)
+        from_first = starts - axis[:-1]
+        rounds.append(tuple(each - (each * legs).sum(axis=2, keepdims=True) * legs for each in (from_first, ways)))
+        if not is_closed(axis):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                cuts = [-((starts[:, 0] - axis[end]) @ legs[end]) / (ways[:, 0] @ legs[end]) for end in (0, -1)]
+    for off, way in rounds:
+        square, half_b, rest = ((a * b).sum(axis=2) for a, b in ((way, way), (off, way), (off, off)))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.sqrt(half_b**2 - square * (rest - half**2))
+            cuts += [((-half_b + sign * root) / square)[:, k] for sign in (-1, 1) for k in range(square.shape[1])]
+    which, number = np.nonzero([(each > 0.0) & (each < 1.0) for each in cuts])
+    share = np.array(cuts)[which, number]
+    places = line[number] + share[:, None] * np.diff(line, axis=0)[number]
+    on = distances(places, axis) < half * (1.0 + 1e-9)  # the outline itself, not its parts drawn further
+    number, share, places = number[on], share[on], places[on]
+    order = np.lexsort((share, number))
+    return np.asarray(np.insert(line, number[order] + 1, places[order], axis=0))
 
 
 def followed(axis: FloatArray, normals: FloatArray, base: NearestPoint) -> tuple[FloatArray, FloatArray]:

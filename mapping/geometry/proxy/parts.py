@@ -28,6 +28,25 @@ class Chain:
 
 
 @dataclass(frozen=True, eq=False)
+class Bar:
+    """A ridge with a flat top and straight flanks, from upright walls (run 0) to a roof (top 0); its ends are square.
+
+    Args:
+        axis: (K, 3) points of the base under the middle, m, K >= 2; first equals last of a closed one.
+        normals: (K, 3) outward unit normals there.
+        height: of the top over the base, m, positive.
+        top: width of the top, m, at least 0.
+        run: how far each flank goes beside it, m, at least 0; not both 0.
+    """
+
+    axis: FloatArray
+    normals: FloatArray
+    height: float
+    top: float
+    run: float
+
+
+@dataclass(frozen=True, eq=False)
 class Bell:
     """A bump with a skirt, z = height (1 + u^2 / (p scale^2))^-p about the normal (theory equation 2.7).
 
@@ -47,7 +66,8 @@ class Bell:
 class Trench:
     """A groove or a pit: all of the base that is nearer to the axis than half the width, lowered, with upright walls.
 
-    A groove ends square at the ends of its axis, as the family that is fitted to it does.
+    A groove ends square at the ends of its axis, as the family that is fitted to it does. Where several overlap, the
+    deepest counts.
 
     Args:
         axis: (K, 3) points of the base, m; one of a pit; first equals last of a closed groove.
@@ -81,4 +101,4 @@ class Terrace:
     high_side: float
 
 
-Part = Chain | Bell | Trench | Terrace
+Part = Chain | Bar | Bell | Trench | Terrace

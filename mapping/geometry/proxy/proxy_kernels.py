@@ -5,8 +5,9 @@ outside as long as its centre keeps to the side of the tangent plane at the near
 the wish on the half-spaces of the elements nearby; no motion within them can pass an element, however long it is.
 
 Lengths are in the frame of the body's TriangleTree. `body` is the tuple that ProxyBody.arrays gives:
-rows, leaves, boxes, links (the tree), open (F,) 1 where a triangle may be cut open, rounds (M, 15), groups (G, 6),
-legs (C, 11) of the axes that triangles are cut open along (last column: 1 a first leg, 2 a last one), trenches (H, 6).
+rows, leaves, boxes, links (the tree), depths (F,) of triangles that deeper trenches cut open (inf: none does),
+rounds (M, 15), groups (G, 6), legs (C, 11) of the axes that triangles are cut open along (last column: 1 a first leg,
+2 a last one), trenches (H, 7; last column: depth).
 """
 
 from __future__ import annotations
@@ -36,8 +37,14 @@ RING_NEWTON_STEPS = (
 )
 FEW_NEIGHBOURS = 32  # with fewer it looks twice as far the next time
 MOST_PROJECTIONS = 24  # projections in one step; what is left of the way is gone in the next
+# Projections after those, which only lead out of what the ball is in: a bell's skirt bends towards a ball, which on its
+# way along the tangent plane gets in by the square of the way over the skirt's radius; out again it is Newton's method
+MOST_WAYS_OUT = 8
 # Of the radius: a shorter move ends the step. The error is its square over twice the radius: 1e-14 radii
 STILL = 1e-7
+# Of the device's motion: the ball goes about as far, and looks again where it goes further. By simulation (a hand at
+# 0.1 m/s over 20 features, 1 kHz) a step takes 16.8 us with 1.2, 19.0 with 1.5 and 23.5 with 2
+REACH_OF_MOTION = 1.2
 SHORTEST_REACH = 1e-3  # of the radius: how far the ball may move beyond the device's own motion
 FIRST_REACH = 0.25  # of the radius: how far it looks at first at most; further where nothing is near
 ALLOWED = 1e-13  # of the radius: a half-space that is violated by less is kept
@@ -72,10 +79,12 @@ def on_segment(a, b, o):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def is_cut_away(body, point, normal):  # type: ignore[no-untyped-def]
-    """True if a point of the base, whose face has that normal, lies over a trench or a pit."""
+def is_cut_away(body, point, normal, depth):  # type: ignore[no-untyped-def]
+    """True if a point of the base lies over a trench that is deeper than a depth, of which its face has the normal."""
     legs, trenches = body[7], body[8]
     for h in range(len(trenches)):
+        if trenches[h, 6] <= depth:
+            continue
         away = sub(point, vector(trenches, h))
         if dot(away, away) > trenches[h, 3] * trenches[h, 3]:
             continue
@@ -136,8 +145,12 @@ def support(body, radius, code, o):  # type: ignore[no-untyped-def]
         rows = body[0]
         q = closest(rows, code, o)
         d = sqrt(dot(q, q))
-        if body[4][code] and is_cut_away(body, moved(o, 1.0, q), (rows[code, 9], rows[code, 10], rows[code, 11])):
-            return -1e9, nowhere
+        depth = body[4][code]
+        if depth < np.inf:
+            normal = (rows[code, 9], rows[code, 10], rows[code, 11])
+            over = moved(moved(o, 1.0, q), depth, normal)  # of a floor's point, the base's over it
+            if is_cut_away(body, over, normal, depth):
+                return -1e9, nowhere
         return d - radius, scaled(-1.0 / d, q)
     rounds, j = body[5], -1 - code
     if rounds[j, 11] == RING:
@@ -213,18 +226,21 @@ def follow(body, radius, o, x, reach, work):  # type: ignore[no-untyped-def]
 
     Every round is the projection on the half-spaces of the elements nearby, so the distance from x only falls. With
     one element active the wish is its own projection, which makes the rounds Newton's: the error is cubed by each.
+    Where they do not suffice, it stays where it came to, but outside.
     """
     found, normals, bounds, numbers, active, weight = work[0], work[1], work[2], work[3], work[4], work[5]
-    rounds, held = 0, 0
-    while rounds < MOST_PROJECTIONS:
+    rounds, held, touching = 0, 0, False
+    while rounds < MOST_PROJECTIONS + MOST_WAYS_OUT:
         near = gather(body, radius, o, reach, work)
         if near < 0:
             rounds += 1
             reach *= 0.5
             continue
         room = reach
-        while rounds < MOST_PROJECTIONS and room > 0.0:
+        while rounds < MOST_PROJECTIONS + MOST_WAYS_OUT and room > 0.0:
             rounds += 1
+            if rounds > MOST_PROJECTIONS:
+                x = o
             count = 0
             for i in range(near):
                 gap, n = support(body, radius, found[i], o)
@@ -243,16 +259,17 @@ def follow(body, radius, o, x, reach, work):  # type: ignore[no-untyped-def]
                     left, now = sub(wish, other), wish
                     if dot(left, left) <= dot(now, now):
                         step, held = other, max(also, 1)
+            touching = held > 0 or (touching and rounds > MOST_PROJECTIONS)
             way = length(step)
             if way <= STILL * radius:
-                return moved(o, 1.0, step), held > 0
+                return moved(o, 1.0, step), touching
             if way >= room:
                 o = moved(o, room / way, step)
                 reach, room = (2.0 if near < FEW_NEIGHBOURS else 1.0) * reach, 0.0
             else:
                 o = moved(o, 1.0, step)
                 room -= way
-    return o, held > 0
+    return o, touching
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -267,7 +284,7 @@ def proxy_step(body, radius, friction, o, last, x, work):  # type: ignore[no-unt
         radius: of the ball; friction: coefficient; o, last, x: (3,) tuples, all in the frame of the body.
     """
     moved_by = sub(x, last)
-    reach = min(2.0 * length(moved_by) + SHORTEST_REACH * radius, FIRST_REACH * radius)
+    reach = min(REACH_OF_MOTION * length(moved_by) + SHORTEST_REACH * radius, FIRST_REACH * radius)
     end, touching = follow(body, radius, o, x, reach, work)
     if friction == 0.0 or not touching:
         return end, touching

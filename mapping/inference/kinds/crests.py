@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
-from mapping.geometry.proxy import Chain, Part
+from mapping.geometry.proxy import Bar, Chain, Part
 from mapping.geometry.templates import chain_height, contact_half_width, radius_of_cap, width_of_cap
 from mapping.inference.kinds.kind import Kind, Section
 from mapping.inference.likelihood import Shape
@@ -24,7 +24,7 @@ class Crest(Kind):
         height = feature.height.median
         if height <= 0.0:
             return np.zeros(len(feet))
-        if feature.details.radius is None and feature.details.top is not None and feature.details.run is not None:
+        if is_flat_topped(feature):
             return _flat_topped(feature, feet, tip_radius)
         radius = crest_radius(feature)
         # a low and wide one is a part of a large ball, which on a bent base comes out again elsewhere
@@ -34,10 +34,13 @@ class Crest(Kind):
         return np.where(near, over, 0.0)
 
     def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
-        """The chain of capsules; None of one that does not stand out."""
+        """The chain of capsules, or the bar that its details describe; None of one that does not stand out."""
         height = exaggeration * feature.height.median
         if not height > 0.0:
             return None
+        if is_flat_topped(feature):
+            top, run = feature.details.top or 0.0, feature.details.run or 0.0
+            return Bar(feature.axis, feature.normals, height, exaggeration * top, exaggeration * run)
         return Chain(feature.axis, feature.normals, height, exaggeration * crest_radius(feature))
 
     def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
@@ -45,6 +48,12 @@ class Crest(Kind):
         radii = np.exp(draws[:, -1])
         cap = Interval.from_draws(width_of_cap(draws[:, -2], radii))
         return Section(Interval.from_draws(draws[:, -2]), cap, {"radius": float(np.median(radii))})
+
+
+def is_flat_topped(feature: Feature) -> bool:
+    """True of a line whose section has straight flanks, with a flat top or none."""
+    details = feature.details
+    return details.radius is None and details.top is not None and details.run is not None
 
 
 def crest_radius(feature: Feature) -> float:

@@ -11,7 +11,7 @@ from contact_bodies import shared
 from explore3d.scene import load_mesh
 from hw.display import DisplayLoop, Hand, Rendering, SimulatedDisplay
 from mapping import FloatArray, Surface
-from mapping.geometry.proxy import Bell, Chain, Part, ProxyBody, Terrace, Trench
+from mapping.geometry.proxy import Bar, Bell, Chain, Part, ProxyBody, Terrace, Trench
 
 MESHES = Path(__file__).parents[3] / "assets" / "meshes"
 PLATE = Surface(0.03 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2], [0, 2, 3]])
@@ -26,7 +26,7 @@ def line(*places: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
 
 
 def every_kind() -> ProxyBody:
-    """A plate with a ridge, a ring, round bumps, a groove, a pit and a step, some of which meet."""
+    """A plate with ridges, bars, a ring, round bumps, grooves, a pit and a step, some of which meet."""
     turn = np.linspace(0.0, 2.0 * np.pi, 61)
     ring = np.column_stack([6.0 * np.cos(turn) - 15.0, 6.0 * np.sin(turn) + 15.0])
     parts: list[Part] = [
@@ -35,7 +35,10 @@ def every_kind() -> ProxyBody:
         Chain(*line(*map(tuple, ring)), 0.5e-3, 0.3e-3),
         Chain(*line((0, 0)), 0.8e-3, 0.4e-3),
         Chain(*line((-20, 0)), 0.2e-3, 2e-3),
+        Bar(*line((-28, -10), (-15, -5), (-14, 5)), 0.4e-3, 1e-3, 0.3e-3),
+        Bar(*line((-28, 10), (-26, -12)), 0.3e-3, 0.0, 0.8e-3),
         Trench(*line((0, 8), (18, 8)), 4e-3, 0.5e-3),
+        Trench(*line((8, -2), (9, 20)), 2e-3, 0.8e-3),
         Trench(*line((20, 20)), 5e-3, 1e-3),
         Terrace(*line((15, -25), (15, -5)), 0.5e-3, -1.0),
     ]
@@ -43,7 +46,7 @@ def every_kind() -> ProxyBody:
 
 
 def bell() -> ProxyBody:
-    """A bump with a skirt, which is a table of rings, in the middle of the plate."""
+    """A bump with a skirt, which bends towards the ball, in the middle of the plate."""
     return ProxyBody(PLATE, [Bell(np.zeros(3), UP, 1e-3, 1e-3, 2.0)], 2e-3)
 
 
@@ -56,12 +59,9 @@ def bunny() -> ProxyBody:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("build", "jumps", "deepest"),
-    [(every_kind, 300_000, 1e-9), (bell, 100_000, 1e-4), (mug, 300_000, 1e-9), (bunny, 300_000, 1e-9)],
-)
-def test_a_million_random_jumps_are_survived(build, jumps: int, deepest: float) -> None:  # type: ignore[no-untyped-def]
-    """Finite, never above the force limit, never inside by more than 1e-9 r; on a bell, by what its chords may miss."""
+@pytest.mark.parametrize(("build", "jumps"), [(every_kind, 300_000), (bell, 100_000), (mug, 300_000), (bunny, 300_000)])
+def test_a_million_random_jumps_are_survived(build, jumps: int) -> None:  # type: ignore[no-untyped-def]
+    """Finite, never above the force limit, never inside by more than 1e-9 r."""
     body, rng = build(), np.random.default_rng(2026)
     low, high = body.base.surface.bounds
     wide = high - low + 4.0 * body.radius
@@ -78,7 +78,7 @@ def test_a_million_random_jumps_are_survived(build, jumps: int, deepest: float) 
             # the device jumped: each place is one that was wished, but for what the force moves the hand
             apart = [run.records[1000:2000, 1:4] - wishes[1000 + late : 2000 + late] for late in (-1, 0, 1)]
             assert min(np.abs(each).max() for each in apart) < 10e-6
-            assert body.gaps(run.centers, body.radius).min() > -deepest * body.radius
+            assert body.gaps(run.centers, body.radius).min() > -1e-9 * body.radius
             assert np.linalg.norm(run.forces, axis=1).max() <= 3.0 * (1.0 + 1e-12)
             assert (run.column("touching") > 0).mean() > 0.1
 

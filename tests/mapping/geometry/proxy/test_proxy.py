@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from mapping import ContactError, FloatArray, Surface
-from mapping.geometry.proxy import Bell, Chain, Part, Proxy, ProxyBody, Terrace, Trench
+from mapping.geometry.proxy import Bar, Bell, Chain, Part, Proxy, ProxyBody, Terrace, Trench
 from mapping.geometry.templates import (
     BumpOfRevolution,
     bell_heights,
@@ -16,6 +17,7 @@ from mapping.geometry.templates import (
     chain_height,
     groove_height,
     rim_height,
+    section_heights,
     step_height,
 )
 
@@ -52,11 +54,29 @@ def bell_form(x: FloatArray, y: FloatArray, r: float) -> FloatArray:
     return np.asarray(out[0])
 
 
+def bar_form(top: float, run: float) -> Form:
+    """A section with a flat top and straight flanks, 0.2 mm high."""
+
+    def form(x: FloatArray, y: FloatArray, r: float) -> FloatArray:
+        nothing, out = np.zeros((len(x), 1)), np.empty((1, len(x)))
+        corners = np.array([[0.5 * top, 0.5 * top + run]]), np.array([[0.2e-3, 0.0]])
+        section_heights(
+            nothing, x[:, None], np.zeros((0, len(x), 1)), nothing, nothing, np.zeros((1, 0)),
+            np.array([[-1e300, 1e300]]), *corners, r, out,
+        )  # fmt: skip
+        return np.asarray(out[0])
+
+    return form
+
+
 CASES: dict[str, tuple[tuple[Part, ...], Form]] = {
     "ridge": ((Chain(*LINE, 0.2e-3, 0.15e-3),), lambda x, y, r: cap_height(x, 0.2e-3, 0.15e-3, r)),
     "low ridge": ((Chain(*LINE, 0.05e-3, 2e-3),), lambda x, y, r: cap_height(x, 0.05e-3, 2e-3, r)),
     "bump": ((Chain(*POINT, 0.2e-3, 0.2e-3),), lambda x, y, r: cap_height(np.hypot(x, y), 0.2e-3, 0.2e-3, r)),
     "bell": ((Bell(np.zeros(3), UP, 0.2e-3, 0.6e-3, 2.0),), bell_form),
+    "bar": ((Bar(*LINE, 0.2e-3, 0.8e-3, 0.0),), bar_form(0.8e-3, 0.0)),
+    "roof": ((Bar(*LINE, 0.2e-3, 0.0, 1.2e-3),), bar_form(0.0, 1.2e-3)),
+    "trapezoid": ((Bar(*LINE, 0.2e-3, 0.7e-3, 0.5e-3),), bar_form(0.7e-3, 0.5e-3)),
     "groove": ((Trench(*LINE, 1e-3, 0.1e-3),), lambda x, y, r: groove_height(x, 1e-3, r, 0.1e-3)),
     "pit": ((Trench(*POINT, 1.5e-3, 0.1e-3),), lambda x, y, r: rim_height(0.75e-3 - np.hypot(x, y), r, 0.1e-3)),
     "step": ((Terrace(*LINE, 0.2e-3, -1.0),), lambda x, y, r: step_height(x, 0.2e-3, r)),
@@ -86,7 +106,7 @@ def test_the_path_over_a_feature_is_its_closed_form(name: str, r: float) -> None
             assert np.abs(x - felt.device[:, 0]).max() < 0.1e-3
 
 
-@pytest.mark.parametrize("name", ["ridge", "bump", "step", "groove"])
+@pytest.mark.parametrize("name", ["ridge", "bar", "roof", "trapezoid", "bump", "step", "groove"])
 @pytest.mark.parametrize("r", TIPS)
 def test_lateral_over_normal_force_is_the_slope(name: str, r: float) -> None:
     parts, form = CASES[name]
@@ -119,7 +139,9 @@ def test_over_a_bell_the_force_is_along_its_normal(r: float) -> None:
     assert np.abs(-force[:, 0] / force[:, 2] - there).max() < 1e-6
 
 
-@pytest.mark.parametrize("name", ["ridge", "bump", "step", "groove", "pit"])
+@pytest.mark.parametrize(
+    "name", ["ridge", "bar", "roof", "trapezoid", "bump", "bell", "step", "groove", "pit", "junction"]
+)
 def test_the_force_jumps_nowhere_by_more_than_people_notice(name: str) -> None:
     parts, _ = CASES[name]
     for r in TIPS[1:]:
@@ -159,6 +181,14 @@ def test_random_jumps_never_bring_it_inside() -> None:
     assert built.gaps(felt.centers, r).min() > -1e-9 * r
 
 
+def test_a_skirt_that_bends_towards_the_ball_lets_it_in_nowhere() -> None:
+    r, rng = 0.3e-3, np.random.default_rng(11)
+    body = ProxyBody(PLATE, (Bell(np.zeros(3), UP, 3e-3, 0.5e-3, 1.0),), r)
+    jumps = rng.uniform([-6e-3, -6e-3, -2e-3], [6e-3, 6e-3, 6e-3], (4000, 3))
+    felt = Proxy(body).follow(np.vstack([[[0.0, 0.0, 20e-3]], jumps]))
+    assert body.gaps(felt.centers, r).min() > -1e-9 * r
+
+
 def test_friction_holds_within_its_cone_and_slips_on_its_border() -> None:
     body = ProxyBody(PLATE, (), 1e-3)
     lateral = np.concatenate([np.linspace(0, 0.04e-3, 50), np.linspace(0.04e-3, 1e-3, 500)])
@@ -189,6 +219,9 @@ def test_it_does_not_pass_a_wall_however_far_the_device_jumps() -> None:
     [
         (Chain(*LINE, 0.0, 1e-3), "height must be positive"),
         (Trench(*LINE, np.nan, 1e-3), "width must be positive"),
+        (Bar(*LINE, 1e-3, 0.0, 0.0), "both 0"),
+        (Bar(*LINE, 1e-3, -1e-3, 0.0), "top must be finite and at least 0"),
+        (Bar(*POINT, 1e-3, 1e-3, 0.0), "two points at least"),
         (Terrace(*POINT, 1e-3, 1.0), "needs two ends"),
         (Chain(LINE[0], LINE[1][:1], 1e-3, 1e-3), "of one shape"),
     ],
@@ -220,7 +253,57 @@ def test_a_groove_ends_square_where_its_axis_ends() -> None:
     assert np.abs(z - 5e-3 - rim_height(np.minimum(20e-3 - place, 0.5e-3), 5e-3, 0.1e-3)).max() < 1e-6
 
 
-def test_an_axis_of_few_points_follows_a_bent_base() -> None:
+def crossing_grooves(shallow: float, deep: float) -> tuple[tuple[Part, ...], Form]:
+    """A groove along y, 1 mm wide, and a deeper one along x, 2 mm wide."""
+    first, second = Trench(*LINE, 1e-3, shallow), Trench(*CROSS, 2e-3, deep)
+
+    def form(x: FloatArray, y: FloatArray, r: float) -> FloatArray:
+        beside, past = 0.5e-3 - np.abs(x), 1e-3 - np.abs(y)  # how far from the walls, inside of each groove
+        land = np.where((beside > 0.0) & (past > 0.0), np.hypot(beside, past), np.maximum(beside, past))
+        floor = np.where(beside < 0.0, np.hypot(np.maximum(past, 0.0), beside), past)
+        return np.maximum(rim_height(land, r, deep), rim_height(floor, r, deep - shallow) - shallow)
+
+    return (first, second), form
+
+
+@pytest.mark.parametrize("depths", [(0.02e-3, 0.1e-3), (0.1e-3, 0.1e-3)])
+@pytest.mark.parametrize("r", TIPS)
+def test_where_grooves_cross_the_deeper_one_counts(depths: tuple[float, float], r: float) -> None:
+    parts, form = crossing_grooves(*depths)
+    way = 1e-3 * np.array([[-3.0, -3.0], [0.1, 0.05], [0.05, 3.0], [0.4, 0.8], [3.0, 0.3], [0.2, 0.1], [0.45, -3.0]])
+    places = np.concatenate([a + np.linspace(0, 1, 500)[:, None] * (b - a) for a, b in itertools.pairwise(way)])
+    for order in (parts, parts[::-1]):
+        x, y = places.T
+        felt = Proxy(ProxyBody(PLATE, order, r)).follow(np.column_stack([x, y, r - 1e-6 + form(x, y, r)]))
+        x, y, z = felt.centers.T
+        assert felt.touching.all()
+        assert np.abs(z - r - form(x, y, r)).max() < 1e-8
+        assert np.hypot(x - places[:, 0], y - places[:, 1]).max() < 0.02e-3
+
+
+def test_a_pit_in_a_groove_goes_on_from_its_floor() -> None:
+    parts = (Trench(*LINE, 3e-3, 0.05e-3), Trench(*POINT, 2e-3, 0.12e-3))
+    y, r = np.linspace(-4e-3, 4e-3, 2000), 1e-3
+    form = rim_height(1e-3 - np.abs(y), r, 0.07e-3) - 0.05e-3
+    felt = Proxy(ProxyBody(PLATE, parts, r)).follow(np.column_stack([np.zeros_like(y), y, r - 1e-6 + form]))
+    _, place, z = felt.centers.T
+    assert np.abs(z - r - rim_height(1e-3 - np.abs(place), r, 0.07e-3) + 0.05e-3).max() < 1e-6
+
+
+def test_a_bar_ends_square_where_its_axis_ends() -> None:
+    r = 5e-3
+    felt = Proxy(ProxyBody(PLATE, (Bar(*LINE, 0.2e-3, 0.6e-3, 0.3e-3),), r)).follow(
+        np.column_stack([np.zeros(800), np.linspace(18e-3, 23e-3, 800), np.full(800, r - 1e-6)])
+        + np.array([0.0, 0.0, 0.2e-3]) * (np.arange(800) < 200)[:, None]
+    )
+    _, y, z = felt.centers.T
+    assert np.abs(z - r - step_height(20e-3 - y, 0.2e-3, r)).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    "section", [lambda *axis: Chain(*axis, 0.3e-3, 0.2e-3), lambda *axis: Bar(*axis, 0.3e-3, 1e-3, 0.2e-3)]
+)
+def test_an_axis_of_few_points_follows_a_bent_base(section: Callable[..., Part]) -> None:
     u, v = np.meshgrid(np.linspace(-0.6, 0.6, 241), np.linspace(-0.02, 0.02, 5), indexing="ij")
     points = 0.04 * np.column_stack([np.sin(u.ravel()), v.ravel() / 0.04, np.cos(u.ravel())])
     corner = (np.arange(240)[:, None] * 5 + np.arange(4)).ravel()
@@ -228,8 +311,7 @@ def test_an_axis_of_few_points_follows_a_bent_base() -> None:
     bent = Surface(points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
     turn = np.linspace(-0.4, 0.4, 6)
     normals = np.column_stack([np.sin(turn), np.zeros(6), np.cos(turn)])
-    ridge = Chain(0.04 * normals, normals, 0.3e-3, 0.2e-3)
-    built = ProxyBody(bent, (ridge,), 5e-3)
+    built = ProxyBody(bent, (section(0.04 * normals, normals),), 5e-3)
     fine = np.linspace(-0.35, 0.35, 2000)
     way = np.column_stack([np.sin(fine), np.zeros(2000), np.cos(fine)])
     felt = Proxy(built).follow((0.04 + 5.3e-3 - 0.02e-3) * way)
