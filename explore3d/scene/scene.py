@@ -41,6 +41,8 @@ SCENE_SCHEMA = "explore3d/scene/1"
 # The slowest speed that is tried is this many times slower than the fastest: the height that white noise hides falls
 # with its power 2/5, four times over the range, and what is still hidden then is better felt by many fast sweeps
 SPEED_RANGE = 30.0
+# Of sweeps where neither the scene names a speed nor noise and finger tell one, m/s: the paper's
+USUAL_SPEED = 0.03
 
 
 # In radii of the tip: a crest of 1e-5 shows over 1e-2 of them, too fine for a survey's lines over one body;
@@ -103,12 +105,13 @@ class SurveyTable(Table):
     """Sweeps over the whole model: the least height to be found (m), the least span of a ridge (m), m/s, N.
 
     Without `shortest_ridge` nothing of that height is missed, bumps included; with it, ridges that span less may be.
-    The speed "fastest" is the greatest at which a sweep still shows the smallest feature (`Scene.sweep_speed`).
+    The speed "fastest" is the greatest at which a sweep still shows the smallest feature (`Scene.sweep_speed`); so it
+    is where none is named and that can be known.
     """
 
     smallest_feature: Length
     shortest_ridge: Length | None = None
-    speed: SweepSpeed = 0.03
+    speed: SweepSpeed | None = None
     force: Force = 1.0
 
 
@@ -257,27 +260,30 @@ class Scene(Table):
 
         That is bounded by the noise, whose white part averages less where samples lie further apart
         (planners.survey.pace); by what the simulated finger can do, and by its inertia, if it has any
-        (SimulatedFingerTable.follows).
+        (SimulatedFingerTable.follows). A scene that names no speed gets it where that can be known, else the paper's.
 
         Raises:
             SceneError: "fastest" is asked for, and the finger's noise or what it can follow is not known.
         """
         speed, smallest, tip = self.survey.speed, self.survey.smallest_feature, self.tip.radius
-        if speed != "fastest":
+        if isinstance(speed, float):
             return speed
         follows = self.finger.follows(tip, smallest)
+        if follows is not None and self.noise is not None:
+            limit, rate = follows
+            return fastest_speed(self.noise.noise, rate, tip, smallest, limit / SPEED_RANGE, limit)
+        if speed is None:
+            # a limit of nothing is that of a tip with inertia in no noise, which no speed leaves without an error
+            return min(USUAL_SPEED, inf if follows is None else follows[0] or inf)
         if follows is None:
             raise SceneError(
                 f"{self._path}: survey.speed: the fastest speed that a machine can follow is not known; found kind "
                 f'"{self.finger.kind}", possible are a number as "20 mm/s", or the kind "simulated"'
             )
-        if self.noise is None:
-            raise SceneError(
-                f"{self._path}: survey.speed: the fastest speed follows from the noise, and finger.noise states none; "
-                'give white or correlated, or a number as "30 mm/s"'
-            )
-        limit, rate = follows
-        return fastest_speed(self.noise.noise, rate, tip, smallest, limit / SPEED_RANGE, limit)
+        raise SceneError(
+            f"{self._path}: survey.speed: the fastest speed follows from the noise, and finger.noise states none; "
+            'give white or correlated, or a number as "30 mm/s"'
+        )
 
     def base_surface(self) -> Surface | None:
         """The global model's mesh in metres, None if only a region is known. Raises SceneError."""

@@ -33,8 +33,8 @@ from planners.follow import (
 from planners.paths import Strokes
 from planners.survey import Survey
 
-# Slides off one end, at most, and in one go
-MOST_SLIDES, SLIDES_AT_ONCE = 150, 8
+# Slides off one end, at most; and so many in a row that do not show it say that no more will
+MOST_SLIDES, VAIN_SLIDES = 150, 8
 # A faint line is straight, and every crossing of it costs many passes: the step, in its length so far
 LEAD_STEP = 0.25
 
@@ -280,18 +280,16 @@ class Explore:
         return RidgeFollower(self.strokes, sense, noise, self.wanted_sd, known=known)
 
     def _slide(self, index: int, which: int, found: Found) -> Plan:
-        """More sweeps to and fro off an end that is not known well enough; the way to it is paid once for all."""
+        """Sweeps to and fro off an end until it is known well enough; the way to it is paid once for all."""
         track = found.tracks[index]
         finder = EndFinder(self.strokes, self.base, found.noise or Noise(0.0))
         crest = Crest.of(track)
-        before = end = track.ends[which]
-        for _ in range(SLIDES_AT_ONCE):
-            end = yield from finder.slide(end, crest)
-            found.slides[index, which] = found.slides.get((index, which), 0) + 1
-            if end.reason != "end" or end.sd <= self._enough(track):
-                break
-        if end is before:  # none showed it, nor would any more
-            found.slides[index, which] = MOST_SLIDES
+        end, done, vain = track.ends[which], found.slides.get((index, which), 0), 0
+        while end.reason == "end" and end.sd > self._enough(track) and done < MOST_SLIDES:
+            slid = yield from finder.slide(end, crest)
+            vain = vain + 1 if slid is end else 0
+            end, done = slid, MOST_SLIDES if vain == VAIN_SLIDES else done + 1
+        found.slides[index, which] = done
         found.tracks[index] = track.with_end(which, end)
         return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")
 

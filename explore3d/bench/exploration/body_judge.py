@@ -107,8 +107,8 @@ class Judge:
             swept: centres of the ball (M, 3) that each sweep measured, m.
         """
         radius = self.tip_radius
-        ball = [-np.inf]
-        stem = [-np.inf]
+        # asked in one go: libigl sorts the object's faces anew each time
+        ball, stem = [np.zeros((0, 3))], [(np.zeros((0, 3)), np.zeros((0, 3)))]
         for before, after in zip([None, *moves], moves, strict=False):
             path, approach = (np.asarray(after[name], dtype=np.float64).reshape(-1, 3) for name in ("path", "approach"))
             parts = [] if after["purpose"] == "sweep" else [(path, approach)]
@@ -120,17 +120,16 @@ class Judge:
                 way = np.stack([np.asarray(before["path"])[-1], path[0]]) - off * radius * ends
                 parts.append((way, ends))
                 stem_parts.append((way, ends))
-            for centers, _ in (_dense(*part, 0.1 * radius) for part in parts):
-                ball.append(float((radius - self.distance(centers)).max()))
-            for part in stem_parts:
-                centers, along = _dense(*part, 0.25 * radius)
-                stem.append(float((STEM_THICK * radius - self._stem_distance(centers, -along)).max()))
+            ball.extend(_dense(*part, 0.1 * radius)[0] for part in parts)
+            stem.extend(_dense(*part, 0.25 * radius) for part in stem_parts)
         for centers in swept:
             count = len(centers) // SAMPLES_AVERAGED
             if count:
-                mean = centers[: count * SAMPLES_AVERAGED].reshape(count, SAMPLES_AVERAGED, 3).mean(axis=1)
-                ball.append(float((radius - self.distance(mean)).max()))
-        return max(ball) / radius, max(stem) / radius
+                ball.append(centers[: count * SAMPLES_AVERAGED].reshape(count, SAMPLES_AVERAGED, 3).mean(axis=1))
+        places, along = (np.concatenate(parts) for parts in zip(*stem, strict=True))
+        nearest = self.distance(np.concatenate(ball)).min(initial=np.inf)
+        stem_nearest = self._stem_distance(places, -along).min(initial=np.inf)
+        return 1.0 - float(nearest) / radius, STEM_THICK - float(stem_nearest) / radius
 
     @cached_property
     def asked(self) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -69,14 +69,14 @@ class BenchScene:
     sides: tuple[str, ...] = ()
     region: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
 
-    def text(self, seed: int, finger: Mapping[str, float], precision: float, speed: float) -> str:
+    def text(self, seed: int, finger: Mapping[str, float], precision: float, speed: float | None = None) -> str:
         """The scene file's text.
 
         Args:
             seed: of the finger's noise and the chains.
             finger: its `rate` (Hz), and its noise as [finger.noise] has it, m.
             precision: wanted half-width of the 90 % interval of an end, m.
-            speed: of the sweeps, m/s.
+            speed: of the sweeps, m/s; None: as fast as noise and finger allow.
         """
         model: dict[str, Any] = {"mesh": BASE_MESH}
         if self.sides:
@@ -84,7 +84,9 @@ class BenchScene:
             model = {"sides": list(self.sides), "region": {"low": low, "high": high}}
         elif self.misplaced:
             model |= {"pose": "estimate"}
-        survey = {"smallest_feature": self.smallest, "speed": speed}
+        survey = {"smallest_feature": self.smallest}
+        if speed is not None:
+            survey |= {"speed": speed}
         if self.shortest_ridge is not None:
             survey |= {"shortest_ridge": self.shortest_ridge}
         noise = {name: level for name, level in finger.items() if name != "rate"}

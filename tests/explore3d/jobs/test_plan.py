@@ -55,6 +55,19 @@ def test_the_fastest_speed_follows_from_noise_dynamics_and_the_smallest_feature(
     assert parse_scene(text, WIRE).sweep_speed == pytest.approx(speed, rel=0.08)
 
 
+def test_a_scene_that_names_no_speed_sweeps_as_fast_as_it_may() -> None:
+    unsaid = FASTEST.replace('speed = "fastest"', "")
+    assert parse_scene(unsaid, WIRE).sweep_speed == parse_scene(FASTEST, WIRE).sweep_speed
+    heavy = unsaid.replace("[survey]", "[finger.dynamics]\n[survey]")
+    assert parse_scene(heavy, WIRE).sweep_speed == pytest.approx(0.0808, rel=0.08)
+    # of a machine nothing says how fast its tip follows; of a finger without noise nothing asks for more
+    pecked = WIRE.with_name("grbl_peck.toml")
+    assert parse_scene(pecked.read_text().replace('speed = "20 mm/s"\n', "", 1), pecked).sweep_speed == 0.03
+    silent = unsaid.replace('white = "0.2 mm"', "").replace('correlated = "0.02 mm"', "")
+    assert parse_scene(silent, WIRE).sweep_speed == 0.03
+    assert parse_scene(silent.replace('"10 mm"', '"1 mm"', 1), WIRE).sweep_speed == pytest.approx(0.025)
+
+
 def test_a_fastest_speed_that_cannot_be_known_is_refused() -> None:
     silent = FASTEST.replace('white = "0.2 mm"', "").replace('correlated = "0.02 mm"', "")
     with pytest.raises(SceneError, match=r"survey\.speed: the fastest speed follows from the noise, and finger\.noise"):

@@ -52,7 +52,7 @@ def test_what_is_left_out_has_the_documented_default() -> None:
     text = 'schema = "explore3d/scene/1"\ntip.radius = 1\nmodel.region = {low = [0, 0, 0], high = [1, 1, "1 cm"]}\n'
     scene = parse_scene(text + 'finger.object = "a.ply"\nsurvey.smallest_feature = "1 mm"', "s.toml")
     assert scene.seed == 1
-    assert scene.survey.speed == 0.03
+    assert scene.sweep_speed == 0.03  # nothing is said of the noise
     assert scene.detection.algorithm == 3
     assert scene.model.region is not None
     assert scene.model.region.high == (1.0, 1.0, 0.01)
