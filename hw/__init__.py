@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         MoveError as MoveError,
         NotFeltError as NotFeltError,
         StoppedError as StoppedError,
+        UntrueForceError as UntrueForceError,
     )
     from hw.finger import Finger as Finger, Workspace as Workspace
     from hw.framing import Frames as Frames, Framing as Framing, Lines as Lines
@@ -22,7 +23,15 @@ if TYPE_CHECKING:
     from hw.simulated.finger import SimulatedFinger as SimulatedFinger
 
 _PUBLIC = {
-    "errors": ("FingerError", "GcodeError", "LinkError", "MoveError", "NotFeltError", "StoppedError"),
+    "errors": (
+        "FingerError",
+        "GcodeError",
+        "LinkError",
+        "MoveError",
+        "NotFeltError",
+        "StoppedError",
+        "UntrueForceError",
+    ),
     "finger": ("Finger", "Workspace"),
     "framing": ("Frames", "Framing", "Lines"),
     "link": ("Link",),

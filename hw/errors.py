@@ -17,6 +17,10 @@ class NotFeltError(StoppedError):
     """The tip went beyond the surface of the model and felt nothing."""
 
 
+class UntrueForceError(StoppedError):
+    """What the force sensor has said since it was last tested may be wrong, nobody knows since when."""
+
+
 class MoveError(ValueError):
     """A move that is malformed."""
 

@@ -13,13 +13,13 @@ from hw import FingerError, LinkError, NotFeltError, Patience, StoppedError
 from hw.grbl.controller import GrblController
 from hw.grbl.expected import ExpectedSurface
 from hw.grbl.frame import StageFrame
-from hw.sensors import ForceSensor
+from hw.sensors import LONGEST_SENSOR_SILENCE, ForceSensor
 from mapping import FloatArray
 
 # Shorter ways are not worth a command: the controller refuses to probe towards where it stands
 STANDING = 5e-6
-# A force sample older than FRESH is not steered by; a sensor silent for LONGEST_SENSOR_SILENCE is taken for lost, s
-FRESH, LONGEST_SENSOR_SILENCE = 0.05, 1.0
+# A force sample older than this is not steered by, s
+FRESH = 0.05
 # How long the machine may stand still in the midst of a motion, s
 LONGEST_STANDSTILL = 5.0
 # What a sensor that froze lets the tip press before it is noticed (SampleWatch.blind), in shares of the force limit:

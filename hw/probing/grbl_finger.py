@@ -11,7 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from hw import THROUGH_SPACE, FingerError, LinkError, Move, Patience, StopOnSignal, StoppedError, Workspace
+from hw import (
+    THROUGH_SPACE,
+    FingerError,
+    LinkError,
+    Move,
+    Patience,
+    StopOnSignal,
+    StoppedError,
+    UntrueForceError,
+    Workspace,
+)
 from hw.grbl import ExpectedSurface, GrblController, GuardedStage, StageFrame
 from hw.probing.lag import measured_delay
 from hw.probing.peck import Peck, Touched
@@ -267,6 +277,8 @@ class GrblFinger:
             self._retreat(stage)  # now, and not when the last samples are thought over: the tip may be pressed hard
             if not any(len(batch.times) for batch in touched):
                 raise
+            if isinstance(error, UntrueForceError):
+                touched.clear()  # nothing is returned in place of what `notice` was told
         except FingerError as error:
             self._cut_short.append(str(error))
             if not any(len(batch.times) for batch in touched):  # what was felt before a line that was refused stays

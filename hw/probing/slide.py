@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hw import LinkError, Move, NotFeltError, Patience, StoppedError
+from hw import LinkError, Move, Patience, StoppedError, UntrueForceError
 from hw.grbl import LONGEST_STANDSTILL, GuardedStage
 from hw.probing.fusion import (
     OFF_THE_LINE_STEPS,
@@ -28,7 +28,7 @@ from hw.probing.lag import EXPECTED, Lag
 from hw.probing.peck import Touched, spaced
 from hw.probing.press_test import press_test
 from hw.probing.zero import ZeroLine, ZerosMoved
-from hw.sensors import ForceSensor
+from hw.sensors import FREE_AIR, ForceSensor
 from mapping import BoolArray, FloatArray
 
 # Jogs that may be under way or waiting when the next is made, in control periods; and less where the way that it takes
@@ -60,6 +60,10 @@ BEFORE = 0.1
 PULL = 0.6
 # The zero may be wrong by this, as a displacement of the tip, during one sweep, m: its samples are off by as much
 ZERO_MOVED = 1.5e-5
+# A zero that seems to drift is listened to for so long, s. At 1 kHz and 5 mN of noise 0.2 s tell a drift to 6 mN/s (sd
+# of a component): over a sweep of 8 s a third of what is refused, which chance exceeds once in 50 sweeps. 1 s tells it
+# to 0.5 mN/s
+SURE_FREE_AIR = 1.0
 # What was felt so long before a stop may be wrong already, s: two requests for a status
 HELD_BACK = 0.1
 # A sweep takes longer than its path: touching, pressing, steep flanks, a host that is busy otherwise, s
@@ -130,36 +134,41 @@ class Slide:
                     last = time.monotonic()  # what the tip feels while it settles is no sweep
                 elif time.monotonic() > told + BATCH:
                     told = time.monotonic()
-                    batch = self._fused(stage, sent, last, told - self.sensor.watch.blind)
+                    batch = self._fused(stage, approach, sent, last, told - self.sensor.watch.blind)
                     if len(batch.times):
                         last = float(batch.times[-1])
                         yield batch
         except (StoppedError, LinkError):
-            yield self._fused(stage, sent, last, time.monotonic() - HELD_BACK)
+            yield self._fused(stage, approach, sent, last, time.monotonic() - HELD_BACK)
             raise
         finally:
             if stage.controller.link.is_open and stage.controller.stop_reason is None:
                 stage.controller.cancel_jog()
-        yield self._fused(stage, sent, last)
+        yield self._fused(stage, approach, sent, last)
 
     def _tare(self, stage: GuardedStage, duration: float) -> None:
-        """Take the zero anew; in free air it must be about where it was, and stay there for the next sweep."""
+        """Take the zero anew; in free air it must be about where it was, and stay there for the next sweep.
+
+        What would end the run is listened to again for longer first: of a moment's noise a drift is made by chance.
+        """
         before = self.sensor.zeroed
-        self.sensor.tare()
-        assert self.sensor.zeroed is not None
         most = max(ZERO_MOVED * self.stiffness, stage.touch_force / 2.0)
-        moved = 0.0 if before is None else ZeroLine(before, self.sensor.zeroed).moved
-        drift = float(np.linalg.norm(self.sensor.zeroed.drift)) * duration
-        if max(moved, drift) > most:
-            what = (
-                f"moved by {moved:.2f} N since the last sweep"
-                if moved > most
-                else f"drifts by {drift / duration:.2f} N/s while nothing touches, "
-                f"{1e6 * drift / self.stiffness:.0f} um of the tip during one sweep"
-            )
-            reason = f"the sensor's zero {what}: let it warm up, or look what hangs on it"
-            stage.controller.halt(reason)
-            raise StoppedError(reason)
+        for listening in (FREE_AIR, SURE_FREE_AIR):
+            self.sensor.tare(listening)
+            assert self.sensor.zeroed is not None
+            moved = 0.0 if before is None else ZeroLine(before, self.sensor.zeroed).moved
+            drift = float(np.linalg.norm(self.sensor.zeroed.drift)) * duration
+            if max(moved, drift) <= most:
+                return
+        what = (
+            f"moved by {moved:.2f} N since the last sweep"
+            if moved > most
+            else f"drifts by {drift / duration:.2f} N/s while nothing touches, "
+            f"{1e6 * drift / self.stiffness:.0f} um of the tip during one sweep"
+        )
+        reason = f"the sensor's zero {what}: let it warm up, or look what hangs on it"
+        stage.controller.halt(reason)
+        raise StoppedError(reason)
 
     def settled(self, stage: GuardedStage, felt: Sequence[Touched]) -> list[Touched]:
         """What a sweep felt, once the tip is in free air again: less what the zero has moved meanwhile.
@@ -207,7 +216,7 @@ class Slide:
             inwards /= np.linalg.norm(inwards)
             pressing = self._pressing(stage, inwards, here, min(sum(queued), ahead), made)
             if pressing < -max(PULL * move.force, 0.5 * stage.touch_force):
-                raise StoppedError(
+                raise UntrueForceError(
                     f"the force pulls the tip by {-pressing:.2f} N where a body can only press: the sensor's sign "
                     "turned or its zero jumped; check its cable, run again"
                 )
@@ -222,7 +231,7 @@ class Slide:
             if depth > self.reach:
                 raise StoppedError("the tip went too deep behind the commanded path: the body ends, or is elsewhere")
             if depth > max(bounds[int(at)], bounds[int(np.ceil(at))]):
-                raise NotFeltError(
+                raise UntrueForceError(
                     f"the tip sank {1e3 * stage.expected.beyond if stage.expected else 0.0:.2f} mm below the surface "
                     "of the model without the force that belongs to it: the sensor's zero or gain drifted, or the body "
                     "is lower there; check both, or set beyond in [finger.machine]"
@@ -261,8 +270,13 @@ class Slide:
         force = stage.frame.turn_to_object(self.sensor.force())
         return -float(force @ inwards)
 
-    def _fused(self, stage: GuardedStage, sent: _Sent, after: float, until: float = np.inf) -> Touched:
-        """Samples in contact taken between these times, as far as the stage has reported where it was."""
+    def _fused(
+        self, stage: GuardedStage, approach: FloatArray, sent: _Sent, after: float, until: float = np.inf
+    ) -> Touched:
+        """Samples in contact taken between these times, as far as the stage has reported where it was.
+
+        One that pulls where a body can only press is no contact.
+        """
         reports = prompt(stage.controller.reported(after - BEFORE))
         if len(reports) < 2:
             return Touched(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
@@ -292,12 +306,15 @@ class Slide:
         forces = stage.frame.turn_to_object(forces)
         pressing = np.linalg.norm(forces, axis=1)
         normals = forces / np.maximum(pressing, self.contact)[:, None]
+        rows = np.interp(times, sent.times, sent.along)
+        inwards = np.column_stack([np.interp(rows, np.arange(len(approach)), column) for column in approach.T])
+        presses = np.einsum("ij,ij->i", forces, inwards) < PULL * pressing
         longest = max(BLIND * self.period, UNUSUAL * float(np.median(np.diff(stamps))))
         step = HARMLESS_STAGE_STEPS * stage.controller.settings.resolution
 
         def touching(delay: float) -> tuple[BoolArray, FloatArray]:
             centers = positions_at(times - delay, stamps, places)
-            sound = (pressing > self.contact) & np.isfinite(centers).all(axis=1) & (times > after)
+            sound = presses & (pressing > self.contact) & np.isfinite(centers).all(axis=1) & (times > after)
             sound &= times < until
             return sound & known_at(times - delay, stamps, places, normals, longest, step), centers
 

@@ -19,6 +19,10 @@ from hw.sensors.clock import SensorClock, missing, unwrapped
 from hw.sensors.watch import SampleWatch
 from mapping import FloatArray, IntArray
 
+# In free air a sensor is listened to for so long, s
+FREE_AIR = 0.2
+# A sensor silent for so long is taken for lost, s
+LONGEST_SENSOR_SILENCE = 1.0
 # Samples that are kept: a minute at 5 kHz
 KEPT_SAMPLES = 300_000
 # Samples of a fast sensor are taken together for so long, s: to be woken for each packet takes more than what is done
@@ -201,7 +205,7 @@ class ForceSensor:
                     return False
         return True
 
-    def tare(self, duration: float = 0.2) -> None:
+    def tare(self, duration: float = FREE_AIR) -> None:
         """Take what is read in free air (`free_air`) as zero, and learn the noise.
 
         Raises:
@@ -216,28 +220,35 @@ class ForceSensor:
             step = float(np.median(np.diff(ticks)))
             self.watch.learn(forces, step, step * self._period)
 
-    def free_air(self, duration: float = 0.2) -> FreeAir:
+    def free_air(self, duration: float = FREE_AIR) -> FreeAir:
         """The median force of the next moments, s, its drift, and when that was. Nothing may touch.
+
+        What counts is when a sample was taken, by the sensor's own clock: one that a busy host hears late may be of
+        the contact before, and a handful of samples makes a drift of noise.
 
         Raises:
             LinkError: no samples.
         """
         since = time.monotonic()
-        self.wait(lambda: time.monotonic() > since + duration, duration + 0.5)
+        until = since + duration
+        heard = self.wait(lambda: self.heard > until, duration + LONGEST_SENSOR_SILENCE)
         ticks, arrivals, forces = self.recorded(since - HISTORY)
         if len(ticks) > 1 and arrivals[-1] - arrivals[0] > PERIOD_SPAN:
             self._period = SensorClock.estimate(ticks.astype(float), arrivals, self.tick).period
             self._least = [np.inf, np.inf]
-        ticks = ticks[arrivals > since].astype(float)
-        recent = forces[arrivals > since]
-        if len(recent) == 0:
-            raise LinkError(f"{self.link.port}: no samples from the {self.name} for {duration:g} s")
+        lately = arrivals > since - DELAY_BLOCK
+        ticks, arrivals, forces = ticks[lately], arrivals[lately], forces[lately]
+        offset = float(np.min(arrivals - self._period * ticks, initial=np.inf))
+        recent = offset + self._period * ticks > since
+        if not heard or not recent.any():
+            raise LinkError(f"{self.link.port}: no samples from the {self.name} for {duration:g} s{self.held_up}")
+        ticks, forces = ticks[recent].astype(float), forces[recent]
         drift = np.zeros(3)
         if len(ticks) > 2:
             at = (ticks - ticks.mean()) * self._period
-            drift = np.asarray(at @ recent / (at @ at))
+            drift = np.asarray(at @ forces / (at @ at))
         # the median: a first sample after a reconnection may be anything
-        return FreeAir(0.5 * (since + time.monotonic()), np.median(recent, axis=0), drift)
+        return FreeAir(0.5 * (since + until), np.median(forces, axis=0), drift)
 
     def recorded(self, since: float = -np.inf) -> tuple[IntArray, FloatArray, FloatArray]:
         """Ticks (N,), arrivals (N,) s and raw forces (N, 3) N of the samples that arrived after `since`."""

@@ -11,7 +11,7 @@ from hw.emulated.force import OptoForceEmulator
 from hw.emulated.grbl import GrblEmulator
 from hw.emulated.pty_server import PtyServer
 from hw.emulated.touched_body import TouchedBody
-from hw.errors import FingerError
+from hw.errors import FingerError, StoppedError
 from hw.move import Move
 from hw.probing.grbl_finger import GrblFinger
 from hw.probing.slide import Slide
@@ -79,3 +79,30 @@ def test_a_sweep_in_which_the_zero_goes_astray_is_left_out_and_said() -> None:
     trace, _, said = slid(at_once=False)
     assert len(trace) == 0
     assert "zero moved by" in said and "left out" in said
+
+
+class Told:
+    """A sensor that tells these drifts in turn, and a stage that hears whether it is halted."""
+
+    def __init__(self, *drifts: float) -> None:
+        self.drifts, self.listened, self.halted = list(drifts), [], ""
+        self.zeroed: FreeAir | None = None
+        self.touch_force, self.controller = 0.3, self
+
+    def tare(self, duration: float) -> None:
+        self.listened.append(duration)
+        self.zeroed = reading(0.0, 0.0, self.drifts.pop(0))
+
+    def halt(self, reason: str) -> None:
+        self.halted = reason
+
+
+def test_a_drift_by_chance_is_listened_to_again_and_one_that_stays_ends_the_run() -> None:
+    told = Told(0.03, 0.001)
+    slide = Slide(told, STIFFNESS)  # type: ignore[arg-type]
+    slide._tare(told, 8.0)  # type: ignore[arg-type]
+    assert not told.halted and told.listened == [0.2, 1.0]
+    told = Told(0.03, 0.03)
+    with pytest.raises(StoppedError, match=r"drifts by 0\.03 N/s"):
+        Slide(told, STIFFNESS)._tare(told, 8.0)  # type: ignore[arg-type]
+    assert told.halted

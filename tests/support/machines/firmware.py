@@ -4,7 +4,9 @@ Two are known: grblHAL's (github.com/grblHAL/Simulator), whose probe is toggled 
 (github.com/grbl/grbl-sim), which has no probe.
 
 Where the motors of the classic one stand it prints. grblHAL's could, too, but then it counts every tick of a processor
-of 16 MHz, and needs a core of its own: it is asked instead, by one more `?` whenever the host has none under way.
+of 16 MHz, and of a short jog prints nothing but its end: it is asked instead, by one more `?` whenever the host has
+none under way. Between two reports it is taken to move evenly, one report late: a tip that jumped from one reported
+place to the next would be felt as no tip can be.
 """
 
 from __future__ import annotations
@@ -46,6 +48,7 @@ class Firmware:
     def __init__(self, program: Path, folder: Path, body: TouchedBody) -> None:
         self.out = bytearray()
         self.body, self.position = body, np.zeros(3)
+        self._told, self._told_before = (0.0, np.zeros(3)), (0.0, np.zeros(3))  # when it said where it stands, s
         self.strongest = 0.0
         told = subprocess.run([program, "-h"], capture_output=True, text=True, check=False)
         self.has_probe = "-p <port>" in told.stdout + told.stderr
@@ -139,13 +142,18 @@ class Firmware:
         """Hear what the firmware says, learn where its motors stand, and close the probe if the tip touches there."""
         said = self._read()
         if self.has_probe:
-            said = self._without_our_own(said)
+            said = self._without_our_own(said, now)
             self._ask()
         elif self._steps is not None:
             self._look(self._steps)
         # what a block prints ends with the planning of its last 60 ms: then its own reports say where it stands
-        self._note(said)
+        if not self.has_probe:
+            self._note(said, now)
         self.out += said
+        if self.has_probe:
+            (before, begin), (after, end) = self._told_before, self._told
+            share = (now - after) / (after - before) if after > before else 1.0
+            self.position = begin + min(max(share, 0.0), 1.0) * (end - begin)
         force = float(np.linalg.norm(self.body.force(self.position)))
         self.strongest = max(self.strongest, force)
         if self.has_probe and (force > 0.0) != self._closed:
@@ -162,19 +170,20 @@ class Firmware:
         self._asked.append(hosts)
         self._write(b"?")
 
-    def _without_our_own(self, said: bytes) -> bytes:
+    def _without_our_own(self, said: bytes, now: float) -> bytes:
         """What the firmware said, in whole lines, but for the reports that the host did not ask for."""
         *lines, self._rest = (self._rest + said).split(b"\n")
         told = b""
         for line in lines:
-            self._note(line)
+            self._note(line, now)
             ours = line.startswith(b"<") and bool(self._asked) and not self._asked.popleft()
             told += b"" if ours else line + b"\n"
         return told
 
-    def _note(self, said: bytes) -> None:
+    def _note(self, said: bytes, now: float) -> None:
         for place in PLACE.findall(said):
             self.position = np.array([float(number) for number in place]) * 1e-3
+            self._told_before, self._told = self._told, (now, self.position)
 
     def _look(self, steps: int) -> None:
         with suppress(BlockingIOError):

@@ -1,0 +1,71 @@
+"""What a force sensor says in free air, heard late by a busy host: only what was taken meanwhile counts."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from hw.errors import LinkError
+from hw.sensors.force_sensor import ForceSensor
+from hw.sensors.line_sensor import LineSensor, encode_line
+from hw.sensors.sample_kernels import load_sample_kernels
+
+NOISE = 0.005  # N
+# Seconds that the host is late, in which the tip was lifted off a contact of 1 N
+LATE = 0.12
+
+
+def taken(since: float, until: float, contact_ends: float, begun: float, seed: int = 0) -> list[bytes]:
+    """Frames of 1 kHz, s of time.monotonic; before `contact_ends` the tip was pressed by 1 N."""
+    times = np.arange(np.ceil(1e3 * (since - begun)), np.ceil(1e3 * (until - begun))) * 1e-3 + begun
+    forces = NOISE * np.random.default_rng(seed).standard_normal((len(times), 3))
+    forces[times < contact_ends, 2] += 1.0
+    return [
+        encode_line(round(1e6 * (at - begun)), tuple(force)).strip() for at, force in zip(times, forces, strict=True)
+    ]
+
+
+class Late:
+    """A sensor whose frames are heard LATE s after they were taken, from now on and for so long, s."""
+
+    def __init__(self, sensor: ForceSensor, lasting: float) -> None:
+        self.sensor, self.lasting = sensor, lasting
+        load_sample_kernels()
+        self.begun = time.monotonic() - 2.0
+        # a second and a half that was heard in time: what is known of the clock
+        for number in range(15):
+            at = self.begun + 0.1 * number
+            sensor._hear(at + 0.1, taken(at, at + 0.1, np.inf, self.begun, number))
+        self._thread = threading.Thread(target=self._speak, daemon=True)
+
+    def _speak(self) -> None:
+        told, ends, off = self.begun + 1.5, time.monotonic() + self.lasting, time.monotonic() - 0.5 * LATE
+        while (now := time.monotonic()) < ends:
+            self.sensor._hear(now, taken(told, now - LATE, off, self.begun, int(1e3 * now)))
+            told = max(told, now - LATE)
+            time.sleep(0.002)
+
+    def __enter__(self) -> ForceSensor:
+        self._thread.start()
+        return self.sensor
+
+    def __exit__(self, *ended: object) -> None:
+        self._thread.join()
+
+
+def test_samples_of_the_contact_before_that_come_late_are_no_zero_and_no_drift() -> None:
+    sensor = LineSensor("nowhere", rate=1000.0)
+    with Late(sensor, 0.6):
+        air = sensor.free_air()
+    # 200 samples of this noise tell a drift to 6 mN/s; what is left of the contact's would make it 1 N/s and more
+    assert np.abs(air.force).max() < 6.0 * NOISE / np.sqrt(100.0)
+    assert np.abs(air.drift).max() < 6.0 * 0.0062
+
+
+def test_a_sensor_that_falls_silent_meanwhile_is_no_zero() -> None:
+    sensor = LineSensor("nowhere", rate=1000.0)
+    with Late(sensor, 0.15), pytest.raises(LinkError, match="no samples"):
+        sensor.free_air()
