@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping import FloatArray, IntArray, Surface
+from mapping import FloatArray, IntArray, Surface, length_text
 from mapping.estimate.sweeps import BRIDGED, EXTRAPOLATED, LABELS, TOUCHED
 
 
@@ -108,6 +108,14 @@ class Estimate:
             "below_median": float(middle) if np.isfinite(middle) else None,
             "below_95": float(most) if np.isfinite(most) else None,
         }
+
+    def sentence(self) -> str:
+        """What is proven of the estimated surface, for people."""
+        shares = [f"{100 * self.fraction(label):.0f} % {LABELS[label]}" for label in (TOUCHED, BRIDGED, EXTRAPOLATED)]
+        half = float(np.quantile(self.below, 0.5, method="higher")) if len(self.points) else float("inf")
+        known = f"under half of its points the body is at most {length_text(half, 2)} away" if np.isfinite(half) else ""
+        touched = f"where touched, the body is proven to be within {length_text(self.tolerance, 2)}"
+        return f"Of the estimated surface {', '.join(shares)}: {'; '.join(part for part in (touched, known) if part)}."
 
 
 _OF_POINTS = ("points", "normals", "centers", "labels", "sample", "sweep", "across", "below", "above")
