@@ -105,7 +105,9 @@ def estimate_surface(
         slack = max(slack, 4 * smoothed.sd)
     else:
         away = _outward(trace, base, outward)
-    known = trace.centers - trace.tip_radius * unit(trace.normals) if method == "contact" else None
+    known = None
+    if method == "contact" and trace.normals is not None:
+        known = trace.centers - trace.tip_radius * unit(trace.normals)
     balls = Balls(trace.centers, trace.sweep, away, trace.tip_radius, slack, known)
     if method == "alpha":
         estimate = alpha_estimate(balls, tolerance)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +76,8 @@ class Estimate:
 
     def select(self, index: IntArray) -> Estimate:
         """The points of these indices, without a mesh."""
-        return Estimate(None, *(getattr(self, name)[index] for name in _OF_POINTS), self.sd, self.tolerance)
+        of_points: dict[str, Any] = {name: getattr(self, name)[index] for name in _OF_POINTS}
+        return replace(self, surface=None, **of_points)
 
     def with_resting(self, points: FloatArray, owners: IntArray) -> Estimate:
         """This estimate with bridged points (K, 3) added, each where balls of three points `owners` (K, 3) meet."""
