@@ -436,8 +436,8 @@ def labels(
     from explore3d.bench.precision import LABEL_BODIES, bench_labels, label_lines
 
     chosen = _names(bodies, "--bodies", list(LABEL_BODIES))
-    few = {"ratios": [0.05], "per_radius": [5], "directions": 1} if quick else {}
-    for line in label_lines(bench_labels(chosen, files, **few)):
+    cases = bench_labels(chosen, files, [0.05], [5], 1) if quick else bench_labels(chosen, files)
+    for line in label_lines(cases):
         print(line, flush=True)
 
 

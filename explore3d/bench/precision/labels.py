@@ -132,7 +132,9 @@ def label_raster(mesh: Surface, ball: BallContact, pitch: float, way: FloatArray
     found = ball.first_contact(place @ np.array([along, across]) + start * way, way)
     met = np.flatnonzero(np.isfinite(found.distance))
     number = np.repeat(np.arange(len(y)), len(x))[met]
-    return Trace(np.arange(len(met)), found.centers[met], number, ball.tip_radius, found.normals[met]), -way
+    return Trace(
+        np.arange(len(met), dtype=np.float64), found.centers[met], number, ball.tip_radius, found.normals[met]
+    ), -way
 
 
 def _judged(
