@@ -90,12 +90,22 @@ class Inspected:
 TOUCHED_REACH = 3.0
 
 
-def base_reach(surface: Surface, estimate: Estimate) -> FloatArray:
-    """(V,) label of each vertex (mapping.estimate): that of the nearest estimated point, EXTRAPOLATED far from any."""
+def base_reach(surface: Surface, estimate: Estimate) -> dict[str, FloatArray]:
+    """Fields (V,) of a model at its vertices, those of the nearest estimated point.
+
+    Returns:
+        `reach`: its label, EXTRAPOLATED far from any; `below` and `above`: what is proven of it, m, infinite far
+        from any.
+    """
     from scipy.spatial import cKDTree
 
     tree = cKDTree(estimate.points)
     apart = np.asarray(tree.query(estimate.points, k=[2])[0])
     reach = TOUCHED_REACH * max(float(np.median(apart)), pitch(estimate.points, estimate.sweep))
     distance, nearest = tree.query(surface.vertices)
-    return np.where(distance <= reach, estimate.labels[nearest].astype(np.float64), float(EXTRAPOLATED))
+    near = distance <= reach
+    return {
+        "reach": np.where(near, estimate.labels[nearest].astype(np.float64), float(EXTRAPOLATED)),
+        "below": np.where(near, estimate.below[nearest], np.inf),
+        "above": np.where(near, estimate.above[nearest], np.inf),
+    }

@@ -499,6 +499,7 @@ def modelled(work: Work, share: Share) -> None:
     rough = {} if work.roughness is None else {"roughness": work.roughness.record()}
     deviation = {} if work.deviation is None else {"deviation": work.deviation.record()}
     curved = {} if work.curvature is None else {"curvature": work.curvature.record()}
+    proven = {} if work.estimate is None else {"estimated_surface": work.estimate.certainty()}
     work.model = ObjectModel.attach(
         work.base,
         in_model_frame(work.features, work.base),
@@ -508,9 +509,10 @@ def modelled(work: Work, share: Share) -> None:
         | path
         | deviation
         | curved
+        | proven
         | rough,
         inspected=work.inspected.height,
-        reach=None if work.estimate is None else base_reach(work.base.surface, work.estimate),
+        **({} if work.estimate is None else base_reach(work.base.surface, work.estimate)),
         dropped=work.dropped,
         deviation=work.deviation.heights if work.deviation and work.deviation.of_the_model else None,
     )

@@ -424,6 +424,24 @@ def sections(
 
 
 @bench.command()
+def labels(
+    bodies: Annotated[str | None, typer.Option(help="Bodies, separated by commas; all if left out.")] = None,
+    files: Annotated[Path | None, typer.Option(help="Folder of published bodies: bunny.off, ...")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="One radius, one pitch and one direction only.")] = False,
+) -> None:
+    """Are labels of estimated points true? Exact rasters over bodies: touched, off, outside their intervals; as CSV.
+
+    Example: explore3d bench labels --bodies holed_plate --quick
+    """
+    from explore3d.bench.precision import LABEL_BODIES, bench_labels, label_lines
+
+    chosen = _names(bodies, "--bodies", list(LABEL_BODIES))
+    cases = bench_labels(chosen, files, [0.05], [5], 1) if quick else bench_labels(chosen, files)
+    for line in label_lines(cases):
+        print(line, flush=True)
+
+
+@bench.command()
 def dynamics() -> None:
     """Computing time and error of stiff contact over the stiffness, as CSV.
 

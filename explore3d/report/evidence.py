@@ -59,7 +59,8 @@ def curvature_maps(analysis: Analysis, pictures: Pictures) -> Html:
     maps = figure(pictures.files["curvature"], "Maps of curvature", caption)
     who = analysis.curvature
     answered = [] if who is None else [paragraph(who.sentence(analysis.trace.tip_radius))]
-    return section("Curvature", "curvature", maps, *answered)
+    proven = [] if analysis.estimate is None else [paragraph(analysis.estimate.sentence())]
+    return section("Curvature", "curvature", maps, *answered, *proven)
 
 
 def roughness_table(analysis: Analysis) -> Html:

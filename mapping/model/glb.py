@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,17 +35,19 @@ def glb_bytes(
     reach: FloatArray | None = None,
     sigma: FloatArray | None = None,
     deviation: FloatArray | None = None,
+    proven: Mapping[str, FloatArray | None] | None = None,
 ) -> bytes:
     """The scene as one GLB file.
 
     Nodes: "object", which turns z up to glTF's y up, and below it "base" and one per feature, named by its id, with
     the feature's record (docs/model.md) in `extras`. Float32 vertex attributes: `_SIGMA`, standard deviation of the
-    surface there, m; `_REACH`, 0 touched, 1 bridged, 2 extrapolated; both -1 where not known. A base that departs from
-    the model that was given has `_DEVIATION` as well, m, and its vertices' colours show it. Vertices are stored
-    relative to the middle of the base, which the nodes' matrices add back: float32 would lose it far from the origin.
+    surface there, m; `_REACH`, 0 touched, 1 bridged, 2 extrapolated; both -1 where not known. `proven` are further
+    attributes of the base, m, by their names. A base that departs from the model that was given has `_DEVIATION` as
+    well, m, and its vertices' colours show it. Vertices are stored relative to the middle of the base, which the nodes'
+    matrices add back: float32 would lose it far from the origin.
     """
     scene, origin = _Scene(), base.bounds.mean(axis=0)
-    scene.add("base", base, origin, GLB_BASE_COLOUR, sigma, reach, deviation)
+    scene.add("base", base, origin, GLB_BASE_COLOUR, sigma, reach, deviation, proven)
     scene.nodes[-1]["extras"] = {"schema": MODEL_SCHEMA, "units": "m"}
     for feature in features:
         mesh = feature_mesh(feature)
@@ -78,12 +80,16 @@ class _Scene:
         sigma: FloatArray | None,
         reach: FloatArray | None,
         deviation: FloatArray | None = None,
+        proven: Mapping[str, FloatArray | None] | None = None,
     ) -> None:
         """A node with a mesh of its own, moved by the origin that its vertices are relative to."""
         attributes = {"POSITION": self._accessor((surface.vertices - origin).astype("<f4"))}
         for key, values in (("_SIGMA", sigma), ("_REACH", reach)):
             known = np.full(len(surface.vertices), np.nan) if values is None else values
             attributes[key] = self._accessor(np.nan_to_num(known, nan=UNKNOWN_ATTRIBUTE).astype("<f4"))
+        for key, values in (proven or {}).items():
+            if values is not None:
+                attributes[key] = self._accessor(np.where(np.isfinite(values), values, UNKNOWN_ATTRIBUTE).astype("<f4"))
         primitive: dict[str, Any] = {"attributes": attributes, "mode": TRIANGLES}
         primitive["indices"] = self._accessor(surface.faces.ravel().astype("<u4"), FACES)
         if deviation is None:

@@ -196,6 +196,6 @@ def merge_model(model: ObjectModel, new: Sequence[Feature], source: str, pose_sd
             features[pair.known] = merge_features(features[pair.known], fresh, source)
     history = [*model.provenance.get("merged", []), source]
     about = {"left_out": model.left_out, "timings": model.timings, "reach": model.reach, "sigma": model.sigma}
-    about["inspected"] = model.inspected
+    about |= {"inspected": model.inspected, "below": model.below, "above": model.above}
     provenance = {**model.provenance, "merged": history}
     return ObjectModel.attach(model.base, [*features, *added], provenance=provenance, dropped=model.dropped, **about)

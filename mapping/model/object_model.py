@@ -34,7 +34,7 @@ __all__ = ["LeftOut", "ObjectModel"]
 
 
 # Fields over the base's vertices or faces that are kept beside it
-FIELDS = ("reach", "sigma", "inspected", "deviation")
+FIELDS = ("reach", "below", "above", "sigma", "inspected", "deviation")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,6 +48,8 @@ class ObjectModel:
         timings: seconds spent per stage.
         provenance: where it came from (scene, tip radius, log hash, software version); JSON values.
         reach: (V,) label of each base vertex (0 touched, 1 bridged, 2 extrapolated), or None.
+        below, above: (V,) what is proven of the estimated surface at each vertex: how far under it the body may be, how
+            far over it it may stand out, m; infinite where nothing is proven; or None.
         sigma: (V,) standard deviation of the base at each vertex, m, or None.
         inspected: (F,) height above which each base face is free of features that were not found, m, or None.
         deviation: (V,) by how much the body stands off the model that was given, at each vertex, m, or None.
@@ -60,6 +62,8 @@ class ObjectModel:
     timings: dict[str, float] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
     reach: FloatArray | None = None
+    below: FloatArray | None = None
+    above: FloatArray | None = None
     sigma: FloatArray | None = None
     inspected: FloatArray | None = None
     deviation: FloatArray | None = None
@@ -132,7 +136,8 @@ class ObjectModel:
         """
         self._check_ids()
         document = json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-        glb = glb_bytes(self.base.surface, self.features, self.reach, self.sigma, self.deviation)
+        proven = {"_BELOW": self.below, "_ABOVE": self.above}
+        glb = glb_bytes(self.base.surface, self.features, self.reach, self.sigma, self.deviation, proven)
         place = Path(folder)
         place.mkdir(parents=True, exist_ok=True)
         write_whole(place / "model.npz", self._arrays())

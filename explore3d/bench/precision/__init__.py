@@ -11,10 +11,16 @@ if TYPE_CHECKING:
         summary as summary,
         write as write,
     )
+    from explore3d.bench.precision.labels import (
+        LABEL_BODIES as LABEL_BODIES,
+        bench_labels as bench_labels,
+        label_lines as label_lines,
+    )
     from explore3d.bench.precision.work_precision import Measured as Measured
 
 _PUBLIC = {
     "bench": ("as_record", "bench", "summary", "write"),
+    "labels": ("LABEL_BODIES", "bench_labels", "label_lines"),
     "work_precision": ("Measured",),
 }
 doorway(__name__, _PUBLIC)

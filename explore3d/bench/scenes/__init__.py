@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         BODY_REPORTED_SEEDS as BODY_REPORTED_SEEDS,
         FILED_BODIES as FILED_BODIES,
         any_body as any_body,
+        filed_body as filed_body,
     )
     from explore3d.bench.scenes.bodies import (
         Mesh as Mesh,
@@ -75,7 +76,7 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
-    "any_body": ("ANY_BODIES", "BODY_BUILDING_SEEDS", "BODY_REPORTED_SEEDS", "FILED_BODIES", "any_body"),
+    "any_body": ("ANY_BODIES", "BODY_BUILDING_SEEDS", "BODY_REPORTED_SEEDS", "FILED_BODIES", "any_body", "filed_body"),
     "bodies": ("Mesh", "blob", "blob_normals", "cylinder", "joined", "sphere_mesh", "tube"),
     "curved_bodies": ("CURVED_BODIES", "SAMPLINGS", "CurvedBody", "curved_body"),
     "drawn_kinds": ("DRAWN_KINDS",),

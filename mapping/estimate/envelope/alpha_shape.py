@@ -11,8 +11,9 @@ import numpy as np
 from mapping import EnvelopeError, FloatArray, IntArray, Surface
 from mapping.estimate.envelope.bridging import resting_points
 from mapping.estimate.envelope.estimate import Estimate
+from mapping.estimate.envelope.proof import Balls
 from mapping.estimate.envelope.sweep_mesh import oriented, sweep_faces
-from mapping.estimate.sweeps import EXTRAPOLATED
+from mapping.estimate.sweeps import EXTRAPOLATED, TOUCHED
 
 EMPTY_BALL_TOLERANCE = 1e-9  # of the radius, by which balls through three centres may hold a fourth
 
@@ -57,27 +58,35 @@ def alpha_facets(centers: FloatArray, outward: FloatArray, tip_radius: float) ->
     return oriented(centers, kept[facets[empty]], outward), met[empty] * tip_radius + centers[kept].mean(axis=0)
 
 
-def alpha_estimate(centers: FloatArray, outward: FloatArray, tip_radius: float, sweep: IntArray) -> Estimate:
+def alpha_estimate(balls: Balls, tolerance: float | None) -> Estimate:
     """The envelope of balls as an estimate: its corners, meshed as a cloud.
 
-    Nothing is called touched: the body lies on or below every point, and positions alone do not tell where it touches.
+    Args:
+        balls: in any order.
+        tolerance: within which corners count as touched, m; None calls none touched, for positions alone do not tell
+            where on its ball's patch the body is.
 
     Raises:
         EnvelopeError: the balls enclose no surface, for example because they lie further apart than they reach.
     """
-    facets, points = alpha_facets(centers, outward, tip_radius)
+    facets, points = alpha_facets(balls.centers, balls.outward, balls.tip_radius)
     if len(points) == 0:
-        raise EnvelopeError(f"no three balls of radius {tip_radius:g} m meet: they lie too far apart")
+        raise EnvelopeError(f"no three balls of radius {balls.tip_radius:g} m meet: they lie too far apart")
     first = facets[:, 0]
-    normals = (centers[first] - points) / tip_radius
+    normals = (balls.centers[first] - points) / balls.tip_radius
     faces = sweep_faces(points, np.arange(len(points)), normals)
+    below, above = balls.reach(points, facets, np.arange(len(balls.centers)), facets, None, 0.0)
+    near = below <= (-1.0 if tolerance is None else tolerance)
     return Estimate(
         Surface(points, faces) if len(faces) else None,
         points,
         normals,
-        centers[first],
-        np.full(len(points), EXTRAPOLATED, dtype=np.int8),
+        balls.centers[first],
+        np.where(near, TOUCHED, EXTRAPOLATED).astype(np.int8),
         np.full(len(points), -1),
-        sweep[first],
+        balls.sweep[first],
         np.full(len(points), np.nan),
+        below,
+        above,
+        tolerance=0.0 if tolerance is None else tolerance,
     )

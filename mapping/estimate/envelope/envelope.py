@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapping import BoolArray, EnvelopeError, FloatArray, Surface, Trace
+from mapping import BoolArray, EnvelopeError, FloatArray, IntArray, Surface, Trace
 from mapping.base import Base, LaidTrace
 from mapping.estimate.envelope.alpha_shape import alpha_estimate
 from mapping.estimate.envelope.bridging import bridged_faces, resting_points, split
 from mapping.estimate.envelope.estimate import Estimate
 from mapping.estimate.envelope.profile_envelope import penetration_below
+from mapping.estimate.envelope.proof import Balls, owners_along
 from mapping.estimate.envelope.sweep_mesh import sweep_faces
 from mapping.estimate.sweeps import (
     BRIDGED,
@@ -30,6 +31,7 @@ from mapping.estimate.sweeps import (
     smooth,
     surface_normals,
     thinned,
+    unit,
 )
 from mapping.instrument import Noise
 
@@ -41,6 +43,10 @@ ENVELOPE_METHODS = ("envelope", "contact", "normals", "alpha")
 OVERLAP_TOLERANCE = 1e-9
 # The doubt of a slope is an estimate, no bound: it must be this much smaller than what would be harmless.
 CAUTION = 2.0
+# Points are touched by default if the body is proven to be within so many of their distances: a contact between two
+# others lies within half a distance, the last of a row within one and a half, for only one side bounds it.
+# Balls that may overlap a contact by s are as good as so much further apart: 2 sqrt(r s) (theory section 4.8).
+STEPS_TOLERATED = 2.0
 # More points of a mesh than this cost memory and minutes of curvature, on bodies that no picture shows so finely.
 MOST_POINTS = 300_000
 
@@ -53,6 +59,7 @@ def estimate_surface(
     outward: ArrayLike | None = None,
     noise: Noise | None = None,
     spacing: float | None = None,
+    tolerance: float | None = None,
 ) -> Estimate:
     """The surface of the body under a trace, every point labelled with how certain it is.
 
@@ -67,19 +74,27 @@ def estimate_surface(
             without it the trace is taken as exact, and ball operators on noise are biased.
         spacing: distance to which points are thinned along the sweeps, m; None takes all points of a single
             sweep and a quarter of the distance between several, or more where that were more than MOST_POINTS.
+        tolerance: points are called touched if the body is proven to come as near, m, and no others. From positions
+            alone no proof is finer than half the distance between the sweeps (theory section 4.8). None takes
+            what the distance between points can prove, and calls touched only single contacts whose neighbours
+            leave no doubt of the slope.
 
     Returns:
-        The estimate; contacts that lie inside another ball are impossible and left out.
+        The estimate, with what is proven of every point; contacts that lie inside another ball are impossible and
+        left out.
 
     Raises:
-        EnvelopeError: an unknown method, no samples, "contact" without recorded normals, or no possible contact.
+        EnvelopeError: an unknown method, no samples, a tolerance that is no length, "contact" without recorded
+            normals, or no possible contact.
 
-    Reference: the paper, sections 2.2 and 3.3, equation 12; theory sections 1 and 4.
+    Reference: the paper, sections 2.2 and 3.3, equation 12; theory sections 1, 4 and 4.8.
     """
     if method not in ENVELOPE_METHODS:
         raise EnvelopeError(f"unknown method {method!r}; possible: {', '.join(ENVELOPE_METHODS)}")
     if len(trace) == 0:
         raise EnvelopeError("cannot estimate a surface from a trace of no samples")
+    if tolerance is not None and not (np.isfinite(tolerance) and tolerance >= 0):
+        raise EnvelopeError(f"the tolerance of touched points must be a length in metres; found {tolerance!r}")
     if method == "contact" and trace.normals is None:
         raise EnvelopeError("method 'contact' needs recorded contact normals; this trace has positions alone")
     slack = OVERLAP_TOLERANCE * trace.tip_radius
@@ -90,12 +105,16 @@ def estimate_surface(
         slack = max(slack, 4 * smoothed.sd)
     else:
         away = _outward(trace, base, outward)
+    known = None
+    if method == "contact" and trace.normals is not None:
+        known = trace.centers - trace.tip_radius * unit(trace.normals)
+    balls = Balls(trace.centers, trace.sweep, away, trace.tip_radius, slack, known)
     if method == "alpha":
-        estimate = alpha_estimate(trace.centers, away, trace.tip_radius, trace.sweep)
+        estimate = alpha_estimate(balls, tolerance)
         return estimate if smoothed is None else replace(estimate, sd=smoothed.sd)
     points = _contacts(trace, method, away, slack)
     if smoothed is not None:
-        points = _unsmoothed(points, smoothed)
+        points = _dented(points, smoothed)
     depth = penetration_below(trace.centers, trace.tip_radius)
     possible = depth(points.points, slack) <= slack
     if not possible.any():
@@ -104,8 +123,63 @@ def estimate_surface(
     step = _step(points, pitch(trace.centers, trace.sweep)) if spacing is None else spacing
     # Thinned by their own distances, and by their balls': over a sharp edge many balls share one contact.
     points = points.select(thinned(points.points, points.sweep, step, _bounding(points)))
-    estimate = _meshed(points, trace.tip_radius, slack, depth)
-    return estimate if smoothed is None else replace(estimate, sd=smoothed.sd)
+    estimate, faces, resting = _meshed(points, trace.tip_radius, slack, depth)
+    estimate = _proven(estimate, faces, resting, balls, smoothed, tolerance)
+    if smoothed is None:
+        return estimate
+    own = estimate.sample >= 0
+    return replace(estimate, sample=np.where(own, smoothed.sample[estimate.sample], -1), sd=smoothed.sd)
+
+
+def _proven(
+    estimate: Estimate,
+    faces: IntArray,
+    resting: IntArray,
+    balls: Balls,
+    smoothed: Smoothed | None,
+    tolerance: float | None,
+) -> Estimate:
+    """The estimate with what is proven of its points, and labels that say no more.
+
+    Args:
+        faces: (F, 3) the mesh of its first points, before those of the resting ball were added.
+        resting: (K, 3) the points whose balls meet in the others.
+    """
+    count = len(estimate.points) - len(resting)
+    spot = estimate.sample[:count]
+    if smoothed is not None:  # where a kink was smoothed over the centres are none of a ball that touched
+        spot = np.where((spot >= 0) & ~smoothed.dented[spot], spot, -1)
+    lone = len(np.unique(estimate.sweep)) < 2
+    across = unit(np.cross(balls.outward[estimate.sample], _along(estimate))) if lone else None
+    near = _resolution(estimate, count, balls) if tolerance is None else tolerance
+    owners = np.vstack(
+        [owners_along(estimate.sweep[:count], spot), np.pad(resting, ((0, 0), (0, 1)), constant_values=-1)]
+    )
+    below, above = balls.reach(estimate.points, owners, spot, faces, across, near)
+    if smoothed is not None:
+        below, above = below + balls.slack, above + balls.slack
+    sure = below <= near
+    if tolerance is None:
+        sure &= estimate.labels == TOUCHED
+        labels = np.where((estimate.labels == TOUCHED) & ~sure, EXTRAPOLATED, estimate.labels)
+    else:
+        labels = np.where(sure, TOUCHED, np.where(estimate.labels == BRIDGED, BRIDGED, EXTRAPOLATED))
+    return replace(estimate, labels=labels.astype(np.int8), below=below, above=above, tolerance=near)
+
+
+def _along(estimate: Estimate) -> FloatArray:
+    """(N, 3) directions of a lone sweep at its points."""
+    steps = np.gradient(estimate.centers, axis=0) if len(estimate.centers) > 1 else np.zeros_like(estimate.centers)
+    return np.asarray(steps)
+
+
+def _resolution(estimate: Estimate, count: int, balls: Balls) -> float:
+    """What so many first points, so far apart, can tell of the place of a contact, m."""
+    points, sweep = estimate.points[:count], estimate.sweep[:count]
+    apart = pitch(points, sweep)
+    if apart == 0 and count > 1:
+        apart = float(np.median(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    return STEPS_TOLERATED * (apart + 2 * float(np.sqrt(balls.tip_radius * balls.slack)))
 
 
 def _step(points: Estimate, apart: float) -> float:
@@ -153,7 +227,7 @@ def _contacts(trace: Trace, method: str, outward: FloatArray, slack: float) -> E
     labels = np.where(uncertain, EXTRAPOLATED, row.labels).astype(np.int8)
     sample = np.where(row.sample < 0, -1, still[row.sample])
     points = row.centers - trace.tip_radius * normals
-    return Estimate(None, points, normals, row.centers, labels, sample, np.concatenate(sweeps), across)
+    return Estimate.unproven(points, normals, row.centers, labels, sample, np.concatenate(sweeps), across)
 
 
 def _bounding(points: Estimate) -> BoolArray:
@@ -171,21 +245,26 @@ def _recorded(trace: Trace, row: ContactRow) -> FloatArray:
     return normals
 
 
-def _unsmoothed(points: Estimate, smoothed: Smoothed) -> Estimate:
-    """Points of a smoothed trace with the samples of the original; what may be a kink is bridged."""
-    own = points.sample >= 0
-    dented = own & smoothed.dented[points.sample]
-    labels = np.where(dented, BRIDGED, points.labels).astype(np.int8)
-    return replace(points, labels=labels, sample=np.where(own, smoothed.sample[points.sample], -1))
+def _dented(points: Estimate, smoothed: Smoothed) -> Estimate:
+    """Points of a smoothed trace; what may be a kink is bridged."""
+    dented = (points.sample >= 0) & smoothed.dented[points.sample]
+    return replace(points, labels=np.where(dented, BRIDGED, points.labels).astype(np.int8))
 
 
-def _meshed(points: Estimate, r: float, slack: float, depth: Callable[[FloatArray, float], FloatArray]) -> Estimate:
-    """The points joined as their centres lie (those never coincide), with resting points in bridged faces."""
+def _meshed(
+    points: Estimate, r: float, slack: float, depth: Callable[[FloatArray, float], FloatArray]
+) -> tuple[Estimate, IntArray, IntArray]:
+    """The points joined as their centres lie (those never coincide), with resting points in bridged faces.
+
+    Returns:
+        The estimate, (F, 3) its faces without resting points, and (K, 3) the points whose balls meet in those.
+    """
+    nothing = np.zeros((0, 3), dtype=np.int64)
     if len(np.unique(points.sweep)) < 2:
-        return points
+        return points, nothing, nothing
     faces = sweep_faces(points.centers, points.sweep, points.normals, points.points)
     if len(faces) == 0:
-        return points
+        return points, nothing, nothing
     flagged = bridged_faces(points.centers, points.normals, faces, r, points.across)
     # Faces at an opened interference point hold their bridged points already.
     chosen = np.flatnonzero(flagged & (points.sample[faces] >= 0).all(axis=1))
@@ -196,4 +275,5 @@ def _meshed(points: Estimate, r: float, slack: float, depth: Callable[[FloatArra
     possible = depth(resting, slack) <= slack + longest**2 / (2 * r)
     chosen, resting = chosen[possible], resting[possible]
     joined = points.with_resting(resting, faces[chosen])
-    return replace(joined, surface=Surface(joined.points, split(faces, chosen, len(points.points))))
+    surface = Surface(joined.points, split(faces, chosen, len(points.points)))
+    return replace(joined, surface=surface), faces, faces[chosen]

@@ -7,19 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping import EnvelopeError, FloatArray, IntArray
 
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
-
-# Centres to a leaf of the tree: of 16 to 512, the fewest instructions on the paper's wire (136k centres, a third of
-# scipy's own 16); most are looked at only because they lie hardly beyond the bound, and rows are cheaper than boxes
-CENTERS_PER_LEAF = 128
 # Share by which the bound of a search is widened: its rounding, and that of distances, is some 1e-16
 BOUND_ROUNDING = 1e-12
 
@@ -75,18 +68,24 @@ def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[Float
     """What gives the depth of points (N, 3) below the surface of the deepest of the balls at `centers` (M, 3), m.
 
     Positive inside a ball, where no body can be; negative outside all of them. Points of a profile (all y of one
-    value) are judged by the profile's envelope in O(n), others by a k-d tree, laid out once. The second argument is the
-    least depth that matters, m: points less deep may be given -inf. A search that knows how near a ball must be looks
-    at few, for most points touch one ball and lie in none.
+    value) are judged by the profile's envelope in O(n), others by boxes about pieces of the sweeps, laid out once;
+    centres in no order are put in one first. The second argument is the least depth that matters, m: points less deep
+    may be given -inf. A search that knows how near a ball must be looks at few, for most points touch one ball and lie
+    in none.
     """
     one_row = np.ptp(centers[:, 1]) == 0 and bool((np.diff(centers[:, 0]) > 0).all())
 
     @cache
-    def tree() -> cKDTree:
-        from scipy.spatial import cKDTree
+    def boxed() -> tuple[FloatArray, FloatArray]:
+        from mapping.estimate.envelope.penetration_kernels import CENTERS_PER_BOX, boxes_of
 
-        # distances are the same whatever the tree, and this one is built in half the time
-        return cKDTree(centers, leafsize=CENTERS_PER_LEAF, balanced_tree=False)
+        laid = np.ascontiguousarray(centers)
+        steps = np.linalg.norm(np.diff(laid, axis=0), axis=1)
+        if len(steps) and CENTERS_PER_BOX * np.median(steps) > 0.5 * float(np.ptp(laid, axis=0).max()):
+            from scipy.spatial import cKDTree
+
+            laid = np.ascontiguousarray(laid[cKDTree(laid, leafsize=CENTERS_PER_BOX).indices])
+        return laid, boxes_of(laid)
 
     def depth(points: FloatArray, least: float) -> FloatArray:
         if len(points) == 0:
@@ -94,7 +93,10 @@ def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[Float
         if one_row and (points[:, 1] == centers[0, 1]).all():
             return _below_profile(points, centers, tip_radius)
         near = max((tip_radius - least) * (1.0 + BOUND_ROUNDING), 0.0)
-        return np.asarray(tip_radius - tree().query(points, distance_upper_bound=near)[0])
+        from mapping.estimate.envelope.penetration_kernels import nearest_within
+
+        laid, boxes = boxed()
+        return np.asarray(tip_radius - nearest_within(laid, boxes, np.ascontiguousarray(points), near))
 
     return depth
 

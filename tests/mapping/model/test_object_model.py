@@ -69,6 +69,8 @@ def model(far: float = 0.0) -> ObjectModel:
         timings={"detect": 1.25},
         provenance={"tip_radius": 0.01, "scene": {"title": "wire"}, "seed": np.int64(4)},
         reach=np.array([0.0, 1, 2, 2]),
+        below=np.array([1e-4, 2e-4, np.inf, 3e-4]),
+        above=np.array([0.0, 1e-6, np.inf, 0.0]),
         sigma=np.array([1e-4, 2e-4, np.nan, 3e-4]),
     )
 
@@ -108,6 +110,8 @@ def assert_same(first: ObjectModel, second: ObjectModel) -> None:
             np.testing.assert_array_equal(one.posterior.samples, other.posterior.samples)
     np.testing.assert_array_equal(first.reach, second.reach)
     np.testing.assert_array_equal(first.sigma, second.sigma)
+    np.testing.assert_array_equal(first.below, second.below)
+    np.testing.assert_array_equal(first.above, second.above)
 
 
 def test_load_returns_what_save_was_given(tmp_path: Path) -> None:
@@ -163,6 +167,8 @@ def test_the_glb_names_each_feature_and_keeps_its_place(tmp_path: Path, far: flo
     np.testing.assert_array_equal(
         mesh.vertex_attributes["_SIGMA"].ravel(), np.array([1e-4, 2e-4, -1, 3e-4], dtype=np.float32)
     )
+    for key, known in (("_BELOW", [1e-4, 2e-4, -1, 3e-4]), ("_ABOVE", [0, 1e-6, -1, 0])):
+        np.testing.assert_array_equal(mesh.vertex_attributes[key].ravel(), np.array(known, dtype=np.float32))
     _, name = scene.graph["ridge-1"]
     tube = scene.geometry[name]
     assert tube.is_watertight and tube.volume > 0

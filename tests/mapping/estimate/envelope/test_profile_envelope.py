@@ -120,3 +120,19 @@ def test_a_search_for_what_is_deep_enough_finds_it_as_deep_as_a_search_for_every
         bounded = depth(points, least)
         np.testing.assert_array_equal(bounded > least, whole > least)
         np.testing.assert_array_equal(bounded[bounded > least], whole[whole > least])
+
+
+@pytest.mark.parametrize("order", ["sweeps", "none"])
+def test_penetration_is_that_of_the_nearest_of_all_centres(order):
+    rng = np.random.default_rng(8)
+    x, y = np.meshgrid(np.arange(-1, 1, 0.02), np.arange(-1, 1, 0.1))
+    centers = np.column_stack([x.ravel(), y.ravel(), 1 + 0.1 * np.sin(3 * x.ravel())])
+    if order == "none":
+        centers = centers[rng.permutation(len(centers))]
+    points = centers - [0, 0, 1] + 0.02 * rng.standard_normal(centers.shape)
+    depth = 1 - np.linalg.norm(points[:, None] - centers[None], axis=2).min(axis=1)
+    found = penetration_below(centers, 1.0)(points, 1e-9)
+    deep = depth > 1e-9
+    assert 0.1 < deep.mean() < 1.0
+    np.testing.assert_allclose(found[deep], depth[deep], rtol=0, atol=1e-15)
+    assert (found[~deep] <= 1e-9).all()
