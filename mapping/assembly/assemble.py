@@ -50,8 +50,8 @@ def assemble(
     meet, each with its ends, closed if it returns to its beginning. Steps are linked likewise; those that a ridge
     explains, because a sweep ran along it, are dropped, and crests that the sweep began or ended on are accepted only
     if no step explains them. What the rules say of details that are felt together, and of lines wider than a wire, is
-    then improved as one configuration (`accounted`). Ridges and grooves too low for any one sweep are found where many sweeps agree. In a
-    single profile every crossing is a bump, a pit or a step.
+    then improved as one configuration (`accounted`). Ridges and grooves too low for any one sweep are found where many
+    sweeps agree. In a single profile every crossing is a bump, a pit or a step.
 
     Args:
         detections: of the trace.

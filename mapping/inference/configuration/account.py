@@ -215,7 +215,8 @@ def _meeting(features: list[Feature], tip: float) -> list[Feature]:
         meets = meets and any(
             min(distances(feature.axis, o).min(), distances(o, feature.axis).min()) < near for o in others
         )
-        result.append(replace(feature, junction=meets))
+        notes = ("junction", *feature.notes) if meets else feature.notes
+        result.append(replace(feature, junction=meets, notes=notes))
     return result
 
 
