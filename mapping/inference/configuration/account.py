@@ -16,7 +16,7 @@ from mapping.inference import describe
 from mapping.inference.configuration.configuration import Configuration, fitted, part_of
 from mapping.inference.configuration.joined_shape import JoinedShape, OneOfMany
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, Places, neighbourhood
-from mapping.inference.configuration.proposals import PROPOSALS, Proposal, apart_of
+from mapping.inference.configuration.proposals import PROPOSALS, Proposal, apart_of, dense
 from mapping.inference.configuration.search import Account, searched
 from mapping.inference.families import PosteriorProblem, Surroundings, TwinShape
 from mapping.inference.kinds import kind_named, kind_of, sizes_of
@@ -210,10 +210,10 @@ def _meeting(features: list[Feature], tip: float) -> list[Feature]:
     result = []
     for feature in features:
         near = MEETING_SHARE * sizes_of(feature, tip).half_width
-        others = [other.axis for other in features if other is not feature and len(other.axis) > 1]
+        others = [dense(other.axis) for other in features if other is not feature and len(other.axis) > 1]
         meets = len(feature.axis) > 1 and kind_of(feature).has_ends
         meets = meets and any(
-            min(distances(feature.axis, o).min(), distances(o, feature.axis).min()) < near for o in others
+            min(distances(dense(feature.axis), o).min(), distances(o, feature.axis).min()) < near for o in others
         )
         notes = ("junction", *feature.notes) if meets else feature.notes
         result.append(replace(feature, junction=meets, notes=notes))

@@ -26,6 +26,8 @@ TOPS, GAPS = (0.5,), (0.2, 0.7)
 ON_LINE = 0.35
 # Half of a line that may be meant instead of a point, in half-widths of its disturbance
 SHORT_LINE = 0.3
+# Points of a leg that distances between lines are taken at
+POINTS_OF_LEG = 65
 # Points that two lines are drawn through, at least
 FEWEST_POINTS = 4
 # Standard deviations by which a place must stand off a configuration to be looked at; how wrong one is, is then asked
@@ -274,12 +276,13 @@ def _faces(first: Part, second: Part, place: Neighbourhood) -> bool:
     """True if two lines run beside each other, nearer than both of their disturbances reach."""
     tip = place.around.trace.tip_radius
     reach = sum(sizes_of(each.feature, tip).half_width for each in (first, second))
-    one, other = _dense(axis_of(first)), _dense(axis_of(second))
+    one, other = dense(axis_of(first)), dense(axis_of(second))
     return bool(np.median(distances(one, other)) < reach and np.median(distances(other, one)) < reach)
 
 
-def _dense(axis: FloatArray) -> FloatArray:
-    share = np.linspace(0.0, 1.0, 9)[:, None]
+def dense(axis: FloatArray) -> FloatArray:
+    """Points along a polyline (K, 3), many to each leg: two that cross have none of their corners in common."""
+    share = np.linspace(0.0, 1.0, POINTS_OF_LEG)[:, None]
     return np.concatenate([a + share * (b - a) for a, b in itertools.pairwise(axis)])
 
 
