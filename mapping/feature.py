@@ -187,6 +187,8 @@ class Details:
         axis_sd: (K,) standard deviation of the axis across itself, at even steps along it, m.
         end_intervals: (2, 2) 90 % interval of the first and the last end along the axis, m, from where it is stated.
         ends_seen: whether the data say that the axis does not go on there.
+        account: what it and what is felt together with it may be, in words, with the probability of each, where more
+            than one is likely.
         high_side: of a step, +1 if the side of normal x tangent (along the axis) is the higher one, else -1.
     """
 
@@ -201,6 +203,7 @@ class Details:
     end_intervals: FloatArray | None = None
     ends_seen: tuple[bool, bool] | None = None
     high_side: float | None = None
+    account: tuple[tuple[str, float], ...] | None = None
 
     def known(self) -> dict[str, Any]:
         """What is known, by name."""
@@ -221,6 +224,8 @@ class Details:
         if "ends_seen" in found:
             first, last = found["ends_seen"]
             found["ends_seen"] = (bool(first), bool(last))
+        if "account" in found:
+            found["account"] = tuple((str(words), float(share)) for words, share in found["account"])
         return cls(**found)
 
 

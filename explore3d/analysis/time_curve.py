@@ -62,7 +62,7 @@ def time_curve(
         sweeps = {crossing.sweep for crossing in detections.crossings if crossing.t <= moment}
         seen = replace(detections, crossings=tuple(c for c in detections.crossings if c.sweep in sweeps))
         known = inspections.of_sweeps(numbers)
-        features = assemble(seen, felt, model.base, spacing=spacing, faint=faint, inspections=known)
+        features = assemble(seen, felt, model.base, spacing=spacing, faint=faint, inspections=known, proposals=())
         curve.append((float(felt.t[-1]), _worst(replace(model, features=features), truth, trace.tip_radius)))
         share((done + 1) / len(moments))
     curve.append((float(trace.t[-1]), _worst(model, truth, trace.tip_radius)))

@@ -64,10 +64,23 @@ def summary(analysis: Analysis) -> list[str]:
         *lines,
         *(feature_line(feature) for feature in features[:MOST_LISTED_FEATURES]),
         *more,
+        *account_lines(analysis),
         *tolerance_lines(analysis),
         limit_sentence(analysis),
         *warnings(analysis),
         *([account.sentence()] if account is not None else []),
+    ]
+
+
+def account_lines(analysis: Analysis) -> list[str]:
+    """How many features are felt together where the trace does not decide, a sentence for each neighbourhood."""
+    felt: dict[tuple[tuple[str, float], ...], list[str]] = {}
+    for feature in analysis.model.features:
+        if feature.details.account:
+            felt.setdefault(feature.details.account, []).append(feature.id)
+    return [
+        f"{', '.join(names)}: {', '.join(f'{words} {100 * share:.0f} %' for words, share in account)}."
+        for account, names in felt.items()
     ]
 
 

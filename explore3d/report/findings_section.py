@@ -9,6 +9,7 @@ from dataclasses import replace
 from explore3d import count_text
 from explore3d.analysis import Analysis
 from explore3d.report.findings import (
+    account_lines,
     deviation_warning,
     dropped_warning,
     form_warnings,
@@ -91,6 +92,7 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
         shared = _shared_notes(features)
         content.append(table(head, [_row(feature, analysis, pictures, shared) for feature in features]))
         content.extend(paragraph(f"{_capital(note)} (all of them).") for note in shared)
+        content.extend(paragraph(f"How many? {each}") for each in account_lines(analysis))
         content.append(paragraph("Ranges are central 90 % intervals. ", limit_sentence(analysis)))
     if analysis.inspected is not None and not is_profile(analysis):
         content.append(paragraph(analysis.inspected.sentence()))

@@ -20,6 +20,8 @@ from mapping.assembly.steps import step_features
 from mapping.base import Base, LaidTrace
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances
+from mapping.inference.configuration import PROPOSALS, Places, Proposal, accounted
+from mapping.inference.families import Surroundings
 from mapping.inference.kinds import kind_made_of
 
 # A group of crossings that spreads over more than this many half-widths cannot be one round bump: sweeps further
@@ -39,6 +41,7 @@ def assemble(
     spacing: float | None = None,
     faint: bool = True,
     inspections: Inspections | None = None,
+    proposals: Sequence[Proposal] = PROPOSALS,
 ) -> tuple[Feature, ...]:
     """Features of the base, the strongest evidence first, with preliminary intervals.
 
@@ -46,8 +49,9 @@ def assemble(
     (or pit) unless the heights of all places around say that it is longer: then a ridge (or groove), or several that
     meet, each with its ends, closed if it returns to its beginning. Steps are linked likewise; those that a ridge
     explains, because a sweep ran along it, are dropped, and crests that the sweep began or ended on are accepted only
-    if no step explains them. Ridges and grooves too low for any one sweep are found where many sweeps agree. In a
-    single profile every crossing is a bump, a pit or a step.
+    if no step explains them. What the rules say of details that are felt together, and of lines wider than a wire, is
+    then improved as one configuration (`accounted`). Ridges and grooves too low for any one sweep are found where many
+    sweeps agree. In a single profile every crossing is a bump, a pit or a step.
 
     Args:
         detections: of the trace.
@@ -57,6 +61,7 @@ def assemble(
         spacing: distance between the places of a sweep whose heights are looked at, m; None: `place_spacing`.
         faint: False to leave out the search for lines too low for any one sweep.
         inspections: the heights of this trace, if they were looked at already (`inspected_for`).
+        proposals: what the features of a neighbourhood may be instead, by evidence; none: what the rules say.
 
     Reference: paper definitions 2 and 3; theory section 5.
     """
@@ -67,6 +72,10 @@ def assemble(
     inspections = inspections or inspected_for(detections, laid, base, spacing=spacing, faint=faint)
     spacing = place_spacing(crossings, trace.tip_radius) if spacing is None and crossings else spacing
     features = [] if spacing is None or not crossings else _linked(detections, laid, inspections.at(spacing))
+    if features and spacing is not None and proposals:
+        places = _places(inspections.at(spacing))
+        around = Surroundings(laid, base, detections.noise.rounded(laid.resolution))
+        features = accounted(features, crossings, places, around, false_alarms_per_metre, proposals)
     if faint:
         features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre, inspections)
     return _strongest_first(features)
@@ -86,6 +95,14 @@ def inspected_for(
     if faint and not why_none_sought(detections, laid, base):
         needed.append(faint_spacing(detections, trace.tip_radius))
     return Inspections.of(laid, base, detections.noise, needed)
+
+
+def _places(inspection: Inspection) -> Places:
+    """The heights that configurations are weighed on."""
+    return Places(
+        inspection.points, inspection.normals, inspection.over_terraces.height, inspection.samples, inspection.sweep,
+        inspection.spacing,
+    )  # fmt: skip
 
 
 def _is_profile(laid: LaidTrace) -> bool:

@@ -32,6 +32,7 @@ class Inspection:
         spacing: distance between neighbouring places of a sweep, m.
         normals: (M, 3) outward directions at the places; (0, 3) where they are not known.
         lowered: (M,) mean heights over the base's own level there, where it has several, m; (0,) if it has one.
+        samples: (M,) samples behind each mean; (0,) where they are not known.
     """
 
     points: FloatArray
@@ -41,6 +42,7 @@ class Inspection:
     spacing: float
     normals: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     lowered: FloatArray = field(default_factory=lambda: np.zeros(0))
+    samples: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @cached_property
     def over_terraces(self) -> Inspection:
@@ -122,8 +124,9 @@ class Inspection:
         keep = np.isin(self.sweep, list(numbers))
         normals = self.normals[keep] if len(self.normals) else self.normals
         lowered = self.lowered[keep] if len(self.lowered) else self.lowered
+        samples = self.samples[keep] if len(self.samples) else self.samples
         columns = self.points[keep], self.height[keep], self.sd[keep], self.sweep[keep]
-        return Inspection(*columns, self.spacing, normals, lowered)
+        return Inspection(*columns, self.spacing, normals, lowered, samples)
 
 
 class Inspections:
@@ -206,10 +209,11 @@ def _joined(
         points.append(under)
         normals.append(up)
     height = np.concatenate([profile.height for profile in profiles])
-    sd = _sd_of_means(noise, spacing, np.concatenate([np.diff(profile.first) for profile in profiles]))
+    samples = np.concatenate([np.diff(profile.first) for profile in profiles])
+    sd = _sd_of_means(noise, spacing, samples)
     sweep = np.repeat([profile.sweep for profile in profiles], [len(profile.height) for profile in profiles])
     over = np.concatenate(lowered) if lowered else np.zeros(0)
-    return Inspection(np.concatenate(points), height, sd, sweep, spacing, np.concatenate(normals), over)
+    return Inspection(np.concatenate(points), height, sd, sweep, spacing, np.concatenate(normals), over, samples)
 
 
 def _sd_of_means(noise: Noise, spacing: float, count: IntArray) -> FloatArray:

@@ -18,11 +18,13 @@ if TYPE_CHECKING:
     )
     from mapping.inference.joint import refine_all as refine_all
     from mapping.inference.kind_odds import as_broken as as_broken, as_bump as as_bump
+    from mapping.inference.summary import describe as describe
 
 _PUBLIC = {
     "evidence": ("log_evidence", "log_evidence_of_nothing"),
     "feature_posterior": ("Solution", "pose_problem", "refine", "sample_posterior", "solve_problem"),
     "joint": ("refine_all",),
     "kind_odds": ("as_broken", "as_bump"),
+    "summary": ("describe",),
 }
 doorway(__name__, _PUBLIC)

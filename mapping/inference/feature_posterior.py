@@ -11,9 +11,12 @@ from mapping import EmptyWindowError, Feature, FloatArray, Posterior, Trace
 from mapping.base import Base, fit_base
 from mapping.inference.evidence import (
     ROUGH_EVIDENCE,
+    UNLIKELY_FAMILY,
     at_optima,
+    averaged,
     better_section,
     log_evidence_of_nothing,
+    probabilities,
     rough_evidence,
 )
 from mapping.inference.families import PosteriorProblem, Surroundings, with_free_tip, with_nominal_tip
@@ -31,7 +34,6 @@ from mapping.inference.sampler import (
     sample_ensemble,
     walkers_for,
 )
-from mapping.inference.sections import UNLIKELY_FAMILY, averaged, probabilities
 from mapping.inference.summary import describe
 from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise

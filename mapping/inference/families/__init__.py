@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         touched_widths as touched_widths,
         trapezoid_beside as trapezoid_beside,
     )
+    from mapping.inference.families.twin import TwinShape as TwinShape, twin_beside as twin_beside
 
 _PUBLIC = {
     "bell": ("BellShape", "bell_shape", "width_at_half_height"),
@@ -51,5 +52,6 @@ _PUBLIC = {
     "ridge": ("RidgeShape", "rounding_of"),
     "step": ("StepShape",),
     "trapezoid": ("TrapezoidShape", "touched_widths", "trapezoid_beside"),
+    "twin": ("TwinShape", "twin_beside"),
 }
 doorway(__name__, _PUBLIC)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -110,22 +110,11 @@ class LineKind(Kind):
         axis, normals, crossings = _axis_of(feature, sizes, around)
         course = self._chart(axis, normals, sizes, crossings, HIGHEST_DEGREE, around, bends=False)
         window = window_for(_crest(course, tip, sizes), sizes, around)
+        laid = replace(feature, axis=axis, normals=normals, evidence=replace(feature.evidence, crossings=crossings))
+        beside = replace(around, others=[other for other in around.others if other is not feature])
 
         def posed(most: int, least: int = 1) -> tuple[PosteriorProblem, int]:
-            if window.flat:  # nothing to unroll, and nothing bends
-                line, degree = smooth_axis(axis, sizes.position_sd, most, least)
-            else:
-                line, degree = smooth_on_base(
-                    axis, normals, sizes.position_sd, most, least, around.base, tip, sizes.half_width
-                )
-            lift = normals_along(line, axis, normals)
-            chart = self._chart(line, lift, sizes, crossings, degree, around, bends=not window.flat)
-            ends = chart.coordinates(axis[[0, -1]])[0]
-            modes = _modes(chart, ends, degree, crossings, sizes)
-            laterals, along = _laterals(modes, crossings, sizes), Parameters()
-            if self.has_ends and not chart.closed:
-                along = _ends(ends, _end_limits(axis, chart, ends, feature, sizes, around), sizes)
-            shape = self.shape(Traced(window, chart, modes, sizes, tip, laterals, along))
+            shape, degree = self.shape_on(window, laid, beside, most, least)
             return pose(feature, sizes, shape, window, around, self._beginnings(shape, sizes)), degree
 
         best, asked = first = posed(HIGHEST_DEGREE)
@@ -141,6 +130,34 @@ class LineKind(Kind):
             if len(costs) > FUTILE_DEGREES and min(costs[-FUTILE_DEGREES:]) >= min(costs[:-FUTILE_DEGREES]):
                 break
         return best
+
+    def shape_on(
+        self, window: Window, feature: Feature, around: Surroundings, most: int = HIGHEST_DEGREE, least: int = 1
+    ) -> tuple[LineShape, int]:
+        """The family about a feature's axis of two points or more, over any window, and the degree of its course.
+
+        Args:
+            window: the bins; they need not be those near this feature alone.
+            feature: of this kind.
+            around: base, tip, and the neighbours that its ends may meet.
+            most, least: degrees that its course may have.
+        """
+        axis, normals, crossings = feature.axis, feature.normals, feature.evidence.crossings
+        tip, sizes = around.trace.tip_radius, sizes_of(feature, around.trace.tip_radius)
+        if window.flat:  # nothing to unroll, and nothing bends
+            line, degree = smooth_axis(axis, sizes.position_sd, most, least)
+        else:
+            line, degree = smooth_on_base(
+                axis, normals, sizes.position_sd, most, least, around.base, tip, sizes.half_width
+            )
+        lift = normals_along(line, axis, normals)
+        chart = self._chart(line, lift, sizes, crossings, degree, around, bends=not window.flat)
+        ends = chart.coordinates(axis[[0, -1]])[0]
+        modes = _modes(chart, ends, degree, crossings, sizes)
+        laterals, along = _laterals(modes, crossings, sizes), Parameters()
+        if self.has_ends and not chart.closed:
+            along = _ends(ends, _end_limits(axis, chart, ends, feature, sizes, around), sizes)
+        return self.shape(Traced(window, chart, modes, sizes, tip, laterals, along)), degree
 
     def _chart(
         self,

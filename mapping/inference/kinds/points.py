@@ -41,12 +41,13 @@ class Seen:
     free: int
 
 
-def seen_about(feature: Feature, around: Surroundings) -> Seen:
-    """The window about a feature's point, and whether the sweeps tell where across them it lies."""
+def seen_about(feature: Feature, around: Surroundings, window: Window | None = None) -> Seen:
+    """The window about a feature's point, if none is given, and whether the sweeps tell where across them it lies."""
     tip = around.trace.tip_radius
     sizes = sizes_of(feature, tip)
     point, normal = feature.axis[:1], feature.normals[:1]
-    window = window_for(point + tip * normal, sizes, around)
+    if window is None:
+        window = window_for(point + tip * normal, sizes, around)
     middle = int(np.argmin(np.linalg.norm(window.feet - point, axis=1)))
     spot = spot_at(point[0], normal[0], window.tangents[middle], around.base, tip, sizes.half_width)
     free = 2 if np.ptp((window.feet - spot.point) @ spot.axes[1]) > SPREAD * sizes.half_width else 1
@@ -67,6 +68,10 @@ class PointKind(Kind):
     def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
         """Further values of the last parameter, from which the search for the optimum begins as well."""
         return ()
+
+    def shape_on(self, window: Window, feature: Feature, around: Surroundings) -> PointShape:
+        """The family about a feature's point, over any window."""
+        return self.shape(seen_about(feature, around, window))
 
     def problem(self, feature: Feature, around: Surroundings) -> PosteriorProblem:
         seen = seen_about(feature, around)

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
         Importance as Importance,
         importance_sample as importance_sample,
     )
-    from mapping.inference.sampler.laplace import find_optima as find_optima, laplace as laplace
+    from mapping.inference.sampler.laplace import Laplace as Laplace, find_optima as find_optima, laplace as laplace
     from mapping.inference.sampler.psis import resample as resample
 
 _PUBLIC = {
     "ensemble": ("Chain", "sample_ensemble", "walkers_for"),
     "importance": ("Importance", "TRUSTED_K_HAT", "importance_sample"),
-    "laplace": ("find_optima", "laplace"),
+    "laplace": ("Laplace", "find_optima", "laplace"),
     "psis": ("resample",),
 }
 doorway(__name__, _PUBLIC)

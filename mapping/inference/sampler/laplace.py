@@ -41,14 +41,14 @@ class Laplace:
         return self.log_density + 0.5 * float(np.linalg.slogdet(2.0 * np.pi * self.covariance)[1])
 
 
-def find_optima(target: LogPosterior, starts: FloatArray) -> list[FloatArray]:
+def find_optima(target: LogPosterior, starts: FloatArray, iterations: int = ITERATIONS) -> list[FloatArray]:
     """Distinct optima (P,) reached by Levenberg-Marquardt from the starts (M, P), best first.
 
     Equally good ones (a crest that ends between either pair of sweeps, mirrored) come in the order of their starts.
     Optima that hold a negligible share of the probability, or lie within a fraction of a step of a better one, are
-    left out; at most MOST_MODES are kept.
+    left out; at most MOST_MODES are kept. After so many iterations a search stops where it is.
     """
-    found = np.array([_descend(target, start) for start in starts])
+    found = np.array([_descend(target, start, iterations) for start in starts])
     values = target.log_density(found)
     kept: list[FloatArray] = []
     for i in _best_first(values):
@@ -68,29 +68,31 @@ def _best_first(values: FloatArray) -> list[int]:
     return order
 
 
-def laplace(target: LogPosterior, optimum: FloatArray) -> Laplace:
+def laplace(target: LogPosterior, optimum: FloatArray, *, scanned: bool = True) -> Laplace:
     """The Gaussian at an optimum; differences are taken over a good part of a standard deviation.
 
     A posterior with kinks (an end between two sweeps) has no useful curvature at a point: along each parameter whose
-    density over +-3 standard deviations disagrees with the Gaussian's, the spread of a scan along it counts.
+    density over +-3 standard deviations disagrees with the Gaussian's, the spread of a scan along it counts (unless
+    it is not `scanned`, at a third of the cost).
     """
     step = target.shape.step.copy()
     for _ in range(3):
         jacobian = _jacobian(target, optimum, step)[1]
         covariance = _inverse(jacobian.T @ jacobian, target)
         step = np.clip(0.3 * np.sqrt(np.diag(covariance)), 1e-3 * target.shape.step, 10 * target.shape.step)
-    covariance = _scanned(target, optimum, covariance)
+    if scanned:
+        covariance = _scanned(target, optimum, covariance)
     return Laplace(optimum, covariance, float(target.log_density(optimum[None])[0]))
 
 
-def _descend(target: LogPosterior, start: FloatArray) -> FloatArray:
+def _descend(target: LogPosterior, start: FloatArray, iterations: int) -> FloatArray:
     low, high, scale = target.low, target.high, target.shape.step
     theta = np.clip(start, low, high)
     # Where the data say nothing the prior's width is the curvature: rounding is not divided by nothing there
     prior = np.diag((scale / _widths(target)) ** 2)
     damping, (residual, jacobian) = 1e-3, _jacobian(target, theta, 0.1 * scale)
     cost = float(residual @ residual)
-    for _ in range(ITERATIONS):
+    for _ in range(iterations):
         scaled = jacobian * scale
         gradient, hessian = scaled.T @ residual, scaled.T @ scaled
         # Several dampings are tried at once: a batch of templates costs little more than one.

@@ -12,8 +12,8 @@ from mapping import Feature, FloatArray, Interval, Support, Surface, Trace
 from mapping.base import Base
 from mapping.geometry.templates import cap_height
 from mapping.inference import refine, refine_all
+from mapping.inference.evidence import probabilities
 from mapping.inference.pooled_residual import PooledResidual, with_remark
-from mapping.inference.sections import probabilities
 from mapping.instrument import Noise
 
 TIP, NOISE = 10e-3, Noise(20e-6)

@@ -1,0 +1,214 @@
+"""Configuration: some features of one neighbourhood together, fitted, with their log odds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mapping import Feature, FloatArray
+from mapping.inference.configuration.joined_shape import JoinedShape
+from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood
+from mapping.inference.curves import HIGHEST_DEGREE
+from mapping.inference.families import RidgeShape, TwinShape, trapezoid_beside, twin_beside
+from mapping.inference.kinds import LineKind, PointKind, kind_of, sizes_of
+from mapping.inference.likelihood import LogPosterior, Shape
+from mapping.inference.sampler import Laplace, find_optima, laplace
+
+# Standard deviations of chi-square by which a residual may exceed the noise where nothing is left to explain
+FITTING_EXCESS = 3.0
+# A line wider than a wire by less is as narrow as one: 2 % of wires are not
+WIDE_SDS = 2.0
+# Iterations after which a configuration is given up if it is still less likely than another by this log odds
+SCREENED, HOPELESS = 8, 40.0
+# The level of misfit is chosen again where the optimum under the first one says another
+MOST_LEVEL_CHANGES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One detail of a configuration.
+
+    Args:
+        feature: what it is called, and where it was proposed.
+        shape: its family over the neighbourhood.
+        start: (P,) parameters that the search begins from.
+    """
+
+    feature: Feature
+    shape: Shape
+    start: FloatArray
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The features that it consists of: a twin of two."""
+        return (self.feature.kind,) * (2 if isinstance(self.shape, TwinShape) else 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Configuration:
+    """Fitted parts.
+
+    Args:
+        parts: the details, each of which begins where it was found.
+        place: the neighbourhood.
+        found: the optimum of all their parameters together, and the Gaussian there.
+        level: number of the most likely one of the levels of misfit.
+        log_odds: log of evidence times prior, up to one constant of the neighbourhood.
+    """
+
+    parts: tuple[Part, ...]
+    place: Neighbourhood
+    found: Laplace
+    level: int
+    log_odds: float
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The features that it consists of."""
+        return tuple(sorted(kind for part in self.parts for kind in part.kinds))
+
+    @cached_property
+    def shape(self) -> JoinedShape:
+        """All parts joined."""
+        return JoinedShape([part.shape for part in self.parts], len(self.place.window), PARTS_OF_BIN)
+
+    @cached_property
+    def template(self) -> FloatArray:
+        """(n,) heights that it leaves, m."""
+        return np.asarray(self.shape.templates(self.found.mean[None])[0])
+
+    def runs(self, k: int) -> int:
+        """How many runs of a sweep felt the k-th part at half its height or more."""
+        part, window = self.parts[k], self.place.window
+        own = np.abs(JoinedShape([part.shape], len(window), PARTS_OF_BIN).templates(part.start[None])[0])
+        return int((np.maximum.reduceat(own, window.starts[:-1]) > 0.5 * own.max()).sum())
+
+    @property
+    def fits(self) -> bool:
+        """True if what it leaves over is no more than noise and the least misfit."""
+        white = self.place.levels[0][0].residuals(self.template[None])[0]
+        return (float(white @ white) - len(white)) / float(np.sqrt(2.0 * len(white))) < FITTING_EXCESS
+
+    @cached_property
+    def as_narrow_as_wires(self) -> list[bool]:
+        """Of each part whether it is a ridge as narrow as a wire of its height that lies on the base, within doubt."""
+        narrow = []
+        for part, own in zip(self.parts, self.shape.columns, strict=True):
+            is_round = isinstance(part.shape, RidgeShape)
+            narrow.append(is_round and _beyond_wire(part, self.found.covariance[own, own]) < WIDE_SDS)
+        return narrow
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """(n,) heights that it leaves over, without what the base may do under each run, m."""
+        window = self.place.window
+        over = window.height - self.template
+        for start, stop in zip(window.starts[:-1], window.starts[1:], strict=True):
+            over[start:stop] -= np.median(over[start:stop])
+        return np.asarray(over)
+
+
+def part_of(feature: Feature, place: Neighbourhood, most: int = HIGHEST_DEGREE) -> Part:
+    """The part of a feature, in the first family of its kind.
+
+    Args:
+        feature: of a kind with a posterior.
+        place: the neighbourhood.
+        most: highest degree of the course of a line.
+    """
+    kind = kind_of(feature)
+    if isinstance(kind, LineKind):
+        line, _ = kind.shape_on(place.fine, feature, place.around, most)
+        return Part(feature, line, line.start)
+    if not isinstance(kind, PointKind):
+        raise TypeError(f"a {feature.kind} has no family of shapes")
+    spot = kind.shape_on(place.fine, feature, place.around)
+    return Part(feature, spot, spot.start)
+
+
+def as_bar(part: Part, place: Neighbourhood, top: float) -> Part:
+    """A ridge with a flat top of a width (m) and upright flanks."""
+    ridge: Any = part.shape
+    bar = trapezoid_beside(ridge, sizes_of(part.feature, ridge.tip_radius), roof=False)
+    course, last = ridge.modes.count, len(part.start) - 1
+    kept = np.delete(part.start, [last] if ridge.chart.closed else [course, last])
+    return Part(part.feature, bar, np.concatenate([kept, np.log([top, 0.02 * place.half_width])]))
+
+
+def as_twin(part: Part, place: Neighbourhood, gap: float) -> Part:
+    """A ridge as two wires that leave a gap, m."""
+    ridge: Any = part.shape
+    twin = twin_beside(ridge, sizes_of(part.feature, ridge.tip_radius))
+    start = part.start.copy()
+    start[-1] = np.log(0.5 * max(start[-2], 1e-3 * place.half_width))
+    return Part(part.feature, twin, np.concatenate([[np.log(gap)], start]))
+
+
+def laid(parts: Sequence[Part], place: Neighbourhood) -> Configuration:
+    """The configuration of these parts as they begin, of no odds: what proposals may begin with."""
+    theta = np.concatenate([np.zeros(0), *(part.start for part in parts)])
+    return Configuration(tuple(parts), place, Laplace(theta, np.zeros((0, 0)), -np.inf), len(place.levels) - 1, -np.inf)
+
+
+def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | None = None) -> Configuration | None:
+    """The configuration of these parts at the optimum of all of them together; None if a rival is far better."""
+    shape = JoinedShape([part.shape for part in parts], len(place.window), PARTS_OF_BIN)
+    theta = np.concatenate([np.zeros(0), *(part.start for part in parts)])
+    constants = np.array([constant for _, constant in place.levels])
+    level = len(constants) - 1 if rival is None else rival.level
+    if rival is not None and len(theta):
+        target = LogPosterior(shape, place.levels[level][0])
+        theta = find_optima(target, theta[None], SCREENED)[0]
+        if float(target.log_density(theta[None])[0]) < rival.found.log_density - HOPELESS:
+            return None
+    for _ in range(MOST_LEVEL_CHANGES):
+        if len(theta):
+            theta = find_optima(LogPosterior(shape, place.levels[level][0]), theta[None])[0]
+        template = shape.templates(theta[None])
+        values = [float(likelihood.log_density(template)[0]) for likelihood, _ in place.levels] + constants
+        level, before = int(np.argmax(values)), level
+        if level == before or not len(theta):
+            break
+    found = Laplace(theta, np.zeros((0, 0)), float(values[level] - constants[level]))
+    evidence = found.log_density
+    if len(theta):
+        found = laplace(LogPosterior(shape, place.levels[level][0]), theta, scanned=False)
+        evidence = found.log_evidence
+    moved = tuple(Part(part.feature, part.shape, theta[own]) for part, own in zip(parts, shape.columns, strict=True))
+    plain = sum(_plain(part, found.covariance[own, own]) for part, own in zip(moved, shape.columns, strict=True))
+    odds = evidence + float(constants[level]) - float(np.log(len(constants))) + plain + len(parts) * place.log_prior
+    return Configuration(moved, place, found, level, float(odds))
+
+
+def _plain(part: Part, covariance: FloatArray) -> float:
+    """What a wire that lies on the base adds to the log evidence: half of all round lines are such, beforehand.
+
+    By the ratio of the Gaussian's density of the log radius less that of half the height at 0, and the prior's there
+    (Savage's ratio; Dickey, Annals of Mathematical Statistics 42, 1971).
+    """
+    shape: Any = part.shape
+    ridge = shape.midway if isinstance(shape, TwinShape) else shape
+    if not isinstance(ridge, RidgeShape):
+        return 0.0
+    height, log_radius = max(float(part.start[-2]), 1e-12), float(part.start[-1])
+    variance = _variance_beyond(height, covariance)
+    off = log_radius - float(np.log(0.5 * height))
+    after = -0.5 * off**2 / variance - 0.5 * float(np.log(2.0 * np.pi * variance))
+    before = float(ridge.priors[-1].log_density(np.array(np.log(0.5 * height))))
+    return float(np.logaddexp(0.0, after - before) - np.log(2.0))
+
+
+def _variance_beyond(height: float, covariance: FloatArray) -> float:
+    """Variance of the log radius less that of half the height."""
+    slope = np.array([-1.0 / height, 1.0])
+    return max(float(slope @ covariance[-2:, -2:] @ slope), np.finfo(float).tiny)
+
+
+def _beyond_wire(part: Part, covariance: FloatArray) -> float:
+    """Standard deviations by which a round line is wider than a wire of its height."""
+    height = max(float(part.start[-2]), np.finfo(float).tiny)
+    return float((part.start[-1] - np.log(0.5 * height)) / np.sqrt(_variance_beyond(height, covariance)))

@@ -1,0 +1,159 @@
+"""Neighbourhood: the inspected places around some features, and how likely heights there are under any of them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapping import Feature, FloatArray, IntArray
+from mapping.geometry.mesh import distances
+from mapping.inference.families import Surroundings
+from mapping.inference.kinds import sizes_of
+from mapping.inference.likelihood import Likelihood, Nuisance, Window, build_likelihood
+from mapping.instrument import Noise
+
+# How wrong the shapes of a configuration may be about a real detail, in shares of its height: which of these it is the
+# data say. In parts of a fifteenth of a half-width w the mean of what is the higher of two crests is off by up to the
+# change of slope times an eighth of a part, (2 H / w) (w / 15) / 8 = 0.02 H, in one part of a crossing; facets of a
+# round crest (24 to its circle) are 0.004 H inside it; 0.04 is SHAPE_ERROR, what crests that were touched showed
+MISFIT_SHARES = (0.01, 0.04)
+# Places so many half-widths beside a crest belong to its window: as many again as it disturbs, which tell the base
+NEIGHBOURHOOD_REACH = 2.0
+# Parts of a bin: where the higher of two crests changes within one, the mean of both heights misses a ninth of what it
+# would in the whole bin
+PARTS_OF_BIN = 3
+# Places that can tell a feature from another: what the smallest has parameters
+FEWEST_PLACES = 8
+# Faces whose normals differ by less are one plane
+SAME_PLANE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Mean heights at places along sweeps, in the order in which each sweep passed them.
+
+    Args:
+        points, normals: (M, 3) on the base, m, and outward.
+        height: (M,) mean heights over the base, m.
+        samples: (M,) samples behind each.
+        sweep: (M,) number of the sweep.
+        spacing: distance between neighbours along a sweep, m.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    height: FloatArray
+    samples: IntArray
+    sweep: IntArray
+    spacing: float
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbourhood:
+    """What configurations of one neighbourhood are weighed on: the same places, noise and base for all.
+
+    Args:
+        window: the places as bins.
+        fine: the same with PARTS_OF_BIN bins for each one: shapes are laid on it.
+        around: trace, base and noise.
+        levels: likelihood under each of MISFIT_SHARES, and the log of its normalisation.
+        half_width: of the narrowest disturbance, m.
+        log_prior: log odds of one more feature before the data: as many false ones are accepted on this path.
+    """
+
+    window: Window
+    fine: Window
+    around: Surroundings
+    levels: tuple[tuple[Likelihood, float], ...]
+    half_width: float
+    log_prior: float
+
+
+def neighbourhood(
+    features: Sequence[Feature],
+    points: Sequence[FloatArray],
+    places: Places,
+    around: Surroundings,
+    false_alarms_per_metre: float,
+) -> Neighbourhood | None:
+    """The neighbourhood of some features and of further points (3,); None where too few places tell of it."""
+    sizes = [sizes_of(feature, around.trace.tip_radius) for feature in features]
+    near = np.zeros(len(places.points), dtype=bool)
+    for feature, size in zip(features, sizes, strict=True):
+        near |= distances(places.points, feature.axis) < NEIGHBOURHOOD_REACH * size.half_width
+    for point in points:
+        reach = NEIGHBOURHOOD_REACH * max(size.half_width for size in sizes)
+        near |= np.linalg.norm(places.points - point, axis=1) < reach
+    near &= places.samples > 0
+    if near.sum() < FEWEST_PLACES:
+        return None
+    window = window_of(places, near)
+    height, half_width = max(size.height for size in sizes), min(size.half_width for size in sizes)
+    vague = 3.0 * max(height, around.noise.sd)
+    nuisance = Nuisance(vague, vague, 0.0 if around.base.kind == "mesh" else 0.3 * height)
+    levels = []
+    for share in MISFIT_SHARES:
+        noise = with_waves(around.noise, share * height, half_width)
+        likelihood = build_likelihood(window, noise, nuisance, 1e-9 * height)
+        constant = np.log(likelihood.filter.scale).sum() + 0.5 * np.log1p(-likelihood.shrink).sum()
+        levels.append((likelihood, float(constant)))
+    path = float(near.sum()) * places.spacing
+    return Neighbourhood(
+        window, _finer(window), around, tuple(levels), half_width, float(np.log(false_alarms_per_metre * path))
+    )
+
+
+def with_waves(noise: Noise, sd: float, length: float) -> Noise:
+    """A noise together with errors that are correlated over a length (m): what a shape gets wrong it gets wrong over a
+    part of itself. Both correlated parts are joined into one of the same variance and the same weight in long means."""
+    own, more = noise.correlated**2, sd**2
+    joined = (own * noise.length + more * length) / max(own + more, np.finfo(float).tiny)
+    return replace(noise, correlated=float(np.sqrt(own + more)), length=joined)
+
+
+def _finer(window: Window) -> Window:
+    """The window with each bin cut into PARTS_OF_BIN."""
+    count = PARTS_OF_BIN * len(window)
+    share = np.tile((np.arange(PARTS_OF_BIN) - 0.5 * (PARTS_OF_BIN - 1)) * 2.0 / PARTS_OF_BIN, len(window))
+    feet, normals, tangents = (
+        np.repeat(each, PARTS_OF_BIN, axis=0) for each in (window.feet, window.normals, window.tangents)
+    )
+    half, place = np.repeat(window.half, PARTS_OF_BIN), np.repeat(window.place, PARTS_OF_BIN)
+    return replace(
+        window,
+        feet=feet + (share * half)[:, None] * tangents,
+        normals=normals,
+        tangents=tangents,
+        height=np.zeros(count),
+        count=np.repeat(window.count, PARTS_OF_BIN),
+        place=place + share * half,
+        last=place + share * half,
+        half=half / PARTS_OF_BIN,
+        starts=PARTS_OF_BIN * window.starts,
+    )
+
+
+def window_of(places: Places, keep: FloatArray) -> Window:
+    """The chosen places as bins: a run ends where a sweep does, or where it leaves them."""
+    index = np.flatnonzero(keep)
+    jump = (np.diff(index) > 1) | (np.diff(places.sweep[index]) != 0)
+    gaps = np.linalg.norm(np.diff(places.points[index], axis=0), axis=1) > 3.0 * places.spacing
+    starts = np.concatenate([[0], np.flatnonzero(jump | gaps) + 1, [len(index)]]).astype(np.int64)
+    # a run of a place or two tells the base alone
+    long = np.repeat(np.diff(starts) > 3, np.diff(starts))
+    starts = np.concatenate([[0], np.cumsum(np.diff(starts)[np.diff(starts) > 3])]).astype(np.int64)
+    index = index[long]
+    points, normals = places.points[index], places.normals[index]
+    tangents, place = np.zeros_like(points), np.zeros(len(index))
+    for start, stop in itertools.pairwise(starts):
+        along = np.gradient(points[start:stop], axis=0)
+        tangents[start:stop] = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(float).tiny)
+        place[start:stop] = places.spacing * np.arange(stop - start)
+    flat = len(index) > 0 and float(np.ptp(normals, axis=0).max()) < SAME_PLANE
+    half = np.full(len(index), 0.5 * places.spacing)
+    count = places.samples[index].astype(np.int64)
+    return Window(points, normals, tangents, places.height[index], count, place, place + half, half, starts,
+                  int(count.sum()), bool(flat))  # fmt: skip

@@ -1,0 +1,338 @@
+"""Proposals: what else the trace of a neighbourhood may mean. A bad one costs time, never correctness.
+
+Each generator takes a fitted configuration and yields lists of parts; the evidence alone decides.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mapping import Feature, FloatArray, Interval, Support
+from mapping.geometry.mesh import arclengths, distances, nearest_on
+from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_twin, part_of
+from mapping.inference.configuration.neighbourhood import Neighbourhood
+from mapping.inference.families import GrooveShape, RidgeShape, TwinShape
+from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
+
+Parts = list[Part]
+# Tops of a bar and gaps of a twin, in half-widths of the disturbance, that their optima are searched from
+TOPS, GAPS = (0.5,), (0.2, 0.7)
+# Points so near to a straight line, in half-widths, may be of it
+ON_LINE = 0.35
+# Half of a line that may be meant instead of a point, in half-widths of its disturbance
+SHORT_LINE = 0.3
+# Points of a leg that distances between lines are taken at
+POINTS_OF_LEG = 65
+# Points that two lines are drawn through, at least
+FEWEST_POINTS = 4
+# Standard deviations by which a place must stand off a configuration to be looked at; how wrong one is, is then asked
+# of the evidence
+PEAK_SDS = 4.0
+# Most points that straight lines are drawn through: two by two, which is the square of that
+MOST_DRAWN_THROUGH = 60
+
+
+def sections(now: Configuration) -> Iterator[Parts]:
+    """Another section of a line that is wider than a wire of its height: round, flat-topped, or two in one."""
+    for k, part in enumerate(now.parts):
+        ridge = _ridge_of(part, now.place)
+        if ridge is None or now.as_narrow_as_wires[k]:
+            continue
+        half = sizes_of(ridge.feature, now.place.around.trace.tip_radius).half_width
+        others = [as_bar(ridge, now.place, share * half) for share in TOPS]
+        others += [as_twin(ridge, now.place, share * half) for share in GAPS]
+        if not isinstance(part.shape, RidgeShape):
+            others.append(ridge)
+        for other in others:
+            if type(other.shape) is not type(part.shape):
+                yield [*now.parts[:k], other, *now.parts[k + 1 :]]
+
+
+def without(now: Configuration) -> Iterator[Parts]:
+    """One detail less."""
+    for k in range(len(now.parts)):
+        yield [*now.parts[:k], *now.parts[k + 1 :]]
+
+
+def joined(now: Configuration) -> Iterator[Parts]:
+    """Two lines as one: end to end, or side by side."""
+    for one, other in itertools.combinations(range(len(now.parts)), 2):
+        first, second = now.parts[one], now.parts[other]
+        lines = [axis_of(first), axis_of(second)]
+        if min(len(line) for line in lines) < 2:
+            continue
+        rest = [part for k, part in enumerate(now.parts) if k not in (one, other)]
+        if first.feature.kind == second.feature.kind:
+            whole = _straight_through(np.concatenate(lines))
+            yield [*rest, _line(first.feature, whole, now.place)]
+        if not _faces(first, second, now.place):
+            continue
+        across = nearest_on(lines[0], lines[1])[0] - lines[0]
+        middle, width = lines[0] + 0.5 * across, float(np.median(np.linalg.norm(across, axis=1)))
+        height = 0.5 * (abs(first.feature.height.median) + abs(second.feature.height.median))
+        for crossings in ("convex", "concave"):
+            kind = kind_made_of(crossings, line=True)
+            line = _line(_sized(first.feature, kind.name, kind.sign * height, width), middle, now.place)
+            yield [*rest, line]
+            if isinstance(line.shape, RidgeShape):
+                yield [*rest, as_bar(line, now.place, width)]
+                yield [*rest, as_twin(line, now.place, width)]
+
+
+def between(now: Configuration) -> Iterator[Parts]:
+    """A groove between two ridges that face each other, and a ridge along each rim of a groove."""
+    for one, other in itertools.combinations(range(len(now.parts)), 2):
+        first, second = now.parts[one], now.parts[other]
+        if {type(first.shape), type(second.shape)} == {RidgeShape} and _faces(first, second, now.place):
+            yield [*now.parts, _hollow(axis_of(first), axis_of(second), first.feature, now.place)]
+    for k, part in enumerate(now.parts):
+        if isinstance(part.shape, TwinShape):
+            single = apart_of(part)
+            hollow = _hollow(axis_of(single[0]), axis_of(single[1]), part.feature, now.place)
+            yield [*now.parts[:k], *single, hollow, *now.parts[k + 1 :]]
+        if isinstance(part.shape, GrooveShape):
+            axis, width = axis_of(part), float(np.exp(part.start[-2]))
+            aside = 0.5 * width * _lateral(part)
+            height = 0.3 * abs(part.feature.height.median)
+            burr = _sized(part.feature, kind_made_of("convex", line=True).name, height, height)
+            yield [*now.parts, *(_line(burr, axis + side * aside, now.place) for side in (-1.0, 1.0))]
+
+
+def apart(now: Configuration) -> Iterator[Parts]:
+    """A twin as two lines that need not be alike."""
+    for k, part in enumerate(now.parts):
+        if isinstance(part.shape, TwinShape):
+            yield [*now.parts[:k], *apart_of(part), *now.parts[k + 1 :]]
+
+
+def other_kinds(now: Configuration) -> Iterator[Parts]:
+    """A short line as a point, and a point as a short line."""
+    for k, part in enumerate(now.parts):
+        kind, half = kind_of(part.feature), sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
+        rest = [*now.parts[:k], *now.parts[k + 1 :]]
+        if kind.sided or not kind.made_of:
+            continue
+        other, axis = kind_made_of(kind.made_of, line=not kind.line), axis_of(part)
+        if kind.line and float(arclengths(axis)[-1]) < 2.0 * half:
+            point = replace(part.feature, kind=other.name, axis=axis[[len(axis) // 2]],
+                            normals=part.feature.normals[:1])  # fmt: skip
+            yield [*rest, part_of(_plainly(point), now.place)]
+        if not kind.line:
+            shape: Any = part.shape
+            like, half_length = replace(part.feature, kind=other.name), SHORT_LINE * half
+            like, half_length = replace(part.feature, kind=other.name), SHORT_LINE * half
+            for way in shape.spot.axes:
+                short = axis + np.array([[-half_length], [half_length]]) * way
+                yield [*rest, _line(like, short, now.place)]
+
+
+def straight(now: Configuration, points: FloatArray) -> Iterator[Parts]:
+    """Straight lines through the crests' points (M, 3), instead of all lines that stand out."""
+    lines = [part for part in now.parts if isinstance(part.shape, RidgeShape | TwinShape)]
+    if not lines or len(points) < FEWEST_POINTS:
+        return
+    near = np.min([distances(points, axis_of(line)) for line in lines], axis=0) < now.place.half_width
+    found = straight_lines(points[near], ON_LINE * now.place.half_width)
+    if found:
+        model = max(lines, key=lambda part: part.feature.evidence.snr).feature
+        rest = [part for part in now.parts if not any(part is line for line in lines)]
+        yield [*rest, *(_line(model, line, now.place) for line in found)]
+
+
+def more(now: Configuration) -> Iterator[Parts]:
+    """Whatever stands off the configuration most: a point there, or a straight line through several such places."""
+    window, tip = now.place.window, now.place.around.trace.tip_radius
+    likelihood = now.place.levels[0][0]
+    sd = 1.0 / likelihood.filter.scale
+    for sign in (1.0, -1.0):
+        over = sign * now.residual
+        peak = np.zeros(len(window), dtype=bool)
+        for start, stop in zip(window.starts[:-1], window.starts[1:], strict=True):
+            own = over[start:stop]
+            peak[start + 1 : stop - 1] = (own[1:-1] >= own[:-2]) & (own[1:-1] > own[2:])
+        peak &= over > PEAK_SDS * sd
+        if not peak.any():
+            continue
+        places, heights = window.feet[peak], over[peak]
+        top = int(np.argmax(heights))
+        high = heights > 0.3 * heights[top]
+        model = _model(now.place, places[top], window.normals[peak][top], sign * float(np.median(heights[high])))
+        half = float(np.sqrt(2.0 * tip * abs(model.height.median)))
+        spot = kind_made_of("convex" if sign > 0 else "concave", line=False)
+        found = straight_lines(places[high], max(ON_LINE * half, 1.5 * float(window.half.max())))
+        line = kind_made_of("convex" if sign > 0 else "concave", line=True)
+        for axis in found[:2]:
+            if len(axis) > 1 and float(arclengths(axis)[-1]) > 0.5 * half:
+                yield [
+                    *now.parts,
+                    _line(_sized(model, line.name, model.height.median, abs(model.height.median)), axis, now.place),
+                ]
+        yield [*now.parts, part_of(replace(model, kind=spot.name), now.place)]
+
+
+def straight_lines(points: FloatArray, tolerance: float) -> list[FloatArray]:
+    """Axes (2, 3) of straight lines that hold the points (M, 3), the one that holds most of them first.
+
+    Args:
+        points: m.
+        tolerance: distance from a line up to which a point may belong to it, m.
+    """
+    left = points[:: 1 + len(points) // MOST_DRAWN_THROUGH]
+    lines = []
+    while len(left) > 1:
+        first, second = np.triu_indices(len(left), 1)
+        way = left[second] - left[first]
+        length = np.linalg.norm(way, axis=1)
+        apart = length > 2.0 * tolerance
+        if not apart.any():
+            break
+        first, way = first[apart], way[apart] / length[apart, None]
+        offset = left[None] - left[first][:, None]
+        along = np.einsum("pmi,pi->pm", offset, way)
+        off = np.linalg.norm(offset - along[..., None] * way[:, None], axis=2)
+        held = off < tolerance
+        best = int(np.argmax(held.sum(axis=1) - (np.where(held, off, 0.0) / tolerance).mean(axis=1)))
+        if held[best].sum() < 2:
+            break
+        lines.append(_straight_through(left[held[best]]))
+        left = left[~held[best]]
+    return lines
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A named generator.
+
+    Args:
+        name: what it does.
+        of: from a configuration and the points of crests (M, 3) to the parts of others.
+        adds: True if it only makes sense where something is left unexplained.
+    """
+
+    name: str
+    of: Callable[[Configuration, FloatArray], Iterator[Parts]]
+    adds: bool = False
+
+
+JOIN = Proposal("join", lambda now, points: joined(now))
+PROPOSALS = (
+    Proposal("section", lambda now, points: sections(now)),
+    Proposal("straight lines", straight),
+    JOIN,
+    Proposal("apart", lambda now, points: apart(now), True),
+    Proposal("between", lambda now, points: between(now)),
+    Proposal("kind", lambda now, points: other_kinds(now), True),
+    Proposal("add", lambda now, points: more(now), True),
+    Proposal("remove", lambda now, points: without(now)),
+)
+
+
+def _ridge_of(part: Part, place: Neighbourhood) -> Part | None:
+    """A line that stands out, as a round ridge on its course; None of others."""
+    shape: Any = part.shape
+    if isinstance(shape, RidgeShape):
+        return part
+    if part.feature.kind != kind_made_of("convex", line=True).name:
+        return None
+    return _line(part.feature, axis_of(part), place, most=8)
+
+
+def axis_of(part: Part) -> FloatArray:
+    """(K, 3) the axis of a part as it was fitted."""
+    shape, theta = part.shape, part.start
+    if isinstance(shape, TwinShape):
+        shape, theta = shape.midway, theta[1:]
+    if not kind_of(part.feature).line:
+        spot: Any = shape
+        place = np.zeros((1, 2))
+        place[0, : spot.free] = theta[: spot.free]
+        return np.asarray(spot.spot.lifted(place, np.zeros(1)))
+    line: Any = shape
+    names = list(line.names)
+    ends = (theta[names.index("start")], theta[names.index("end")]) if "start" in names else (
+        line.modes.middle - line.modes.reach, line.modes.middle + line.modes.reach)  # fmt: skip
+    s = np.linspace(*ends, 2 if line.modes.degree < 2 and len(line.chart.s) < 9 else 33)
+    points, laterals, _, _ = line.chart.at(s)
+    return np.asarray(points + line.modes.lateral(theta[None, : line.modes.count], s)[0][:, None] * laterals)
+
+
+def _lateral(part: Part) -> FloatArray:
+    line: Any = part.shape
+    return np.asarray(line.chart.laterals[len(line.chart.laterals) // 2])
+
+
+def apart_of(part: Part) -> Parts:
+    """Both lines of a twin."""
+    twin: Any = part.shape
+    return [Part(part.feature, twin.midway, twin.single(part.start[None], side)[0]) for side in (-1.0, 1.0)]
+
+
+def _faces(first: Part, second: Part, place: Neighbourhood) -> bool:
+    """True if two lines run beside each other, nearer than both of their disturbances reach."""
+    tip = place.around.trace.tip_radius
+    reach = sum(sizes_of(each.feature, tip).half_width for each in (first, second))
+    one, other = dense(axis_of(first)), dense(axis_of(second))
+    return bool(np.median(distances(one, other)) < reach and np.median(distances(other, one)) < reach)
+
+
+def dense(axis: FloatArray) -> FloatArray:
+    """Points along a polyline (K, 3), many to each leg: two that cross have none of their corners in common."""
+    share = np.linspace(0.0, 1.0, POINTS_OF_LEG)[:, None]
+    return np.concatenate([a + share * (b - a) for a, b in itertools.pairwise(axis)])
+
+
+def _hollow(one: FloatArray, other: FloatArray, like: Feature, place: Neighbourhood) -> Part:
+    """The groove between two lines: as wide as they are apart, as deep as a ball dips there."""
+    across = nearest_on(one, other)[0] - one
+    width = float(np.median(np.linalg.norm(across, axis=1)))
+    tip = place.around.trace.tip_radius
+    kind = kind_made_of("concave", line=True)
+    return _line(_sized(like, kind.name, -(width**2) / (8.0 * tip), width), one + 0.5 * across, place)
+
+
+def _straight_through(points: FloatArray) -> FloatArray:
+    """(2, 3) the straight line through points, from the first to the last of them along it."""
+    middle = points.mean(axis=0)
+    way = np.linalg.svd(points - middle, full_matrices=False)[2][0]
+    along = (points - middle) @ way
+    return np.asarray(middle + np.array([[along.min()], [along.max()]]) * way)
+
+
+def _nearest(lines: Sequence[Part], point: FloatArray) -> Part:
+    return min(lines, key=lambda line: float(distances(point[None], axis_of(line))[0]))
+
+
+def _line(like: Feature, axis: FloatArray, place: Neighbourhood, most: int = 1) -> Part:
+    """A part of a feature's kind and sizes along another axis."""
+    base, tip = place.around.base, place.around.trace.tip_radius
+    up = like.normals[np.linalg.norm(axis[:, None] - like.axis[None], axis=2).argmin(axis=1)]
+    feet = base.foot(axis + tip * up, tip)
+    laid = replace(like, axis=axis if place.window.flat else feet.points, normals=feet.normals)
+    return part_of(_plainly(laid), place, most)
+
+
+def _plainly(feature: Feature) -> Feature:
+    """What a proposal begins with: nothing is known of it but its kind, place and sizes."""
+    return replace(feature, notes=(), junction=False, posterior=None, faint=False)
+
+
+def _sized(like: Feature, kind: str, height: float, width: float) -> Feature:
+    details = replace(like.details, radius=None, top=None, run=None, high_side=None, misfit=None)
+    low, high = sorted((0.8 * height, 1.2 * height))
+    size = Interval(height, low, high)
+    return replace(like, kind=kind, height=size, width=Interval(width, 0.5 * width, 2.0 * width), details=details)
+
+
+def _model(place: Neighbourhood, point: FloatArray, normal: FloatArray, height: float) -> Feature:
+    """A feature of a height about a place, of which nothing else is known."""
+    kind = kind_made_of("convex" if height > 0.0 else "concave", line=False)
+    low, high = sorted((0.8 * height, 1.2 * height))
+    size = Interval(height, low, high)
+    width = abs(height) if height > 0.0 else 2.0 * float(np.sqrt(2.0 * place.around.trace.tip_radius * -height))
+    return Feature(kind.name, point[None], normal[None], size, Interval(width, 0.5 * width, 2.0 * width),
+                   Interval(0.0, 0.0, 0.0), Support(0.0, 2), True, 0.1 * place.half_width)  # fmt: skip

@@ -1,0 +1,115 @@
+"""Search: from what the rules propose to the configuration with the highest odds, by accepted proposals alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import FloatArray, MappingError
+from mapping.inference.configuration.configuration import Configuration, Part, fitted, laid
+from mapping.inference.configuration.neighbourhood import Neighbourhood
+from mapping.inference.configuration.proposals import JOIN, PROPOSALS, Parts, Proposal
+
+# Configurations that are fitted in one neighbourhood: a bound on the time, which crowded ones reach
+MOST_FITTED = 40
+# A proposal must be better by this log odds: less is rounding, or the same configuration found again
+WORTH = 0.5
+# What is less likely than the best by this log odds is not gone on from, nor told
+NEGLIGIBLE_ODDS = 7.0
+
+
+@dataclass(frozen=True, eq=False)
+class Account:
+    """What a search found.
+
+    Args:
+        start: what the rules say.
+        best: the configuration of the highest odds.
+        visited: the best of each set of kinds, the best of all first.
+        accepted: names of the proposals that led from the beginning to the best.
+    """
+
+    start: Configuration
+    best: Configuration
+    visited: tuple[Configuration, ...]
+    accepted: tuple[str, ...]
+
+    @property
+    def shares(self) -> list[tuple[tuple[str, ...], float]]:
+        """Probability of each set of kinds among those that were visited, the largest first."""
+        odds = np.array([each.log_odds for each in self.visited])
+        weights = np.exp(odds - odds.max())
+        return [(each.kinds, float(w)) for each, w in zip(self.visited, weights / weights.sum(), strict=True)]
+
+
+def searched(
+    parts: Sequence[Part], place: Neighbourhood, points: FloatArray, proposals: Sequence[Proposal] = PROPOSALS
+) -> Account:
+    """Improve a configuration until no proposal does.
+
+    Args:
+        parts: what the rules say.
+        place: the neighbourhood.
+        points: (M, 3) of crests in the neighbourhood, m.
+        proposals: the generators that are asked, in order.
+    """
+    start = fitted(parts, place)
+    assert start is not None
+    best, accepted, count, idle = start, list[str](), 1, 0
+    visited = {start.kinds: start}
+    whole, joining = laid(parts, place), True
+    # pieces of one line hide each other once they are fitted: they are joined as the rules left them
+    while joining and count < MOST_FITTED:
+        joining = False
+        for other_parts in _yielded(JOIN, whole, points) if JOIN in proposals else ():
+            other = fitted(other_parts, place)
+            count += 1
+            if other is not None and other.log_odds > best.log_odds + WORTH:
+                best, whole, joining = other, laid(other_parts, place), True
+                visited[other.kinds] = other
+                accepted.append(JOIN.name)
+                break
+    while idle < len(proposals):
+        for proposal in proposals:
+            found = best
+            for proposed in _yielded(proposal, best, points) if proposal.adds is False or not best.fits else ():
+                if count >= MOST_FITTED:
+                    break
+                count += 1
+                other = fitted(proposed, best.place, best)
+                if other is None or not _agreed(other, best):
+                    continue
+                known = visited.get(other.kinds)
+                if known is None or other.log_odds > known.log_odds:
+                    visited[other.kinds] = other
+                if other.log_odds > found.log_odds + WORTH:
+                    found = other
+            idle = 0 if found is not best else idle + 1
+            if found is not best:
+                best = found
+                accepted.append(proposal.name)
+            if idle == len(proposals):
+                break
+    order = sorted(visited.values(), key=lambda each: -each.log_odds)
+    likely = [each for each in order if each.log_odds > best.log_odds - NEGLIGIBLE_ODDS]
+    return Account(start, best, tuple(likely), tuple(accepted))
+
+
+def _agreed(other: Configuration, now: Configuration) -> bool:
+    """True if several sweeps felt each detail that a proposal brought: what one alone shows is detection's to judge."""
+    known = {id(part.shape) for part in now.parts}
+    return all(other.runs(k) > 1 for k, part in enumerate(other.parts) if id(part.shape) not in known)
+
+
+def _yielded(proposal: Proposal, now: Configuration, points: FloatArray) -> Iterator[Parts]:
+    """What a proposal yields, up to what the base has no room for."""
+    parts = proposal.of(now, points)
+    while True:
+        try:
+            yield next(parts)
+        except StopIteration:
+            return
+        except MappingError:
+            return

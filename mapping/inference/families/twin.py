@@ -1,0 +1,66 @@
+"""TwinShape: two ridges of one section that run beside each other at one distance, as a double wire does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.inference.families.problem import Sizes
+from mapping.inference.families.ridge import RidgeShape
+from mapping.inference.families.trapezoid import NARROWEST_PART, WIDEST_PART
+from mapping.inference.likelihood import Prior, Uniform
+
+
+@dataclass(frozen=True, eq=False)
+class TwinShape:
+    """A ridge twice, to either side of its course: log gap between both, and the parameters of the ridge midway.
+
+    One parameter more than a ridge has, as a flat top is: whether a wide line is a bar or two wires is then asked of
+    families that cost the same. The gap is clear: what overlaps is one line.
+
+    Args:
+        midway: the ridge on the course between both.
+        half_width: of the disturbance of one of them, m: the scale of gaps.
+    """
+
+    midway: RidgeShape
+    half_width: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return ("log gap", *self.midway.names)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return ("ln m", *self.midway.units)
+
+    @property
+    def priors(self) -> tuple[Prior, ...]:
+        gap = Uniform(*np.log(self.half_width * np.array([NARROWEST_PART, WIDEST_PART])))
+        return (gap, *self.midway.priors)
+
+    @property
+    def start(self) -> FloatArray:
+        return np.concatenate([[np.log(0.2 * self.half_width)], self.midway.start])
+
+    @property
+    def step(self) -> FloatArray:
+        return np.concatenate([[0.05], self.midway.step])
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights over the base's trace, m: the higher of both (dilation distributes over unions)."""
+        one, other = (self.midway.templates(self.single(theta, side)) for side in (-1.0, 1.0))
+        return np.maximum(one, other)
+
+    def single(self, theta: FloatArray, side: float) -> FloatArray:
+        """(W, P - 1) parameters of the ridge on one side, -1 or 1, of the course midway."""
+        ridge = theta[:, 1:].copy()
+        ridge[:, 0] += side * (0.5 * np.exp(theta[:, 0]) + np.exp(ridge[:, -1]))
+        return np.ascontiguousarray(ridge)
+
+
+def twin_beside(ridge: RidgeShape, sizes: Sizes) -> TwinShape:
+    """The family on a ridge's window, with its course, its ends and its section, and their priors."""
+    return TwinShape(ridge, sizes.half_width)
