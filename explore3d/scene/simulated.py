@@ -78,7 +78,9 @@ class SimulatedFingerTable(FingerTable):
         """As fast as the ball can go, and as its inertia lets it follow the smallest feature's kinks in the noise."""
         limit = TOP_SPEED_RADII * tip_radius
         if self.dynamics is not None:
-            kink = float(kink_angle(smallest, 0.5 * smallest, tip_radius))
+            # what is as high as the ball's radius is met as a wall, which is followed at no speed
+            height = min(smallest, tip_radius)
+            kink = float(kink_angle(height, 0.5 * height, tip_radius))
             sigma = float((self.noise.white**2 + self.noise.correlated**2) ** 0.5)
             limit = min(limit, Dynamics(**self.dynamics.model_dump()).fastest(kink, sigma))
         return limit, self.rate

@@ -33,6 +33,7 @@ white = "0.05 mm"
 correlated = "0.005 mm"
 [survey]
 smallest_feature = "0.4 mm"
+speed = "30 mm/s"
 [explore]
 time_budget = "{budget}"
 """

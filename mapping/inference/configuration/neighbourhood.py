@@ -91,6 +91,8 @@ def neighbourhood(
     if near.sum() < FEWEST_PLACES:
         return None
     window = window_of(places, near)
+    if not len(window):  # of sweeps with a few samples each no run of places is left
+        return None
     height, half_width = max(size.height for size in sizes), min(size.half_width for size in sizes)
     vague = 3.0 * max(height, around.noise.sd)
     nuisance = Nuisance(vague, vague, 0.0 if around.base.kind == "mesh" else 0.3 * height)

@@ -22,7 +22,7 @@ def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
         height=height,
         width=Interval(1e-3, 1e-3, 1e-3),
         length=length,
-        details=SimpleNamespace(misfit=None),
+        details=SimpleNamespace(misfit=None, account=()),
     )
 
 
