@@ -260,7 +260,7 @@ def _weighed(
             masks = [found[i].unclear for i in numbers]
         tails = None
         for _ in range(NULL_ROUNDS):
-            heights = [without(p.height, mask, bank.drift > 0) for p, mask in zip(group, masks, strict=True)]
+            heights = [without(p.height, mask, bank) for p, mask in zip(group, masks, strict=True)]
             scales = null_scales(group, heights, masks, bank, threshold, CONTACT_ROUNDING * tip, tails)
             # what is found, but not clear, stays out of the tails: they tell of noise that is nowhere found
             tails = scales[0].tails

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -171,11 +171,12 @@ def typical_scale(scales: Sequence[NullScale]) -> FloatArray:
 
 
 def effective_noise(bank: Bank, scales: Sequence[NullScale]) -> Noise:
-    """White and correlated noise under which the filters' outputs scatter as measured, for all who need one law.
+    """The noise under which the filters' outputs scatter as measured, for all who need one law.
 
-    The variance of a filter's output is linear in the variances of both parts: for each correlation length of a
-    ladder, the least relative errors over the filters and over the white level of single samples, each weighed by
-    how well a path of that length tells it: single bins tell the level, and a wide filter sees few places.
+    The variance of a filter's output is linear in the variances of all parts: white noise, one process whose length is
+    chosen from a ladder, and the fitted further terms, with the least relative errors over the filters and over the
+    white level of single samples, each weighed by how well a path of that length tells it: single bins tell the level,
+    and a wide filter sees few places.
     """
     from scipy.optimize import nnls
 
@@ -183,18 +184,23 @@ def effective_noise(bank: Bank, scales: Sequence[NullScale]) -> Noise:
     measured = [np.mean([np.mean(scale.level(k) ** 2) for scale in scales]) for k in numbers]
     target = np.array([bank.filters[k].sd ** 2 * m for k, m in zip(numbers, measured, strict=True)])
     level = float(np.mean([scale.local.mean() for scale in scales])) * bank.noise.white**2
-    white = np.array([_output_variance(bank, k, Noise(1.0)) for k in numbers])
     bins = sum(len(scale.local) for scale in scales)
     seen = np.array([bins * bank.spacing / bank.filters[k].half_width for k in numbers]) / LOG_VARIANCE_PER_WIDTH
     weights = np.sqrt(np.append(seen, bins / LOG_VARIANCE_PER_BIN))
+
+    def shape(noise: Noise) -> FloatArray:
+        own = [_output_variance(bank, k, noise) for k in numbers] / target
+        return np.asarray(np.append(own, noise.white**2 / level) * weights)
+
+    kept = [shape(Noise(1.0)), *(shape(Noise(0.0, 0.0, 1.0, (replace(t, sd=1.0),))) for t in bank.noise.further)]
     best, noise = np.inf, bank.noise
     for length in np.geomspace(2 * bank.spacing, bank.filters[-1].half_width, CORRELATION_LENGTHS):
-        correlated = [_output_variance(bank, k, Noise(0.0, 1.0, float(length))) for k in numbers]
-        shapes = np.column_stack([white, correlated]) / target[:, None]
-        levels, misfit = nnls(np.vstack([shapes, [1 / level, 0.0]]) * weights[:, None], weights)
+        shapes = np.column_stack([*kept, shape(Noise(0.0, 1.0, float(length)))])
+        levels, misfit = nnls(shapes, weights)
         if misfit < best:
-            white_sd, correlated_sd = np.sqrt(levels).tolist()
-            best, noise = misfit, Noise(white_sd, correlated_sd, float(length))
+            white, *further, correlated = np.sqrt(levels).tolist()
+            terms = (replace(t, sd=sd) for t, sd in zip(bank.noise.further, further, strict=True) if sd > 0)
+            best, noise = misfit, Noise(white, correlated, float(length), tuple(terms))
     return noise
 
 
