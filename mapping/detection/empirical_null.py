@@ -36,6 +36,11 @@ CELL_WIDTHS = 12.0
 LEAST_SWEEP_WIDTHS = 2 * CELL_WIDTHS
 # Filters between one that is measured and the next: neighbours on the ladder see nearly the same.
 STRIDE = 3
+# Places of a profile that tell how loud it is along it, and groups that places of like loudness are put into: a group
+# holds a twentieth of the path, which is what a limit of 95 % is about.
+PLACES_A_PROFILE, LOUDNESS_GROUPS = 64, 20
+# Standard deviations within which 95 % of a normal variable's values are, from below
+CERTAIN = 1.6448536
 # Correlation lengths among which that of the effective noise is chosen: a quarter of an octave apart or less.
 CORRELATION_LENGTHS = 40
 # Share of a filter's width from which features may have been taken out: its output loses that share of its variance.
@@ -164,10 +169,40 @@ def null_scales(
     ]
 
 
-def typical_scale(scales: Sequence[NullScale]) -> FloatArray:
-    """(F,) for each filter, the median over all cells of all profiles."""
-    levels = [(each.doubt * each.pooled)[:, None] * each.own * np.sqrt(np.median(each.local)) for each in scales]
-    return np.asarray(np.median(np.concatenate(levels, axis=1), axis=1))
+def limit_along(bank: Bank, scales: Sequence[NullScale], threshold: float, tip_radius: float) -> float:
+    """Height of a sharp crest that is found with 95 % probability at a place by chance along all profiles, m.
+
+    Where the noise is louder less is found: at each place the probability is Phi of the signal-to-noise ratio, which
+    grows as the 5/4th power of the height, less the threshold (theory equation 6.13), and its mean over the path is
+    what is promised. Places are put together by how loud they are.
+    """
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
+    filters = range(len(bank.filters))
+    parts = []
+    for scale in scales:
+        places = np.arange(0, len(scale.local), max(1, len(scale.local) // PLACES_A_PROFILE))
+        parts.append(np.array([scale.along(k)[places] for k in filters]))
+    levels = np.concatenate(parts, axis=1)
+    usual = bank.scaled(np.median(levels, axis=1)).detection_limit(threshold, tip_radius)
+    if not np.isfinite(usual):
+        return usual
+    widths = np.array([f.half_width for f in bank.filters])
+    at = int(np.abs(np.log(widths / np.sqrt(2 * tip_radius * usual))).argmin())
+    groups = np.array_split(np.argsort(levels[at], kind="stable"), min(LOUDNESS_GROUPS, levels.shape[1]))
+    told = [bank.scaled(levels[:, group].mean(axis=1)).detection_limit(threshold, tip_radius) for group in groups]
+    shares = np.array([len(group) for group in groups]) / levels.shape[1]
+    found = float(ndtr(CERTAIN))
+
+    def excess(logarithm: float) -> float:
+        signal = (threshold + CERTAIN) * (np.exp(logarithm) / np.array(told)) ** 1.25
+        return float(shares @ ndtr(signal - threshold)) - found
+
+    low, high = np.log(min(told)), np.log(max(told))
+    if not np.isfinite(high) or excess(low) >= 0 or excess(high) <= 0:
+        return max(told)
+    return float(np.exp(brentq(excess, low, high, xtol=1e-4)))
 
 
 def effective_noise(bank: Bank, scales: Sequence[NullScale]) -> Noise:
