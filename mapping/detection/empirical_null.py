@@ -148,13 +148,19 @@ def null_scales(
         told = [_cell_levels(z, len(i), bank, k) for z, i in zip(outputs, inherited, strict=True)]
         if all(p.length >= LEAST_SWEEP_WIDTHS * widths[k] for p in profiles):
             inherited, variance = _deviations(told)
+        error = LOG_VARIANCE_PER_WIDTH * widths[k] / length + _spread(inherited)
         unsure = variance + levels.doubt_over(2 * widths[k] / bank.spacing)
+        if bank.noise.further:
+            unsure = unsure + error
         heavier[k] = _heavier_tail(together, length / widths[k], threshold) if tails is None else tails[k]
         # an uncertain level makes such tails, too
         doubt[k] = max(_doubt(0.5 * np.sqrt(unsure), threshold), heavier[k])
         level = 2 * np.log(max(robust_sd(together), 1e-12))
-        error = LOG_VARIANCE_PER_WIDTH * widths[k] / length + _spread(inherited)
-        pooled[k] = _likely_scale(level, error, length / widths[k], len(measured))
+        if bank.noise.further:
+            # a sum of processes stands in for a law that is none: its ripple is measured, not doubted
+            pooled[k] = np.exp(0.5 * level)
+        else:
+            pooled[k] = _likely_scale(level, error, length / widths[k], len(measured))
         if not any(deviation.any() for deviation in inherited):
             # one level everywhere: the fitted one is not undercut, for many a law has lighter middles than tails
             pooled[k] = max(1.0, pooled[k])
