@@ -63,7 +63,7 @@ def forecast(analysis: Analysis) -> Forecast | None:
     if not (np.isfinite(sd) and sd > 0):
         return None
     how = "from the standard deviations of the posteriors: noise averages out as the root of the time"
-    if analysis.detections.noise.correlated > analysis.detections.noise.white:
+    if analysis.detections.noise.correlated_sd > analysis.detections.noise.white:
         how += "; much of this noise is correlated, so that only new passes count, not slower ones"
     return _spread(seconds, sd, 0.5, how)
 

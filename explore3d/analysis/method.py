@@ -592,7 +592,7 @@ def _provenance(work: Work) -> dict[str, Any]:
         "complete": stop is None or not stop.incomplete,
         "read_as": log.metadata.get("read_as", []),
         "average": log.metadata.get("average"),
-        "noise": {"white": noise.white, "correlated": noise.correlated, "length": noise.length},
+        "noise": noise.record,
         "detection_limit": work.detections.detection_limit,
         "limit_measured": {"injected": work.detections.injected, "recovered": work.detections.recovered},
         "warnings": list(work.detections.remarks),

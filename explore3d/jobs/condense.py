@@ -23,7 +23,7 @@ from mapping.base import Base
 from mapping.detection import Crossing, Detections, detect
 from mapping.geometry.mesh import write_whole
 from mapping.inference.likelihood import samples_near
-from mapping.instrument import Noise
+from mapping.instrument import Noise, Term
 
 CHUNK = 2_000_000  # samples searched at once
 KEPT_BACKGROUND_SAMPLES = 1_500_000  # samples kept away from crossings, about
@@ -173,7 +173,8 @@ def _load(file: Path, key: str) -> Condensed | None:
     crossings = tuple(
         Crossing(**(each | {name: np.array(each[name]) for name in vectors})) for each in record.pop("crossings")
     )
-    noise = Noise(**record.pop("noise"))
+    told = record.pop("noise")
+    noise = Noise(**(told | {"further": tuple(Term(**term) for term in told.get("further", ()))}))
     for name in ("left_out", "remarks", "unfelt"):
         record[name] = tuple(record.get(name, ()))
     record["inspected_sweeps"] = tuple((number, length) for number, length in record.get("inspected_sweeps", ()))

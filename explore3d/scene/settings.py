@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from mapping.instrument import Noise, StatedNoise
+from mapping.instrument import StatedNoise
 
 if TYPE_CHECKING:
     from explore3d.scene.scene import Scene
@@ -42,9 +42,8 @@ class AnalysisSettings:
         """The same of a recording whose samples are means: their white noise is less than the scene states."""
         if average is None or self.noise is None:
             return self
-        noise = self.noise.noise
-        white = noise.white * float(average["white_noise"])
-        return replace(self, noise=replace(self.noise, noise=Noise(white, noise.correlated, noise.length)))
+        noise = self.noise.noise.scaled(white=float(average["white_noise"]))
+        return replace(self, noise=replace(self.noise, noise=noise))
 
     @property
     def detection(self) -> dict[str, Any]:

@@ -123,14 +123,14 @@ def _unclear(stretches: list[tuple[int, int, bool]], count: int) -> BoolArray:
     return quiet
 
 
-def without(height: FloatArray, quiet: BoolArray, drift: bool) -> FloatArray:
+def without(height: FloatArray, quiet: BoolArray, bank: Bank) -> FloatArray:
     """Heights (n,) with every run that is not quiet brought down to its shoulders."""
     if quiet.all():
         return height
     height = height.copy()
     edges = np.flatnonzero(np.diff(np.concatenate([[True], quiet, [True]])))
     for begin, end in edges.reshape(-1, 2):
-        shoulders = _shoulders(height, begin, end, drift)
+        shoulders = _shoulders(height, begin, end, bank)
         height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
     return height
 
@@ -168,7 +168,7 @@ def _stretches(
             if snr < HIDING * threshold:
                 weak.append((place, half_width))
                 continue
-            shoulders = _shoulders(height, begin, end, bank.drift > 0)
+            shoulders = _shoulders(height, begin, end, bank)
             changed = True
             height[begin:end] = np.interp(np.arange(begin, end), [begin - 1, end], shoulders)
 
@@ -177,7 +177,7 @@ def _scarcity(profile: SweepHeights, bank: Bank) -> FloatArray:
     """(n,) share by which the noise's variance in a bin exceeds the average for want of samples; 0 if none does."""
     counts = np.maximum(np.diff(profile.first), 1)
     white = bank.noise.white**2 / bank.samples
-    share = white / max(white + bank.noise.correlated**2, np.finfo(float).tiny)
+    share = white / max(white + bank.noise.correlated_sd**2, np.finfo(float).tiny)
     return np.asarray(share * (bank.samples / counts - 1.0))
 
 
@@ -276,13 +276,21 @@ def _smoothing(
     return size, float(np.sqrt(covariance[0]))
 
 
-def _shoulders(height: FloatArray, begin: int, end: int, drift: bool) -> tuple[float, float]:
-    """Levels to join when a stretch is removed: the base itself, or what stands beside it."""
-    if not drift:
-        return 0.0, 0.0
+def _shoulders(height: FloatArray, begin: int, end: int, bank: Bank) -> tuple[float, float]:
+    """Levels to join when a stretch is removed: what stands beside it, as far as that tells what lay below.
+
+    Over an unknown base that is all of it; over a known one, under a law of several terms, what the noise beside says
+    of the noise within: the share of its mean that its neighbour has in common. Under one process the base will do.
+    """
     size = max(2, (end - begin) // 3)
+    share = 1.0
+    if bank.drift == 0:
+        if not bank.noise.further:
+            return 0.0, 0.0
+        own, next_ = bank.noise.block_covariances(2, size * bank.spacing, size * bank.samples)
+        share = float(next_ / own)
     sides = [height[max(0, begin - size) : begin], height[end : end + size]]
-    levels = [float(np.median(side)) for side in sides if len(side)] or [0.0]
+    levels = [share * float(np.median(side)) for side in sides if len(side)] or [0.0]
     return levels[0], levels[-1]
 
 

@@ -12,7 +12,7 @@ from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
 from mapping.detection.candidates import LARGEST_SHARE, Searched, search, unclear_bins, without
 from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import STEP_CROSSINGS, Crossing
-from mapping.detection.empirical_null import NullScale, effective_noise, null_scales, typical_scale
+from mapping.detection.empirical_null import NullScale, effective_noise, limit_along, null_scales
 from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH, Bank, smallest_half_width, threshold_for
 from mapping.detection.outliers import outliers
 from mapping.detection.paper_algorithms import along_chord, curvature_features
@@ -173,21 +173,22 @@ def detect(
     # what is stated of the whole trace holds for the sweeps that make most of it
     usual = max(lengths, key=lambda spacing: lengths[spacing])
     threshold, bank = thresholds[usual], behind.banks[usual]
+    found_from = bank.detection_limit(threshold, tip)
     rounding, remarks = UNRESOLVED * trace.resolution, tuple[str, ...]()
     # a noise that is given is the caller's word; one that was fitted is held against the quiet path
     if noise is None and level.white > CONTACT_ROUNDING * tip:
         weighed, nulls = _weighed(profiles, list(found), behind.banks, level, thresholds, tip)
         told = [null for p, null in zip(profiles, nulls, strict=True) if p.spacing == usual and null is not None]
-        scaled = bank.scaled(typical_scale(told)) if told else bank
+        measured = limit_along(bank, told, threshold, tip) if told else found_from
         # where all that is kept must stand out of the rounding of the positions, the law of what is less than that
         # decides nothing; and it is no law: a level path rounds to one value, a steep one to another at each sample
-        if scaled.detection_limit(threshold, tip) > rounding:
-            remarks = (_raised(scaled, bank, threshold, tip, base),) if told else ()
+        if measured > rounding:
+            remarks = (_raised(measured, found_from, base),) if told else ()
             # over a base that was fitted to one profile, small features and roughness are the same thing: what
             # speaks against the law is said, and decides nothing (see _stands_out)
             if base.kind != "profile":
                 found, level = weighed, floored(effective_noise(bank, told), tip) if told else level
-                bank = scaled
+                found_from = measured
     crossings = []
     for one, each in zip(over, found, strict=True):
         disturbances = each.disturbances
@@ -201,7 +202,7 @@ def detect(
     left_out += unresolved
     if algorithm != 3:
         crossings = _judged(crossings, usable, algorithm, level)
-    limit = max(bank.detection_limit(threshold, tip), rounding)
+    limit = max(found_from, rounding)
     of_each = _inspected(profiles, behind.banks)
     return Detections(
         tuple(crossings),
@@ -260,7 +261,7 @@ def _weighed(
             masks = [found[i].unclear for i in numbers]
         tails = None
         for _ in range(NULL_ROUNDS):
-            heights = [without(p.height, mask, bank.drift > 0) for p, mask in zip(group, masks, strict=True)]
+            heights = [without(p.height, mask, bank) for p, mask in zip(group, masks, strict=True)]
             scales = null_scales(group, heights, masks, bank, threshold, CONTACT_ROUNDING * tip, tails)
             # what is found, but not clear, stays out of the tails: they tell of noise that is nowhere found
             tails = scales[0].tails
@@ -278,8 +279,8 @@ def _weighed(
     return found, nulls
 
 
-def _raised(measured: Bank, fitted: Bank, threshold: float, tip: float, base: Base) -> str:
-    before, after = (length_text(bank.detection_limit(threshold, tip), 2) for bank in (fitted, measured))
+def _raised(measured: float, fitted: float, base: Base) -> str:
+    before, after = length_text(fitted, 2), length_text(measured, 2)
     said = (
         "the noise is not the same everywhere, or of no simple law: where nothing is, the filters' outputs scatter "
         "otherwise than the fitted noise says"
@@ -287,7 +288,7 @@ def _raised(measured: Bank, fitted: Bank, threshold: float, tip: float, base: Ba
     if base.kind == "profile":
         return f"{said}; one profile cannot tell roughness from small features, and crests below {after} may be either"
     limit = f"is {after} instead of {before}" if after != before else f"stays {after}"
-    return f"{said}; crests are weighed by what was measured, and the typical limit {limit}"
+    return f"{said}; crests are weighed by what was measured, and the limit {limit}"
 
 
 def _felt(laid: LaidTrace, profiles: dict[int, tuple[SweepHeights, ...]]) -> tuple[BoolArray, tuple[str, ...]]:

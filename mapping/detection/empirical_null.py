@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -36,6 +36,11 @@ CELL_WIDTHS = 12.0
 LEAST_SWEEP_WIDTHS = 2 * CELL_WIDTHS
 # Filters between one that is measured and the next: neighbours on the ladder see nearly the same.
 STRIDE = 3
+# Places of a profile that tell how loud it is along it, and groups that places of like loudness are put into: a group
+# holds a twentieth of the path, which is what a limit of 95 % is about.
+PLACES_A_PROFILE, LOUDNESS_GROUPS = 64, 20
+# Standard deviations within which 95 % of a normal variable's values are, from below
+CERTAIN = 1.6448536
 # Correlation lengths among which that of the effective noise is chosen: a quarter of an octave apart or less.
 CORRELATION_LENGTHS = 40
 # Share of a filter's width from which features may have been taken out: its output loses that share of its variance.
@@ -143,13 +148,19 @@ def null_scales(
         told = [_cell_levels(z, len(i), bank, k) for z, i in zip(outputs, inherited, strict=True)]
         if all(p.length >= LEAST_SWEEP_WIDTHS * widths[k] for p in profiles):
             inherited, variance = _deviations(told)
+        error = LOG_VARIANCE_PER_WIDTH * widths[k] / length + _spread(inherited)
         unsure = variance + levels.doubt_over(2 * widths[k] / bank.spacing)
+        if bank.noise.further:
+            unsure = unsure + error
         heavier[k] = _heavier_tail(together, length / widths[k], threshold) if tails is None else tails[k]
         # an uncertain level makes such tails, too
         doubt[k] = max(_doubt(0.5 * np.sqrt(unsure), threshold), heavier[k])
         level = 2 * np.log(max(robust_sd(together), 1e-12))
-        error = LOG_VARIANCE_PER_WIDTH * widths[k] / length + _spread(inherited)
-        pooled[k] = _likely_scale(level, error, length / widths[k], len(measured))
+        if bank.noise.further:
+            # a sum of processes stands in for a law that is none: its ripple is measured, not doubted
+            pooled[k] = np.exp(0.5 * level)
+        else:
+            pooled[k] = _likely_scale(level, error, length / widths[k], len(measured))
         if not any(deviation.any() for deviation in inherited):
             # one level everywhere: the fitted one is not undercut, for many a law has lighter middles than tails
             pooled[k] = max(1.0, pooled[k])
@@ -164,18 +175,49 @@ def null_scales(
     ]
 
 
-def typical_scale(scales: Sequence[NullScale]) -> FloatArray:
-    """(F,) for each filter, the median over all cells of all profiles."""
-    levels = [(each.doubt * each.pooled)[:, None] * each.own * np.sqrt(np.median(each.local)) for each in scales]
-    return np.asarray(np.median(np.concatenate(levels, axis=1), axis=1))
+def limit_along(bank: Bank, scales: Sequence[NullScale], threshold: float, tip_radius: float) -> float:
+    """Height of a sharp crest that is found with 95 % probability at a place by chance along all profiles, m.
+
+    Where the noise is louder less is found: at each place the probability is Phi of the signal-to-noise ratio, which
+    grows as the 5/4th power of the height, less the threshold (theory equation 6.13), and its mean over the path is
+    what is promised. Places are put together by how loud they are.
+    """
+    from scipy.optimize import brentq
+    from scipy.special import ndtr
+
+    filters = range(len(bank.filters))
+    parts = []
+    for scale in scales:
+        places = np.arange(0, len(scale.local), max(1, len(scale.local) // PLACES_A_PROFILE))
+        parts.append(np.array([scale.along(k)[places] for k in filters]))
+    levels = np.concatenate(parts, axis=1)
+    usual = bank.scaled(np.median(levels, axis=1)).detection_limit(threshold, tip_radius)
+    if not np.isfinite(usual):
+        return usual
+    widths = np.array([f.half_width for f in bank.filters])
+    at = int(np.abs(np.log(widths / np.sqrt(2 * tip_radius * usual))).argmin())
+    groups = np.array_split(np.argsort(levels[at], kind="stable"), min(LOUDNESS_GROUPS, levels.shape[1]))
+    told = [bank.scaled(levels[:, group].mean(axis=1)).detection_limit(threshold, tip_radius) for group in groups]
+    shares = np.array([len(group) for group in groups]) / levels.shape[1]
+    found = float(ndtr(CERTAIN))
+
+    def excess(logarithm: float) -> float:
+        signal = (threshold + CERTAIN) * (np.exp(logarithm) / np.array(told)) ** 1.25
+        return float(shares @ ndtr(signal - threshold)) - found
+
+    low, high = np.log(min(told)), np.log(max(told))
+    if not np.isfinite(high) or excess(low) >= 0 or excess(high) <= 0:
+        return max(told)
+    return float(np.exp(brentq(excess, low, high, xtol=1e-4)))
 
 
 def effective_noise(bank: Bank, scales: Sequence[NullScale]) -> Noise:
-    """White and correlated noise under which the filters' outputs scatter as measured, for all who need one law.
+    """The noise under which the filters' outputs scatter as measured, for all who need one law.
 
-    The variance of a filter's output is linear in the variances of both parts: for each correlation length of a
-    ladder, the least relative errors over the filters and over the white level of single samples, each weighed by
-    how well a path of that length tells it: single bins tell the level, and a wide filter sees few places.
+    The variance of a filter's output is linear in the variances of all parts: white noise, one process whose length is
+    chosen from a ladder, and the fitted further terms, with the least relative errors over the filters and over the
+    white level of single samples, each weighed by how well a path of that length tells it: single bins tell the level,
+    and a wide filter sees few places.
     """
     from scipy.optimize import nnls
 
@@ -183,18 +225,23 @@ def effective_noise(bank: Bank, scales: Sequence[NullScale]) -> Noise:
     measured = [np.mean([np.mean(scale.level(k) ** 2) for scale in scales]) for k in numbers]
     target = np.array([bank.filters[k].sd ** 2 * m for k, m in zip(numbers, measured, strict=True)])
     level = float(np.mean([scale.local.mean() for scale in scales])) * bank.noise.white**2
-    white = np.array([_output_variance(bank, k, Noise(1.0)) for k in numbers])
     bins = sum(len(scale.local) for scale in scales)
     seen = np.array([bins * bank.spacing / bank.filters[k].half_width for k in numbers]) / LOG_VARIANCE_PER_WIDTH
     weights = np.sqrt(np.append(seen, bins / LOG_VARIANCE_PER_BIN))
+
+    def shape(noise: Noise) -> FloatArray:
+        own = [_output_variance(bank, k, noise) for k in numbers] / target
+        return np.asarray(np.append(own, noise.white**2 / level) * weights)
+
+    kept = [shape(Noise(1.0)), *(shape(Noise(0.0, 0.0, 1.0, (replace(t, sd=1.0),))) for t in bank.noise.further)]
     best, noise = np.inf, bank.noise
     for length in np.geomspace(2 * bank.spacing, bank.filters[-1].half_width, CORRELATION_LENGTHS):
-        correlated = [_output_variance(bank, k, Noise(0.0, 1.0, float(length))) for k in numbers]
-        shapes = np.column_stack([white, correlated]) / target[:, None]
-        levels, misfit = nnls(np.vstack([shapes, [1 / level, 0.0]]) * weights[:, None], weights)
+        shapes = np.column_stack([*kept, shape(Noise(0.0, 1.0, float(length)))])
+        levels, misfit = nnls(shapes, weights)
         if misfit < best:
-            white_sd, correlated_sd = np.sqrt(levels).tolist()
-            best, noise = misfit, Noise(white_sd, correlated_sd, float(length))
+            white, *further, correlated = np.sqrt(levels).tolist()
+            terms = (replace(t, sd=sd) for t, sd in zip(bank.noise.further, further, strict=True) if sd > 0)
+            best, noise = misfit, Noise(white, correlated, float(length), tuple(terms))
     return noise
 
 

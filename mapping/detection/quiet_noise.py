@@ -28,7 +28,9 @@ UNLIKELY = 10.0
 # Samples that the noise is first estimated from, and blocks that it is fitted to.
 RAW_SAMPLES = 40_000
 NOISE_FIT_BLOCKS = 8000
-QUIET_NOISE_ROUNDS = 3
+# Rounds in which noise and quiet path settle; where one process is not enough, as many again: a first look through one
+# process takes the slow parts of 1/f noise for features, and two fifths of the path for quiet.
+QUIET_NOISE_ROUNDS, MORE_ROUNDS = 3, 3
 GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
 
 
@@ -143,7 +145,9 @@ def background(
         return Background(floored(given, tip_radius), banks, dict.fromkeys(banks, 0.0))
     level, fit, banks = first, NoiseFit(first), _banks(profiles, first, tip_radius, largest, drift)
     before: list[BoolArray] = []
-    for _ in range(QUIET_NOISE_ROUNDS):
+    for turn in range(QUIET_NOISE_ROUNDS + MORE_ROUNDS):
+        if turn >= QUIET_NOISE_ROUNDS and not level.further:
+            break
         quiet = [
             quiet_bins(p, banks[p.spacing], level, SUSPECT, tip_radius) & _likely(p, level, drift) for p in profiles
         ]
@@ -238,7 +242,9 @@ def _uncertainty(fit: NoiseFit, bank: Bank) -> float:
     """Relative standard deviation of the narrowest filter's noise; every threshold rests on it."""
     width, spacing, samples = bank.filters[0].half_width, bank.spacing, bank.samples
     own = filter_sd(width, fit.noise, spacing, samples, bank.drift)
-    others = [filter_sd(width, perturbed(fit.noise, k, 0.1), spacing, samples, bank.drift) for k in range(3)]
+    others = [
+        filter_sd(width, perturbed(fit.noise, k, 0.1), spacing, samples, bank.drift) for k in range(len(fit.covariance))
+    ]
     return relative_sd(fit, np.log(np.array(others) / own) / 0.1)
 
 

@@ -6,13 +6,13 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from mapping.instrument.averaging import Means as Means, RunMeans as RunMeans, running_mean as running_mean
-    from mapping.instrument.fit import (
+    from mapping.instrument.block_likelihood import (
         Blocks as Blocks,
         NoiseFit as NoiseFit,
-        fit_noise as fit_noise,
         perturbed as perturbed,
         relative_sd as relative_sd,
     )
+    from mapping.instrument.fit import fit_noise as fit_noise
     from mapping.instrument.noise import Noise as Noise, estimate_noise as estimate_noise
     from mapping.instrument.robust import (
         BISQUARE as BISQUARE,
@@ -25,11 +25,14 @@ if TYPE_CHECKING:
         robust_sd as robust_sd,
     )
     from mapping.instrument.stated import StatedNoise as StatedNoise
+    from mapping.instrument.states import Filter as Filter, mean_steps as mean_steps
+    from mapping.instrument.term import Term as Term
     from mapping.instrument.tip_calibration import TipCalibration as TipCalibration, calibrate_tip as calibrate_tip
 
 _PUBLIC = {
     "averaging": ("Means", "RunMeans", "running_mean"),
-    "fit": ("Blocks", "NoiseFit", "fit_noise", "perturbed", "relative_sd"),
+    "block_likelihood": ("Blocks", "NoiseFit", "perturbed", "relative_sd"),
+    "fit": ("fit_noise",),
     "noise": ("Noise", "estimate_noise"),
     "robust": (
         "BISQUARE",
@@ -42,6 +45,8 @@ _PUBLIC = {
         "robust_sd",
     ),
     "stated": ("StatedNoise",),
+    "states": ("Filter", "mean_steps"),
+    "term": ("Term",),
     "tip_calibration": ("TipCalibration", "calibrate_tip"),
 }
 doorway(__name__, _PUBLIC)

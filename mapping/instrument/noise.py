@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping import FloatArray, NoiseError
 from mapping.instrument.robust import robust_sd
-
-# The median of |x| of a standard normal variable: turns a median absolute deviation into a standard deviation.
+from mapping.instrument.states import point_steps
+from mapping.instrument.term import Term
 
 # A correlated part must lower chi-square by this much, or the noise counts as white.
 LEAST_CHI_SQUARE_GAIN = 6.0
@@ -24,24 +26,27 @@ FACTORIALS = np.cumprod(np.arange(1.0, 22.0))[SERIES_POWERS + 1]
 
 @dataclass(frozen=True)
 class Noise:
-    """White noise plus an Ornstein-Uhlenbeck process along the arclength.
+    """White noise plus Ornstein-Uhlenbeck processes and oscillators along the arclength.
 
-    The covariance of two samples is white^2 delta_ij + correlated^2 exp(-|s_i - s_j| / length).
+    The covariance of two samples is white^2 delta_ij + correlated^2 exp(-|s_i - s_j| / length), and what further terms
+    add to it.
 
     Args:
         white: standard deviation of the independent part, m.
         correlated: standard deviation of the correlated part, m.
         length: correlation length, m; matters only where `correlated` is positive.
+        further: correlated terms beyond that one, where one does not explain what is measured.
 
     Raises:
         NoiseError: a negative or non-finite value, or correlated noise without a positive length.
 
-    Reference: theory section 6.
+    Reference: theory section 6, equation 6.16.
     """
 
     white: float
     correlated: float = 0.0
     length: float = 1e-3
+    further: tuple[Term, ...] = ()
 
     def __post_init__(self) -> None:
         values = (self.white, self.correlated, self.length)
@@ -52,10 +57,55 @@ class Noise:
         if self.correlated > 0 and self.length == 0:
             raise NoiseError("correlated noise needs a positive correlation length; found 0")
 
+    @classmethod
+    def of_terms(cls, white: float, terms: Sequence[Term], length: float = 1e-3) -> Noise:
+        """White noise and terms; `length` stands where none of them is an Ornstein-Uhlenbeck process."""
+        plain = [t for t in terms if not t.turns]
+        first = max(plain, key=lambda t: t.sd, default=None)
+        if first is None:
+            return cls(white, 0.0, length, tuple(terms))
+        return cls(white, first.sd, first.length, tuple(t for t in terms if t is not first))
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """All correlated parts."""
+        own = (Term(self.correlated, self.length),) if self.correlated > 0 else ()
+        return own + self.further
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Its numbers, for JSON; no further terms are no entry, and a wavelength that is infinite is none."""
+        numbers: dict[str, Any] = {"white": self.white, "correlated": self.correlated, "length": self.length}
+        if self.further:
+            numbers["further"] = [
+                {"sd": t.sd, "length": t.length} | ({"wavelength": t.wavelength} if t.turns else {})
+                for t in self.further
+            ]
+        return numbers
+
+    @property
+    def correlated_sd(self) -> float:
+        """Standard deviation of all correlated parts together, m."""
+        return float(np.sqrt(self.correlated**2 + sum(t.sd**2 for t in self.further)))
+
+    @property
+    def longest(self) -> float:
+        """The longest correlation length, m; 0 for white noise."""
+        return max((t.length for t in self.terms), default=0.0)
+
     @property
     def sd(self) -> float:
         """Standard deviation of a single sample, m."""
-        return float(np.hypot(self.white, self.correlated))
+        return float(np.hypot(self.white, self.correlated_sd))
+
+    def scaled(self, height: float = 1.0, path: float = 1.0, white: float = 1.0) -> Noise:
+        """The noise with its levels and lengths so many times as large, and the white level `white` times that."""
+        further = tuple(Term(t.sd * height, t.length * path, t.wavelength * path) for t in self.further)
+        return Noise(self.white * height * white, self.correlated * height, self.length * path, further)
+
+    def of_passes(self, count: int) -> Noise:
+        """Of the samples of so many passes over one place: the correlated parts average out, not along a pass."""
+        return replace(self.scaled(count**-0.5), white=self.white)
 
     def rounded(self, step: float) -> Noise:
         """This noise together with that of positions rounded to a step, m.
@@ -69,13 +119,43 @@ class Noise:
             return self
         own, rounding = self.correlated**2, step**2 / 12.0
         length = (own * self.length + rounding * step) / (own + rounding)
-        return Noise(self.white, float(np.sqrt(own + rounding)), length)
+        return Noise(self.white, float(np.sqrt(own + rounding)), length, self.further)
 
     def covariance(self, s: ArrayLike) -> FloatArray:
         """(N, N) covariance of samples at arclengths s (N,), m^2."""
         s = np.asarray(s, dtype=np.float64)
-        lag = np.abs(s[:, None] - s[None, :]) / max(self.length, np.finfo(float).tiny)
-        return np.asarray(self.white**2 * np.eye(len(s)) + self.correlated**2 * np.exp(-lag))
+        lag = np.abs(s[:, None] - s[None, :])
+        out = self.white**2 * np.eye(len(s))
+        for t in self.terms:
+            out += t.sd**2 * np.exp(-t.rate * lag).real
+        return np.asarray(out)
+
+    def density(self, frequency: FloatArray, spacing: float) -> FloatArray:
+        """Two-sided spectral density at angular frequencies, rad/m, of samples so far apart, m^3.
+
+        Reference: theory equation 6.2.
+        """
+        out = np.full(np.shape(frequency), self.white**2 * spacing)
+        for t in self.terms:
+            out += 2.0 * t.sd**2 * (t.rate / (t.rate**2 + np.asarray(frequency) ** 2)).real
+        return np.asarray(out)
+
+    def cap_sd(self, half_width: FloatArray, spacing: float) -> FloatArray:
+        """(W,) relative standard deviation, m, of the height of caps 1 - (x / w)^2 of these half-widths, m.
+
+        White noise leaves the information 16 w / (15 sigma^2 Delta) on the height, a process of correlation length L
+        the integral of (T'^2 L + T^2 / L) / (2 sigma^2) over the cap T (theory equations 6.9 and 6.11). Parts are
+        added as if each stood alone, which is an upper bound of what they leave together; alone, a tone leaves nothing.
+
+        Args:
+            half_width: of the caps, m.
+            spacing: distance of the samples, m.
+        """
+        w = np.asarray(half_width)
+        total = self.white**2 * (15.0 * spacing / (16.0 * w))
+        for t in (t for t in self.terms if not t.turns):
+            total = total + t.sd**2 * 2.0 / (8.0 * t.length / (3.0 * w) + 16.0 * w / (15.0 * t.length))
+        return np.asarray(np.sqrt(total))
 
     def block_covariances(self, count: int, block: float, samples: float) -> FloatArray:
         """(count,) autocovariance of means over adjoining blocks, at lags 0 to count - 1 blocks.
@@ -84,12 +164,16 @@ class Noise:
             block: length of a block, m.
             samples: number of samples in a block; may be fractional on average.
         """
-        lags = np.arange(count)
-        x = block / max(self.length, np.finfo(float).tiny)
-        rise = -np.expm1(-x) / x
-        covariances = (self.correlated * rise) ** 2 * np.exp(-np.maximum(lags - 1, 0) * x)
-        covariances[0] = self.correlated**2 * _mean_variance(np.array(x)) + self.white**2 / samples
-        return np.asarray(covariances)
+        lags = np.maximum(np.arange(count) - 1, 0)
+        covariances, own = np.zeros(count), self.white**2 / samples
+        for t in self.terms:
+            # real numbers where nothing turns: three times as quick
+            x = block * (t.rate if t.turns else 1.0 / t.length)
+            rise = -np.expm1(-x) / x
+            covariances += np.real((t.sd * rise) ** 2 * np.exp(-lags * x))
+            own += t.sd**2 * float(_mean_variance(np.array(x)).real)
+        covariances[0] = own
+        return covariances
 
     def whiten(self, values: ArrayLike, s: ArrayLike) -> tuple[FloatArray, float]:
         """Values as seen by independent unit noise, in O(N).
@@ -111,17 +195,17 @@ class Noise:
         positions = np.asarray(s, dtype=np.float64)
         if columns.shape[:1] != positions.shape:
             raise NoiseError(f"values and s must have one length; found {columns.shape} and {positions.shape}")
-        if self.white == 0 and (self.correlated == 0 or (np.diff(positions) == 0).any()):
+        if self.white == 0 and (not self.terms or (np.diff(positions) == 0).any()):
             raise NoiseError(
                 "cannot whiten: the covariance is singular (no white noise and repeated or certain samples)"
             )
-        if self.correlated == 0:
+        if not self.terms:
             return columns / self.white, 2 * len(positions) * float(np.log(self.white))
-        from mapping.instrument.noise_kernels import innovations
-
-        flat = np.ascontiguousarray(columns.reshape(len(positions), -1))
-        whitened, logdet = innovations(flat, np.diff(positions), self.white, self.correlated, self.length)
-        return whitened.reshape(columns.shape), float(logdet)
+        count = len(positions)
+        steps = point_steps(self.terms, self.white, np.diff(positions, prepend=positions[:1]))
+        filter_ = steps.filter(np.arange(count), np.arange(count) == 0, np.ones(count, dtype=bool))
+        whitened = filter_.whiten(np.ascontiguousarray(columns.reshape(count, -1).T))
+        return np.ascontiguousarray(whitened.T).reshape(columns.shape), filter_.logdet
 
 
 def estimate_noise(residual: ArrayLike, s: ArrayLike) -> Noise:
@@ -148,10 +232,11 @@ def estimate_noise(residual: ArrayLike, s: ArrayLike) -> Noise:
 
 
 def _mean_variance(x: FloatArray) -> FloatArray:
-    """Variance of the mean of a unit OU process over x correlation lengths; series where the form cancels."""
-    safe = np.maximum(x, SERIES_LIMIT)
-    series = np.polynomial.polynomial.polyval(np.minimum(x, SERIES_LIMIT), 2.0 * SIGNS / FACTORIALS)
-    return np.where(x < SERIES_LIMIT, series, 2 * ((safe + np.expm1(-safe)) / safe) / safe)
+    """Variance of the mean of a unit process over x = rate times length; series where the form cancels."""
+    near = np.abs(x) < SERIES_LIMIT
+    safe, close = np.where(near, SERIES_LIMIT, x), np.where(near, x, SERIES_LIMIT)
+    series = np.polynomial.polynomial.polyval(close, 2.0 * SIGNS / FACTORIALS)
+    return np.where(near, series, 2 * ((safe + np.expm1(-safe)) / safe) / safe)
 
 
 def _allan_of_ou(x: FloatArray) -> FloatArray:

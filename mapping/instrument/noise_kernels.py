@@ -1,43 +1,131 @@
-"""The sequential part of whitening, compiled."""
+"""The Kalman filter of a noise's states, compiled: one recursion for all who whiten (theory section 6.9).
+
+The states of oscillators come first, two each (a complex amplitude that turns), then one for each
+Ornstein-Uhlenbeck term. Over a step every state decays, oscillators turn as well, and what is read is linear in the
+states before the step, with innovations that may be shared with the states after it (theory equation 6.17).
+"""
+
+# mypy: disable-error-code="untyped-decorator"
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
+# Relative change of a covariance below which it stands still: along a run of equal steps it soon does.
+SETTLED = 1e-10
 
-@njit(cache=True)
-def innovations(values, steps, white, correlated, length):  # type: ignore[no-untyped-def]
-    """Normalised Kalman innovations of columns (N, P) under white + OU noise, and the log-determinant."""
-    count, columns = values.shape
-    out = np.empty((count, columns))
-    state = np.zeros(columns)
-    variance = correlated * correlated
-    noise = white * white
-    logdet = 0.0
+
+@njit(cache=True, error_model="numpy")
+def gains(kind, begins, known, observe, spread, shared, carry, turn, fresh, power):  # type: ignore[no-untyped-def]
+    """Gains of the filter, which do not depend on what is read.
+
+    Args:
+        kind: (N,) row of the transition that leads to each reading.
+        begins: (N,) True where the states are as before anything was read.
+        known: (N,) False where nothing is read.
+        observe: (K, D) weights of the states before the step in what is read.
+        spread: (K,) variance of what is read, given these states.
+        shared: (K, D) its covariance with the states after the step.
+        carry: (K, D) by which each state decays.
+        turn: (K, P) sine by which the first P pairs turn.
+        fresh: (K, D) variances that the step adds.
+        power: (D,) of the states at rest.
+
+    Returns:
+        (N, D) gains, and (N,) one over the standard deviation of each innovation; 0 where nothing is read.
+    """
+    count, states, pairs = len(kind), len(power), turn.shape[1]
+    gain, scale = np.zeros((count, states)), np.zeros(count)
+    covariance, carried = np.zeros((states, states)), np.zeros((states, states))
+    seen = np.zeros(states)
+    settled = False
     for i in range(count):
-        if i > 0:
-            decay = np.exp(-steps[i - 1] / length)
-            state *= decay
-            variance = correlated * correlated + decay * decay * (variance - correlated * correlated)
-        total = variance + noise
-        root = np.sqrt(total)
-        gain = variance / total
-        for j in range(columns):
-            error = values[i, j] - state[j]
-            out[i, j] = error / root
-            state[j] += gain * error
-        variance *= noise / total
-        logdet += np.log(total)
-    return out, logdet
+        k = kind[i]
+        if begins[i]:
+            covariance[:] = 0.0
+            for a in range(states):
+                covariance[a, a] = power[a]
+        elif settled and known[i] and known[i - 1] and k == kind[i - 1]:
+            gain[i], scale[i] = gain[i - 1], scale[i - 1]
+            continue
+        settled = False
+        total = spread[k]
+        for a in range(states):
+            seen[a] = 0.0
+            for b in range(states):
+                seen[a] += covariance[a, b] * observe[k, b]
+            total += observe[k, a] * seen[a]
+        # A P, then (A P) A^T
+        for b in range(states):
+            for p in range(pairs):
+                x, y = covariance[2 * p, b], covariance[2 * p + 1, b]
+                carried[2 * p, b] = carry[k, 2 * p] * x + turn[k, p] * y
+                carried[2 * p + 1, b] = carry[k, 2 * p] * y - turn[k, p] * x
+            for a in range(2 * pairs, states):
+                carried[a, b] = carry[k, a] * covariance[a, b]
+        if known[i]:
+            scale[i] = 1.0 / np.sqrt(total)
+            for a in range(states):
+                along = shared[k, a]
+                for b in range(states):
+                    along += carried[a, b] * observe[k, b]
+                gain[i, a] = along / total
+        change = 0.0
+        for a in range(states):
+            for p in range(pairs):
+                x, y = carried[a, 2 * p], carried[a, 2 * p + 1]
+                carried[a, 2 * p] = carry[k, 2 * p] * x + turn[k, p] * y
+                carried[a, 2 * p + 1] = carry[k, 2 * p] * y - turn[k, p] * x
+            for b in range(2 * pairs, states):
+                carried[a, b] *= carry[k, b]
+            for b in range(states):
+                new = carried[a, b] - gain[i, a] * gain[i, b] * total
+                if a == b:
+                    new = max(new + fresh[k, a], 0.0)
+                change = max(change, abs(new - covariance[a, b]) / np.sqrt(power[a] * power[b]))
+                carried[a, b] = new
+        for a in range(states):
+            for b in range(states):
+                covariance[a, b] = 0.5 * (carried[a, b] + carried[b, a])
+        settled = known[i] and not begins[i] and change < SETTLED
+    return gain, scale
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def innovations(values, kind, begins, observe, carry, turn, gain, scale):  # type: ignore[no-untyped-def]
+    """(W, N) innovations over their standard deviations of W series (W, N); 0 where nothing is read."""
+    series, count = values.shape
+    states, pairs = observe.shape[1], turn.shape[1]
+    out = np.zeros((series, count))
+    state = np.zeros(states)
+    for w in range(series):
+        for i in range(count):
+            k = kind[i]
+            if begins[i]:
+                state[:] = 0.0
+            error = 0.0
+            if scale[i] > 0.0:
+                error = values[w, i]
+                for a in range(states):
+                    error -= observe[k, a] * state[a]
+                out[w, i] = error * scale[i]
+            for p in range(pairs):
+                x, y = state[2 * p], state[2 * p + 1]
+                state[2 * p] = carry[k, 2 * p] * x + turn[k, p] * y
+                state[2 * p + 1] = carry[k, 2 * p] * y - turn[k, p] * x
+            for a in range(2 * pairs, states):
+                state[a] *= carry[k, a]
+            for a in range(states):
+                state[a] += gain[i, a] * error
+    return out
 
 
 @njit(cache=True)
 def block_likelihood(values, steps, samples, white, correlated, length):  # type: ignore[no-untyped-def]
     """Twice the negative log-likelihood, less N log(2 pi), of means over adjoining blocks of white + OU noise.
 
-    The state is the process at a block's end; its mean over the next block and its next value share what happens
-    within that block.
+    `gains` and `innovations` of one state in one pass: most noise needs no more, and its fit asks most often.
 
     Args:
         values: (N,) block means; NaN where nothing counts.

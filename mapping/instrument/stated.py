@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import FloatArray, NoiseError
+from mapping import NoiseError
 from mapping.instrument.noise import Noise
 
 # Degrees of freedom of what is stated (1: Cauchy's): its tails let measurements that contradict it prevail.
@@ -34,17 +34,16 @@ class StatedNoise:
 
     def scaled(self, height: float, path: float) -> StatedNoise:
         """The same in other units of height and path."""
-        noise = Noise(self.noise.white / height, self.noise.correlated / height, self.noise.length / path)
-        return replace(self, noise=noise)
+        return replace(self, noise=self.noise.scaled(1 / height, 1 / path))
 
-    def surprise(self, theta: FloatArray) -> float:
-        """Twice the negative logarithm of its density (Student's t in each logarithm), up to a constant."""
-        total = 0.0
+    def surprise(self, noise: Noise) -> float:
+        """Twice the negative logarithm of a noise's density (Student's t in each logarithm), up to a constant."""
+        total, least = 0.0, np.finfo(float).tiny
         if self.noise.white > 0:
-            total += _tail((theta[0] - 2 * np.log(self.noise.white)) / (2 * self.doubt))
+            total += _tail(float(np.log(max(noise.white, least) / self.noise.white)) / self.doubt)
         if self.noise.correlated > 0:
-            total += _tail((theta[1] - 2 * np.log(self.noise.correlated)) / (2 * self.doubt))
-            total += _tail((theta[2] - np.log(self.noise.length)) / self.doubt)
+            total += _tail(float(np.log(max(noise.correlated, least) / self.noise.correlated)) / self.doubt)
+            total += _tail(float(np.log(noise.length / self.noise.length)) / self.doubt)
         return total
 
 

@@ -110,7 +110,7 @@ class EndFinder:
         place = places_along(felt.points, points, along)
         order = np.argsort(place, kind="stable")
         # the correlated part of the noise averages out over the slides, not along them
-        noise = replace(self.noise, correlated=self.noise.correlated / np.sqrt(felt.count))
+        noise = self.noise.of_passes(felt.count)
         shape = end_shape(crest.sign, self.strokes.tip_radius)
         wide = flattening(along, normals, points[-1] - points[0], self.strokes.tip_radius)
         fit = fit_shape(

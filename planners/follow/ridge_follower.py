@@ -234,7 +234,7 @@ class RidgeFollower:
     ) -> Crossing | None:
         """The crossing that several sweeps over one line show together."""
         # the correlated part of the noise averages out over the passes, not along them
-        noise = replace(self.noise, correlated=self.noise.correlated / np.sqrt(len(felt)))
+        noise = self.noise.of_passes(len(felt))
         return seen_again(Trace.concatenate(felt), self.sense.base, noise, point, way, like, reach, gain)
 
     def _is_open(

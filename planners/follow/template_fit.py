@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -124,8 +124,7 @@ def _binned(s: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def _covariance(place: FloatArray, samples: FloatArray, noise: Noise) -> FloatArray:
-    gap = np.abs(place[:, None] - place[None, :])
-    correlated = noise.correlated**2 * np.exp(-gap / max(noise.length, np.finfo(float).tiny))
+    correlated = replace(noise, white=0.0).covariance(place)
     # a noise-free trace still carries rounding, and the shapes are not exact
     floor = 1e-12 * float(np.ptp(place)) ** 2
     return np.asarray(correlated + np.diag(noise.white**2 / samples + floor))

@@ -38,9 +38,7 @@ def fastest_speed(
 def least_height(noise: Noise, spacing: float, tip_radius: float, ratio: float) -> float:
     """Height of the smallest sharp crest whose matched filter has a signal-to-noise ratio, m.
 
-    A crest of height h disturbs w = sqrt(2 r h) to either side, as the cap T = h (1 - (x / w)^2). White noise leaves
-    the information 16 w / (15 sigma^2 Delta) on its height, a process of correlation length L the integral of
-    (T'^2 L + T^2 / L) / (2 sigma^2 h^2).
+    A crest of height h disturbs w = sqrt(2 r h) to either side, as the cap T = h (1 - (x / w)^2).
 
     Args:
         spacing: of the samples, Delta, m.
@@ -49,8 +47,5 @@ def least_height(noise: Noise, spacing: float, tip_radius: float, ratio: float) 
     """
     heights = np.geomspace(1e-7, 1.0, 800) * tip_radius
     width = np.sqrt(2.0 * tip_radius * heights)
-    length = max(noise.length, np.finfo(float).tiny)
-    white = noise.white * np.sqrt(15.0 * spacing / (16.0 * width))
-    correlated = noise.correlated * np.sqrt(2.0 / (8.0 * length / (3.0 * width) + 16.0 * width / (15.0 * length)))
-    seen = heights >= ratio * np.hypot(white, correlated)
+    seen = heights >= ratio * noise.cap_sd(width, spacing)
     return float(heights[seen.argmax()] if seen.any() else heights[-1])

@@ -22,6 +22,7 @@ from mapping.detection.filters.matched_filter import (
     cap_bins,
     colour_in_bins,
     filter_reach,
+    on_rungs,
     rung,
     toeplitz,
 )
@@ -52,14 +53,12 @@ def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float 
         uncertainty: relative standard deviation of the filters' noise.
     """
     colour, _ = colour_in_bins(bank.noise, bank.spacing, bank.samples)
-    sizes = (
-        min(rung(colour.correlated, STEPS_PER_OCTAVE), 1.0),
-        rung(colour.length, STEPS_PER_OCTAVE) if colour.correlated else 0.0,
-        rung(bank.filters[0].half_width / bank.spacing, STEPS_PER_OCTAVE),
-    )
+    noise = on_rungs(colour, STEPS_PER_OCTAVE)
+    smallest = rung(bank.filters[0].half_width / bank.spacing, STEPS_PER_OCTAVE)
 
     def solved(near: float) -> float:
-        return _solve(_intensity(*sizes, len(bank.filters), bank.drift, near), false_alarms_per_metre * bank.spacing)
+        intensity = _intensity(noise, smallest, len(bank.filters), bank.drift, near)
+        return _solve(intensity, false_alarms_per_metre * bank.spacing)
 
     normal = solved(round(solved(TYPICAL_THRESHOLD) / THRESHOLD_STEP) * THRESHOLD_STEP)
     if uncertainty < NEGLIGIBLE_UNCERTAINTY:
@@ -71,15 +70,14 @@ def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float 
 
 
 @lru_cache(maxsize=256)
-def _intensity(correlated: float, length: float, smallest: float, count: int, drift: int, threshold: float) -> float:
+def _intensity(noise: Noise, smallest: float, count: int, drift: int, threshold: float) -> float:
     """Intensity of the clumps of a bank in units of its bins and its noise, remembered."""
-    return _clumps(correlated, length, smallest, count, drift).intensity(threshold)
+    return _clumps(noise, smallest, count, drift).intensity(threshold)
 
 
 @lru_cache(maxsize=2)
-def _clumps(correlated: float, length: float, smallest: float, count: int, drift: int) -> BankClumps:
+def _clumps(noise: Noise, smallest: float, count: int, drift: int) -> BankClumps:
     """The clumps of a bank in such units: one threshold is asked for after another."""
-    noise = Noise(float(np.sqrt(1.0 - correlated**2)), correlated, length or 1.0)
     return clumps_of(build_bank(noise, 1.0, 1.0, smallest, smallest * LADDER ** (count - 1), drift))
 
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from mapping import FloatArray
-from mapping.instrument import Noise
+from mapping.instrument import Noise, Term
 
 # Ratio of neighbouring half-widths: a cap between two templates loses less than 0.6 % of its signal-to-noise.
 LADDER = 1.2
@@ -128,7 +128,7 @@ def build_bank(noise: Noise, spacing: float, samples: float, smallest: float, la
     """
     colour, level = colour_in_bins(noise, spacing, samples)
     count = 1 + max(0, int(np.ceil(np.log(largest / smallest) / np.log(LADDER) - 1e-9)))
-    unit = _unit_filters(rung(colour.correlated), rung(colour.length), rung(smallest / spacing), count, drift)
+    unit = _unit_filters(on_rungs(colour), rung(smallest / spacing), count, drift)
     filters = tuple(
         replace(f, half_width=f.half_width * spacing, sd=f.sd * level, edge_sd=f.edge_sd * level) for f in unit
     )
@@ -137,9 +137,22 @@ def build_bank(noise: Noise, spacing: float, samples: float, smallest: float, la
 
 def colour_in_bins(noise: Noise, spacing: float, samples: float) -> tuple[Noise, float]:
     """The noise with bins for length and its level in a bin's mean for height, and that level, m."""
-    level = float(np.hypot(noise.white / np.sqrt(samples), noise.correlated))
+    level = float(np.hypot(noise.white / np.sqrt(samples), noise.correlated_sd))
     level = level if level > 0 else 1.0
-    return Noise(noise.white / np.sqrt(samples) / level, noise.correlated / level, noise.length / spacing), level
+    return noise.scaled(1 / level, 1 / spacing, float(samples) ** -0.5), level
+
+
+def on_rungs(colour: Noise, octave: int = 256) -> Noise:
+    """A noise of unit variance with its levels and lengths on the steps of a ladder: near ones become one."""
+    correlated, length = rung(colour.correlated, octave), rung(colour.length, octave) if colour.correlated else 0.0
+    further = tuple(
+        Term(rung(t.sd, octave), rung(t.length, octave), rung(t.wavelength, octave) if t.turns else np.inf)
+        for t in colour.further
+    )
+    # a process shorter than any filter's bin is white noise; no length is needed without a process
+    stepped = Noise(0.0, correlated, length or 1.0, further)
+    left = 1.0 - stepped.correlated_sd**2
+    return replace(stepped, white=left**0.5) if left > 0 else stepped.scaled(1.0 / stepped.correlated_sd)
 
 
 def rung(size: float, octave: int = 256) -> float:
@@ -148,13 +161,8 @@ def rung(size: float, octave: int = 256) -> float:
 
 
 @lru_cache(maxsize=64)
-def _unit_filters(
-    correlated: float, length: float, smallest: float, count: int, drift: int
-) -> tuple[MatchedFilter, ...]:
+def _unit_filters(noise: Noise, smallest: float, count: int, drift: int) -> tuple[MatchedFilter, ...]:
     """Filters for bins of unit width whose noise has unit variance."""
-    correlated = min(correlated, 1.0)
-    # a process shorter than any filter's bin is white noise; no length is needed without a process
-    noise = Noise(float(np.sqrt(1.0 - correlated**2)), correlated, length or 1.0)
     return tuple(_build_filter(smallest * LADDER**k, noise, 1.0, 1.0, drift) for k in range(count))
 
 
@@ -164,12 +172,7 @@ def smallest_half_width(noise: Noise, spacing: float, samples: float, tip_radius
     A crest of half-width w is w^2 / (2 r) high; its estimate has the sd of the matched filter.
     """
     widths = np.geomspace(1.5 * spacing, 4 * tip_radius + 3 * spacing, 40)
-    # information on a cap under white noise: 16 w / (15 sigma^2 Delta); under an OU process of correlation length L:
-    # the integral of (T'^2 L + T^2 / L) / (2 sigma^2) over the cap T
-    white = noise.white * np.sqrt(15 * spacing / (16 * widths * samples))
-    length = max(noise.length, np.finfo(float).tiny)
-    correlated = noise.correlated * np.sqrt(2 / (8 * length / (3 * widths) + 16 * widths / (15 * length)))
-    visible = widths**2 / (2 * tip_radius) > threshold * np.hypot(white, correlated)
+    visible = widths**2 / (2 * tip_radius) > threshold * noise.cap_sd(widths, spacing / samples)
     return float(widths[visible.argmax()] if visible.any() else widths[-1])
 
 
@@ -190,8 +193,8 @@ def toeplitz(first: FloatArray) -> FloatArray:
 def filter_reach(half_width: float, noise: Noise, step: float, drift: int) -> int:
     """Bins that a filter needs on either side: the cap, a stretch to know the drift by, and what noise it shares."""
     reach = int(np.ceil((3.5 if drift else 1.0) * half_width / step))
-    if noise.correlated > 0:
-        reach += int(min(np.ceil(2 * noise.length / step) + 1, 1.5 * half_width / step + 1))
+    if noise.terms:
+        reach += int(min(np.ceil(2 * noise.longest / step) + 1, 1.5 * half_width / step + 1))
     return reach
 
 

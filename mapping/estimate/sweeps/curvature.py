@@ -46,10 +46,10 @@ def half_width_for(noise: Noise, spacing: float, threshold: float) -> float:
     from scipy.optimize import brentq
 
     white = float((22.5 * noise.white**2 * spacing * THRESHOLD_SDS**2 / threshold**2) ** 0.2)
-    if noise.correlated == 0:
+    if not noise.terms:
         return max(white, 4 * spacing)
     # over many correlation lengths the process is white noise of this density; over few it is less than that
-    density = noise.white**2 * spacing + 2 * noise.correlated**2 * noise.length
+    density = float(noise.density(np.zeros(1), spacing)[0])
     widest = float((22.5 * density * THRESHOLD_SDS**2 / threshold**2) ** 0.2)
 
     def excess(log_width: float) -> float:

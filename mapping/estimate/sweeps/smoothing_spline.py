@@ -66,7 +66,7 @@ def smoothing_length(noise: Noise, spacing: float, tip_radius: float) -> float:
     def excess(log_h: float) -> float:
         return float(np.log(curvature_sd(noise, spacing, np.exp(log_h)) * tip_radius * CONFIDENCE))
 
-    low, high = np.log(1e-9 * tip_radius), np.log(1e9 * max(tip_radius, noise.sd, noise.length))
+    low, high = np.log(1e-9 * tip_radius), np.log(1e9 * max(tip_radius, noise.sd, noise.length, noise.longest))
     if excess(low) <= 0:
         return float(np.exp(low))
     return float(np.exp(brentq(excess, low, high, xtol=1e-6)))
@@ -88,6 +88,5 @@ def _remaining(noise: Noise, spacing: float, h: float, power: int) -> float:
     Reference: theory equation 6.6.
     """
     x = np.geomspace(1e-6, 1e3, 2000)  # x = h w
-    density = noise.white**2 * spacing + 2 * noise.correlated**2 * noise.length / (1 + (x * noise.length / h) ** 2)
-    integrand = density * x**power / (1 + x**4) ** 2
+    integrand = noise.density(x / h, spacing) * x**power / (1 + x**4) ** 2
     return float(np.sqrt(np.trapezoid(integrand * x, np.log(x)) / (np.pi * h ** (power + 1))))

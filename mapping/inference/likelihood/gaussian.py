@@ -53,7 +53,16 @@ class Likelihood:
         f = self.filter
         templates = np.ascontiguousarray(templates)
         square = chi_square(
-            self.window.height, templates, f.starts, f.carry, f.observe, f.gain, f.scale, self.basis, self.shrink
+            self.window.height,
+            templates,
+            f.starts,
+            f.carry,
+            f.observe,
+            f.gain,
+            f.turn,
+            f.scale,
+            self.basis,
+            self.shrink,
         )
         return np.asarray(-0.5 * square)
 

@@ -1,4 +1,4 @@
-"""Compiled whitening of binned traces: one pass of a scalar Kalman filter, O(n) per template."""
+"""Compiled whitening of binned traces: one pass of a Kalman filter of the states, O(n) per template."""
 
 # mypy: disable-error-code="untyped-decorator"
 
@@ -16,20 +16,37 @@ LANES = 8
 
 @njit(cache=True, nogil=True)
 def whiten(
-    values: FloatArray, starts: IntArray, carry: FloatArray, observe: FloatArray, gain: FloatArray, scale: FloatArray
+    values: FloatArray,
+    starts: IntArray,
+    carry: FloatArray,
+    observe: FloatArray,
+    gain: FloatArray,
+    turn: FloatArray,
+    scale: FloatArray,
 ) -> FloatArray:
     """Innovations over their standard deviation of W series (W, n); the filter begins anew at each of `starts`.
 
-    m' = carry m + gain v, v = y - observe m: the gains do not depend on the data.
+    m' = carry m + gain v, v = y - observe . m: the gains do not depend on the data.
     """
     walkers, n = values.shape
+    states, pairs = carry.shape[1], turn.shape[1]
     out = np.empty((walkers, n))
+    state = np.zeros(states)
     for w in range(walkers):
         for run in range(len(starts) - 1):
-            state = 0.0
+            state[:] = 0.0
             for i in range(starts[run], starts[run + 1]):
-                innovation = values[w, i] - observe[i] * state
-                state = carry[i] * state + gain[i] * innovation
+                innovation = values[w, i]
+                for a in range(states):
+                    innovation -= observe[i, a] * state[a]
+                for p in range(pairs):
+                    x, y = state[2 * p], state[2 * p + 1]
+                    state[2 * p] = carry[i, 2 * p] * x + turn[i, p] * y
+                    state[2 * p + 1] = carry[i, 2 * p] * y - turn[i, p] * x
+                for a in range(2 * pairs, states):
+                    state[a] *= carry[i, a]
+                for a in range(states):
+                    state[a] += gain[i, a] * innovation
                 out[w, i] = innovation * scale[i]
     return out
 
@@ -42,6 +59,7 @@ def chi_square(
     carry: FloatArray,
     observe: FloatArray,
     gain: FloatArray,
+    turn: FloatArray,
     scale: FloatArray,
     basis: FloatArray,
     shrink: FloatArray,
@@ -52,9 +70,10 @@ def chi_square(
     `shrink` (runs, Q) holding g_j^2. `whiten` and this in one pass, which keeps no whitened series.
     """
     walkers, count = templates.shape[0], basis.shape[1]
+    states, pairs = carry.shape[1], turn.shape[1]
     total = np.zeros(walkers)
-    below, state, white, square = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
-    dots = np.empty((count, LANES))
+    innovation, white, square = np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    state, dots = np.empty((states, LANES)), np.empty((count, LANES))
     for first in range(0, walkers, LANES):
         square[:] = 0.0
         for run in range(len(starts) - 1):
@@ -62,11 +81,23 @@ def chi_square(
             state[:] = 0.0
             for i in range(starts[run], starts[run + 1]):
                 for lane in range(LANES):  # the last template fills the lanes that are left over
-                    below[lane] = templates[min(first + lane, walkers - 1), i]
+                    innovation[lane] = height[i] - templates[min(first + lane, walkers - 1), i]
+                for a in range(states):
+                    for lane in range(LANES):
+                        innovation[lane] -= observe[i, a] * state[a, lane]
+                for p in range(pairs):
+                    for lane in range(LANES):
+                        x, y = state[2 * p, lane], state[2 * p + 1, lane]
+                        state[2 * p, lane] = carry[i, 2 * p] * x + turn[i, p] * y
+                        state[2 * p + 1, lane] = carry[i, 2 * p] * y - turn[i, p] * x
+                for a in range(2 * pairs):
+                    for lane in range(LANES):
+                        state[a, lane] += gain[i, a] * innovation[lane]
+                for a in range(2 * pairs, states):
+                    for lane in range(LANES):
+                        state[a, lane] = carry[i, a] * state[a, lane] + gain[i, a] * innovation[lane]
                 for lane in range(LANES):
-                    innovation = height[i] - below[lane] - observe[i] * state[lane]
-                    state[lane] = carry[i] * state[lane] + gain[i] * innovation
-                    white[lane] = innovation * scale[i]
+                    white[lane] = innovation[lane] * scale[i]
                     square[lane] += white[lane] * white[lane]
                 for j in range(count):
                     for lane in range(LANES):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mapping.arrays import FloatArray
@@ -33,11 +35,22 @@ def test_in_white_noise_the_computed_limit_is_the_measured_one() -> None:
     assert measured.detection_limit <= 1.13 * computed.detection_limit
 
 
-def test_where_the_level_differs_by_sweep_the_limit_is_raised_and_that_is_told() -> None:
+def test_where_the_level_differs_by_sweep_the_computed_limit_is_that_of_a_place_by_chance() -> None:
+    levels = np.exp(0.7 * np.random.default_rng(14).standard_normal(SWEEPS))
+    trace, even = laid(levels), laid(np.full(SWEEPS, np.median(levels)))
+    computed = detect(trace, PLATE)
+    assert computed.detection_limit > 1.3 * detect(even, PLATE).detection_limit
+    measured = recovered(computed, trace, np.random.default_rng(0))
+    assert measured.recovered >= 0.85 * measured.injected
+    assert measured.detection_limit <= 1.13 * computed.detection_limit
+
+
+def test_a_limit_that_is_too_low_is_raised_and_that_is_told() -> None:
     trace = laid(np.exp(0.7 * np.random.default_rng(14).standard_normal(SWEEPS)))
     computed = detect(trace, PLATE)
-    measured = recovered(computed, trace, np.random.default_rng(0))
-    assert measured.detection_limit > 1.3 * computed.detection_limit
+    low = replace(computed, detection_limit=0.5 * computed.detection_limit)
+    measured = recovered(low, trace, np.random.default_rng(0))
+    assert measured.detection_limit > 1.3 * low.detection_limit
     assert measured.recovered >= 0.85 * measured.injected
     assert "limit was raised" in measured.remarks[-1]
 
