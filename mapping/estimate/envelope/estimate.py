@@ -115,9 +115,10 @@ class Estimate:
         """What is proven of the estimated surface, for people."""
         shares = [f"{100 * self.fraction(label):.0f} % {LABELS[label]}" for label in (TOUCHED, BRIDGED, EXTRAPOLATED)]
         half = float(np.quantile(self.below, 0.5, method="higher")) if len(self.points) else float("inf")
-        known = f"under half of its points the body is at most {length_text(half, 2)} away" if np.isfinite(half) else ""
-        touched = f"where touched, the body is proven to be within {length_text(self.tolerance, 2)}"
-        return f"Of the estimated surface {', '.join(shares)}: {'; '.join(part for part in (touched, known) if part)}."
+        known = f"and within {length_text(half, 2)} of half of all points" if np.isfinite(half) else ""
+        touched = f"whatever its form, the body comes within {length_text(self.tolerance, 2)} of what is touched"
+        proven = " ".join(part for part in (touched, known) if part)
+        return f"Of the estimated surface {', '.join(shares)}. Proven is: {proven}; closer sweeps prove more."
 
 
 _OF_POINTS = ("points", "normals", "centers", "labels", "sample", "sweep", "across", "below", "above")
