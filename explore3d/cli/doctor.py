@@ -160,6 +160,7 @@ def compile_kernels(quiet: bool) -> None:
     of the 1.7 CPU s of a quick analysis went into compiling 350 files anew.
     """
     from compileall import compile_dir
+
     from explore3d.cli.progress import shown
     from explore3d.jobs import run
     from explore3d.jobs.batch import rehearse
