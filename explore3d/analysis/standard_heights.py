@@ -273,12 +273,12 @@ def _result(
 
 def _mean(values: Sequence[float]) -> Interval | None:
     """The mean of sections with its 90 % interval by Student's t; of a single one the value alone."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     if not values:
         return None
     mean = float(np.mean(values))
     if len(values) == 1:
         return Interval(mean, mean, mean)
-    wide = float(t.ppf(0.95, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
+    wide = float(stdtrit(len(values) - 1, 0.95) * np.std(values, ddof=1) / np.sqrt(len(values)))
     return Interval(mean, mean - wide, mean + wide)

@@ -279,8 +279,10 @@ class Recorder(LogWriter):
         self._reading.path = path
 
     def recorded(self) -> Log:
-        """What explore3d.log.own.reader.read_log would read from the closed file."""
+        """What explore3d.log.own.reader.read_log would read from the closed file; the parts are let go of, for they
+        would stay beside the whole for as long as the session does."""
         trace = Trace.concatenate(self._traces)
+        self._traces = [trace]
         resolution = float(self._reading.start["resolution"])
         stated = trace if trace.resolution == resolution else replace(trace, resolution=resolution)
         return as_log(stated, self._reading)

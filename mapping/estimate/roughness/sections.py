@@ -29,14 +29,14 @@ def with_interval(table: FloatArray, value: Callable[[FloatArray], FloatArray], 
         value: of the sums (..., K) of all sections, the parameter (...).
         signed: True of a parameter that may be negative.
     """
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     middle = float(value(table.sum(axis=0)))
     count = len(table)
     if count < 2 or not np.isfinite(middle):
         return Interval(middle, float("nan"), float("nan"))
     low, high = np.nanquantile(value(_drawn(table)), [0.05, 0.95])
-    wider = float(np.sqrt(count / (count - 1.0)) * t.ppf(0.95, count - 1) / 1.6448536)
+    wider = float(np.sqrt(count / (count - 1.0)) * stdtrit(count - 1, 0.95) / 1.6448536)
     if signed or middle <= 0.0:
         return Interval(middle, middle - wider * (middle - float(low)), middle + wider * (float(high) - middle))
     return Interval(middle, middle * (float(low) / middle) ** wider, middle * (float(high) / middle) ** wider)
