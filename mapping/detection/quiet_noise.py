@@ -30,7 +30,7 @@ RAW_SAMPLES = 40_000
 NOISE_FIT_BLOCKS = 8000
 # Rounds in which noise and quiet path settle; where one process is not enough, as many again: a first look through one
 # process takes the slow parts of 1/f noise for features, and two fifths of the path for quiet.
-QUIET_NOISE_ROUNDS, MORE_ROUNDS = 3, 3
+QUIET_NOISE_ROUNDS = 3
 GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
 
 
@@ -144,18 +144,24 @@ def background(
         banks = _banks(profiles, floored(given, tip_radius), tip_radius, largest, drift)
         return Background(floored(given, tip_radius), banks, dict.fromkeys(banks, 0.0))
     level, fit, banks = first, NoiseFit(first), _banks(profiles, first, tip_radius, largest, drift)
-    before: list[BoolArray] = []
-    for turn in range(QUIET_NOISE_ROUNDS + MORE_ROUNDS):
-        if turn >= QUIET_NOISE_ROUNDS and not level.further:
-            break
-        quiet = [
-            quiet_bins(p, banks[p.spacing], level, SUSPECT, tip_radius) & _likely(p, level, drift) for p in profiles
-        ]
-        if before and all(np.array_equal(a, b) for a, b in zip(quiet, before, strict=True)):
-            break
-        fit = _fit(profiles, quiet, stretches, level, first, base, stated)
-        level = floored(fit.noise, tip_radius)
-        banks, before = _banks(profiles, level, tip_radius, largest, drift), quiet
+    quiet: list[BoolArray] = []
+    # Features that are not taken out yet look like slow noise: further terms are asked for when one process has
+    # found them, and with these the quiet path settles once more
+    for several in (False, True):
+        for turn in range(QUIET_NOISE_ROUNDS):
+            before = quiet
+            if turn or not several:
+                quiet = [
+                    quiet_bins(p, banks[p.spacing], level, SUSPECT, tip_radius) & _likely(p, level, drift)
+                    for p in profiles
+                ]
+                if before and all(np.array_equal(a, b) for a, b in zip(quiet, before, strict=True)):
+                    break
+            fit = _fit(profiles, quiet, stretches, level, first, base, stated, several)
+            level = floored(fit.noise, tip_radius)
+            banks = _banks(profiles, level, tip_radius, largest, drift)
+            if several and not level.further:
+                break
     return Background(level, banks, {spacing: _uncertainty(fit, bank) for spacing, bank in banks.items()})
 
 
@@ -187,15 +193,17 @@ def _fit(
     first: Noise,
     base: Base,
     stated: StatedNoise | None,
+    several: bool,
 ) -> NoiseFit:
-    """Noise of what is quiet: by likelihood over a known base, else by what an unknown base disturbs less."""
+    """Noise of what is quiet, of several terms if asked for, by likelihood over a known base; over an unknown one by
+    what that disturbs less."""
     if not base.known:
         return NoiseFit(_robust(profiles, quiet, first))
     size = max(1, -(-sum(len(stretch.s) for stretch in stretches) // NOISE_FIT_BLOCKS))
     blocks = [_raw_blocks(stretches, profiles, quiet, size)]
     if sum(p.samples * len(p.height) for p in profiles) > 1.1 * sum(len(stretch.s) for stretch in stretches):
         blocks += [_profile_blocks(p, keep) for p, keep in zip(profiles, quiet, strict=True)]
-    return fit_noise(blocks, start, stated)
+    return fit_noise(blocks, start, stated, several=several)
 
 
 def _raw_blocks(

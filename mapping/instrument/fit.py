@@ -18,7 +18,9 @@ LEAST_LIKELIHOOD_GAIN = 8.0
 LONGEST = 0.25
 
 
-def fit_noise(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None = None) -> NoiseFit:
+def fit_noise(
+    blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None = None, *, several: bool = True
+) -> NoiseFit:
     """The most likely noise, from any start within about a decade; the start where none is found.
 
     White noise alone, or with one Ornstein-Uhlenbeck process; more terms where what that leaves is not white (see
@@ -28,6 +30,7 @@ def fit_noise(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None
         blocks: what was measured, on one or more scales.
         start: a first estimate (see `estimate_noise`).
         stated: what was known before, or None.
+        several: False to stop at one process.
     """
     count = sum(int(np.isfinite(b.values).sum()) for b in blocks)
     white = white_alone(blocks)
@@ -41,6 +44,7 @@ def fit_noise(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None
         [Blocks(b.values / height, b.steps / path, b.samples) for b in blocks],
         start.scaled(1 / height, 1 / path),
         None if stated is None else stated.scaled(height, path),
+        several,
     )
     noise = fit.noise.scaled(height, path)
     if noise.correlated > 0 and noise.length > LONGEST * sum(float(np.abs(b.steps).sum()) for b in blocks):
@@ -48,7 +52,7 @@ def fit_noise(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None
     return replace(fit, noise=noise)
 
 
-def _unit_fit(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None) -> NoiseFit:
+def _unit_fit(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None, several: bool) -> NoiseFit:
     """The fit in units in which levels and steps are about 1."""
     white = white_alone(blocks)
     expected = stated.noise if stated is not None and stated.noise.correlated > 0 else None
@@ -58,4 +62,4 @@ def _unit_fit(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None
         alone = np.zeros((3, 3))
         alone[0, 0] = 2.0 / sum(int(np.isfinite(b.values).sum()) for b in blocks)
         fit = NoiseFit(Noise(white, 0.0, guess.length), alone)
-    return with_further_terms(blocks, fit, start, stated)
+    return with_further_terms(blocks, fit, start, stated) if several else fit
