@@ -408,7 +408,7 @@ def standing_told(work: Work, share: Share) -> None:
         found = [asdict(each) for each in left_standing(work.laid)] if felt else []
     found = [bend for bend in found if not any(_accounts_for(each, bend) for each in work.features)]
     for level in unclimbed_levels(work.laid):
-        if not any(kind_of(each).sided and _stands_between(each, level) for each in work.features):
+        if not any(_stands_between(each, level, work.trace.tip_radius) for each in work.features):
             work.stages.left_out.append(LeftOut(ABSORBED, _unclimbed_text(level)))
     for bend in found[:MOST_STANDING]:
         seen = f" in {count_text(bend['sweeps'], 'sweep')}" if "sweeps" in bend else ""
@@ -427,9 +427,12 @@ def _unclimbed_text(level: UnclimbedLevel) -> str:
     )
 
 
-def _stands_between(step: Feature, level: UnclimbedLevel) -> bool:
-    """True of a step about as high as the levels are apart: sweeps across have found it."""
-    return 0.5 < abs(step.height.median / level.height) < 2.0
+def _stands_between(feature: Feature, level: UnclimbedLevel, tip_radius: float) -> bool:
+    """True of a step between the two sweeps, about as high as their levels are apart: sweeps across have found it."""
+    as_high = 0.5 < abs(feature.height.median / level.height) < 2.0
+    # the sweeps' centres are a radius above the body
+    near = float(distances(level.place[None], feature.axis)[0]) < level.apart + 2.0 * tip_radius
+    return kind_of(feature).sided and as_high and near
 
 
 def _accounts_for(feature: Feature, bend: dict[str, Any]) -> bool:

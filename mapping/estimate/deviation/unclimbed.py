@@ -16,12 +16,14 @@ _KEEPS = 0.8
 
 @dataclass(frozen=True, eq=False)
 class UnclimbedLevel:
-    """By how much (signed) the sweeps from `behind` on stand over those up to `before`, m, and a place between, m."""
+    """By how much (signed) the sweeps from `behind` on stand over those up to `before`, m, the place midway between the
+    centres of these two, m, and how far they are apart, m."""
 
     height: float
     before: int
     behind: int
     place: FloatArray
+    apart: float
 
 
 def unclimbed_levels(trace: LaidTrace) -> list[UnclimbedLevel]:
@@ -43,10 +45,11 @@ def unclimbed_levels(trace: LaidTrace) -> list[UnclimbedLevel]:
         # neighbours that all differ stand on the arc of one edge
         if begun is None or found[-1].behind != one.number:
             begun, climbed = one, 0.0
-            found.append(UnclimbedLevel(0.0, one.number, one.number, one.trace.centers[0]))
+            found.append(UnclimbedLevel(0.0, one.number, one.number, _middle(one), 0.0))
         climbed += float(levels[there] - levels[here])
-        place = 0.5 * (_middle(begun) + _middle(other))
-        found[-1] = UnclimbedLevel(climbed, begun.number, other.number, place)
+        first, last = _middle(begun), _middle(other)
+        apart = float(np.linalg.norm(last - first))
+        found[-1] = UnclimbedLevel(climbed, begun.number, other.number, 0.5 * (first + last), apart)
     return found
 
 
