@@ -16,6 +16,7 @@ from mapping.geometry.proxy.draping import (
     followed,
     is_closed,
     joined,
+    rim_arcs,
     terrace_mesh,
     trench_meshes,
 )
@@ -73,7 +74,7 @@ class ProxyBody:
         self._tree = TriangleTree(Surface(*whole), 2.0 * radius)
         depth = np.full(len(whole[1]), NEVER_OPEN)
         depth[: sum(map(len, depths))] = self.scale * np.concatenate(depths)
-        rounds, groups = self._rounds([part for part in parts if isinstance(part, Chain | Bell)])
+        rounds, groups = self._rounds(parts)
         legs, hulls = self._legs(trenches)
         tree = self._tree
         self.arrays: tuple[Any, ...] = (
@@ -117,8 +118,12 @@ class ProxyBody:
         axis, normals = followed(part.axis, part.normals, self.base)
         return replace(part, axis=axis, normals=normals)
 
-    def _rounds(self, parts: Sequence[Chain | Bell]) -> tuple[FloatArray, FloatArray]:
-        rows = [self._capsules(part) if isinstance(part, Chain) else self._rings(part) for part in parts]
+    def _rounds(self, parts: Sequence[Part]) -> tuple[FloatArray, FloatArray]:
+        trenches = [part for part in parts if isinstance(part, Trench)]
+        rows = [self._capsules(part) for part in parts if isinstance(part, Chain)]
+        rows += [self._rings(part) for part in parts if isinstance(part, Bell)]
+        rows += [self._arcs(part, [each for each in trenches if each is not part])
+                 for part in trenches if len(part.axis) == 1]  # fmt: skip
         groups: list[tuple[FloatArray, float, int, int]] = []
         first = 0
         for block in rows:
@@ -178,6 +183,22 @@ class ProxyBody:
         rows[:, 12:15] = self.scale * bell.height, self.scale * bell.scale, bell.exponent
         return rows
 
+    def _arcs(self, pit: Trench, others: Sequence[Trench]) -> FloatArray:
+        """(M, 15) arcs of a rim: centre, axis, radius, middle as a direction, cosine of half the angle, kind."""
+        first, middle, last = (self.into(each) for each in rim_arcs(pit, self.base, others))
+        rows = np.zeros((len(first), 15))
+        chord, sag = 0.5 * (last - first), middle - 0.5 * (first + last)
+        sag -= np.einsum("ij,ij->i", sag, chord)[:, None] / (chord**2).sum(axis=1)[:, None] * chord
+        half, rise = np.linalg.norm(chord, axis=1), np.linalg.norm(sag, axis=1)
+        out = sag / rise[:, None]
+        radius = 0.5 * (half**2 / rise + rise)
+        axis = np.cross(out, chord)
+        rows[:, 0:3] = 0.5 * (first + last) + (rise - radius)[:, None] * out
+        rows[:, 3:6] = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+        rows[:, 6], rows[:, 7:10] = radius, out
+        rows[:, 10], rows[:, 11] = (radius - rise) / radius, 2.0
+        return rows
+
     def _legs(self, trenches: Sequence[Trench]) -> tuple[FloatArray, FloatArray]:
         rows, hulls, first = [], [], 0
         for trench in trenches:
@@ -215,14 +236,21 @@ def meridian(bell: Bell) -> FloatArray:
 
 
 def _ends(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Ends of the skeleton of capsules, or of rings, (M, 3) each."""
+    """Ends of the skeleton of capsules, of rings, or of arcs, (M, 3) each."""
     if rows[0, 11] == 0.0:
         return rows[:, 0:3], rows[:, 3:6]
+    if rows[0, 11] == 2.0:
+        cosine = rows[:, 10:11]
+        near = rows[:, 0:3] + rows[:, 6:7] * cosine * rows[:, 7:10]
+        chord = rows[:, 6:7] * np.sqrt(1.0 - cosine**2) * np.cross(rows[:, 3:6], rows[:, 7:10])
+        return near - chord, near + chord
     return rows[:, 0:3] + rows[:, 7:8] * rows[:, 3:6], rows[:, 0:3] + rows[:, 9:10] * rows[:, 3:6]
 
 
 def _widths(rows: FloatArray) -> FloatArray:
     """Distance of the surface from the skeleton, at most."""
+    if rows[0, 11] == 2.0:
+        return np.asarray(rows[:, 6] * (1.0 - rows[:, 10]))
     return np.asarray(rows[:, 6] if rows[0, 11] == 0.0 else rows[:, 8])
 
 

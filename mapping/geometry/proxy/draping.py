@@ -17,6 +17,9 @@ CHORD_ERROR = 2.5e-7
 LONGEST_MITRE = 2.0
 # Legs that chords are halved into on a bent base, at most
 MOST_HALVINGS = 7
+# Arcs of a pit's rim. On a saddle or a cylinder the rim rises and falls twice, by a in all; an arc through three of its
+# points misses it by at most a (2 pi / RIM_ARCS)^3 / (36 sqrt 3): 0.0003 of it, 0.1 um where a rim bends by 0.35 mm
+RIM_ARCS = 24
 # Rows of a floor from side to side, at most
 MOST_FLOOR_ROWS = 33
 # The ramps at the far sides of a step fall by one in so many: 1.1 degrees, below what people call a slope in a crossing
@@ -34,7 +37,7 @@ def trench_meshes(trench: Trench, base: NearestPoint, others: Sequence[Trench] =
     if len(axis) == 1:
         turn = np.linspace(0.0, 2.0 * np.pi, _chords(half) + 1)[:-1]
         across, along = _plane(trench.normals[0])
-        ring = _even(half, len(turn)) * (np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * along)
+        ring = half / np.cos(np.pi / len(turn)) * (np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * along)
         ring = np.vstack([ring, ring[:1]])
         shares = _shares(draped(axis + ring, base)[0].mean(axis=0) - axis[0])
         rows = [draped(axis + share * ring, base) for share in shares[::-1]]
@@ -64,6 +67,24 @@ def _walls(rim: FloatArray, depth: float, base: NearestPoint, others: Sequence[T
         vertices, faces = _strips([points - upper * normals, points - lower * normals])
         walls.append((vertices, faces[np.tile(~np.any(taken, axis=0), 2)] if taken else faces))
     return joined(walls)
+
+
+def rim_arcs(
+    pit: Trench, base: NearestPoint, others: Sequence[Trench] = ()
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """First, middle and last points (M, 3) of the arcs of a pit's rim, m, but for those that other trenches take away.
+
+    The walls are a polygon about the rim, so that a ball in the mouth touches the arcs: from chord to chord its normal
+    would turn by degrees.
+    """
+    turn = np.linspace(0.0, 2.0 * np.pi, 2 * RIM_ARCS + 1)
+    across, along = _plane(pit.normals[0])
+    rim, _ = draped(pit.axis + 0.5 * pit.width * (np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * along), base)
+    first, middle, last = rim[:-1:2], rim[1::2], rim[2::2]
+    whole = np.ones(RIM_ARCS, dtype=bool)
+    for other in others:
+        whole &= ~(within(first, other) | within(middle, other) | within(last, other))
+    return first[whole], middle[whole], last[whole]
 
 
 def bar_mesh(bar: Bar, base: NearestPoint) -> Mesh:
@@ -146,11 +167,6 @@ def _strips(rows: list[FloatArray]) -> Mesh:
 def _chords(radius: float) -> int:
     """Chords of a full circle that miss it by CHORD_ERROR to either side at most; an even number."""
     return 2 * max(8, int(np.ceil(np.pi / np.arccos(max(1.0 - 2.0 * CHORD_ERROR / radius, 0.9)) / 2.0)))
-
-
-def _even(radius: float, chords: int) -> float:
-    """Radius of the corners of a polygon that is outside of a circle by as much as it is inside."""
-    return float(radius * 2.0 / (1.0 + np.cos(np.pi / chords)))
 
 
 def _shares(sag: FloatArray) -> FloatArray:

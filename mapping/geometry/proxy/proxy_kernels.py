@@ -1,7 +1,7 @@
 """One step of the proxy: a ball that follows a place as far as the body lets it (numba). Theory section 12.
 
-All elements of a body are convex: triangles, capsules, rings of bells. A ball outside of a convex element stays
-outside as long as its centre keeps to the side of the tangent plane at the nearest point. So every round projects
+The elements of a body are triangles, capsules, rings of bells and arcs of rims. A ball outside of a convex element
+stays outside as long as its centre keeps to the side of the tangent plane at the nearest point. So every round projects
 the wish on the half-spaces of the elements nearby; no motion within them can pass an element, however long it is.
 
 Lengths are in the frame of the body's TriangleTree. `body` is the tuple that ProxyBody.arrays gives:
@@ -21,6 +21,7 @@ from mapping.geometry.mesh import (
     STACK,
     WIDTH,
     closest,
+    cross,
     dot,
     moved,
     push_lanes,
@@ -30,15 +31,16 @@ from mapping.geometry.mesh import (
 )
 from mapping.geometry.proxy.halfspace_kernels import length, nearest_allowed
 
-CAPSULE, RING = 0.0, 1.0
+CAPSULE, RING, RIM = 0.0, 1.0, 2.0
 MOST_NEIGHBOURS = 256  # elements within reach that are looked at together; more of them shorten the reach
 RING_NEWTON_STEPS = (
     4  # the chord's nearest place is off by a part in a thousand of the ring's width: squared four times
 )
 FEW_NEIGHBOURS = 32  # with fewer it looks twice as far the next time
 MOST_PROJECTIONS = 24  # projections in one step; what is left of the way is gone in the next
-# Projections after those, which only lead out of what the ball is in: a bell's skirt bends towards a ball, which on its
-# way along the tangent plane gets in by the square of the way over the skirt's radius; out again it is Newton's method
+# Projections after those, which only lead out of what the ball is in: a bell's skirt and a pit's rim bend towards a
+# ball, which on its way along the tangent plane gets in by the square of the way over their radius; out again it is
+# Newton's method
 MOST_WAYS_OUT = 8
 # Of the radius: a shorter move ends the step. The error is its square over twice the radius: 1e-14 radii
 STILL = 1e-7
@@ -135,6 +137,24 @@ def off_bell(rounds, j, o):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
+def on_arc(rounds, j, o):  # type: ignore[no-untyped-def]
+    """Point of an arc of a rim closest to o; its middle if o is on the axis of its circle."""
+    center, axis, radius = vector(rounds, j), (rounds[j, 3], rounds[j, 4], rounds[j, 5]), rounds[j, 6]
+    middle, cosine = (rounds[j, 7], rounds[j, 8], rounds[j, 9]), rounds[j, 10]
+    aside = cross(axis, middle)
+    w = sub(o, center)
+    x, y = dot(w, middle), dot(w, aside)
+    rho = sqrt(x * x + y * y)
+    if rho == 0.0:
+        return moved(center, radius, middle)
+    if x < cosine * rho:  # beyond an end
+        x, y = cosine, sqrt((1.0 - cosine) * (1.0 + cosine)) * (1.0 if y > 0.0 else -1.0)
+    else:
+        x, y = x / rho, y / rho
+    return moved(moved(center, radius * x, middle), radius * y, aside)
+
+
+@njit(cache=True, error_model="numpy")
 def support(body, radius, code, o):  # type: ignore[no-untyped-def]
     """(gap, n): how far the ball at o is from an element, and the unit normal there; gap -1e9 if it is not there.
 
@@ -156,6 +176,10 @@ def support(body, radius, code, o):  # type: ignore[no-untyped-def]
     if rounds[j, 11] == RING:
         d, n = off_bell(rounds, j, o)
         return (d - radius, n) if d >= 0.0 else (-1e9, n)
+    if rounds[j, 11] == RIM:
+        away = sub(o, on_arc(rounds, j, o))
+        d = sqrt(dot(away, away))
+        return d - radius, scaled(1.0 / d, away)
     away = sub(o, on_segment(vector(rounds, j), (rounds[j, 3], rounds[j, 4], rounds[j, 5]), o))
     d = sqrt(dot(away, away))
     n = scaled(1.0 / d, away)
@@ -211,6 +235,8 @@ def projected(body, radius, code, n, x):  # type: ignore[no-untyped-def]
         if rounds[j, 11] == RING:
             d, way = off_bell(rounds, j, x)
             out, whole = scaled(max(d, 0.0), way), radius
+        elif rounds[j, 11] == RIM:
+            out, whole = sub(x, on_arc(rounds, j, x)), radius
         else:
             out = sub(x, on_segment(vector(rounds, j), (rounds[j, 3], rounds[j, 4], rounds[j, 5]), x))
             whole = radius + rounds[j, 6]

@@ -106,23 +106,28 @@ def test_the_path_over_a_feature_is_its_closed_form(name: str, r: float) -> None
             assert np.abs(x - felt.device[:, 0]).max() < 0.1e-3
 
 
-@pytest.mark.parametrize("name", ["ridge", "bar", "roof", "trapezoid", "bump", "step", "groove"])
+@pytest.mark.parametrize("name", [name for name in CASES if name != "bell"])
 @pytest.mark.parametrize("r", TIPS)
 def test_lateral_over_normal_force_is_the_slope(name: str, r: float) -> None:
     parts, form = CASES[name]
-    felt = Proxy(ProxyBody(PLATE, parts, r)).follow(crossing(form, r, 1.0, 0.0, 0.05e-3))
-    force = felt.force(500.0)
-    x = felt.centers[:, 0]
-    h = 1e-3 * r * 1e-2
-    zero = np.zeros_like(x)
-    left, right = (form(x, zero, r) - form(x - h, zero, r)) / h, (form(x + h, zero, r) - form(x, zero, r)) / h
-    slope = 0.5 * (left + right)
-    # away from kinks, where the slope has two values, and both walls push
-    smooth = np.abs(left - right) < 5e-3 + 4.0 * h / r
-    assert smooth.mean() > 0.5
-    pushed = -force[:, 0] / force[:, 2]
-    wrong = np.abs(pushed - slope)[smooth]
-    assert (wrong <= 0.01 * np.abs(slope[smooth]) + 1e-6).mean() > 0.999
+    body = ProxyBody(PLATE, parts, r)
+    h = 1e-5 * r
+    for y in (0.0, 0.3e-3):
+        felt = Proxy(body).follow(crossing(form, r, 1.0, y, 0.05e-3))
+        force = felt.force(500.0)
+        x, beside, _ = felt.centers.T
+        smooth = np.ones(len(x), dtype=bool)
+        wrong = []
+        for lateral, dx, dy in ((0, h, 0.0), (1, 0.0, h)):
+            here = form(x, beside, r)
+            left, right = (here - form(x - dx, beside - dy, r)) / h, (form(x + dx, beside + dy, r) - here) / h
+            slope = 0.5 * (left + right)
+            # away from kinks, where the slope has two values, and both walls push
+            smooth &= np.abs(left - right) < 5e-3 + 4.0 * h / r
+            off = np.abs(-force[:, lateral] / force[:, 2] - slope)
+            wrong.append(off > 0.01 * np.abs(slope) + 1e-6)
+        assert smooth.mean() > 0.9
+        assert not (wrong[0] | wrong[1])[smooth].any()
 
 
 @pytest.mark.parametrize("r", TIPS[:2])
@@ -144,9 +149,11 @@ def test_over_a_bell_the_force_is_along_its_normal(r: float) -> None:
 )
 def test_the_force_jumps_nowhere_by_more_than_people_notice(name: str) -> None:
     parts, _ = CASES[name]
-    for r in TIPS[1:]:
+    for r in TIPS:
         x = np.linspace(-4.5e-3, 4.5e-3, 9000)  # 1 um a step: 1 mm/s at 1 kHz, 10 mm/s at 10 kHz
-        device = np.column_stack([x, np.zeros_like(x), np.full_like(x, r - 0.12e-3)])
+        # below the floor of hollows; pressed in beyond its own radius the ball slips off an edge, as real ones do
+        press = 0.12e-3 if name in ("groove", "pit") or r > 0.3e-3 else 0.08e-3
+        device = np.column_stack([x, np.zeros_like(x), np.full_like(x, r - press)])
         felt = Proxy(ProxyBody(PLATE, parts, r)).follow(device)
         force = felt.force(500.0)
         jump = np.linalg.norm(np.diff(force, axis=0), axis=1) / np.linalg.norm(force, axis=1)[1:]
