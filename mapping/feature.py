@@ -190,6 +190,7 @@ class Details:
         account: what it and what is felt together with it may be, in words, with the probability of each, where more
             than one is likely.
         high_side: of a step, +1 if the side of normal x tangent (along the axis) is the higher one, else -1.
+        free_section: True of a detail so wide that the trace over it is its surface: measured there, no family fitted.
     """
 
     trace_curvature: float | None = None
@@ -204,6 +205,7 @@ class Details:
     ends_seen: tuple[bool, bool] | None = None
     high_side: float | None = None
     account: tuple[tuple[str, float], ...] | None = None
+    free_section: bool | None = None
 
     def known(self) -> dict[str, Any]:
         """What is known, by name."""

@@ -437,7 +437,10 @@ def _stands_between(feature: Feature, level: UnclimbedLevel, tip_radius: float) 
 
 def _accounts_for(feature: Feature, bend: dict[str, Any]) -> bool:
     """True if a feature overlaps with what stands off the base, on the same side and as high."""
-    as_high = max(np.sign(bend["height"]) * np.array([feature.height.low, feature.height.high])) >= abs(bend["height"])
+    bounds = np.array([feature.height.low, feature.height.high])
+    if kind_of(feature).sided:  # a base drawn through a step swings about it
+        bounds = np.append(bounds, -bounds)
+    as_high = max(np.sign(bend["height"]) * bounds) >= abs(bend["height"])
     apart = float(distances(np.asarray(bend["place"])[None], feature.axis)[0])
     return bool(as_high and apart <= 0.5 * (feature.width.high + bend["width"]))
 
@@ -532,7 +535,7 @@ def why_no_standard_heights(work: Work) -> str | None:
     if work.log.detections:
         return None
     lines = any(has_sections(feature) for feature in work.model.features)
-    return "" if lines else "there is no ridge, groove or step"
+    return "" if lines else "there is no ridge, groove or step, and nothing wide in a profile"
 
 
 def standard_heights_taken(work: Work, share: Share) -> None:

@@ -73,8 +73,8 @@ class StandardHeight:
 
 
 def has_sections(feature: Feature) -> bool:
-    """True of what the standards have sections of: ridges, grooves and steps."""
-    return kind_of(feature).line and kind_of(feature).sampled
+    """True of what the standards have sections of: ridges, grooves and steps, and what is like them in a profile."""
+    return bool(feature.details.free_section) or (kind_of(feature).line and kind_of(feature).sampled)
 
 
 def standard_heights(trace: LaidTrace, features: Sequence[Feature]) -> tuple[StandardHeight, ...]:

@@ -34,7 +34,8 @@ def section_picture(sections: Sequence[CrossSection], truths: Sequence[float | N
 
 def _panel(section: CrossSection, true: float | None) -> Panel:
     x_factor, x_name = length_unit(float(np.abs(section.x).max()))
-    shown = np.concatenate([section.predicted, section.bin_height])
+    fitted = not section.feature.details.free_section
+    shown = np.concatenate([section.predicted[: len(section.predicted) * fitted], section.bin_height])
     z_factor, z_name = length_unit(float(np.abs(shown).max()))
     dots = np.linspace(0, len(section.x) - 1, min(DOTS, len(section.x))).astype(int)
     few = len(section.x) <= 150
@@ -51,14 +52,16 @@ def _panel(section: CrossSection, true: float | None) -> Panel:
     )  # fmt: skip
     grid = section.grid / x_factor
     band = np.concatenate([section.low, section.high[::-1]]) / z_factor
-    panel.area(np.concatenate([grid, grid[::-1]]), band, BAND)
+    if fitted:
+        panel.area(np.concatenate([grid, grid[::-1]]), band, BAND)
     if true is not None:
         panel.level(true / z_factor, TRUTH, dash=DASHED, name="true height")
     if not few:
         x, z, sd = section.bin_x / x_factor, section.bin_height / z_factor, 1.645 * section.bin_sd / z_factor
         panel.bars(np.column_stack([x, x]), np.column_stack([z - sd, z + sd]), "#486581", width=1.2)
         panel.dots(x, z, "#486581", size=3.6, name="trace, means with 90 %")
-    panel.line(grid, section.predicted / z_factor, ESTIMATED, name="trace of the feature found")
+    if fitted:
+        panel.line(grid, section.predicted / z_factor, ESTIMATED, name="trace of the feature found")
     if len(section.body_x):
         _body(panel, section, x_factor, z_factor)
     return panel

@@ -187,7 +187,7 @@ def _place(feature: Feature, analysis: Analysis) -> Html:
 
 def _posterior(feature: Feature, pictures: Pictures) -> Html:
     if feature.posterior is None:
-        return badge("none", "plain")
+        return badge("measured, not fitted" if feature.details.free_section else "none", "plain")
     kind = "good" if feature.posterior.status in ("converged", "not needed") else "bad"
     label = "by Laplace" if feature.posterior.status == "not needed" else feature.posterior.status
     draws, picture = f"{len(feature.posterior.samples)} draws", f"corner-{feature.id}"

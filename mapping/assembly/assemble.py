@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from mapping import Feature, FloatArray, Trace
-from mapping.assembly.edges import edge_features
+from mapping.assembly.edges import edge_features, step_features
 from mapping.assembly.faint_features import faint_spacing, why_none_sought, with_faint_lines
 from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
+from mapping.assembly.free_sections import free_sections
 from mapping.assembly.inspection import Inspection, Inspections
 from mapping.assembly.lines import Around, line_features
 from mapping.assembly.linking import groups
 from mapping.assembly.points import outline, point_feature
 from mapping.assembly.runs import along, split_runs, told_crests
-from mapping.assembly.steps import step_features
 from mapping.base import Base, LaidTrace
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances
@@ -51,7 +51,7 @@ def assemble(
     explains, because a sweep ran along it, are dropped, and crests that the sweep began or ended on are accepted only
     if no step explains them. What the rules say of details that are felt together, and of lines wider than a wire, is
     then improved as one configuration (`accounted`). Ridges and grooves too low for any one sweep are found where many
-    sweeps agree. In a single profile every crossing is a bump, a pit or a step.
+    sweeps agree. In a single profile every crossing is a bump, a pit or a step, or belongs to a free section.
 
     Args:
         detections: of the trace.
@@ -68,7 +68,7 @@ def assemble(
     crossings = detections.crossings
     laid = LaidTrace.of(trace, base)
     if _is_profile(laid):
-        return _strongest_first([point_feature([c], _name(c), detections, trace.tip_radius) for c in crossings])
+        return _of_profile(detections, laid)
     inspections = inspections or inspected_for(detections, laid, base, spacing=spacing, faint=faint)
     spacing = place_spacing(crossings, trace.tip_radius) if spacing is None and crossings else spacing
     features = [] if spacing is None or not crossings else _linked(detections, laid, inspections.at(spacing))
@@ -195,6 +195,18 @@ def _without_strays(group: list[Crossing], scale: float) -> list[list[Crossing]]
 def _nearest(point: FloatArray, others: list[FloatArray]) -> float:
     """Distance of a point (3,) from the nearest of others, m."""
     return float(np.linalg.norm(np.array(others) - point, axis=1).min()) if others else float("inf")
+
+
+def _of_profile(detections: Detections, laid: LaidTrace) -> tuple[Feature, ...]:
+    """Features of a single sweep: each crossing one, but for those that are parts of a free section."""
+    wide, upon, rest = list[Feature](), list[Crossing](), list(detections.crossings)
+    if laid.base.kind == "profile":  # a given base that is off is no detail, however wide
+        wide, upon, rest = free_sections(detections, laid)
+    fine, standing = (
+        [point_feature([c], _name(c), detections, laid.tip_radius) for c in crossings] for crossings in (rest, upon)
+    )
+    measured = [replace(each, details=replace(each.details, free_section=True)) for each in standing]
+    return _strongest_first([*wide, *fine, *measured])
 
 
 def _name(crossing: Crossing) -> str:

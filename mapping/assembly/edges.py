@@ -1,7 +1,8 @@
-"""Edge feature: convex edges and concave corners of the body that the base does not have.
+"""Edges: of the body that the base does not have, and steps between two levels.
 
-Beyond such an edge the body runs away from the base in a straight line, to the end of every sweep: no crest and no
-step, but a hinge. Edges that the base has leave no height and are never seen here.
+Beyond a convex edge or a concave corner the body runs away from the base in a straight line, to the end of every sweep:
+no crest and no step, but a hinge. Edges that the base has leave no height and are never seen here. Beyond the edge of a
+step the body keeps to another level.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ import numpy as np
 from mapping import Feature, FloatArray, Interval, Support
 from mapping.assembly.branches import main_line
 from mapping.assembly.inspection import Inspection
-from mapping.assembly.lines import Around
+from mapping.assembly.lines import ONE_POINT, Around, mean_point, merged
+from mapping.assembly.linking import groups
 from mapping.detection import Crossing
-from mapping.geometry.mesh import arclengths, nearest_on
+from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.inference.kinds import kind_made_of
 
 # A stretch is straight if it bends by less than this share of its rise, once its first part is left out, where the
@@ -128,3 +130,42 @@ def _beyond(crossing: Crossing, edge: Feature, out: FloatArray, tip_radius: floa
     """True for what lies past the edge, where the base is no model of the body, or within half a tip radius of it."""
     offset = crossing.point - nearest_on(crossing.point[None], edge.axis)[0][0]
     return bool(offset @ out > 0 or np.linalg.norm(offset) < 0.5 * tip_radius)
+
+
+def step_features(
+    steps: Sequence[Crossing], features: Sequence[Feature], around: Around, scale: float
+) -> list[Feature]:
+    """Steps that no other feature explains; in an area at least two sweeps must agree on one."""
+    free = [c for c in steps if not _explained(c, features, around.tip_radius)]
+    lines = [[free[i] for i in members] for members in groups(free, around.inspection, scale)] if free else []
+    return [_step(line, around) for line in lines if len({c.sweep for c in line}) > 1]
+
+
+def _explained(step: Crossing, features: Sequence[Feature], tip_radius: float) -> bool:
+    """True where a sweep ran on to a ridge, or along it: it goes up and down at the ridge's rims."""
+    return any(
+        distances(step.point[None], f.axis)[0] < 2 * np.sqrt(2 * tip_radius * abs(f.height.median)) + step.half_width
+        for f in features
+    )
+
+
+def _step(line: list[Crossing], around: Around) -> Feature:
+    half_width = float(np.median([c.half_width for c in line]))
+    points = np.array([mean_point(cluster) for cluster in merged(line, ONE_POINT * half_width)])
+    axis = main_line(points)
+    height = float(np.median([abs(c.height) for c in line]))
+    sd = float(np.median([c.height_sd for c in line]) / np.sqrt(len(line)))
+    length = float(arclengths(axis)[-1])
+    slack = 2 * around.inspection.pitch
+    normals = around.base.foot(axis + around.tip_radius * line[0].normal, around.tip_radius).normals
+    return Feature(
+        kind=kind_made_of("step", line=True).name,
+        axis=axis,
+        normals=normals,
+        height=Interval.normal(height, sd),
+        width=Interval(0.0, 0.0, 2 * half_width),
+        length=Interval(length, length, length + slack),
+        evidence=Support(float(np.sqrt(sum(c.snr**2 for c in line))), len(line), (around.detections.algorithm,)),
+        curvature_feature=any(c.curvature_feature for c in line),
+        position_sd=float(np.median([c.position_sd for c in line])),
+    )

@@ -13,7 +13,7 @@ from mapping.base import Base
 from mapping.geometry.mesh import distances, nearest_on
 from mapping.inference.families import Surroundings
 from mapping.inference.feature_posterior import refine, settle
-from mapping.inference.junctions import Meeting, brought_together, meetings
+from mapping.inference.junctions import NORMAL_QUANTILE_95, Meeting, brought_together, meetings
 from mapping.inference.kinds import Kind, kind_made_of, kind_of, sizes_of
 from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise
@@ -39,7 +39,7 @@ def refine_all(
     Where the disturbances of two that several sweeps saw overlap, both are laid out first by the optima of their
     posteriors: what is a neighbour's and what its own depends on both. What fewer sweeps saw is judged beside them, and
     counts as their neighbour only if it is likely then. Lines that meet end in one place, which the courses of all of
-    them tell.
+    them tell. Free sections are measured already, and come back as they are.
 
     Args:
         features: as detected.
@@ -53,6 +53,8 @@ def refine_all(
     """
     tip = trace.tip_radius
     noise = noise or noise_of_trace(trace, base)
+    measured = [_with_tip_doubt(feature, tip_sd) for feature in features if feature.details.free_section]
+    features = [feature for feature in features if not feature.details.free_section]
     features = _facing_as_one(features, Surroundings(trace, base, noise, features, tip_sd), seed)
     half_widths = [sizes_of(feature, tip).half_width for feature in features]
     met = meetings(features, half_widths)
@@ -78,7 +80,14 @@ def refine_all(
     for k in certain:
         if beside[k].intersection(true, doubtful):
             known[k] = refined(k, true)
-    return tuple(brought_together(known, met, half_widths, base, tip))
+    together = brought_together(known, met, half_widths, base, tip)
+    return tuple(sorted([*measured, *together], key=lambda feature: -feature.evidence.snr) if measured else together)
+
+
+def _with_tip_doubt(feature: Feature, tip_sd: float) -> Feature:
+    """A free section whose flanks are doubtful by the tip's radius: by r tan(a/2) <= r each (theory section 5.4)."""
+    sd = np.hypot((feature.width.high - feature.width.low) / (2.0 * NORMAL_QUANTILE_95), 2.0 * tip_sd)
+    return replace(feature, width=Interval.normal(feature.width.median, float(sd)))
 
 
 def _facing_as_one(features: Sequence[Feature], around: Surroundings, seed: int) -> list[Feature]:

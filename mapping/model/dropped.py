@@ -47,7 +47,8 @@ def dropped_crossings(
     own = np.array([crossing.half_width for crossing in crossings])
     for number, feature in enumerate(features):
         apart = distances(points, feature.axis)
-        accounted |= apart <= np.maximum(own, sizes_of(feature, tip_radius).half_width)
+        reach = np.maximum(own, sizes_of(feature, tip_radius).half_width)
+        accounted |= apart <= (2.0 * own + 0.5 * feature.width.high if feature.details.free_section else reach)
         nearest, away = np.where(apart < away, number, nearest), np.minimum(apart, away)
     return tuple(
         Dropped(

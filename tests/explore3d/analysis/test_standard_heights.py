@@ -97,4 +97,4 @@ def test_the_command_prints_them(
     table.write_text("x [mm],z [mm]\n" + "".join(f"{a:.4f},{b:.7f}\n" for a, b in zip(x, z, strict=True)))
     assert explore3d_main(monkeypatch, "roughness", table, "--tip-radius", "2 um") == 0
     text = capsys.readouterr().out
-    assert "  step-1 to step-2 by ISO 5436-1 A1: -1.5 µm in 1 section; Wolf pruning height 1.5" in text
+    assert "  pit-1 by ISO 5436-1 A1: -1.5 µm in 1 section; Wolf pruning height 1.5" in text

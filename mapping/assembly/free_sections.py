@@ -1,0 +1,308 @@
+"""Free sections: details of a single profile so much wider than a crest under the ball that the trace is their surface.
+
+No family is fitted to them: the trace over the base, monotone on both sides of its extreme, is the section. What the
+ball changes is known in closed form. On a flank of slope tan(a) the trace stands off the body by r (1/cos a - 1), and
+round the edge of a wall it rolls along a circle; the tangent of the trace, drawn on to the base, therefore meets it
+r tan(a/2) beside the body's own edge in either case, exactly (theory section 5.4). At the bottom of a hollow the ball
+may touch both flanks and not what is between: its depth is then only bounded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping import Details, Feature, FloatArray, Interval, Support
+from mapping.base import LaidSweep, LaidTrace, SweepHeights
+from mapping.detection import Crossing, Detections
+from mapping.inference.kinds import kind_made_of
+from mapping.instrument import Noise, neighbour_scatter, robust_scale
+
+# Bins of a profile are no finer than this share of the tip's radius: what is measured on them is many radii wide
+FINEST = 0.1
+# Widths of a crest of no width of its own, felt at the same share of the height, from which on the trace is the section
+WIDER_THAN_CREST = 3.0
+# Where flanks are read: a quarter of the height, on every form but the vertical still beyond what rounds feet ...
+FLANK = 0.25
+# ... which stands clear of what else the profile scatters by so many of that: a crest of 16
+FLANK_SDS = 4.0
+# A tangent is the line through all between these shares of that height
+ABOUT = 0.6, 1.4
+# A side that rises by more than this share of the height from one sample to the next is a wall
+WALL = 0.5
+# The flank once more, half as high: where both tell another width the foot is round, and the width as doubtful as that
+NEAR_FOOT = 0.5 * FLANK
+# Of a profile's length: longer ones are levels, which steps begin and end
+LONGEST_DETAIL_SHARE = 0.25
+# The extreme is the mean over as many places as make its standard deviation this share of the height, but not over more
+# than where the section is within a fifth of it
+EXTREME_SD, EXTREME_SHARE = 0.005, 0.8
+# What lies above this share of the height is called the top (or floor), of which flat ones are most of the width
+NEARLY_FLAT = 0.95
+# A section has as many degrees of freedom as splines that would follow it (as in `pooled_residual`)
+FREEDOM = 14
+
+
+@dataclass(frozen=True)
+class _Section:
+    """One detail of a profile, as indices of its bins: where it leaves the base, where it returns, and its extreme."""
+
+    piece: SweepHeights
+    sign: float
+    begin: int
+    end: int
+    top: int
+    monotone: FloatArray
+
+
+def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[Feature], list[Crossing], list[Crossing]]:
+    """The wide details of a profile on a base that was fitted to it; crossings on one of them, and all that are not.
+
+    What is fine on a flank or a floor is too far from the base for a family that stands on it.
+
+    Args:
+        detections: of the trace; what they did not notice is no detail.
+        trace: a single sweep, laid on its base.
+
+    Reference: theory section 5.4.
+    """
+    features, rest, upon = list[Feature](), list(detections.crossings), list[Crossing]()
+    for sweep in trace.laid_sweeps:
+        between = float(np.median(np.diff(sweep.arclength)))
+        for piece in sweep.heights(max(between, FINEST * trace.tip_radius)):
+            usual = max(robust_scale(piece.height), neighbour_scatter(piece.height), np.finfo(float).tiny)
+            for section in _sections(piece, usual, trace.tip_radius):
+                inside = [c for c in rest if _overlaps(section, c)]
+                if not inside or _is_step(section, usual):
+                    continue
+                feature = _measured(section, sweep, detections.noise, detections.algorithm, len(inside))
+                if feature is not None:
+                    features.append(feature)
+                    fine = [c for c in inside if _stands_off(section, c)]
+                    upon += [c for c in fine if section.begin < _bin(piece, c) < section.end]
+                    rest = [c for c in rest if c not in inside or (c in fine and c not in upon)]
+    return features, upon, rest
+
+
+def _sections(piece: SweepHeights, usual: float, tip_radius: float) -> list[_Section]:
+    """What stands clear of the usual scatter (m) of a profile, and is wide."""
+    z, found = piece.height, []
+    for sign in (1.0, -1.0):
+        out = np.concatenate([[False], sign * z > FLANK_SDS * usual, [False]])
+        edges = np.flatnonzero(np.diff(out.astype(int)))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+            if begin == 0 or end >= len(z):
+                continue  # what goes on beyond the profile's end is no detail
+            section = _outlined(piece, sign, int(begin), int(end), usual)
+            if section is not None and _is_wide(section, tip_radius):
+                found.append(section)
+    return found
+
+
+def _outlined(piece: SweepHeights, sign: float, begin: int, end: int, usual: float) -> _Section | None:
+    """The section from where it leaves the scatter of the base to where it comes back, monotone on either side."""
+    from scipy.optimize import isotonic_regression
+
+    z = sign * piece.height
+    high = float(z[begin:end].max())
+    if high * FLANK < FLANK_SDS * usual:
+        return None
+    low = z < usual
+    before, after = np.flatnonzero(low[:begin]), np.flatnonzero(low[end:])
+    if not len(before) or not len(after):
+        return None
+    first, last = int(before[-1]), end + int(after[0])
+    if (last - first) * piece.spacing > LONGEST_DETAIL_SHARE * piece.length:
+        return None
+    inside = z[first : last + 1]
+    top = int(np.argmax(np.convolve(inside, np.ones(3) / 3.0, mode="same")))
+    rise = isotonic_regression(inside[: top + 1], increasing=True).x
+    fall = isotonic_regression(inside[top:], increasing=False).x
+    monotone = np.concatenate([rise[:-1], [max(rise[-1], fall[0])], fall[1:]])
+    return _Section(piece, sign, first, last, first + top, monotone)
+
+
+def _is_wide(section: _Section, tip_radius: float) -> bool:
+    """True if a crest of no width of its own would be felt over much less."""
+    high = float(section.monotone.max())
+    drop = min((1.0 - FLANK) * high, tip_radius)
+    crest = 2.0 * np.sqrt(drop * (2.0 * tip_radius - drop))
+    left, right = _flanks(section, FLANK)
+    return bool(right.place - left.place > WIDER_THAN_CREST * crest)
+
+
+@dataclass(frozen=True)
+class _Flank:
+    """A side of a section about a share of its height.
+
+    Args:
+        place: where it passes that height, m from the profile's start.
+        foot: where its tangent there meets the base, m.
+        foot_sd: its standard deviation, m.
+        angle: of the tangent over the base, rad.
+    """
+
+    place: float
+    foot: float
+    foot_sd: float
+    angle: float
+
+
+def _flanks(section: _Section, share: float, noise: Noise | None = None) -> tuple[_Flank, _Flank]:
+    """Both sides at a share of the height; without a noise their feet have no standard deviation."""
+    s = section.piece.s[section.begin : section.end + 1]
+    top = section.top - section.begin
+    left = _flank(s[: top + 1], section.monotone[: top + 1], share, noise)
+    right = _flank(-s[top:][::-1], section.monotone[top:][::-1], share, noise)
+    return left, _Flank(-right.place, -right.foot, right.foot_sd, right.angle)
+
+
+def _flank(x: FloatArray, z: FloatArray, share: float, noise: Noise | None) -> _Flank:
+    """The line through what lies about a share of the height of a rising side, or the wall between two samples."""
+    level, spacing = share * float(z[-1]), float(x[1] - x[0])
+    after = max(int(np.argmax(z > level)), 1)
+    if z[after] - z[after - 1] > WALL * z[-1]:
+        place = 0.5 * float(x[after] + x[after - 1])
+        return _Flank(place, place, spacing / np.sqrt(12.0), 0.5 * np.pi)
+    low, high = ABOUT
+    first = min(int(np.argmax(z > low * level)), after - 1)
+    last = max(int(np.argmax(z > high * level)), after)
+    u, rise = x[first : last + 1] - x[after], z[first : last + 1]
+    lines = np.linalg.pinv(np.column_stack([np.ones_like(u), u]))
+    offset, slope = lines @ rise
+    slope = max(float(slope), np.finfo(float).tiny)
+    sd = 0.0
+    if noise is not None:
+        gradient = np.array([-1.0, offset / slope]) / slope @ lines
+        sd = float(np.sqrt(gradient @ noise.covariance(u - u[0]) @ gradient))
+    at = float(x[after])
+    return _Flank(at + (level - float(offset)) / slope, at - float(offset) / slope, sd, float(np.arctan(slope)))
+
+
+def _measured(section: _Section, sweep: LaidSweep, noise: Noise, algorithm: int, crossings: int) -> Feature | None:
+    """The section as a feature; None if a free form says no more than noise."""
+    piece, tip = section.piece, sweep.trace.tip_radius
+    bins = slice(section.begin, section.end + 1)
+    place = piece.s[bins]
+    noise = noise.scaled(white=max(piece.samples, 1.0) ** -0.5)  # of a bin's mean
+    sd = noise.sd
+    snr = float(np.linalg.norm(noise.whiten(section.monotone, place)[0]))
+    log_odds = 0.5 * (snr**2 - FREEDOM * np.log1p(snr**2 / FREEDOM)) - np.log(piece.length / np.ptp(place))
+    height, height_sd = _extreme(section, sd)
+    width, width_sd, middle = _width(section, tip, noise)
+    center = np.array([np.interp(middle, piece.s, piece.centers[:, k]) for k in range(3)])
+    foot = sweep.base.foot(center[None], tip)
+    left, right = _flanks(section, NEARLY_FLAT)
+    below = _unfelt_depth(section, tip, sd) if section.sign < 0.0 else 0.0
+    if not np.isfinite([height, width, height_sd, width_sd, log_odds]).all() or width <= 0.0:
+        return None
+    low = Interval.normal(section.sign * height, height_sd)
+    deep = Interval.normal(section.sign * (height + below), height_sd)
+    bounds = min(low.low, deep.low), max(low.high, deep.high)
+    return Feature(
+        kind=kind_made_of("convex" if section.sign > 0.0 else "concave", line=False).name,
+        axis=foot.points,
+        normals=foot.normals,
+        height=Interval(section.sign * (height + 0.5 * below), *bounds),
+        width=Interval.normal(width, width_sd),
+        length=Interval(0.0, 0.0, 0.0),
+        evidence=Support(snr, crossings, (algorithm,), float(log_odds)),
+        curvature_feature=False,
+        position_sd=0.5 * width_sd,
+        details=Details(top=right.place - left.place, free_section=True),
+    )
+
+
+def _extreme(section: _Section, sd: float) -> tuple[float, float]:
+    """The height (positive), and its standard deviation: of the mean, or the crest of a parabola, about the extreme."""
+    z = section.sign * section.piece.height
+    high = float(section.monotone.max())
+    near = section.monotone > EXTREME_SHARE * high
+    reach = min(section.top - section.begin - int(np.argmax(near)), int(near.sum()) - 1)
+    half = int(np.clip((sd / (EXTREME_SD * high)) ** 2, 1, max(reach, 1)))
+    first = max(section.top - half, section.begin)
+    around = z[first : section.top + half + 1]
+    u = np.arange(len(around)) - (section.top - first)
+    if len(around) < 3:
+        return float(around.max()), sd
+    bent = np.polyfit(u, around, 2)
+    crest = -0.5 * bent[1] / bent[0] if bent[0] < 0.0 else 0.0
+    crest = float(np.clip(crest, u[0], u[-1]))
+    return float(np.polyval(bent, crest)), sd
+
+
+def _width(section: _Section, tip: float, noise: Noise) -> tuple[float, float, float]:
+    """(width on the body, its standard deviation, middle): the flanks drawn on to the base, without the ball's part."""
+    widths = []
+    for share in (NEAR_FOOT, FLANK):
+        left, right = _flanks(section, share, noise)
+        begin, end = (
+            flank.foot + side * section.sign * tip * np.tan(0.5 * flank.angle)
+            for side, flank in ((1.0, left), (-1.0, right))
+        )
+        widths.append(end - begin)
+    sd = np.hypot(np.hypot(left.foot_sd, right.foot_sd), widths[1] - widths[0])
+    return widths[1], float(sd), 0.5 * float(begin + end)
+
+
+def _unfelt_depth(section: _Section, tip: float, sd: float) -> float:
+    """By how much a hollow may go on below the ball, which touches two flanks there: as far as these meet, m."""
+    piece, top = section.piece, section.top
+    high = float(section.monotone.max())
+    least = max(3, int(np.ceil((sd / (EXTREME_SD * high)) ** 2)))
+    z = section.sign * piece.height
+    slopes = []
+    for side in (z[max(section.begin, top - least) : top + 1], z[top : min(section.end, top + least) + 1][::-1]):
+        if len(side) < 3:
+            return 0.0
+        x = piece.spacing * np.arange(len(side))
+        error = sd / (piece.spacing * np.sqrt(len(side) * (len(side) ** 2 - 1) / 12.0))
+        slopes.append(max(float(np.polyfit(x, side, 1)[0]) - error, 0.0))
+    slope = min(slopes)
+    return float(tip * (np.hypot(1.0, slope) - 1.0))
+
+
+def _is_step(section: _Section, usual: float) -> bool:
+    """True if two levels with an edge between them are as good an account: a base drawn through a step swings about it.
+
+    Both levels bend alike, as one parabola.
+    """
+    piece, width = section.piece, section.end - section.begin
+    around = slice(max(section.begin - width, 0), section.end + width + 1)
+    normal = np.diff(piece.centers[[around.start, min(around.stop, len(piece.height)) - 1]], axis=0)[0]
+    along = normal / np.linalg.norm(normal)
+    offset = piece.centers[around] - piece.centers[section.top]
+    x = offset @ along
+    off = offset - np.outer(x, along)
+    up = np.linalg.svd(off, full_matrices=False)[2][0]
+    y, u = off @ up, x / np.abs(x).max()
+    lag = max(1, width // 16)
+    edge = int(np.argmax(np.abs(y[lag:] - y[:-lag]))) + lag // 2
+    design = np.column_stack([np.ones_like(u), u, u * u, np.arange(len(u)) > edge])
+    keep = np.abs(np.arange(len(u)) - edge) > lag
+    fit = np.linalg.lstsq(design[keep], y[keep], rcond=None)[0]
+    return bool(np.quantile(np.abs(y - design @ fit)[keep], 0.95) < FLANK_SDS * usual)
+
+
+def _overlaps(section: _Section, crossing: Crossing) -> bool:
+    """True of a crossing whose disturbance, or the path beside that it was compared with, covers part of a section."""
+    piece = section.piece
+    if not piece.t[0] <= crossing.t <= piece.t[-1]:
+        return False
+    reach = 2.0 * crossing.half_width / piece.spacing
+    return bool(section.begin - reach <= _bin(piece, crossing) <= section.end + reach)
+
+
+def _bin(piece: SweepHeights, crossing: Crossing) -> float:
+    """The place of a crossing among the bins of its piece."""
+    return float(np.interp(crossing.t, piece.t, np.arange(len(piece.t))))
+
+
+def _stands_off(section: _Section, crossing: Crossing) -> bool:
+    """True of what a section that is monotone on either side does not hold: a detail on its flank, floor or side."""
+    piece = section.piece
+    off = piece.height.copy()
+    off[section.begin : section.end + 1] -= section.sign * section.monotone
+    reach, at = max(1, int(crossing.half_width / piece.spacing)), int(_bin(piece, crossing))
+    return bool(np.abs(off[max(at - reach, 0) : at + reach + 1]).max() > 0.5 * abs(crossing.height))
