@@ -15,7 +15,7 @@ import numpy as np
 
 from mapping import Details, Feature, FloatArray, Interval, Support
 from mapping.base import LaidSweep, LaidTrace, SweepHeights
-from mapping.detection import Crossing, Detections
+from mapping.detection import Crossing, Detections, terraced
 from mapping.inference.kinds import kind_made_of
 from mapping.instrument import Noise, neighbour_scatter, robust_scale
 
@@ -34,7 +34,7 @@ WALL = 0.5
 # The flank once more, half as high: where both tell another width the foot is round, and the width as doubtful as that
 NEAR_FOOT = 0.5 * FLANK
 # Of a profile's length: longer ones are levels, which steps begin and end
-LONGEST_DETAIL_SHARE = 0.25
+LONGEST_DETAIL_SHARE = 1 / 8
 # The extreme is the mean over as many places as make its standard deviation this share of the height, but not over more
 # than where the section is within a fifth of it
 EXTREME_SD, EXTREME_SHARE = 0.005, 0.8
@@ -70,7 +70,8 @@ def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[Featur
     features, rest, upon = list[Feature](), list(detections.crossings), list[Crossing]()
     for sweep in trace.laid_sweeps:
         between = float(np.median(np.diff(sweep.arclength)))
-        for piece in sweep.heights(max(between, FINEST * trace.tip_radius)):
+        for over in sweep.heights(max(between, FINEST * trace.tip_radius)):
+            piece = terraced(over, trace.base, trace.tip_radius).profile
             usual = max(robust_scale(piece.height), neighbour_scatter(piece.height), np.finfo(float).tiny)
             for section in _sections(piece, usual, trace.tip_radius):
                 inside = [c for c in rest if _overlaps(section, c)]

@@ -20,6 +20,11 @@ from mapping.instrument import FEATURE_RESIDUAL_SDS, Noise, neighbour_scatter, r
 # what is narrower is one on the level below. On either side of an edge as much is looked at, of which the arc about it
 # is a quarter at most.
 TERRACE = 4.0
+# So many times as much is fitted at most: of the bins of a cap's fit (CAP_FIT_BINS) that leaves one to each radius, a
+# twelfth of the arc about an edge of a radius' height on both of its sides
+EDGE_TERRACES = 15
+# Of the difference between two levels: what is nearer than that to one of them is not on its way to the other
+CLIMB = 0.1
 # Half of the stretch (tip radii) over which means tell the level: single bins of noise tell none, and the arc about an
 # edge of a hundredth of the radius, sqrt(2 / 100) wide, is as wide as the stretch
 MEAN = 0.1
@@ -77,6 +82,7 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
     # bins finer than the sampling are filled in: these scatter by nothing
     noise = neighbour_scatter(profile.height[np.diff(profile.first) > 0])
     runs = _runs(own.argmin(axis=1), own.min(axis=1) < FEATURE_RESIDUAL_SDS * noise, reach)
+    runs = _up_to_edges(runs, reach, smooth, levels)
     # a long way from one level to the next is no edge, and the base's levels are none of this sweep's
     if not runs or any(onward - end > reach for (_, end, _), (onward, _, _) in itertools.pairwise(runs)):
         return Terraced(profile)
@@ -99,9 +105,10 @@ def terraced(profile: SweepHeights, base: Base, tip_radius: float) -> Terraced:
         for ground, detail in ((here, slice(begin, end - reach)), (there, slice(onward + reach, last))):
             stands = np.abs(plain[detail] - levels[ground]) >= FEATURE_RESIDUAL_SDS * noise
             plain[detail][stands] = levels[ground]
-        piece = _piece(replace(profile, height=plain - min(levels[here], levels[there])), begin, last)
+        start, stop = max(begin, end - EDGE_TERRACES * reach), min(last, onward + EDGE_TERRACES * reach)
+        piece = _piece(replace(profile, height=plain - min(levels[here], levels[there])), start, stop)
         up = levels[there] > levels[here]
-        edges.append(Edge(piece, (end - begin, last - begin) if up else (0, onward - begin)))
+        edges.append(Edge(piece, (end - start, stop - start) if up else (0, onward - start)))
     return Terraced(replace(profile, height=height), tuple(edges), level)
 
 
@@ -120,6 +127,23 @@ def _runs(level: IntArray, on: BoolArray, shortest: float) -> list[tuple[int, in
         else:
             runs.append((begin, end, own))
     return runs
+
+
+def _up_to_edges(
+    runs: list[tuple[int, int, int]], reach: int, height: FloatArray, levels: FloatArray
+) -> list[tuple[int, int, int]]:
+    """The runs, where they end far from each other as far as no climb leads off: roughness leaves levels, too."""
+    longer = list(runs)
+    for k, ((_, end, here), (onward, last, there)) in enumerate(itertools.pairwise(runs)):
+        if onward - end <= reach:
+            continue
+        near = CLIMB * abs(levels[there] - levels[here])
+        left = np.abs(height[end:onward] - levels[here]) >= near
+        back = np.abs(height[end:onward] - levels[there])[::-1] >= near
+        end += int(left.argmax()) if left.any() else len(left)
+        onward = max(onward - (int(back.argmax()) if back.any() else len(back)), end)
+        longer[k], longer[k + 1] = (longer[k][0], end, here), (onward, last, there)
+    return longer
 
 
 def _piece(profile: SweepHeights, low: int, high: int) -> SweepHeights:

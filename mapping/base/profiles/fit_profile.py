@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -11,14 +11,17 @@ from mapping import FloatArray, Surface, Trace
 from mapping.base.profiles.form import AUTO, Form, form_line
 from mapping.base.profiles.frame import ProfileFrame
 from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_rest
+from mapping.base.profiles.jumps import MOST_JUMPS, are_apart, possible_jumps, steps_up
 from mapping.geometry.mesh import Spline, spline_design
-from mapping.instrument import neighbour_scatter, robust_fit
+from mapping.instrument import RobustFit, neighbour_scatter, robust_fit, robust_scale
 
 # A base bends over no less than this many tip radii: shorter details are features.
 SHORTEST_BEND = 8.0
 # Pieces that are tried; the evidence chooses.
 PIECES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 PROFILE_CELLS = 480
+# A place is a parameter that only one cell in n fits: it costs twice what a height does (2 log n against log n)
+EDGE_FREEDOM = 2
 # A piece of a cubic has four coefficients: with fewer places between masked stretches than that nothing determines it
 CELLS_PER_PIECE = 4
 
@@ -28,7 +31,8 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
 
     Splines of growing freedom (a line, a parabola, cubics) are fitted to the centres by robust least
     squares and the one with the best truncated evidence is taken; the ribbon is its parallel curve one tip
-    radius inward.
+    radius inward. Where the profile steps for good from one level to another the spline keeps to the longest of them,
+    if by the same evidence the edges are worth their places and heights.
 
     Args:
         trace: along one line.
@@ -56,19 +60,67 @@ def fit_profile(trace: Trace, frame: ProfileFrame, form: Form = AUTO) -> tuple[S
         return _ribbon(trace.tip_radius, frame, places, line, slope), {"form": asdict(form)}
     limit = (stop - start) / (SHORTEST_BEND * trace.tip_radius)
     choices = [(1, 1), (2, 1), *((3, n) for n in PIECES if n == 1 or (n <= limit and 10 * n <= len(x)))]
-    fits = []
+    splines = []
     for degree, pieces in choices[: max(1, len(x) - 2)]:
         knots = np.concatenate([[start] * degree, np.linspace(start, stop, pieces + 1), [stop] * degree])
         if form.masks and np.histogram(x, knots[degree : len(knots) - degree])[0].min() < CELLS_PER_PIECE:
             continue
-        fits.append((robust_fit(spline_design(x, knots, degree), z, scale), knots, degree, pieces))
-    best, knots, degree, pieces = min(fits, key=lambda choice: choice[0].cost)
-    curve, places = Spline(knots, best.coefficients, degree), np.linspace(start, stop, 64 * pieces + 1)
+        splines.append(_Spline(spline_design(x, knots, degree), knots, degree, pieces))
+    best, chosen, edges = _likeliest(splines, x, z, scale)
+    knots, degree, pieces = chosen.knots, chosen.degree, chosen.pieces
+    heights = np.append(0.0, np.cumsum(best.coefficients[chosen.design.shape[1] :]))
+    level = steps_up(edges, len(x)).sum(axis=1).astype(np.int64)
+    ground = heights[np.bincount(level).argmax()]  # the base is the level with the most places
+    heights, z = heights - ground, z - (heights - ground)[level]
+    # the pieces of a spline sum to one: a constant is one of every coefficient
+    curve = Spline(knots, best.coefficients[: chosen.design.shape[1]] + ground, degree)
+    places = np.linspace(start, stop, 64 * pieces + 1)
     ribbon = _ribbon(trace.tip_radius, frame, places, curve(places), curve.derivative()(places))
     fitted: dict[str, Any] = {"degree": float(degree), "pieces": float(pieces), "piece_length": (stop - start) / pieces}
     bends = isolated_bends(x, z, curve(x), scale) if pieces > 1 else []
     rest = isolated_rest(x, z, curve(x), scale, SHORTEST_BEND * trace.tip_radius)
+    if edges:
+        known = np.unique(heights)
+        fitted["levels"] = known[np.argsort(np.abs(known), kind="stable")].tolist()
     return ribbon, fitted | _listed("absorbed", bends, frame, curve) | _listed("left standing", rest, frame, curve)
+
+
+@dataclass(frozen=True, eq=False)
+class _Spline:
+    """A family of curves: its design (N, P) at the places, knots, degree and number of pieces."""
+
+    design: FloatArray
+    knots: FloatArray
+    degree: int
+    pieces: int
+
+
+def _likeliest(
+    splines: list[_Spline], x: FloatArray, z: FloatArray, scale: float
+) -> tuple[RobustFit, _Spline, list[int]]:
+    """The spline with the edges that are worth their price, and these; its further coefficients are their heights."""
+
+    def best(edges: list[int]) -> tuple[float, RobustFit, _Spline]:
+        up = steps_up(edges, len(z))
+        fits = [(robust_fit(np.hstack([each.design, up]), z, scale), each) for each in splines]
+        fit, spline = min(fits, key=lambda pair: pair[0].cost)
+        return fit.cost + EDGE_FREEDOM * len(edges) * float(np.log(len(z))), fit, spline
+
+    candidates = [int(i) for i in possible_jumps(x, z, scale)]
+    if (
+        candidates
+    ):  # a spline so free that it follows roughness would follow half of an edge: what it leaves is no signal
+        freest = np.hstack([splines[-1].design, steps_up(candidates, len(z))])
+        scale = max(scale, robust_scale(robust_fit(freest, z, scale).residual))
+    edges = list[int]()
+    cost, fit, spline = best(edges)
+    while len(edges) < MOST_JUMPS:
+        further = [[*edges, i] for i in candidates if i not in edges and are_apart([*edges, i], len(z))]
+        tried = [(*best(some), some) for some in further]
+        if not tried or min(each[0] for each in tried) >= cost:
+            break
+        cost, fit, spline, edges = min(tried, key=lambda each: each[0])
+    return fit, spline, sorted(edges)
 
 
 def _listed(name: str, bends: list[Bend], frame: ProfileFrame, curve: Spline) -> dict[str, Any]:

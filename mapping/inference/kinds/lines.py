@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mapping import Feature, FloatArray
+from mapping import EmptyWindowError, Feature, FloatArray
 from mapping.inference.curves import (
     HIGHEST_DEGREE,
     Chart,
@@ -109,7 +109,8 @@ class LineKind(Kind):
         sizes = sizes_of(feature, tip)
         axis, normals, crossings = _axis_of(feature, sizes, around)
         course = self._chart(axis, normals, sizes, crossings, HIGHEST_DEGREE, around, bends=False)
-        window = window_for(_crest(course, tip, sizes), sizes, around)
+        rises = (0.0, sizes.height, -sizes.height) if self.sided else (0.0,)
+        window = window_for(_crest(course, tip, sizes, rises), sizes, around)
         laid = replace(feature, axis=axis, normals=normals, evidence=replace(feature.evidence, crossings=crossings))
         beside = replace(around, others=[other for other in around.others if other is not feature])
 
@@ -217,6 +218,8 @@ def _axis_of(feature: Feature, sizes: Sizes, around: Surroundings) -> tuple[Floa
     window = window_for(axis[:1] + around.trace.tip_radius * normals[:1], sizes, around)
     nearest = int(np.argmin(np.linalg.norm(window.feet - axis[0], axis=1)))
     across = np.cross(normals[0], window.tangents[nearest])
+    if not across.any():
+        raise EmptyWindowError(f"a single sample lies near the {feature.kind}: it tells no direction of the sweep")
     half = 0.5 * sizes.half_width * across / max(float(np.linalg.norm(across)), np.finfo(float).tiny)
     return np.stack([axis[0] - half, axis[0] + half]), np.repeat(normals[:1], 2, axis=0), 1
 
@@ -232,11 +235,14 @@ def _modes(chart: Chart, ends: FloatArray, degree: int, crossings: int, sizes: S
     return CurveModes(highest, float(ends.mean()), reach, False)
 
 
-def _crest(chart: Chart, tip_radius: float, sizes: Sizes) -> FloatArray:
-    """Points along the chart one tip radius above the base, close enough together to measure distances from."""
+def _crest(chart: Chart, tip_radius: float, sizes: Sizes, rises: tuple[float, ...]) -> FloatArray:
+    """Points along the chart one tip radius above the base, close enough together to measure distances from.
+
+    They stand that far above the base and, of an edge between two levels, above where the other may be: rises, m.
+    """
     count = max(2, int(np.ceil(chart.length / (0.25 * sizes.half_width))) + 1)
     points, _, normals, _ = chart.at(np.linspace(chart.s[0], chart.s[-1], count))
-    return np.asarray(points + tip_radius * normals)
+    return np.concatenate([points + (tip_radius + rise) * normals for rise in rises])
 
 
 def _end_limits(

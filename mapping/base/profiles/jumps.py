@@ -1,0 +1,54 @@
+"""Jumps: steps that a profile's base does not follow, so that it keeps to one of their levels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mapping import FloatArray, IntArray
+from mapping.instrument import robust_scale
+
+# Of the length: what keeps to another level for less is a detail of the level beside it
+SHORTEST_LEVEL = 1 / 8
+# A difference between neighbours that leaves the usual ones by so many of their scatter may be an edge
+JUMP_SDS = 6.0
+# Of that difference so much must be left between the medians of the levels on either side, and the same the other way:
+# of a slope each difference is only a part
+KEPT_SHARE = 0.5
+# Edges that are looked at, the highest: a staircase has no more levels of the shortest length
+MOST_JUMPS = 7
+
+
+def possible_jumps(x: FloatArray, z: FloatArray, scale: float) -> IntArray:
+    """Indices i between which and i + 1 a profile may step, for good, from one level to another; the highest first.
+
+    Args:
+        x, z: (N,) the profile in the order of x, m.
+        scale: scatter of it from place to place, m.
+    """
+    side = int(0.5 * SHORTEST_LEVEL * len(z))
+    if side < 3:
+        return np.zeros(0, dtype=np.int64)
+    rise = np.diff(z)
+    off = rise - np.median(rise)
+    usual = max(robust_scale(off), np.sqrt(2.0) * scale, np.finfo(float).tiny)
+    slope = np.median(rise / np.maximum(np.diff(x), np.finfo(float).tiny))
+    found = []
+    for i in np.flatnonzero(np.abs(off) > JUMP_SDS * usual):
+        before, after = slice(max(i + 1 - side, 0), i + 1), slice(i + 1, i + 1 + side)
+        if i + 1 < side or len(z) - i - 1 < side:
+            continue
+        level = np.median(z[after] - slope * x[after]) - np.median(z[before] - slope * x[before])
+        if KEPT_SHARE < level / off[i] < 1.0 / KEPT_SHARE:
+            found.append(i)
+    return np.array(sorted(found, key=lambda i: -abs(off[i]))[: 2 * MOST_JUMPS], dtype=np.int64)
+
+
+def are_apart(edges: list[int], count: int) -> bool:
+    """True if all levels between edges, and at both ends, are long enough."""
+    bounds = np.array([-1, *sorted(edges), count - 1])
+    return bool(np.diff(bounds).min() >= SHORTEST_LEVEL * count)
+
+
+def steps_up(edges: list[int], count: int) -> FloatArray:
+    """(count, E) columns that are 1 beyond each edge."""
+    return (np.arange(count)[:, None] > np.array(edges, dtype=np.int64)[None, :]).astype(np.float64)
