@@ -17,6 +17,7 @@ from mapping.base.quadrics import FAMILIES, Cloud, Family, Fitted, cylinder, pla
 from mapping.base.star import star
 from mapping.base.terraces import terraced_plane, terraced_quadric
 from mapping.base.tube import tube
+from mapping.geometry.mesh import NearestPoint
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_scale
 
 MOST_BASE_CELLS = 4000
@@ -38,6 +39,8 @@ SIMPLE: dict[str, tuple[Family, ...]] = {
     "cylinder": (cylinder,),
     "sphere": (sphere,),
 }
+# Share of the sweeps that may seem to pass through a body: by single wrong readings
+MOST_WALKED = 0.25
 # Sweeps of each half, at least: a bend across them takes three
 FEWEST_HALF = 3
 # A base foretells a path if it misses it by no more than so many times the scatter from cell to cell, that is if of the
@@ -90,12 +93,29 @@ def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO) -> B
         raise FormError(f"form {form.kind!r}: none of its bodies can be fitted to this trace; possible: auto, line")
     # levels explain the top of a block and of the table beneath it: its sides ask for a body
     if form.kind == "auto" and all(_missed(fit, cloud) > EXPLAINED for fit in fits if "levels" not in fit.parameters):
-        fits += _last_resort((polyhedron,), cloud)
+        bodies = _last_resort((polyhedron,), cloud)
+        fits += [body for body in bodies if not _walked_through(body, cloud, trace)]
         if all(_missed(fit, cloud) > EXACTLY for fit in fits):
             fits += _last_resort(FREE, cloud)
     scale, share = _noise_of(min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual, cloud.floor)
     best = min(fits, key=lambda fitted: fitted.cost(scale, share))
     return Base(best.surface(cloud, spacing), best.kind, best.parameters, missed=_foretold(best, trace))
+
+
+def _walked_through(body: Fitted, cloud: Cloud, trace: Trace) -> bool:
+    """True if many sweeps go from sample to sample straight through a body: it is not where they went.
+
+    The upper side of a plate and what lies beyond its edge, deeper than a ball is wide, are else a slab's two sides.
+    """
+    step = np.diff(trace.centers, axis=0)
+    along = (np.diff(trace.sweep) == 0) & (np.linalg.norm(step, axis=1) > 0.5 * trace.tip_radius)
+    if not along.any():
+        return False
+    middles = (trace.centers[:-1] + 0.5 * step)[along]
+    near = NearestPoint(body.surface(cloud, None)).query(middles)
+    inside = np.einsum("ij,ij->i", middles - near.points, near.normals) < 0.0
+    through = np.unique(trace.sweep[:-1][along][inside])
+    return bool(len(through) > MOST_WALKED * len(np.unique(trace.sweep)))
 
 
 def _foretold(best: Fitted, trace: Trace) -> float | None:
