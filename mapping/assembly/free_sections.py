@@ -35,9 +35,9 @@ WALL = 0.5
 NEAR_FOOT = 0.5 * FLANK
 # Of a profile's length: longer ones are levels, which steps begin and end
 LONGEST_DETAIL_SHARE = 1 / 8
-# The extreme is the mean over as many places as make its standard deviation this share of the height, but not over more
-# than where the section is within a fifth of it
-EXTREME_SD, EXTREME_SHARE = 0.005, 0.8
+# So many places about the extreme as make its standard deviation this share of the height would be enough; where it is
+# flat over more, as many times that: the parabola through them takes a V's tip 0.2 of what they fall short of it
+EXTREME_SD, EXTREME_WINDOW = 0.005, 4
 # What lies above this share of the height is called the top (or floor), of which flat ones are most of the width
 NEARLY_FLAT = 0.95
 # A section has as many degrees of freedom as splines that would follow it (as in `pooled_residual`)
@@ -217,14 +217,16 @@ def _measured(section: _Section, sweep: LaidSweep, noise: Noise, algorithm: int,
 
 def _extreme(section: _Section, sd: float) -> tuple[float, float]:
     """The height (positive), and its standard deviation: of the mean, or the crest of a parabola, about the extreme."""
-    z = section.sign * section.piece.height
+    z = section.sign * section.piece.height[section.begin : section.end + 1]
     high = float(section.monotone.max())
-    near = section.monotone > EXTREME_SHARE * high
-    reach = min(section.top - section.begin - int(np.argmax(near)), int(near.sum()) - 1)
-    half = int(np.clip((sd / (EXTREME_SD * high)) ** 2, 1, max(reach, 1)))
-    first = max(section.top - half, section.begin)
-    around = z[first : section.top + half + 1]
-    u = np.arange(len(around)) - (section.top - first)
+    # the middle of what is nearly as high, not its highest place, which is high by its noise
+    top = np.flatnonzero(section.monotone > min(NEARLY_FLAT, 1.0 - 2.0 * sd / high) * high)
+    needed = max(1, int((sd / (EXTREME_SD * high)) ** 2))
+    half = max(1, min(len(top) // 2, EXTREME_WINDOW * needed))
+    middle = int(top[0] + top[-1]) // 2
+    first = max(middle - half, 0)
+    around = z[first : middle + half + 1]
+    u = np.arange(len(around)) - (middle - first)
     if len(around) < 3:
         return float(around.max()), sd
     bent = np.polyfit(u, around, 2)
