@@ -74,7 +74,7 @@ def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[Featur
             piece = terraced(over, trace.base, trace.tip_radius).profile
             usual = max(robust_scale(piece.height), neighbour_scatter(piece.height), np.finfo(float).tiny)
             for section in _sections(piece, usual, trace.tip_radius):
-                inside = [c for c in rest if _overlaps(section, c)]
+                inside = [c for c in rest if _overlaps(section, c, sweep.trace.t)]
                 if not inside or _is_step(section, usual):
                     continue
                 feature = _measured(section, sweep, detections.noise, detections.algorithm, len(inside))
@@ -288,13 +288,16 @@ def _is_step(section: _Section, usual: float) -> bool:
     return bool(np.quantile(np.abs(y - design @ fit)[keep], 0.95) < FLANK_SDS * usual)
 
 
-def _overlaps(section: _Section, crossing: Crossing) -> bool:
+def _overlaps(section: _Section, crossing: Crossing, t: FloatArray) -> bool:
     """True of a crossing whose disturbance, or the path beside that it was compared with, covers part of a section."""
     piece = section.piece
     if not piece.t[0] <= crossing.t <= piece.t[-1]:
         return False
-    reach = 2.0 * crossing.half_width / piece.spacing
-    return bool(section.begin - reach <= _bin(piece, crossing) <= section.end + reach)
+    reach, bins = 2.0 * crossing.half_width / piece.spacing, np.arange(len(piece.t))
+    last = min(max(crossing.stop - 1, crossing.start), len(t) - 1)
+    begin, end = np.interp([t[crossing.start], t[last]], piece.t, bins)
+    at = _bin(piece, crossing)
+    return bool(min(begin, at) - reach <= section.end and max(end, at) + reach >= section.begin)
 
 
 def _bin(piece: SweepHeights, crossing: Crossing) -> float:

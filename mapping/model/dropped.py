@@ -45,10 +45,18 @@ def dropped_crossings(
     nearest, away = np.full(len(points), -1), np.full(len(points), np.inf)
     accounted = np.zeros(len(points), dtype=bool)
     own = np.array([crossing.half_width for crossing in crossings])
+    begin, end = (np.array([getattr(crossing, name) for crossing in crossings]) for name in ("start", "stop"))
+    sweeps = np.array([crossing.sweep for crossing in crossings])
     for number, feature in enumerate(features):
         apart = distances(points, feature.axis)
-        reach = np.maximum(own, sizes_of(feature, tip_radius).half_width)
-        accounted |= apart <= (2.0 * own + 0.5 * feature.width.high if feature.details.free_section else reach)
+        if feature.details.free_section:
+            parts = apart <= 2.0 * own + 0.5 * feature.width.high
+            # a plateau that was fitted too wide has its edges beside the section, and the section within it
+            for k in np.flatnonzero(parts):
+                parts |= (sweeps == sweeps[k]) & (begin < end[k]) & (end > begin[k])
+            accounted |= parts
+        else:
+            accounted |= apart <= np.maximum(own, sizes_of(feature, tip_radius).half_width)
         nearest, away = np.where(apart < away, number, nearest), np.minimum(apart, away)
     return tuple(
         Dropped(

@@ -65,7 +65,8 @@ def _alone(x: FloatArray, told: FloatArray, off: FloatArray, usual: float) -> li
         edges = np.flatnonzero(np.diff(out.astype(int)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
             inside = begin > 0 and end < len(x)  # what goes on beyond the profile's end is no detail
-            if inside and float(x[end] - x[begin]) < LONGEST_BEND_SHARE * float(x[-1] - x[0]):
+            shown = bool((sign * off[begin:end] > 0.0).any())  # a line may swing to where nothing is
+            if inside and shown and float(x[end] - x[begin]) < LONGEST_BEND_SHARE * float(x[-1] - x[0]):
                 found.append(_measured(x, off, begin, end, sign))
     chosen: list[Bend] = []
     for bend in sorted(found, key=lambda bend: -abs(bend.height)):

@@ -7,6 +7,7 @@ import pytest
 
 from mapping import FloatArray, FormError, Trace
 from mapping.base import Base, Form, LaidTrace, fit_base
+from mapping.base.profiles.isolated_bends import isolated_bends
 from mapping.detection import detect
 
 TIP, RADIUS = 2e-6, 40e-3
@@ -129,3 +130,10 @@ def test_form_alone_is_not_said_to_be_absorbed(seed: int) -> None:
     wave = 2e-6 * np.sin(2 * np.pi * X / 0.5e-3 + rng.uniform(0, 6)) + 5e-6 * np.cos(X / 1e-3)
     base = fit_base(Trace.from_profile(X, wave + 1e-7 * rng.standard_normal(len(X)), TIP))
     assert not {"absorbed", "left standing"} & set(base.parameters)
+
+
+def test_a_line_that_swings_away_from_the_profile_is_no_bend_of_it() -> None:
+    x, z = np.arange(100.0), -0.1 * np.cos(np.arange(100.0))
+    line = z + np.where((x > 40) & (x < 46), 9.0, 0.0)
+    z[(x > 40) & (x < 46)] = [-3.0, -9.0, -2.0, -9.0, -3.0]
+    assert isolated_bends(x, z, line, 0.1) == []
