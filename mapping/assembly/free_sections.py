@@ -195,7 +195,7 @@ def _measured(section: _Section, sweep: LaidSweep, noise: Noise, algorithm: int,
     center = np.array([np.interp(middle, piece.s, piece.centers[:, k]) for k in range(3)])
     foot = sweep.base.foot(center[None], tip)
     left, right = _flanks(section, NEARLY_FLAT)
-    below = _unfelt_depth(section, tip, sd) if section.sign < 0.0 else 0.0
+    below = _unfelt_depth(section, tip, height, sd) if section.sign < 0.0 else 0.0
     if not np.isfinite([height, width, height_sd, width_sd, log_odds]).all() or width <= 0.0:
         return None
     low = Interval.normal(section.sign * height, height_sd)
@@ -249,21 +249,30 @@ def _width(section: _Section, tip: float, noise: Noise) -> tuple[float, float, f
     return widths[1], float(sd), 0.5 * float(begin + end)
 
 
-def _unfelt_depth(section: _Section, tip: float, sd: float) -> float:
-    """By how much a hollow may go on below the ball, which touches two flanks there: as far as these meet, m."""
+def _unfelt_depth(section: _Section, tip: float, height: float, sd: float) -> float:
+    """By how much a hollow may go on below what was felt of it: as far as its flanks meet, without the ball, m.
+
+    Between two samples lies the trace's own bottom, and below that the ball touches two flanks and nothing between.
+    """
     piece, top = section.piece, section.top
-    high = float(section.monotone.max())
-    least = max(3, int(np.ceil((sd / (EXTREME_SD * high)) ** 2)))
     z = section.sign * piece.height
-    slopes = []
-    for side in (z[max(section.begin, top - least) : top + 1], z[top : min(section.end, top + least) + 1][::-1]):
-        if len(side) < 3:
+    count = max(3, int(np.ceil((sd / (EXTREME_SD * height)) ** 2)))
+    lines = []
+    for side in (slice(max(section.begin, top - count), top), slice(top + 1, min(section.end, top + count) + 1)):
+        u, rise = np.arange(side.start, side.stop) - float(top), z[side]
+        if len(u) < 3:
             return 0.0
-        x = piece.spacing * np.arange(len(side))
-        error = sd / (piece.spacing * np.sqrt(len(side) * (len(side) ** 2 - 1) / 12.0))
-        slopes.append(max(float(np.polyfit(x, side, 1)[0]) - error, 0.0))
-    slope = min(slopes)
-    return float(tip * (np.hypot(1.0, slope) - 1.0))
+        slope, level = np.polyfit(u, rise, 1)
+        error = sd / np.sqrt(len(u) * (len(u) ** 2 - 1) / 12.0)
+        if abs(slope) < 2.0 * error:  # a floor
+            return 0.0
+        lines.append((float(slope), float(level)))
+    (up, left), (down, right) = lines
+    if not up > 0.0 > down:
+        return 0.0
+    meeting = left + up * (right - left) / (up - down)
+    slope = np.sqrt(-up * down) / piece.spacing
+    return float(max(meeting - height, 0.0) + tip * (np.hypot(1.0, slope) - 1.0))
 
 
 def _is_step(section: _Section, usual: float) -> bool:

@@ -13,13 +13,16 @@ from mapping.base.profiles.frame import ProfileFrame
 from mapping.base.profiles.isolated_bends import Bend, isolated_bends, isolated_rest
 from mapping.base.profiles.jumps import MOST_JUMPS, are_apart, possible_jumps, steps_up
 from mapping.geometry.mesh import Spline, spline_design
-from mapping.instrument import RobustFit, neighbour_scatter, robust_fit, robust_scale
+from mapping.instrument import FEATURE_RESIDUAL_SDS, RobustFit, neighbour_scatter, robust_fit, robust_scale
 
 # A base bends over no less than this many tip radii: shorter details are features.
 SHORTEST_BEND = 8.0
 # Pieces that are tried; the evidence chooses.
 PIECES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48)
 PROFILE_CELLS = 480
+# A curve all pieces of which are told is taken before a likelier one with a piece that nothing tells, if it comes as
+# near to the profile but for so much: of its variance at most three quarters are of something else
+AS_NEAR = 2.0
 # A place is a parameter that only one cell in n fits: it costs twice what a height does (2 log n against log n)
 EDGE_FREEDOM = 2
 # A piece of a cubic has four coefficients: with fewer places between masked stretches than that nothing determines it
@@ -94,6 +97,12 @@ class _Spline:
     degree: int
     pieces: int
 
+    def is_told_by(self, x: FloatArray, residual: FloatArray, scale: float) -> bool:
+        """True if each piece has enough places that are not left out as details: without them it would go anywhere."""
+        kept = x[np.abs(residual) < FEATURE_RESIDUAL_SDS * scale]
+        edges = self.knots[self.degree : len(self.knots) - self.degree]
+        return self.pieces == 1 or bool(np.histogram(kept, edges)[0].min() >= CELLS_PER_PIECE)
+
 
 def _likeliest(
     splines: list[_Spline], x: FloatArray, z: FloatArray, scale: float
@@ -104,6 +113,13 @@ def _likeliest(
         up = steps_up(edges, len(z))
         fits = [(robust_fit(np.hstack([each.design, up]), z, scale), each) for each in splines]
         fit, spline = min(fits, key=lambda pair: pair[0].cost)
+        reach = AS_NEAR * max(robust_scale(fit.residual), scale)
+        told = [
+            pair
+            for pair in fits
+            if pair[1].is_told_by(x, pair[0].residual, scale) and robust_scale(pair[0].residual) <= reach
+        ]
+        fit, spline = min(told or [(fit, spline)], key=lambda pair: pair[0].cost)
         return fit.cost + EDGE_FREEDOM * len(edges) * float(np.log(len(z))), fit, spline
 
     candidates = [int(i) for i in possible_jumps(x, z, scale)]
