@@ -424,6 +424,23 @@ def sections(
 
 
 @bench.command()
+def profiles(
+    forms: Annotated[str | None, typer.Option(help="Forms, separated by commas; all if left out.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Profiles of each form.")] = 10,
+    building: Annotated[bool, typer.Option("--building", help="The seeds that may be looked into.")] = False,
+) -> None:
+    """Are scratches, slots, steps and humps of a rough profile found, with true sizes? As CSV.
+
+    Example: explore3d bench profiles --forms slot,step --seeds 2
+    """
+    from explore3d.bench.precision import FIRST_REPORTED, PROFILE_FORMS, bench_profiles
+
+    first = 0 if building else FIRST_REPORTED
+    for line in bench_profiles(_names(forms, "--forms", list(PROFILE_FORMS)), range(first, first + seeds)):
+        print(line, flush=True)
+
+
+@bench.command()
 def labels(
     bodies: Annotated[str | None, typer.Option(help="Bodies, separated by commas; all if left out.")] = None,
     files: Annotated[Path | None, typer.Option(help="Folder of published bodies: bunny.off, ...")] = None,

@@ -162,10 +162,11 @@ def _flanks(section: _Section, share: float, noise: Noise | None = None) -> tupl
 def _flank(x: FloatArray, z: FloatArray, share: float, noise: Noise | None) -> _Flank:
     """The line through what lies about a share of the height of a rising side, or the wall between two samples."""
     level, spacing = share * float(z[-1]), float(x[1] - x[0])
-    after = max(int(np.argmax(z > level)), 1)
-    if z[after] - z[after - 1] > WALL * z[-1]:
-        place = 0.5 * float(x[after] + x[after - 1])
+    steepest = int(np.diff(z).argmax())
+    if z[steepest + 1] - z[steepest] > WALL * z[-1]:
+        place = 0.5 * float(x[steepest] + x[steepest + 1])
         return _Flank(place, place, spacing / np.sqrt(12.0), 0.5 * np.pi)
+    after = max(int(np.argmax(z > level)), 1)
     low, high = ABOUT
     first = min(int(np.argmax(z > low * level)), after - 1)
     last = max(int(np.argmax(z > high * level)), after)

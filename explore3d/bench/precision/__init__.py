@@ -16,11 +16,18 @@ if TYPE_CHECKING:
         bench_labels as bench_labels,
         label_lines as label_lines,
     )
+    from explore3d.bench.precision.profiles import (
+        FIRST_REPORTED as FIRST_REPORTED,
+        PROFILE_FORMS as PROFILE_FORMS,
+        bench_profiles as bench_profiles,
+        profile_trial as profile_trial,
+    )
     from explore3d.bench.precision.work_precision import Measured as Measured
 
 _PUBLIC = {
     "bench": ("as_record", "bench", "summary", "write"),
     "labels": ("LABEL_BODIES", "bench_labels", "label_lines"),
+    "profiles": ("FIRST_REPORTED", "PROFILE_FORMS", "bench_profiles", "profile_trial"),
     "work_precision": ("Measured",),
 }
 doorway(__name__, _PUBLIC)

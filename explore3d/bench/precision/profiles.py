@@ -1,0 +1,129 @@
+"""Profiles: scratches, slots, steps and humps under a stylus, on a rough and drifting profile; are they found and true?
+
+The trace is a dilation by brute force on a grid of 40 nm, none of the closed forms that the analysis rests on; what is
+analysed is a table, as `explore3d analyze` reads it.
+
+    explore3d bench profiles --seeds 10
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+import explore3d
+from mapping import Feature, FloatArray, Interval
+
+STYLUS, GRID_PITCH, GRID_PER_SAMPLE, PROFILE_LENGTH = 2e-6, 40e-9, 25, 10e-3
+# Roughness correlated over 20 um, white noise, and a random walk from sample to sample, m; slope of the whole
+ROUGH_SD, CORRELATED_OVER, WHITE_SD, WALK_SD, PROFILE_TILT = 50e-9, 20e-6, 10e-9, 2e-9, 3e-3
+# Seeds that the analysis was built with lie below
+FIRST_REPORTED = 2000
+# A form: heights over places (m) from its middle, and what is to be found: kind, height and width (NaN: has none), m
+Form = tuple[Callable[[FloatArray], FloatArray], tuple[tuple[str, float, float], ...]]
+
+
+def _slot(rng: np.random.Generator) -> Form:
+    width, depth = rng.uniform(50e-6, 200e-6), rng.uniform(5e-6, 30e-6)
+    return lambda u: np.where(np.abs(u) < 0.5 * width, -depth, 0.0), (("pit", -depth, width),)
+
+
+def _scratch(rng: np.random.Generator) -> Form:
+    width, depth = rng.uniform(30e-6, 80e-6), rng.uniform(8e-6, 20e-6)
+    return lambda u: -np.maximum(0.0, depth * (1.0 - 2.0 * np.abs(u) / width)), (("pit", -depth, width),)
+
+
+def _burred(rng: np.random.Generator) -> Form:
+    scratch, ((_, depth, width),) = _scratch(rng)
+    height, sd = rng.uniform(2e-6, 6e-6), rng.uniform(5e-6, 10e-6)
+
+    def heights(u: FloatArray) -> FloatArray:
+        return scratch(u) + height * np.exp(-0.5 * ((np.abs(u) - 0.5 * width - 3.0 * sd) / sd) ** 2)
+
+    return heights, (("bump", height, np.nan), ("pit", depth, width), ("bump", height, np.nan))
+
+
+def _hump(rng: np.random.Generator) -> Form:
+    width, height = rng.uniform(30e-6, 90e-6), rng.uniform(5e-6, 12e-6)
+    return lambda u: np.maximum(0.0, height * (1.0 - (2.0 * u / width) ** 2)), (("bump", height, width),)
+
+
+def _step(rng: np.random.Generator) -> Form:
+    height = rng.uniform(0.5e-6, 10e-6)
+    return lambda u: np.where(u > 0.0, height, 0.0), (("step", height, np.nan),)
+
+
+def _on_an_arc(rng: np.random.Generator) -> Form:
+    slot, found = _slot(rng)
+    radius = rng.uniform(20e-3, 80e-3)
+    return lambda u: slot(u) - u**2 / (2.0 * radius), found
+
+
+def _bare(rng: np.random.Generator) -> Form:
+    return lambda u: 0.0 * u, ()
+
+
+PROFILE_FORMS: dict[str, Callable[[np.random.Generator], Form]] = {
+    "slot": _slot,
+    "scratch": _scratch,
+    "scratch with burrs": _burred,
+    "hump": _hump,
+    "step": _step,
+    "slot on an arc": _on_an_arc,
+    "bare": _bare,
+}
+
+
+def bench_profiles(forms: Sequence[str], seeds: range) -> Iterator[str]:
+    """CSV lines: of each form the profiles, those right in kind and count, and sizes within their 90 % intervals."""
+    yield "form,profiles,right,heights,heights_inside,widths,widths_inside"
+    for name in forms:
+        right, heights, widths = 0, list[bool](), list[bool]()
+        for seed in seeds:
+            found, wanted = profile_trial(name, seed)
+            if [feature.kind for feature in found] != [kind for kind, _, _ in wanted]:
+                continue
+            right += 1
+            for feature, (_, height, width) in zip(found, wanted, strict=True):
+                heights.append(_holds(feature.height, height))
+                if np.isfinite(width):
+                    widths.append(_holds(feature.width, width))
+        yield f"{name},{len(seeds)},{right},{len(heights)},{sum(heights)},{len(widths)},{sum(widths)}"
+
+
+def profile_trial(name: str, seed: int) -> tuple[list[Feature], tuple[tuple[str, float, float], ...]]:
+    """The features of one profile along it, as `explore3d analyze --quick` finds them, and what is there."""
+    rng = np.random.default_rng([seed, *name.encode()])
+    form, wanted = PROFILE_FORMS[name](rng)
+    x, z = _felt(form, rng.uniform(0.3, 0.7) * PROFILE_LENGTH, rng)
+    with TemporaryDirectory() as folder:
+        table = Path(folder, "profile.csv")
+        np.savetxt(table, 1e3 * np.column_stack([x, z]), fmt="%.7f", delimiter=",", header="x [mm],z [mm]", comments="")
+        analysis = explore3d.analyze(table, tip_radius=STYLUS, quick=True)
+    return sorted(analysis.model.features, key=lambda feature: float(feature.axis[0, 0])), wanted
+
+
+def _felt(
+    form: Callable[[FloatArray], FloatArray], middle: float, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    from scipy.ndimage import gaussian_filter1d
+
+    x: FloatArray = GRID_PITCH * np.arange(int(PROFILE_LENGTH / GRID_PITCH), dtype=np.float64)
+    reach = int(STYLUS / GRID_PITCH)
+    around = np.pad(form(x - middle), reach, mode="edge")
+    trace = np.full(len(x), -np.inf)
+    for k in range(-reach, reach + 1):
+        ball = float(np.sqrt(max(STYLUS**2 - (GRID_PITCH * k) ** 2, 0.0))) - STYLUS
+        np.maximum(trace, around[reach + k : reach + k + len(x)] + ball, out=trace)
+    x, trace = x[::GRID_PER_SAMPLE], trace[::GRID_PER_SAMPLE]
+    rough = gaussian_filter1d(rng.standard_normal(len(x)), CORRELATED_OVER / (GRID_PITCH * GRID_PER_SAMPLE))
+    noise = WHITE_SD * rng.standard_normal(len(x)) + WALK_SD * np.cumsum(rng.standard_normal(len(x)))
+    return x, trace + ROUGH_SD * rough / rough.std() + noise + PROFILE_TILT * x
+
+
+def _holds(interval: Interval, true: float) -> bool:
+    low, high = sorted((abs(interval.low), abs(interval.high)))  # a step's sign is the side that it was come from
+    return bool(low <= abs(true) <= high)
