@@ -74,7 +74,10 @@ def at_kinks(trace: Trace, row: ContactRow, directions: FloatArray) -> tuple[Int
 def _curves(trace: Trace, row: ContactRow, rows: list[IntArray]) -> list[SweepCurve]:
     """The curve of each of `rows`."""
     sweep = trace.sweep[row.nearest]
-    return [SweepCurve.of(row.select(np.flatnonzero(sweep == trace.sweep[own[0]]))) for own in rows]
+    order = np.argsort(sweep, kind="stable")
+    names = trace.sweep[[own[0] for own in rows]]
+    first, last = (np.searchsorted(sweep[order], names, side=side) for side in ("left", "right"))
+    return [SweepCurve.of(row.select(order[start:stop])) for start, stop in zip(first, last, strict=True)]
 
 
 def _fitted(
