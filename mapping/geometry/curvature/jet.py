@@ -29,7 +29,7 @@ SAMPLE = 3000
 LOST_WEIGHT_SHARE = 0.1
 # Meshes above this size try only the neighbourhoods that a sample of their points chooses.
 LARGE_MESH_POINTS = 20_000
-# Points to a leaf of the tree: searches for 547 neighbours took a fifth less time than with the default of 10; with 64 as much
+# Points to a leaf of the tree: searches for 547 neighbours take a fifth less time than with the default of 10
 LEAF_POINTS = 32
 # Neighbour indices held at once by one thread: keeps a million points under a gigabyte.
 CHUNK_VALUES = 4_000_000
