@@ -17,7 +17,7 @@ from mapping.estimate.sweeps.rows import parallel_rows, pitch, thinned
 from mapping.estimate.sweeps.tangents import lagrange, unit
 
 # Samples whose neighbourhoods are fitted together: a bound on the memory that they take
-SAMPLES_AT_ONCE = 16_384
+SAMPLES_AT_ONCE = 4096
 
 
 def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
