@@ -21,6 +21,8 @@ ONE_PLANE = 0.01
 # over an edge, the centre goes round it on a circle of the tip's radius: linear between two that are an angle a apart
 # they are at most a^2 / 8 off, 1.3e-3 rad for a tenth; a contact's angle is measured to 1 degree, 17e-3 rad
 LONGEST_KNOWN_GAP = 0.1
+# Row of a sample that is not laid on the base yet
+NOT_LAID = -1
 
 
 class LaidSweep:
@@ -36,8 +38,10 @@ class LaidSweep:
         self.number, self.trace, self.base = number, trace, base
         self._arclength: FloatArray | None = None
         self._heights: dict[float, tuple[SweepHeights, ...]] = {}
-        self._feet: Feet | None = None
-        self._laid: BoolArray = np.zeros(len(trace), dtype=bool)
+        # feet of the samples laid by now, in the order in which they were asked for, and each sample's row among them:
+        # few are, and those of all would take more memory than the trace itself
+        self._feet = _empty(0)
+        self._row: IntArray = np.full(len(trace), NOT_LAID, dtype=np.int64)
 
     @property
     def arclength(self) -> FloatArray:
@@ -61,13 +65,17 @@ class LaidSweep:
     def feet(self, index: slice | IntArray = slice(None)) -> Feet:
         """Where some of the samples stand; each sample is laid on the base the first time that it is asked for."""
         which = np.arange(len(self.trace))[index]
-        new = which[~self._laid[which]]
-        if self._feet is None:
-            self._feet = _empty(len(self.trace))
+        new = which[self._row[which] == NOT_LAID]
         if len(new):
-            _put(self._feet, new, self.base.foot(self.trace.centers[new], self.trace.tip_radius))
-            self._laid[new] = True
-        return Feet(*(getattr(self._feet, each.name)[index] for each in fields(Feet)))
+            count = len(self._feet.height)
+            laid = self.base.foot(self.trace.centers[new], self.trace.tip_radius)
+            self._feet = _joined([self._feet, laid]) if count else laid
+            self._row[new] = np.arange(count, count + len(new))
+        return _rows(self._feet, self._row[index])
+
+    @property
+    def _all_laid(self) -> bool:
+        return len(self._feet.height) == len(self._row)
 
     def feet_of_means(
         self, centers: FloatArray, first: IntArray, stop: int
@@ -85,20 +93,23 @@ class LaidSweep:
         """
         found = np.empty((len(first), 3)), np.empty((len(first), 3)), np.empty(len(first))
         known = np.zeros(len(first), dtype=bool)
-        kept = self._feet
-        if kept is not None and len(first):
-            used, runs, counts = slice(first[0], stop), first - first[0], np.diff(np.append(first, stop))
-            up = np.repeat(kept.normals[first], counts, axis=0)
-            turn = np.abs(kept.normals[used] - up).max(axis=1)
-            apart = kept.points[used] - np.repeat(kept.points[first], counts, axis=0)
-            flat = self._laid[used] & (turn < ONE_PLANE)
+        if len(self._feet.height) and len(first):
+            rows, counts = self._row[first[0] : stop], np.diff(np.append(first, stop))
+            known = np.logical_and.reduceat(rows != NOT_LAID, first - first[0])
+            rows, counts = rows[np.repeat(known, counts)], counts[known]
+        if known.any():
+            starts = np.cumsum([0, *counts[:-1]])
+            kept = _rows(self._feet, rows)
+            up = np.repeat(kept.normals[starts], counts, axis=0)
+            turn = np.abs(kept.normals - up).max(axis=1)
+            apart = kept.points - np.repeat(kept.points[starts], counts, axis=0)
+            flat = turn < ONE_PLANE
             flat &= np.abs((apart * up).sum(1)) <= ONE_PLANE * np.linalg.norm(apart, axis=1)
-            known = np.logical_and.reduceat(flat, runs)
-        if kept is not None and known.any():
-            own = np.flatnonzero(np.repeat(known, counts)) + first[0]
-            starts, share = np.cumsum([0, *counts[known][:-1]]), counts[known]
+            plane = np.logical_and.reduceat(flat, starts)
+            known[known] = plane
             for place, values in zip(found, (kept.points, kept.normals, kept.height), strict=True):
-                place[known] = np.add.reduceat(values[own], starts) / (share if values.ndim == 1 else share[:, None])
+                mean = np.add.reduceat(values, starts) / (counts if values.ndim == 1 else counts[:, None])
+                place[known] = mean[plane]
         if not known.all():
             feet = self.base.foot(centers[~known], self.trace.tip_radius)
             for place, values in zip(found, (feet.points, feet.normals, feet.height), strict=True):
@@ -107,12 +118,13 @@ class LaidSweep:
 
     def known_feet(self, part: slice) -> Feet | None:
         """The feet of some samples in a row if all of them are known by now, else None: nothing is laid."""
-        return self.feet(part) if self._laid[part].all() else None
+        return self.feet(part) if (self._row[part] != NOT_LAID).all() else None
 
     def touched(self) -> tuple[FloatArray, FloatArray]:
         """Known points of the base under the sweep, and directions from there to the ball, both (M, 3)."""
-        if self._feet is not None and self._laid.all():
-            return self._feet.points, self._feet.normals
+        if self._all_laid:
+            feet = self.feet()
+            return feet.points, feet.normals
         bins = self.known_heights()
         known = [(each.feet, each.normals) for each in bins if each.feet is not None and each.normals is not None]
         if not known:
@@ -121,21 +133,23 @@ class LaidSweep:
 
     def directions(self) -> tuple[FloatArray, FloatArray]:
         """(M, 3) centres of which it is known what lies under them, in the order of time, and their directions."""
-        if self._feet is not None and self._laid.all():
-            return self.trace.centers, self._feet.normals
+        if self._all_laid:
+            return self.trace.centers, self.feet().normals
         bins = self.known_heights()
         known = [(each.centers, each.normals) for each in bins if each.normals is not None]
         if not known:
             return np.zeros((0, 3)), np.zeros((0, 3))
         return np.concatenate([centers for centers, _ in known]), np.concatenate([up for _, up in known])
 
-    def kept(self) -> tuple[Feet, BoolArray]:
-        """Feet of all samples as far as they are known by now, and (N,) where they are: nothing is laid."""
-        return self._feet or _empty(len(self.trace)), self._laid
+    def kept(self) -> tuple[Feet, IntArray]:
+        """Feet of the samples laid by now, and (N,) each sample's row among them, or NOT_LAID: nothing is laid."""
+        return self._feet, self._row
 
-    def take(self, feet: Feet, known: BoolArray) -> None:
-        """Keep the feet of those samples of which they are known from elsewhere."""
-        self._feet, self._laid = feet, known
+    def take(self, feet: Feet, row: IntArray) -> None:
+        """Keep the feet of those samples of which they are known from elsewhere, and their rows among them (N,)."""
+        known = row != NOT_LAID
+        self._feet = _rows(feet, row[known])
+        self._row[known] = np.arange(len(self._feet.height))
 
 
 class LaidTrace(Trace):
@@ -204,11 +218,14 @@ class LaidTrace(Trace):
         picked = LaidTrace(self.select(keep), self.base)
         kept = [sweep.kept() for sweep in self.laid_sweeps]
         if kept:
-            feet, known = _joined([each for each, _ in kept]), np.concatenate([each for _, each in kept])
+            firsts = np.cumsum([0, *(len(feet.height) for feet, _ in kept)])
+            feet = _joined([feet for feet, _ in kept])
+            rows = np.concatenate(
+                [np.where(row == NOT_LAID, row, row + n) for (_, row), n in zip(kept, firsts[:-1], strict=True)]
+            )[keep]
             starts: IntArray = picked.__dict__["_starts"]
             for sweep, start, stop in zip(picked.laid_sweeps, starts[:-1], starts[1:], strict=True):
-                own = np.flatnonzero(keep)[start:stop]
-                sweep.take(Feet(*(getattr(feet, each.name)[own] for each in fields(Feet))), known[own])
+                sweep.take(feet, rows[start:stop])
         return picked
 
     def directions(self) -> Callable[[FloatArray], FloatArray]:
@@ -271,6 +288,5 @@ def _empty(count: int) -> Feet:
     )
 
 
-def _put(feet: Feet, index: IntArray, found: Feet) -> None:
-    for each in fields(Feet):
-        getattr(feet, each.name)[index] = getattr(found, each.name)
+def _rows(feet: Feet, rows: IntArray | slice) -> Feet:
+    return Feet(*(getattr(feet, each.name)[rows] for each in fields(Feet)))

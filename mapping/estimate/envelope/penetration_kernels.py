@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from mapping import FloatArray
+from mapping.geometry.mesh import inlined
 
 # Centres to a box. Neighbours along a sweep lie in small boxes without any sorting; of 8, 16 and 32 on a raster of 1e5
 # samples, 16 took least time
@@ -64,7 +65,7 @@ def nearest_within(centers: FloatArray, boxes: FloatArray, points: FloatArray, r
     return out
 
 
-@njit(cache=True, error_model="numpy", nogil=True, inline="always")
+@inlined
 def _apart(boxes, box, x, y, z):  # type: ignore[no-untyped-def]
     """Squared distance of a point from a box."""
     u = max(boxes[box, 0] - x, 0.0, x - boxes[box, 3])

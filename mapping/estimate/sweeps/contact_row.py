@@ -65,8 +65,8 @@ def contact_row(centers: FloatArray, outward: FloatArray, tip_radius: float, ope
     count = len(centers)
     own = np.arange(count)
     parts = [(own.astype(float), centers, along, in_plane(along, outward), np.full(count, TOUCHED), own, own)]
-    for k in range(len(kinks.cuts)):
-        parts.append(_fan(kinks, k, outward, tip_radius, usual))
+    if len(kinks.cuts):
+        parts.append(_fans(kinks, outward, tip_radius, usual))
     for cut in lifted:
         parts.append(_span(centers, parts[0][3], along, int(cut), usual))
     place, *columns = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -83,36 +83,41 @@ def in_plane(along: FloatArray, outward: FloatArray) -> FloatArray:
 _Part = tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray, IntArray]
 
 
-def _fan(kinks: Kinks, k: int, outward: FloatArray, tip_radius: float, usual: float) -> _Part:
-    """Both contacts of the ball at a kink, and points of the ball between them."""
-    cut = int(kinks.cuts[k])
-    first = in_plane(kinks.before[k : k + 1], outward[cut - 1 : cut])[0]
-    last = in_plane(kinks.after[k : k + 1], outward[cut : cut + 1])[0]
-    angle = 2 * np.arcsin(min(1.0, float(np.linalg.norm(first - last)) / 2))
-    inner = int(np.clip(np.ceil(tip_radius * angle / max(usual, 1e-300)) - 1, 1, LARGEST_FAN))
-    share = np.linspace(0.0, 1.0, inner + 2)[:, None]
-    normals = np.vstack([first, _turned(first, last, angle, share[1:-1]), last])
-    labels = np.r_[TOUCHED, np.full(inner, BRIDGED), TOUCHED]
-    half = (inner + 2) // 2
-    nearest = np.r_[np.full(half, cut - 1), np.full(inner + 2 - half, cut)]
-    along = unit(kinks.before[k] * (1 - share) + kinks.after[k] * share)
-    place = cut - 1 + np.linspace(0.25, 0.75, inner + 2)
+def _fans(kinks: Kinks, outward: FloatArray, tip_radius: float, usual: float) -> _Part:
+    """Both contacts of the ball at each kink, and points of the ball between them."""
+    cuts = kinks.cuts
+    first, last = in_plane(kinks.before, outward[cuts - 1]), in_plane(kinks.after, outward[cuts])
+    angle = 2 * np.arcsin(np.minimum(1.0, np.linalg.norm(first - last, axis=1) / 2))
+    inner = np.clip(np.ceil(tip_radius * angle / max(usual, 1e-300)) - 1, 1, LARGEST_FAN).astype(np.int64)
+    size = inner + 2
+    kink = np.repeat(np.arange(len(cuts)), size)
+    number = np.arange(len(kink)) - np.repeat(np.cumsum(size) - size, size)
+    begins, ends = number == 0, number == size[kink] - 1
+    share = np.where(ends, 1.0, number * (1.0 / (inner + 1))[kink])
+    normals = _turned(first[kink], last[kink], angle[kink], share[:, None])
+    normals[begins], normals[ends] = first, last
+    along = unit(kinks.before[kink] * (1 - share)[:, None] + kinks.after[kink] * share[:, None])
+    labels = np.where(begins | ends, TOUCHED, BRIDGED)
+    nearest = cuts[kink] - (number < (size // 2)[kink])
+    place = cuts[kink] - 1 + np.where(ends, 0.75, number * (0.5 / (inner + 1))[kink] + 0.25)
     return (
-        place,
-        np.repeat(kinks.centers[k : k + 1], inner + 2, 0),
+        np.asarray(place, dtype=np.float64),
+        kinks.centers[kink],
         along,
         normals,
-        labels,
-        np.full(inner + 2, -1),
+        np.asarray(labels),
+        np.full(len(kink), -1),
         nearest,
     )
 
 
-def _turned(first: FloatArray, last: FloatArray, angle: float, share: FloatArray) -> FloatArray:
-    """Directions between two at equal angles; the chord serves where the angle has no digits."""
-    if angle < 1e-6:
-        return unit(first * (1 - share) + last * share)
-    return np.asarray((np.sin((1 - share) * angle) * first + np.sin(share * angle) * last) / np.sin(angle))
+def _turned(first: FloatArray, last: FloatArray, angle: FloatArray, share: FloatArray) -> FloatArray:
+    """Directions (N, 3) between two at equal angles (N,); the chord serves where the angle has no digits."""
+    straight, angle = angle < 1e-6, angle[:, None]
+    with np.errstate(invalid="ignore"):  # an angle of zero, for which the chord serves
+        turned = (np.sin((1 - share) * angle) * first + np.sin(share * angle) * last) / np.sin(angle)
+    turned[straight] = unit(first[straight] * (1 - share[straight]) + last[straight] * share[straight])
+    return np.asarray(turned)
 
 
 def _span(centers: FloatArray, normals: FloatArray, along: FloatArray, cut: int, usual: float) -> _Part:

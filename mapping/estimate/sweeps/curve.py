@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -36,13 +38,17 @@ class SweepCurve:
 
         Of several crossings one near the point is taken.
         """
-        from scipy.spatial import cKDTree
-
         if len(self.nodes) < 2:
             return np.full_like(points, np.nan)
         from mapping.estimate.sweeps.curve_kernels import plane_crossings
 
-        nearest = np.asarray(cKDTree(self.nodes).query(points)[1], dtype=np.int64)
+        nearest = np.asarray(self._tree.query(points)[1], dtype=np.int64)
         out = np.empty(points.shape)
         plane_crossings(self.nodes, self.arriving, self.leaving, nearest, points, normals, out)
         return out
+
+    @cached_property
+    def _tree(self) -> Any:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.nodes)

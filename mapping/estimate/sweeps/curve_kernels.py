@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from mapping.geometry.mesh import dot, sub, vector
+from mapping.geometry.mesh import borrowing, dot, inlined, sub, vector
 
 PLANE_CROSSING_ROUNDS = 6
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@borrowing
 def plane_crossings(nodes, arriving, leaving, nearest, points, normals, out):  # type: ignore[no-untyped-def]
     """Write (N, 3) where the curve crosses the plane through each point; NaN where it does not.
 
@@ -42,7 +41,7 @@ def plane_crossings(nodes, arriving, leaving, nearest, points, normals, out):  #
             out[q, k] = _cubic(nodes, arriving, leaving, i, k, t)[0]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _cubic(nodes, arriving, leaving, i, k, t):  # type: ignore[no-untyped-def]
     """One coordinate of segment i at the share t of its way, and its derivative."""
     chord = 0.0

@@ -17,7 +17,7 @@ from mapping.estimate.sweeps.rows import parallel_rows, pitch, thinned
 from mapping.estimate.sweeps.tangents import lagrange, unit
 
 # Samples whose neighbourhoods are fitted together: a bound on the memory that they take
-SAMPLES_AT_ONCE = 16_384
+SAMPLES_AT_ONCE = 4096
 
 
 def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -74,7 +74,10 @@ def at_kinks(trace: Trace, row: ContactRow, directions: FloatArray) -> tuple[Int
 def _curves(trace: Trace, row: ContactRow, rows: list[IntArray]) -> list[SweepCurve]:
     """The curve of each of `rows`."""
     sweep = trace.sweep[row.nearest]
-    return [SweepCurve.of(row.select(np.flatnonzero(sweep == trace.sweep[own[0]]))) for own in rows]
+    order = np.argsort(sweep, kind="stable")
+    names = trace.sweep[[own[0] for own in rows]]
+    first, last = (np.searchsorted(sweep[order], names, side=side) for side in ("left", "right"))
+    return [SweepCurve.of(row.select(order[start:stop])) for start, stop in zip(first, last, strict=True)]
 
 
 def _fitted(

@@ -11,7 +11,7 @@ from mapping import BoolArray, FloatArray, IntArray
 
 def parallel_rows(points: FloatArray, sweep: IntArray) -> list[IntArray] | None:
     """Indices of each sweep, neighbours next to each other, if consecutive sweeps run side by side; else None."""
-    rows = [np.flatnonzero(sweep == name) for name in _in_order(sweep)]
+    rows = _of_each(sweep)
     if len(rows) < 2 or min(len(row) for row in rows) < 2:
         return None
     found = []
@@ -22,9 +22,11 @@ def parallel_rows(points: FloatArray, sweep: IntArray) -> list[IntArray] | None:
     return min(found, key=lambda pair: pair[0])[1] if found else None
 
 
-def _in_order(sweep: IntArray) -> IntArray:
-    names, first = np.unique(sweep, return_index=True)
-    return np.asarray(names[np.argsort(first)])
+def _of_each(sweep: IntArray) -> list[IntArray]:
+    """Indices of the samples of each sweep, in the order in which the sweeps begin."""
+    first, counts = np.unique(sweep, return_index=True, return_counts=True)[1:]
+    each = np.split(np.argsort(sweep, kind="stable"), np.cumsum(counts)[:-1])
+    return [each[k] for k in np.argsort(first)]
 
 
 def _across(points: FloatArray, rows: list[IntArray]) -> list[IntArray]:
@@ -52,14 +54,13 @@ def pitch(points: FloatArray, sweep: IntArray) -> float:
     """Usual distance from a sample to the nearest sample of another sweep, m; 0 for a single sweep."""
     from scipy.spatial import cKDTree
 
-    names = _in_order(sweep)
-    if len(names) < 2:
+    rows = _of_each(sweep)
+    if len(rows) < 2:
         return 0.0
     distances = []
-    for name, following in pairwise(names):
-        own = points[sweep == name]
-        probes = own[np.linspace(0, len(own) - 1, min(len(own), 33)).astype(int)]
-        distances.append(float(np.median(cKDTree(points[sweep == following]).query(probes)[0])))
+    for own, following in pairwise(rows):
+        probes = points[own[np.linspace(0, len(own) - 1, min(len(own), 33)).astype(int)]]
+        distances.append(float(np.median(cKDTree(points[following]).query(probes)[0])))
     return float(np.median(distances))
 
 

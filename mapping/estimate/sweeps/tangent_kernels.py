@@ -60,6 +60,28 @@ def sweep_tangents(
     return result
 
 
+@njit(cache=True, error_model="numpy")
+def lagrange_weights(nodes: FloatArray, at: FloatArray, value: FloatArray, slope: FloatArray) -> None:
+    """Write weights (K, m) of the interpolating polynomial's value and derivative at `at` (K,) for nodes (K, m)."""
+    count = nodes.shape[1]
+    for i in range(len(nodes)):
+        for j in range(count):
+            product, total = 1.0, 0.0
+            for k in range(count):
+                if k != j:
+                    product *= (at[i] - nodes[i, k]) / (nodes[i, j] - nodes[i, k])
+            for skip in range(count):
+                if skip == j:
+                    continue
+                factors = 1.0
+                for k in range(count):
+                    if k != j:
+                        gap = nodes[i, j] - nodes[i, k]
+                        factors *= 1.0 / gap if k == skip else (at[i] - nodes[i, k]) / gap
+                total += factors
+            value[i, j], slope[i, j] = product, total
+
+
 QUADRATIC_TERMS = 6  # terms of a quadratic of two variables
 # Ratio of the diagonal of R below which neighbours do not determine all terms: on one line it is rounding, 1e-16, and
 # at 1e-6 the coefficients have ten digits; what lies between is as well left to a singular value decomposition.

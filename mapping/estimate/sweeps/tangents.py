@@ -19,16 +19,10 @@ def chord_lengths(points: FloatArray) -> FloatArray:
 
 def lagrange(nodes: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Weights (K, m) of the interpolating polynomial's value and derivative at `at` (K,) for nodes (K, m)."""
-    count = nodes.shape[1]
-    value, slope = np.zeros_like(nodes), np.zeros_like(nodes)
-    for j in range(count):
-        others = [k for k in range(count) if k != j]
-        gaps = [nodes[:, j] - nodes[:, k] for k in others]
-        rises = [at - nodes[:, k] for k in others]
-        value[:, j] = np.prod([rise / gap for rise, gap in zip(rises, gaps, strict=True)], axis=0)
-        for skip in range(len(others)):
-            factors = [1.0 / gaps[k] if k == skip else rises[k] / gaps[k] for k in range(len(others))]
-            slope[:, j] += np.prod(factors, axis=0)
+    from mapping.estimate.sweeps.tangent_kernels import lagrange_weights
+
+    value, slope = np.empty(nodes.shape), np.empty(nodes.shape)
+    lagrange_weights(nodes, at, value, slope)
     return value, slope
 
 

@@ -16,6 +16,7 @@ from mapping.geometry.mesh import (
     QUERIES_PER_BLOCK,
     STACK,
     WIDTH,
+    borrowing,
     closest,
     closing_step,
     corners,
@@ -23,6 +24,7 @@ from mapping.geometry.mesh import (
     dot,
     enter_face,
     enter_triangle,
+    inlined,
     moved,
     push_lanes,
     scaled,
@@ -38,7 +40,7 @@ GLANCING = 1e-3  # cosine below which a step along the way says little about the
 MOST_DISTINCT_CONTACTS = 16  # distinct contacts that are told apart
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def stays_above(rows, i, end, d, reach):  # type: ignore[no-untyped-def]
     """True if a ball on its way along d to `end` stays further than `reach` from a triangle's plane."""
     n = (rows[i, 9], rows[i, 10], rows[i, 11])
@@ -46,7 +48,7 @@ def stays_above(rows, i, end, d, reach):  # type: ignore[no-untyped-def]
     return abs(height) > reach and height * dot(d, n) >= 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def meet(rows, i, o, d, ball, start, far):  # type: ignore[no-untyped-def]
     """When a ball free at o meets the triangle: 0 <= t < far, inf if never, -1 if it overlaps it at o.
 
@@ -60,7 +62,7 @@ def meet(rows, i, o, d, ball, start, far):  # type: ignore[no-untyped-def]
     return enter_triangle(a, b, c, n, d, ball, start, far)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def first_touch(rows, leaves, boxes, links, ball, o, d, far, guess, near, stack, apart, late):  # type: ignore[no-untyped-def]
     """Search for the earliest contact before `far`, triangle `guess` first.
 
@@ -102,7 +104,7 @@ def first_touch(rows, leaves, boxes, links, ball, o, d, far, guess, near, stack,
     return best, hit, kept
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def further(p, d, radius):  # type: ignore[no-untyped-def]
     """How much further along d a ball rests on the point p that it all but touches; inf if it slides along it."""
     gap = sqrt(dot(p, p))
@@ -110,7 +112,7 @@ def further(p, d, radius):  # type: ignore[no-untyped-def]
     return (gap - radius) / cosine if cosine > GLANCING else inf
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def settle(rows, order, near, kept, hit, o, d, ball):  # type: ignore[no-untyped-def]
     """(triangle, step, kept): which of the near triangles stops the ball first, and how much further along d than o.
 
@@ -135,7 +137,7 @@ def settle(rows, order, near, kept, hit, o, d, ball):  # type: ignore[no-untyped
     return first if first >= 0 else hit, least, stay
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def count_contacts(rows, near, kept, first, o, ball, points):  # type: ignore[no-untyped-def]
     """Number of distinct places of the near triangles that a ball at o touches, `first` (relative to o) among them."""
     apart = DISTINCT_CONTACT_GAP * ball[0]
@@ -153,7 +155,7 @@ def count_contacts(rows, near, kept, first, o, ball, points):  # type: ignore[no
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def feature_of(rows, i, o, p, rounding):  # type: ignore[no-untyped-def]
     """1 face, 2 edge, 3 vertex: the smallest part of the triangle that holds the point p relative to o."""
     a, b, c, _ = corners(rows, i, o)
@@ -168,7 +170,7 @@ def feature_of(rows, i, o, p, rounding):  # type: ignore[no-untyped-def]
     return feature
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def way_to_body(o, d, around):  # type: ignore[no-untyped-def]
     """(start, length) of the part of a ray within a sphere around the body; length < 0 if it misses it."""
     middle = -dot(o, d)

@@ -11,6 +11,7 @@ from mapping.geometry.contact.contact_kernels import way_to_body
 from mapping.geometry.mesh import (
     STACK,
     WIDTH,
+    borrowing,
     closest_on_triangle,
     closing_step,
     corners,
@@ -46,7 +47,7 @@ def retreats(rows, leaves, boxes, links, ball, size, outward, centers, backward,
         distance[q] = away
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def leave_overlap(rows, leaves, boxes, links, ball, o, d, stack, apart, late):  # type: ignore[no-untyped-def]
     """How far the ball at o moves along d until it overlaps nothing."""
     away, step = 0.0, inf
@@ -56,7 +57,7 @@ def leave_overlap(rows, leaves, boxes, links, ball, o, d, stack, apart, late):  
     return away
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def overlap_ahead(rows, leaves, boxes, links, ball, o, d, stack, apart, late):  # type: ignore[no-untyped-def]
     """How far the ball at o moves along d to leave every triangle that it overlaps now."""
     radius, _, graze = ball
@@ -82,7 +83,7 @@ def overlap_ahead(rows, leaves, boxes, links, ball, o, d, stack, apart, late):  
     return step
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def first_face(rows, leaves, boxes, links, o, d, length, slack, stack, apart, late):  # type: ignore[no-untyped-def]
     """First face that the ray from o along d crosses: (t, cosine of its normal and d); (inf, 0) if none."""
     best, facing = length, 0.0
@@ -100,7 +101,7 @@ def first_face(rows, leaves, boxes, links, o, d, length, slack, stack, apart, la
     return best, facing
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def crossing(rows, i, o, d, slack):  # type: ignore[no-untyped-def]
     """(t >= 0, cosine) where the ray crosses a face or passes its border within the slack; (inf, 0) if neither."""
     a, b, c, n = corners(rows, i, o)

@@ -6,6 +6,7 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from mapping.geometry.mesh.atomic_write import write_whole as write_whole
+    from mapping.geometry.mesh.borrowing_kernels import borrowing as borrowing, inlined as inlined
     from mapping.geometry.mesh.bvh_kernels import STACK as STACK, WIDTH as WIDTH, push_lanes as push_lanes
     from mapping.geometry.mesh.nearest import MovedNearestPoint as MovedNearestPoint, NearestPoint as NearestPoint
     from mapping.geometry.mesh.open3d_import import open3d as open3d
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "spline": ("Spline", "spline_design"),
     "atomic_write": ("write_whole",),
+    "borrowing_kernels": ("borrowing", "inlined"),
     "bvh_kernels": ("STACK", "WIDTH", "push_lanes"),
     "nearest": ("MovedNearestPoint", "NearestPoint"),
     "open3d_import": ("open3d",),

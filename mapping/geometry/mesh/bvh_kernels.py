@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from mapping.geometry.mesh.borrowing_kernels import borrowing, inlined
 from mapping.geometry.mesh.vector_kernels import dot, moved, sub
 
 WIDTH = 16
@@ -62,7 +63,7 @@ def leaf_order(vertices, faces):  # type: ignore[no-untyped-def]
     return order
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def longest_axis(keys, first, end):  # type: ignore[no-untyped-def]
     """Axis along which the keys spread most."""
     best, longest = 0, F4(-1.0)
@@ -75,7 +76,7 @@ def longest_axis(keys, first, end):  # type: ignore[no-untyped-def]
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def part(keys, order, first, end, cut, axis):  # type: ignore[no-untyped-def]
     """Permute keys and order so that none before `cut` exceeds one after it (Hoare's quickselect)."""
     low, high, chance = first, end - 1, 12345
@@ -137,7 +138,7 @@ def build_tree(rows):  # type: ignore[no-untyped-def]
     return leaves, boxes, links
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def longest_square(rows, i):  # type: ignore[no-untyped-def]
     """Longest side of a triangle, squared."""
     a, b = (rows[i, 0], rows[i, 1], rows[i, 2]), (rows[i, 3], rows[i, 4], rows[i, 5])
@@ -146,7 +147,7 @@ def longest_square(rows, i):  # type: ignore[no-untyped-def]
     return max(dot(u, u), dot(v, v), dot(w, w))
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def lane_box(leaves, boxes, node, lane):  # type: ignore[no-untyped-def]
     """(low, high): corners of the box of a lane."""
     i = node - len(leaves)
@@ -162,7 +163,7 @@ def lane_box(leaves, boxes, node, lane):  # type: ignore[no-untyped-def]
     return low, (max(a[0], b[0], c[0]), max(a[1], b[1], c[1]), max(a[2], b[2], c[2]))
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def enclose(leaves, boxes, links, node, parent, lane):  # type: ignore[no-untyped-def]
     """Write the box around all lanes of a node into a lane of its parent (its number among `boxes`)."""
     for i in range(links[node, 1]):
@@ -174,7 +175,7 @@ def enclose(leaves, boxes, links, node, parent, lane):  # type: ignore[no-untype
                 boxes[parent, 3 + k, lane] = high[k]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def leaf_tests(leaves, node, end, d, reach, apart):  # type: ignore[no-untyped-def]
     """`box_tests` for the triangles of a leaf.
 
@@ -199,7 +200,7 @@ def leaf_tests(leaves, node, end, d, reach, apart):  # type: ignore[no-untyped-d
         apart[i] = max(box, near)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def box_tests(boxes, node, end, d, reach, apart, late):  # type: ignore[no-untyped-def]
     """Look from the end of a ball's way, along the unit vector d, at the boxes of a node's lanes.
 
@@ -221,7 +222,7 @@ def box_tests(boxes, node, end, d, reach, apart, late):  # type: ignore[no-untyp
         late[i] = lx * lx + ly * ly + lz * lz + (twice - along) * along
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def passes(leaves, boxes, node, lane, start, end, d, length, reach):  # type: ignore[no-untyped-def]
     """True if a ball on its way from `start` to `end` surely stays further than `reach` from a lane's box.
 
@@ -245,7 +246,7 @@ def passes(leaves, boxes, node, lane, start, end, d, length, reach):  # type: ig
     return gap > 0.0 and gap * gap > reach * reach * square
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def push_lanes(leaves, boxes, links, stack, waiting, start, end, d, length, reach, apart, late):  # type: ignore[no-untyped-def]
     """Replace the node on top of the stack by the lanes that a ball on its way may touch, the earliest on top.
 

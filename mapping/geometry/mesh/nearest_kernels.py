@@ -7,6 +7,7 @@ from math import sqrt
 import numpy as np
 from numba import njit
 
+from mapping.geometry.mesh.borrowing_kernels import borrowing
 from mapping.geometry.mesh.bvh_kernels import BOX_ROUNDING, STACK, WIDTH, push_lanes
 from mapping.geometry.mesh.triangle_row_kernels import QUERIES_PER_BLOCK, closest
 from mapping.geometry.mesh.vector_kernels import dot, moved, vector
@@ -29,7 +30,7 @@ def nearest_points(rows, order, leaves, boxes, links, queries, points, face):  #
         face[q] = order[guess]
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def nearest_triangle(rows, order, leaves, boxes, links, o, guess, stack, apart, late):  # type: ignore[no-untyped-def]
     """The triangle nearest to o, looked for in the neighbourhood that the distance of `guess` leaves."""
     best, still = guess, (0.0, 0.0, 0.0)

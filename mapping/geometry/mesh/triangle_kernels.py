@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from numba import njit
-
+from mapping.geometry.mesh.borrowing_kernels import borrowing
 from mapping.geometry.mesh.vector_kernels import cross, dot, moved, scaled, sub
 
 # What remains of a gap that closes to a tangent shrinks fourfold a step, from 1 to 1e-16 in 27 steps, and as many again
@@ -18,7 +17,7 @@ MOST_TANGENTS = 64
 SLIVER = 1e-14  # height over longest side below which a triangle is a segment: narrower than rounding
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def unit_normal(a, b, c):  # type: ignore[no-untyped-def]
     """Unit normal of a triangle, zero where it has no area."""
     u, v, w = sub(b, a), sub(c, a), sub(c, b)
@@ -32,19 +31,19 @@ def unit_normal(a, b, c):  # type: ignore[no-untyped-def]
     return scaled(1.0 / length, n)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def left_of(a, b, f, n):  # type: ignore[no-untyped-def]
     """Positive if f lies on the inner side of the edge ab of a triangle with normal n."""
     return dot(n, cross(sub(b, a), sub(f, a)))
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def holds(a, b, c, n, f):  # type: ignore[no-untyped-def]
     """True if the triangle, its border included, holds the point f of its plane."""
     return left_of(a, b, f, n) >= 0.0 and left_of(b, c, f, n) >= 0.0 and left_of(c, a, f, n) >= 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def closest_on_segment(a, b):  # type: ignore[no-untyped-def]
     """Point of the segment ab closest to the origin."""
     e = sub(b, a)
@@ -56,7 +55,7 @@ def closest_on_segment(a, b):  # type: ignore[no-untyped-def]
     return moved(a, along / square, e)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def closest_on_triangle(a, b, c, n):  # type: ignore[no-untyped-def]
     """Point of the triangle closest to the origin.
 
@@ -74,7 +73,7 @@ def closest_on_triangle(a, b, c, n):  # type: ignore[no-untyped-def]
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def enter_face(a, b, c, n, d, radius):  # type: ignore[no-untyped-def]
     """When a ball from the origin along d comes to touch the inside of the triangle, from either side; inf if never."""
     cosine = dot(d, n)
@@ -83,7 +82,7 @@ def enter_face(a, b, c, n, d, radius):  # type: ignore[no-untyped-def]
     return t if holds(a, b, c, n, moved(scaled(t, d), -side, n)) else inf
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def enter_triangle(a, b, c, n, d, ball, start, far):  # type: ignore[no-untyped-def]
     """When a ball at the origin comes to touch the triangle on its way along the unit vector d, 0 <= t < far.
 
@@ -115,7 +114,7 @@ def enter_triangle(a, b, c, n, d, ball, start, far):  # type: ignore[no-untyped-
     return min(touched, t)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def closing_step(gap, closing, radius):  # type: ignore[no-untyped-def]
     """How far along d the gap to the closest point p is the radius at the present rate; closing = p d > 0."""
     return (gap - radius) * (gap / closing)
