@@ -125,7 +125,6 @@ def with_waves(noise: Noise, sd: float, length: float) -> Noise:
 
 def _finer(window: Window) -> Window:
     """The window with each bin cut into PARTS_OF_BIN."""
-    count = PARTS_OF_BIN * len(window)
     share = np.tile((np.arange(PARTS_OF_BIN) - 0.5 * (PARTS_OF_BIN - 1)) * 2.0 / PARTS_OF_BIN, len(window))
     feet, normals, tangents = (
         np.repeat(each, PARTS_OF_BIN, axis=0) for each in (window.feet, window.normals, window.tangents)
@@ -136,7 +135,7 @@ def _finer(window: Window) -> Window:
         feet=feet + (share * half)[:, None] * tangents,
         normals=normals,
         tangents=tangents,
-        height=np.zeros(count),
+        height=np.repeat(window.height, PARTS_OF_BIN),
         count=np.repeat(window.count, PARTS_OF_BIN),
         place=place + share * half,
         last=place + share * half,

@@ -16,7 +16,7 @@ from mapping import Feature, FloatArray, Interval, Support
 from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_twin, laid, part_of
 from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, Neighbourhood
-from mapping.inference.families import BumpShape, GrooveShape, RidgeShape, TwinShape
+from mapping.inference.families import BumpShape, GrooveShape, RidgeShape, TrapezoidShape, TwinShape
 from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 
 Parts = list[Part]
@@ -130,8 +130,14 @@ def apart(now: Configuration) -> Iterator[Parts]:
 
 
 def other_kinds(now: Configuration) -> Iterator[Parts]:
-    """A short line as a point, and a point as a short line."""
+    """A short line as a point, a point as a short line, and a bar as a step along one of its walls."""
     for k, part in enumerate(now.parts):
+        if isinstance(part.shape, TrapezoidShape):
+            step, top = kind_made_of("step", line=True), float(part.shape.parts(part.start[None])[1][0])
+            for side in (-1.0, 1.0):
+                edge = _line(_sized(part.feature, step.name, abs(part.feature.height.median), 0.0),
+                             axis_of(part) + 0.5 * side * top * _lateral(part), now.place)  # fmt: skip
+                yield [*now.parts[:k], edge, *now.parts[k + 1 :]]
         kind, half = kind_of(part.feature), sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
         rest = [*now.parts[:k], *now.parts[k + 1 :]]
         if kind.sided or not kind.made_of:
