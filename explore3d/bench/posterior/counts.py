@@ -23,7 +23,7 @@ from mapping import Feature, FloatArray, Interval, Support
 from mapping.assembly import assemble
 from mapping.base import LaidTrace
 from mapping.detection import detect
-from mapping.inference.configuration import count_in
+from mapping.inference.configuration import PROPOSALS, count_in
 from mapping.inference.kinds import feature_trace, kind_named
 
 # Sweeps over a square of twice this, m, one pitch apart; details stay inside by the margin
@@ -42,15 +42,19 @@ DECILES = np.linspace(0.0, 1.0, 11)
 
 @dataclass(frozen=True)
 class CountCase:
-    """One plate: how many details it bears that leave a trace, and the probability that was stated of each number."""
+    """One plate: how many details it bears that leave a trace, and the probability that was stated of each number.
+
+    `without` names the proposal that was not made.
+    """
 
     seed: int
     true: int
     stated: dict[int, float]
     seconds: float
+    without: str = ""
 
 
-def run_counts(seed: int) -> CountCase:
+def run_counts(seed: int, without: str = "") -> CountCase:
     """Draw a plate, sweep it, and count."""
     rng = np.random.default_rng([7, seed])
     details: list[Feature] = []
@@ -66,13 +70,14 @@ def run_counts(seed: int) -> CountCase:
     tip = record([feet], np.zeros(len(feet))).tip_radius
     each = np.array([feature_trace(detail, feet, up, tip) for detail in details]).reshape(len(details), len(feet))
     heights = each.max(axis=0, initial=0.0)
-    without = [np.delete(each, k, axis=0).max(axis=0, initial=0.0) for k in range(len(details))]
-    true = sum(float(np.linalg.norm(heights - rest)) > COUNTED_SNR * WHITE for rest in without)
+    rests = [np.delete(each, k, axis=0).max(axis=0, initial=0.0) for k in range(len(details))]
+    true = sum(float(np.linalg.norm(heights - rest)) > COUNTED_SNR * WHITE for rest in rests)
     trace, base = record(paths, heights + WHITE * rng.standard_normal(len(feet))), plate()
     start = time.process_time()
     laid = LaidTrace.of(trace, base)
-    features = assemble(detect(laid, base), laid, base)
-    return CountCase(seed, true, stated_counts(features), time.process_time() - start)
+    proposals = [proposal for proposal in PROPOSALS if proposal.name != without]
+    features = assemble(detect(laid, base), laid, base, proposals=proposals)
+    return CountCase(seed, true, stated_counts(features), time.process_time() - start, without)
 
 
 def drawn(rng: np.random.Generator, others: Sequence[Feature] = ()) -> Feature:
@@ -108,18 +113,20 @@ def stated_counts(features: Sequence[Feature]) -> dict[int, float]:
     return {number: float(p) for number, p in enumerate(total) if p > 0.0}
 
 
-def bench_counts(store: Path, seeds: int, seconds: float = float("inf"), *, building: bool = False) -> list[CountCase]:
+def bench_counts(
+    store: Path, seeds: int, seconds: float = float("inf"), *, building: bool = False, without: str = ""
+) -> list[CountCase]:
     """Run what the store does not hold; returns all cases of the request."""
-    done = {case.seed: case for case in load_counts(store)} if store.exists() else {}
+    done = {(case.seed, case.without): case for case in load_counts(store)} if store.exists() else {}
     end, first = time.monotonic() + seconds, FIRST_BUILT_WITH if building else 0
-    asked = range(first, first + seeds)
+    asked = [(seed, without) for seed in range(first, first + seeds)]
     with store.open("a", encoding="utf-8") as file:
-        for seed in asked:
-            if seed not in done and time.monotonic() < end:
-                done[seed] = case = run_counts(seed)
+        for key in asked:
+            if key not in done and time.monotonic() < end:
+                done[key] = case = run_counts(*key)
                 file.write(json.dumps(case.__dict__) + "\n")
                 file.flush()
-    return [done[seed] for seed in asked if seed in done]
+    return [done[key] for key in asked if key in done]
 
 
 def load_counts(store: Path) -> list[CountCase]:
