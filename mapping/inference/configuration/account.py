@@ -202,18 +202,21 @@ def _support(k: int, best: Configuration, algorithms: tuple[int, ...]) -> Suppor
 
 
 def _meeting(features: list[Feature], tip: float) -> list[Feature]:
-    """The lines, those that meet others marked."""
-    result = []
-    for feature in features:
-        near = MEETING_SHARE * sizes_of(feature, tip).half_width
-        others = [dense(other.axis) for other in features if other is not feature and len(other.axis) > 1]
-        meets = len(feature.axis) > 1 and kind_of(feature).has_ends
-        meets = meets and any(
-            min(distances(dense(feature.axis), o).min(), distances(o, feature.axis).min()) < near for o in others
-        )
-        notes = ("junction", *feature.notes) if meets else feature.notes
-        result.append(replace(feature, junction=meets, notes=notes))
-    return result
+    """The lines, those that meet others marked; lines that run beside each other do not meet."""
+    lines = {k: dense(feature.axis) for k, feature in enumerate(features) if len(feature.axis) > 1}
+    met: set[int] = set()
+    for k, m in itertools.combinations(lines, 2):
+        half = min(sizes_of(features[n], tip).half_width for n in (k, m))
+        gaps = [distances(lines[one], lines[other]) for one, other in ((k, m), (m, k))]
+        touching = min(gap.min() for gap in gaps) < MEETING_SHARE * half
+        if touching and all(np.median(gap) > half for gap in gaps):
+            met |= {k, m}
+    return [
+        replace(feature, junction=True, notes=("junction", *feature.notes))
+        if k in met and kind_of(feature).has_ends
+        else replace(feature, junction=False)
+        for k, feature in enumerate(features)
+    ]
 
 
 def _told(found: Account) -> tuple[tuple[str, float], ...]:
