@@ -81,9 +81,13 @@ class JoinedShape:
 
     @staticmethod
     def _alone(shape: Shape, theta: FloatArray) -> FloatArray:
-        """The heights of one shape: of the rows of one difference quotient most are equal in its parameters."""
-        rows, which = np.unique(theta, axis=0, return_inverse=True)
-        return np.asarray(shape.templates(np.ascontiguousarray(rows))[which.reshape(-1)])
+        """The heights of one shape: most rows of one difference quotient are the last one's in its parameters."""
+        own = (theta != theta[-1]).any(axis=1)
+        own[-1] = True
+        found = shape.templates(np.ascontiguousarray(theta[own]))
+        heights = np.tile(found[-1], (len(theta), 1))
+        heights[own] = found
+        return heights
 
     def _on_steps(self, k: int, own: Sequence[FloatArray]) -> Iterator[tuple[FloatArray, FloatArray]]:
         """What of the k-th shape stands on the high side of each step: its parameters (W, P), and the (W,) lift, m."""
