@@ -93,8 +93,9 @@ def _improved(
     ]
     found = searched(start, [part_of(feature, place) for feature in group], np.array(points).reshape(-1, 3), proposals)
     odds = _told(found)
-    # a section alone is the posterior's to choose, and what explains the trace no better than in part is no account
-    if not found.best.fits or (set(found.accepted) <= {"section"} and found.best.kinds == found.start.kinds):
+    # a section alone is the posterior's to choose, and what explains the trace only in part adds nothing
+    adds = len(found.best.kinds) > len(found.start.kinds)
+    if (adds and not found.best.fits) or (set(found.accepted) <= {"section"} and found.best.kinds == found.start.kinds):
         return [_with_odds(feature, odds if found.best.fits else ()) for feature in group]
     algorithms = group[0].evidence.algorithms if group else ()
     features = [_with_odds(feature, odds) for feature in _described(found.best, around, algorithms)]

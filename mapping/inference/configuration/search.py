@@ -12,7 +12,7 @@ from mapping.inference.configuration.configuration import Configuration, Part, f
 from mapping.inference.configuration.proposals import JOIN, PROPOSALS, Parts, Proposal
 
 # Configurations that are fitted in one neighbourhood: a bound on the time, which crowded ones reach
-MOST_FITTED = 80
+MOST_FITTED = 40
 # A proposal must be better by this log odds: less is rounding, or the same configuration found again
 WORTH = 0.5
 # What is less likely than the best by this log odds is not gone on from, nor told
