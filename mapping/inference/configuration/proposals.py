@@ -14,7 +14,7 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Interval, Support
 from mapping.geometry.mesh import arclengths, distances, nearest_on
-from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_twin, laid, part_of
+from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_bell, as_twin, laid, part_of
 from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, Neighbourhood
 from mapping.inference.families import BumpShape, GrooveShape, RidgeShape, TrapezoidShape, TwinShape
 from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
@@ -22,6 +22,8 @@ from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 Parts = list[Part]
 # Tops of a bar and gaps of a twin, in half-widths of the disturbance, that their optima are searched from
 TOPS, GAPS = (0.5,), (0.2, 0.7)
+# Scales of a bump with a skirt, in half-widths, that its optimum is searched from
+SKIRTS = (0.3, 0.8)
 # Points so near to a straight line, in half-widths, may be of it
 ON_LINE = 0.35
 # Half of a line that may be meant instead of a point, in half-widths of its disturbance
@@ -42,8 +44,13 @@ MOST_DRAWN_THROUGH = 60
 
 
 def sections(now: Configuration) -> Iterator[Parts]:
-    """Another section of a line that is wider than a wire of its height: round, flat-topped, or two in one."""
+    """Another section of a line that is wider than a wire of its height: round, flat-topped, or two in one; and a bump
+    with a skirt."""
     for k, part in enumerate(now.parts):
+        if isinstance(part.shape, BumpShape):
+            half = sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
+            for share in SKIRTS:
+                yield [*now.parts[:k], as_bell(part, now.place, share * half), *now.parts[k + 1 :]]
         ridge = _ridge_of(part, now.place)
         if ridge is None or now.as_narrow_as_wires[k]:
             continue

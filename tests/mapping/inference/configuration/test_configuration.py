@@ -8,9 +8,10 @@ import pytest
 from explore3d.analysis import TrueFeature
 from explore3d.bench.detection import NOISE_SOURCES
 from explore3d.bench.detection.classify import noisy, touched, trial
+from explore3d.bench.posterior.calibration import plate
 from explore3d.bench.posterior.counts import run_counts
 from explore3d.bench.scenes import FIRST_BUILT_WITH, classified_body
-from mapping import Details, Feature, Interval, Support
+from mapping import Details, Feature, Interval, Support, Trace
 from mapping.assembly import assemble
 from mapping.base import Base
 from mapping.detection import detect
@@ -131,3 +132,18 @@ def test_counts_read_as_people_say_them() -> None:
     assert in_words(()) == "nothing"
     for kinds in [(), ("bump",), ("ridge", "ridge", "step"), ("pit",) * 12]:
         assert count_in(in_words(kinds)) == len(kinds)
+
+
+def test_a_bump_that_runs_out_gently_is_one_with_a_skirt_and_not_several() -> None:
+    height, scale, tip = 0.3e-3, 2e-3, 10e-3
+    y = np.arange(-18e-3, 18e-3, 30e-6)
+    x = np.arange(-15e-3, 15e-3, 3e-3) + 1.1e-3
+    across, along = np.repeat(x, len(y)), np.tile(y, len(x))
+    away, reach = np.linspace(0.0, 25e-3, 400), np.linspace(-9.9e-3, 9.9e-3, 1500)
+    body = height * np.exp(-0.5 * ((away[:, None] + reach) / scale) ** 2)
+    felt = (body + np.sqrt(tip**2 - reach**2) - tip).max(axis=1)
+    noise = 40e-6 * np.random.default_rng(5).standard_normal(len(across))
+    centers = np.column_stack([across, along, tip + np.interp(np.hypot(across, along), away, felt) + noise])
+    sweep = np.repeat(np.arange(len(x)), len(y))
+    trace, base = Trace(1e-3 * np.arange(float(len(across))), centers, sweep, tip), plate()
+    assert [feature.kind for feature in assemble(detect(trace, base), trace, base)] == ["bump"]
