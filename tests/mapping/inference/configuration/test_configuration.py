@@ -8,12 +8,12 @@ import pytest
 from explore3d.analysis import TrueFeature
 from explore3d.bench.detection import NOISE_SOURCES
 from explore3d.bench.detection.classify import noisy, touched, trial
-from explore3d.bench.posterior.calibration import plate
+from explore3d.bench.posterior.calibration import plate, record, straight_path
 from explore3d.bench.posterior.counts import run_counts
 from explore3d.bench.scenes import FIRST_BUILT_WITH, classified_body
-from mapping import Details, Feature, Interval, Support, Trace
+from mapping import Details, Feature, Interval, Support
 from mapping.assembly import assemble
-from mapping.base import Base
+from mapping.base import Base, LaidTrace
 from mapping.detection import detect
 from mapping.inference.configuration import Places, count_in, in_words
 from mapping.inference.configuration.configuration import part_of
@@ -136,14 +136,12 @@ def test_counts_read_as_people_say_them() -> None:
 
 def test_a_bump_that_runs_out_gently_is_one_with_a_skirt_and_not_several() -> None:
     height, scale, tip = 0.3e-3, 2e-3, 10e-3
-    y = np.arange(-18e-3, 18e-3, 30e-6)
-    x = np.arange(-15e-3, 15e-3, 3e-3) + 1.1e-3
-    across, along = np.repeat(x, len(y)), np.tile(y, len(x))
-    away, reach = np.linspace(0.0, 25e-3, 400), np.linspace(-9.9e-3, 9.9e-3, 1500)
+    paths = [straight_path((-20e-3, y), (20e-3, y)) for y in np.arange(-20e-3, 20e-3, 3e-3) + 1.1e-3]
+    away, reach = np.linspace(0.0, 30e-3, 601), np.linspace(-9.9e-3, 9.9e-3, 1981)
     body = height * np.exp(-0.5 * ((away[:, None] + reach) / scale) ** 2)
     felt = (body + np.sqrt(tip**2 - reach**2) - tip).max(axis=1)
-    noise = 40e-6 * np.random.default_rng(5).standard_normal(len(across))
-    centers = np.column_stack([across, along, tip + np.interp(np.hypot(across, along), away, felt) + noise])
-    sweep = np.repeat(np.arange(len(x)), len(y))
-    trace, base = Trace(1e-3 * np.arange(float(len(across))), centers, sweep, tip), plate()
-    assert [feature.kind for feature in assemble(detect(trace, base), trace, base)] == ["bump"]
+    heights = np.interp(np.linalg.norm(np.concatenate(paths), axis=1), away, felt)
+    trace = record(paths, heights + 20e-6 * np.random.default_rng(3001).standard_normal(len(heights)))
+    base = plate()
+    laid = LaidTrace.of(trace, base)
+    assert [feature.kind for feature in assemble(detect(laid, base), laid, base)] == ["bump"]
