@@ -196,15 +196,26 @@ def calibration(
 @bench.command()
 def odds(
     store: Store,
-    seeds: Annotated[int, typer.Option(min=1, help="Simulations of each pair.")] = 50,
+    seeds: Annotated[int, typer.Option(min=1, help="Simulations of each pair, or plates.")] = 50,
     seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+    counts: Annotated[
+        bool, typer.Option("--counts", help="Plates of none to five details: how many are there?")
+    ] = False,
+    building: Annotated[bool, typer.Option("--building", help="The plates that may be looked into.")] = False,
+    without: Annotated[str, typer.Option(help="A proposal that is not made on the plates.")] = "",
 ) -> None:
-    """Do stated probabilities come true: bump or nothing, ridge or bump, two ridges or one?
+    """Do stated probabilities come true: bump or nothing, ridge or bump, two ridges or one, how many?
 
     Example: explore3d bench odds --store odds.jsonl --seeds 200
+    Example: explore3d bench odds --store counts.jsonl --counts --seeds 1000
     """
-    from explore3d.bench.posterior import bench_odds, odds_table
+    from explore3d.bench.posterior import bench_counts, bench_odds, counts_table, odds_table
+    from mapping.inference.configuration import PROPOSALS
 
+    if counts:
+        _names(without or None, "--without", [proposal.name for proposal in PROPOSALS])
+        counts_table(bench_counts(store, seeds, seconds, building=building, without=without), print)
+        return
     odds_table(bench_odds(store, seeds, seconds), print)
 
 

@@ -73,13 +73,14 @@ def summary(analysis: Analysis) -> list[str]:
 
 
 def account_lines(analysis: Analysis) -> list[str]:
-    """How many features are felt together where the trace does not decide, a sentence for each neighbourhood."""
+    """What details that are felt together may be where the trace does not decide, a sentence a neighbourhood."""
     felt: dict[tuple[tuple[str, float], ...], list[str]] = {}
     for feature in analysis.model.features:
         if feature.details.account:
             felt.setdefault(feature.details.account, []).append(feature.id)
     return [
-        f"{', '.join(names)}: {', '.join(f'{words} {100 * share:.0f} %' for words, share in account)}."
+        f"The sweeps do not decide what {' and '.join(names)} {'are' if len(names) > 1 else 'is'}: "
+        f"{', '.join(f'{words} {100 * share:.0f} %' for words, share in account)}."
         for account, names in felt.items()
     ]
 

@@ -92,7 +92,7 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
         shared = _shared_notes(features)
         content.append(table(head, [_row(feature, analysis, pictures, shared) for feature in features]))
         content.extend(paragraph(f"{_capital(note)} (all of them).") for note in shared)
-        content.extend(paragraph(f"How many? {each}") for each in account_lines(analysis))
+        content.extend(paragraph(each) for each in account_lines(analysis))
         content.append(paragraph("Ranges are central 90 % intervals. ", limit_sentence(analysis)))
     if analysis.inspected is not None and not is_profile(analysis):
         content.append(paragraph(analysis.inspected.sentence()))

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         verdicts as verdicts,
         write_record as write_record,
     )
+    from explore3d.bench.posterior.counts import bench_counts as bench_counts, counts_table as counts_table
     from explore3d.bench.posterior.odds import bench_odds as bench_odds, odds_table as odds_table
     from explore3d.bench.posterior.sampling import (
         APPARATUS_NOISE as APPARATUS_NOISE,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "calibration": ("CALIBRATED_KINDS", "calibrate", "campaign"),
     "calibration_verdicts": ("by_kind", "draw_ranks", "verdicts", "write_record"),
+    "counts": ("bench_counts", "counts_table"),
     "odds": ("bench_odds", "odds_table"),
     "sampling": ("APPARATUS_NOISE", "DIAMETER", "Timing", "bench_posterior", "crossings"),
 }

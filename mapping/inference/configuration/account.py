@@ -9,28 +9,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapping import Feature, FloatArray, MappingError, Posterior, Support
+from mapping import Feature, MappingError, Posterior, Support
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference import describe
 from mapping.inference.configuration.configuration import Configuration, fitted, part_of
 from mapping.inference.configuration.joined_shape import JoinedShape, OneOfMany
-from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, Places, neighbourhood
-from mapping.inference.configuration.proposals import PROPOSALS, Proposal, apart_of, dense
+from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Places, neighbourhood, thin_half_width
+from mapping.inference.configuration.proposals import PEAK_SDS, PROPOSALS, Proposal, apart_of, as_far_as_felt, dense
 from mapping.inference.configuration.search import Account, searched
-from mapping.inference.families import PosteriorProblem, Surroundings, TwinShape
+from mapping.inference.families import PosteriorProblem, RidgeShape, Surroundings, TwinShape
 from mapping.inference.kinds import kind_named, kind_of, sizes_of
 from mapping.inference.likelihood import Nuisance
 
-# A line disturbs its trace over this much more than a thin wire of its height does, where it may be a bar or two: the
-# half-width that assembly finds is known to some hundredths
-WIDER = 1.06
 # A line that was found reaches what was a neighbourhood of its own: both are looked at once more, together
 LOOKS = 2
 # What is less likely than this is not told
 TOLD_SHARE = 0.01
 # Draws of the Gaussian that preliminary intervals are taken from
 PRELIMINARY_DRAWS = 400
+NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 # Lines nearer to each other than this share of a half-width meet
 MEETING_SHARE = 0.25
 
@@ -55,12 +53,14 @@ def accounted(
         proposals: what is tried.
     """
     rest = [feature for feature in features if not _weighed(feature)]
+    tip = around.trace.tip_radius
+    open_to = [c for c in crossings if not any(_felt_by(c, feature, tip) for feature in rest)]
     settled: list[list[Feature]] = [[feature] for feature in features if _weighed(feature)]
     for again in range(LOOKS):
         origin = {id(feature): k for k, known in enumerate(settled) for feature in known}
         found: list[list[Feature]] = []
-        for group, own in _groups([feature for known in settled for feature in known], crossings, around):
-            if again and len({origin[id(feature)] for feature in group}) == 1:
+        for group, own in _groups([feature for known in settled for feature in known], open_to, tip):
+            if again and len({origin[id(feature)] for feature in group}) < 2:
                 found.append(group)
             else:
                 found.append(_improved(group, own, places, around, false_alarms_per_metre, proposals))
@@ -77,36 +77,35 @@ def _improved(
     proposals: Sequence[Proposal],
 ) -> list[Feature]:
     """The features of one neighbourhood, as they are or better."""
-    if _is_plain(group, crossings, around.trace.tip_radius):
+    place = neighbourhood(group, crossings, places, around, false_alarms_per_metre)
+    if place is None:
         return group
-    place = neighbourhood(group, [c.point for c in crossings], places, around, false_alarms_per_metre)
-    return group if place is None else _of_group(group, crossings, place, around, proposals)
-
-
-def _of_group(
-    group: list[Feature],
-    crossings: Sequence[Crossing],
-    place: Neighbourhood,
-    around: Surroundings,
-    proposals: Sequence[Proposal],
-) -> list[Feature]:
-    """The features of the best configuration of one neighbourhood."""
     try:
-        parts = [part_of(feature, place) for feature in group]
+        start = fitted([part_of(feature, place) for feature in group], place)
     except MappingError:  # a feature over whose axis the base does not go on has no family here
+        return group
+    assert start is not None
+    if _is_plain(start):
         return group
     points = [c.point for c in crossings if c.kind == "convex"]
     points += [
         point for feature in group if kind_of(feature).line and kind_of(feature).sign > 0 for point in feature.axis
     ]
-    found = searched(parts, place, np.array(points).reshape(-1, 3), proposals)
+    found = searched(start, [part_of(feature, place) for feature in group], np.array(points).reshape(-1, 3), proposals)
     odds = _told(found)
-    # a section alone is the posterior's to choose, and what explains the trace no better than in part is no account
-    if not found.best.fits or (set(found.accepted) <= {"section"} and found.best.kinds == found.start.kinds):
+    # a section alone is the posterior's to choose, and what explains the trace only in part adds nothing
+    adds = len(found.best.kinds) > len(found.start.kinds)
+    if (adds and not found.best.fits) or (set(found.accepted) <= {"section"} and found.best.kinds == found.start.kinds):
         return [_with_odds(feature, odds if found.best.fits else ()) for feature in group]
-    algorithm = group[0].evidence.algorithms
-    features = [_with_odds(feature, odds) for feature in _described(found.best, around, algorithm)]
+    algorithms = group[0].evidence.algorithms if group else ()
+    features = [_with_odds(feature, odds) for feature in _described(found.best, around, algorithms)]
     return _meeting(features, around.trace.tip_radius)
+
+
+def _is_plain(start: Configuration) -> bool:
+    """True of at most one detail that has no wide section to choose, and over which nothing stands out."""
+    wide = any(isinstance(part.shape, RidgeShape) for part in start.parts) and not all(start.as_narrow_as_wires)
+    return len(start.parts) < 2 and not wide and not bool((np.abs(start.standing_off) > PEAK_SDS).any())
 
 
 def _weighed(feature: Feature) -> bool:
@@ -115,16 +114,15 @@ def _weighed(feature: Feature) -> bool:
 
 
 def _groups(
-    features: list[Feature], crossings: Sequence[Crossing], around: Surroundings
+    features: list[Feature], crossings: Sequence[Crossing], tip: float
 ) -> list[tuple[list[Feature], list[Crossing]]]:
-    """Features whose disturbances touch, directly or by those of crossings between them, and these crossings."""
-    tip = around.trace.tip_radius
+    """Features whose disturbances touch, directly or by those of crossings between them, and these crossings.
+
+    What single sweeps detected and no feature explains is felt together in groups of its own.
+    """
     reach = [sizes_of(feature, tip).half_width for feature in features]
-    near = [
-        [c for c in crossings if distances(c.point[None], feature.axis)[0] < own + c.half_width]
-        for feature, own in zip(features, reach, strict=True)
-    ]
-    parent = list(range(len(features)))
+    near = [[k for k, feature in enumerate(features) if _felt_by(c, feature, tip)] for c in crossings]
+    parent = list(range(len(features) + len(crossings)))
 
     def root(i: int) -> int:
         while parent[i] != i:
@@ -135,49 +133,48 @@ def _groups(
         touching = min(
             distances(features[i].axis, features[j].axis).min(), distances(features[j].axis, features[i].axis).min()
         )
-        shared = {id(c) for c in near[i]} & {id(c) for c in near[j]}
-        if touching < reach[i] + reach[j] or shared:
+        if touching < reach[i] + reach[j]:
             parent[root(j)] = root(i)
-    groups: dict[int, tuple[list[Feature], dict[int, Crossing]]] = {}
-    for k, feature in enumerate(features):
-        own, held = groups.setdefault(root(k), ([], {}))
-        own.append(feature)
-        held |= {id(c): c for c in near[k]}
-    return [(own, list(held.values())) for own, held in groups.values()]
+    for n, own in enumerate(near):
+        for k in own:
+            parent[root(len(features) + n)] = root(k)
+    alone = [n for n, own in enumerate(near) if not own]
+    for n, m in itertools.combinations(alone, 2):
+        apart = float(np.linalg.norm(crossings[n].point - crossings[m].point))
+        if apart < thin_half_width(crossings[n], tip) + thin_half_width(crossings[m], tip):
+            parent[root(len(features) + m)] = root(len(features) + n)
+    groups: dict[int, tuple[list[Feature], list[Crossing]]] = {}
+    for i, feature in enumerate(features):
+        groups.setdefault(root(i), ([], []))[0].append(feature)
+    for n, crossing in enumerate(crossings):
+        groups.setdefault(root(len(features) + n), ([], []))[1].append(crossing)
+    return list(groups.values())
 
 
-def _is_plain(group: list[Feature], crossings: Sequence[Crossing], tip: float) -> bool:
-    """True of one detail that is as narrow as it is high, or hollow, and explains all crossings about it."""
-    if len(group) > 1:
-        return False
-    feature = group[0]
-    half = sizes_of(feature, tip).half_width
-    off = [c for c in crossings if distances(c.point[None], feature.axis)[0] > half]
-    if off:
-        return False
-    thin = float(np.sqrt(2.0 * tip * abs(feature.height.median)))
-    wide = kind_of(feature).line and kind_of(feature).sign > 0 and 0.5 * feature.width.high > WIDER * thin
-    turns = kind_of(feature).line and len(feature.axis) > 3 and _turns(feature.axis)
-    return not (wide or turns)
-
-
-def _turns(axis: FloatArray) -> bool:
-    """True of a polyline that turns back on itself at a corner, as two lines do that were taken for one."""
-    legs = np.diff(axis, axis=0)
-    legs = legs / np.maximum(np.linalg.norm(legs, axis=1, keepdims=True), np.finfo(float).tiny)
-    return bool((np.einsum("ij,ij->i", legs[1:], legs[:-1]) < 0.5).any())
+def _felt_by(crossing: Crossing, feature: Feature, tip: float) -> bool:
+    """True if what a sweep detected may be a part of what a feature disturbs."""
+    reach, axis = sizes_of(feature, tip).half_width + crossing.half_width, feature.axis
+    if kind_of(feature).line and not kind_of(feature).has_ends and not feature.closed:  # it goes on
+        far = np.linalg.norm(crossing.point - axis[[0, -1]], axis=1)
+        ways = axis[[0, -1]] - axis[[1, -2]]
+        ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), np.finfo(float).tiny)
+        axis = np.vstack([axis[0] + far[0] * ways[0], axis, axis[-1] + far[1] * ways[1]])
+    return bool(distances(crossing.point[None], axis)[0] < reach)
 
 
 def _described(best: Configuration, around: Surroundings, algorithms: tuple[int, ...]) -> list[Feature]:
     """Each part as a feature: beside the others, with intervals from the Gaussian at the optimum."""
-    twins = [part for part in best.parts if isinstance(part.shape, TwinShape)]
-    if twins:
-        parts = [
-            one for part in best.parts for one in (apart_of(part) if isinstance(part.shape, TwinShape) else [part])
-        ]
+    parts = [
+        one
+        for part in best.parts
+        for one in (apart_of(part) if isinstance(part.shape, TwinShape) else [as_far_as_felt(part, best.place)])
+    ]
+    if any(one is not other for one, other in itertools.zip_longest(parts, best.parts)):
         whole = fitted(parts, best.place)
         assert whole is not None
         best = whole
+    if not best.parts:
+        return []
     theta, rng = best.found.mean, np.random.default_rng(0)
     likelihood = best.place.levels[best.level][0]
     draws = rng.multivariate_normal(theta, best.found.covariance, PRELIMINARY_DRAWS, method="eigh")
@@ -206,18 +203,21 @@ def _support(k: int, best: Configuration, algorithms: tuple[int, ...]) -> Suppor
 
 
 def _meeting(features: list[Feature], tip: float) -> list[Feature]:
-    """The lines, those that meet others marked."""
-    result = []
-    for feature in features:
-        near = MEETING_SHARE * sizes_of(feature, tip).half_width
-        others = [dense(other.axis) for other in features if other is not feature and len(other.axis) > 1]
-        meets = len(feature.axis) > 1 and kind_of(feature).has_ends
-        meets = meets and any(
-            min(distances(dense(feature.axis), o).min(), distances(o, feature.axis).min()) < near for o in others
-        )
-        notes = ("junction", *feature.notes) if meets else feature.notes
-        result.append(replace(feature, junction=meets, notes=notes))
-    return result
+    """The lines, those that meet others marked; lines that run beside each other do not meet."""
+    lines = {k: dense(feature.axis) for k, feature in enumerate(features) if len(feature.axis) > 1}
+    met: set[int] = set()
+    for k, m in itertools.combinations(lines, 2):
+        half = min(sizes_of(features[n], tip).half_width for n in (k, m))
+        gaps = [distances(lines[one], lines[other]) for one, other in ((k, m), (m, k))]
+        touching = min(gap.min() for gap in gaps) < MEETING_SHARE * half
+        if touching and all(np.median(gap) > half for gap in gaps):
+            met |= {k, m}
+    return [
+        replace(feature, junction=True, notes=("junction", *feature.notes))
+        if k in met and kind_of(feature).has_ends
+        else replace(feature, junction=False)
+        for k, feature in enumerate(features)
+    ]
 
 
 def _told(found: Account) -> tuple[tuple[str, float], ...]:
@@ -228,12 +228,17 @@ def _told(found: Account) -> tuple[tuple[str, float], ...]:
 
 def in_words(kinds: Sequence[str]) -> str:
     """Kinds of features as people count them: "one step and two ridges"."""
-    numbers = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
     parts = []
     for name, count in Counter(kinds).items():
-        number = numbers[count] if count < len(numbers) else str(count)
+        number = NUMBERS[count] if count < len(NUMBERS) else str(count)
         parts.append(f"{number} {name if count == 1 else kind_named(name).plural}")
     return " and ".join(parts) if parts else "nothing"
+
+
+def count_in(words: str) -> int:
+    """How many details `in_words` speaks of."""
+    first = [part.split()[0] for part in words.split(" and ") if words != "nothing"]
+    return sum(NUMBERS.index(word) if word in NUMBERS else int(word) for word in first)
 
 
 def _with_odds(feature: Feature, odds: tuple[tuple[str, float], ...]) -> Feature:

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from mapping import Feature, FloatArray
+from mapping.geometry.mesh import distances
+from mapping.geometry.templates import crest_trace
 from mapping.inference.configuration.joined_shape import JoinedShape
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood
 from mapping.inference.curves import HIGHEST_DEGREE
-from mapping.inference.families import RidgeShape, TwinShape, trapezoid_beside, twin_beside
+from mapping.inference.families import RidgeShape, TwinShape, bell_shape, trapezoid_beside, twin_beside
 from mapping.inference.kinds import LineKind, PointKind, kind_of, sizes_of
 from mapping.inference.likelihood import LogPosterior, Shape
 from mapping.inference.sampler import Laplace, find_optima, laplace
@@ -22,8 +24,13 @@ from mapping.inference.sampler import Laplace, find_optima, laplace
 FITTING_EXCESS = 3.0
 # A line wider than a wire by less is as narrow as one: 2 % of wires are not
 WIDE_SDS = 2.0
+# Half-width of the crests that a residual is searched with, in that of the narrowest detail: where one is hidden in
+# another's disturbance only a part of it stands out
+SHARPEST = 0.7
 # Iterations after which a configuration is given up if it is still less likely than another by this log odds
 SCREENED, HOPELESS = 8, 40.0
+# Half-widths within which the priors of the kinds leave a place open
+PLACE_OPEN = 1.5
 # The level of misfit is chosen again where the optimum under the first one says another
 MOST_LEVEL_CHANGES = 3
 
@@ -111,6 +118,22 @@ class Configuration:
             over[start:stop] -= np.median(over[start:stop])
         return np.asarray(over)
 
+    @cached_property
+    def standing_off(self) -> FloatArray:
+        """(n,) standard deviations by which a thin crest at each place would stand out of it along its run."""
+        window, half = self.place.window, SHARPEST * self.place.half_width
+        spacing = 2.0 * float(window.half[0])
+        reach = max(int(half / spacing), 0)
+        crest = crest_trace(np.abs(np.arange(-reach, reach + 1) * spacing), 1.0, half)
+        weight = self.place.levels[0][0].filter.scale ** 2
+        off = np.zeros(len(window))
+        for start, stop in zip(window.starts[:-1], window.starts[1:], strict=True):
+            own = slice(start, stop)
+            found = np.convolve(weight[own] * self.residual[own], crest, "full")[reach : reach + stop - start]
+            square = np.convolve(weight[own], crest**2, "full")[reach : reach + stop - start]
+            off[own] = found / np.sqrt(np.maximum(square, np.finfo(float).tiny))
+        return off
+
 
 def part_of(feature: Feature, place: Neighbourhood, most: int = HIGHEST_DEGREE) -> Part:
     """The part of a feature, in the first family of its kind.
@@ -137,6 +160,15 @@ def as_bar(part: Part, place: Neighbourhood, top: float) -> Part:
     course, last = ridge.modes.count, len(part.start) - 1
     kept = np.delete(part.start, [last] if ridge.chart.closed else [course, last])
     return Part(part.feature, bar, np.concatenate([kept, np.log([top, 0.02 * place.half_width])]))
+
+
+def as_bell(part: Part, place: Neighbourhood, scale: float) -> Part:
+    """A round bump as one with a skirt, of a scale (m)."""
+    cap: Any = part.shape
+    sizes, height = sizes_of(part.feature, cap.tip_radius), cap.priors[cap.free]
+    bell = bell_shape(cap.window, cap.spot, sizes, cap.tip_radius, cap.free, cap.priors[0], height)
+    start = np.concatenate([part.start[: cap.free + 1], [np.log(scale), bell.start[-1]]])
+    return Part(part.feature, bell, start)
 
 
 def as_twin(part: Part, place: Neighbourhood, gap: float) -> Part:
@@ -180,8 +212,22 @@ def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | N
         evidence = found.log_evidence
     moved = tuple(Part(part.feature, part.shape, theta[own]) for part, own in zip(parts, shape.columns, strict=True))
     plain = sum(_plain(part, found.covariance[own, own]) for part, own in zip(moved, shape.columns, strict=True))
-    odds = evidence + float(constants[level]) - float(np.log(len(constants))) + plain + len(parts) * place.log_prior
+    prior = sum(_log_prior(part, place) for part in parts)
+    odds = evidence + float(constants[level]) - float(np.log(len(constants))) + plain + prior
     return Configuration(moved, place, found, level, float(odds))
+
+
+def _log_prior(part: Part, place: Neighbourhood) -> float:
+    """Log odds of one detail more before the data: as many false ones are accepted on the path where it may lie.
+
+    Its place is left open within PLACE_OPEN half-widths of where it was proposed. What is proposed wherever the
+    residual is highest pays thereby for all the places that it might have been proposed at.
+    """
+    window, feature = place.window, part.feature
+    open_to = PLACE_OPEN * sizes_of(feature, place.around.trace.tip_radius).half_width
+    near = distances(window.feet, feature.axis) < open_to
+    path = float(2.0 * window.half[near].sum())
+    return float(np.log(place.false_alarms_per_metre * max(path, open_to)))
 
 
 def _plain(part: Part, covariance: FloatArray) -> float:

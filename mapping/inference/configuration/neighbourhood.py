@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import Feature, FloatArray, IntArray
+from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference.families import Surroundings
 from mapping.inference.kinds import sizes_of
@@ -61,7 +62,8 @@ class Neighbourhood:
         around: trace, base and noise.
         levels: likelihood under each of MISFIT_SHARES, and the log of its normalisation.
         half_width: of the narrowest disturbance, m.
-        log_prior: log odds of one more feature before the data: as many false ones are accepted on this path.
+        told: (M, 3) places where single sweeps detected something, m.
+        false_alarms_per_metre: false features that are accepted, 1/m of path.
     """
 
     window: Window
@@ -69,31 +71,33 @@ class Neighbourhood:
     around: Surroundings
     levels: tuple[tuple[Likelihood, float], ...]
     half_width: float
-    log_prior: float
+    told: FloatArray
+    false_alarms_per_metre: float
 
 
 def neighbourhood(
     features: Sequence[Feature],
-    points: Sequence[FloatArray],
+    crossings: Sequence[Crossing],
     places: Places,
     around: Surroundings,
     false_alarms_per_metre: float,
 ) -> Neighbourhood | None:
-    """The neighbourhood of some features and of further points (3,); None where too few places tell of it."""
-    sizes = [sizes_of(feature, around.trace.tip_radius) for feature in features]
+    """The neighbourhood of some features and crossings; None where too few places tell of it."""
+    tip = around.trace.tip_radius
+    sizes = [sizes_of(feature, tip) for feature in features]
+    widths = [size.half_width for size in sizes] + [thin_half_width(crossing, tip) for crossing in crossings]
+    axes = [feature.axis for feature in features] + [crossing.point[None] for crossing in crossings]
     near = np.zeros(len(places.points), dtype=bool)
-    for feature, size in zip(features, sizes, strict=True):
-        near |= distances(places.points, feature.axis) < NEIGHBOURHOOD_REACH * size.half_width
-    for point in points:
-        reach = NEIGHBOURHOOD_REACH * max(size.half_width for size in sizes)
-        near |= np.linalg.norm(places.points - point, axis=1) < reach
+    for axis, width in zip(axes, widths, strict=True):
+        near |= distances(places.points, axis) < NEIGHBOURHOOD_REACH * width
     near &= places.samples > 0
     if near.sum() < FEWEST_PLACES:
         return None
     window = window_of(places, near)
     if not len(window):  # of sweeps with a few samples each no run of places is left
         return None
-    height, half_width = max(size.height for size in sizes), min(size.half_width for size in sizes)
+    height = max([size.height for size in sizes] or [abs(crossing.height) for crossing in crossings])
+    half_width = min([size.half_width for size in sizes] or widths)
     vague = 3.0 * max(height, around.noise.sd)
     nuisance = Nuisance(vague, vague, 0.0 if around.base.kind == "mesh" else 0.3 * height)
     levels = []
@@ -102,10 +106,13 @@ def neighbourhood(
         likelihood = build_likelihood(window, noise, nuisance, 1e-9 * height)
         constant = np.log(likelihood.filter.scale).sum() + 0.5 * np.log1p(-likelihood.shrink).sum()
         levels.append((likelihood, float(constant)))
-    path = float(near.sum()) * places.spacing
-    return Neighbourhood(
-        window, _finer(window), around, tuple(levels), half_width, float(np.log(false_alarms_per_metre * path))
-    )
+    told = np.array([crossing.point for crossing in crossings]).reshape(-1, 3)
+    return Neighbourhood(window, _finer(window), around, tuple(levels), half_width, told, false_alarms_per_metre)
+
+
+def thin_half_width(crossing: Crossing, tip: float) -> float:
+    """Half-width of the disturbance of a sharp crest as high as a crossing, m."""
+    return float(np.sqrt(2.0 * tip * abs(crossing.height)))
 
 
 def with_waves(noise: Noise, sd: float, length: float) -> Noise:
@@ -118,7 +125,6 @@ def with_waves(noise: Noise, sd: float, length: float) -> Noise:
 
 def _finer(window: Window) -> Window:
     """The window with each bin cut into PARTS_OF_BIN."""
-    count = PARTS_OF_BIN * len(window)
     share = np.tile((np.arange(PARTS_OF_BIN) - 0.5 * (PARTS_OF_BIN - 1)) * 2.0 / PARTS_OF_BIN, len(window))
     feet, normals, tangents = (
         np.repeat(each, PARTS_OF_BIN, axis=0) for each in (window.feet, window.normals, window.tangents)
@@ -129,7 +135,7 @@ def _finer(window: Window) -> Window:
         feet=feet + (share * half)[:, None] * tangents,
         normals=normals,
         tangents=tangents,
-        height=np.zeros(count),
+        height=np.repeat(window.height, PARTS_OF_BIN),
         count=np.repeat(window.count, PARTS_OF_BIN),
         place=place + share * half,
         last=place + share * half,

@@ -6,7 +6,7 @@ Each generator takes a fitted configuration and yields lists of parts; the evide
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,18 +14,22 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Interval, Support
 from mapping.geometry.mesh import arclengths, distances, nearest_on
-from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_twin, part_of
-from mapping.inference.configuration.neighbourhood import Neighbourhood
-from mapping.inference.families import GrooveShape, RidgeShape, TwinShape
+from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_bell, as_twin, laid, part_of
+from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, Neighbourhood
+from mapping.inference.families import BumpShape, GrooveShape, RidgeShape, TrapezoidShape, TwinShape
 from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 
 Parts = list[Part]
 # Tops of a bar and gaps of a twin, in half-widths of the disturbance, that their optima are searched from
 TOPS, GAPS = (0.5,), (0.2, 0.7)
+# Scales of a bump with a skirt, in half-widths, that its optimum is searched from
+SKIRTS = (0.3, 0.8)
 # Points so near to a straight line, in half-widths, may be of it
 ON_LINE = 0.35
 # Half of a line that may be meant instead of a point, in half-widths of its disturbance
 SHORT_LINE = 0.3
+# Two points that may be meant instead of one lie so many of its half-widths to either side
+POINTS_APART = 0.3
 # Points of a leg that distances between lines are taken at
 POINTS_OF_LEG = 65
 # Points that two lines are drawn through, at least
@@ -33,13 +37,20 @@ FEWEST_POINTS = 4
 # Standard deviations by which a place must stand off a configuration to be looked at; how wrong one is, is then asked
 # of the evidence
 PEAK_SDS = 4.0
+# Logarithm by which the radius of a crest exceeds a wire's where the thin one is asked as well: the prior's scale
+THINNER = 1.0
 # Most points that straight lines are drawn through: two by two, which is the square of that
 MOST_DRAWN_THROUGH = 60
 
 
 def sections(now: Configuration) -> Iterator[Parts]:
-    """Another section of a line that is wider than a wire of its height: round, flat-topped, or two in one."""
+    """Another section of a line that is wider than a wire of its height: round, flat-topped, or two in one; and a bump
+    with a skirt."""
     for k, part in enumerate(now.parts):
+        if isinstance(part.shape, BumpShape):
+            half = sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
+            for share in SKIRTS:
+                yield [*now.parts[:k], as_bell(part, now.place, share * half), *now.parts[k + 1 :]]
         ridge = _ridge_of(part, now.place)
         if ridge is None or now.as_narrow_as_wires[k]:
             continue
@@ -60,16 +71,22 @@ def without(now: Configuration) -> Iterator[Parts]:
 
 
 def joined(now: Configuration) -> Iterator[Parts]:
-    """Two lines as one: end to end, or side by side."""
+    """Two details as one line: end to end, a line and a point that is more of it, or two lines side by side."""
     for one, other in itertools.combinations(range(len(now.parts)), 2):
         first, second = now.parts[one], now.parts[other]
         lines = [axis_of(first), axis_of(second)]
+        rest = [part for k, part in enumerate(now.parts) if k not in (one, other)]
+        made_of = kind_of(first.feature).made_of
+        if made_of and made_of == kind_of(second.feature).made_of:
+            whole = _straight_through(np.concatenate(lines))
+            like = max(first, second, key=lambda part: kind_of(part.feature).line).feature
+            like = replace(like, kind=kind_made_of(made_of, line=True).name)
+            yield [*rest, _line(like, whole, now.place)]
+            if min(len(line) for line in lines) == 1:  # a sweep that passes beyond an end feels it, too
+                short = _shortened(whole, lines[0 if len(lines[0]) == 1 else 1][0], like, now.place)
+                yield [*rest, _line(like, short, now.place)]
         if min(len(line) for line in lines) < 2:
             continue
-        rest = [part for k, part in enumerate(now.parts) if k not in (one, other)]
-        if first.feature.kind == second.feature.kind:
-            whole = _straight_through(np.concatenate(lines))
-            yield [*rest, _line(first.feature, whole, now.place)]
         if not _faces(first, second, now.place):
             continue
         across = nearest_on(lines[0], lines[1])[0] - lines[0]
@@ -88,7 +105,8 @@ def between(now: Configuration) -> Iterator[Parts]:
     """A groove between two ridges that face each other, and a ridge along each rim of a groove."""
     for one, other in itertools.combinations(range(len(now.parts)), 2):
         first, second = now.parts[one], now.parts[other]
-        if {type(first.shape), type(second.shape)} == {RidgeShape} and _faces(first, second, now.place):
+        ridges = {type(first.shape), type(second.shape)} == {RidgeShape}
+        if ridges and _faces(first, second, now.place, NEIGHBOURHOOD_REACH):
             yield [*now.parts, _hollow(axis_of(first), axis_of(second), first.feature, now.place)]
     for k, part in enumerate(now.parts):
         if isinstance(part.shape, TwinShape):
@@ -104,15 +122,29 @@ def between(now: Configuration) -> Iterator[Parts]:
 
 
 def apart(now: Configuration) -> Iterator[Parts]:
-    """A twin as two lines that need not be alike."""
+    """A twin as two lines that need not be alike, and a point as two."""
     for k, part in enumerate(now.parts):
         if isinstance(part.shape, TwinShape):
             yield [*now.parts[:k], *apart_of(part), *now.parts[k + 1 :]]
+        if not kind_of(part.feature).line:
+            spot, half = part.shape, sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
+            for way in spot.spot.axes:  # type: ignore[attr-defined]
+                two = [
+                    replace(part.feature, axis=axis_of(part) + side * POINTS_APART * half * way) for side in (-1.0, 1.0)
+                ]
+                rest = [*now.parts[:k], *now.parts[k + 1 :]]
+                yield [*rest, *(part_of(_plainly(each), now.place) for each in two)]
 
 
 def other_kinds(now: Configuration) -> Iterator[Parts]:
-    """A short line as a point, and a point as a short line."""
+    """A short line as a point, a point as a short line, and a bar as a step along one of its walls."""
     for k, part in enumerate(now.parts):
+        if isinstance(part.shape, TrapezoidShape):
+            step, top = kind_made_of("step", line=True), float(part.shape.parts(part.start[None])[1][0])
+            for side in (-1.0, 1.0):
+                edge = _line(_sized(part.feature, step.name, abs(part.feature.height.median), 0.0),
+                             axis_of(part) + 0.5 * side * top * _lateral(part), now.place)  # fmt: skip
+                yield [*now.parts[:k], edge, *now.parts[k + 1 :]]
         kind, half = kind_of(part.feature), sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
         rest = [*now.parts[:k], *now.parts[k + 1 :]]
         if kind.sided or not kind.made_of:
@@ -124,7 +156,6 @@ def other_kinds(now: Configuration) -> Iterator[Parts]:
             yield [*rest, part_of(_plainly(point), now.place)]
         if not kind.line:
             shape: Any = part.shape
-            like, half_length = replace(part.feature, kind=other.name), SHORT_LINE * half
             like, half_length = replace(part.feature, kind=other.name), SHORT_LINE * half
             for way in shape.spot.axes:
                 short = axis + np.array([[-half_length], [half_length]]) * way
@@ -145,17 +176,35 @@ def straight(now: Configuration, points: FloatArray) -> Iterator[Parts]:
 
 
 def more(now: Configuration) -> Iterator[Parts]:
-    """Whatever stands off the configuration most: a point there, or a straight line through several such places."""
+    """Whatever stands off the configuration most: a point there, or a straight line through several such places.
+
+    A crest that was fitted alone is as wide as what lies beside it made it: it is asked as a thin one, too.
+    """
+    yield from _more(now)
+    thin = [_thin(part) for part in now.parts]
+    if any(one is not other for one, other in zip(thin, now.parts, strict=True)):
+        yield from _more(laid(thin, now.place))
+
+
+def _thin(part: Part) -> Part:
+    """A round crest with the section of a wire of its height; others as they are."""
+    if not isinstance(part.shape, RidgeShape | BumpShape):
+        return part
+    start = part.start.copy()
+    start[-1] = np.log(0.5 * max(float(start[-2]), np.finfo(float).tiny))
+    return Part(part.feature, part.shape, start) if start[-1] < part.start[-1] - THINNER else part
+
+
+def _more(now: Configuration) -> Iterator[Parts]:
+    """The same for one configuration."""
     window, tip = now.place.window, now.place.around.trace.tip_radius
-    likelihood = now.place.levels[0][0]
-    sd = 1.0 / likelihood.filter.scale
     for sign in (1.0, -1.0):
         over = sign * now.residual
         peak = np.zeros(len(window), dtype=bool)
         for start, stop in zip(window.starts[:-1], window.starts[1:], strict=True):
             own = over[start:stop]
             peak[start + 1 : stop - 1] = (own[1:-1] >= own[:-2]) & (own[1:-1] > own[2:])
-        peak &= over > PEAK_SDS * sd
+        peak &= sign * now.standing_off > PEAK_SDS
         if not peak.any():
             continue
         places, heights = window.feet[peak], over[peak]
@@ -211,12 +260,10 @@ class Proposal:
     Args:
         name: what it does.
         of: from a configuration and the points of crests (M, 3) to the parts of others.
-        adds: True if it only makes sense where something is left unexplained.
     """
 
     name: str
     of: Callable[[Configuration, FloatArray], Iterator[Parts]]
-    adds: bool = False
 
 
 JOIN = Proposal("join", lambda now, points: joined(now))
@@ -224,10 +271,10 @@ PROPOSALS = (
     Proposal("section", lambda now, points: sections(now)),
     Proposal("straight lines", straight),
     JOIN,
-    Proposal("apart", lambda now, points: apart(now), True),
+    Proposal("apart", lambda now, points: apart(now)),
     Proposal("between", lambda now, points: between(now)),
-    Proposal("kind", lambda now, points: other_kinds(now), True),
-    Proposal("add", lambda now, points: more(now), True),
+    Proposal("kind", lambda now, points: other_kinds(now)),
+    Proposal("add", lambda now, points: more(now)),
     Proposal("remove", lambda now, points: without(now)),
 )
 
@@ -272,10 +319,30 @@ def apart_of(part: Part) -> Parts:
     return [Part(part.feature, twin.midway, twin.single(part.start[None], side)[0]) for side in (-1.0, 1.0)]
 
 
-def _faces(first: Part, second: Part, place: Neighbourhood) -> bool:
-    """True if two lines run beside each other, nearer than both of their disturbances reach."""
+def as_far_as_felt(part: Part, place: Neighbourhood) -> Part:
+    """A line of a kind without ends over all places that felt it; others as they are."""
+    kind, shape = kind_of(part.feature), part.shape
+    if not kind.line or kind.has_ends or part.feature.closed:
+        return part
+    axis = axis_of(part)
+    way = (axis[-1] - axis[0]) / max(float(np.linalg.norm(axis[-1] - axis[0])), np.finfo(float).tiny)
+    half = sizes_of(part.feature, place.around.trace.tip_radius).half_width
+    line: Any = shape
+    s, lateral, _ = line.chart.coordinates(place.window.feet)
+    along = (place.window.feet - axis[0]) @ way
+    felt = np.abs(lateral - line.modes.lateral(part.start[None, : line.modes.count], s)[0]) < half
+    low, high = float(along[felt].min(initial=0.0)), float(along[felt].max(initial=(axis[-1] - axis[0]) @ way))
+    before, after = -low > half, high - (axis[-1] - axis[0]) @ way > half
+    if not before and not after:
+        return part
+    first = [axis[0] + low * way] if before else []
+    return _line(part.feature, np.vstack([*first, axis, *([axis[0] + high * way] if after else [])]), place)
+
+
+def _faces(first: Part, second: Part, place: Neighbourhood, share: float = 1.0) -> bool:
+    """True if two lines run beside each other, nearer than both of their disturbances reach, or this share of it."""
     tip = place.around.trace.tip_radius
-    reach = sum(sizes_of(each.feature, tip).half_width for each in (first, second))
+    reach = share * sum(sizes_of(each.feature, tip).half_width for each in (first, second))
     one, other = dense(axis_of(first)), dense(axis_of(second))
     return bool(np.median(distances(one, other)) < reach and np.median(distances(other, one)) < reach)
 
@@ -303,8 +370,13 @@ def _straight_through(points: FloatArray) -> FloatArray:
     return np.asarray(middle + np.array([[along.min()], [along.max()]]) * way)
 
 
-def _nearest(lines: Sequence[Part], point: FloatArray) -> Part:
-    return min(lines, key=lambda line: float(distances(point[None], axis_of(line))[0]))
+def _shortened(axis: FloatArray, point: FloatArray, like: Feature, place: Neighbourhood) -> FloatArray:
+    """A straight axis (2, 3) whose end at a point (3,) is a half-width short of it, or the axis half as long."""
+    end = int(np.argmin(np.linalg.norm(axis - point, axis=1)))
+    back, short = axis[1 - end] - axis[end], axis.copy()
+    half = sizes_of(like, place.around.trace.tip_radius).half_width
+    short[end] = axis[end] + min(half / max(float(np.linalg.norm(back)), np.finfo(float).tiny), 0.5) * back
+    return short
 
 
 def _line(like: Feature, axis: FloatArray, place: Neighbourhood, most: int = 1) -> Part:

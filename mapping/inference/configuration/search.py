@@ -9,7 +9,6 @@ import numpy as np
 
 from mapping import FloatArray, MappingError
 from mapping.inference.configuration.configuration import Configuration, Part, fitted, laid
-from mapping.inference.configuration.neighbourhood import Neighbourhood
 from mapping.inference.configuration.proposals import JOIN, PROPOSALS, Parts, Proposal
 
 # Configurations that are fitted in one neighbourhood: a bound on the time, which crowded ones reach
@@ -45,19 +44,17 @@ class Account:
 
 
 def searched(
-    parts: Sequence[Part], place: Neighbourhood, points: FloatArray, proposals: Sequence[Proposal] = PROPOSALS
+    start: Configuration, parts: Sequence[Part], points: FloatArray, proposals: Sequence[Proposal] = PROPOSALS
 ) -> Account:
     """Improve a configuration until no proposal does.
 
     Args:
-        parts: what the rules say.
-        place: the neighbourhood.
+        start: what the rules say, fitted.
+        parts: the same, as the rules left it.
         points: (M, 3) of crests in the neighbourhood, m.
         proposals: the generators that are asked, in order.
     """
-    start = fitted(parts, place)
-    assert start is not None
-    best, accepted, count, idle = start, list[str](), 1, 0
+    place, best, accepted, count, idle = start.place, start, list[str](), 1, 0
     visited = {start.kinds: start}
     whole, joining = laid(parts, place), True
     # pieces of one line hide each other once they are fitted: they are joined as the rules left them
@@ -74,12 +71,12 @@ def searched(
     while idle < len(proposals):
         for proposal in proposals:
             found = best
-            for proposed in _yielded(proposal, best, points) if proposal.adds is False or not best.fits else ():
+            for proposed in _yielded(proposal, best, points):
                 if count >= MOST_FITTED:
                     break
                 count += 1
                 other = fitted(proposed, best.place, best)
-                if other is None or not _agreed(other, best):
+                if other is None:
                     continue
                 known = visited.get(other.kinds)
                 if known is None or other.log_odds > known.log_odds:
@@ -95,12 +92,6 @@ def searched(
     order = sorted(visited.values(), key=lambda each: -each.log_odds)
     likely = [each for each in order if each.log_odds > best.log_odds - NEGLIGIBLE_ODDS]
     return Account(start, best, tuple(likely), tuple(accepted))
-
-
-def _agreed(other: Configuration, now: Configuration) -> bool:
-    """True if several sweeps felt each detail that a proposal brought: what one alone shows is detection's to judge."""
-    known = {id(part.shape) for part in now.parts}
-    return all(other.runs(k) > 1 for k, part in enumerate(other.parts) if id(part.shape) not in known)
 
 
 def _yielded(proposal: Proposal, now: Configuration, points: FloatArray) -> Iterator[Parts]:

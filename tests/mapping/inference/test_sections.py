@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from mapping import Feature, FloatArray, Interval, Support, Surface, Trace
+from mapping.assembly import assemble
 from mapping.base import Base
+from mapping.detection import detect
 from mapping.geometry.templates import cap_height
 from mapping.inference import refine, refine_all
 from mapping.inference.evidence import probabilities
@@ -76,15 +78,12 @@ def test_a_height_that_grows_along_a_line_is_remarked_upon() -> None:
 
 def test_two_edges_that_face_each_other_are_one_bar() -> None:
     x, y = places(5)
-    edges = [ridge(kind="step", y=-1e-3), ridge(kind="step", y=1e-3)]
-    (found,) = refine_all(edges, swept(bar(y, 0.4e-3, 2e-3), x, y), 0, base=PLATE, noise=NOISE, confirm=False)
+    trace = swept(bar(y, 0.4e-3, 2e-3), x, y)
+    (line,) = assemble(detect(trace, PLATE), trace, PLATE)
+    (found,) = refine_all([line], trace, 0, base=PLATE, noise=NOISE, confirm=False)
     assert found.kind == "ridge" and abs(found.height.median - 0.4e-3) < 5e-6
-    far = [
-        replace(edges[0], axis=edges[0].axis - [0.0, 4e-3, 0.0]),
-        replace(edges[1], axis=edges[1].axis - [0.0, -4e-3, 0.0]),
-    ]
-    wide = refine_all(far, swept(bar(y, 0.4e-3, 10e-3), x, y), 0, base=PLATE, noise=NOISE, confirm=False)
-    assert [each.kind for each in wide] == ["step", "step"]
+    wide = swept(bar(y, 0.4e-3, 10e-3), x, y)
+    assert [each.kind for each in assemble(detect(wide, PLATE), wide, PLATE)] == ["step", "step"]
 
 
 def test_probabilities_are_those_of_evidences() -> None:
