@@ -28,7 +28,8 @@ DUG_BY_NOISE = 1e-3
 SIDE_LOBE = 0.12
 # Share of the threshold that the fitted height must reach too: at the ends of a sweep the fit knows less.
 MEASURED = 0.5
-# The tip draws no cap higher than w^2 / (2 r); twice as much is no contact but a disturbance of the measurement.
+# The tip draws no cap higher than w^2 / (2 r); twice as much is no contact but a disturbance of the measurement: a run
+# of readings that are off, or a single one.
 PHYSICAL = 2.0
 LARGEST_SHARE = 0.6
 # A disturbance weaker than this many thresholds hides no other: its residual is its own side lobes.
@@ -85,9 +86,22 @@ class Searched:
         weak = self.unclear & ~self.quiet
         return int((weak & ~down).sum()), int((weak & down).sum())
 
-    @cached_property
+    @property
     def disturbances(self) -> tuple[Disturbance, ...]:
-        """Above the threshold, the strongest first; measured when they are asked for, which costs most of a search."""
+        """Above the threshold, the strongest first; what no ball felt is left out."""
+        return tuple(each for each in self._measured if self._felt(each))
+
+    @property
+    def unfelt(self) -> int:
+        """How many are higher than a ball makes them that are no wider."""
+        return sum(not self._felt(each) for each in self._measured)
+
+    def _felt(self, found: Disturbance) -> bool:
+        return abs(found.height) <= PHYSICAL * found.highest(self.tip_radius, self.profile.spacing)
+
+    @cached_property
+    def _measured(self) -> tuple[Disturbance, ...]:
+        """All above the threshold; measured when they are asked for, which costs most of a search."""
         profile, bank, tip_radius, null = self.profile, self.bank, self.tip_radius, self.null
         found: list[Disturbance] = []
         for height, begin, end, crest, snr in self.stretches:

@@ -198,6 +198,8 @@ def detect(
         for edge in one.edges:
             own += [c for c in _crossings(edge.step(level, tip), edge.piece, base, tip) if c.kind in STEP_CROSSINGS]
         crossings += sorted(own, key=lambda c: c.t)
+    if narrow := sum(each.unfelt for each in found):
+        left_out += (f"{narrow} details are narrower than a ball makes them that is so large: they were not felt",)
     crossings, unresolved = _resolved(crossings, trace.resolution)
     left_out += unresolved
     if algorithm != 3:

@@ -45,6 +45,17 @@ def test_a_burst_is_left_out_where_it_is_and_listed(sign: float) -> None:
     assert any("bend sharper than the ball" in sentence for sentence in result.left_out)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_burst_that_the_noise_nearly_hides_is_no_detail(sign: float) -> None:
+    # its ends bend by no more than noise and ball may, but it is higher than a ball's trace so narrow can be
+    burst = np.zeros(len(S))
+    burst[2000:2022] = sign * 6.0 * WHITE
+    result = found(sweeps(3, burst))
+    assert result.crossings == ()
+    told = [said for said in result.left_out if "not felt" in said]
+    assert len(told) == 1 and ("narrower than a ball makes them" in told[0] or "bend sharper" in told[0])
+
+
 def test_readings_that_do_not_change_are_left_out_and_listed() -> None:
     heights = sweeps(1, np.zeros(len(S)))
     heights[1, 3000:3040] = heights[1, 3000]
