@@ -23,6 +23,9 @@ FLANK_ROUNDS = 4
 SPREAD_PLACES, SPREAD_WIDTHS = 24, np.geomspace(1 / 1.5, 1.5, 7)
 # Standard deviations of its place by which a crest may be wider than it seems.
 UNSURE = 3.0
+# A dip between two rims is a cusp (1 - |x| / w)^2: the best cap has 0.61 of its width and 0.77 of its depth, so many
+# times the height of a crest's so wide.
+CUSP = 2.08
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,14 +218,18 @@ class Disturbance:
     snr: float
 
     def highest(self, tip_radius: float, spacing: float) -> float:
-        """Height of the highest cap that a ball draws with flanks as wide as these may be, m; infinite from r on.
+        """Height of the highest cap that fits what a ball draws with flanks as wide as these may be, m.
+
+        Infinite from r on: a wall may be of any height.
 
         Args:
             tip_radius: r, m.
             spacing: of the bins, m: what begins within one is one wider.
         """
         flank = self.half_width - self.flat + UNSURE * self.place_sd + 2.0 * spacing
-        return flank**2 / (2 * tip_radius) if flank < tip_radius else np.inf
+        if flank >= tip_radius:
+            return np.inf
+        return (CUSP if self.height < 0 else 1.0) * (tip_radius - float(np.sqrt(tip_radius**2 - flank**2)))
 
     def at_scale(self, scale: float) -> Disturbance:
         """The same where the noise is that many times what it was taken for."""

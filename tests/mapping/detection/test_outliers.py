@@ -81,6 +81,15 @@ def test_crests_and_notches_of_a_ball_are_not_left_out(height: float) -> None:
     assert {c.sweep for c in result.crossings} == {1}
 
 
+@pytest.mark.parametrize("width", [2e-3, 4e-3, 8e-3])
+def test_a_dip_between_two_rims_is_felt(width: float) -> None:
+    # narrower than a crest so high, for it is a cusp
+    away = np.maximum(width - np.abs(S - 0.05), 0.0)
+    result = found(sweeps(4, np.sqrt(TIP**2 - away**2) - TIP))
+    assert result.unfelt == () and not any("not felt" in said for said in result.left_out)
+    assert [(c.sweep, c.kind) for c in result.crossings] == [(1, "concave")]
+
+
 @pytest.mark.parametrize("height", [0.5, 0.8, 2.0])
 def test_steps_as_high_as_the_ball_are_felt_from_end_to_end(height: float) -> None:
     # hardly any noise and samples far apart: the arc about the edge bends the heights the more the steeper it is
