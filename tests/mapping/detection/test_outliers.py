@@ -7,6 +7,7 @@ import pytest
 
 from mapping.arrays import FloatArray
 from mapping.base.base import Base
+from mapping.detection.cap_fit import CUSP
 from mapping.detection.detect import Detections, detect
 from mapping.detection.outliers import LEAST_OUT, OUT, _out
 from mapping.geometry.templates import step_height
@@ -79,6 +80,15 @@ def test_crests_and_notches_of_a_ball_are_not_left_out(height: float) -> None:
     result = found(sweeps(2, np.maximum(np.max(arcs, axis=0), 0.0)))
     assert result.unfelt == ()
     assert {c.sweep for c in result.crossings} == {1}
+
+
+def test_the_best_cap_of_a_cusp_is_so_much_higher_than_a_crest_so_wide() -> None:
+    x = np.linspace(-1.0, 1.0, 4001)
+    cusp, widths = (1.0 - np.abs(x)) ** 2, np.linspace(0.5, 0.8, 301)
+    caps = np.maximum(1.0 - (x / widths[:, None]) ** 2, 0.0)
+    k = int(((caps @ cusp) ** 2 / np.einsum("ij,ij->i", caps, caps)).argmax())
+    height = float(caps[k] @ cusp / (caps[k] @ caps[k]))
+    assert height / widths[k] ** 2 == pytest.approx(CUSP, rel=0.01)
 
 
 @pytest.mark.parametrize("width", [2e-3, 4e-3, 8e-3])
