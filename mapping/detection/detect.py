@@ -199,7 +199,7 @@ def detect(
             own += [c for c in _crossings(edge.step(level, tip), edge.piece, base, tip) if c.kind in STEP_CROSSINGS]
         crossings += sorted(own, key=lambda c: c.t)
     if narrow := sum(each.unfelt for each in found):
-        left_out += (f"{narrow} details are narrower than a ball makes them that is so large: they were not felt",)
+        left_out += (f"details that were not felt, for this ball draws nothing so narrow that is so high: {narrow}",)
     crossings, unresolved = _resolved(crossings, trace.resolution)
     left_out += unresolved
     if algorithm != 3:

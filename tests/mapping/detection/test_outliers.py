@@ -54,7 +54,7 @@ def test_a_burst_that_the_noise_nearly_hides_is_no_detail(sign: float) -> None:
     result = found(sweeps(3, burst))
     assert result.crossings == ()
     told = [said for said in result.left_out if "not felt" in said]
-    assert len(told) == 1 and ("narrower than a ball makes them" in told[0] or "bend sharper" in told[0])
+    assert len(told) == 1 and ("draws nothing so narrow" in told[0] or "bend sharper" in told[0])
 
 
 def test_readings_that_do_not_change_are_left_out_and_listed() -> None:
