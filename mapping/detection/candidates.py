@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -28,7 +28,8 @@ DUG_BY_NOISE = 1e-3
 SIDE_LOBE = 0.12
 # Share of the threshold that the fitted height must reach too: at the ends of a sweep the fit knows less.
 MEASURED = 0.5
-# The tip draws no cap higher than w^2 / (2 r); twice as much is no contact but a disturbance of the measurement.
+# The tip draws no cap higher than w^2 / (2 r); twice as much is no contact but a disturbance of the measurement: a run
+# of readings that are off, or a single one.
 PHYSICAL = 2.0
 LARGEST_SHARE = 0.6
 # A disturbance weaker than this many thresholds hides no other: its residual is its own side lobes.
@@ -46,16 +47,76 @@ class Searched:
     """What a search of one profile came to.
 
     Args:
-        disturbances: above the threshold, the strongest first.
-        quiet: (n,) False where something exceeds the threshold.
-        unclear: (n,) False where something is clearly no noise.
-        weak: bins of what exceeds the threshold upwards and downwards, and is not clear.
+        profile, bank, noise, threshold, tip_radius, null: as in `search`.
+        stretches: above the threshold: (heights, first bin, past-last bin, crest, signal-to-noise) of each.
     """
 
-    disturbances: tuple[Disturbance, ...]
-    quiet: BoolArray
-    unclear: BoolArray
-    weak: tuple[int, int]
+    profile: SweepHeights
+    bank: Bank
+    noise: Noise
+    threshold: float
+    tip_radius: float
+    null: NullScale | None
+    stretches: tuple[tuple[FloatArray, int, int, float, float], ...]
+
+    @property
+    def quiet(self) -> BoolArray:
+        """(n,) False where something exceeds the threshold."""
+        quiet = np.ones(len(self.profile.height), dtype=bool)
+        for _, begin, end, _, _ in self.stretches:
+            quiet[begin:end] = False
+        return quiet
+
+    @property
+    def unclear(self) -> BoolArray:
+        """(n,) False where something is clearly no noise, and in the skirts and side lobes of that."""
+        unclear = np.ones(len(self.profile.height), dtype=bool)
+        clear = CLEAR * self.threshold
+        for _, begin, end, _, snr in sorted(self.stretches, key=lambda each: each[4] < clear):
+            if snr >= clear or not unclear[max(0, 2 * begin - end) : 2 * end - begin].all():
+                unclear[begin:end] = False
+        return unclear
+
+    @property
+    def weak(self) -> tuple[int, int]:
+        """Bins of what exceeds the threshold upwards and downwards, and is not clear."""
+        down = np.zeros(len(self.profile.height), dtype=bool)
+        for _, begin, end, crest, _ in self.stretches:
+            down[begin:end] = crest < 0
+        weak = self.unclear & ~self.quiet
+        return int((weak & ~down).sum()), int((weak & down).sum())
+
+    @property
+    def disturbances(self) -> tuple[Disturbance, ...]:
+        """Above the threshold, the strongest first; what no ball felt is left out."""
+        return tuple(each for each in self._measured if self._felt(each))
+
+    @property
+    def unfelt(self) -> int:
+        """How many are higher than a ball makes them that are no wider."""
+        return sum(not self._felt(each) for each in self._measured)
+
+    def _felt(self, found: Disturbance) -> bool:
+        return abs(found.height) <= PHYSICAL * found.highest(self.tip_radius, self.profile.spacing)
+
+    @cached_property
+    def _measured(self) -> tuple[Disturbance, ...]:
+        """All above the threshold; measured when they are asked for, which costs most of a search."""
+        profile, bank, tip_radius, null = self.profile, self.bank, self.tip_radius, self.null
+        found: list[Disturbance] = []
+        for height, begin, end, crest, snr in self.stretches:
+            for low, high in _crests(height, begin, end, crest, profile, self.noise, tip_radius):
+                beside = (low > begin, high < end)
+                sign = float(np.sign(crest))
+                new = fit_cap(height, (low, high), sign, profile, self.noise, bank.drift, tip_radius, beside)
+                if null is not None:
+                    new = new.at_scale(null.at(new.half_width, (new.place - profile.start) / profile.spacing))
+                if not any(beside) and new.snr < snr:
+                    new = replace(new, snr=snr)
+                certain = abs(new.height) >= MEASURED * self.threshold * new.height_sd
+                if certain and new.snr >= self.threshold and not _side_lobe(new, found, bank.drift > 0):
+                    found.append(new)
+        return tuple(found)
 
 
 def search(
@@ -76,51 +137,8 @@ def search(
         tip_radius: m.
         null: how far the outputs scatter where nothing is, against the noise; None: as the noise says.
     """
-    found: list[Disturbance] = []
-    stretches, downwards = [], []
-    for height, begin, end, crest, snr in _stretches(profile, bank, noise, threshold, tip_radius, null):
-        stretches.append((begin, end, snr >= CLEAR * threshold))
-        downwards.append(crest < 0)
-        for low, high in _crests(height, begin, end, crest, profile, noise, tip_radius):
-            beside = (low > begin, high < end)
-            sign = float(np.sign(crest))
-            new = fit_cap(height, (low, high), sign, profile, noise, bank.drift, tip_radius, beside)
-            if null is not None:
-                new = new.at_scale(null.at(new.half_width, (new.place - profile.start) / profile.spacing))
-            if not any(beside) and new.snr < snr:
-                new = replace(new, snr=snr)
-            certain = abs(new.height) >= MEASURED * threshold * new.height_sd
-            if certain and new.snr >= threshold and not _side_lobe(new, found, bank.drift > 0):
-                found.append(new)
-    quiet = np.ones(len(profile.height), dtype=bool)
-    for begin, end, _ in stretches:
-        quiet[begin:end] = False
-    unclear = _unclear(stretches, len(quiet))
-    down = np.zeros(len(quiet), dtype=bool)
-    for (begin, end, _), downward in zip(stretches, downwards, strict=True):
-        down[begin:end] = downward
-    weak = unclear & ~quiet
-    return Searched(tuple(found), quiet, unclear, (int((weak & ~down).sum()), int((weak & down).sum())))
-
-
-def unclear_bins(
-    profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float, null: NullScale
-) -> BoolArray:
-    """(n,) False where something is clearly no noise: the same as `search` finds, which also measures it."""
-    stretches = [
-        (begin, end, snr >= CLEAR * threshold)
-        for _, begin, end, _, snr in _stretches(profile, bank, noise, threshold, tip_radius, null)
-    ]
-    return _unclear(stretches, len(profile.height))
-
-
-def _unclear(stretches: list[tuple[int, int, bool]], count: int) -> BoolArray:
-    """(count,) False in the stretches (begin, end, clear) that are clear, and in the skirts and side lobes of these."""
-    quiet = np.ones(count, dtype=bool)
-    for begin, end, clear in sorted(stretches, key=lambda each: not each[2]):
-        if clear or not quiet[max(0, 2 * begin - end) : 2 * end - begin].all():
-            quiet[begin:end] = False
-    return quiet
+    stretches = tuple(_stretches(profile, bank, noise, threshold, tip_radius, null))
+    return Searched(profile, bank, noise, threshold, tip_radius, null, stretches)
 
 
 def without(height: FloatArray, quiet: BoolArray, bank: Bank) -> FloatArray:

@@ -18,6 +18,14 @@ ZOOM_ROUNDS = 5
 # Shares of a plateau's half-width that its flanks may take, and how often the best share is refined.
 FLANKS = (0.4, 0.02)
 FLANK_ROUNDS = 4
+# Places to either side of the best, from a tenth of its own standard deviation to a half-width, and half-widths about
+# the best, over which its likelihood is averaged.
+SPREAD_PLACES, SPREAD_WIDTHS = 24, np.geomspace(1 / 1.5, 1.5, 7)
+# Standard deviations of its place by which a crest may be wider than it seems.
+UNSURE = 3.0
+# A dip between two rims is a cusp (1 - |x| / w)^2: the best cap has 0.61 of its width and 0.77 of its depth, so many
+# times the height of a crest's so wide.
+CUSP = 2.08
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,18 +94,38 @@ def fit_cap(
         np.array([place - shift, place, place + shift]), np.full(3, half_width), np.full(3, flat)
     )
     bend = float(sign * (2 * around[1] - around[0] - around[2])) / shift**2
+    sharp = min(float(np.sqrt(2 / bend)) if bend > 0 else half_width, half_width)
     return Disturbance(
         place=place + profile.start,
         start=low * spacing + profile.start,
         stop=(high - 1) * spacing + profile.start,
         height=float(heights[1]),
         height_sd=float(1 / np.sqrt(information[1])),
-        place_sd=min(float(np.sqrt(2 / bend)) if bend > 0 else half_width, half_width),
+        place_sd=_spread(window, sign, crest, sharp),
         half_width=half_width,
         flat=flat * half_width,
         curvature=2 * float(heights[1]) / (half_width * (1 - flat)) ** 2,
         snr=float(np.sqrt(max(gain, 0.0))),
     )
+
+
+def _spread(window: _Whitened, sign: float, crest: tuple[float, float, float, float], sharp: float) -> float:
+    """Standard deviation of the place about the best, m, over all places and half-widths that are likely, too.
+
+    In correlated noise the likelihood has more than one top, and the highest is sharper than the truth is near: the
+    bend there tells too little. In 178 crossings under a process (signal-to-noise 11) 90 % by the bend held 72 %.
+
+    Args:
+        crest: gain, place, half-width, flatness of the best.
+        sharp: standard deviation by the bend at the best alone, m.
+    """
+    _, place, half_width, flat = crest
+    away = sharp * np.geomspace(0.1, max(half_width / sharp, 1.0), SPREAD_PLACES)
+    away = np.concatenate([-away[::-1], [0.0], away])
+    shift, width = (g.ravel() for g in np.meshgrid(away, half_width * SPREAD_WIDTHS))
+    gains = sign * window.gains(place + shift, width, np.full(len(shift), flat))[0]
+    weight = np.exp(0.5 * (gains - gains.max())) * np.tile(np.gradient(away), len(SPREAD_WIDTHS))
+    return float(np.sqrt(weight @ shift**2 / weight.sum()))
 
 
 def _whitened(
@@ -188,6 +216,20 @@ class Disturbance:
     flat: float
     curvature: float
     snr: float
+
+    def highest(self, tip_radius: float, spacing: float) -> float:
+        """Height of the highest cap that fits what a ball draws with flanks as wide as these may be, m.
+
+        Infinite from r on: a wall may be of any height.
+
+        Args:
+            tip_radius: r, m.
+            spacing: of the bins, m: what begins within one is one wider.
+        """
+        flank = self.half_width - self.flat + UNSURE * self.place_sd + 2.0 * spacing
+        if flank >= tip_radius:
+            return np.inf
+        return (CUSP if self.height < 0 else 1.0) * (tip_radius - float(np.sqrt(tip_radius**2 - flank**2)))
 
     def at_scale(self, scale: float) -> Disturbance:
         """The same where the noise is that many times what it was taken for."""

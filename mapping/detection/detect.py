@@ -9,7 +9,7 @@ import numpy as np
 
 from mapping import BoolArray, DetectionError, FloatArray, IntArray, Trace, length_text
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
-from mapping.detection.candidates import LARGEST_SHARE, Searched, search, unclear_bins, without
+from mapping.detection.candidates import LARGEST_SHARE, Searched, search, without
 from mapping.detection.cap_fit import Disturbance
 from mapping.detection.crossing import STEP_CROSSINGS, Crossing
 from mapping.detection.empirical_null import NullScale, effective_noise, limit_along, null_scales
@@ -198,6 +198,8 @@ def detect(
         for edge in one.edges:
             own += [c for c in _crossings(edge.step(level, tip), edge.piece, base, tip) if c.kind in STEP_CROSSINGS]
         crossings += sorted(own, key=lambda c: c.t)
+    if narrow := sum(each.unfelt for each in found):
+        left_out += (f"details that were not felt, for this ball draws nothing so narrow that is so high: {narrow}",)
     crossings, unresolved = _resolved(crossings, trace.resolution)
     left_out += unresolved
     if algorithm != 3:
@@ -268,14 +270,10 @@ def _weighed(
             if all(scale.as_fitted for scale in scales):
                 break
             for i, scale in zip(numbers, scales, strict=True):
-                nulls[i] = scale
-            before = masks
-            masks = [unclear_bins(p, bank, noise, threshold, tip, s) for p, s in zip(group, scales, strict=True)]
+                nulls[i], found[i] = scale, search(profiles[i], bank, noise, threshold, tip, scale)
+            before, masks = masks, [found[i].unclear for i in numbers]
             if all(np.array_equal(one, other) for one, other in zip(before, masks, strict=True)):
                 break
-        for i in numbers:
-            if nulls[i] is not None:
-                found[i] = search(profiles[i], bank, noise, threshold, tip, nulls[i])
     return found, nulls
 
 

@@ -157,7 +157,8 @@ def background(
                 ]
                 if before and all(np.array_equal(a, b) for a, b in zip(quiet, before, strict=True)):
                     break
-            fit = _fit(profiles, quiet, stretches, level, first, base, stated, several)
+            one = fit if several and turn == 0 else None
+            fit = _fit(profiles, quiet, stretches, level, first, base, stated, several, one)
             level = floored(fit.noise, tip_radius)
             banks = _banks(profiles, level, tip_radius, largest, drift)
             if several and not level.further:
@@ -194,16 +195,19 @@ def _fit(
     base: Base,
     stated: StatedNoise | None,
     several: bool,
+    one: NoiseFit | None,
 ) -> NoiseFit:
-    """Noise of what is quiet, of several terms if asked for, by likelihood over a known base; over an unknown one by
-    what that disturbs less."""
+    """Noise of what is quiet, by likelihood over a known base; over an unknown one by what that disturbs less.
+
+    Of several terms if asked for: what it is with `one` process may be known already.
+    """
     if not base.known:
         return NoiseFit(_robust(profiles, quiet, first))
     size = max(1, -(-sum(len(stretch.s) for stretch in stretches) // NOISE_FIT_BLOCKS))
     blocks = [_raw_blocks(stretches, profiles, quiet, size)]
     if sum(p.samples * len(p.height) for p in profiles) > 1.1 * sum(len(stretch.s) for stretch in stretches):
         blocks += [_profile_blocks(p, keep) for p, keep in zip(profiles, quiet, strict=True)]
-    return fit_noise(blocks, start, stated, several=several)
+    return fit_noise(blocks, start, stated, several=several, one=one)
 
 
 def _raw_blocks(

@@ -5,10 +5,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from mapping import FloatArray
+from mapping import FloatArray, IntArray
 from mapping.instrument.noise import Noise
 from mapping.instrument.stated import StatedNoise
 from mapping.instrument.states import mean_steps
@@ -36,6 +37,12 @@ class Blocks:
     values: FloatArray
     steps: FloatArray
     samples: float
+
+    @cached_property
+    def kinds(self) -> tuple[FloatArray, IntArray]:
+        """(K,) lengths that steps have, m, and (N,) which of them each has."""
+        step, kind = np.unique(np.abs(self.steps), return_inverse=True)
+        return step, kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +210,7 @@ def law_misfit(blocks: Sequence[Blocks], noise: Noise) -> float:
 
 def whitened(blocks: Blocks, noise: Noise) -> tuple[FloatArray, float]:
     """(N,) blocks as unit independent noise, 0 where nothing counts, and the log-determinant of their covariance."""
-    step, kind = np.unique(np.abs(blocks.steps), return_inverse=True)
+    step, kind = blocks.kinds
     filter_ = mean_steps(noise.terms, step, np.full(len(step), noise.white**2 / blocks.samples)).filter(
         kind, blocks.steps < 0, np.isfinite(blocks.values)
     )

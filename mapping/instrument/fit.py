@@ -19,7 +19,12 @@ LONGEST = 0.25
 
 
 def fit_noise(
-    blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None = None, *, several: bool = True
+    blocks: Sequence[Blocks],
+    start: Noise,
+    stated: StatedNoise | None = None,
+    *,
+    several: bool = True,
+    one: NoiseFit | None = None,
 ) -> NoiseFit:
     """The most likely noise, from any start within about a decade; the start where none is found.
 
@@ -31,6 +36,7 @@ def fit_noise(
         start: a first estimate (see `estimate_noise`).
         stated: what was known before, or None.
         several: False to stop at one process.
+        one: what that came to for the same blocks, where it is known.
     """
     count = sum(int(np.isfinite(b.values).sum()) for b in blocks)
     white = white_alone(blocks)
@@ -40,11 +46,13 @@ def fit_noise(
     height = float(np.exp2(np.round(np.log2(white))))
     longest = max(float(np.abs(b.steps).max(initial=0.0)) for b in blocks)
     path = float(np.exp2(np.round(np.log2(longest))))
+    known = None if one is None else replace(one, noise=one.noise.scaled(1 / height, 1 / path))
     fit = _unit_fit(
         [Blocks(b.values / height, b.steps / path, b.samples) for b in blocks],
         start.scaled(1 / height, 1 / path),
         None if stated is None else stated.scaled(height, path),
         several,
+        known,
     )
     noise = fit.noise.scaled(height, path)
     if noise.correlated > 0 and noise.length > LONGEST * sum(float(np.abs(b.steps).sum()) for b in blocks):
@@ -52,14 +60,22 @@ def fit_noise(
     return replace(fit, noise=noise)
 
 
-def _unit_fit(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None, several: bool) -> NoiseFit:
+def _unit_fit(
+    blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None, several: bool, one: NoiseFit | None
+) -> NoiseFit:
     """The fit in units in which levels and steps are about 1."""
+    fit = _of_one_process(blocks, start, stated) if one is None else one
+    return with_further_terms(blocks, fit, start, stated) if several else fit
+
+
+def _of_one_process(blocks: Sequence[Blocks], start: Noise, stated: StatedNoise | None) -> NoiseFit:
+    """The fit of white noise, and of one process if it gains enough."""
     white = white_alone(blocks)
     expected = stated.noise if stated is not None and stated.noise.correlated > 0 else None
     guess = start if start.correlated > 0 else expected or Noise(start.white or white, 0.1 * white, 10.0)
     fit, misfit = most_likely(blocks, replace(guess, further=()), stated)
-    if misfit + (0.0 if expected else LEAST_LIKELIHOOD_GAIN) > law_misfit(blocks, Noise(white)):
-        alone = np.zeros((3, 3))
-        alone[0, 0] = 2.0 / sum(int(np.isfinite(b.values).sum()) for b in blocks)
-        fit = NoiseFit(Noise(white, 0.0, guess.length), alone)
-    return with_further_terms(blocks, fit, start, stated) if several else fit
+    if misfit + (0.0 if expected else LEAST_LIKELIHOOD_GAIN) <= law_misfit(blocks, Noise(white)):
+        return fit
+    alone = np.zeros((3, 3))
+    alone[0, 0] = 2.0 / sum(int(np.isfinite(b.values).sum()) for b in blocks)
+    return NoiseFit(Noise(white, 0.0, guess.length), alone)

@@ -14,11 +14,15 @@ from numba import njit
 
 # Relative change of a covariance below which it stands still: along a run of equal steps it soon does.
 SETTLED = 1e-10
+# Readings of the first run whose covariances are kept, for runs that are like it no further.
+REMEMBERED = 2048
 
 
 @njit(cache=True, error_model="numpy")
 def gains(kind, begins, known, observe, spread, shared, carry, turn, fresh, power):  # type: ignore[no-untyped-def]
     """Gains of the filter, which do not depend on what is read.
+
+    As long as a run's steps are those of the first run, so are its gains.
 
     Args:
         kind: (N,) row of the transition that leads to each reading.
@@ -39,14 +43,33 @@ def gains(kind, begins, known, observe, spread, shared, carry, turn, fresh, powe
     gain, scale = np.zeros((count, states)), np.zeros(count)
     covariance, carried = np.zeros((states, states)), np.zeros((states, states))
     seen = np.zeros(states)
-    settled = False
-    for i in range(count):
+    first = 1
+    while first < count and not begins[first]:
+        first += 1
+    # before the first readings of the first run: the covariance, and whether it stands still
+    stored = min(first, REMEMBERED) if first < count else 0
+    before, still = np.zeros((stored, states, states)), np.zeros(stored, dtype=np.bool_)
+    settled, alike, own, i = False, False, 0, -1
+    while i < count - 1:
+        i += 1
         k = kind[i]
         if begins[i]:
+            own, alike, settled = i, i > 0, False
             covariance[:] = 0.0
             for a in range(states):
                 covariance[a, a] = power[a]
-        elif settled and known[i] and known[i - 1] and k == kind[i - 1]:
+        if alike:
+            at = i - own
+            if at < first and k == kind[at] and known[i] == known[at]:
+                gain[i], scale[i] = gain[at], scale[at]
+                continue
+            alike = False
+            at = min(at, stored - 1)
+            covariance[:], settled, i = before[at], still[at], own + at
+            k = kind[i]
+        elif i < stored:
+            before[i], still[i] = covariance, settled
+        if i > own and settled and known[i] and known[i - 1] and k == kind[i - 1]:
             gain[i], scale[i] = gain[i - 1], scale[i - 1]
             continue
         settled = False

@@ -28,7 +28,7 @@ from explore3d.log import Log
 from mapping import Feature, FloatArray, Trace, length_text
 from mapping.base import LaidTrace
 from mapping.detection import detect
-from mapping.geometry.mesh import nearest_on, resample
+from mapping.geometry.mesh import nearest_on, resample, write_whole
 
 # Candidates that are asked for a metre, beside the default rate: enough to be counted
 COUNTED_RATE = 1.0
@@ -115,6 +115,8 @@ def bench_trust(
 ) -> Iterator[dict[str, Any]]:
     """Run what is not yet in the store and append it there, until so many seconds have passed; yields new records."""
     begin = perf_counter()
+    if store.exists() and len(whole := _whole_lines(store)) < len(store.read_text()):
+        write_whole(store, whole)
     done = {tuple(each[name.name] for name in fields(Case)) for each in trust_records(store)}
     for case in cases(of, laws, bodies, bare, wired):
         if astuple(case) in done:
@@ -129,7 +131,13 @@ def bench_trust(
 
 def trust_records(store: File) -> list[dict[str, Any]]:
     """The finished recordings in a store; none if there is no such file."""
-    return [json.loads(text) for text in store.read_text().splitlines()] if store.exists() else []
+    return [json.loads(text) for text in _whole_lines(store).splitlines()]
+
+
+def _whole_lines(store: File) -> str:
+    """What a store holds, less a last line that was being written when its run was ended."""
+    text = store.read_text() if store.exists() else ""
+    return text[: text.rfind("\n") + 1]
 
 
 def run_trust_case(case: Case) -> dict[str, Any]:

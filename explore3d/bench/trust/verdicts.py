@@ -242,7 +242,7 @@ def _usual_warnings(records: Sequence[dict[str, Any]], law: str) -> str:
     kinds = {
         "crests weighed by what was measured": "crests are weighed",
         "limit raised": "detection limit was raised",
-        "samples not felt": "were not felt",
+        "samples or details not felt": "were not felt",
         "sweeps drift": "sweeps drift",
         "path cut": "path was cut",
         "too few samples": "too few to inspect",

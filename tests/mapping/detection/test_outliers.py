@@ -7,6 +7,7 @@ import pytest
 
 from mapping.arrays import FloatArray
 from mapping.base.base import Base
+from mapping.detection.cap_fit import CUSP
 from mapping.detection.detect import Detections, detect
 from mapping.detection.outliers import LEAST_OUT, OUT, _out
 from mapping.geometry.templates import step_height
@@ -45,6 +46,17 @@ def test_a_burst_is_left_out_where_it_is_and_listed(sign: float) -> None:
     assert any("bend sharper than the ball" in sentence for sentence in result.left_out)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_burst_that_the_noise_nearly_hides_is_no_detail(sign: float) -> None:
+    # its ends bend by no more than noise and ball may, but it is higher than a ball's trace so narrow can be
+    burst = np.zeros(len(S))
+    burst[2000:2022] = sign * 6.0 * WHITE
+    result = found(sweeps(3, burst))
+    assert result.crossings == ()
+    told = [said for said in result.left_out if "not felt" in said]
+    assert len(told) == 1 and ("draws nothing so narrow" in told[0] or "bend sharper" in told[0])
+
+
 def test_readings_that_do_not_change_are_left_out_and_listed() -> None:
     heights = sweeps(1, np.zeros(len(S)))
     heights[1, 3000:3040] = heights[1, 3000]
@@ -68,6 +80,24 @@ def test_crests_and_notches_of_a_ball_are_not_left_out(height: float) -> None:
     result = found(sweeps(2, np.maximum(np.max(arcs, axis=0), 0.0)))
     assert result.unfelt == ()
     assert {c.sweep for c in result.crossings} == {1}
+
+
+def test_the_best_cap_of_a_cusp_is_so_much_higher_than_a_crest_so_wide() -> None:
+    x = np.linspace(-1.0, 1.0, 4001)
+    cusp, widths = (1.0 - np.abs(x)) ** 2, np.linspace(0.5, 0.8, 301)
+    caps = np.maximum(1.0 - (x / widths[:, None]) ** 2, 0.0)
+    k = int(((caps @ cusp) ** 2 / np.einsum("ij,ij->i", caps, caps)).argmax())
+    height = float(caps[k] @ cusp / (caps[k] @ caps[k]))
+    assert height / widths[k] ** 2 == pytest.approx(CUSP, rel=0.01)
+
+
+@pytest.mark.parametrize("width", [2e-3, 4e-3, 8e-3])
+def test_a_dip_between_two_rims_is_felt(width: float) -> None:
+    # narrower than a crest so high, for it is a cusp
+    away = np.maximum(width - np.abs(S - 0.05), 0.0)
+    result = found(sweeps(4, np.sqrt(TIP**2 - away**2) - TIP))
+    assert result.unfelt == () and not any("not felt" in said for said in result.left_out)
+    assert [(c.sweep, c.kind) for c in result.crossings] == [(1, "concave")]
 
 
 @pytest.mark.parametrize("height", [0.5, 0.8, 2.0])

@@ -40,6 +40,23 @@ def test_means_of_a_process_are_as_likely_as_their_covariance_says_also_with_gap
     np.testing.assert_allclose(white @ white + filter_.logdet, expected, rtol=1e-6)
 
 
+@pytest.mark.parametrize("differ", ["nowhere", "step", "gap", "longer"])
+def test_a_run_that_is_like_the_first_for_a_while_has_the_gains_it_has_alone(differ):
+    steps = mean_steps(SEVERAL.terms, np.array([0.01, 0.02]), np.full(2, 2e-3))
+    lengths = (3000, 3500 if differ == "longer" else 3000)
+    begins = np.isin(np.arange(sum(lengths)), [0, lengths[0]])
+    # beyond what is remembered of the first run, and within
+    for place in (2500, 40):
+        kind, known = np.zeros(len(begins), dtype=np.int64), np.ones(len(begins), dtype=bool)
+        kind[lengths[0] + place] = differ == "step"
+        known[lengths[0] + place : lengths[0] + place + 3] = differ != "gap"
+        both = steps.filter(kind, begins, known)
+        second = slice(lengths[0], None)
+        alone = steps.filter(kind[second], begins[second], known[second])
+        np.testing.assert_array_equal(both.gain[second], alone.gain)
+        np.testing.assert_array_equal(both.scale[second], alone.scale)
+
+
 @pytest.mark.parametrize("scale", [1.0, 1e-4, 1e-8])
 def test_means_over_samples_are_white_whatever_their_number(scale):
     counts = np.array([20.0, 20, 7, 1, 33, 20, 20])
