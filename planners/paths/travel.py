@@ -34,6 +34,9 @@ MOST_NEAR_PLACES, NEAR_NEIGHBOURS = 2000, 10
 # Where along a way it is looked whether there is room, the middle first: what is blocked there needs no second look
 WAY_SHARES = (0.5, 0.25, 0.75, 0.125, 0.875, 0.375, 0.625)
 
+# A plan that asks so often for what was refused does nothing else: the driver is asked again, and ends it
+MOST_SPARED = 20
+
 
 def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
     """The way between two moves (2, 3), m: backed off where the one ends, straight, and down where the other begins.
@@ -66,17 +69,24 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
 
     What was made is learnt from what the driver sends back: after a planners.Refused the finger still stands where
     the last executed move ended. The plan is sent a planners.Parted for a move that was made in parts or after travel.
+    What was refused is not asked again, in neither direction, until another move was made: nothing has changed, and
+    the plan is sent the same answer.
 
     Args:
         check: what is wrong with a move, wherever it begins, or None; only a sweep with something wrong is split.
     """
     answer: Trace | None = None
     before: Move | None = None
+    refused, spared = list[tuple[Move, Refused]](), 0
     while True:
         try:
             move = next(plan) if answer is None else plan.send(answer)
         except StopIteration as end:
             return end.value if isinstance(end.value, Outcome) else Outcome("done")
+        again = next((said for asked, said in refused if _same_way(asked, move)), None)
+        if again is not None and spared < MOST_SPARED:
+            answer, spared = again, spared + 1
+            continue
         parts = [move]
         if check is not None and move.purpose == "sweep" and check(move):
             parts = sound_parts(move, ways.carrier) or [move]
@@ -89,6 +99,20 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
                 made.extend([done] if travelled is None else [travelled, done])
         if made and made != [move]:
             answer = Parted.of(felt, made)
+        if made:
+            refused, spared = [], 0
+        elif isinstance(answer, Refused):
+            refused.append((move, answer))
+
+
+def _same_way(one: Move, other: Move) -> bool:
+    """True if a move is another one, or that backwards."""
+    if one.purpose != other.purpose or one.path.shape != other.path.shape:
+        return False
+    return any(
+        np.array_equal(one.path[::turn], other.path) and np.array_equal(one.approach[::turn], other.approach)
+        for turn in (1, -1)
+    )
 
 
 def _reached(

@@ -71,6 +71,25 @@ def test_a_refused_move_forbids_none_of_those_after_it() -> None:
     assert [move.purpose for move in made] == ["sweep", "travel", "sweep", "travel", "sweep"]
 
 
+def test_what_was_refused_is_not_asked_again_until_another_move_was_made() -> None:
+    inside, backwards = sweep([30, 3, 5], [30, 3, 35], DOWN), sweep([30, 3, 35], [30, 3, 5], DOWN)
+    made, answers, complaints = driven(FLOOR, inside, inside, backwards, FLOOR, inside)
+    assert len(complaints) == 2 and len(made) == 2
+    assert [isinstance(each, Refused) for each in answers] == [False, True, True, True, False, True]
+
+
+def test_a_plan_that_asks_for_nothing_but_what_was_refused_ends() -> None:
+    def plan() -> Plan:
+        while True:
+            yield sweep([30, 3, 5], [30, 3, 35], DOWN)
+
+    touch = finger()
+    limits = Limits.of(touch.workspace, BASE, R)
+    ways = Ways(BASE, R, touch.workspace.low, touch.workspace.high, 0.07)
+    _, outcome = drive(routed(plan(), ways, limits.violation), touch.execute, check=limits.violation, empty=EMPTY)
+    assert outcome.reason == "finger refuses"
+
+
 def test_a_sweep_into_a_wall_is_made_up_to_the_wall() -> None:
     made, answers, complaints = driven(INTO_WALL)
     assert not complaints and len(made) == 1
