@@ -16,7 +16,7 @@ from mapping.detection import face_samples
 from planners import Outcome, Parted, Plan, Refused
 from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
 from planners.paths.detour import Detour
-from planners.paths.sound import BACK_OFF_DISTANCE, DETAIL_ROOM, resampled, sound_parts
+from planners.paths.sound import BACK_OFF_DISTANCE, DETAIL_ROOM, can_be_left, resampled, sound_parts
 
 # Places of a way lie at most so far apart where it is looked whether it is free, in tip radii
 FREE_SPACING = 0.25
@@ -73,7 +73,8 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
     the plan is sent the same answer.
 
     Args:
-        check: what is wrong with a move, wherever it begins, or None; only a sweep with something wrong is split.
+        check: what is wrong with a move, wherever it begins, or None; only a sweep with something wrong, or that the
+            finger could not leave, is split.
     """
     answer: Trace | None = None
     before: Move | None = None
@@ -88,7 +89,7 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
             answer, spared = again, spared + 1
             continue
         parts = [move]
-        if check is not None and move.purpose == "sweep" and check(move):
+        if check is not None and move.purpose == "sweep" and (check(move) or not can_be_left(move, ways.carrier)):
             parts = sound_parts(move, ways.carrier) or [move]
         felt, made = [], []
         for part in parts:
