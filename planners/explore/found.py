@@ -12,7 +12,7 @@ from mapping.instrument import Noise
 from planners.explore.faint_search import FaintLead
 from planners.follow import AxisTrack, BumpSize, is_step, slender
 from planners.paths import tangential
-from planners.survey.pace import CERTAIN_CREST_SDS
+from planners.survey import CERTAIN_CREST_SDS
 
 # Standard deviations by which a crossing must be lower than what is asked for to be none of it
 LOWER_SDS = 2.0

@@ -25,6 +25,8 @@ ENDS = 1.0
 # Of the grid on which ways round the body are looked for, in tip radii; and its most nodes along an axis
 GRID_SPACING, MOST_GRID_NODES = 0.75, 40
 ROOM = 4.0
+# Most ways are hardly longer than straight ones: the others are looked for in a second search
+SHORT_WAY = 1.5
 # How far out of a narrow place a straight way is looked for, in tip radii
 OUT_DISTANCE = 6.0
 # Places off the surface where the grid is too coarse: how high over contact, in tip radii; how many of each at most;
@@ -34,6 +36,8 @@ MOST_NEAR_PLACES, NEAR_NEIGHBOURS = 2000, 10
 # Where along a way it is looked whether there is room, the middle first: what is blocked there needs no second look
 WAY_SHARES = (0.5, 0.25, 0.75, 0.125, 0.875, 0.375, 0.625)
 
+# A sheet whose mean normal is longer than this, all of it within 60 degrees of one direction, needs no ways round it
+ONE_SIDED = 0.5
 # A plan that asks so often for what was refused does nothing else: the driver is asked again, and ends it
 MOST_SPARED = 20
 
@@ -155,6 +159,12 @@ class Ways:
     low: FloatArray
     high: FloatArray
     speed: float
+
+    def make_ready(self) -> None:
+        """Make the roadmap before the finger waits for it, for a body that is to be felt from more than one side."""
+        areas = self.base.surface.face_areas
+        if np.linalg.norm(areas @ self.base.surface.face_normals) < ONE_SIDED * areas.sum():
+            _ = self._graph
 
     def free(self, path: FloatArray, room: float = 0.0) -> bool:
         """True if a ball on the polyline (K, 3) stays out of the body, so far off it as `room` (m) says."""
@@ -333,10 +343,16 @@ class Ways:
         source, target = self._node(start), self._node(stop)
         if source is None or target is None:
             return None
-        lengths, befores = dijkstra(graph, directed=False, indices=np.array([source]), return_predecessors=True)
-        previous = befores[0]
-        if not np.isfinite(lengths[0, target]):
+        straight = float(np.linalg.norm(points[target] - points[source]))
+        for limit in (SHORT_WAY * straight + ROOM * self.tip_radius, np.inf):
+            lengths, befores = dijkstra(
+                graph, directed=False, indices=np.array([source]), return_predecessors=True, limit=limit
+            )
+            if np.isfinite(lengths[0, target]):
+                break
+        else:
             return None
+        previous = befores[0]
         route = [target]
         while route[-1] != source:
             route.append(int(previous[route[-1]]))
