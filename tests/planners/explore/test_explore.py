@@ -23,6 +23,8 @@ from planners.budget import Spent, within
 from planners.drive import drive
 from planners.explore.explore import Explore, Found
 from planners.follow.axis_track import AxisEnd, AxisTrack, course, polyline_distance
+from planners.follow.bump import BumpSizer
+from planners.follow.sense import Sense
 from planners.follow.template_fit import crest_shape, dip_shape, edge_shape, end_shape, fit_shape
 from planners.paths.limits import Limits
 from planners.paths.strokes import Strokes, tangential
@@ -337,3 +339,14 @@ def test_what_is_lower_than_asked_for_and_hardly_above_the_noise_is_passed_over(
     assert [each.sweep for each in found.unexplained()] == [0, 1, 2, 3]
     assert found.passed_over() == 2
     assert replace(found, asked=0.0).passed_over() == 0
+
+
+def test_a_bump_that_is_not_there_costs_two_sweeps() -> None:
+    finger = SimulatedFinger(object=PLATE, tip_radius=R, rate=1500.0, seed=3, white=1e-4)
+    base, up, along = Base(PLATE), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    seed = Crossing(
+        0, 0.0, np.array([0.04, 0.03, 0.0]), up, along, "convex", 1e-4, 2e-5, 1e-4, 2e-3, 0.0, 5.0, True, 0, 1
+    )
+    sizer = BumpSizer(Strokes(base, R), Sense(base, Noise(1e-4)), 1e-4)
+    record, outcome = drive(sizer.size(seed), finger.execute)
+    assert outcome.reason == "lost" and len(record) == 2
