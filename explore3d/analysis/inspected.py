@@ -17,6 +17,9 @@ from mapping.estimate.sweeps import EXTRAPOLATED, pitch
 MOST_SURFACE_CELLS = 20_000
 # Heights that the record states the inspected share for, in detection limits
 STATED = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
+# Where no height is asked for, those are told that hold on so much of what sweeps came near: the limit itself holds
+# only where a sweep passes, on no area
+TOLD_SHARES = (("half", 0.5), ("nine tenths", 0.9))
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +59,13 @@ class Inspected:
         """Share of the area on which every crest at least `height` m high would have been found."""
         return float(self.area[self.place <= height].sum() / self.area.sum())
 
+    def above(self, share: float) -> float:
+        """Height above which every crest would have been found on that share of what sweeps came near, m."""
+        near = np.isfinite(self.place)
+        order = np.argsort(self.place[near], kind="stable")
+        area = np.cumsum(self.area[near][order])
+        return float(self.place[near][order][np.searchsorted(area, share * area[-1])]) if len(area) else float("inf")
+
     @property
     def untouched(self) -> float:
         """Share of the area that no sweep came near."""
@@ -74,13 +84,17 @@ class Inspected:
 
     def sentence(self) -> str:
         """The same for people."""
-        height = self.limit if self.asked is None else self.asked
-        if not np.isfinite(height):
+        if not np.isfinite(self.limit if self.asked is None else self.asked):
             return "The trace is too short to say what it inspected."
-        sentence = (
-            f"{100 * self.share(height):.1f} % of the surface is inspected for sharp features above "
-            f"{length_text(height, 2)}, with a probability of at least {100 * self.probability:.0f} % each."
-        )
+        if self.asked is None:
+            told = [f"{name} of it above {length_text(self.above(share), 2)}" for name, share in TOLD_SHARES]
+            sentence = f"Of the surface that sweeps came near, sharp features are found on {' and on '.join(told)}"
+        else:
+            sentence = (
+                f"{100 * self.share(self.asked):.1f} % of the surface is inspected for sharp features above "
+                f"{length_text(self.asked, 2)}"
+            )
+        sentence += f", with a probability of at least {100 * self.probability:.0f} % each."
         if self.untouched > 5e-4:
             sentence += f" No sweep came near {100 * self.untouched:.1f} % of it."
         return sentence

@@ -183,6 +183,7 @@ class Explorer:
             return plan
         space = self.workspace
         ways = Ways(base, self.tip_radius, space.low, space.high, space.max_speed)
+        ways.make_ready()
         return routed(plan, ways, self.limits(base).violation)
 
     def carry_out(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +22,43 @@ from hw.probing import GrblFinger
 from hw.simulated import SimulatedFinger
 from mapping import Surface, Trace, length_text
 from mapping.base import Base
+from mapping.detection import face_samples
 from mapping.geometry.mesh import algebra_in_one_thread
 from planners import Spent, drive, dry_run
 from planners.explore import Discover, SurveyCount
+
+# What is rehearsed: how high, in heights of the smallest feature asked for, of which some are lower and some higher (a
+# height from once to three times that changes a ridge's time by a fifth to either side); how long a ridge is at least,
+# in tip radii; how wide a bump is, in heights; and the ridge's direction, rad, in line with no sweep
+REHEARSED_HEIGHT, REHEARSED_LENGTH, REHEARSED_WIDTH, REHEARSED_TURN = 2.0, 5.0, 3.0, 0.6
+# Room about a rehearsed detail, in tip radii: circuits and slides reach less than one beyond it
+REHEARSED_ROOM = 3.0
+# Places of a surface between which the mean way is asked
+WAY_PLACES = 300
+
+
+@dataclass(frozen=True)
+class DetailTime:
+    """Finger time that each detail adds to the survey, by rehearsal: the way to it, and all that is felt of it.
+
+    Args:
+        bump: of a bump, s; None where only ridges are asked for.
+        ridge: of a ridge so long, s.
+        length: of that ridge, m.
+        height: of both, m.
+    """
+
+    bump: float | None
+    ridge: float
+    length: float
+    height: float
+
+    def sentence(self) -> str:
+        """It in words."""
+        size = f"{length_text(self.height, 2)} high"
+        bump = "" if self.bump is None else f"a bump {size} about {seconds_text(self.bump)}, "
+        ridge = f"a ridge {size} and {length_text(self.length, 2)} long about {seconds_text(self.ridge)}"
+        return f"what is found takes more time: {bump}{ridge}, each"
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +77,7 @@ class DryRun:
         account: what of the surface the sweeps would sweep; None if the time budget ends before the survey.
         assumed: what had to be assumed of the object, and what the plan falls short of; a sentence or "".
         pecking: s that the moves will take by the finger's own forecast, where it touches point by point; else None.
+        detail: what each detail that is found adds; None where that cannot be rehearsed.
     """
 
     base: Base
@@ -57,6 +92,7 @@ class DryRun:
     account: SurfaceAccount | None = None
     assumed: str = ""
     pecking: float | None = None
+    detail: DetailTime | None = None
 
     def record(self) -> dict[str, Any]:
         """The plan in JSON values: SI units."""
@@ -66,6 +102,7 @@ class DryRun:
             "length": self.metres,
             "time": self.seconds,
             "pecking_time": self.pecking,
+            "detail_time": None if self.detail is None else asdict(self.detail),
             "speed": self.speed,
             "covered": self.covered,
             "reach": self.reach,
@@ -88,7 +125,8 @@ class DryRun:
         account = [] if self.account is None else [self.account.sentence()]
         warning = [self.account.warning()] if self.account is not None and self.account.short else []
         told = [] if self.pecking is None else [f"pecking takes it about {seconds_text(self.pecking)}, ways included"]
-        return [*warning, *assumed, first, *told, *within, *account, *(broken or ["no move breaks a limit"])]
+        more = [] if self.detail is None else [self.detail.sentence()]
+        return [*warning, *assumed, first, *more, *told, *within, *account, *(broken or ["no move breaks a limit"])]
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""
@@ -160,6 +198,8 @@ def _planned(scene: Scene, finger: Finger, stages: Stages) -> DryRun:
     refused = [(moves[number], what) for number, what in broken.items()]
     with stages.stage("surface swept"):
         account = None if survey is None else SurfaceAccount.of_plan(sound, refused, base, scene)
+    with stages.stage("rehearsal"):
+        detail = _rehearsed(scene, planned, base, finger) if isinstance(finger, SimulatedFinger) else None
     return DryRun(
         base,
         scene.tip.radius,
@@ -173,7 +213,49 @@ def _planned(scene: Scene, finger: Finger, stages: Stages) -> DryRun:
         account,
         assumed,
         sum(map(finger.forecast, moves)) if isinstance(finger, GrblFinger) and finger.peck is not None else None,
+        detail,
     )
+
+
+def _rehearsed(scene: Scene, planned: Explorer, base: Base, finger: SimulatedFinger) -> DetailTime | None:
+    """What a detail adds: the same procedures feel one on a flat plate with the same finger, and none.
+
+    None if the noise hides even these.
+    """
+    import trimesh
+    from scipy.spatial.distance import pdist
+    from trimesh.transformations import rotation_matrix
+
+    tip, ridges_only = scene.tip.radius, scene.survey.shortest_ridge
+    height = REHEARSED_HEIGHT * scene.survey.smallest_feature
+    length = max(ridges_only or REHEARSED_LENGTH * tip, REHEARSED_WIDTH * height)
+    wire = trimesh.creation.capsule(height=length - height, radius=0.5 * height)
+    wire.apply_translation([0.0, 0.0, 0.5 * height] - wire.bounds.mean(axis=0))
+    wire.apply_transform(rotation_matrix(0.5 * np.pi, [0, 1, 0], [0, 0, 0.5 * height]))
+    wire.apply_transform(rotation_matrix(REHEARSED_TURN, [0, 0, 1]))
+    cap = trimesh.creation.icosphere(subdivisions=4)
+    cap.apply_scale([0.5 * REHEARSED_WIDTH * height] * 2 + [height])
+    half = 0.5 * length + REHEARSED_ROOM * tip
+    plate = trimesh.Trimesh(
+        half * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2], [0, 2, 3]], process=False
+    )
+    known = Base(Surface(plate.vertices, plate.faces))
+
+    def seconds(*details: trimesh.Trimesh) -> float:
+        """Finger time for the plate with these on it, s; no number if they are not found."""
+        whole = trimesh.util.concatenate([plate, *details])
+        touch = replace(finger, object=Surface(whole.vertices, whole.faces), margin=REHEARSED_ROOM * tip)
+        rehearsing = replace(planned, workspace=touch.workspace)
+        plan = planned.explore(base=known, region=None, time_budget=np.inf).plan()
+        outcome, spent = rehearsing.carry_out(plan, known, touch.execute)
+        found = outcome.value
+        shown = not details or (found is not None and bool(found.tracks or found.bumps))
+        return spent if shown else float("nan")
+
+    places, _ = face_samples(base.surface, float(np.sqrt(base.surface.face_areas.sum() / WAY_PLACES)))
+    less = seconds() - float(pdist(places).mean()) / planned.workspace.max_speed
+    ridge, bump = seconds(wire) - less, None if ridges_only else seconds(cap) - less
+    return DetailTime(bump, ridge, length, height) if np.isfinite([ridge, bump or 0.0]).all() else None
 
 
 def _to_know_the_base(planned: Explorer) -> tuple[list[Move], Base, str]:

@@ -132,20 +132,25 @@ def _without_tears(surface: Surface, tip_radius: float) -> tuple[Surface, list[I
 
 
 def _rims(sides: IntArray) -> list[IntArray]:
-    """The closed ones among directed sides (N, 2) that have a face to one hand only, each in its order."""
+    """The closed ones among directed sides (N, 2) that have a face to one hand only, each in its order.
+
+    None passes a place twice: where two holes, or a hole and the border, meet in a corner they are two.
+    """
     after: dict[int, list[int]] = {}
     for begin, end in sides.tolist():
         after.setdefault(begin, []).append(end)
     rims = []
     for first in list(after):
         while after[first]:
-            path, place = [], first
+            path, place = [first], first
             while after.get(place):
-                path.append((place, after[place].pop()))
-                place = path[-1][1]
-                if place == first:
-                    rims.append(np.array(path))
-                    break
+                place = after[place].pop()
+                if place in path:
+                    loop = path[path.index(place) :]
+                    rims.append(np.column_stack([loop, np.roll(loop, -1)]))
+                    del path[path.index(place) + 1 :]
+                else:
+                    path.append(place)
     return rims
 
 

@@ -131,6 +131,9 @@ class Explore:
         outcome = yield from within(everything, spent, self.time_budget, self.path_budget)
         if found.surveyed:
             self._account(surveyor, found)
+        if over := found.passed_over():
+            lower = "lower than the smallest feature asked for and hardly above the noise"
+            found.left_out.append(f"{_counted(over, 'detection')} not looked into: {lower}")
         if outcome.reason == "budget":
             found.left_out.append(f"{_counted(len(found.unexplained()), 'detection')} not looked into: budget spent")
         told = outcome.detail if outcome.reason == "model wrong" else self._why(outcome.reason, found)
@@ -157,7 +160,7 @@ class Explore:
 
     def _everything(self, surveyor: Surveyor, found: Found) -> Plan:
         yield from surveyor.plan()
-        found.surveyed = True
+        found.surveyed, found.asked = True, surveyor.visible * self.smallest
         deviation = surveyor.deviation()
         if deviation is None:
             return (yield from self._hunt(surveyor, found))

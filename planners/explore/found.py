@@ -12,6 +12,10 @@ from mapping.instrument import Noise
 from planners.explore.faint_search import FaintLead
 from planners.follow import AxisTrack, BumpSize, is_step, slender
 from planners.paths import tangential
+from planners.survey import CERTAIN_CREST_SDS
+
+# Standard deviations by which a crossing must be lower than what is asked for to be none of it
+LOWER_SDS = 2.0
 
 
 @dataclass
@@ -19,11 +23,13 @@ class Found:
     """What the exploration knows so far; the outcome's value.
 
     `surveyed` says whether the survey was finished; `actions` names everything that was done after it, with its
-    outcome; `left_out` what was not, `unseen` what the survey may have missed.
+    outcome; `left_out` what was not, `unseen` what the survey may have missed. `asked` is the height (m) that the
+    smallest feature asked for shows at least on some sweep.
     """
 
     tip_radius: float
     surveyed: bool = False
+    asked: float = 0.0
     survey: Coverage | None = None
     noise: Noise | None = None
     tracks: list[AxisTrack] = field(default_factory=list)
@@ -37,14 +43,31 @@ class Found:
     unseen: list[str] = field(default_factory=list)
 
     def unexplained(self) -> list[Crossing]:
-        """Crossings that no track or bump accounts for and that were not looked into yet.
+        """Crossings that no track or bump accounts for, that were not looked into yet, and that are worth it.
 
         The highest come first, but those that are wider than a wire of their height would be come later: they
         were met at a slant, or beside a neighbour.
         """
-        known: list[AxisTrack | BumpSize] = [*self.tracks, *self.bumps]
-        rest = [c for c in self.crossings if not any(k.explains(c) for k in known) and not self._tried(c)]
+        rest = [c for c in self._open() if self._worth_a_look(c)]
         return sorted(rest, key=lambda c: -abs(c.height) * min(1.0, slender(c, self.tip_radius)))
+
+    def passed_over(self) -> int:
+        """How many crossings are not worth a look."""
+        return sum(not self._worth_a_look(c) for c in self._open())
+
+    def _open(self) -> list[Crossing]:
+        """Crossings that no track or bump accounts for and that were not looked into yet."""
+        known: list[AxisTrack | BumpSize] = [*self.tracks, *self.bumps]
+        return [c for c in self.crossings if not any(k.explains(c) for k in known) and not self._tried(c)]
+
+    def _worth_a_look(self, crossing: Crossing) -> bool:
+        """True for what may be a feature asked for, and for whatever else is certainly there.
+
+        What is asked for shows somewhere as high as `asked`; what is lower there by two standard deviations is none,
+        and most often noise: more false alarms are let through to here than in the end.
+        """
+        highest = abs(crossing.height) * (1.0 + LOWER_SDS / max(crossing.snr, LOWER_SDS))
+        return highest >= self.asked or crossing.snr >= CERTAIN_CREST_SDS
 
     def step_heading(self, seed: Crossing, reach: float) -> FloatArray | None:
         """Direction from a step to the nearest one on another sweep, or None if the seed is no open step.

@@ -56,6 +56,8 @@ class BumpSize:
 class BumpSizer:
     """Sweeps through the top in two crossed directions, each moving on to the top that the last one found.
 
+    It gives up where the first two show nothing.
+
     Args:
         strokes, sense: how to touch and to feel.
         precision: wanted standard deviation of the centre, m.
@@ -79,6 +81,8 @@ class BumpSizer:
             lowest = 0.5 * abs(seed.height)
             crossing = self.sense.nearest(trace, point, sign, lowest, 1.5 * seed.half_width)
             if crossing is None:
+                if k % 2 and not any(found):  # the same two sweeps again would show as little
+                    break
                 continue
             moved = float(np.linalg.norm(crossing.point - point))
             point = crossing.point

@@ -54,10 +54,7 @@ def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     tip = carrier.tip_radius
     roomy = replace(carrier, radius=carrier.radius + DETAIL_ROOM * tip)
     leaving = replace(carrier, backing=BACK_OFF_DISTANCE * tip)
-    ends = np.array([0, -1])
-    if (free & (roomy.clearance(path, approach) >= 0)).all() and (
-        leaving.clearance(path[ends], approach[ends]) >= 0
-    ).all():
+    if (free & (roomy.clearance(path, approach) >= 0)).all() and can_be_left(move, carrier):
         return [move]
     for each in (roomy, carrier):
         for run in runs(free):
@@ -66,6 +63,13 @@ def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     stretches = (part for run in runs(free) for part in _left(path[run], approach[run], leaving))
     parts = (replace(move, path=part[0], approach=part[1]) for part in stretches if len(part[0]) > 1)
     return [part for part in parts if part.length >= SHORTEST_PART * tip]
+
+
+def can_be_left(move: Move, carrier: Carrier) -> bool:
+    """True if the finger can draw back where a sweep ends, and had room to come to where it begins."""
+    leaving = replace(carrier, backing=BACK_OFF_DISTANCE * carrier.tip_radius)
+    ends = np.array([0, -1])
+    return bool((leaving.clearance(move.path[ends], move.approach[ends]) >= 0).all())
 
 
 def _left(path: FloatArray, approach: FloatArray, leaving: Carrier) -> Iterator[tuple[FloatArray, FloatArray]]:

@@ -16,7 +16,7 @@ from mapping.detection import face_samples
 from planners import Outcome, Parted, Plan, Refused
 from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
 from planners.paths.detour import Detour
-from planners.paths.sound import BACK_OFF_DISTANCE, DETAIL_ROOM, resampled, sound_parts
+from planners.paths.sound import BACK_OFF_DISTANCE, DETAIL_ROOM, can_be_left, resampled, sound_parts
 
 # Places of a way lie at most so far apart where it is looked whether it is free, in tip radii
 FREE_SPACING = 0.25
@@ -25,6 +25,8 @@ ENDS = 1.0
 # Of the grid on which ways round the body are looked for, in tip radii; and its most nodes along an axis
 GRID_SPACING, MOST_GRID_NODES = 0.75, 40
 ROOM = 4.0
+# Most ways are hardly longer than straight ones: the others are looked for in a second search
+SHORT_WAY = 1.5
 # How far out of a narrow place a straight way is looked for, in tip radii
 OUT_DISTANCE = 6.0
 # Places off the surface where the grid is too coarse: how high over contact, in tip radii; how many of each at most;
@@ -33,6 +35,11 @@ NEAR_LIFTS = (0.2, 0.5)
 MOST_NEAR_PLACES, NEAR_NEIGHBOURS = 2000, 10
 # Where along a way it is looked whether there is room, the middle first: what is blocked there needs no second look
 WAY_SHARES = (0.5, 0.25, 0.75, 0.125, 0.875, 0.375, 0.625)
+
+# A sheet whose mean normal is longer than this, all of it within 60 degrees of one direction, needs no ways round it
+ONE_SIDED = 0.5
+# A plan that asks so often for what was refused does nothing else: the driver is asked again, and ends it
+MOST_SPARED = 20
 
 
 def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
@@ -66,19 +73,27 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
 
     What was made is learnt from what the driver sends back: after a planners.Refused the finger still stands where
     the last executed move ended. The plan is sent a planners.Parted for a move that was made in parts or after travel.
+    What was refused is not asked again, in neither direction, until another move was made: nothing has changed, and
+    the plan is sent the same answer.
 
     Args:
-        check: what is wrong with a move, wherever it begins, or None; only a sweep with something wrong is split.
+        check: what is wrong with a move, wherever it begins, or None; only a sweep with something wrong, or that the
+            finger could not leave, is split.
     """
     answer: Trace | None = None
     before: Move | None = None
+    refused, spared = list[tuple[Move, Refused]](), 0
     while True:
         try:
             move = next(plan) if answer is None else plan.send(answer)
         except StopIteration as end:
             return end.value if isinstance(end.value, Outcome) else Outcome("done")
+        again = next((said for asked, said in refused if _same_way(asked, move)), None)
+        if again is not None and spared < MOST_SPARED:
+            answer, spared = again, spared + 1
+            continue
         parts = [move]
-        if check is not None and move.purpose == "sweep" and check(move):
+        if check is not None and move.purpose == "sweep" and (check(move) or not can_be_left(move, ways.carrier)):
             parts = sound_parts(move, ways.carrier) or [move]
         felt, made = [], []
         for part in parts:
@@ -89,6 +104,20 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
                 made.extend([done] if travelled is None else [travelled, done])
         if made and made != [move]:
             answer = Parted.of(felt, made)
+        if made:
+            refused, spared = [], 0
+        elif isinstance(answer, Refused):
+            refused.append((move, answer))
+
+
+def _same_way(one: Move, other: Move) -> bool:
+    """True if a move is another one, or that backwards."""
+    if one.purpose != other.purpose or one.path.shape != other.path.shape:
+        return False
+    return any(
+        np.array_equal(one.path[::turn], other.path) and np.array_equal(one.approach[::turn], other.approach)
+        for turn in (1, -1)
+    )
 
 
 def _reached(
@@ -130,6 +159,12 @@ class Ways:
     low: FloatArray
     high: FloatArray
     speed: float
+
+    def make_ready(self) -> None:
+        """Make the roadmap before the finger waits for it, for a body that is to be felt from more than one side."""
+        areas = self.base.surface.face_areas
+        if np.linalg.norm(areas @ self.base.surface.face_normals) < ONE_SIDED * areas.sum():
+            _ = self._graph
 
     def free(self, path: FloatArray, room: float = 0.0) -> bool:
         """True if a ball on the polyline (K, 3) stays out of the body, so far off it as `room` (m) says."""
@@ -265,6 +300,10 @@ class Ways:
         surface = self.base.surface
         spacing = max(self.tip_radius, float(np.sqrt(surface.face_areas.sum() / MOST_NEAR_PLACES)))
         on, face = face_samples(surface, spacing)
+        # of long faces, and small ones, samples lie closer: one for each cell half as wide, and side of the body
+        cells = np.column_stack([np.floor(2.0 * on / spacing), np.rint(surface.face_normals[face])])
+        one = np.sort(np.unique(cells, axis=0, return_index=True)[1])
+        on, face = on[one], face[one]
         places = [on + (1.0 + lift) * self.tip_radius * surface.face_normals[face] for lift in NEAR_LIFTS]
         near = np.concatenate(places)
         inside = ((near >= self.low) & (near <= self.high)).all(axis=1)
@@ -304,10 +343,16 @@ class Ways:
         source, target = self._node(start), self._node(stop)
         if source is None or target is None:
             return None
-        lengths, befores = dijkstra(graph, directed=False, indices=np.array([source]), return_predecessors=True)
-        previous = befores[0]
-        if not np.isfinite(lengths[0, target]):
+        straight = float(np.linalg.norm(points[target] - points[source]))
+        for limit in (SHORT_WAY * straight + ROOM * self.tip_radius, np.inf):
+            lengths, befores = dijkstra(
+                graph, directed=False, indices=np.array([source]), return_predecessors=True, limit=limit
+            )
+            if np.isfinite(lengths[0, target]):
+                break
+        else:
             return None
+        previous = befores[0]
         route = [target]
         while route[-1] != source:
             route.append(int(previous[route[-1]]))

@@ -21,7 +21,7 @@ from planners.paths.carrier import Carrier
 from planners.paths.detour import Detour
 from planners.paths.limits import Limits
 from planners.paths.reach import reachable
-from planners.paths.sound import held_up, sound_parts
+from planners.paths.sound import can_be_left, held_up, sound_parts
 from planners.paths.travel import Ways, routed
 from planners.plan import Outcome, Parted, Plan, Refused, executed
 
@@ -69,6 +69,56 @@ def test_a_refused_move_forbids_none_of_those_after_it() -> None:
     assert len(complaints) == 1
     assert [isinstance(each, Refused) for each in answers] == [False, True, False, False]
     assert [move.purpose for move in made] == ["sweep", "travel", "sweep", "travel", "sweep"]
+
+
+def test_a_sweep_that_the_finger_could_not_leave_ends_where_it_can() -> None:
+    from trimesh.creation import box
+
+    # under the ceiling there is room for the stem, but none to draw back by half a radius
+    floor, ceiling = box(extents=(60, 60, 4)), box(extents=(30, 60, 4))
+    floor.apply_translation([0, 0, -2])
+    ceiling.apply_translation([15, 0, 25.2])
+    body = Surface(
+        1e-3 * np.concatenate([floor.vertices, ceiling.vertices]), np.concatenate([floor.faces, ceiling.faces + 8])
+    )
+    base, touch = Base(body), SimulatedFinger(object=body, tip_radius=R, rate=500.0)
+    limits, carrier = Limits.of(touch.workspace, base, R), Carrier.of(base, R)
+    under = sweep([-20, 0, 2.94], [20, 0, 2.94], np.array([0.0, 0.0, -1.0]))
+    assert limits.violation(under) is None and not can_be_left(under, carrier)
+
+    def plan() -> Plan:
+        yield under
+        yield sweep([-20, 10, 2.94], [-10, 10, 2.94], np.array([0.0, 0.0, -1.0]))
+        return Outcome("done")
+
+    complaints: list[str] = []
+    ways = Ways(base, R, touch.workspace.low, touch.workspace.high, 0.07)
+    record, _ = drive(
+        routed(plan(), ways, limits.violation), touch.execute, check=limits.violation, note=complaints.append
+    )
+    sweeps = [move for move, _ in record if move.purpose == "sweep"]
+    assert not complaints and len(sweeps) == 2
+    assert all(can_be_left(move, carrier) for move in sweeps)
+    assert sweeps[0].path[-1, 0] > -2e-3  # nothing of what is open is given up
+
+
+def test_what_was_refused_is_not_asked_again_until_another_move_was_made() -> None:
+    inside, backwards = sweep([30, 3, 5], [30, 3, 35], DOWN), sweep([30, 3, 35], [30, 3, 5], DOWN)
+    made, answers, complaints = driven(FLOOR, inside, inside, backwards, FLOOR, inside)
+    assert len(complaints) == 2 and len(made) == 2
+    assert [isinstance(each, Refused) for each in answers] == [False, True, True, True, False, True]
+
+
+def test_a_plan_that_asks_for_nothing_but_what_was_refused_ends() -> None:
+    def plan() -> Plan:
+        while True:
+            yield sweep([30, 3, 5], [30, 3, 35], DOWN)
+
+    touch = finger()
+    limits = Limits.of(touch.workspace, BASE, R)
+    ways = Ways(BASE, R, touch.workspace.low, touch.workspace.high, 0.07)
+    _, outcome = drive(routed(plan(), ways, limits.violation), touch.execute, check=limits.violation, empty=EMPTY)
+    assert outcome.reason == "finger refuses"
 
 
 def test_a_sweep_into_a_wall_is_made_up_to_the_wall() -> None:

@@ -70,8 +70,11 @@ def body_run(name: str, seed: int, folder: Path | None, place: Path) -> dict[str
     begin = process_time()
     analysis = run(scene, place / "out", overwrite=True)
     cpu = process_time() - begin
+    assert plan.detail is not None and plan.detail.bump is not None  # the finger is simulated, bumps are looked for
+    bumps = sum(true.kind == "bump" for true in body.truth)
     return {
         "planned_seconds": plan.seconds,
+        "planned_details": bumps * plan.detail.bump + (len(body.truth) - bumps) * plan.detail.ridge,
         "planned_swept": None if plan.account is None else plan.account.swept,
         "cpu_seconds": cpu,
     } | judged(analysis, *(Judge(each, analysis.trace.tip_radius) for each in (body.object, body.base)))
@@ -133,7 +136,8 @@ def body_lines(records: Sequence[dict[str, Any]]) -> Iterator[str]:
             f"{each['refused']} of {each['moves'] + each['refused']}, {each['refused_twice']} | "
             f"{each['ball_sank']:.3f} | {each['found']} of {each['reachable_features']} | {len(each['invented'])} | "
             f"{each['finger_seconds']:.0f} | {each['cpu_seconds']:.0f} | "
-            f"{planned} of {100 * each['account_swept']:.1f} | {each['planned_seconds']:.0f} |"
+            f"{planned} of {100 * each['account_swept']:.1f} | "
+            f"{each['planned_seconds']:.0f} + {each['planned_details']:.0f} |"
         )
     if records:
         found, there = (sum(each[name] for each in records) for name in ("found", "reachable_features"))

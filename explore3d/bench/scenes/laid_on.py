@@ -68,7 +68,8 @@ def laid_on(body: Mesh, details: Sequence[Detail]) -> Mesh:
     """The body with its details; where none is, its faces are where they were.
 
     Edges longer than a detail's section allows are halved, the longest of a triangle first, on both their sides, so
-    that the mesh stays closed and no angle gets smaller than half of the smallest there was (Rivara 1984).
+    that the mesh stays closed and no angle gets smaller than half of the smallest there was (Rivara 1984). The top of a
+    detail about a point becomes a corner, or the mesh would cut it off: up to 9 um of bumps of 0.6 mm.
     """
     vertices, faces = body
     short = np.zeros(0, dtype=np.int64)
@@ -85,6 +86,9 @@ def laid_on(body: Mesh, details: Sequence[Detail]) -> Mesh:
             break
         short = name[~too_long]
         vertices, faces = _halved(vertices, faces, edges, number, length, too_long)
+    for detail in details:
+        if len(detail.course) == 1:
+            vertices, faces = _with_corner(vertices, faces, detail.course)
     raised = vertices.copy()
     normals = Surface(vertices, faces).face_normals
     outward = np.zeros_like(vertices)
@@ -97,6 +101,15 @@ def laid_on(body: Mesh, details: Sequence[Detail]) -> Mesh:
         section = detail.height * np.cos(np.pi * distance[near] / detail.width) ** 2
         raised[near] += np.where(same_side, section, 0.0)[:, None] * up
     return raised, faces
+
+
+def _with_corner(vertices: FloatArray, faces: IntArray, place: FloatArray) -> Mesh:
+    """The mesh with its point nearest to a place (1, 3) as a corner: of three faces where there was one."""
+    near = NearestPoint(Surface(vertices, faces)).query(place)
+    a, b, c = faces[near.face[0]]
+    new = len(vertices)
+    parts = np.array([[a, b, new], [b, c, new], [c, a, new]])
+    return np.concatenate([vertices, near.points]), np.concatenate([np.delete(faces, near.face[0], axis=0), parts])
 
 
 def _allowed(points: FloatArray, details: Sequence[Detail]) -> FloatArray:

@@ -114,6 +114,11 @@ class Estimate:
     def sentence(self) -> str:
         """What is proven of the estimated surface, for people."""
         shares = [f"{100 * self.fraction(label):.0f} % {LABELS[label]}" for label in (TOUCHED, BRIDGED, EXTRAPOLATED)]
+        ball = float(np.linalg.norm(self.centers - self.points, axis=1).max(initial=0.0))
+        if self.tolerance >= ball:
+            # wherever a ball rests something touches it: that much is known without its neighbours
+            apart = f"The sweeps lie too far apart to prove to better than the ball's radius, {length_text(ball, 2)},"
+            return f"Of the estimated surface {', '.join(shares)}. {apart} where between them the body is."
         half = float(np.quantile(self.below, 0.5, method="higher")) if len(self.points) else float("inf")
         known = f"and within {length_text(half, 2)} of half of all points" if np.isfinite(half) else ""
         touched = f"whatever its form, the body comes within {length_text(self.tolerance, 2)} of what is touched"

@@ -8,8 +8,11 @@ import pytest
 from scene_files import write_scene_file
 
 from explore3d.errors import SceneError
+from explore3d.jobs.expedition import explorer
 from explore3d.jobs.plan import DryRun, plan_scene
+from explore3d.jobs.run import scene_finger
 from explore3d.scene.scene import parse_scene
+from hw.simulated import SimulatedFinger
 
 WIRE = Path(__file__).resolve().parents[3] / "assets" / "scenes" / "wire_on_plate.toml"
 TEXT = WIRE.read_text()
@@ -32,6 +35,23 @@ def test_the_span_of_the_shortest_ridge_and_the_fastest_speed_save_finger_time(t
     assert not ridges.violations and not fast.violations
     assert fast.speed == pytest.approx(0.25) and fast.record()["speed"] == fast.speed
     assert sweeping(fast) == pytest.approx(sweeping(ridges) * 0.03 / 0.25, rel=1e-6)
+
+
+def test_what_a_detail_adds_is_foretold(tmp_path: Path) -> None:
+    text = TEXT.replace("wire_on_plate.ply", "wire_on_tile.ply").replace("meshes/plate.ply", "meshes/tile.ply")
+    text = text.replace('radius = "10 mm"', 'radius = "5 mm"').replace('white = "0.2 mm"', 'white = "0.05 mm"')
+    text = text.replace('speed = "30 mm/s"', "")
+    plan = planned(tmp_path, text)
+    assert plan.detail is not None and plan.detail.bump is not None
+    assert 0.5 < plan.detail.bump < plan.detail.ridge
+    assert plan.detail.sentence() in plan.lines()
+    scene = parse_scene(text, WIRE)
+    with scene_finger(scene) as finger:
+        expedition = explorer(scene, finger.workspace)
+        expedition.go(finger.execute)
+        assert isinstance(finger, SimulatedFinger)
+        # one ridge of 27 mm
+        assert finger.clock == pytest.approx(plan.seconds + plan.detail.ridge, rel=0.1)
 
 
 @pytest.mark.parametrize(

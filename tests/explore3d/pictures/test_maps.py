@@ -42,3 +42,17 @@ def test_a_tear_that_the_ball_does_not_pass_is_closed_and_an_opening_is_not() ->
     assert (closed.face_normals[:, 2] > 0.99).all() and len(closed.vertices) == 37
     assert [sorted(rim.tolist()) for rim in rims] == [[7, 8, 13, 15, 20, 21]]
     assert len(_without_tears(torn, 1.0e-3)[0].faces) == len(faces) - 6  # girth 6.28 mm
+
+
+def test_tears_that_meet_each_other_or_the_border_in_a_corner_are_closed_too() -> None:
+    places = 1e-3 * np.array([[x, y, 0.0] for y in range(6) for x in range(6)])
+    corner = np.array([6 * y + x for y in range(5) for x in range(5)])
+    halves = [np.column_stack([corner, corner + 1, corner + 7]), np.column_stack([corner, corner + 7, corner + 6])]
+    faces = np.concatenate(halves)
+    gone = (faces == 14).any(axis=1)
+    for one in ([21, 22, 28], [10, 17, 16]):  # the one touches that tear in place 21, the other the border in 17
+        gone |= (faces == one).all(axis=1)
+    assert gone.sum() == 8
+    closed, rims = _without_tears(Surface(places, faces[~gone]), 1.1e-3)
+    assert sorted(len(rim) for rim in rims) == [3, 3, 6]
+    assert closed.face_areas.sum() == pytest.approx(25e-6) and (closed.face_normals[:, 2] > 0.99).all()

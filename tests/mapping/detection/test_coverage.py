@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from explore3d.analysis.inspected import Inspected
 from hw.simulated.finger import SimulatedFinger
+from mapping import length_text
 from mapping.base.base import Base
 from mapping.detection.coverage import found_heights, found_probability
 from mapping.detection.detect import detect
@@ -72,6 +75,13 @@ def test_a_survey_inspects_what_it_was_asked_for() -> None:
     part = Inspected.of(half, base, detect(half, base), 4e-4)
     assert 0.2 < part.share(4e-4) < 0.5 and part.untouched > 0.4
     assert "No sweep came near" in part.sentence()
+    # where no height is asked for, heights are told that hold on some area: the limit holds on none
+    unasked = replace(part, asked=None)
+    half_of_it, most_of_it = unasked.above(0.5), unasked.above(0.9)
+    assert part.limit < half_of_it < 4e-4 < most_of_it < 0.51 * R
+    assert part.share(part.limit) < 0.01
+    assert part.share(half_of_it) == pytest.approx(0.5 * (1.0 - part.untouched), rel=0.01)
+    assert f"on half of it above {length_text(half_of_it, 2)} and on nine tenths" in unasked.sentence()
 
 
 def test_the_share_that_was_passed_does_not_depend_on_how_large_the_faces_are():

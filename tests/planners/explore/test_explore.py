@@ -13,6 +13,7 @@ from hw.errors import FingerError
 from hw.move import Move
 from hw.simulated.finger import SimulatedFinger
 from mapping.base.base import Base
+from mapping.detection.crossing import Crossing
 from mapping.geometry.templates.shapes import cap_height
 from mapping.instrument.noise import Noise
 from mapping.instrument.stated import StatedNoise
@@ -22,6 +23,8 @@ from planners.budget import Spent, within
 from planners.drive import drive
 from planners.explore.explore import Explore, Found
 from planners.follow.axis_track import AxisEnd, AxisTrack, course, polyline_distance
+from planners.follow.bump import BumpSizer
+from planners.follow.sense import Sense
 from planners.follow.template_fit import crest_shape, dip_shape, edge_shape, end_shape, fit_shape
 from planners.paths.limits import Limits
 from planners.paths.strokes import Strokes, tangential
@@ -317,3 +320,33 @@ def test_what_the_survey_may_have_missed_is_said_where_the_exploration_ends() ->
     assert len(found.unseen) == 1 and not found.crossings
     _, _, outcome = explore(PLATE)
     assert "not inspected" not in outcome.detail
+
+
+def test_what_is_lower_than_asked_for_and_hardly_above_the_noise_is_passed_over() -> None:
+    def crossing(number: int, height: float, snr: float) -> Crossing:
+        place, up, along = np.array([0.01 * number, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
+        sd = abs(height) / snr
+        kind = "convex" if height > 0 else "concave"
+        return Crossing(number, 0.0, place, up, along, kind, height, sd, 1e-4, 1e-3, 0.0, snr, True, 0, 1)
+
+    found = Found(R, asked=1e-4)
+    # as high as asked for; lower by one standard deviation; a dip as deep; lower, and certainly there
+    found.crossings = [
+        crossing(0, 2e-4, 4.7), crossing(1, 8e-5, 5.0), crossing(2, -8e-5, 5.0), crossing(3, 4e-5, 20.0)
+    ]  # fmt: skip
+    assert len(found.unexplained()) == 4 and found.passed_over() == 0
+    found.crossings += [crossing(4, 4e-5, 4.8), crossing(5, -3e-5, 5.2)]  # what noise makes
+    assert [each.sweep for each in found.unexplained()] == [0, 1, 2, 3]
+    assert found.passed_over() == 2
+    assert replace(found, asked=0.0).passed_over() == 0
+
+
+def test_a_bump_that_is_not_there_costs_two_sweeps() -> None:
+    finger = SimulatedFinger(object=PLATE, tip_radius=R, rate=1500.0, seed=3, white=1e-4)
+    base, up, along = Base(PLATE), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    seed = Crossing(
+        0, 0.0, np.array([0.04, 0.03, 0.0]), up, along, "convex", 1e-4, 2e-5, 1e-4, 2e-3, 0.0, 5.0, True, 0, 1
+    )
+    sizer = BumpSizer(Strokes(base, R), Sense(base, Noise(1e-4)), 1e-4)
+    record, outcome = drive(sizer.size(seed), finger.execute)
+    assert outcome.reason == "lost" and len(record) == 2

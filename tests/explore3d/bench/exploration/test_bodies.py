@@ -44,6 +44,15 @@ def test_a_detail_has_its_height_and_leaves_the_rest_of_the_body_where_it_was() 
     assert grown == pytest.approx(0.5 * 0.5e-3 * 2e-3 * 10e-3 + ends, rel=0.02)
 
 
+def test_a_bump_is_as_high_as_it_is_said_to_be_wherever_it_lies() -> None:
+    plain = box(0.04)
+    for x, y in ((1.23e-3, -4.56e-3), (0.0, 0.0)):  # in a face; where edges of the refined mesh may meet
+        bump = Detail("bump", np.array([[x, y, 0.02]]), np.array([[0.0, 0.0, 1.0]]), 0.6e-3, 3e-3)
+        detailed = Surface(*laid_on((plain.vertices, plain.faces), [bump]))
+        assert not detailed.open_sides.any()
+        assert detailed.vertices[:, 2].max() == pytest.approx(0.0206, abs=1e-9)
+
+
 def volume(surface: Surface) -> float:
     a, b, c = (surface.vertices[surface.faces[:, k]] for k in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)

@@ -115,6 +115,14 @@ def test_a_finer_tolerance_calls_fewer_points_touched():
     assert shares[-1] == 0.0
 
 
+def test_sweeps_that_prove_no_more_than_the_ball_does_are_said_to():
+    trace = raster(lambda x, y: 0 * x + 1)
+    close, far = (estimate_surface(trace, tolerance=t).sentence() for t in (0.5, 1.5))
+    assert "comes within 500 mm of what is touched" in close
+    assert "comes within" not in far
+    assert "too far apart to prove to better than the ball's radius, 1 m, where between them" in far
+
+
 def test_noise_widens_what_is_proven_and_the_body_stays_within():
     rng = np.random.default_rng(5)
     sigma = 1e-3
