@@ -22,6 +22,7 @@ from explore3d.bench.exploration.body_judge import Judge, anchors_right, refusal
 from explore3d.bench.scenes import any_body
 from explore3d.jobs import plan_scene, run
 from explore3d.log import read_log
+from mapping.inference.kinds import kind_named
 
 
 def bench_bodies(
@@ -71,7 +72,7 @@ def body_run(name: str, seed: int, folder: Path | None, place: Path) -> dict[str
     analysis = run(scene, place / "out", overwrite=True)
     cpu = process_time() - begin
     assert plan.detail is not None and plan.detail.bump is not None  # the finger is simulated, bumps are looked for
-    bumps = sum(true.kind == "bump" for true in body.truth)
+    bumps = sum(not kind_named(true.kind).line for true in body.truth)
     return {
         "planned_seconds": plan.seconds,
         "planned_details": bumps * plan.detail.bump + (len(body.truth) - bumps) * plan.detail.ridge,

@@ -24,7 +24,7 @@ from mapping.assembly import assemble
 from mapping.base import LaidTrace
 from mapping.detection import detect
 from mapping.inference.configuration import PROPOSALS, count_in
-from mapping.inference.kinds import feature_trace, kind_named
+from mapping.inference.kinds import feature_trace, kind_made_of
 
 # Sweeps over a square of twice this, m, one pitch apart; details stay inside by the margin
 COUNTED_HALF_SIDE, COUNTED_PITCH, MARGIN = 20e-3, 3e-3, 4e-3
@@ -84,16 +84,17 @@ def drawn(rng: np.random.Generator, others: Sequence[Feature] = ()) -> Feature:
     """A bump or a straight wire that lies on the plate, anywhere or as often beside another one."""
     height = float(np.exp(rng.uniform(np.log(LOWEST_COUNTED), np.log(HIGHEST_COUNTED))))
     inside = COUNTED_HALF_SIDE - MARGIN
-    middle, kind = np.array([*rng.uniform(-inside, inside, 2), 0.0]), ("bump", "ridge")[int(rng.integers(2))]
+    middle, is_line = np.array([*rng.uniform(-inside, inside, 2), 0.0]), bool(rng.integers(2))
     if others and rng.random() < 0.5:
         middle[:2] = others[int(rng.integers(len(others)))].axis.mean(axis=0)[:2] + BESIDE * rng.standard_normal(2)
         middle = np.clip(middle, -inside, inside)
     axis = middle[None]
-    if kind_named(kind).line:
+    if is_line:
         heading, half = rng.uniform(0.0, np.pi), 0.5 * rng.uniform(SHORTEST_WIRE, LONGEST_WIRE)
         axis = middle + half * np.array([[-1.0], [1.0]]) * [np.cos(heading), np.sin(heading), 0.0]
         axis = np.clip(axis, -inside, inside)
     size = Interval(height, height, height)
+    kind = kind_made_of("convex", line=is_line).name
     return Feature(kind, axis, np.tile([0.0, 0.0, 1.0], (len(axis), 1)), size, size, size, Support(9.0, 9), True, 1e-4)
 
 

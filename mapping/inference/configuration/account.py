@@ -18,7 +18,7 @@ from mapping.inference.configuration.joined_shape import JoinedShape, OneOfMany
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Places, neighbourhood, thin_half_width
 from mapping.inference.configuration.proposals import PEAK_SDS, PROPOSALS, Proposal, apart_of, as_far_as_felt, dense
 from mapping.inference.configuration.search import Account, searched
-from mapping.inference.families import PosteriorProblem, RidgeShape, Surroundings, TwinShape
+from mapping.inference.families import MEETING_REACH, PosteriorProblem, RidgeShape, Surroundings, TwinShape
 from mapping.inference.kinds import kind_named, kind_of, sizes_of
 from mapping.inference.likelihood import Nuisance
 
@@ -29,8 +29,6 @@ TOLD_SHARE = 0.01
 # Draws of the Gaussian that preliminary intervals are taken from
 PRELIMINARY_DRAWS = 400
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
-# Lines nearer to each other than this share of a half-width meet
-MEETING_SHARE = 0.25
 
 
 def accounted(
@@ -209,7 +207,7 @@ def _meeting(features: list[Feature], tip: float) -> list[Feature]:
     for k, m in itertools.combinations(lines, 2):
         half = min(sizes_of(features[n], tip).half_width for n in (k, m))
         gaps = [distances(lines[one], lines[other]) for one, other in ((k, m), (m, k))]
-        touching = min(gap.min() for gap in gaps) < MEETING_SHARE * half
+        touching = min(gap.min() for gap in gaps) < MEETING_REACH * half  # an end beneath the other line is not told
         if touching and all(np.median(gap) > half for gap in gaps):
             met |= {k, m}
     return [

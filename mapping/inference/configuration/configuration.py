@@ -31,6 +31,8 @@ SHARPEST = 0.7
 SCREENED, HOPELESS = 8, 40.0
 # Half-widths within which the priors of the kinds leave a place open
 PLACE_OPEN = 1.5
+# Lower is no height, m: its inverse squared is still a number
+NO_HEIGHT = 1e-12
 # The level of misfit is chosen again where the optimum under the first one says another
 MOST_LEVEL_CHANGES = 3
 
@@ -240,7 +242,7 @@ def _plain(part: Part, covariance: FloatArray) -> float:
     ridge = shape.midway if isinstance(shape, TwinShape) else shape
     if not isinstance(ridge, RidgeShape):
         return 0.0
-    height, log_radius = max(float(part.start[-2]), 1e-12), float(part.start[-1])
+    height, log_radius = max(float(part.start[-2]), NO_HEIGHT), float(part.start[-1])
     variance = _variance_beyond(height, covariance)
     off = log_radius - float(np.log(0.5 * height))
     after = -0.5 * off**2 / variance - 0.5 * float(np.log(2.0 * np.pi * variance))
@@ -256,5 +258,5 @@ def _variance_beyond(height: float, covariance: FloatArray) -> float:
 
 def _beyond_wire(part: Part, covariance: FloatArray) -> float:
     """Standard deviations by which a round line is wider than a wire of its height."""
-    height = max(float(part.start[-2]), np.finfo(float).tiny)
+    height = max(float(part.start[-2]), NO_HEIGHT)
     return float((part.start[-1] - np.log(0.5 * height)) / np.sqrt(_variance_beyond(height, covariance)))
