@@ -37,6 +37,8 @@ from planners.survey import Survey
 MOST_SLIDES, VAIN_SLIDES = 150, 8
 # A faint line is straight, and every crossing of it costs many passes: the step, in its length so far
 LEAD_STEP = 0.25
+# Why a detection is passed over (see Found.passed_over)
+LOWER = "lower than the smallest feature asked for and hardly above the noise"
 
 
 @dataclass(frozen=True)
@@ -132,8 +134,7 @@ class Explore:
         if found.surveyed:
             self._account(surveyor, found)
         if over := found.passed_over():
-            lower = "lower than the smallest feature asked for and hardly above the noise"
-            found.left_out.append(f"{_counted(over, 'detection')} not looked into: {lower}")
+            found.left_out.append(f"{_counted(over, 'detection')} not looked into: {LOWER}")
         if outcome.reason == "budget":
             found.left_out.append(f"{_counted(len(found.unexplained()), 'detection')} not looked into: budget spent")
         told = outcome.detail if outcome.reason == "model wrong" else self._why(outcome.reason, found)
@@ -147,6 +148,8 @@ class Explore:
             return f"the budget was spent, with {_counted(len(found.unexplained()), 'detection')} not looked into"
         if reason == "nothing found":
             return "the survey found nothing to look into"
+        if over := found.passed_over():
+            return f"nothing was left to sharpen, and {_counted(over, 'detection')} not looked into, {LOWER}"
         return "every detection was looked into and nothing was left to sharpen"
 
     def _account(self, surveyor: Surveyor, found: Found) -> None:
