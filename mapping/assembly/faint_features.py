@@ -14,6 +14,7 @@ from mapping.assembly.points import body_width
 from mapping.base import Base
 from mapping.detection import Detections
 from mapping.geometry.mesh import arclengths, distances
+from mapping.inference.configuration import in_words
 from mapping.inference.kinds import kind_made_of
 
 # Places to a half-width of the narrowest section looked for.
@@ -91,7 +92,9 @@ def _is_weak(feature: Feature, detections: Detections) -> bool:
     few = feature.evidence.crossings <= FEW_CROSSINGS and feature.evidence.snr < CLEAR_THRESHOLDS * detections.threshold
     # sweeps that leave a groove by its end feel a dip there, each for itself
     alone = len(feature.axis) == 1 or feature.evidence.crossings <= SOME
-    return few or (alone and abs(feature.height.median) < detections.detection_limit)
+    # a piece of a line, which by itself may be nothing
+    doubtful = any(words == in_words(()) for words, _ in feature.details.account or ())
+    return few or doubtful or (alone and abs(feature.height.median) < detections.detection_limit)
 
 
 def _inflation(inspection: Inspection, detections: Detections, samples: int, half_width: float) -> float:
