@@ -396,7 +396,13 @@ def believed(work: Work, share: Share) -> None:
     for each in unlikely:
         x, y, z = np.round(1e3 * each.point, 2)
         work.stages.left_out.append(LeftOut(f"a {each.kind} at ({x:g}, {y:g}, {z:g}) mm", each.reason))
-    work.features = tuple(feature for feature in work.features if feature.evidence.likely)
+    # what is said of a neighbourhood counts what was just dropped
+    gone = {feature.details.account for feature in work.features if not feature.evidence.likely} - {None}
+    work.features = tuple(
+        replace(feature, details=replace(feature.details, account=None)) if feature.details.account in gone else feature
+        for feature in work.features
+        if feature.evidence.likely
+    )
 
 
 def standing_told(work: Work, share: Share) -> None:
