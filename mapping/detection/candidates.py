@@ -97,7 +97,8 @@ class Searched:
         return sum(not self._felt(each) for each in self._measured)
 
     def _felt(self, found: Disturbance) -> bool:
-        return abs(found.height) <= PHYSICAL * found.highest(self.tip_radius, self.profile.spacing)
+        low = abs(found.height) <= PHYSICAL * found.highest(self.tip_radius, self.profile.spacing)
+        return low or not found.tells_flanks(self.tip_radius)
 
     @cached_property
     def _measured(self) -> tuple[Disturbance, ...]:

@@ -23,6 +23,8 @@ FLANK_ROUNDS = 4
 SPREAD_PLACES, SPREAD_WIDTHS = 24, np.geomspace(1 / 1.5, 1.5, 7)
 # Standard deviations of its place by which a crest may be wider than it seems.
 UNSURE = 3.0
+# Of the square of a flank 1 - x^2 what is left beside the step that is nearest to it, which ends at x = sqrt(1/2)
+FLANK_MISS = 0.062
 # A dip between two rims is a cusp (1 - |x| / w)^2: the best cap has 0.61 of its width and 0.77 of its depth, so many
 # times the height of a crest's so wide.
 CUSP = 2.08
@@ -230,6 +232,15 @@ class Disturbance:
         if flank >= tip_radius:
             return np.inf
         return (CUSP if self.height < 0 else 1.0) * (tip_radius - float(np.sqrt(tip_radius**2 - flank**2)))
+
+    def tells_flanks(self, tip_radius: float) -> bool:
+        """True if the data tell a ball's flanks, sqrt(2 r h) wide, from upright ones; those of a crest are all of it.
+
+        Best placed, an upright flank misses a ball's by FLANK_MISS h^2 times its width; all of a plateau is h^2 times
+        its length, which the signal-to-noise ratio squared stands for.
+        """
+        flank = min(float(np.sqrt(2.0 * tip_radius * abs(self.height))), tip_radius)
+        return self.flat <= flank or self.snr * float(np.sqrt(FLANK_MISS * flank / self.flat)) > UNSURE
 
     def at_scale(self, scale: float) -> Disturbance:
         """The same where the noise is that many times what it was taken for."""

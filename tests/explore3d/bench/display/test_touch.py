@@ -39,3 +39,9 @@ def test_who_does_not_know_the_place_is_right_less_often() -> None:
     known, unknown = best_shares(places, noise, 1e-5, 1e-5, np.random.default_rng(2))
     assert known == pytest.approx(0.9615, abs=1e-3)  # Phi(2.5 / sqrt 2)
     assert 0.55 < unknown < 0.8
+
+
+def test_a_wide_dot_that_stands_out_is_felt_however_steep_noise_makes_its_flanks() -> None:
+    noise = touch.head_noise("white")
+    heights = [touch._strongest(602e-6, 1.09e-6, noise, np.random.default_rng(seed)) for seed in range(44, 56)]
+    assert min(heights) > 8.0
