@@ -86,7 +86,7 @@ class Filter:
         """Unit independent noise (W, N) from W series (W, N), m; 0 where nothing is read."""
         from mapping.instrument.noise_kernels import innovations
 
-        s = self.steps
+        s, values = self.steps, np.ascontiguousarray(values)
         return np.asarray(
             innovations(values, self.kind, self.begins, s.observe, s.carry, s.turn, self.gain, self.scale)
         )
@@ -152,7 +152,7 @@ def mean_steps(terms: Sequence[Term], step: FloatArray, own: FloatArray, count: 
 
 def _rates(terms: Sequence[Term]) -> ComplexArray:
     """(T,) complex 1 / length + 2 pi i / wavelength of the terms, 1/m."""
-    return np.array([complex(1.0 / t.length, 2.0 * np.pi / t.wavelength) for t in terms])
+    return np.array([complex(1.0 / t.length, 2.0 * np.pi / t.wavelength) for t in terms], dtype=np.complex128)
 
 
 def _stacked(
@@ -177,5 +177,5 @@ def _stacked(
         states(carry.real, carry.real),
         np.ascontiguousarray(-carry.imag[:pairs].T),
         states(fresh, fresh),
-        np.repeat([t.sd**2 for t in terms], [2] * pairs + [1] * (len(terms) - pairs)),
+        np.array([t.sd**2 for t in terms for _ in range(2 if t.turns else 1)]),
     )

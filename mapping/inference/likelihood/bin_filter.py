@@ -1,57 +1,20 @@
-"""BinFilter: whitens means over bins of white and correlated noise in O(n)."""
+"""The filter of a window's bins: it whitens means over bins of white and correlated noise in O(n)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from mapping import FloatArray, IntArray
+from mapping import FloatArray
 from mapping.inference.likelihood.window import Window
-from mapping.instrument import Noise, mean_steps
+from mapping.instrument import Filter, Noise, mean_steps
 
 
-@dataclass(frozen=True, eq=False)
-class BinFilter:
-    """The Kalman filter of the noise of a window's bins; its gains do not depend on the data.
+def bin_filter(window: Window, noise: Noise, floor: float, inflation: FloatArray | None = None) -> Filter:
+    """The Kalman filter of the noise of a window's bins.
 
     The states are the correlated noise at the last sample of a bin (see `instrument.states`). The mean over the next
     bin and the states at its end are both linear in them, with innovations that are correlated with each other: exact
     for evenly spaced samples.
-
-    Args:
-        starts: (runs + 1,) first bin of each run, and n.
-        carry, observe, gain: (n, D) coefficients of m' = carry m + gain v, v = y - observe . m, for D states.
-        turn: (n, P) sine by which the first P pairs of states turn.
-        scale: (n,) one over the standard deviation of v, 1/m.
-    """
-
-    starts: IntArray
-    carry: FloatArray
-    observe: FloatArray
-    gain: FloatArray
-    turn: FloatArray
-    scale: FloatArray
-
-    def whiten(self, values: FloatArray) -> FloatArray:
-        """Unit independent noise (W, n) from W series of bin means (W, n), m."""
-        from mapping.inference.likelihood.whitening_kernels import whiten
-
-        return np.asarray(
-            whiten(
-                np.ascontiguousarray(values),
-                self.starts,
-                self.carry,
-                self.observe,
-                self.gain,
-                self.turn,
-                self.scale,
-            )
-        )
-
-
-def bin_filter(window: Window, noise: Noise, floor: float, inflation: FloatArray | None = None) -> BinFilter:
-    """The filter for a window.
 
     Args:
         window: the bins.
@@ -64,14 +27,10 @@ def bin_filter(window: Window, noise: Noise, floor: float, inflation: FloatArray
     own = (noise.white**2 + floor**2) / count
     if inflation is not None:
         own = own * inflation + (inflation - 1.0) * noise.correlated_sd**2
-    if not noise.terms:
-        none = np.zeros((len(count), 0))
-        return BinFilter(window.starts, none, none, none, none, 1.0 / np.sqrt(own))
     begins = np.zeros(len(count), dtype=bool)
     begins[window.starts[:-1]] = True
     steps = mean_steps(noise.terms, _distance_from_previous(window), own, count)
-    filter_ = steps.filter(np.arange(len(count)), begins, np.ones(len(count), dtype=bool))
-    return BinFilter(window.starts, steps.carry, steps.observe, filter_.gain, steps.turn, filter_.scale)
+    return steps.filter(np.arange(len(count)), begins, np.ones(len(count), dtype=bool))
 
 
 def _distance_from_previous(window: Window) -> FloatArray:

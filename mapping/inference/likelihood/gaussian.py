@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import FloatArray
-from mapping.inference.likelihood.bin_filter import BinFilter, bin_filter
+from mapping.inference.likelihood.bin_filter import bin_filter
 from mapping.inference.likelihood.window import Window
-from mapping.instrument import Noise
+from mapping.instrument import Filter, Noise
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Likelihood:
     """
 
     window: Window
-    filter: BinFilter
+    filter: Filter
     basis: FloatArray
     shrink: FloatArray
 
@@ -55,11 +55,11 @@ class Likelihood:
         square = chi_square(
             self.window.height,
             templates,
-            f.starts,
-            f.carry,
-            f.observe,
+            self.window.starts,
+            f.steps.carry,
+            f.steps.observe,
             f.gain,
-            f.turn,
+            f.steps.turn,
             f.scale,
             self.basis,
             self.shrink,
@@ -71,7 +71,7 @@ class Likelihood:
         from mapping.inference.likelihood.whitening_kernels import project
 
         white = self.filter.whiten(self.window.height - templates)
-        project(white, self.filter.starts, self.basis, self.shrink)
+        project(white, self.window.starts, self.basis, self.shrink)
         return white
 
 

@@ -1,4 +1,4 @@
-"""Compiled whitening of binned traces: one pass of a Kalman filter of the states, O(n) per template."""
+"""What whitened traces weigh, compiled: chi-square of many templates in one pass of the filter, O(n) each."""
 
 # mypy: disable-error-code="untyped-decorator"
 
@@ -12,43 +12,6 @@ from mapping import FloatArray, IntArray
 # Templates that are whitened side by side: a filter waits for its own last state, others need not wait with it. Of 4, 8
 # and 16 the fastest, by 1.5 against one after the other
 LANES = 8
-
-
-@njit(cache=True, nogil=True)
-def whiten(
-    values: FloatArray,
-    starts: IntArray,
-    carry: FloatArray,
-    observe: FloatArray,
-    gain: FloatArray,
-    turn: FloatArray,
-    scale: FloatArray,
-) -> FloatArray:
-    """Innovations over their standard deviation of W series (W, n); the filter begins anew at each of `starts`.
-
-    m' = carry m + gain v, v = y - observe . m: the gains do not depend on the data.
-    """
-    walkers, n = values.shape
-    states, pairs = carry.shape[1], turn.shape[1]
-    out = np.empty((walkers, n))
-    state = np.zeros(states)
-    for w in range(walkers):
-        for run in range(len(starts) - 1):
-            state[:] = 0.0
-            for i in range(starts[run], starts[run + 1]):
-                innovation = values[w, i]
-                for a in range(states):
-                    innovation -= observe[i, a] * state[a]
-                for p in range(pairs):
-                    x, y = state[2 * p], state[2 * p + 1]
-                    state[2 * p] = carry[i, 2 * p] * x + turn[i, p] * y
-                    state[2 * p + 1] = carry[i, 2 * p] * y - turn[i, p] * x
-                for a in range(2 * pairs, states):
-                    state[a] *= carry[i, a]
-                for a in range(states):
-                    state[a] += gain[i, a] * innovation
-                out[w, i] = innovation * scale[i]
-    return out
 
 
 @njit(cache=True, nogil=True)
