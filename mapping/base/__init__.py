@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mapping.base.height_profile import UNEVEN as UNEVEN, SweepHeights as SweepHeights
     from mapping.base.laid_trace import LaidSweep as LaidSweep, LaidTrace as LaidTrace
     from mapping.base.pose import Pose as Pose, estimate_pose as estimate_pose
-    from mapping.base.profiles import Form as Form
+    from mapping.base.profiles import SHORTEST_LEVEL as SHORTEST_LEVEL, Form as Form
     from mapping.base.projection import onto_base as onto_base
     from mapping.base.terraces import over_levels as over_levels
 
@@ -32,7 +32,7 @@ _PUBLIC = {
     "height_profile": ("UNEVEN", "SweepHeights"),
     "laid_trace": ("LaidSweep", "LaidTrace"),
     "pose": ("Pose", "estimate_pose"),
-    "profiles": ("Form",),
+    "profiles": ("SHORTEST_LEVEL", "Form"),
     "projection": ("onto_base",),
     "terraces": ("over_levels",),
 }

@@ -9,11 +9,13 @@ if TYPE_CHECKING:
     from mapping.base.profiles.form import AUTO as AUTO, Form as Form
     from mapping.base.profiles.frame import profile_frame as profile_frame
     from mapping.base.profiles.isolated_bends import isolated_rest as isolated_rest
+    from mapping.base.profiles.jumps import SHORTEST_LEVEL as SHORTEST_LEVEL
 
 _PUBLIC = {
     "fit_profile": ("SHORTEST_BEND", "fit_profile"),
     "form": ("AUTO", "Form"),
     "frame": ("profile_frame",),
     "isolated_bends": ("isolated_rest",),
+    "jumps": ("SHORTEST_LEVEL",),
 }
 doorway(__name__, _PUBLIC)
