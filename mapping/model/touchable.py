@@ -33,7 +33,8 @@ def touchable(
         )
     parts, left_out = [], []
     for feature in model.features:
-        part = kind_of(feature).part(feature, exaggeration)
+        # a free section is known where it was crossed, by no form
+        part = None if feature.details.free_section else kind_of(feature).part(feature, exaggeration)
         if part is None:
             left_out.append(
                 LeftOut(feature.id, f"a {feature.kind} of which no closed form, or no higher side, is known")

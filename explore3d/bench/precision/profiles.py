@@ -21,7 +21,7 @@ STYLUS, GRID_PITCH, GRID_PER_SAMPLE, PROFILE_LENGTH = 2e-6, 40e-9, 25, 10e-3
 # Roughness correlated over 20 um, white noise, and a random walk from sample to sample, m; slope of the whole
 ROUGH_SD, CORRELATED_OVER, WHITE_SD, WALK_SD, PROFILE_TILT = 50e-9, 20e-6, 10e-9, 2e-9, 3e-3
 # Seeds that the analysis was built with lie below
-FIRST_REPORTED = 2000
+FIRST_REPORTED = 3000
 # A form: heights over places (m) from its middle, and what is to be found: kind, height and width (NaN: has none), m
 Form = tuple[Callable[[FloatArray], FloatArray], tuple[tuple[str, float, float], ...]]
 

@@ -49,6 +49,9 @@ def test_what_has_no_closed_form_is_left_out_and_named() -> None:
     body, left_out = touchable(known, 5e-3)
     assert body.parts == ()
     assert [each.stage for each in left_out] == ["step-1", "convex-edge-1", "ridge-1"]
+    # what was measured where it was crossed has a height and a width, and no form
+    _, left_out = touchable(model(feature("pit", LINE[:1], -0.1e-3, details=Details(free_section=True))), 5e-3)
+    assert [each.stage for each in left_out] == ["pit-1"]
 
 
 @pytest.mark.parametrize("exaggeration", [0.5, 101.0, float("nan")])
