@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d.analysis import Analysis, Stages, build_model, compare
+from explore3d.analysis import Analysis, Stages, TrueFeature, build_model, compare
 from explore3d.bench.trust.laws import LAWS, Level, Path
 from explore3d.bench.trust.paths import (
     PATH_LENGTH,
@@ -26,7 +26,7 @@ from explore3d.bench.trust.paths import (
 )
 from explore3d.log import Log
 from mapping import Feature, FloatArray, Trace, length_text
-from mapping.base import LaidTrace
+from mapping.base import LaidTrace, Pose
 from mapping.detection import detect
 from mapping.geometry.mesh import nearest_on, resample, write_whole
 
@@ -149,9 +149,9 @@ def run_trust_case(case: Case) -> dict[str, Any]:
     size = of.sizes[case.number // len(of.tips) % len(of.sizes)]
     if case.wires:
         draw = of.first_seed, which[1], case.number % WIRE_DRAWS
-        path, base, truth = wired_path(case.body, size, tip, draw)
+        path, base, truth, crests = wired_path(case.body, size, tip, draw)
     else:
-        (path, base), truth = bare_path(case.body, size, tip), ()
+        (path, base), truth, crests = bare_path(case.body, size, tip), (), ()
     level, length = (np.exp(rng.uniform(*np.log(bounds))) * tip for bounds in (of.levels, of.lengths))
     index, centers = LAWS[case.law].record(path, Level(float(level), float(length)), rng)
     trace = Trace(path.t[index], centers, path.sweep[index], tip)
@@ -160,7 +160,7 @@ def run_trust_case(case: Case) -> dict[str, Any]:
     seconds = process_time() - begin
     record = _common(analysis, seconds) | {"tip": tip, "level": float(level), "length": float(length)}
     if case.wires:
-        return record | _against_truth(analysis, path, truth)
+        return record | _against_truth(analysis, path, truth, crests)
     laid = LaidTrace.of(analysis.trace, analysis.base)
     often = detect(laid, analysis.base, false_alarms_per_metre=COUNTED_RATE)
     record |= {"often": len(often.crossings), "often_metres": often.inspected_length}
@@ -222,8 +222,17 @@ def _recovery(analysis: Analysis, laid: LaidTrace, rng: np.random.Generator) -> 
     return {"put": len(put), "put_found": count}
 
 
-def _against_truth(analysis: Analysis, path: Path, truth: Sequence[Any]) -> dict[str, Any]:
-    """How many wires were found and whether their intervals hold them."""
+def _against_truth(
+    analysis: Analysis, path: Path, truth: Sequence[TrueFeature], crests: Sequence[FloatArray]
+) -> dict[str, Any]:
+    """How many wires were found and whether their intervals hold them.
+
+    Where the analysis took the object for moved, a wire lies where it lies on the object.
+    """
+    pose = Pose.of(analysis.base)
+    if pose is not None:
+        truth = [replace(each, axis=pose.onto(each.axis)) for each in truth]
+        crests = [pose.onto(each) for each in crests]
     rows = compare(analysis.model, truth, path.tip_radius)
     found = [row for row in rows if row.status == "found"]
     inside: dict[str, list[bool]] = {
@@ -233,8 +242,8 @@ def _against_truth(analysis: Analysis, path: Path, truth: Sequence[Any]) -> dict
     inside["place"] = [_place_inside(row.found, row.true.axis) for row in found if row.found and row.true]
     inside["crossing"] = []
     for crossing in analysis.detections.crossings:
-        gaps = [(_away(crossing.point[None], true.axis)[0], true) for true in truth]
-        gap, true = min(gaps, key=lambda each: each[0])
+        gaps = [_away(crossing.point[None], crest)[0] for crest in crests]
+        gap, true = min(gaps), truth[int(np.argmin(gaps))]
         # a crossing near an end, or of nothing, has no place to compare with
         ends = np.linalg.norm(true.axis[[0, -1]] - crossing.point, axis=1).min()
         strip = np.sqrt(2 * path.tip_radius * true.height)

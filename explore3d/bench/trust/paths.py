@@ -111,15 +111,18 @@ def bare_path(name: str, size: float, tip_radius: float) -> tuple[Path, Base]:
 @lru_cache(maxsize=16)
 def wired_path(
     name: str, size: float, tip_radius: float, draw: tuple[int, ...]
-) -> tuple[Path, Base, tuple[TrueFeature, ...]]:
-    """The same over a body that wires lie on, across some of the sweeps; and these wires.
+) -> tuple[Path, Base, tuple[TrueFeature, ...], tuple[FloatArray, ...]]:
+    """The same over a body that wires lie on, across some of the sweeps; these wires, and where sweeps meet them.
+
+    A crossing is the foot of the ball's crest, and on facets a foot stays behind at an edge that the ball rolls over:
+    by r sin(0.5 deg) = 35 um for r = 4 mm where they meet at a degree. A wire lies where it lies.
 
     Args:
         draw: seed of their places, lengths and diameters.
     """
     body, surface = _body(name, size)
     rng = np.random.default_rng(draw)
-    base, wires, truth = Base(surface), [], []
+    base, wires, truth, crests = Base(surface), [], [], []
     for share in WIRE_PLACES:
         diameter = tip_radius * rng.uniform(*WIRE_DIAMETERS)
         place = (share + rng.uniform(-0.05, 0.05) - 0.5) * PATH_LENGTH
@@ -128,11 +131,11 @@ def wired_path(
         lean = rng.uniform(-0.3, 0.3)
         axis, up = body.at(place + lean * across, across)
         wires.append(tube(axis + 0.5 * diameter * up, up, 0.5 * diameter))
-        # what is felt is laid on the mesh by its nearest point, which stays behind at a convex edge: so is the truth
         crest = axis + (diameter + tip_radius) * up
-        truth.append(TrueFeature("ridge", base.foot(crest, tip_radius).points, diameter, diameter))
+        truth.append(TrueFeature("ridge", base.foot(axis, tip_radius).points, diameter, diameter))
+        crests.append(base.foot(crest, tip_radius).points)
     path, _ = _felt(body, joined(body.mesh, *wires), base, tip_radius)
-    return path, base, tuple(truth)
+    return path, base, tuple(truth), tuple(crests)
 
 
 def _felt(body: Body, surface: Surface, base: Base, tip_radius: float) -> tuple[Path, Base]:

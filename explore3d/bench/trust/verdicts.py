@@ -244,6 +244,7 @@ def _usual_warnings(records: Sequence[dict[str, Any]], law: str) -> str:
         "limit raised": "detection limit was raised",
         "samples or details not felt": "were not felt",
         "sweeps drift": "sweeps drift",
+        "instrument drifts": "instrument drifts",
         "path cut": "path was cut",
         "too few samples": "too few to inspect",
         "may be rounding": "may be rounding",

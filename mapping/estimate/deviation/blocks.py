@@ -48,6 +48,7 @@ class Blocks:
         sweep: (B,) number of the sweep that each is a part of.
         piece: (B,) number of the unbroken stretch of that sweep, not decreasing.
         place: (B,) arclength along it, m.
+        t: (B,) when it was felt, s.
         steepness: (B,) largest slope of the height between the bins of a block and on to the next, beyond noise.
         edge: (B,) whether the height jumps there, however little.
         noise: standard deviation of one block by the differences of neighbouring bins, m.
@@ -59,6 +60,7 @@ class Blocks:
     sweep: IntArray
     piece: IntArray
     place: FloatArray
+    t: FloatArray
     steepness: FloatArray
     edge: BoolArray
     noise: float
@@ -77,10 +79,15 @@ class Blocks:
         if not parts:
             nothing = np.zeros(0)
             none = nothing.astype(np.int64)
-            return cls(np.zeros((0, 3)), np.zeros((0, 3)), nothing, none, none, nothing, nothing, none > 0, 0.0)
+            empty = np.zeros((0, 3))
+            return cls(empty, empty, nothing, none, none, nothing, nothing, nothing, none > 0, 0.0)
         points, normals, height, piece, place, steepness, edge = map(np.concatenate, zip(*parts, strict=True))
         sweep = np.array([p.sweep for p in profiles])[piece]
-        return cls(points, normals, height, sweep, piece, place, steepness, edge, sd / np.sqrt(BINS_PER_BLOCK))
+        own = {s.number: s for s in laid.laid_sweeps}
+        felt = [(own[profile.sweep], part[4]) for profile, part in zip(profiles, parts, strict=True)]
+        t = np.concatenate([np.interp(where, of.arclength, of.trace.t) for of, where in felt])
+        noise = sd / np.sqrt(BINS_PER_BLOCK)
+        return cls(points, normals, height, sweep, piece, place, t, steepness, edge, noise)
 
     def __len__(self) -> int:
         return len(self.height)

@@ -1,14 +1,17 @@
-"""Drift: an offset and a slope of each sweep's own, as of an instrument that warms up or is zeroed anew.
+"""Drift: of the whole recording evenly in time, as of an instrument that warms up, or of each sweep on its own.
 
-Whether the sweeps have such lines is judged by evidence: against noise that wanders along the sweeps (white and an
-Ornstein-Uhlenbeck part, which also makes sweeps stand at different levels), the lines of all sweeps are Gaussian with
-one variance of the offsets and one of the slopes, and the likelihood of both has a closed form. What is taken off is
-each line's expectation: shrunk where the noise may be what is seen.
+The first is one number, judged with the causes that are the body's (see `explain`). The second is an offset and a
+slope of each sweep, as of an instrument that is zeroed anew. Whether the sweeps have such lines is judged by evidence:
+against noise that wanders along the sweeps (white and an Ornstein-Uhlenbeck part, which also makes sweeps stand at
+different levels), the lines of all sweeps are Gaussian with one variance of the offsets and one of the slopes, and the
+likelihood of both has a closed form. What is taken off is each line's expectation: shrunk where the noise may be what
+is seen.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +22,40 @@ from mapping.estimate.deviation.evidence import NOISE_GRID, decorrelated, laws
 # Standard deviations of the sweeps' offsets and half rises that are tried, against the noise of a block: a factor of
 # three apart, for a variance that is wrong by that costs a fifth of what one sweep says
 LINES = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
+
+
+@dataclass(frozen=True)
+class SteadyDrift:
+    """An even drift from the first sample on.
+
+    Args:
+        begin: time of the first sample, s.
+        rate: m/s along the normals of the base.
+        whole: by how much until the last sample, m.
+    """
+
+    begin: float
+    rate: float
+    whole: float
+
+    @classmethod
+    def over(cls, t: FloatArray, whole: float) -> SteadyDrift:
+        """A drift of so much, m, over times (N,), s."""
+        begin, end = float(t.min()), float(t.max())
+        return cls(begin, whole / max(end - begin, np.finfo(float).tiny), whole)
+
+    def without(self, laid: LaidTrace) -> Trace:
+        """The trace with the drift taken off along the normals of the base that it lies on."""
+        return _lowered(laid, self.rate * (laid.t - self.begin))
+
+    def sentence(self) -> str:
+        """What was found and done."""
+        way = "upwards" if self.whole > 0 else "downwards"
+        return f"the instrument drifts {way} by {length_text(abs(self.whole), 2)} over the recording: taken off"
+
+    def record(self) -> dict[str, Any]:
+        """JSON values, SI units."""
+        return {"begin": self.begin, "rate": self.rate}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +84,7 @@ class Drift:
     def without(self, laid: LaidTrace) -> Trace:
         """The trace with each sweep's line taken off along the normals of the base that it lies on."""
         place = np.concatenate([own.arclength for own in laid.laid_sweeps])
-        shift = self.at(laid.sweep, place)[:, None] * laid.feet().normals
-        contacts = None if laid.contacts is None else laid.contacts - shift
-        moved = laid.centers - shift
-        return Trace(laid.t, moved, laid.sweep, laid.tip_radius, laid.normals, contacts, laid.force, laid.resolution)
+        return _lowered(laid, self.at(laid.sweep, place))
 
     def sentence(self) -> str:
         """What was found and done."""
@@ -59,6 +93,10 @@ class Drift:
             f"the sweeps drift: offsets of {length_text(offset, 2)} and rises of {length_text(2 * rise, 2)} from end "
             "to end (rms), each sweep its own, were taken off"
         )
+
+    def record(self) -> dict[str, Any]:
+        """JSON values, SI units."""
+        return {"sweep": self.sweep.tolist(), "line": self.line.tolist()}
 
 
 def drift(sweep: IntArray, place: FloatArray, height: FloatArray, noise: float, step: float) -> Drift:
@@ -92,6 +130,14 @@ def drift(sweep: IntArray, place: FloatArray, height: FloatArray, noise: float, 
                 best = _Best(float(log[top]), grams, float(white), spreads)
     assert best is not None  # there are laws
     return Drift(numbers, middle, half, best.lines(), best.log - nothing)
+
+
+def _lowered(laid: LaidTrace, height: FloatArray) -> Trace:
+    """The trace (N) with heights (N,), m, taken off along the normals of the base that it lies on."""
+    shift = height[:, None] * laid.feet().normals
+    contacts = None if laid.contacts is None else laid.contacts - shift
+    moved = laid.centers - shift
+    return Trace(laid.t, moved, laid.sweep, laid.tip_radius, laid.normals, contacts, laid.force, laid.resolution)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidTrace, Pose
 from mapping.estimate.deviation.blocks import BIN, BINS_PER_BLOCK, Blocks
-from mapping.estimate.deviation.drift import Drift, drift
+from mapping.estimate.deviation.drift import Drift, SteadyDrift, drift
 from mapping.estimate.deviation.evidence import Fit, Whitened, best_fit, every_law, whitened
 from mapping.estimate.deviation.fields import RigidFrame, SmoothField, spread
 from mapping.estimate.deviation.parts import parts_of, stands_off
@@ -59,7 +59,11 @@ FEW_SAMPLES = 32
 
 @dataclass(frozen=True, eq=False)
 class _Explanation:
-    """Causes with their sizes: `rigid` as the columns of RigidFrame, `smooth` coefficients of `field`."""
+    """Causes with their sizes.
+
+    The body's are as the columns of RigidFrame, `drift` from the first block to the last, m, `smooth` the coefficients
+    of `field`.
+    """
 
     causes: tuple[str, ...]
     instead: tuple[str, ...]
@@ -67,25 +71,28 @@ class _Explanation:
     offset: float
     pose: FloatArray
     scale: float
+    drift: float
     field: SmoothField | None
     smooth: FloatArray
     gain: float
 
-    def heights(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """(N,) that it gives at places (N, 3) with normals, m."""
+    def heights(self, blocks: Blocks) -> FloatArray:
+        """(B,) that it gives the blocks, m."""
+        points, normals = blocks.points, blocks.normals
         rigid = self.frame.pose(points, normals) @ self.pose + self.scale * self.frame.scale(points, normals)[:, 0]
         smooth = 0.0 if self.field is None else self.field.columns(points, normals) @ self.smooth
-        return np.asarray(self.offset + rigid + smooth)
+        return np.asarray(self.offset + rigid + self.drift * _elapsed(blocks)[:, 0] + smooth)
 
 
 def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> Deviation | None:
     """What is wrong with the model at long wavelengths; None if what was felt agrees with it.
 
     The heights of blocks of half a tip radius over the model are explained by nothing, or by an offset, a pose, a
-    scale, a smooth deformation, and all of them together, or by a line of each sweep's own: each a Gaussian field whose
-    marginal likelihood has a closed form, under noise that is white and correlated along sweeps. Blocks beyond a steep
-    place do not count: fine features are what is steep. The most probable explanation is corrected, and wide places
-    that still stand off are parts that the model has and the body has not, or the other way round.
+    scale, an even drift, a smooth deformation, and all of them together, or by a line of each sweep's own: each a
+    Gaussian field whose marginal likelihood has a closed form, under noise that is white and correlated along sweeps.
+    Blocks beyond a steep place do not count: fine features are what is steep. The most probable explanation is
+    corrected, and wide places that still stand off are parts that the model has and the body has not, or the other way
+    round.
 
     Args:
         trace: some sweeps all over the body; a LaidTrace on `base` spares laying it down again.
@@ -103,8 +110,8 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
     parts = parts_of(blocks, blocks.height, keep, tip, missed)
     before, now, seen = base, base, blocks
     found: list[_Explanation] = []
-    lines: list[Drift] = []
-    while len(found) + len(lines) < MOST_ROUNDS:
+    lines: list[Drift | SteadyDrift] = []
+    for _ in range(MOST_ROUNDS):
         whole = ~_covered(parts, seen.points)
         keep = seen.smooth(seen.height) & whole
         # near what is steep a height may be the skirt of a feature: of the model it says something if enough lies apart
@@ -123,6 +130,9 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
                 before = fine_enough(before, step.field.length)
                 now = before
             now = _corrected(now, step)
+            if step.drift:
+                lines.append(SteadyDrift.over(seen.t, step.drift))
+                trace = lines[-1].without(LaidTrace.of(trace, now))
         else:
             break
         seen = Blocks.of(LaidTrace.of(trace, now))
@@ -173,7 +183,7 @@ def _explanation(blocks: Blocks, whole: BoolArray, base: Base, tip: float) -> _E
     """The most probable causes of the heights of blocks outside of parts (B,), None if none is probable enough."""
     frame = RigidFrame.of(base.surface)
     causes = (frame.offset, frame.pose, frame.scale)
-    rigid = np.column_stack([make(blocks.points, blocks.normals) for make in causes])
+    rigid = np.column_stack([*(make(blocks.points, blocks.normals) for make in causes), _elapsed(blocks)])
     everything = np.ones(len(blocks), dtype=bool)
     keep = whole & blocks.smooth(blocks.height - _robust(rigid, blocks.height, everything, EXPECTED_SHARE * tip))
     if keep.sum() < FEWEST_BLOCKS:
@@ -184,7 +194,7 @@ def _explanation(blocks: Blocks, whole: BoolArray, base: Base, tip: float) -> _E
     keep = _near(left, keep, blocks.noise)
     best = _most_probable(blocks, keep, frame, rigid, fields, tip)
     if best is not None:
-        left = blocks.height - best.heights(blocks.points, blocks.normals)
+        left = blocks.height - best.heights(blocks)
         near = _near(left, keep, blocks.noise)
         if near.sum() < keep.sum():
             best = _most_probable(blocks, near, frame, rigid, fields, tip)
@@ -235,8 +245,14 @@ def _robust(columns: FloatArray, height: FloatArray, keep: BoolArray, prior: flo
     return np.asarray(columns @ found)
 
 
-# Columns of the rigid causes
-RIGID = {"offset": np.arange(1), "pose": np.arange(1, 7), "scale": np.arange(7, 8)}
+def _elapsed(blocks: Blocks) -> FloatArray:
+    """(B, 1) share of the recording's time that had passed when each was felt."""
+    whole = max(float(np.ptp(blocks.t)), np.finfo(float).tiny)
+    return np.asarray((blocks.t - blocks.t.min()) / whole)[:, None]
+
+
+# Columns of the causes that do not bend the body
+RIGID = {"offset": np.arange(1), "pose": np.arange(1, 7), "scale": np.arange(7, 8), "drift": np.arange(8, 9)}
 
 
 def _rigid_sets() -> Iterator[tuple[str, ...]]:
@@ -246,7 +262,7 @@ def _rigid_sets() -> Iterator[tuple[str, ...]]:
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """The blocks that speak for a cause, with the columns (B, 8) of the rigid ones."""
+    """The blocks that speak for a cause, with the columns (B, 9) of the rigid ones."""
 
     height: FloatArray
     points: FloatArray
@@ -310,7 +326,7 @@ def _most_probable(
     nothing = fits[()].log_evidence
     best = max(fits, key=lambda names: fits[names].log_evidence)
     found = replace(_of_fit(best, fits[best], frame, nothing), instead=_instead(best, fits))
-    left = blocks.height - found.heights(blocks.points, blocks.normals)
+    left = blocks.height - found.heights(blocks)
     if not _agrees(blocks, left, keep, tip):
         for field in fields:
             bent = _of_fit(*kept.bent_fit(field), frame, nothing, field)
@@ -319,7 +335,7 @@ def _most_probable(
 
 
 def _instead(best: tuple[str, ...], fits: dict[tuple[str, ...], Fit]) -> tuple[str, ...]:
-    """As many other rigid causes that explain the heights as well."""
+    """As many other causes that explain the heights as well."""
     enough = fits[best].log_evidence - ALIKE_EVIDENCE
     other = [names for names in fits if len(names) == len(best) and names != best]
     return tuple(" and ".join(names) for names in other if fits[names].log_evidence > enough)
@@ -330,7 +346,7 @@ def _of_fit(
 ) -> _Explanation:
     """What a fit of rigid causes, and of a smooth field after them, says."""
     which = np.concatenate([np.zeros(0, dtype=np.int64), *(RIGID[name] for name in names)])
-    values = np.zeros(8)
+    values = np.zeros(9)
     values[which] = fit.coefficients[: len(which)]
     return _Explanation(
         causes=names if field is None else (*names, "deformation"),
@@ -339,6 +355,7 @@ def _of_fit(
         offset=float(values[0]),
         pose=values[1:7],
         scale=float(values[7]),
+        drift=float(values[8]),
         field=field,
         smooth=fit.coefficients[len(which) :],
         gain=fit.log_evidence - nothing,
@@ -352,6 +369,7 @@ def _ordered(found: _Explanation, kept: _Kept) -> _Explanation:
         "offset": np.full(len(points), found.offset),
         "pose": frame.pose(points, normals) @ found.pose,
         "scale": found.scale * frame.scale(points, normals)[:, 0],
+        "drift": found.drift * kept.rigid[:, RIGID["drift"][0]],
         "deformation": 0.0 if found.field is None else found.field.columns(points, normals) @ found.smooth,
     }
     size = {cause: float(np.sqrt(np.mean(np.square(alone[cause])))) for cause in found.causes}
@@ -383,12 +401,15 @@ def _deviation(
     blocks: Blocks,
     seen: Blocks,
     found: list[_Explanation],
-    lines: list[Drift],
+    lines: list[Drift | SteadyDrift],
     parts: tuple[Part, ...],
     tip: float,
 ) -> Deviation:
     """What all rounds and the parts come to."""
-    causes = (*(found[0].causes if found else ()), *(("drift",) if lines else ()), *(("part",) if parts else ()))
+    of_body = [step.causes for step in found if step.causes != ("drift",)]
+    named = dict.fromkeys(
+        [*(of_body[0] if of_body else ()), *(["drift"] if lines else []), *(["part"] if parts else [])]
+    )
     vertices = before.surface.vertices
     heights = ((now.surface.vertices - vertices) * _vertex_normals(before)).sum(axis=1) + now.offset - before.offset
     for part in parts:
@@ -408,7 +429,7 @@ def _deviation(
     smooth = blocks.smooth(blocks.height)
     return Deviation(
         base=now,
-        causes=causes,
+        causes=tuple(named),
         instead=found[0].instead if found else (),
         shift=shift,
         turn=turn,
@@ -420,7 +441,7 @@ def _deviation(
         parts=parts,
         rms=MAD_TO_SD * float(np.median(np.abs(blocks.height[smooth]))),
         left=MAD_TO_SD * float(np.median(np.abs(seen.height[keep]))),
-        gain=(*(step.gain for step in found), *(each.gain for each in lines), 0.0)[0],
+        gain=(*(step.gain for step in found), *(own.gain for own in lines if isinstance(own, Drift)), 0.0)[0],
         heights=heights,
         unexplained=unexplained,
         beyond_repair=unexplained > BEYOND_REPAIR,

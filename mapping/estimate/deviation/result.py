@@ -9,7 +9,7 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray, Trace, length_text
 from mapping.base import Base, LaidTrace
-from mapping.estimate.deviation.drift import Drift
+from mapping.estimate.deviation.drift import Drift, SteadyDrift
 
 # What may be wrong with a model, or with the sweeps over it; a part is where the body departs from it alone and sharply
 CAUSES = ("offset", "pose", "scale", "deformation", "drift", "part")
@@ -66,7 +66,7 @@ class Deviation:
         offset: by which the ball, or a coat of the body, is larger than said, m.
         bent: largest smooth displacement along the normal at a place that was felt, m.
         length: over which that changes, m; 0 without one.
-        lines: of the sweeps' own, which are no part of the body; one after the other.
+        lines: drift of the recording or of each sweep on its own, no part of the body; one after the other.
         parts: where the body departs from the model alone.
         rms: of the heights before, where a smooth surface joins them, by their median, m.
         left: of what remains of them, m.
@@ -84,7 +84,7 @@ class Deviation:
     offset: float
     bent: float
     length: float
-    lines: tuple[Drift, ...]
+    lines: tuple[Drift | SteadyDrift, ...]
     parts: tuple[Part, ...]
     rms: float
     left: float
@@ -116,11 +116,11 @@ class Deviation:
         """What is wrong and what was done about it."""
         said = [self._said(cause) for cause in self.causes if cause not in ("drift", "part")]
         said += [lines.sentence() for lines in self.lines]
-        if not self.of_the_model:
-            return "; ".join(said)
         said += [part.sentence() for part in self.parts]
         if self.instead:
             said.append(f"the trace cannot tell that from: {', '.join(self.instead)}")
+        if not self.of_the_model:
+            return "; ".join(said)
         if self.beyond_repair:
             said.append(
                 f"{100 * self.unexplained:.0f} % of what was felt fits no moved, scaled or bent model: "
@@ -169,7 +169,7 @@ class Deviation:
             "gain": self.gain,
             "unexplained": self.unexplained,
             "beyond_repair": self.beyond_repair,
-            "drift": [{"sweep": lines.sweep.tolist(), "line": lines.line.tolist()} for lines in self.lines],
+            "drift": [lines.record() for lines in self.lines],
             "parts": [
                 {"place": part.points.mean(axis=0).tolist(), "width": part.width, "height": part.height,
                  "path": part.path} for part in self.parts

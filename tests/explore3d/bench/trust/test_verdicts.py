@@ -61,9 +61,12 @@ def test_every_body_is_its_own_base_and_wires_stand_on_it():
     for name in ("plane", "cylinder"):
         path, base = bare_path(name, BUILDING.sizes[0], BUILDING.tips[1])
         assert np.abs(base.foot(path.centers, path.tip_radius).height).max() < 1e-9
-        wired, base, truth = wired_path(name, BUILDING.sizes[0], BUILDING.tips[1], (1, 2))
+        wired, base, truth, crests = wired_path(name, BUILDING.sizes[0], BUILDING.tips[1], (1, 2))
         crest = base.foot(wired.centers, wired.tip_radius).height.max()
         assert crest == pytest.approx(max(each.height for each in truth), rel=0.02)
+        # a foot stays behind at the edges between facets, which meet at a degree
+        behind = [np.linalg.norm(at - each.axis, axis=1).max() for at, each in zip(crests, truth, strict=True)]
+        assert max(behind) < 1e-9 if name == "plane" else 2e-5 < max(behind) < 1e-4
     assert len(TRUST_BODIES) == 4
 
 

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from mapping import FloatArray, Surface, Trace
 from mapping.base import Base, LaidTrace
 from mapping.estimate.deviation import explain
+from mapping.estimate.deviation.drift import SteadyDrift
 from mapping.estimate.deviation.explain import FEW_SAMPLES, _robust, _unfelt
 
 TIP = 0.01
@@ -205,6 +206,30 @@ def test_levels_of_single_sweeps_are_their_drift_and_not_the_model(seed: int) ->
     without = LaidTrace.of(found.without_drift(LaidTrace.of(trace, base)), base)
     levels = [float(sweep.feet().height.mean()) for sweep in without.laid_sweeps]
     assert np.std(levels) < 3e-6
+
+
+@pytest.mark.parametrize("whole", [0.4e-3, -0.4e-3, 0.05e-3])
+def test_an_even_drift_is_the_instruments_and_is_taken_off(whole: float) -> None:
+    steady, base = felt(), model()
+    lift = base.foot(steady.centers, TIP).normals * (whole * steady.t / steady.t[-1])[:, None]
+    trace = Trace(steady.t, steady.centers + lift, steady.sweep, TIP)
+    found = explain(trace, base)
+    assert found is not None and found.causes == ("drift",) and found.base is base
+    (drift,) = found.lines
+    facets = 4e-6  # by which the model's facets, 2 mm wide, stay below the sheet
+    assert isinstance(drift, SteadyDrift) and drift.whole == pytest.approx(whole, abs=facets)
+    assert f"drifts {'upwards' if whole > 0 else 'downwards'} by" in found.sentence()
+    without = found.without_drift(LaidTrace.of(trace, base))
+    assert np.abs(without.centers - steady.centers).max() < facets
+
+
+def test_a_drift_of_a_body_that_was_moved_is_told_beside_the_pose() -> None:
+    moved, base = felt(turned), model()
+    lift = base.foot(moved.centers, TIP).normals * (0.3e-3 * moved.t / moved.t[-1])[:, None]
+    found = explain(Trace(moved.t, moved.centers + lift, moved.sweep, TIP), base)
+    assert found is not None and set(found.causes) == {"pose", "drift"}
+    assert np.degrees(found.turn) == pytest.approx(0.5, abs=0.02)
+    assert sum(each.whole for each in found.lines) == pytest.approx(0.3e-3, rel=0.03)
 
 
 def test_slopes_of_single_sweeps_are_taken_off() -> None:
