@@ -48,6 +48,8 @@ NAMING = 1.0
 RESTARTING = 1.0
 # The link's round trip is the median of so many
 RECENT_REPORTS = 15
+# and its shortest is the least of so many: two seconds and more of asking as fast as a port can answer
+LATEST_REPORTS = 500
 # A machine that is asked where it stands does so, and says it twice, within so many s: a line may have been looked at
 # late, and with 1 % of all bytes wrong every second report is
 LONGEST_TO_A_STAND = 4.0
@@ -432,6 +434,12 @@ class GrblController:
         """What asking where the machine is has taken lately, s; 0 before it was asked."""
         recent = list(islice(reversed(self.reports), RECENT_REPORTS))
         return float(np.median([report.round_trip for report in recent])) if recent else 0.0
+
+    @property
+    def shortest_round_trip(self) -> float:
+        """What asking takes if nobody is busy, s: the least of a few hundred last reports; 0 before it was asked."""
+        recent = islice(reversed(self.reports), LATEST_REPORTS)
+        return min((report.round_trip for report in recent if report.round_trip > 0.0), default=0.0)
 
     def cancel_jog(self, within: float = 2.0) -> None:
         """Stop jogging, forget what is queued, wait until the machine stands."""
