@@ -60,6 +60,9 @@ KEPT_REPORTS = 50_000
 class Report(NamedTuple):
     """A status report: true at some moment of the round trip that ended at `at`, s, time.monotonic.
 
+    The question is one byte, which a controller takes at once and answers as it stands then; the answer waits for the
+    main loop, for the line and for the timers of adapters and hosts. So it is most likely true of when it was asked for.
+
     Args:
         at: when it arrived.
         status: what it says.
@@ -69,6 +72,11 @@ class Report(NamedTuple):
     at: float
     status: Status
     round_trip: float
+
+    @property
+    def asked(self) -> float:
+        """When it was asked for, s, time.monotonic."""
+        return self.at - self.round_trip
 
 
 class GrblController:

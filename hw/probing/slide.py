@@ -281,14 +281,15 @@ class Slide:
         reports = prompt(stage.controller.reported(after - BEFORE))
         if len(reports) < 2:
             return Touched(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
-        stamps = np.array([report.at for report in reports])
-        doubts = np.array([report.round_trip for report in reports]) - stage.controller.shortest_round_trip
+        came = np.array([report.at for report in reports])
+        stamps = np.array([report.asked for report in reports])
+        doubts = came - stamps - stage.controller.shortest_round_trip
         places = stage.frame.to_object(
             np.array([stage.controller.machine_position(report.status) for report in reports])
         )
         off = OFF_THE_LINE_STEPS * stage.controller.settings.resolution
         good = on_the_way(
-            stamps,
+            came,
             places,
             np.array(sent.times),
             np.array(sent.ends),
