@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hw import FingerError, Lines, Link, LinkError, Patience, StoppedError
+from hw import FingerError, Lines, Link, LinkError, Patience, StopIfKilled, StoppedError
 from hw.grbl import protocol as protocol
 from hw.grbl.protocol import GrblSettings, Probed, Status
 from mapping import FloatArray
@@ -61,7 +61,7 @@ class Report(NamedTuple):
     """A status report: true at some moment of the round trip that ended at `at`, s, time.monotonic.
 
     The question is one byte, which a controller takes at once and answers as it stands then; the answer waits for the
-    main loop, for the line and for the timers of adapters and hosts. So it is most likely true of when it was asked for.
+    main loop, the line, and the timers of adapters and hosts. So it is most likely true of when it was asked for.
 
     Args:
         at: when it arrived.
@@ -570,13 +570,16 @@ class GrblController:
 
         One ramp comes on top of the ways at their speeds; an axis has reached its fastest by then.
         """
-        fastest, slowest = (
-            np.append(self.settings.max_rate, 0.0),
-            np.nanmin(np.append(self.settings.acceleration, np.inf)),
-        )
-        ramp = float(np.nanmax(fastest) / slowest) if slowest > 0.0 else 0.0
+        ramp = self._ramp()
+        ramp = ramp if np.isfinite(ramp) else 0.0
         while (left := self._moves_until + ramp - time.monotonic()) > 0.0:
             time.sleep(min(left, POLL))
+
+    def _ramp(self) -> float:
+        """Longest that it may take to reach the fastest speed, or to brake from it, s; inf where it does not say."""
+        fastest = float(np.nanmax(np.append(self.settings.max_rate, 0.0)))
+        slowest = float(np.nanmin(np.append(self.settings.acceleration, np.inf)))
+        return fastest / slowest if 0.0 < slowest < np.inf and fastest > 0.0 else np.inf
 
     def _standing(self) -> bool:
         return bool(self.reports) and self.reports[-1].status.state == "Idle"
@@ -619,6 +622,12 @@ class GrblController:
         with suppress(LinkError):
             self.link.write(protocol.HOLD + protocol.JOG_CANCEL)
         self._notify()
+
+    def stop_if_killed(self) -> StopIfKilled:
+        """While entered, the machine is stopped as by `halt` and `clear` if this program dies without a word."""
+        ramp = self._ramp()
+        stands = 2.0 * ramp if np.isfinite(ramp) else LONGEST_TO_A_STAND
+        return StopIfKilled(self.link.handle, protocol.HOLD + protocol.JOG_CANCEL, stands, protocol.RESET)
 
     def clear(self, within: float = 3.0) -> bool:
         """After a halt: throw away what is queued and be ready again; True if the position is still known."""

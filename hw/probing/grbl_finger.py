@@ -113,6 +113,8 @@ class GrblFinger:
             self._signals = undo.enter_context(StopOnSignal(controller.halt))
             undo.callback(controller.close)
             controller.open()
+            if self.armed:
+                undo.enter_context(controller.stop_if_killed())
             if self.slide is not None:
                 undo.enter_context(self.slide.sensor)
                 self.slide.sensor.guard(self.max_force, controller.halt)
