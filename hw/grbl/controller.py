@@ -136,9 +136,12 @@ class GrblController:
         try:
             status = self._first_status()
             if status.state not in ("Idle", "Alarm", "Check", "Sleep"):
-                raise FingerError(
-                    f"{self.link.port}: the machine is in state {status.state}; wait until it is idle, or stop it"
+                held = (
+                    "let it go on (cycle start, ~), or reset it (Ctrl-X): a machine that stands keeps its place"
+                    if status.state in ("Hold", "Door")
+                    else "wait until it is idle, or stop it"
                 )
+                raise FingerError(f"{self.link.port}: the machine is in state {status.state}; {held}")
             self.alarm = "the machine is locked (state Alarm)" if status.state == "Alarm" else None
             self.version = " ".join(line for line in self._ask("$I") if line.startswith("["))
             self.settings = GrblSettings.of(self._agreed("$$"))
