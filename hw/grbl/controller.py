@@ -66,7 +66,7 @@ class Report(NamedTuple):
     Args:
         at: when it arrived.
         status: what it says.
-        round_trip: s since it was asked for; 0 if it came unasked.
+        round_trip: s since it was asked for; inf if it came unasked.
     """
 
     at: float
@@ -108,6 +108,7 @@ class GrblController:
         self.reports: deque[Report] = deque(maxlen=KEPT_REPORTS)
         self._asked: deque[float] = deque()  # when, for every report that has not come yet
         self._in_vain: float | None = None  # when was asked what is taken for lost since the last report
+        self._silent: deque[float] = deque()  # when, for every report that did not come while nothing at all did
         self._news = threading.Condition()
         self._answers: deque[str] = deque()
         self._feedback: list[str] = []
@@ -278,13 +279,17 @@ class GrblController:
         """Ask for a report; its round trip counts from the first asking that is not answered yet.
 
         An answer that was lost would make all reports after it look late. So one that did not come for so long, s, is
-        taken for lost, and the next report to come for late: nobody knows which of the two it answers.
+        taken for lost, and the next report to come for late: nobody knows which of the two it answers. But where
+        nothing at all was heard since, nothing was lost: the device, or this program, was held up; each answer comes.
         """
         now = time.monotonic()
         with self._news:
             while self._asked and now - self._asked[0] >= patience:
                 lost = self._asked.popleft()
-                self._in_vain = lost if self._in_vain is None else self._in_vain
+                if self.link.heard < lost:
+                    self._silent.append(lost)
+                elif self._in_vain is None:
+                    self._in_vain = lost
             self._asked.append(now)
         self.link.write(protocol.STATUS)
 
@@ -444,7 +449,8 @@ class GrblController:
     def round_trip(self) -> float:
         """What asking where the machine is has taken lately, s; 0 before it was asked."""
         recent = list(islice(reversed(self.reports), RECENT_REPORTS))
-        return float(np.median([report.round_trip for report in recent])) if recent else 0.0
+        trips = [report.round_trip for report in recent if report.round_trip < np.inf]
+        return float(np.median(trips)) if trips else 0.0
 
     @property
     def shortest_round_trip(self) -> float:
@@ -668,7 +674,8 @@ class GrblController:
 
     def _sort(self, now: float, line: str) -> None:
         if line.startswith("<"):
-            asked = self._asked.popleft() if self._asked else now
+            waiting = self._silent or self._asked
+            asked = waiting.popleft() if waiting else -np.inf
             status, round_trip = protocol.parse_status(line), now - (self._in_vain or asked)
             self._in_vain = None
             if status is None:

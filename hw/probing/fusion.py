@@ -23,7 +23,8 @@ JUDGED_BY = 2
 
 def prompt(reports: Sequence[Report]) -> list[Report]:
     """The reports whose round trip took hardly longer than is usual: those that their stamps can be trusted of."""
-    usual = float(np.median([report.round_trip for report in reports])) if reports else 0.0
+    trips = [report.round_trip for report in reports if report.round_trip < np.inf]
+    usual = float(np.median(trips)) if trips else 0.0
     return [report for report in reports if report.round_trip <= usual + LATE]
 
 
