@@ -19,7 +19,12 @@ if TYPE_CHECKING:
     from hw.link import Link as Link
     from hw.move import THROUGH_SPACE as THROUGH_SPACE, Move as Move
     from hw.patience import Patience as Patience
-    from hw.safety import SIGNALS as SIGNALS, StopOnSignal as StopOnSignal, end_program as end_program
+    from hw.safety import (
+        SIGNALS as SIGNALS,
+        StopIfKilled as StopIfKilled,
+        StopOnSignal as StopOnSignal,
+        end_program as end_program,
+    )
     from hw.simulated.finger import SimulatedFinger as SimulatedFinger
 
 _PUBLIC = {
@@ -37,7 +42,7 @@ _PUBLIC = {
     "link": ("Link",),
     "move": ("THROUGH_SPACE", "Move"),
     "patience": ("Patience",),
-    "safety": ("SIGNALS", "StopOnSignal", "end_program"),
+    "safety": ("SIGNALS", "StopIfKilled", "StopOnSignal", "end_program"),
     "simulated.finger": ("SimulatedFinger",),
 }
 doorway(__name__, _PUBLIC)

@@ -96,6 +96,12 @@ class Link:
         return self._serial is not None and self.error is None
 
     @property
+    def handle(self) -> int | None:
+        """Of the open port's file; None where it is no file."""
+        handle: int | None = getattr(self._serial, "fd", None)
+        return handle
+
+    @property
     def counters(self) -> dict[str, int]:
         """Bytes received, good frames, garbage bytes, bad frames, reconnections."""
         counts = self.framing.counts

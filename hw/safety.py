@@ -1,9 +1,12 @@
-"""Safety: stopping at once on a signal, and getting away undisturbed afterwards."""
+"""Safety: stopping at once on a signal, getting away undisturbed afterwards; and what stops a machine left alone."""
 
 from __future__ import annotations
 
 import _thread
+import os
 import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
 from types import FrameType, TracebackType
@@ -91,3 +94,66 @@ class StopOnSignal:
             self._stopped = True
             self._stop(f"stopped by {signal.Signals(number).name}")
         end_program(number, frame)
+
+
+# Waits for a word through its first handle; without one writes to the second: what stops, and, once the machine stands,
+# what makes it ready again
+_WIDOW = """
+import os, sys, time
+word, port, stop, stands, ready = sys.argv[1:]
+if not os.read(int(word), 1):
+    os.write(int(port), bytes.fromhex(stop))
+    time.sleep(float(stands))
+    os.write(int(port), bytes.fromhex(ready))
+"""
+# It has been told, and ends, within so many s
+_TOLD_WITHIN = 1.0
+
+
+class StopIfKilled:
+    """A small process that stops the machine if this one dies without a word: kill -9, no memory left, a crash.
+
+    A controller carries out what it was told: a stroke of a probe, a motion through free space. Where the port is no
+    file (Windows, a socket) there is no such process, and that is what happens.
+
+    Args:
+        port: handle of the port, or None.
+        stop: bytes that stop the machine.
+        stands: s after which it stands.
+        ready: bytes that make it ready again.
+    """
+
+    def __init__(self, port: int | None, stop: bytes, stands: float, ready: bytes) -> None:
+        self._port, self._words = port, [stop.hex(), str(stands), ready.hex()]
+        self._process: subprocess.Popen[bytes] | None = None
+        self._word = -1
+
+    def __enter__(self) -> StopIfKilled:
+        if self._port is None or os.name != "posix":
+            return self
+        heard, self._word = os.pipe()
+        # in a session of its own: a signal to the program's group does not end it
+        self._process = subprocess.Popen(
+            [sys.executable, "-I", "-S", "-c", _WIDOW, str(heard), str(self._port), *self._words],
+            pass_fds=(heard, self._port),
+            start_new_session=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(heard)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        if self._process is None:
+            return
+        try:
+            os.write(self._word, b".")
+            self._process.wait(_TOLD_WITHIN)
+        except (BrokenPipeError, subprocess.TimeoutExpired):  # it was ended by somebody
+            self._process.kill()
+            self._process.wait()
+        finally:
+            os.close(self._word)

@@ -249,11 +249,12 @@ def doctor(
 
     def line(check: Check) -> str:
         remedy = f" -> {check.remedy}" if check.remedy else ""
-        return f"{check.state:<8}{check.subject:<16}{check.found} ({check.needed_for}){remedy}"
+        return f"{check.state:<8}{check.subject:<{wide}}  {check.found} ({check.needed_for}){remedy}"
 
     if compile:
         compile_kernels(quiet=json)
     checks = examine() + ([] if port is None else controller(port, baudrate))
+    wide = max(len(check.subject) for check in checks)
     print(dumps([asdict(check) for check in checks]) if json else "\n".join(line(check) for check in checks))
     if any(check.state == "missing" for check in checks):
         raise typer.Exit(1)

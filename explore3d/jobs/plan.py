@@ -300,7 +300,7 @@ def plan_into(
     if out is None:
         return plan_scene(path, files_from, progress)
     subject = scene_digest(open_scene(path, files_from))
-    with Session(out, Job("plan", subject), overwrite=overwrite) as session:
+    with Session(out, Job("plan", subject, ("plan",)), overwrite=overwrite) as session:
         plan = plan_scene(path, files_from, progress)
         session.write("plan.json", json.dumps(plan.record(), indent=1))
         session.write("plan.png", plan.picture())

@@ -42,7 +42,7 @@ class Job:
     Args:
         name: of the command.
         subject: what it works on, as a digest: a session of another subject is replaced only if that is asked for.
-        replaces: other commands whose session of the same subject it may replace.
+        replaces: commands whose session it may replace, whatever it is of: it holds nothing that cannot be made again.
         go_on: the command that goes on with it where it ended early.
         again: the command that begins it again, where nothing was recorded.
         reads: files that its scene names: the session's own scene may name them where they are, while they stay as
@@ -57,8 +57,9 @@ class Job:
     reads: tuple[Path, ...] = ()
 
     def may_replace(self, earlier: dict[str, Any]) -> bool:
-        """True if a session with that record is an earlier one of the same."""
-        return earlier.get("subject") == self.subject and earlier.get("job") in (self.name, *self.replaces)
+        """True if a session with that record is an earlier one of the same, or nothing is lost with it."""
+        same = earlier.get("subject") == self.subject and earlier.get("job") == self.name
+        return same or earlier.get("job") in self.replaces
 
 
 class Session:

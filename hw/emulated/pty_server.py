@@ -17,6 +17,8 @@ from hw.emulated.faults import BYTE_FAULTS, Fault
 from hw.emulated.wire import Wire
 
 TICK = 0.001  # s
+# So many bytes wait for a host that reads late; what a device says beyond is lost, as with a port that nobody has open
+HELD = 65536
 
 
 class Device(Protocol):
@@ -160,6 +162,7 @@ class PtyServer:
                 # a copy: a test may make the device speak from its own thread meanwhile
                 sent = os.write(port[0], bytes(device.out))
                 del device.out[:sent]
+            del device.out[: max(0, len(device.out) - HELD)]
 
     # faults
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hw import FingerError, Lines, Link, LinkError, Patience, StoppedError
+from hw import FingerError, Lines, Link, LinkError, Patience, StopIfKilled, StoppedError
 from hw.grbl import protocol as protocol
 from hw.grbl.protocol import GrblSettings, Probed, Status
 from mapping import FloatArray
@@ -48,6 +48,8 @@ NAMING = 1.0
 RESTARTING = 1.0
 # The link's round trip is the median of so many
 RECENT_REPORTS = 15
+# and its shortest is the least of so many: two seconds and more of asking as fast as a port can answer
+LATEST_REPORTS = 500
 # A machine that is asked where it stands does so, and says it twice, within so many s: a line may have been looked at
 # late, and with 1 % of all bytes wrong every second report is
 LONGEST_TO_A_STAND = 4.0
@@ -58,15 +60,23 @@ KEPT_REPORTS = 50_000
 class Report(NamedTuple):
     """A status report: true at some moment of the round trip that ended at `at`, s, time.monotonic.
 
+    The question is one byte, which a controller takes at once and answers as it stands then; the answer waits for the
+    main loop, the line, and the timers of adapters and hosts. So it is most likely true of when it was asked for.
+
     Args:
         at: when it arrived.
         status: what it says.
-        round_trip: s since it was asked for; 0 if it came unasked.
+        round_trip: s since it was asked for; inf if it came unasked.
     """
 
     at: float
     status: Status
     round_trip: float
+
+    @property
+    def asked(self) -> float:
+        """When it was asked for, s, time.monotonic."""
+        return self.at - self.round_trip
 
 
 class GrblController:
@@ -98,6 +108,7 @@ class GrblController:
         self.reports: deque[Report] = deque(maxlen=KEPT_REPORTS)
         self._asked: deque[float] = deque()  # when, for every report that has not come yet
         self._in_vain: float | None = None  # when was asked what is taken for lost since the last report
+        self._silent: deque[float] = deque()  # when, for every report that did not come while nothing at all did
         self._news = threading.Condition()
         self._answers: deque[str] = deque()
         self._feedback: list[str] = []
@@ -126,9 +137,12 @@ class GrblController:
         try:
             status = self._first_status()
             if status.state not in ("Idle", "Alarm", "Check", "Sleep"):
-                raise FingerError(
-                    f"{self.link.port}: the machine is in state {status.state}; wait until it is idle, or stop it"
+                held = (
+                    "let it go on (cycle start, ~), or reset it (Ctrl-X): a machine that stands keeps its place"
+                    if status.state in ("Hold", "Door")
+                    else "wait until it is idle, or stop it"
                 )
+                raise FingerError(f"{self.link.port}: the machine is in state {status.state}; {held}")
             self.alarm = "the machine is locked (state Alarm)" if status.state == "Alarm" else None
             self.version = " ".join(line for line in self._ask("$I") if line.startswith("["))
             self.settings = GrblSettings.of(self._agreed("$$"))
@@ -265,13 +279,17 @@ class GrblController:
         """Ask for a report; its round trip counts from the first asking that is not answered yet.
 
         An answer that was lost would make all reports after it look late. So one that did not come for so long, s, is
-        taken for lost, and the next report to come for late: nobody knows which of the two it answers.
+        taken for lost, and the next report to come for late: nobody knows which of the two it answers. But where
+        nothing at all was heard since, nothing was lost: the device, or this program, was held up; each answer comes.
         """
         now = time.monotonic()
         with self._news:
             while self._asked and now - self._asked[0] >= patience:
                 lost = self._asked.popleft()
-                self._in_vain = lost if self._in_vain is None else self._in_vain
+                if self.link.heard < lost:
+                    self._silent.append(lost)
+                elif self._in_vain is None:
+                    self._in_vain = lost
             self._asked.append(now)
         self.link.write(protocol.STATUS)
 
@@ -431,7 +449,14 @@ class GrblController:
     def round_trip(self) -> float:
         """What asking where the machine is has taken lately, s; 0 before it was asked."""
         recent = list(islice(reversed(self.reports), RECENT_REPORTS))
-        return float(np.median([report.round_trip for report in recent])) if recent else 0.0
+        trips = [report.round_trip for report in recent if report.round_trip < np.inf]
+        return float(np.median(trips)) if trips else 0.0
+
+    @property
+    def shortest_round_trip(self) -> float:
+        """What asking takes if nobody is busy, s: the least of a few hundred last reports; 0 before it was asked."""
+        recent = islice(reversed(self.reports), LATEST_REPORTS)
+        return min((report.round_trip for report in recent if report.round_trip > 0.0), default=0.0)
 
     def cancel_jog(self, within: float = 2.0) -> None:
         """Stop jogging, forget what is queued, wait until the machine stands."""
@@ -554,13 +579,16 @@ class GrblController:
 
         One ramp comes on top of the ways at their speeds; an axis has reached its fastest by then.
         """
-        fastest, slowest = (
-            np.append(self.settings.max_rate, 0.0),
-            np.nanmin(np.append(self.settings.acceleration, np.inf)),
-        )
-        ramp = float(np.nanmax(fastest) / slowest) if slowest > 0.0 else 0.0
+        ramp = self._ramp()
+        ramp = ramp if np.isfinite(ramp) else 0.0
         while (left := self._moves_until + ramp - time.monotonic()) > 0.0:
             time.sleep(min(left, POLL))
+
+    def _ramp(self) -> float:
+        """Longest that it may take to reach the fastest speed, or to brake from it, s; inf where it does not say."""
+        fastest = float(np.nanmax(np.append(self.settings.max_rate, 0.0)))
+        slowest = float(np.nanmin(np.append(self.settings.acceleration, np.inf)))
+        return fastest / slowest if 0.0 < slowest < np.inf and fastest > 0.0 else np.inf
 
     def _standing(self) -> bool:
         return bool(self.reports) and self.reports[-1].status.state == "Idle"
@@ -604,6 +632,12 @@ class GrblController:
             self.link.write(protocol.HOLD + protocol.JOG_CANCEL)
         self._notify()
 
+    def stop_if_killed(self) -> StopIfKilled:
+        """While entered, the machine is stopped as by `halt` and `clear` if this program dies without a word."""
+        ramp = self._ramp()
+        stands = 2.0 * ramp if np.isfinite(ramp) else LONGEST_TO_A_STAND
+        return StopIfKilled(self.link.handle, protocol.HOLD + protocol.JOG_CANCEL, stands, protocol.RESET)
+
     def clear(self, within: float = 3.0) -> bool:
         """After a halt: throw away what is queued and be ready again; True if the position is still known."""
         patience = Patience(within)
@@ -640,7 +674,8 @@ class GrblController:
 
     def _sort(self, now: float, line: str) -> None:
         if line.startswith("<"):
-            asked = self._asked.popleft() if self._asked else now
+            waiting = self._silent or self._asked
+            asked = waiting.popleft() if waiting else -np.inf
             status, round_trip = protocol.parse_status(line), now - (self._in_vain or asked)
             self._in_vain = None
             if status is None:

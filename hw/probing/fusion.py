@@ -17,11 +17,14 @@ LATE = 5e-4
 OFF_THE_LINE_STEPS = 2.0
 # The noise of a sample and the half of its neighbours' exceeds so many standard deviations once in 1e15
 LONE = 8.0 * 1.5**0.5
+# A sample is judged by so many before it and behind it
+JUDGED_BY = 2
 
 
 def prompt(reports: Sequence[Report]) -> list[Report]:
     """The reports whose round trip took hardly longer than is usual: those that their stamps can be trusted of."""
-    usual = float(np.median([report.round_trip for report in reports])) if reports else 0.0
+    trips = [report.round_trip for report in reports if report.round_trip < np.inf]
+    usual = float(np.median(trips)) if trips else 0.0
     return [report for report in reports if report.round_trip <= usual + LATE]
 
 
@@ -81,12 +84,16 @@ def _rising(values: FloatArray) -> BoolArray:
 
 
 def no_spikes(forces: FloatArray, noise: FloatArray) -> BoolArray:
-    """(N,) whether a sample (N, 3) lies between its neighbours, N, but for their noise (3,): else it was garbled."""
-    keep = np.ones(len(forces), dtype=bool)
-    if len(forces) > 2:
-        apart = np.abs(forces[2:] - forces[:-2])
-        off = np.abs(forces[1:-1] - 0.5 * (forces[2:] + forces[:-2]))
-        keep[1:-1] = (off <= apart + LONE * noise).all(axis=1)
+    """(N,) whether a sample (N, 3), N, lies where its neighbours lead, but for their noise (3,): else it was garbled.
+
+    Of the two before it and the two behind it the lowest and the highest say nothing: one of them may be garbled, too.
+    What has fewer neighbours on either side cannot be judged, and is not kept.
+    """
+    keep = np.zeros(len(forces), dtype=bool)
+    if len(forces) > 2 * JUDGED_BY:
+        near = np.sort(np.stack([forces[:-4], forces[1:-3], forces[3:-1], forces[4:]]), axis=0)[1:3]
+        off = np.abs(forces[JUDGED_BY:-JUDGED_BY] - near.mean(axis=0))
+        keep[JUDGED_BY:-JUDGED_BY] = (off <= np.ptp(near, axis=0) + LONE * noise).all(axis=1)
     return keep
 
 
@@ -99,23 +106,31 @@ def positions_at(times: FloatArray, reported: FloatArray, positions: FloatArray)
 
 
 def known_at(
-    times: FloatArray, reported: FloatArray, positions: FloatArray, normals: FloatArray, longest: float, apart: float
+    times: FloatArray,
+    reported: FloatArray,
+    doubts: FloatArray,
+    positions: FloatArray,
+    normals: FloatArray,
+    longest: float,
+    apart: float,
 ) -> BoolArray:
     """(N,) whether the reports tell where the stage was across the surface, and not only where along it.
 
-    Between two reports the stage may have turned, or stood for a while: that matters as far as they differ along
-    the normal.
+    Between two reports the stage may have turned, or stood for a while, and a report may have been true sooner than it
+    came: that matters as far as they differ along the normal.
 
     Args:
         times: (N,) s.
-        reported, positions: (M,) s and (M, 3) m of the reports.
+        reported, doubts, positions: (M,) s, (M,) s and (M, 3) m of the reports: how much longer than need be each took.
         normals: (N, 3) unit normals of the contact.
         longest: time between two reports that hides nothing, s.
         apart: distance along the normal that hides nothing, m.
     """
     after = np.clip(np.searchsorted(reported, times), 1, len(reported) - 1)
-    between = np.einsum("ij,ij->i", positions[after] - positions[after - 1], normals)
-    return np.asarray((reported[after] - reported[after - 1] <= longest) | (np.abs(between) <= apart))
+    between = np.abs(np.einsum("ij,ij->i", positions[after] - positions[after - 1], normals))
+    lasted, doubt = reported[after] - reported[after - 1], np.maximum(doubts[after], doubts[after - 1])
+    hidden = np.where(lasted <= longest, np.minimum(doubt / np.maximum(lasted, 1e-9), 1.0) * between, between)
+    return np.asarray(hidden <= apart)
 
 
 def rigid_centers(positions: FloatArray, forces: FloatArray, stiffness: float) -> FloatArray:

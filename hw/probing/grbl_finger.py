@@ -113,6 +113,8 @@ class GrblFinger:
             self._signals = undo.enter_context(StopOnSignal(controller.halt))
             undo.callback(controller.close)
             controller.open()
+            if self.armed:
+                undo.enter_context(controller.stop_if_killed())
             if self.slide is not None:
                 undo.enter_context(self.slide.sensor)
                 self.slide.sensor.guard(self.max_force, controller.halt)
@@ -187,9 +189,12 @@ class GrblFinger:
             self._open.close()
 
     def _retreat(self, stage: GuardedStage) -> None:
-        """Stop what moves and leave the body; on a machine that is lost or locked nothing can be done."""
+        """Stop what moves and leave the body; on a machine that is lost or locked nothing can be done.
+
+        A machine that was halted before its first motion is let go of, too: it would refuse the next program.
+        """
         controller = stage.controller
-        if not self.armed or self._away is None or self._left or not controller.link.is_open:
+        if not self.armed or self._left or not controller.link.is_open:
             return
         self._left = True
         try:
@@ -203,7 +208,7 @@ class GrblFinger:
                 controller.halt("leaving")
                 if not controller.clear():
                     return  # the position is lost: any motion could do harm
-            if controller.alarm is None:
+            if controller.alarm is None and self._away is not None:
                 self._lift(stage, 2.0 * self.tip_radius)
         except FingerError as error:
             self._lost = (

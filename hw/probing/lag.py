@@ -124,7 +124,7 @@ def measured_delay(
         heights = [float(place @ -inwards) for place in places]
         times, forces = sensor.timed(begun)
         pressing = -(stage.frame.turn_to_object(forces) @ inwards)
-        stamps = np.array([report.at for report in reports])
+        stamps = np.array([report.asked for report in reports])
         with suppress(ValueError):  # a touch during which a busy host missed the reports says nothing
             found.append(estimate_delay(stamps, np.array(heights), times, pressing, 0.3 * press))
         if len(found) == ENOUGH_TOUCHES:

@@ -16,6 +16,7 @@ import numpy as np
 from hw import LinkError, Move, Patience, StoppedError, UntrueForceError
 from hw.grbl import LONGEST_STANDSTILL, GuardedStage
 from hw.probing.fusion import (
+    JUDGED_BY,
     OFF_THE_LINE_STEPS,
     known_at,
     no_spikes,
@@ -280,13 +281,15 @@ class Slide:
         reports = prompt(stage.controller.reported(after - BEFORE))
         if len(reports) < 2:
             return Touched(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
-        stamps = np.array([report.at for report in reports])
+        came = np.array([report.at for report in reports])
+        stamps = np.array([report.asked for report in reports])
+        doubts = came - stamps - stage.controller.shortest_round_trip
         places = stage.frame.to_object(
             np.array([stage.controller.machine_position(report.status) for report in reports])
         )
         off = OFF_THE_LINE_STEPS * stage.controller.settings.resolution
         good = on_the_way(
-            stamps,
+            came,
             places,
             np.array(sent.times),
             np.array(sent.ends),
@@ -299,8 +302,9 @@ class Slide:
                 f"{np.sum(~good)} of {len(good)} reports of the machine's place lie more than {1e6 * off:.0f} um off "
                 "the way that it was sent: check its cable, and whether another program or a pendant steers it"
             )
-        stamps, places = stamps[good], places[good]
-        times, forces = self.sensor.timed(after)
+        stamps, places, doubts = stamps[good], places[good], doubts[good]
+        # with those that the first ones are judged by
+        times, forces = self.sensor.timed(after - BEFORE - JUDGED_BY * self.sensor.watch.spacing)
         whole = no_spikes(forces, np.abs(self.sensor.turned) @ self.sensor.watch.noise)
         times, forces = times[whole], forces[whole]
         forces = stage.frame.turn_to_object(forces)
@@ -316,7 +320,7 @@ class Slide:
             centers = positions_at(times - delay, stamps, places)
             sound = presses & (pressing > self.contact) & np.isfinite(centers).all(axis=1) & (times > after)
             sound &= times < until
-            return sound & known_at(times - delay, stamps, places, normals, longest, step), centers
+            return sound & known_at(times - delay, stamps, doubts, places, normals, longest, step), centers
 
         self.lag.expected = max(EXPECTED, stage.controller.round_trip)
         sound, centers = touching(self.delay)

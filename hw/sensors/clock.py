@@ -8,6 +8,10 @@ import numpy as np
 
 from mapping import FloatArray, IntArray
 
+# A clock may be off what is known of its period by so much; a host is this late, s, as a rule. What comes later than
+# both tell was held back in a buffer while nobody read, for as long as that may have been: it says nothing of the clock
+CLOCK_UNSURE, USUALLY_LATE = 0.02, 0.05
+
 
 @dataclass(frozen=True)
 class SensorClock:
@@ -41,10 +45,13 @@ class SensorClock:
         span = float(ticks[-1] - ticks[0]) if len(ticks) > 1 else 0.0
         period = nominal
         if len(ticks) >= 50:
-            fifth = len(ticks) // 5
             late = arrivals - nominal * ticks
+            soon = late <= late.min() + CLOCK_UNSURE * float(np.ptp(arrivals)) + USUALLY_LATE
+            ticks, arrivals, late = ticks[soon], arrivals[soon], late[soon]
+            fifth = max(1, len(ticks) // 5)
             first, last = int(late[:fifth].argmin()), len(ticks) - fifth + int(late[-fifth:].argmin())
-            period = float((arrivals[last] - arrivals[first]) / (ticks[last] - ticks[first]))
+            if ticks[last] > ticks[first]:
+                period = float((arrivals[last] - arrivals[first]) / (ticks[last] - ticks[first]))
         late = arrivals - period * ticks
         jitter = float(np.std(late)) if span > 0 else 0.0
         return cls(period, float(late.min()), jitter)

@@ -36,6 +36,8 @@ HISTORY = 10.0
 # The least delay of a sample is that of the last one to two blocks of so long, s: a clock that is 1 % off what is known
 # of it is then 20 ms off at most, less than the 50 ms after which a sample is not steered by
 DELAY_BLOCK = 1.0
+# So many standard deviations off the median no sample of free air is noise; an even drift alone reaches 1.35 of them
+OFF_FREE_AIR = 8.0
 # A host may hold back samples for 0.1 s: over so many s that makes the sensor's period uncertain by 2 %
 PERIOD_SPAN = 5.0
 
@@ -218,7 +220,8 @@ class ForceSensor:
         ticks, _, forces = self.recorded(since)
         if len(ticks) > 2:
             step = float(np.median(np.diff(ticks)))
-            self.watch.learn(forces, step, step * self._period)
+            uneven = 1.4826 * float(np.median(np.abs(np.diff(ticks) - step)))
+            self.watch.learn(forces, step, step * self._period, uneven)
 
     def free_air(self, duration: float = FREE_AIR) -> FreeAir:
         """The median force of the next moments, s, its drift, and when that was. Nothing may touch.
@@ -245,8 +248,7 @@ class ForceSensor:
         ticks, forces = ticks[recent].astype(float), forces[recent]
         drift = np.zeros(3)
         if len(ticks) > 2:
-            at = (ticks - ticks.mean()) * self._period
-            drift = np.asarray(at @ forces / (at @ at))
+            drift = np.array([_slope(np.asarray(ticks * self._period), column) for column in forces.T])
         # the median: a first sample after a reconnection may be anything
         return FreeAir(0.5 * (since + until), np.median(forces, axis=0), drift)
 
@@ -296,21 +298,18 @@ class ForceSensor:
             if sample is None:
                 self.faulty += 1
                 continue
-            count, sound, fault = watch.judge(sample)
-            if fault is not None and self.fault is None:
-                self.fault, taken_back = f"the {self.name} {fault}", watch.doubtful
+            told = watch.judge(sample, now)
+            if told.fault is not None and self.fault is None:
+                self.fault, taken_back = f"the {self.name} {told.fault}", watch.doubtful
                 self._strike(self.fault)
-            if sound and self.fault is None:
-                newest = count
-                kept.append((now, *sample))
-            else:
-                self.faulty += 1
-            # what is no sample of the record may still be a force, and counts for the limits; a lone jump is none
-            if not watch.lone:
-                _, x, y, z = sample
-                square = (x - u) ** 2 + (y - v) ** 2 + (z - w) ** 2
-                if square > strongest:
-                    strongest = square
+            self.faulty += 1  # or waits for the next
+            if self.fault is not None:
+                continue
+            for at, (count, x, y, z) in told.kept:
+                self.faulty -= 1
+                newest = told.newest
+                kept.append((at, count, x, y, z))
+                strongest = max(strongest, (x - u) ** 2 + (y - v) ** 2 + (z - w) ** 2)
         self._heed(strongest**0.5)
         if newest is not None:
             self._stamp(now, newest)
@@ -348,6 +347,14 @@ class ForceSensor:
 
     def _on_lost(self) -> None:
         self._halt(f"the {self.name} was lost ({self.link.error})")
+
+
+def _slope(times: FloatArray, values: FloatArray) -> float:
+    """By least squares, less what lies too far from the median to be noise: a garbled sample would tilt the line."""
+    off = np.abs(values - np.median(values))
+    near = off <= OFF_FREE_AIR * 1.4826 * np.median(off)
+    at = times[near] - times[near].mean()
+    return float(at @ values[near] / (at @ at)) if near.sum() > 2 else 0.0
 
 
 def _nothing_more() -> None:

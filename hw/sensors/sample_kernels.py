@@ -116,7 +116,7 @@ def read_lines(block: NDArray[np.uint8], counts: IntArray, forces: FloatArray) -
 
 @njit(cache=True)
 def judge_block(
-    counts: IntArray, forces: FloatArray, limits: FloatArray, state: IntArray, wrap: int, together: int
+    counts: IntArray, forces: FloatArray, limits: FloatArray, state: IntArray, wrap: int, ticks: float, slack: float
 ) -> tuple[int, float]:
     """How far the count went on over samples that may all be kept, and the largest force of them, N.
 
@@ -128,13 +128,13 @@ def judge_block(
             before, which becomes that of the last sample; zero of the force, N.
         state: (4,) count of the sample before, and how often each axis had the value that it has; goes on likewise.
         wrap: the count begins anew after so many.
-        together: a count may go on by so many at once.
+        ticks, slack: by how much a count goes on, and how much that may be off.
     """
     before, advance, strongest = state[0], 0, 0.0
     runs = state[1:].copy()
     for row in range(len(counts)):
         step = (counts[row] - before) % wrap
-        if step == 0 or step > together:
+        if abs(step - ticks) > slack:
             return -1, 0.0
         advance += step
         before = counts[row]
@@ -162,4 +162,4 @@ def load_sample_kernels() -> None:
     whole_frames(block, np.frombuffer(bytes(4), np.uint8), 16)
     read_frames(block, 0, np.ones(3), counts, forces)
     read_lines(np.frombuffer(b"\n\n", np.uint8), counts, forces)
-    judge_block(counts, forces, np.zeros((4, 3)), np.zeros(4, np.int64), 65536, 8)
+    judge_block(counts, forces, np.zeros((4, 3)), np.zeros(4, np.int64), 65536, 1.0, 0.1)

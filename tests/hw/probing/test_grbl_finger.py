@@ -241,6 +241,17 @@ def test_the_probe_is_checked_by_the_users_touch() -> None:
     assert len(asked) == 2
 
 
+def test_a_machine_that_was_halted_before_its_first_motion_is_left_idle(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hw.probing.grbl_finger.TOUCH_BY_HAND", 0.2)
+    with machine(pace=10.0) as (server, stage):
+        begun = stage.motion.travelled
+        with pytest.raises(FingerError, match="did not close"), pecker(server, ask=lambda what: None) as finger:
+            finger.execute(across(x=0.003))
+        assert stage.motion.travelled == begun
+        with pecker(server) as finger:  # a machine that is held would be refused
+            assert len(finger.execute(across(x=0.003))) > 3
+
+
 @pytest.mark.parametrize("kind", ["garble", pytest.param("lose", marks=SLOW), pytest.param("double", marks=SLOW)])
 def test_garbled_doubled_and_lost_reply_bytes_never_become_contacts(kind: str) -> None:
     with machine(pace=10.0) as (server, _), pecker(server) as finger:

@@ -30,7 +30,11 @@ def watching(axes: int = 3) -> SampleWatch:
 
 
 def faults(watch: SampleWatch, told: list[Sample]) -> list[str]:
-    return [fault for sample in told if (fault := watch.judge(sample)[2]) is not None]
+    return [fault for sample in told if (fault := watch.judge(sample).fault) is not None]
+
+
+def kept(watch: SampleWatch, told: list[Sample]) -> list[Sample]:
+    return [sample for each in told for _, sample in watch.judge(each).kept]
 
 
 def test_an_hour_of_rounded_noise_is_no_fault() -> None:
@@ -41,7 +45,7 @@ def test_a_frozen_value_is_found_within_control_periods() -> None:
     watch = watching()
     assert not faults(watch, samples(noise(50, 3)))
     frozen = samples(np.tile(noise(1, 4), (60, 1)), 50)
-    judged = [watch.judge(sample)[2] for sample in frozen]
+    judged = [watch.judge(sample).fault for sample in frozen]
     assert next(i for i, fault in enumerate(judged) if fault) <= 25, "25 ms"
 
 
@@ -57,9 +61,9 @@ def test_a_sensor_that_never_changes_is_refused_before_it_is_used() -> None:
 def test_a_lone_spike_is_left_out_and_a_jump_that_stays_is_a_fault() -> None:
     told = noise(100, 6)
     told[50] += 3.0
-    watch = watching()
-    kept = [watch.judge(sample)[1] for sample in samples(told)]
-    assert kept.count(False) == 1 and not kept[50]
+    assert [count for count, *_ in kept(watching(), samples(told))] == [*range(50), *range(51, 100)]
+    told[51] += 3.0
+    assert not faults(watching(), samples(told))
     told[50:] += 3.0
     assert "jumped" in faults(watching(), samples(told))[0]
 
@@ -73,20 +77,43 @@ def test_a_force_that_rises_as_fast_as_the_stage_presses_is_no_jump() -> None:
 def test_an_old_sample_again_is_no_sample() -> None:
     watch = watching()
     told = samples(noise(10, 8))
-    assert all(watch.judge(sample)[1] for sample in told)
-    assert not any(watch.judge(told[-1])[1] for _ in range(5))
-    assert not watch.judge(told[3])[1]
+    assert kept(watch, told) == told
+    assert not kept(watch, [told[-1]] * 5)
+    assert not kept(watch, told[3:6])
 
 
-def test_a_garbled_count_costs_one_sample_and_a_pause_one_more() -> None:
+@pytest.mark.parametrize("off", [-512, -1, 1, 2, 7, 8, 512])
+def test_a_garbled_count_costs_its_sample_and_no_other(off: int) -> None:
+    told = samples(noise(200, 9), 1000)
+    true = list(told)
+    told[50] = (told[50][0] + off, *told[50][1:])
+    watch = watching()
+    assert kept(watch, told) == true[:50] + true[51:]
+    assert watch.judge((1200, 0.0, 0.001, 0.0)).newest == 1200
+
+
+def test_after_a_pause_the_next_sample_bears_the_first_one_out() -> None:
     told = samples(noise(200, 9))
-    told[50] = (told[50][0] + 512, *told[50][1:])
     told[150:] = [((count + 3000) % 2**16, *force) for count, *force in told[150:]]
     watch = watching()
-    judged = [watch.judge(sample) for sample in told]
-    assert [i for i, (_, sound, _) in enumerate(judged) if not sound] == [50, 150]
-    assert not any(fault for _, _, fault in judged)
-    assert judged[-1][0] == 3199
+    assert kept(watch, told[:151]) == told[:150]
+    verdict = watch.judge(told[151], at=5.0)
+    assert [sample for _, sample in verdict.kept] == told[150:152] and verdict.newest == 3151
+
+
+def test_the_first_sample_of_all_may_be_garbled() -> None:
+    told = samples(noise(100, 9), 100)
+    assert kept(SampleWatch(16), [(30_000, *told[0][1:]), *told])[1:] == told
+
+
+def test_a_clock_of_uneven_steps_is_followed_as_it_was_in_free_air() -> None:
+    rng = np.random.default_rng(3)
+    counts = np.cumsum(np.round(1000.0 + 40.0 * rng.standard_normal(2000))).astype(int)
+    told = [(int(count), *map(float, force)) for count, force in zip(counts, noise(2000, 4), strict=True)]
+    watch = SampleWatch(32)
+    watch.learn(noise(200, 1), 1000.0, 1e-3, 40.0)
+    watch.judge(told[0])
+    assert kept(watch, told[1:]) == told
 
 
 def test_what_goes_on_jumping_is_a_fault() -> None:
@@ -96,8 +123,12 @@ def test_what_goes_on_jumping_is_a_fault() -> None:
 
 
 def test_no_number_and_overload_are_faults() -> None:
-    assert "no number" in faults(watching(), [(0, 0.0, 0.0, float("nan"))])[0]
-    assert "overloaded" in faults(watching(), [(0, 0.0, 0.0, float("inf"))])[0]
+    for value, why in ((float("nan"), "no number"), (float("inf"), "overloaded")):
+        told = samples(noise(100, 6))
+        told[50] = (50, 0.0, 0.0, value)
+        assert not faults(watching(), told)
+        told[50:53] = [(50 + i, 0.0, 0.0, value) for i in range(3)]
+        assert why in faults(watching(), told)[0]
 
 
 def spoilt(number: int, seed: int) -> list[Sample]:
@@ -128,13 +159,14 @@ def test_a_block_is_judged_as_its_samples_are_one_by_one(seed: int) -> None:
         size = int(rng.integers(1, 30))
         block, told = told[:size], told[size:]
         judged = [each.judge(sample) for sample in block]
+        whole = [sample for verdict in judged for _, sample in verdict.kept] == block
         counts, forces = np.array([s[0] for s in block]), np.array([s[1:] for s in block])
         found = together.judge_all(counts, forces, (0.1, -0.2, 0.3))
         if found is None:
             assert [together.judge(sample) for sample in block] == judged
             continue
         taken += 1
-        assert all(sound and fault is None for _, sound, fault in judged)
-        assert found[0] == judged[-1][0]
+        assert whole and judged[-1].fault is None
+        assert found[0] == judged[-1].newest
         assert found[1] == pytest.approx(np.linalg.norm(forces - (0.1, -0.2, 0.3), axis=1).max())
     assert taken > 50

@@ -54,6 +54,7 @@ class Firmware:
         self.has_probe = "-p <port>" in told.stdout + told.stderr
         self._program, self._folder = program, folder
         self._closed, self._printed = False, b""
+        self._socket: socket.socket | None = None
         self._steps: int | None = None
         self._asked: deque[bool] = deque()  # for each report that is to come: was it the host that asked?
         self._waiting = 0  # the host's questions, while our own is under way: one report would answer both
@@ -61,6 +62,7 @@ class Firmware:
 
     def __enter__(self) -> Firmware:
         words = [str(self._program), "-n", "-b", os.devnull]
+        port = 0
         if self.has_probe:
             words += ["-s", os.devnull]
             with socket.create_server(("127.0.0.1", 0)) as free:
@@ -75,6 +77,14 @@ class Firmware:
         self._process = subprocess.Popen(
             words, cwd=self._folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0
         )
+        try:
+            self._begin(port)
+        except BaseException:  # its loop never sleeps: one that is left behind takes a core
+            self.__exit__(None, None, None)
+            raise
+        return self
+
+    def _begin(self, port: int) -> None:
         assert self._process.stdout is not None
         self._socket = self._connected(port) if self.has_probe else None
         os.set_blocking(self._process.stdout.fileno(), False)
@@ -82,7 +92,6 @@ class Firmware:
         for number, value in SETTINGS.items():
             self._write(f"${number}={value}\n".encode())
             self._answer("ok\r\n")
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
