@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     )
     from explore3d.analysis.forecast import Forecast as Forecast, forecast as forecast, worst_errors as worst_errors
     from explore3d.analysis.method import ABSORBED as ABSORBED, FAILED as FAILED
-    from explore3d.analysis.result import Analysis as Analysis
+    from explore3d.analysis.result import Analysis as Analysis, Computing as Computing
     from explore3d.analysis.roughness import (
         Roughness as Roughness,
         residual as residual,
@@ -44,7 +44,7 @@ _PUBLIC = {
     "feature_table": ("FEATURE_COLUMNS", "csv_text", "feature_rows", "parquet_bytes", "run_key"),
     "forecast": ("Forecast", "forecast", "worst_errors"),
     "method": ("ABSORBED", "FAILED"),
-    "result": ("Analysis",),
+    "result": ("Analysis", "Computing"),
     "roughness": ("Roughness", "residual", "roughness_of", "why_no_roughness_of"),
     "savings": ("without_needless_dynamics",),
     "stages": ("FINGER_STAGE", "Progress", "Stages", "silent"),

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from explore3d import seconds_text
 from mapping import LeftOut, Trace
 from mapping.base import Base
 from mapping.model import Judgement, ObjectModel
@@ -40,6 +41,32 @@ class TipCount:
     gentler: int
 
 
+@dataclass(frozen=True)
+class Computing:
+    """What a run's planning and modelling took of one core, the simulation of a finger apart; s of CPU time.
+
+    Args:
+        planning: choosing, checking and routing moves, looking at what they felt, and writing it down.
+        modelling: from the log to the model.
+        median_wait, worst_wait: of the finger for a move; the first one's is not among them, nothing moves before it.
+    """
+
+    planning: float
+    modelling: float
+    median_wait: float
+    worst_wait: float
+
+    def sentence(self, finger_seconds: float) -> str:
+        """In words, against the time that the finger moved (s)."""
+        took = self.planning + self.modelling
+        share = f", {100 * took / finger_seconds:.0f} % of the finger's time" if finger_seconds > 0 else ""
+        return (
+            f"Planning took {seconds_text(self.planning)} and modelling {seconds_text(self.modelling)} of one "
+            f"core{share}; for its next move the finger waited {1e3 * self.median_wait:.0f} ms (median) and "
+            f"{1e3 * self.worst_wait:.0f} ms at worst."
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Analysis:
     """The result of `analyze`, and what it rests on.
@@ -71,6 +98,7 @@ class Analysis:
         judgements: what became of each tolerance of the scene.
         roughness: what the surface is like beside the features; None where a trace cannot tell.
         standard_heights: what its ridges, grooves and steps measure by the standards.
+        computing: what a run's planning and modelling took; None where nothing was planned.
     """
 
     title: str
@@ -99,3 +127,4 @@ class Analysis:
     judgements: tuple[Judgement, ...] = ()
     roughness: Roughness | None = None
     standard_heights: tuple[StandardHeight, ...] = ()
+    computing: Computing | None = None

@@ -12,7 +12,12 @@ if TYPE_CHECKING:
         log_path as log_path,
     )
     from explore3d.jobs.compare import Compared as Compared, compare as compare, watched as watched
-    from explore3d.jobs.expedition import Explored as Explored, Explorer as Explorer, explorer as explorer
+    from explore3d.jobs.expedition import (
+        Explored as Explored,
+        Explorer as Explorer,
+        Waits as Waits,
+        explorer as explorer,
+    )
     from explore3d.jobs.merge import load as load, merge as merge
     from explore3d.jobs.plan import plan_into as plan_into, plan_scene as plan_scene
     from explore3d.jobs.resume import Execute as Execute, Replay as Replay
@@ -27,7 +32,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "analyze": ("Told", "analyze", "analyze_each", "log_path"),
     "compare": ("Compared", "compare", "watched"),
-    "expedition": ("Explored", "Explorer", "explorer"),
+    "expedition": ("Explored", "Explorer", "Waits", "explorer"),
     "merge": ("load", "merge"),
     "plan": ("plan_into", "plan_scene"),
     "resume": ("Execute", "Replay"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from time import process_time
 
 from explore3d.analysis import (
     FEATURE_COLUMNS,
@@ -16,6 +17,7 @@ from explore3d.analysis import (
     parquet_bytes,
     worst_errors,
 )
+from explore3d.jobs.expedition import Waits
 from explore3d.jobs.session import Session
 from explore3d.log import Log
 from explore3d.report import write_report
@@ -37,15 +39,20 @@ def conclude(
     *,
     report: bool = True,
     run: str = "",
+    waits: Waits | None = None,
 ) -> Analysis:
     """Build the model of a log and write it, with its table, pictures and report, into a session's folder.
 
     Args:
         report: False to leave pictures and report out.
         run: key of the analysis in the table.
+        waits: of the finger that made the log; None if that was not now.
         go_on: the command that goes on with an exploration that ended early.
     """
+    begin = process_time()
     analysis = replace(build_model(log, scene, base, stages), go_on=go_on)
+    if waits is not None:
+        analysis = replace(analysis, computing=waits.computing(process_time() - begin))
     with session.staging() as folder:
         if report:
             with stages.stage("report"):

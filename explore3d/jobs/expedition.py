@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from time import process_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from explore3d.analysis import Computing
 from explore3d.log import KIND, SURVEY, Stop, base_event
 from hw import FingerError, Move, Workspace
 from mapping import Trace
@@ -30,6 +32,58 @@ Event = Callable[[str, dict[str, Any]], None]
 
 def unheard(kind: str, data: dict[str, Any]) -> None:
     """An event that nobody notes."""
+
+
+@dataclass
+class Waits:
+    """Carries out moves, and keeps how long the finger waited for each: planning, checks, ways, and writing it down.
+
+    In CPU time of this program, so that what else a computer does is not counted; what carries a move out (where the
+    finger is simulated, that is much) is counted by itself.
+
+    Args:
+        execute: carries out one move.
+        each: before every move, s; the first one holds what was made ready before anything moved.
+        carrying_out: of all moves, s.
+    """
+
+    execute: Execute
+    each: list[float] = field(init=False, default_factory=list)
+    carrying_out: float = field(init=False, default=0.0)
+    _since: float = field(init=False, default_factory=process_time)
+    _after: float = field(init=False, default=0.0)
+
+    @property
+    def planning(self) -> float:
+        """What all waits come to, and what the plan did after its last move, s."""
+        return sum(self.each) + self._after
+
+    def ended(self) -> None:
+        """The plan is over."""
+        self._after = process_time() - self._since
+
+    def computing(self, modelling: float) -> Computing:
+        """The account of a run whose modelling took so long (s)."""
+        return Computing(self.planning, modelling, self.median, self.worst)
+
+    @property
+    def median(self) -> float:
+        """For a move after the first, s; 0 if there is none."""
+        return float(np.median(self.each[1:])) if self.each[1:] else 0.0
+
+    @property
+    def worst(self) -> float:
+        """For a move after the first, s; 0 if there is none."""
+        return max(self.each[1:], default=0.0)
+
+    def __call__(self, move: Move) -> Trace:
+        begin = process_time()
+        self.each.append(begin - self._since)
+        try:
+            return self.execute(move)
+        finally:
+            self._since = process_time()
+            self.carrying_out += self._since - begin
 
 
 @dataclass
@@ -176,15 +230,21 @@ class Explorer:
         """What every move must keep to."""
         return Limits.of(self.workspace, base, self.tip_radius)
 
-    def prepared(self, plan: Plan, base: Base | None, spent: Spent, seconds: float) -> Plan:
-        """The plan within `seconds` of finger time, counted in `spent`, on ways that lead round the base."""
+    def prepared(
+        self, plan: Plan, base: Base | None, spent: Spent, seconds: float, limits: Limits | None = None
+    ) -> Plan:
+        """The plan within `seconds` of finger time, counted in `spent`, on ways that lead round the base.
+
+        Args:
+            limits: what a move is checked by, if the driver checks it by the same: it is not checked twice then.
+        """
         plan = within(plan, spent, seconds)
         if base is None:
             return plan
         space = self.workspace
         ways = Ways(base, self.tip_radius, space.low, space.high, space.max_speed)
         ways.make_ready()
-        return routed(plan, ways, self.limits(base).violation)
+        return routed(plan, ways, (limits or self.limits(base)).violation)
 
     def carry_out(
         self, plan: Plan, base: Base | None, execute: Execute, event: Event = unheard, seconds: float = np.inf
@@ -197,16 +257,16 @@ class Explorer:
             event: told what was refused.
             seconds: finger time that the plan may take.
         """
-        spent = Spent(self.workspace.max_speed)
+        spent, limits = Spent(self.workspace.max_speed), self.limits(base)
 
         def refused(move: Move, why: str) -> None:
             what = f"{move.purpose} not executed: {why}"
             event("refused", {"what": what, "purpose": move.purpose, "path": move.path.tolist()})
 
         _, outcome = drive(
-            self.prepared(plan, base, spent, seconds),
+            self.prepared(plan, base, spent, seconds, limits),
             execute,
-            check=self.limits(base).violation,
+            check=limits.violation,
             refused_move=refused,
             empty=self.nothing,
         )

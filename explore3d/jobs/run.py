@@ -17,7 +17,7 @@ from explore3d import UserError, __version__, count_text, seconds_text
 from explore3d.analysis import FINGER_STAGE, Analysis, Progress, Stages, run_key, silent, without_needless_dynamics
 from explore3d.jobs.analyze import Told
 from explore3d.jobs.conclude import conclude
-from explore3d.jobs.expedition import SurveyWatch, explorer, known_base
+from explore3d.jobs.expedition import SurveyWatch, Waits, explorer, known_base
 from explore3d.jobs.resume import BROKEN_OFF, Replay, replay_of
 from explore3d.jobs.session import Job, Session, unchanged_files
 from explore3d.log import EXPLORATION, OUTCOME, Log, read_base, stop_of
@@ -87,12 +87,12 @@ def run(
     with Session(out, job, resume=resume, overwrite=overwrite) as session:
         replay = None if session.source is None else replay_of(session.source)
         session.write("scene.toml", scene.resolved)
-        log = _explore(scene, finger, session, stages, replay)
+        log, waits = _explore(scene, finger, session, stages, replay)
         stop = stop_of(log)
         session.stopped = stop.text if stop is not None and stop.incomplete else ""
         with _after_the_sweeps(session):
             key, base = run_key(log.sha256, Told(force=tuple(force)).record([])), read_base(log.events)
-            analysis = conclude(session, log, scene, base, stages, go_on, report=report, run=key)
+            analysis = conclude(session, log, scene, base, stages, go_on, report=report, run=key, waits=waits)
     return replace(analysis, folder=session.place)
 
 
@@ -141,7 +141,9 @@ def scene_finger(scene: Scene, arm: bool = False) -> Finger:
     return scene.open_finger(arm)
 
 
-def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, replay: Replay | None = None) -> Log:
+def _explore(
+    scene: Scene, finger: Finger, session: Session, stages: Stages, replay: Replay | None = None
+) -> tuple[Log, Waits]:
     """Carry out the exploration; every sample is in the session's log before the next move begins."""
     with stages.stage(FINGER_STAGE) as share, finger:
         about = {"software": f"explore3d {__version__}", "seed": scene.seed, "finger": finger.info} | EXPLORATION
@@ -161,9 +163,10 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
             touch = replay.before(finger.execute, getattr(finger, "skip", None), log.write)
 
         cut_short: list[str] = []
+        waits = Waits(touch)
 
         def execute(move: Move) -> Trace:
-            trace = touch(move)
+            trace = waits(move)
             log.write(move, trace)
             told = finger.info.get("cut_short", []) if move.purpose == "sweep" else []
             if len(told) > len(cut_short):
@@ -178,6 +181,7 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
         watch = SurveyWatch(execute, log.event)
         try:
             outcome = explorer(scene, finger.workspace).go(watch, log.event, watch)
+            waits.ended()
         except BaseException as error:
             if log.samples:
                 stop = watch.stop(cause(error))
@@ -198,7 +202,7 @@ def _explore(scene: Scene, finger: Finger, session: Session, stages: Stages, rep
                 raise UserError(f"{session.folder}: nothing was felt: {why}")
             session.settle()
             log.close()  # its digest goes into the model
-            return log.recorded()
+            return log.recorded(), waits
 
 
 @contextmanager

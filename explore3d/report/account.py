@@ -57,7 +57,10 @@ def account_of_time(analysis: Analysis) -> Html:
         for name, seconds in analysis.timings.items()
     ]
     rows.append((element("b", "together"), seconds_text(sum(analysis.timings.values())), ""))
-    content = [table(("stage", "time", ""), rows, numeric=(1,)), *_what_time_buys(analysis)]
+    content = [table(("stage", "time", ""), rows, numeric=(1,))]
+    if analysis.computing is not None and len(analysis.trace):
+        content.append(paragraph(analysis.computing.sentence(float(analysis.trace.t[-1]))))
+    content.extend(_what_time_buys(analysis))
     return section("Where the time went", "time", *content)
 
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -68,16 +69,15 @@ def body_run(name: str, seed: int, folder: Path | None, place: Path) -> dict[str
     body, text = any_body(name, seed, folder)
     scene = body.write(text, place / "scene")
     plan = plan_scene(scene)
-    begin = process_time()
     analysis = run(scene, place / "out", overwrite=True)
-    cpu = process_time() - begin
+    assert analysis.computing is not None  # it was run now
     assert plan.detail is not None and plan.detail.bump is not None  # the finger is simulated, bumps are looked for
     bumps = sum(not kind_named(true.kind).line for true in body.truth)
     return {
         "planned_seconds": plan.seconds,
         "planned_details": bumps * plan.detail.bump + (len(body.truth) - bumps) * plan.detail.ridge,
         "planned_swept": None if plan.account is None else plan.account.swept,
-        "cpu_seconds": cpu,
+        **asdict(analysis.computing),
     } | judged(analysis, *(Judge(each, analysis.trace.tip_radius) for each in (body.object, body.base)))
 
 
@@ -128,15 +128,16 @@ SWEPT_EVERY = 5
 
 def body_lines(records: Sequence[dict[str, Any]]) -> Iterator[str]:
     """The table of all runs in Markdown, and what they come to."""
-    yield "| body | seed | reachable swept, % | refused, twice | ball sank, r | found | invented | finger, s | CPU, s | planned swept, % | planned time, s |"  # noqa: E501
-    yield "|---|---|---|---|---|---|---|---|---|---|---|"
+    yield "| body | seed | reachable swept, % | refused, twice | ball sank, r | found | invented | finger, s | planning + modelling, CPU s | waits, ms | planned swept, % | planned time, s |"  # noqa: E501
+    yield "|---|---|---|---|---|---|---|---|---|---|---|---|"
     for each in records:
         planned = "" if each["planned_swept"] is None else f"{100 * each['planned_swept']:.1f}"
         yield (
             f"| {each['body']} | {each['seed']} | {100 * each['swept']:.1f} | "
             f"{each['refused']} of {each['moves'] + each['refused']}, {each['refused_twice']} | "
             f"{each['ball_sank']:.3f} | {each['found']} of {each['reachable_features']} | {len(each['invented'])} | "
-            f"{each['finger_seconds']:.0f} | {each['cpu_seconds']:.0f} | "
+            f"{each['finger_seconds']:.0f} | {each['planning']:.0f} + {each['modelling']:.0f} | "
+            f"{1e3 * each['median_wait']:.0f}, {1e3 * each['worst_wait']:.0f} | "
             f"{planned} of {100 * each['account_swept']:.1f} | "
             f"{each['planned_seconds']:.0f} + {each['planned_details']:.0f} |"
         )

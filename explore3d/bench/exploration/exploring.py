@@ -12,14 +12,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
 
 from explore3d.analysis import Comparison, Stages, TrueFeature, build_model, compare
 from explore3d.bench.scenes import BENCH_TIP_RADIUS, SCENES, BenchScene
-from explore3d.jobs import Explored, Explorer, explorer, scene_finger
+from explore3d.jobs import Explored, Explorer, Waits, explorer, scene_finger
 from explore3d.log import Event, Log, move_event
 from explore3d.scene import Scene
 from hw import Finger, Move
@@ -123,17 +123,17 @@ def one_run(body: BenchScene, strategy: str, seed: int, noise: str = "apparatus"
         assert isinstance(finger, SimulatedFinger)  # every bench scene names it
         clock = _Clock(finger)
         outcome = _swept(strategy, explorer(scene, finger.workspace), body, clock, seed)
-    after = clock.idle
-    start = perf_counter()
+    clock.waits.ended()
+    start = process_time()
     model = build_model(clock.log(), scene, outcome.value.base, Stages()).model
-    modelling = perf_counter() - start
+    modelling = process_time() - start
     return {
         "finger_seconds": finger.clock,
-        "planning_seconds": float(sum(clock.waits)) + after,
+        "planning_seconds": clock.waits.planning,
         "modelling_seconds": modelling,
-        "latency_median": float(np.median(clock.waits[1:])),
-        "latency_worst": float(max(clock.waits[1:])),
-        "moves": len(clock.waits),
+        "latency_median": clock.waits.median,
+        "latency_worst": clock.waits.worst,
+        "moves": len(clock.waits.each),
         "outcome": outcome.reason,
     } | errors(model, body)
 
@@ -177,33 +177,21 @@ def free_end_errors(pair: Comparison, truth: Sequence[TrueFeature]) -> list[floa
 
 
 class _Clock:
-    """Executes moves, and keeps how long the finger waited for each of them: the simulation is no part of planning.
-
-    What a log would hold of them is kept in memory.
-    """
+    """Executes moves, keeps how long the finger waited for each of them, and what a log would hold, in memory."""
 
     def __init__(self, finger: Finger) -> None:
-        self.finger = finger
-        self.waits: list[float] = []
+        self.waits = Waits(finger.execute)
         self.felt: list[Trace] = []
         self.moves: list[Event] = []
         self._samples = 0
-        self._idle = perf_counter()
-
-    @property
-    def idle(self) -> float:
-        """Time since the last move ended, s."""
-        return perf_counter() - self._idle
 
     def execute(self, move: Move) -> Trace:
-        self.waits.append(self.idle)
         before = float(self.felt[-1].t[-1]) if self.felt else None
-        trace = self.finger.execute(move)
+        trace = self.waits(move)
         self.moves.append(move_event(move, before, self._samples, len(trace)))
         if len(trace):
             self.felt.append(trace)
             self._samples += len(trace)
-        self._idle = perf_counter()
         return trace
 
     def log(self) -> Log:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scene_files import write_scene_file
 from explore3d.analysis.result import Analysis
 from explore3d.errors import UserError
 from explore3d.jobs.analyze import analyze
+from explore3d.jobs.expedition import Waits
 from explore3d.jobs.run import run
 from explore3d.log.own.reader import read_log
 from explore3d.log.own.record import read_base
@@ -131,3 +133,25 @@ def test_an_object_that_stands_too_far_off_is_not_explored(tmp_path: Path) -> No
     analysis = run(write_scene(tmp_path, model, object), tmp_path / "out")
     assert "the scene allows 1 mm" in analysis.ended
     assert any(left.stage == "pose" for left in analysis.left_out)
+
+
+def test_waits_are_what_the_program_takes_between_moves_and_not_what_the_finger_does():
+    def busy(seconds: float) -> None:
+        end = process_time() + seconds
+        while process_time() < end:
+            pass
+
+    def execute(move: Move) -> Trace:
+        busy(0.05)
+        return Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), 5e-3)
+
+    waits = Waits(execute)
+    for seconds in (0.1, 0.02, 0.04, 0.02):
+        busy(seconds)
+        waits(Move(np.zeros((2, 3)), np.array([[0.0, 0.0, -1.0]] * 2)))
+    busy(0.03)
+    waits.ended()
+    told = waits.computing(0.5)
+    assert told.planning == pytest.approx(0.21, rel=0.1) and waits.carrying_out == pytest.approx(0.2, rel=0.1)
+    assert told.median_wait == pytest.approx(0.02, rel=0.2) and told.worst_wait == pytest.approx(0.04, rel=0.2)
+    assert "71 % of the finger's time" in told.sentence(1.0)
