@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 
 import numpy as np
 
@@ -24,6 +26,8 @@ FIRST_NOISE_PATH = 50.0
 CANDIDATES = 4.0
 # Height that must stay visible between two sweeps, in detection limits; and its least share of the smallest feature's
 VISIBLE_HEIGHT_MARGIN, LEAST_VISIBLE_SHARE = 1.25, 0.1
+# Sweeps that are worked out before each one: all are known after a third of them, and three take some 40 ms
+LAID_OUT = 3
 # Samples that a sweep must have to be looked at
 FEWEST_SWEEP_SAMPLES = 16
 
@@ -33,7 +37,7 @@ class SurveyCount:
     """How far a survey is, for whoever watches it.
 
     Args:
-        planned: sweeps that it wants, known once the first has told the noise; None before.
+        planned: sweeps that it wants, known after a third of them; None before.
         made: sweeps that it was answered, also those that could not be made.
     """
 
@@ -84,9 +88,7 @@ class Surveyor:
             self._keep(executed(first, trace), trace)
             self._widen(trace)
         waiting, felt = list[Trace](), 0.0
-        moves = list(self.survey.sweeps(self.visible))
-        self.count.planned = self.count.made + len(moves)
-        for move in moves:
+        for move in self._laid_out():
             trace = yield move
             self.count.made += 1
             done = executed(move, trace)
@@ -105,6 +107,18 @@ class Surveyor:
         if waiting:
             self._detect(waiting)
         return Outcome("done")
+
+    def _laid_out(self) -> Iterator[Move]:
+        """The sweeps, a few of them worked out before each: the finger does not wait for all of them at once."""
+        coming, ahead = self.survey.sweeps(self.visible), deque[Move]()
+        while True:
+            if self.count.planned is None:
+                more = list(islice(coming, LAID_OUT))
+                ahead.extend(more)
+                self.count.planned = self.count.made + len(ahead) if len(more) < LAID_OUT else None
+            if not ahead:
+                return
+            yield ahead.popleft()
 
     def _keep(self, done: Sequence[Move], trace: Trace) -> None:
         self.commanded.extend(part.path for part in done)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -45,14 +46,24 @@ class Limits:
 
     def violation(self, move: Move, before: Move | None = None) -> str | None:
         """What is wrong with the move, and the way to it from the one before it, as a sentence; None if nothing is."""
-        for complaint in (self._workspace(move), self._speed(move)):
-            if complaint:
-                return complaint
-        if self.base is None:
-            return None
-        checks = (self._field(move, self.base), self._collision(move, self.base), self._stem(move, self.base))
-        way = None if before is None else self._way(before, move, self.base)
-        return next((complaint for complaint in (*checks, way) if complaint), None)
+        if not self._last or self._last[-1][0] is not move:
+            self._last[:] = [(move, self._wrong(move))]
+        wrong = self._last[-1][1]
+        if wrong or before is None or self.base is None:
+            return wrong
+        return self._way(before, move, self.base)
+
+    @cached_property
+    def _last(self) -> list[tuple[Move, str | None]]:
+        """The last move that was looked at, and what is wrong with it: router and driver ask for one in turn."""
+        return []
+
+    def _wrong(self, move: Move) -> str | None:
+        """What is wrong with the move itself, wherever it begins."""
+        complaint = self._workspace(move) or self._speed(move)
+        if complaint or self.base is None:
+            return complaint
+        return self._field(move, self.base) or self._collision(move, self.base) or self._stem(move, self.base)
 
     def _workspace(self, move: Move) -> str | None:
         outside = ((move.path < self.workspace.low) | (move.path > self.workspace.high)).any(axis=1)

@@ -51,12 +51,13 @@ def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
     return np.stack([before.path[-1] - first * before.approach[-1], after.path[0] - last * after.approach[0]])
 
 
-def sunk(path: FloatArray, base: Base, tip_radius: float, spacing: float = 0.5) -> float:
-    """How deep a ball on a polyline (K, 3) sinks into the base at the deepest, m; 0 where it stays free.
+def sunk(path: FloatArray, base: Base, tip_radius: float) -> float:
+    """How deep a ball on a polyline (K, 3) may sink into the base at the deepest, m; 0 where it stays free.
 
-    It is looked at every `spacing` tip radii: round an edge it may sink spacing^2 / 8 of them deeper between.
+    It is looked at every FREE_SPACING tip radii: round an edge it may sink FREE_SPACING^2 / 8 of them deeper between.
     """
-    return max(0.0, -float(base.foot(dense(path, spacing * tip_radius), tip_radius).height.min()))
+    lowest = float(base.foot(dense(path, FREE_SPACING * tip_radius), tip_radius).height.min())
+    return max(0.0, FREE_SPACING**2 / 8.0 * tip_radius - lowest) if lowest < 0.0 else 0.0
 
 
 def dense(path: FloatArray, spacing: float) -> FloatArray:
@@ -288,7 +289,10 @@ class Ways:
         near = self._near_surface(points)
         points, a, b = np.concatenate([points, near[0]]), np.append(a, near[1]), np.append(b, near[2])
         lengths = np.linalg.norm(points[a] - points[b], axis=1)
-        return points, coo_matrix((lengths, (a, b)), shape=(len(points), len(points))).tocsr()
+        one_way = coo_matrix((lengths, (a, b)), shape=(len(points), len(points))).tocsr()
+        # to both sides: a search over an undirected graph would turn it round anew for every way
+        graph = one_way.maximum(one_way.T).tocsr()
+        return points, graph
 
     def _near_surface(self, grid: FloatArray) -> tuple[FloatArray, IntArray, IntArray]:
         """Free places (M, 3) off the surface that the grid's nodes (N, 3) are too coarse for, and the ways to others.
@@ -345,9 +349,7 @@ class Ways:
             return None
         straight = float(np.linalg.norm(points[target] - points[source]))
         for limit in (SHORT_WAY * straight + ROOM * self.tip_radius, np.inf):
-            lengths, befores = dijkstra(
-                graph, directed=False, indices=np.array([source]), return_predecessors=True, limit=limit
-            )
+            lengths, befores = dijkstra(graph, indices=np.array([source]), return_predecessors=True, limit=limit)
             if np.isfinite(lengths[0, target]):
                 break
         else:

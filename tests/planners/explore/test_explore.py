@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from mapping.trace import Trace
 from planners.budget import Spent, within
 from planners.drive import drive
 from planners.explore.explore import Explore, Found
+from planners.explore.surveyor import Surveyor
 from planners.follow.axis_track import AxisEnd, AxisTrack, course, polyline_distance
 from planners.follow.bump import BumpSizer
 from planners.follow.sense import Sense
@@ -350,3 +352,21 @@ def test_a_bump_that_is_not_there_costs_two_sweeps() -> None:
     sizer = BumpSizer(Strokes(base, R), Sense(base, Noise(1e-4)), 1e-4)
     record, outcome = drive(sizer.size(seed), finger.execute)
     assert outcome.reason == "lost" and len(record) == 2
+
+
+def test_a_survey_is_worked_out_as_it_goes_and_says_how_long_it_is_once_that_is_known():
+    drawn = list[int]()
+
+    def sweeps(visible):
+        for number in range(10):
+            drawn.append(number)
+            yield number
+
+    surveyor = Surveyor(SimpleNamespace(visible=0.35, sweeps=sweeps), Found(5e-3), 0.01)
+    seen = []
+    for move in surveyor._laid_out():
+        seen.append((move, len(drawn), surveyor.count.planned))
+        surveyor.count.made += 1
+    assert [move for move, _, _ in seen] == list(range(10))
+    assert [known for _, known, _ in seen[:4]] == [3, 6, 9, 10]
+    assert [planned for _, _, planned in seen] == [None, None, None, *[10] * 7]
