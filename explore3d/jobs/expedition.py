@@ -92,7 +92,7 @@ class SurveyWatch:
 
     Args:
         execute: carries out one move.
-        event: told once how many sweeps the survey has.
+        event: told how many sweeps the survey has, and again where that changes.
         count: how far the survey's own account is.
     """
 
@@ -102,7 +102,7 @@ class SurveyWatch:
     refused: str = field(init=False, default="")  # why the finger did not carry out the last move that it refused
     _sweeps: int = field(init=False, default=0)
     _before: int = field(init=False, default=0)
-    _told: bool = field(init=False, default=False)
+    _told: int | None = field(init=False, default=None)
 
     def begun(self) -> SurveyCount:
         """The count to keep up: the survey begins, what was swept before was to know the base."""
@@ -110,8 +110,8 @@ class SurveyWatch:
         return self.count
 
     def __call__(self, move: Move) -> Trace:
-        if self.count.planned is not None and not self._told:
-            self._told = True
+        if self.count.planned != self._told:
+            self._told = self.count.planned
             self.event(SURVEY, {"sweeps": self.count.planned, "before": self._before})
         try:
             trace = self.execute(move)

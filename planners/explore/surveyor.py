@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
 
 import numpy as np
 
@@ -26,7 +25,7 @@ FIRST_NOISE_PATH = 50.0
 CANDIDATES = 4.0
 # Height that must stay visible between two sweeps, in detection limits; and its least share of the smallest feature's
 VISIBLE_HEIGHT_MARGIN, LEAST_VISIBLE_SHARE = 1.25, 0.1
-# Sweeps that are worked out before each one: all are known after a third of them, and three take some 40 ms
+# Lines that are worked out before each sweep, some 40 ms: all are after a third of the sweeps
 LAID_OUT = 3
 # Samples that a sweep must have to be looked at
 FEWEST_SWEEP_SAMPLES = 16
@@ -37,7 +36,8 @@ class SurveyCount:
     """How far a survey is, for whoever watches it.
 
     Args:
-        planned: sweeps that it wants, known after a third of them; None before.
+        planned: sweeps that it wants, known once the first has told the noise; None before. A line is one, until it is
+            known whether ball and stem can make it whole: it changes in the first third where they cannot.
         made: sweeps that it was answered, also those that could not be made.
     """
 
@@ -109,16 +109,16 @@ class Surveyor:
         return Outcome("done")
 
     def _laid_out(self) -> Iterator[Move]:
-        """The sweeps, a few of them worked out before each: the finger does not wait for all of them at once."""
-        coming, ahead = self.survey.sweeps(self.visible), deque[Move]()
+        """The sweeps; what ball and stem can make of a few lines is worked out before each, not of all at once."""
+        lines, ahead = deque(self.survey.lines(self.visible)), deque[Move]()
         while True:
-            if self.count.planned is None:
-                more = list(islice(coming, LAID_OUT))
-                ahead.extend(more)
-                self.count.planned = self.count.made + len(ahead) if len(more) < LAID_OUT else None
-            if not ahead:
+            for _ in range(min(LAID_OUT, len(lines))):
+                ahead.extend(self.survey.pressed(lines.popleft()))
+            self.count.planned = self.count.made + len(ahead) + len(lines)
+            if ahead:
+                yield ahead.popleft()
+            elif not lines:
                 return
-            yield ahead.popleft()
 
     def _keep(self, done: Sequence[Move], trace: Trace) -> None:
         self.commanded.extend(part.path for part in done)

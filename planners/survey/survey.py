@@ -108,11 +108,14 @@ class Survey:
 
     def sweeps(self, visible: float | None = None) -> Iterator[Move]:
         """All sweeps, each begun near the end of the one before it; another visible share may be given."""
+        for line in self.lines(visible):
+            yield from self.pressed(line)
+
+    def lines(self, visible: float | None = None) -> Iterator[Isoline]:
+        """Where the sweeps touch the base; what ball and stem can make of each is worked out by `pressed`."""
         visible = visible or self.visible
         slices = self.crossed(visible)
-        lines = self._strips(self.strip(visible)) if slices is None else self._sections(slices)
-        for line in lines:
-            yield from self._pressed(line)
+        return self._strips(self.strip(visible)) if slices is None else self._sections(slices)
 
     def _sections(self, slices: Slices) -> Iterator[Isoline]:
         """Lines along one family of plane sections after the other."""
@@ -157,7 +160,8 @@ class Survey:
             if len(chart) < len(surface.faces):
                 done |= self.covered(touched, pitch).share > 0.999
 
-    def _pressed(self, line: Isoline) -> Iterator[Move]:
+    def pressed(self, line: Isoline) -> Iterator[Move]:
+        """The sweeps along a line that ball and stem can make."""
         points, normals = touched_points(line, self.base.surface)
         points, normals = thinned(points, normals, min(0.1 * self.tip_radius, 0.5 * self.pitch))
         sweep = pressed_sweep(points, normals, self.tip_radius, self.speed, self.force)

@@ -354,19 +354,22 @@ def test_a_bump_that_is_not_there_costs_two_sweeps() -> None:
     assert outcome.reason == "lost" and len(record) == 2
 
 
-def test_a_survey_is_worked_out_as_it_goes_and_says_how_long_it_is_once_that_is_known():
-    drawn = list[int]()
+def test_a_survey_is_worked_out_as_it_goes_and_knows_how_long_it_is():
+    pressed = list[int]()
 
-    def sweeps(visible):
-        for number in range(10):
-            drawn.append(number)
-            yield number
+    def press(line):
+        pressed.append(line)
+        yield from {4: [], 5: [5, 50], 9: []}.get(line, [line])  # one in two parts, two not at all
 
-    surveyor = Surveyor(SimpleNamespace(visible=0.35, sweeps=sweeps), Found(5e-3), 0.01)
-    seen = []
+    surveyor = Surveyor(
+        SimpleNamespace(visible=0.35, lines=lambda visible: iter(range(10)), pressed=press), Found(R), 1.0
+    )
+    moves, known, planned = list[int](), list[int](), list[int | None]()
     for move in surveyor._laid_out():
-        seen.append((move, len(drawn), surveyor.count.planned))
+        moves.append(move)
+        known.append(len(pressed))
+        planned.append(surveyor.count.planned)
         surveyor.count.made += 1
-    assert [move for move, _, _ in seen] == list(range(10))
-    assert [known for _, known, _ in seen[:4]] == [3, 6, 9, 10]
-    assert [planned for _, _, planned in seen] == [None, None, None, *[10] * 7]
+    assert moves == [0, 1, 2, 3, 5, 50, 6, 7, 8] and surveyor.count.planned == surveyor.count.made == 9
+    assert known == [3, 6, 9, *[10] * 6]
+    assert planned == [10, 10, 10, *[9] * 6]
