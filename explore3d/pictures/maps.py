@@ -74,9 +74,10 @@ def curvature_picture(
     scaled[:, 2:] = np.hypot(scaled[:, 2:], _contradicted(estimate.surface.faces, estimate.sweep, scaled[:, :2]))
     felt = replace(felt, values=scaled[known])
     bodies = [Body(each, np.ones(3)) for each in (base, *map(feature_mesh, features))]
+    sides = np.concatenate([base.face_normals, *(_sides(*each) for each in zip(bodies[1:], features, strict=True))])
     content, down, right = "", CURVATURE_TITLE, 0.0
     for camera in cameras_for(base.vertices[np.unique(base.faces)], directions):
-        picture = render(bodies, camera)
+        picture = replace(render(bodies, camera), flat=sides)
         width, height = camera.width / SUPERSAMPLING, camera.height / SUPERSAMPLING
         lit = picture.reduced(SUPERSAMPLING) / 255.0
         for left, colours, name in zip(
@@ -171,6 +172,13 @@ class Line:
         length = float(arclengths(self.axis)[-1])
         beyond = np.maximum(np.maximum(-beside[:, 0], beside[:, 0] - length), 0.0)
         return np.clip((ZONE - np.hypot(beside[:, 1], beyond) / self.reach) / (ZONE - 1.0), 0.0, 1.0)
+
+
+def _sides(body: Body, feature: Feature) -> FloatArray:
+    """(F, 3) of the faces of a feature's body: the base's normal under it. What was felt on a steep flank leans less."""
+    middles = body.surface.vertices[body.surface.faces].mean(axis=1)
+    nearest = np.linalg.norm(middles[:, None] - feature.axis[None], axis=2).argmin(axis=1)
+    return np.asarray(feature.normals[nearest])
 
 
 def _contradicted(faces: IntArray, sweep: IntArray, values: FloatArray) -> FloatArray:
