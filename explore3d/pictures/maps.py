@@ -175,7 +175,7 @@ class Line:
 
 
 def _sides(body: Body, feature: Feature) -> FloatArray:
-    """(F, 3) of the faces of a feature's body: the base's normal under it. What was felt on a steep flank leans less."""
+    """(F, 3) of a feature's body: the base's normal under each face. What was felt on a steep flank leans less."""
     middles = body.surface.vertices[body.surface.faces].mean(axis=1)
     nearest = np.linalg.norm(middles[:, None] - feature.axis[None], axis=2).argmin(axis=1)
     return np.asarray(feature.normals[nearest])
