@@ -31,7 +31,11 @@ if TYPE_CHECKING:
         thinned as thinned,
     )
     from explore3d.pictures.section import section_picture as section_picture
-    from explore3d.pictures.sweep_paths import SweepPath as SweepPath, sweep_paths as sweep_paths
+    from explore3d.pictures.sweep_paths import (
+        SweepPath as SweepPath,
+        over_features as over_features,
+        sweep_paths as sweep_paths,
+    )
 
 _PUBLIC = {
     "corner": ("corner_picture",),
@@ -44,6 +48,6 @@ _PUBLIC = {
     "plan": ("plan_picture",),
     "profile": ("profile_line", "profile_picture", "thinned"),
     "section": ("section_picture",),
-    "sweep_paths": ("SweepPath", "sweep_paths"),
+    "sweep_paths": ("SweepPath", "over_features", "sweep_paths"),
 }
 doorway(__name__, _PUBLIC)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from explore3d.pictures.chart import FONT_SIZE, drawing, image, pixels_png, text_at
 from explore3d.pictures.object import SUPERSAMPLING, cameras_for, pictured, shifted, view_directions
-from explore3d.pictures.render import Body, render
+from explore3d.pictures.render import Body, Picture, render
 from mapping import BoolArray, Feature, FloatArray, IntArray, Surface, length_unit
-from mapping.geometry.mesh import NearestPoint
+from mapping.geometry.mesh import arclengths, directions, resample
+from mapping.model import feature_mesh
 
 if TYPE_CHECKING:
+    from mapping.estimate.envelope import Estimate
     from mapping.geometry.curvature import Curvature
 
 NOT_VALID = np.array([0.75, 0.75, 0.75])
@@ -25,55 +28,242 @@ BLUE_TO_RED = (
 BAR = (16.0, 220.0)  # width and height of the scale of colours, px
 BAR_ROOM = 90.0  # px
 CURVATURE_TITLE = 28.0  # px
-# Views of the object that curvatures are drawn in, two pictures each
-MOST_ROWS = 2
-# An edge of 2 r that spans a body of radius 5 r or more stays nearer to it than this share of r: (2 r)^2 / (8 * 5 r)
-LID_SAGITTA = 0.1
+# A map is read once for so many pixels of the drawing each way: its values change over several samples
+MAP_PIXELS = 2
+# Points that a value is read from: those of a ring about the nearest in a mesh of triangles, and of the ring about it
+# (6 and 12), less those that weigh nothing
+READ_FROM = 12
+# What is felt around the corner, turned by more than 60 degrees, says nothing of a place
+LEAST_ALIKE = 0.5
+# A line's own values hold up to its reach, and fade to nothing at so many times it: the fits of curvature take in
+# neighbours from as far again
+ZONE = 2.0
+LINE_PLACES = 400
+# Sweeps that cross a line before a map reads between them, and the share of the gaps between them that it spans
+LEAST_CROSSINGS, SPANNED = 3, 0.9
 # Places on the scale that bear a number
 MARKS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 
 
 def curvature_picture(
-    surface: Surface, curvature: Curvature, tip_radius: float, base: Surface, features: Sequence[Feature]
+    estimate: Estimate, curvature: Curvature, tip_radius: float, base: Surface, features: Sequence[Feature]
 ) -> bytes:
-    """SVG of k1 and k2 in units of 1/r: red bulges out, blue bends in; the paler, the less sure
-    it is which of both, grey where no value is valid.
+    """SVG of k1 and k2 in units of 1/r, on the object as it was found: red bulges out, blue bends in; the paler, the
+    less sure it is which of both; grey is further than the tip's radius from every place that was felt.
 
-    A row for each view of the object's own picture; what merely closes an opening of the object is not drawn, and a
-    tear of the mesh that the ball does not pass is closed in the colour of its rim.
+    The views are those of the object's own picture. What is drawn is the base with its features, not the mesh of the
+    estimate: between sweeps that lie apart that mesh is folded as the triangles happen to fall.
 
     Args:
-        surface: the estimated surface.
-        curvature: at its vertices.
+        estimate: of the surface, with a mesh.
+        curvature: at its points.
         tip_radius: r, m.
         base: the global model.
         features: that were found: they are turned to the front.
     """
-    areas = surface.face_areas[:, None]
-    directions = view_directions(surface.face_normals * areas / areas.mean(), features, base)[:MOST_ROWS]
-    highest = max((max(abs(each.height.low), abs(each.height.high)) for each in features), default=0.0)
-    near = NearestPoint(base)
-    surface = _without_spikes(_without_lids(surface, near, tip_radius), near, highest + LID_SAGITTA * tip_radius)
-    closed, rims = _without_tears(surface, tip_radius)
-    scaled, sd = [np.asarray(values) * tip_radius for values in (curvature.k1, curvature.k2)], curvature.sd * tip_radius
-    top = _span(scaled, curvature.valid)
+    assert estimate.surface is not None
+    areas = estimate.surface.face_areas[:, None]
+    outward = estimate.surface.face_normals * areas / areas.mean()
+    directions = view_directions(outward, features, base)
+    own_sd = np.nan_to_num(curvature.sd)
+    scaled = np.column_stack([curvature.k1, curvature.k2, own_sd, own_sd]) * tip_radius
+    top = _span([scaled[:, 0], scaled[:, 1]], curvature.valid)
+    known = np.flatnonzero(curvature.valid & np.isfinite(scaled).all(axis=1))
+    felt = Felt(estimate.points[known], estimate.normals[known], estimate.sweep[known], scaled[known])
+    lines = [line for each in features if (line := Line.of(each, felt, tip_radius)) is not None]
+    scaled[:, 2:] = np.hypot(scaled[:, 2:], _contradicted(estimate.surface.faces, estimate.sweep, scaled[:, :2]))
+    felt = replace(felt, values=scaled[known])
+    bodies = [Body(each, np.ones(3)) for each in (base, *map(feature_mesh, features))]
+    sides = np.concatenate([base.face_normals, *(_sides(*each) for each in zip(bodies[1:], features, strict=True))])
     content, down, right = "", CURVATURE_TITLE, 0.0
-    for direction in directions:
-        camera = cameras_for(surface.vertices, [direction, direction])[0]
+    for camera in cameras_for(base.vertices[np.unique(base.faces)], directions):
+        picture = replace(render(bodies, camera), flat=sides)
         width, height = camera.width / SUPERSAMPLING, camera.height / SUPERSAMPLING
-        for left, values, name in zip((0.0, width), scaled, ("larger, k₁", "smaller, k₂"), strict=True):
-            colours = coloured(0.5 + 0.5 * faded(values / top, sd / top))
-            colours[~curvature.valid] = NOT_VALID
+        lit = picture.reduced(SUPERSAMPLING) / 255.0
+        for left, colours, name in zip(
+            (0.0, width),
+            _map_colours(picture, felt, lines, tip_radius, top),
+            ("larger, k₁", "smaller, k₂"),
+            strict=True,
+        ):
             if not right:
                 content += text_at(left + 4.0, 18.0, f"Principal curvature, {name}", size=1.1 * FONT_SIZE, bold=True)
-            colours = np.vstack([colours, *(colours[rim].mean(axis=0) for rim in rims)])
-            content += shifted(pictured(render([Body(closed, colours)], camera, rims=False)), left, down)
+            pixels = np.rint(255.0 * lit * colours[: lit.shape[0], : lit.shape[1]]).astype(np.uint8)
+            content += shifted(image(pixels_png(pixels), 0.0, 0.0, width, height), left, down)
         down, right = down + height, max(right, 2.0 * width)
     bar = min(BAR[1], down - CURVATURE_TITLE)
     marks = [f"{share * top:.2g}" for share in MARKS]
     middle = 0.5 * (CURVATURE_TITLE + down - bar)
     content += shifted(_bar(marks, "curvature × tip radius", bar), right + 14.0, middle)
     return drawing(right + BAR_ROOM, down + 10.0, content)
+
+
+@dataclass(frozen=True, eq=False)
+class Felt:
+    """Places (N, 3) of an estimate, m, outward normals (N, 3), sweeps (N,), and values (N, 4): k1, k2 and their sds."""
+
+    places: FloatArray
+    normals: FloatArray
+    sweep: IntArray
+    values: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A feature along a curve as a map reads it: between the sweeps that cross it, along its axis.
+
+    A sweep meets it where the next one does not, so a mesh joins its crest to its flank or to the plate. What lies as
+    far along it as sweeps lie apart is as near as what lies one sample aside.
+
+    Args:
+        axis, normals, ways: (K, 3) places of its axis, m, outward normals, unit directions along.
+        reach: the ball leaves the base at this distance from its axis, m.
+        scale: (2,) distance between crossings along the axis and between samples across it, m.
+        beside: (M, 2) places of the felt beside it, along and across, in units of the scale.
+        values: (M, 4) theirs.
+    """
+
+    axis: FloatArray
+    normals: FloatArray
+    ways: FloatArray
+    reach: float
+    scale: FloatArray
+    beside: FloatArray
+    values: FloatArray
+
+    @classmethod
+    def of(cls, feature: Feature, felt: Felt, tip_radius: float) -> Line | None:
+        """None of a feature without a length, or that too few sweeps cross to read between them."""
+        if len(feature.axis) < 2:
+            return None
+        axis = resample(feature.axis, LINE_PLACES)
+        share, own = np.linspace(0.0, 1.0, LINE_PLACES), arclengths(feature.axis)
+        normals = np.column_stack([np.interp(share, own / own[-1], feature.normals[:, i]) for i in range(3)])
+        height = min(abs(feature.height.median), tip_radius)
+        reach = float(np.sqrt(2.0 * tip_radius * height) + 0.5 * max(feature.width.median, 0.0))
+        line = cls(axis, normals, directions(axis), reach, np.ones(2), np.zeros((0, 2)), np.zeros((0, 4)))
+        near, beside = line.zone(felt.places, felt.normals)
+        crossed = near[np.abs(beside[:, 1]) < 0.5 * reach]
+        if len(sweeps := np.unique(felt.sweep[crossed])) < LEAST_CROSSINGS:
+            return None
+        along = beside[np.abs(beside[:, 1]) < 0.5 * reach, 0]
+        met = np.sort([along[felt.sweep[crossed] == each].mean() for each in sweeps])
+        own_way = np.flatnonzero(np.diff(felt.sweep[near]) == 0)
+        steps = np.linalg.norm(np.diff(felt.places[near], axis=0)[own_way], axis=1)
+        step = float(np.median(steps)) if len(steps) else reach
+        scale = np.array([max(float(np.quantile(np.diff(met), SPANNED)), step), step])
+        return replace(line, scale=scale, beside=beside / scale, values=felt.values[near])
+
+    def zone(self, places: FloatArray, normals: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Which of the places (N, 3) lie beside the line, on its side of the body; (M, 2) how far along and across."""
+        from scipy.spatial import cKDTree
+
+        apart, foot = cKDTree(self.axis).query(places, distance_upper_bound=ZONE * self.reach)
+        near, foot = np.flatnonzero(np.isfinite(apart)), np.asarray(foot)
+        near = near[np.einsum("ij,ij->i", normals[near], self.normals[foot[near]]) > 0.0]
+        foot = foot[near]
+        off, way = places[near] - self.axis[foot], self.ways[foot]
+        along = arclengths(self.axis)[foot] + np.einsum("ij,ij->i", off, way)
+        across = np.einsum("ij,ij->i", off, np.cross(self.normals[foot], way))
+        return near, np.column_stack([along, across])
+
+    def share(self, beside: FloatArray) -> FloatArray:
+        """(M,) 1 where places (M, 2) along and across are the line's own, 0 where they are no longer."""
+        length = float(arclengths(self.axis)[-1])
+        beyond = np.maximum(np.maximum(-beside[:, 0], beside[:, 0] - length), 0.0)
+        return np.clip((ZONE - np.hypot(beside[:, 1], beyond) / self.reach) / (ZONE - 1.0), 0.0, 1.0)
+
+
+def _sides(body: Body, feature: Feature) -> FloatArray:
+    """(F, 3) of a feature's body: the base's normal under each face. What was felt on a steep flank leans less."""
+    middles = body.surface.vertices[body.surface.faces].mean(axis=1)
+    nearest = np.linalg.norm(middles[:, None] - feature.axis[None], axis=2).argmin(axis=1)
+    return np.asarray(feature.normals[nearest])
+
+
+def _contradicted(faces: IntArray, sweep: IntArray, values: FloatArray) -> FloatArray:
+    """(N, 2) root mean square difference of values (N, 2) to those that other sweeps gave beside them; 0 for none.
+
+    A detail that lies between two sweeps is one thing to the one and another to the other: what only one of them says
+    is not known of the surface between them.
+    """
+    sides = np.concatenate([faces, np.roll(faces, -1, axis=1)]).reshape(2, -1).T
+    sides = sides[sweep[sides[:, 0]] != sweep[sides[:, 1]]]
+    squares = np.nan_to_num((values[sides[:, 0]] - values[sides[:, 1]]) ** 2)
+    ends, twice = sides.T.ravel(), np.concatenate([squares, squares])
+    count = np.maximum(np.bincount(ends, minlength=len(values)), 1)
+    return np.sqrt(np.column_stack([np.bincount(ends, twice[:, i], len(values)) / count for i in (0, 1)]))
+
+
+def _map_colours(
+    picture: Picture, felt: Felt, lines: Sequence[Line], tip_radius: float, top: float
+) -> tuple[FloatArray, FloatArray]:
+    """(H, W, 3) colours of k1 and of k2 for the pixels of the drawing, a block of MAP_PIXELS alike."""
+    places, normals, blocks = _seen(picture, SUPERSAMPLING * MAP_PIXELS)
+    front = np.einsum("ij,ij->i", felt.normals, picture.camera.eye - felt.places) > 0.0  # walls are thin
+    read, apart = _read(places, felt.places[front], felt.values[front], (normals, felt.normals[front]))
+    for line in lines:
+        near, beside = line.zone(places, normals)
+        if len(near):
+            own, _ = _read(beside / line.scale, line.beside, line.values)
+            share = line.share(beside)[:, None]
+            read[near] = share * own + (1.0 - share) * read[near]
+    maps = []
+    for number in (0, 1):
+        colours = coloured(0.5 + 0.5 * faded(read[:, number] / top, read[:, 2 + number] / top))
+        colours[~(apart < tip_radius)] = NOT_VALID
+        whole = np.ones((*blocks.shape, 3))
+        whole[blocks] = colours
+        maps.append(whole.repeat(MAP_PIXELS, axis=0).repeat(MAP_PIXELS, axis=1))
+    return maps[0], maps[1]
+
+
+def _seen(picture: Picture, block: int) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Of each block of pixels that sees the body one place (M, 3) and normal (M, 3), and which blocks (H, W) do."""
+    height, width = (-(-each // block) * block for each in picture.depth.shape)
+    rows, columns = picture.depth.shape
+    depth = np.full((height, width), np.inf, dtype=np.float32)
+    depth[:rows, :columns] = picture.depth
+    tiles = depth.reshape(height // block, block, width // block, block).swapaxes(1, 2).reshape(-1, block * block)
+    best = tiles.argmin(axis=1)
+    sees = np.isfinite(tiles[np.arange(len(tiles)), best])
+    tile = np.flatnonzero(sees)
+    row = block * (tile // (width // block)) + best[sees] // block
+    column = block * (tile % (width // block)) + best[sees] % block
+    places = picture.camera.eye + picture.depth[row, column][:, None] * picture.camera.rays()[row, column]
+    return places, picture.normals(row, column), sees.reshape(height // block, width // block)
+
+
+def _read(
+    places: FloatArray, points: FloatArray, values: FloatArray, sides: tuple[FloatArray, FloatArray] | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """(M, 4) k1, k2 and their standard deviations at places (M, D), and (M,) how far the nearest point is.
+
+    Means over the READ_FROM nearest points (N, D), weighed down to nothing at the last of them, so that they change
+    without a jump; neighbours that contradict each other make a value unsure.
+
+    Args:
+        values: (N, 4) k1, k2 and their standard deviations.
+        sides: normals of places and points: what faces away does not count. None: all does.
+    """
+    from scipy.spatial import cKDTree
+
+    count = min(READ_FROM, len(points))
+    if count == 0:
+        return np.zeros((len(places), 4)), np.full(len(places), np.inf)
+    apart, which = cKDTree(points).query(places, k=count)
+    apart, which = np.reshape(apart, (len(places), count)), np.reshape(which, (len(places), count))
+    weights = (1.0 - (apart / np.maximum(apart[:, -1:], np.finfo(float).tiny)) ** 2) ** 2 + 1e-9
+    nearest = apart[:, 0]
+    if sides is not None:
+        facing = np.einsum("mj,mkj->mk", sides[0], sides[1][which])
+        weights = weights * np.clip(facing, 0.0, 1.0)
+        nearest = np.where(facing > LEAST_ALIKE, apart, np.inf).min(axis=1)
+    weights = weights / np.maximum(weights.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    mean = np.einsum("mk,mkj->mj", weights, values[which])
+    spread = np.einsum("mk,mkj->mj", weights, values[which][..., :2] ** 2) - mean[:, :2] ** 2
+    sd = np.sqrt(np.maximum(spread, 0.0) + mean[:, 2:] ** 2)
+    return np.column_stack([mean[:, :2], sd]), nearest
 
 
 def faded(shares: FloatArray, sd: FloatArray) -> FloatArray:
@@ -91,67 +281,6 @@ def faded(shares: FloatArray, sd: FloatArray) -> FloatArray:
     with np.errstate(divide="ignore", invalid="ignore"):
         sure = 2.0 * ndtr(np.abs(shares) / sd) - 1.0
     return np.clip(shares, -1.0, 1.0) * np.where(np.isnan(sure), 1.0, sure)
-
-
-def _without_lids(surface: Surface, near: NearestPoint, tip_radius: float) -> Surface:
-    """The faces that a ball can rest on: one wider than the ball whose longest edge leaves the base closes a hole."""
-    corners = surface.vertices[surface.faces]
-    others = np.roll(corners, 1, axis=1)
-    edges = np.linalg.norm(corners - others, axis=2)
-    wide, longest = np.flatnonzero(edges.max(axis=1) > 2.0 * tip_radius), edges.argmax(axis=1)
-    middles = 0.5 * (corners + others)[wide, longest[wide]]
-    off = near.query(middles).distance > LID_SAGITTA * tip_radius
-    return Surface(surface.vertices, np.delete(surface.faces, wide[off], axis=0))
-
-
-def _without_spikes(surface: Surface, near: NearestPoint, allowed: float) -> Surface:
-    """The faces none of whose corners is further off the base than any feature: where sweeps end, balls far apart meet
-    beside the body."""
-    off = near.query(surface.vertices).distance > allowed
-    kept = ~off[surface.faces].any(axis=1)
-    return Surface(surface.vertices, surface.faces[kept]) if kept.any() else surface
-
-
-def _without_tears(surface: Surface, tip_radius: float) -> tuple[Surface, list[IntArray]]:
-    """A fan over each hole whose rim is shorter than the ball's girth, which the ball does not pass.
-
-    Returns:
-        The surface, with one more vertex for each hole, and the vertices of their rims.
-    """
-    sides = np.concatenate([surface.faces, np.roll(surface.faces, -1, axis=1)]).reshape(2, -1).T
-    _, which, times = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    vertices, faces = [surface.vertices], [surface.faces]
-    rims: list[IntArray] = []
-    for rim in _rims(sides[times[which.ravel()] == 1]):
-        ends = surface.vertices[rim]
-        if np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum() < 2.0 * np.pi * tip_radius:
-            faces.append(np.column_stack([rim[:, ::-1], np.full(len(rim), len(surface.vertices) + len(rims))]))
-            vertices.append(ends[:, 0].mean(axis=0, keepdims=True))
-            rims.append(rim[:, 0])
-    return Surface(np.concatenate(vertices), np.concatenate(faces)), rims
-
-
-def _rims(sides: IntArray) -> list[IntArray]:
-    """The closed ones among directed sides (N, 2) that have a face to one hand only, each in its order.
-
-    None passes a place twice: where two holes, or a hole and the border, meet in a corner they are two.
-    """
-    after: dict[int, list[int]] = {}
-    for begin, end in sides.tolist():
-        after.setdefault(begin, []).append(end)
-    rims = []
-    for first in list(after):
-        while after[first]:
-            path, place = [first], first
-            while after.get(place):
-                place = after[place].pop()
-                if place in path:
-                    loop = path[path.index(place) :]
-                    rims.append(np.column_stack([loop, np.roll(loop, -1)]))
-                    del path[path.index(place) + 1 :]
-                else:
-                    path.append(place)
-    return rims
 
 
 def coloured(share: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explore3d.pictures.camera import Camera
-from mapping import FloatArray, Surface
+from mapping import FloatArray, IntArray, Surface
 
 # Creases sharper than this keep their edge; flatter ones are shaded round.
 CREASE_COSINE = np.cos(np.radians(35.0))
@@ -33,11 +33,24 @@ class Body:
 
 @dataclass
 class Picture:
-    """Pixels (H, W, 3) from 0 to 1 and depth (H, W) along the view, m (inf: background); splats draw into it."""
+    """Pixels (H, W, 3) from 0 to 1 and depth (H, W) along the view, m (inf: background); splats draw into it.
+
+    Args:
+        seen: (H, W) face that each pixel sees, -1: none.
+        flat: (F, 3) unit normals of the faces.
+    """
 
     camera: Camera
     pixels: NDArray[np.float32]
     depth: NDArray[np.float32]
+    seen: NDArray[np.int32]
+    flat: FloatArray
+
+    def normals(self, row: IntArray, column: IntArray) -> FloatArray:
+        """(N, 3) unit normals of what pixels see, turned towards the camera; all must see something."""
+        normals = self.flat[self.seen[row, column]]
+        away = np.einsum("ij,ij->i", normals, self.camera.rays()[row, column]) > 0.0
+        return np.where(away[:, None], -normals, normals)
 
     def splat(self, points: FloatArray, colours: FloatArray, radius: float, bias: float) -> None:
         """Draw discs of `radius` pixels at points (N, 3), m, where nothing is more than `bias` m in front.
@@ -62,13 +75,8 @@ class Picture:
         return np.asarray(np.rint(sums * (255.0 / factor**2)), dtype=np.uint8)
 
 
-def render(bodies: Sequence[Body], camera: Camera, rims: bool = True) -> Picture:
-    """The bodies as the camera sees them, lit from beside the camera, with outlines where the depth jumps.
-
-    Args:
-        rims: outline what stands before another part, too; False: only what stands before the background. The rims of
-            a measured surface are those of its own roughness, flecks.
-    """
+def render(bodies: Sequence[Body], camera: Camera) -> Picture:
+    """The bodies as the camera sees them, lit from beside the camera, with outlines where the depth jumps."""
     from explore3d.pictures.render_kernels import outline, see, shade
 
     right, up, forward = camera.frame
@@ -88,9 +96,8 @@ def render(bodies: Sequence[Body], camera: Camera, rims: bool = True) -> Picture
     first = forward + camera.pixel * (0.5 * (camera.height - 1) * up - 0.5 * (camera.width - 1) * right)
     rays = np.stack([camera.pixel * right, -camera.pixel * up, first])
     shade(seen, weights, faces, flat, bent, rounded, colours, light, rays, AMBIENT, BRIGHTEST, pixels)
-    outlined = depth if rims else np.where(depth < np.inf, 1.0, depth).astype(np.float32)
-    outline(outlined, OUTLINE_PIXELS * camera.pixel, OUTLINE, pixels)
-    return Picture(camera, pixels, depth)
+    outline(depth, OUTLINE_PIXELS * camera.pixel, OUTLINE, pixels)
+    return Picture(camera, pixels, depth, seen, flat)
 
 
 def _vertex_normals(surface: Surface) -> FloatArray:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, Trace
+from mapping import BoolArray, Feature, FloatArray, Trace
 from mapping.base import Base
 from mapping.detection import Crossing
+from mapping.geometry.contact import BallContact
 from mapping.geometry.mesh import arclengths
+from mapping.model import feature_mesh
 
 # Samples are averaged over this share of the explored size: about three pixels of a picture.
 DRAWN_SPACING_SHARE = 0.0025
@@ -19,6 +21,8 @@ DRAWN_SPACING_SHARE = 0.0025
 SIZE_SAMPLES = 50_000
 # Blocks from which the true length of a noisy path is taken.
 LENGTH_BLOCKS = 64
+# A sweep's way up onto a feature is that of a ball of this share of its height
+WAY_SHARE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +59,33 @@ def sweep_paths(trace: Trace, base: Base, crossings: Sequence[Crossing] = ()) ->
     noticed = marked[np.concatenate(middles)]
     parts = (np.split(array, cuts) for array in (feet.points, feet.normals, noticed))
     return [SweepPath(*each) for each in zip(*parts, strict=True)]
+
+
+def over_features(paths: Sequence[SweepPath], features: Sequence[Feature]) -> list[SweepPath]:
+    """The sweeps as they climb the features, which would hide them where they are wider than a line is drawn.
+
+    Along its normal a point of a sweep is lifted onto the highest feature that stands over it.
+    """
+    if not paths:
+        return []
+    points = np.concatenate([path.points for path in paths])
+    normals = np.concatenate([path.normals for path in paths])
+    lift = np.zeros(len(points))
+    for feature in features:
+        height = feature.height.median
+        if not (np.isfinite(height) and height > 0.0):
+            continue
+        body = feature_mesh(feature)
+        low, high = body.bounds
+        near = np.flatnonzero(((points >= low - height) & (points <= high + height)).all(axis=1))
+        if len(near):
+            size = WAY_SHARE * height
+            start = 1.5 * height
+            met = BallContact(body, size).first_contact(points[near] + start * normals[near], -normals[near])
+            up = start - met.distance - size
+            lift[near] = np.where(met.count > 0, np.maximum(lift[near], up), lift[near])
+    lifted = np.split(points + lift[:, None] * normals, np.cumsum([len(path.points) for path in paths])[:-1])
+    return [replace(path, points=places) for path, places in zip(paths, lifted, strict=True)]
 
 
 def _block(points: FloatArray, spacing: float) -> int:

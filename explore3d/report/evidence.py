@@ -53,7 +53,8 @@ def curvature_maps(analysis: Analysis, pictures: Pictures) -> Html:
         return Html("")
     caption = (
         "Principal curvatures of the estimated surface in units of the tip's own curvature 1/r. Red bulges out, blue "
-        "bends in; the paler, the less sure it is which of both; grey: no valid value. "
+        "bends in; the paler, the less sure it is which of both; grey is further than r from all that was felt. "
+        "Between the sweeps that cross a line it is read along the line. "
         "A fillet of exactly −1 is the tip's own shape, left where it could not reach."
     )
     maps = figure(pictures.files["curvature"], "Maps of curvature", caption)

@@ -99,7 +99,7 @@ def _rendered(analysis: Analysis, sweeps: Sequence[SweepPath]) -> dict[str, byte
     files: dict[str, bytes | None] = {"object": picture}
     if analysis.estimate is not None and analysis.estimate.surface is not None and analysis.curvature is not None:
         files["curvature"] = curvature_picture(
-            analysis.estimate.surface,
+            analysis.estimate,
             analysis.curvature,
             analysis.trace.tip_radius,
             analysis.base.surface,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from explore3d.analysis import Analysis
-from explore3d.pictures import SweepPath, sweep_paths
+from explore3d.pictures import SweepPath, over_features, sweep_paths
 from explore3d.report.account import account_of_time, provenance, what_was_left_out
 from explore3d.report.evidence import (
     compared_with_truth,
@@ -43,7 +43,8 @@ def write_report(analysis: Analysis, folder: Path | str, rendered: bool = False)
         OSError: the folder cannot be written.
     """
     place = Path(folder)
-    sweeps = sweep_paths(analysis.trace, analysis.base, analysis.detections.crossings)
+    flat = sweep_paths(analysis.trace, analysis.base, analysis.detections.crossings)
+    sweeps = over_features(flat, analysis.model.features)
     pictures = draw_pictures(analysis, sweeps, rendered)
     page = report_page(analysis, pictures, sweeps)
     (place / PICTURES).mkdir(parents=True, exist_ok=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from explore3d.pictures.maps import _without_tears, coloured, faded
-from mapping import Surface
+from explore3d.pictures.maps import Felt, Line, _contradicted, _read, coloured, faded
+from mapping import Feature, Interval, Support
 
 
 def test_a_sure_value_has_its_colour_and_an_unsure_one_none() -> None:
@@ -30,29 +30,59 @@ def test_what_is_twice_as_sure_is_never_paler() -> None:
         assert (np.diff(faded(shares, np.full(301, sd))) >= 0.0).all()  # order stays order
 
 
-def test_a_tear_that_the_ball_does_not_pass_is_closed_and_an_opening_is_not() -> None:
-    places = 1e-3 * np.array([[x, y, 0.0] for y in range(6) for x in range(6)])
-    corner = np.array([6 * y + x for y in range(5) for x in range(5)])
-    halves = [np.column_stack([corner, corner + 1, corner + 7]), np.column_stack([corner, corner + 7, corner + 6])]
-    faces = np.concatenate(halves)
-    middle = (faces == 14).any(axis=1)  # six faces about one vertex: their rim is 4 + 2 sqrt 2 mm long
-    torn = Surface(places, faces[~middle])
-    closed, rims = _without_tears(torn, 1.1e-3)  # girth 6.91 mm
-    assert len(closed.faces) == len(faces) and closed.face_areas.sum() == pytest.approx(25e-6)
-    assert (closed.face_normals[:, 2] > 0.99).all() and len(closed.vertices) == 37
-    assert [sorted(rim.tolist()) for rim in rims] == [[7, 8, 13, 15, 20, 21]]
-    assert len(_without_tears(torn, 1.0e-3)[0].faces) == len(faces) - 6  # girth 6.28 mm
+TIP = 5e-3  # m
+UP = np.array([0.0, 0.0, 1.0])
 
 
-def test_tears_that_meet_each_other_or_the_border_in_a_corner_are_closed_too() -> None:
-    places = 1e-3 * np.array([[x, y, 0.0] for y in range(6) for x in range(6)])
-    corner = np.array([6 * y + x for y in range(5) for x in range(5)])
-    halves = [np.column_stack([corner, corner + 1, corner + 7]), np.column_stack([corner, corner + 7, corner + 6])]
-    faces = np.concatenate(halves)
-    gone = (faces == 14).any(axis=1)
-    for one in ([21, 22, 28], [10, 17, 16]):  # the one touches that tear in place 21, the other the border in 17
-        gone |= (faces == one).all(axis=1)
-    assert gone.sum() == 8
-    closed, rims = _without_tears(Surface(places, faces[~gone]), 1.1e-3)
-    assert sorted(len(rim) for rim in rims) == [3, 3, 6]
-    assert closed.face_areas.sum() == pytest.approx(25e-6) and (closed.face_normals[:, 2] > 0.99).all()
+def wire_felt(apart: float) -> tuple[Felt, Feature]:
+    """Rows `apart`, m, over a plate with a wire of 0.65 mm at 35 degrees to them: red on its crest, white elsewhere."""
+    x, y = np.meshgrid(np.arange(-0.03, 0.03, 5e-4), np.arange(-0.02, 0.02, apart))
+    way = np.array([np.cos(0.61), np.sin(0.61), 0.0])
+    places = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    across = places @ np.cross(UP, way)
+    crest = np.exp(-0.5 * (across / 6e-4) ** 2)
+    values = np.column_stack([crest, -0.1 * crest, np.full((x.size, 2), 1e-3)])
+    sweep = np.repeat(np.arange(x.shape[0]), x.shape[1])
+    axis = np.linspace(-0.014, 0.014, 15)[:, None] * way
+    sizes = [Interval(each, each, each) for each in (6.5e-4, 6.5e-4, 0.028)]
+    wire = Feature("ridge", axis, np.tile(UP, (15, 1)), *sizes, Support(9.0, 9), True, 1e-5)
+    return Felt(places, np.tile(UP, (x.size, 1)), sweep, values), wire
+
+
+def test_a_line_is_read_along_its_axis_however_far_apart_the_sweeps_lie() -> None:
+    felt, wire = wire_felt(3e-3)  # five times the wire's width
+    line = Line.of(wire, felt, TIP)
+    assert line is not None
+    assert line.scale[0] == pytest.approx(3e-3 / np.sin(0.61), rel=0.2)
+    crest = wire.axis[0] + np.linspace(0.15, 0.85, 60)[:, None] * (wire.axis[-1] - wire.axis[0])
+    _, beside = line.zone(crest, np.tile(UP, (60, 1)))
+    along, _ = _read(beside / line.scale, line.beside, line.values)
+    as_it_comes, _ = _read(crest, felt.places, felt.values)
+    assert along[:, 0].min() > 0.5
+    assert as_it_comes[:, 0].min() < 0.2  # between the sweeps the crest would be lost: flecks
+
+
+def test_a_line_that_two_sweeps_cross_is_not_read_between_them() -> None:
+    felt, wire = wire_felt(3e-3)
+    two = (np.abs(felt.places[:, 1]) < 2.5e-3) & np.isin(felt.sweep, [6, 7])
+    few = Felt(felt.places[two], felt.normals[two], felt.sweep[two], felt.values[two])
+    assert Line.of(wire, few, TIP) is None
+
+
+def test_the_other_side_of_a_thin_wall_is_not_read() -> None:
+    front, back = np.zeros((3, 3)), np.array([[0.0, 0.0, -1e-4]] * 3)
+    places, normals = np.vstack([front, back]), np.vstack([np.tile(UP, (3, 1)), np.tile(-UP, (3, 1))])
+    values = np.array([[1.0, 1.0, 0.0, 0.0]] * 3 + [[-1.0, -1.0, 0.0, 0.0]] * 3)
+    read, apart = _read(np.array([[0.0, 0.0, -0.9e-4]]), places, values, (UP[None], normals))
+    np.testing.assert_allclose(read[0, :2], 1.0)
+    assert apart[0] == pytest.approx(0.9e-4)
+
+
+def test_what_only_one_of_two_sweeps_says_is_unsure() -> None:
+    faces = np.array([[0, 1, 2], [1, 3, 2]])  # 0 and 1 are one sweep, 2 and 3 the other
+    values = np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 0.0], [-1.0, 0.0]])
+    found = _contradicted(faces, np.array([1, 1, 2, 2]), values)
+    assert found[0] == pytest.approx([0.0, 0.0])
+    assert found[3, 0] == pytest.approx(2.0)
+    assert found[1, 0] == pytest.approx(np.sqrt(4.0 / 3.0))  # the side between both faces counts twice
+    assert not _contradicted(faces, np.ones(4, dtype=int), values).any()

@@ -10,7 +10,7 @@ import pytest
 from explore3d.pictures.camera import Camera
 from explore3d.pictures.object import MOST_VIEWS, VIEW_HEIGHTS, object_picture, view_directions
 from explore3d.pictures.render import Body, render
-from explore3d.pictures.sweep_paths import SweepPath
+from explore3d.pictures.sweep_paths import SweepPath, over_features
 from explore3d.scene import examples, load_scene
 from mapping import Feature, Interval, ObjectModel, Support, Surface
 from mapping.base import Base
@@ -51,14 +51,15 @@ def test_a_line_that_one_view_can_show_does_not_end_at_a_bodys_rim() -> None:
     assert len(directions) == 2 and facing.min(axis=1).max() > 0.2
 
 
-def test_a_measured_surface_is_outlined_against_the_background_alone() -> None:
+def test_a_picture_knows_the_normals_of_what_its_pixels_see() -> None:
     low, high = (np.array([[-1.0, -1, z], [1, -1, z], [1, 1, z], [-1, 1, z]]) for z in (0.0, 0.5))
-    both = Surface(np.vstack([low, 0.4 * high * [1, 1, 2.5]]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
-    camera = Camera.facing(both.vertices, np.array([0.0, 0.0, 1.0]), 200, 200)
-    dark = [
-        render([Body(both, np.full(3, 0.9))], camera, rims=rims).pixels[40:-40, 40:-40].min() for rims in (True, False)
-    ]
-    assert dark[0] < 0.7 * dark[1]
+    slanted = 0.4 * high * [1, 1, 2.5] + [0.0, 0.0, 0.0] + np.outer([-0.4, 0.4, 0.4, -0.4], [0.0, 0.0, 0.5])
+    both = Surface(np.vstack([low, slanted]), [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    picture = render([Body(both, np.ones(3))], Camera.facing(both.vertices, np.array([0.0, 0.0, 1.0]), 200, 200))
+    middle, side = (np.array(each) for each in (100, 30))
+    leaning = np.array([-0.5, 0.0, 1.0]) / np.sqrt(1.25)
+    np.testing.assert_allclose(picture.normals(middle[None], middle[None]), [leaning], atol=1e-12)
+    np.testing.assert_allclose(picture.normals(middle[None], side[None]), [[0.0, 0.0, 1.0]], atol=1e-12)
 
 
 def test_what_is_turned_down_is_lit_where_it_is_seen_from_below() -> None:
@@ -66,7 +67,7 @@ def test_what_is_turned_down_is_lit_where_it_is_seen_from_below() -> None:
     brightness = []
     for height in (VIEW_HEIGHTS[0], -VIEW_HEIGHTS[0]):
         camera = Camera.facing(plate.vertices, np.array([0.8, 0.6, height]), 200, 200)
-        seen = render([Body(plate, np.full(3, 0.9))], camera, rims=False).pixels
+        seen = render([Body(plate, np.full(3, 0.9))], camera).pixels
         brightness.append(float(np.median(seen[seen[:, :, 0] < 1.0])))
     assert brightness[1] == pytest.approx(brightness[0], abs=0.01) and brightness[0] > 0.75
 
@@ -79,3 +80,16 @@ def test_a_level_plate_is_seen_from_one_side_however_a_step_leans_it() -> None:
         for turn in (0.0, 2.0, 4.0)
     ]
     np.testing.assert_allclose(np.array(ways), np.broadcast_to(ways[0], np.shape(ways)), atol=1e-12)
+
+
+def test_a_sweep_is_drawn_over_the_bump_that_it_climbed_not_under_it() -> None:
+    up = np.array([0.0, 0.0, 1.0])
+    sizes = [Interval(each, each, each) for each in (1.0, 4.0, 0.0)]
+    bump = Feature("bump", np.zeros((1, 3)), up[None], *sizes, Support(9.0, 9), True, 1e-5)
+    x = np.linspace(-3.0, 3.0, 61)
+    path = SweepPath(np.column_stack([x, 0.0 * x, 0.0 * x]), np.tile(up, (61, 1)), np.abs(x) < 2.0)
+    (lifted,) = over_features([path], [bump])
+    ellipse = np.sqrt(np.clip(1.0 - (x / 2.0) ** 2, 0.0, None))  # the body that stands for a bump
+    np.testing.assert_allclose(lifted.points[:, 2], ellipse, atol=0.05)
+    np.testing.assert_array_equal(lifted.points[:, :2], path.points[:, :2])
+    np.testing.assert_array_equal(over_features([path], [])[0].points, path.points)
