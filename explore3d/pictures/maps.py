@@ -38,6 +38,7 @@ LEAST_ALIKE = 0.5
 # A line's own values hold up to its reach, and fade to nothing at so many times it: the fits of curvature take in
 # neighbours from as far again
 ZONE = 2.0
+# Places of a line's axis: on a picture some 800 px wide they lie two pixels apart at most
 LINE_PLACES = 400
 # Sweeps that cross a line before a map reads between them, and the share of the gaps between them that it spans
 LEAST_CROSSINGS, SPANNED = 3, 0.9

@@ -131,12 +131,13 @@ def null_scales(
     widths = np.array([f.half_width for f in bank.filters])
     levels = local_levels(heights, quiet, bank)
     local = levels.variance
+    least = np.array([_output_variance(bank, k, Noise(rounding)) / f.sd**2 for k, f in enumerate(bank.filters)]) ** 0.5
     pooled, doubt, heavier = (np.ones(len(widths)) for _ in range(3))
     own = [np.ones((len(widths), _cells(p, widths[0]))) for p in profiles]
     inherited, variance = [np.zeros(each.shape[1]) for each in own], 0.0
     measured = [*range(0, len(widths), STRIDE)]
     for k in measured:
-        outputs = [_outputs(h, q, v, bank, k) for h, q, v in zip(heights, quiet, local, strict=True)]
+        outputs = [_outputs(h, q, v, bank, k, float(least[k])) for h, q, v in zip(heights, quiet, local, strict=True)]
         together = np.concatenate([each[np.isfinite(each)] for each in outputs])
         length = len(together) * bank.filters[k].coarse * bank.spacing
         if length < CELL_WIDTHS * widths[k]:
@@ -168,7 +169,6 @@ def null_scales(
             each[k] = np.exp(0.5 * deviation)
     pooled, doubt, heavier = (_between(each, measured) for each in (pooled, doubt, heavier))
     own = [_between(each, measured) for each in own]
-    least = np.array([_output_variance(bank, k, Noise(rounding)) / f.sd**2 for k, f in enumerate(bank.filters)]) ** 0.5
     return [
         NullScale(pooled, each, v, doubt, heavier, bank.spacing, widths, least)
         for each, v in zip(own, local, strict=True)
@@ -275,15 +275,15 @@ def _seen(local: FloatArray, bins: float) -> FloatArray:
     return np.sqrt(running_mean(local, max(1, int(0.5 * bins))))
 
 
-def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank, k: int) -> FloatArray:
-    """Outputs of a filter over their sd, one a coarse bin; NaN where what it sees is not all quiet path."""
+def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank, k: int, least: float) -> FloatArray:
+    """Outputs of a filter over their sd, `least` at least, one a coarse bin; NaN where it sees not all quiet path."""
     f = bank.filters[k]
     if len(height) < 2 * f.coarse:
         return np.full(0, np.nan)
     crest, sd = f.heights(height)
     z, bins, places = crest / sd, f.half_width / bank.spacing, slice(None, len(crest) * f.coarse, f.coarse)
     if not (local == 1.0).all():
-        z /= _seen(local, bins)[places]
+        z /= np.maximum(_seen(local, bins)[places], least)
     if not quiet.all():
         z[running_mean((~quiet).astype(np.float64), max(1, int(bins)))[places] > MISSING_SHARE] = np.nan
     return np.asarray(z)

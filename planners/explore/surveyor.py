@@ -25,7 +25,8 @@ FIRST_NOISE_PATH = 50.0
 CANDIDATES = 4.0
 # Height that must stay visible between two sweeps, in detection limits; and its least share of the smallest feature's
 VISIBLE_HEIGHT_MARGIN, LEAST_VISIBLE_SHARE = 1.25, 0.1
-# Lines that are worked out before each sweep, some 40 ms: all are after a third of the sweeps
+# Lines that are worked out before each sweep: one takes some 13 ms on the bench's bodies, and the finger is to wait no
+# longer than 50 ms; all are after a third of the sweeps
 LAID_OUT = 3
 # Samples that a sweep must have to be looked at
 FEWEST_SWEEP_SAMPLES = 16

@@ -12,7 +12,7 @@ from mapping.arrays import FloatArray
 from mapping.base.base import Base
 from mapping.detection import quiet_noise
 from mapping.detection.detect import Detections, detect
-from mapping.detection.empirical_null import _heavier_tail
+from mapping.detection.empirical_null import _heavier_tail, _outputs, _seen
 from mapping.detection.filters.matched_filter import build_bank
 from mapping.detection.level_kernels import expected_level, level_likelihood
 from mapping.detection.local_level import local_levels
@@ -63,6 +63,18 @@ def test_a_path_without_noise_is_no_quieter_than_rounding() -> None:
     assert len(crossings) >= SWEEPS
     # a crest of 0.1 mm over the rounding of 0.1 nm of all the samples under it
     assert max(crossing.snr for crossing in crossings) < 1e6 * np.sqrt(2 * np.sqrt(2 * TIP * WIRE) / STEP)
+
+
+@pytest.mark.filterwarnings("error")
+def test_where_nothing_scatters_the_rounding_is_the_level() -> None:
+    """A mean over levels that differ by 24 powers of ten comes out as nothing at all, and nothing by nothing is no z."""
+    bank = build_bank(Noise(1.0), 1.0, 1.0, 12.0, 100.0, 0)
+    height, quiet = np.random.default_rng(1).standard_normal(2000), np.ones(2000, dtype=bool)
+    height[1000:] = 0.0
+    local = np.repeat([1.0, 1e-24], 1000)
+    assert _seen(local, bank.filters[0].half_width / bank.spacing)[-1] == 0.0
+    outputs = _outputs(height, quiet, local, bank, 0, 1e-6)
+    assert np.isfinite(outputs).all() and np.abs(outputs[-10:]).max() < 1e-6
 
 
 def test_what_lies_in_the_middle_of_every_sweep_is_not_taken_for_noise(monkeypatch: pytest.MonkeyPatch) -> None:
