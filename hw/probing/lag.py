@@ -19,6 +19,7 @@ from hw.grbl import LONGEST_STANDSTILL, GuardedStage
 from hw.probing.fusion import estimate_delay
 from hw.sensors import ForceSensor
 from mapping import FloatArray
+from mapping.instrument import MAD_TO_SD
 
 # The lag is expected to be of this size, s: a stretch without chatter leaves it as it is
 EXPECTED = 5e-4
@@ -71,7 +72,7 @@ class Lag:
         slope = 0.0
         for _ in range(3):
             rest = height - slope * chatter
-            spread = 1.4826 * float(np.median(np.abs(rest))) if len(rest) else 0.0
+            spread = MAD_TO_SD * float(np.median(np.abs(rest))) if len(rest) else 0.0
             use = np.abs(rest) <= KINK * spread
             power = float(chatter[use] @ chatter[use])
             if spread == 0.0 or power == 0.0:

@@ -18,6 +18,7 @@ from hw import Framing, Link, LinkError, Patience
 from hw.sensors.clock import SensorClock, missing, unwrapped
 from hw.sensors.watch import SampleWatch
 from mapping import FloatArray, IntArray
+from mapping.instrument import MAD_TO_SD
 
 # In free air a sensor is listened to for so long, s
 FREE_AIR = 0.2
@@ -220,7 +221,7 @@ class ForceSensor:
         ticks, _, forces = self.recorded(since)
         if len(ticks) > 2:
             step = float(np.median(np.diff(ticks)))
-            uneven = 1.4826 * float(np.median(np.abs(np.diff(ticks) - step)))
+            uneven = MAD_TO_SD * float(np.median(np.abs(np.diff(ticks) - step)))
             self.watch.learn(forces, step, step * self._period, uneven)
 
     def free_air(self, duration: float = FREE_AIR) -> FreeAir:
@@ -352,7 +353,7 @@ class ForceSensor:
 def _slope(times: FloatArray, values: FloatArray) -> float:
     """By least squares, less what lies too far from the median to be noise: a garbled sample would tilt the line."""
     off = np.abs(values - np.median(values))
-    near = off <= OFF_FREE_AIR * 1.4826 * np.median(off)
+    near = off <= OFF_FREE_AIR * MAD_TO_SD * np.median(off)
     at = times[near] - times[near].mean()
     return float(at @ values[near] / (at @ at)) if near.sum() > 2 else 0.0
 

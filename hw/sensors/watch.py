@@ -13,6 +13,7 @@ import numpy as np
 
 from hw import StoppedError
 from mapping import FloatArray, IntArray
+from mapping.instrument import MAD_TO_SD
 
 # Chance of a false stop per sample and axis: one in a thousand sessions of 10 h at 5 kHz (5e8 values)
 FALSE_STOP = 2e-12
@@ -105,7 +106,7 @@ class SampleWatch:
         self._slack = max(STEP_SLACK * ticks, STEPS_APART * uneven)
         # until then nobody knows that the sensor is frozen: the axis that changes most tells first
         self.blind = spacing * min(self._longest)
-        self.noise = 1.4826 * np.median(np.abs(free - np.median(free, axis=0)), axis=0)
+        self.noise = MAD_TO_SD * np.median(np.abs(free - np.median(free, axis=0)), axis=0)
         self._margins = [NOISE_OF_A_DIFFERENCE * float(sd) for sd in self.noise]  # numpy's numbers are slow one by one
         self._equal = [1, 1, 1]
 
