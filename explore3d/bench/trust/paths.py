@@ -115,7 +115,8 @@ def wired_path(
     """The same over a body that wires lie on, across some of the sweeps; these wires, and where sweeps meet them.
 
     A crossing is the foot of the ball's crest, and on facets a foot stays behind at an edge that the ball rolls over:
-    by r sin(0.5 deg) = 35 um for r = 4 mm where they meet at a degree. A wire lies where it lies.
+    by r sin(0.5 deg) = 35 um for r = 4 mm where they meet at a degree. A wire lies where it lies, and is as high as it
+    stands over the facets: the round body's own surface is up to 2 um over them where its radius is 45 mm.
 
     Args:
         draw: seed of their places, lengths and diameters.
@@ -131,9 +132,10 @@ def wired_path(
         lean = rng.uniform(-0.3, 0.3)
         axis, up = body.at(place + lean * across, across)
         wires.append(tube(axis + 0.5 * diameter * up, up, 0.5 * diameter))
-        crest = axis + (diameter + tip_radius) * up
-        truth.append(TrueFeature("ridge", base.foot(axis, tip_radius).points, diameter, diameter))
-        crests.append(base.foot(crest, tip_radius).points)
+        crest = base.foot(axis + (diameter + tip_radius) * up, tip_radius)
+        height = float(crest.height.mean())
+        truth.append(TrueFeature("ridge", base.foot(axis, tip_radius).points, height, diameter))
+        crests.append(crest.points)
     path, _ = _felt(body, joined(body.mesh, *wires), base, tip_radius)
     return path, base, tuple(truth), tuple(crests)
 

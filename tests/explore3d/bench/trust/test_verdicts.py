@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from explore3d.bench.trust.case import BUILDING, REPORTED_TRUST, bench_trust, recordings_of, trust_records
 from explore3d.bench.trust.paths import TRUST_BODIES, bare_path, wired_path
+from mapping.geometry.mesh import nearest_on
 from explore3d.bench.trust.verdicts import VERDICT_HEAD, body_verdicts, law_verdicts, poisson_range, write_trust
 from explore3d.cli.bench import bench
 
@@ -68,6 +69,17 @@ def test_every_body_is_its_own_base_and_wires_stand_on_it():
         behind = [np.linalg.norm(at - each.axis, axis=1).max() for at, each in zip(crests, truth, strict=True)]
         assert max(behind) < 1e-9 if name == "plane" else 2e-5 < max(behind) < 1e-4
     assert len(TRUST_BODIES) == 4
+
+
+def test_a_wire_is_as_high_as_it_stands_over_the_facets_of_a_round_body():
+    wired, base, truth, _ = wired_path("sphere", BUILDING.sizes[0], BUILDING.tips[1], (1, 2))
+    feet = base.foot(wired.centers, wired.tip_radius)
+    for wire in truth:
+        near = np.linalg.norm(feet.points - nearest_on(feet.points, wire.axis)[0], axis=1) < 0.5e-3
+        tops = [feet.height[near & (wired.sweep == sweep)].max(initial=0.0) for sweep in range(12)]
+        crossed = [top for top in tops if top > 0.9 * wire.height]
+        # the round body's own surface lies 2 um over its facets
+        assert np.mean(crossed) == pytest.approx(wire.height, abs=0.3e-6) and wire.height - wire.width > 1.5e-6
 
 
 def test_a_recording_is_analysed_once_and_told(tmp_path: Path):
