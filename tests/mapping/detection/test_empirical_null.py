@@ -67,7 +67,7 @@ def test_a_path_without_noise_is_no_quieter_than_rounding() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_where_nothing_scatters_the_rounding_is_the_level() -> None:
-    """A mean over levels that differ by 24 powers of ten comes out as nothing at all, and nothing by nothing is no z."""
+    """A mean over levels that differ by 24 powers of ten comes out as nothing, and nothing by nothing is no z."""
     bank = build_bank(Noise(1.0), 1.0, 1.0, 12.0, 100.0, 0)
     height, quiet = np.random.default_rng(1).standard_normal(2000), np.ones(2000, dtype=bool)
     height[1000:] = 0.0

@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 
 from explore3d.bench.trust.case import BUILDING, REPORTED_TRUST, bench_trust, recordings_of, trust_records
 from explore3d.bench.trust.paths import TRUST_BODIES, bare_path, wired_path
-from mapping.geometry.mesh import nearest_on
 from explore3d.bench.trust.verdicts import VERDICT_HEAD, body_verdicts, law_verdicts, poisson_range, write_trust
 from explore3d.cli.bench import bench
+from mapping.geometry.mesh import nearest_on
 
 
 def record(law: str, often: int, crossings: int, wires: bool = False) -> dict:
