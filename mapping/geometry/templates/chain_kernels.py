@@ -137,8 +137,9 @@ def chain_heights(
                 if t <= best:
                     continue
                 sx, sy, sz = ox + t * nx, oy + t * ny, oz + t * nz
-                if last_leg >= 0 and rounding[w] < 1.0 and first_leg <= beside and beside <= last_leg:
-                    # half of a joint's sphere is in the leg beside it, unless that ends there, cut square
+                if rounding[w] < 1.0 and start <= beside and beside < stop:
+                    # half of a joint's sphere is in the leg beside it, unless that ends there, cut square; where this
+                    # bin does not look at that leg the sphere is all that stands for it
                     into = sx * unit[beside, 0] + sy * unit[beside, 1] + sz * unit[beside, 2]
                     if (into if beside > k else -into) > 0.0:
                         continue

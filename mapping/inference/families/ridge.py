@@ -11,8 +11,8 @@ from mapping import FloatArray, IntArray
 from mapping.inference.curves import Chart, CurveModes
 from mapping.inference.likelihood import Prior, Window
 
-# A bin looks at the legs of the chart within this share of a tip radius of the one nearest to it: an axis that is
-# turned a little against the chart is nearest at a place a little further along.
+# A bin looks at the legs of the chart within this share of a tip radius of the one nearest to the ball's centre: an
+# axis that is turned a little against the chart is nearest at a place a little further along.
 LOOK_AROUND = 0.1
 
 
@@ -115,7 +115,10 @@ class RidgeShape:
 
     @cached_property
     def _candidates(self) -> tuple[IntArray, IntArray]:
-        leg = self.chart.coordinates(self.window.feet)[2]
+        # The ball touches near its centre's own place along the chart: where the body is bent the foot's lies
+        # elsewhere, by r times the sine of the normal's lean along the chart.
+        window = self.window
+        leg = self.chart.coordinates(window.feet + self.tip_radius * window.normals)[2]
         neighbours = 1 + int(LOOK_AROUND * self.tip_radius / float(np.diff(self.chart.s).mean()))
         return np.maximum(leg - neighbours, 0), np.minimum(leg + 1 + neighbours, len(self.chart.s) - 1)
 

@@ -10,11 +10,12 @@ from mapping.geometry.templates.shapes import cap_height, chain_height
 TIP = 10e-3
 
 
-def heights(feet, normals, chain, radius, rounding=1.0, half_bin=1e-15, tangents=None):
+def heights(feet, normals, chain, radius, rounding=1.0, half_bin=1e-15, tangents=None, looks_at=None):
     from mapping.geometry.templates.chain_kernels import chain_heights
 
     out = np.empty((1, len(feet)))
-    first, last = np.zeros(len(feet), dtype=np.int64), np.full(len(feet), len(chain) - 1, dtype=np.int64)
+    low, high = (0, len(chain) - 1) if looks_at is None else looks_at
+    first, last = np.full(len(feet), low, dtype=np.int64), np.full(len(feet), high, dtype=np.int64)
     tangents = np.zeros_like(feet) if tangents is None else tangents
     half = np.full(len(feet), half_bin)
     where = (feet, normals, tangents, half, first, last)
@@ -76,3 +77,13 @@ def test_where_a_chart_has_its_vertices_does_not_matter_to_the_ends_of_a_ridge(r
         joints = axis[0] + np.outer([0.0, *shares, 1.0], axis[1] - axis[0])
         np.testing.assert_allclose(heights(feet, normals, joints, radius, rounding), plain, atol=1e-12)
     assert (plain > 0).sum() > 100
+
+
+def test_a_joint_counts_whole_where_the_leg_beside_it_is_not_looked_at():
+    """A ridge with ends not quite round lost what stands beyond the legs that a bin looks at: 0.3 mm of its height."""
+    feet, normals = scattered(7, tilt=0.2)
+    chain = 1e-3 * np.array([[-6, 0, 0.2], [-2, 1, 0.2], [2, 1, 0.2], [6, 0, 0.2]])
+    round_ends = heights(feet, normals, chain, 0.5e-3, looks_at=(1, 2))
+    nearly = heights(feet, normals, chain, 0.5e-3, rounding=1.0 - 1e-12, looks_at=(1, 2))
+    np.testing.assert_allclose(nearly, round_ends, atol=1e-12)
+    assert (round_ends > 0).sum() > 100
