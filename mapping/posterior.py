@@ -40,6 +40,11 @@ class Posterior:
     k_hat: float = float("nan")
     ess: float = float("nan")
 
+    @property
+    def trusted(self) -> bool:
+        """True where its draws stand for the posterior; else `reason` says what hinders."""
+        return self.status in ("converged", "not needed")
+
     def plot(self, figure: Any = None) -> Any:
         """Draw a histogram of each parameter's draws, with its median and central 90 %.
 

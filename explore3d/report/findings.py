@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 
@@ -92,6 +93,7 @@ def warnings(analysis: Analysis) -> list[str]:
         *path_warning(analysis),
         *form_warnings(analysis),
         *misfit_warnings(analysis),
+        *posterior_warnings(analysis),
         *dropped_warning(analysis),
         *warning_lines(analysis),
     ]
@@ -116,9 +118,25 @@ def form_warnings(analysis: Analysis) -> list[str]:
 
 def misfit_warnings(analysis: Analysis) -> list[str]:
     """Features that are not of the form that their sizes are those of."""
-    wrong = [feature for feature in analysis.model.features if feature.details.misfit]
+    return _feature_warnings(
+        [(feature, feature.details.misfit) for feature in analysis.model.features if feature.details.misfit]
+    )
+
+
+def posterior_warnings(analysis: Analysis) -> list[str]:
+    """Features whose intervals rest on draws that do not stand for the posterior."""
+    return _feature_warnings(
+        [
+            (feature, f"its intervals are not to be trusted, {feature.posterior.reason}")
+            for feature in analysis.model.features
+            if feature.posterior is not None and not feature.posterior.trusted
+        ]
+    )
+
+
+def _feature_warnings(wrong: Sequence[tuple[Feature, str]]) -> list[str]:
     more = [f"... and {len(wrong) - MOST_REMARKS} features more."] if len(wrong) > MOST_REMARKS else []
-    return [*(f"Warning: {feature.id}: {feature.details.misfit}." for feature in wrong[:MOST_REMARKS]), *more]
+    return [*(f"Warning: {feature.id}: {why}." for feature, why in wrong[:MOST_REMARKS]), *more]
 
 
 def dropped_warning(analysis: Analysis) -> list[str]:

@@ -188,7 +188,7 @@ def _place(feature: Feature, analysis: Analysis) -> Html:
 def _posterior(feature: Feature, pictures: Pictures) -> Html:
     if feature.posterior is None:
         return badge("measured, not fitted" if feature.details.free_section else "none", "plain")
-    kind = "good" if feature.posterior.status in ("converged", "not needed") else "bad"
+    kind = "good" if feature.posterior.trusted else "bad"
     label = "by Laplace" if feature.posterior.status == "not needed" else feature.posterior.status
     draws, picture = f"{len(feature.posterior.samples)} draws", f"corner-{feature.id}"
     shown = element("a", draws, href=f"#{picture}") if picture in pictures.files else draws

@@ -31,7 +31,7 @@ def describe(problem: PosteriorProblem, posterior: Posterior, base: Base) -> Fea
 
 
 def _warnings(posterior: Posterior) -> tuple[str, ...]:
-    if posterior.status in ("converged", "not needed"):
+    if posterior.trusted:
         return ()
     return (f"posterior: {posterior.status}: {posterior.reason}",)
 

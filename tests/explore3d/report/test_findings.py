@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from explore3d.report.findings import summary, warnings
-from mapping import Dropped
+from mapping import Dropped, Posterior
 from mapping.detection.path import PathLedger
 from mapping.feature import Interval
 
@@ -23,6 +23,7 @@ def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
         width=Interval(1e-3, 1e-3, 1e-3),
         length=length,
         details=SimpleNamespace(misfit=None, account=()),
+        posterior=None,
     )
 
 
@@ -116,6 +117,19 @@ def test_what_is_clear_of_the_noise_and_in_no_feature_is_said() -> None:
         "Warning: 2 detections clear of the noise became no feature, the plainest a step up of 0.6 mm"
     )
     assert "(20.0, 0.0, 1.0) mm: no line." in said
+
+
+def test_intervals_that_rest_on_a_chain_that_did_not_settle_are_said_not_to_be_trusted() -> None:
+    sound, stuck = (feature(name, True, Interval(0.05, 0.049, 0.051)) for name in ("ridge-1", "ridge-2"))
+    draws = np.zeros((10, 1))
+    sound.posterior = Posterior(("height",), ("m",), draws, nan, nan, "not needed", "k-hat 0.2 < 0.5")
+    stuck.posterior = Posterior(
+        ("height",), ("m",), draws, 376.0, 0.07, "chain too short", "6000 steps are only 16 times"
+    )
+    assert warnings(analysis(sound)) == []
+    assert warnings(analysis(sound, stuck)) == [
+        "Warning: ridge-2: its intervals are not to be trusted, 6000 steps are only 16 times."
+    ]
 
 
 def test_a_doubt_of_the_tip_that_was_assumed_is_said() -> None:
