@@ -40,7 +40,8 @@ def chain_heights(
 ) -> None:
     """Heights (W, n) of W chains (W, K, 3) over n bins, averaged over each bin; written to `out`.
 
-    Bin i looks at the vertices first[i] to last[i] alone (a single one is a sphere). A capsule is convex: where the
+    Bin i looks at the vertices first[i] to last[i] alone (a single one is a sphere), and at what the ball touches where
+    it stands on the base: what it would meet further out does not lift it. A capsule is convex: where the
     ray leaves its infinite cylinder beyond a joint, it leaves the capsule through that joint's sphere. Both ends of
     the chain are rounded over by e = rounding * a: 1 is a capsule's hemisphere, 0 is cut square. At x beyond an end
     the dilated body then has the radius a - e + sqrt((r + e)^2 - x^2).
@@ -79,7 +80,7 @@ def chain_heights(
                 start = min(max(first[i], first_leg), last_leg)
                 stop = max(min(last[i] - 1, last_leg), start) + 1
             for k in range(start, stop):
-                beside = -1
+                joined = -1
                 ox, oy, oz = qx - chain[k, 0], qy - chain[k, 1], qz - chain[k, 2]
                 if last_leg >= 0:
                     if length[k] == 0.0:
@@ -87,9 +88,14 @@ def chain_heights(
                     ux, uy, uz = unit[k, 0], unit[k, 1], unit[k, 2]
                     o_along = ox * ux + oy * uy + oz * uz
                     n_along = nx * ux + ny * uy + nz * uz
-                    along = ox * nx + oy * ny + oz * nz - o_along * n_along
+                    toward, apart = ox * nx + oy * ny + oz * nz, ox * ox + oy * oy + oz * oz
+                    along = toward - o_along * n_along
                     # most bins are far from most legs: they are told by the cheapest form, which cancels a little
-                    if along > 0.0 and ox * ox + oy * oy + oz * oz - o_along * o_along > far:
+                    if along > 0.0 and apart - o_along * o_along > far:
+                        continue
+                    # what the ball would only meet further out does not lift it, whatever stands there
+                    beside = min(max(o_along, 0.0), length[k])
+                    if toward < beside * n_along and apart - beside * (2.0 * o_along - beside) > total * total:
                         continue
                     ax, ay, az = ox - o_along * ux, oy - o_along * uy, oz - o_along * uz
                     bx, by, bz = nx - n_along * ux, ny - n_along * uy, nz - n_along * uz
@@ -127,21 +133,21 @@ def chain_heights(
                     beyond = place > length[k]
                     if beyond:
                         ox, oy, oz = qx - chain[k + 1, 0], qy - chain[k + 1, 1], qz - chain[k + 1, 2]
-                    beside = k + 1 if beyond else k - 1
+                    joined = k + 1 if beyond else k - 1
                 along = ox * nx + oy * ny + oz * nz
                 distance = ox * ox + oy * oy + oz * oz
-                if distance > far and along > 0.0:
+                if distance > (far if along > 0.0 else total * total):
                     continue
                 distance = np.sqrt(distance)
                 t = _last_exit(1.0, along, (distance - total) * (distance + total))
                 if t <= best:
                     continue
                 sx, sy, sz = ox + t * nx, oy + t * ny, oz + t * nz
-                if rounding[w] < 1.0 and start <= beside and beside < stop:
+                if rounding[w] < 1.0 and start <= joined and joined < stop:
                     # half of a joint's sphere is in the leg beside it, unless that ends there, cut square; where this
                     # bin does not look at that leg the sphere is all that stands for it
-                    into = sx * unit[beside, 0] + sy * unit[beside, 1] + sz * unit[beside, 2]
-                    if (into if beside > k else -into) > 0.0:
+                    into = sx * unit[joined, 0] + sy * unit[joined, 1] + sz * unit[joined, 2]
+                    if (into if joined > k else -into) > 0.0:
                         continue
                 best, mx, my, mz = t, sx, sy, sz
             if best <= -half_bin[i]:

@@ -13,7 +13,7 @@ import itertools
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapping import FloatArray, ShapeError
+from mapping import BoolArray, FloatArray, ShapeError
 
 
 def contact_half_width(height: ArrayLike, radius: ArrayLike, tip_radius: float) -> FloatArray:
@@ -120,7 +120,9 @@ def chain_height(feet: ArrayLike, normals: ArrayLike, axis: ArrayLike, radius: f
     """(N,) heights >= 0 at which the ball on each base normal leaves a chain of capsules; 0 where it misses, m.
 
     The exact outer envelope of the ridge of round section: each segment of the axis dilates to a capsule of radius
-    a + r, and the ray q + (r + t) n leaves a capsule through its cylinder or through the sphere at either end.
+    a + r, and the ray q + (r + t) n leaves a capsule through its cylinder or through the sphere at either end. A
+    capsule that the ball does not touch where it rests on the base does not lift it, though it may stand in its way
+    further out, as a ridge on the other wall of an inner corner does.
 
     Args:
         feet: (N, 3) points q of the base, m.
@@ -134,10 +136,21 @@ def chain_height(feet: ArrayLike, normals: ArrayLike, axis: ArrayLike, radius: f
     total = radius + tip_radius
     height = np.zeros(len(feet))
     for vertex in axis:
-        height = np.maximum(height, _last_exit(feet - vertex + tip_radius * normals, normals, total))
+        offset = feet - vertex + tip_radius * normals
+        ahead = _lies_ahead(offset, normals, total)
+        height = np.maximum(height, np.where(ahead, 0.0, _last_exit(offset, normals, total)))
     for start, end in itertools.pairwise(axis):
-        height = np.maximum(height, _cylinder_exit(feet - start + tip_radius * normals, normals, end - start, total))
+        offset, leg = feet - start + tip_radius * normals, end - start
+        share = np.clip(offset @ leg / max(float(leg @ leg), np.finfo(float).tiny), 0.0, 1.0)
+        ahead = _lies_ahead(offset - np.outer(share, leg), normals, total)
+        height = np.maximum(height, np.where(ahead, 0.0, _cylinder_exit(offset, normals, leg, total)))
     return height
+
+
+def _lies_ahead(offset: FloatArray, direction: FloatArray, radius: float) -> BoolArray:
+    """(N,) True where something about a place is not reached yet, and comes nearer."""
+    apart = np.einsum("ij,ij->i", offset, offset) > radius * radius
+    return np.asarray(apart & (np.einsum("ij,ij->i", offset, direction) < 0.0))
 
 
 def _last_exit(offset: FloatArray, direction: FloatArray, radius: float) -> FloatArray:

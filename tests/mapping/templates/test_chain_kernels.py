@@ -87,3 +87,15 @@ def test_a_joint_counts_whole_where_the_leg_beside_it_is_not_looked_at():
     nearly = heights(feet, normals, chain, 0.5e-3, rounding=1.0 - 1e-12, looks_at=(1, 2))
     np.testing.assert_allclose(nearly, round_ends, atol=1e-12)
     assert (round_ends > 0).sum() > 100
+
+
+def test_a_ridge_on_the_other_wall_of_an_inner_corner_lifts_nothing_before_it_is_met():
+    """A ball on the floor was put on the wall's ridge, 8 mm above: the search for that ridge ended 1000 too low."""
+    chain, radius = np.array([[0.2e-3, 0, 25e-3], [0.2e-3, 0, 20e-3], [0.2e-3, 0, 15e-3]]), 0.3e-3
+    feet = np.column_stack([np.linspace(10e-3, 10.4e-3, 9), np.zeros((9, 2))])
+    up = np.tile([0.0, 0.0, 1.0], (9, 1))
+    assert (heights(feet, up, chain, radius) == 0.0).all() and (chain_height(feet, up, chain, radius, TIP) == 0.0).all()
+    feet[:, 2] = 6e-3  # the floor is higher, and the ball stands in the ridge
+    met = heights(feet, up, chain, radius)
+    assert (met[:3] > 0.0).all()
+    np.testing.assert_allclose(met, chain_height(feet, up, chain, radius, TIP), atol=1e-12)
