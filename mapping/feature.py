@@ -182,6 +182,8 @@ class Details:
         trace_curvature: of the trace over the crest, 1/m.
         radius: of a protruding section's cap, m.
         scale, exponent: of a bump of revolution with a skirt (m, 1).
+        taper, bottom: of a hollow whose walls run out without an edge (1, and the depth that they lead to, m); scale is
+            then its half width at half of that.
         top, run: width of a flat top and run of each flank beside it, m.
         misfit: in which way no family of its kind fits it, in words.
         axis_sd: (K,) standard deviation of the axis across itself, at even steps along it, m.
@@ -197,6 +199,8 @@ class Details:
     radius: float | None = None
     scale: float | None = None
     exponent: float | None = None
+    taper: float | None = None
+    bottom: float | None = None
     top: float | None = None
     run: float | None = None
     misfit: str | None = None

@@ -67,7 +67,8 @@ def better_section(first: PosteriorProblem, around: Surroundings, rng: np.random
         around: what it was posed in.
         rng: randomness of the importance sampling, of those whose Gaussian approximations do not decide.
     """
-    posed = kind_of(first.feature).alternatives(first.feature, around)
+    plain = replace(with_nominal_tip(first.under(around.noise)), misfit=0.0)
+    posed = kind_of(first.feature).alternatives(plain, around)
     if not posed:
         return None
     if around.tip_sd > 0.0:

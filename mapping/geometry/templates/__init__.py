@@ -30,6 +30,10 @@ if TYPE_CHECKING:
         crest_trace as crest_trace,
         robust_cost as robust_cost,
     )
+    from mapping.geometry.templates.smooth_kernels import (
+        smooth_groove_heights as smooth_groove_heights,
+        smooth_pit_heights as smooth_pit_heights,
+    )
 
 _PUBLIC = {
     "bell_kernels": ("bell_heights",),
@@ -48,5 +52,6 @@ _PUBLIC = {
         "step_height",
     ),
     "small_heights": ("CREST_OUTLIER_SDS", "SHAPE_ERROR", "crest_trace", "robust_cost"),
+    "smooth_kernels": ("smooth_groove_heights", "smooth_pit_heights"),
 }
 doorway(__name__, _PUBLIC)

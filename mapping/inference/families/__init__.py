@@ -25,6 +25,14 @@ if TYPE_CHECKING:
         window_for as window_for,
     )
     from mapping.inference.families.ridge import RidgeShape as RidgeShape, rounding_of as rounding_of
+    from mapping.inference.families.smooth_hollow import (
+        SmoothGrooveShape as SmoothGrooveShape,
+        SmoothPitShape as SmoothPitShape,
+        smooth_beginnings as smooth_beginnings,
+        smooth_groove_beside as smooth_groove_beside,
+        smooth_pit_beside as smooth_pit_beside,
+        smooth_section as smooth_section,
+    )
     from mapping.inference.families.step import StepShape as StepShape
     from mapping.inference.families.trapezoid import (
         TrapezoidShape as TrapezoidShape,
@@ -50,6 +58,14 @@ _PUBLIC = {
         "window_for",
     ),
     "ridge": ("RidgeShape", "rounding_of"),
+    "smooth_hollow": (
+        "SmoothGrooveShape",
+        "SmoothPitShape",
+        "smooth_beginnings",
+        "smooth_groove_beside",
+        "smooth_pit_beside",
+        "smooth_section",
+    ),
     "step": ("StepShape",),
     "trapezoid": ("TrapezoidShape", "touched_widths", "trapezoid_beside"),
     "twin": ("TwinShape", "twin_beside"),

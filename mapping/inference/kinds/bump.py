@@ -49,12 +49,12 @@ class Bump(Crest, PointKind):
     def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
         return float(np.log(4.0 * sizes.radius)), float(np.log(0.5 * sizes.height))
 
-    def alternatives(self, feature: Feature, around: Surroundings) -> Sequence[PosteriorProblem]:
+    def alternatives(self, problem: PosteriorProblem, around: Surroundings) -> Sequence[PosteriorProblem]:
         """A bump with a skirt."""
-        seen = seen_about(feature, around)
+        seen = seen_about(problem.feature, around, problem.window)
         priors = place_prior(seen.sizes), height_prior(seen.sizes)
         bell = bell_shape(seen.window, seen.spot, seen.sizes, seen.tip_radius, seen.free, *priors)
-        return (pose(feature, seen.sizes, bell, seen.window, around, _bell_beginnings(bell.start)),)
+        return (pose(problem.feature, seen.sizes, bell, seen.window, around, _bell_beginnings(bell.start)),)
 
     def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
         """Of a cap, or of a bell: its width at half height, scale and exponent."""

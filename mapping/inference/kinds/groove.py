@@ -1,21 +1,30 @@
-"""Groove: a hollow line with upright walls."""
+"""Groove: a hollow line with upright walls, or with walls that run out smoothly."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mapping import FloatArray
 from mapping.geometry.templates import groove_height, rim_height
-from mapping.inference.families import GrooveShape, Sizes
+from mapping.inference.families import (
+    GrooveShape,
+    PosteriorProblem,
+    Sizes,
+    Surroundings,
+    smooth_beginnings,
+    smooth_groove_beside,
+)
 from mapping.inference.kinds.hollows import Hollow
 from mapping.inference.kinds.lines import LineKind, Parameters, Traced
 from mapping.inference.kinds.posing import hollow_priors
 
 
 class Groove(Hollow, LineKind):
-    """Grooves with a flat bottom: course, places of the ends, log width, log depth."""
+    """Grooves with a flat bottom: course, places of the ends, log width, log depth; smooth ones where none fits."""
 
     def shape(self, traced: Traced) -> GrooveShape:
         sizes, tip = traced.sizes, traced.tip_radius
@@ -25,6 +34,12 @@ class Groove(Hollow, LineKind):
 
     def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
         return (float(np.log(sizes.height)),)
+
+    def alternatives(self, problem: PosteriorProblem, around: Surroundings) -> Sequence[PosteriorProblem]:
+        """A groove without an edge, on the same course."""
+        upright: Any = problem.target.shape
+        target = replace(problem.target, shape=smooth_groove_beside(upright, problem.sizes))
+        return (replace(problem, target=target, beginnings=smooth_beginnings(problem.beginnings, problem.sizes)),)
 
     def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
         s, lateral, _ = shape.chart.coordinates(feet)

@@ -107,8 +107,13 @@ class Kind:
         possible = ", ".join(name for name in KINDS if kind_named(name).sampled)
         raise MappingError(f"no posterior for a {self.name!r}: closed-form traces exist for {possible}")
 
-    def alternatives(self, feature: Feature, around: Surroundings) -> Sequence[PosteriorProblem]:
-        """Further families on the same window, tried where the first does not fit within the noise."""
+    def alternatives(self, problem: PosteriorProblem, around: Surroundings) -> Sequence[PosteriorProblem]:
+        """Further families on the same window, tried where the first does not fit within the noise.
+
+        Args:
+            problem: of the first family, as posed for the nominal tip.
+            around: what it was posed in.
+        """
         return ()
 
     def rivals(self, problem: PosteriorProblem, optimum: FloatArray) -> Sequence[PosteriorProblem]:

@@ -1,14 +1,23 @@
-"""Pit: a round hollow with an upright wall."""
+"""Pit: a round hollow with an upright wall, or with one that runs out smoothly."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mapping import FloatArray
 from mapping.geometry.templates import rim_height
-from mapping.inference.families import PitShape, Sizes
+from mapping.inference.families import (
+    PitShape,
+    PosteriorProblem,
+    Sizes,
+    Surroundings,
+    smooth_beginnings,
+    smooth_pit_beside,
+)
 from mapping.inference.kinds.hollows import Hollow
 from mapping.inference.kinds.points import PointKind, Seen
 from mapping.inference.kinds.posing import hollow_priors, place_prior
@@ -27,6 +36,12 @@ class Pit(Hollow, PointKind):
 
     def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
         return (float(np.log(sizes.height)),)
+
+    def alternatives(self, problem: PosteriorProblem, around: Surroundings) -> Sequence[PosteriorProblem]:
+        """A pit without an edge."""
+        upright: Any = problem.target.shape
+        target = replace(problem.target, shape=smooth_pit_beside(upright, problem.sizes))
+        return (replace(problem, target=target, beginnings=smooth_beginnings(problem.beginnings, problem.sizes)),)
 
     def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
         place = np.zeros(2)

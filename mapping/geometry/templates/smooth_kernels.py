@@ -1,0 +1,178 @@
+"""Compiled traces of hollows whose walls run out smoothly, dilated by the ball across the hollow."""
+
+# mypy: disable-error-code="untyped-decorator"
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mapping import FloatArray
+from mapping.geometry.templates.bell_kernels import GONE, SHARE_A_STEP, TABLE_PLACES, TURN_A_STEP
+
+# Tables for balls of so many curvatures, between which the trace changes evenly: where they differ by a half of the
+# ball's own it errs by 4e-4 of the depth
+TABLE_BENDS = 5
+# Share of the way to the edge of a section that has one that a step covers at most: there its bend may be anything
+SHARE_TO_EDGE = 0.25
+# Below this taper the section is Gaussian, to the last digit of its own series
+GAUSSIAN = 1e-5
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _share(square, taper):  # type: ignore[no-untyped-def]
+    """The part of the depth that is left at a squared distance in scales, and the base of its power."""
+    base = 1.0 + taper * square
+    if abs(taper) < GAUSSIAN:
+        return np.exp(-square * (1.0 - 0.5 * taper * square)), base
+    if base <= 0.0:
+        return 0.0, 0.0
+    return base ** (-1.0 / taper), base
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def smooth_trace(depth: float, half: float, taper: float, tip: float, table: FloatArray, spacing: float) -> None:
+    """Heights (negative) of the ball over the plane at distances 0, spacing, ... from the middle, written to `table`.
+
+    The section z = -H (1 + k u^2 / w^2)^(-1/k) of taper k has half of its depth at u = `half`: a cosine nearly at
+    k = -0.4, a Gaussian at 0, the paper's bump upside down at 1. It is walked from the middle outwards; the ball's
+    centre over each point is on the parallel curve (paper, equation 11), and where that crosses itself the highest
+    branch is the trace. What is beyond the middle touches lower, for both sides are alike.
+    """
+    table[:] = -np.inf
+    last = spacing * (len(table) - 1)
+    doubled = np.log(2.0) if abs(taper) < GAUSSIAN else np.expm1(taper * np.log(2.0)) / taper
+    scale = half / np.sqrt(doubled)
+    edge = scale / np.sqrt(-taper) if taper < 0.0 else np.inf
+    u, rho0, t0, slope0 = 0.0, 0.0, -depth, 0.0
+    base, left = 1.0, 1.0
+    while rho0 < last and left > GONE:
+        square = (u / scale) ** 2
+        bend = 2.0 * depth * left / (scale * scale * base) * (1.0 - 2.0 * (1.0 + taper) * square / base)
+        slope = 2.0 * depth * left * u / (scale * scale * base)
+        step = min(SHARE_A_STEP * scale * np.sqrt(base), SHARE_TO_EDGE * (edge - u))
+        if step * abs(bend) > TURN_A_STEP * (1.0 + slope * slope):
+            step = TURN_A_STEP * (1.0 + slope * slope) / abs(bend)
+        u += step
+        square = (u / scale) ** 2
+        left, base = _share(square, taper)
+        slope = 2.0 * depth * left * u / (scale * scale * base)
+        stretch = np.sqrt(1.0 + slope * slope)
+        rho = u - tip * slope / stretch
+        # r/c - r in the form that keeps its digits on a flat wall
+        t = -depth * left - tip * slope * slope / (stretch * (1.0 + stretch))
+        run = rho - rho0
+        for k in range(max(int(np.ceil(min(rho0, rho) / spacing)), 0), len(table)):
+            if k * spacing > max(rho0, rho):
+                break
+            # a cubic: the parallel curve has the slope of the section
+            x = (k * spacing - rho0) / run if run != 0.0 else 0.0
+            bow = (1.0 - x) * (slope0 * run - (t - t0)) + x * ((t - t0) - slope * run)
+            table[k] = max(table[k], t0 + x * (t - t0) + x * (1.0 - x) * bow)
+        rho0, t0, slope0 = rho, t, slope
+    for k in range(len(table)):
+        if table[k] == -np.inf:
+            table[k] = 0.0
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _means(
+    away: FloatArray, toward: FloatArray, depth: float, half: float, taper: float, tip: float, out: FloatArray
+) -> None:
+    """Mean heights (n,) over nodes (n, q) `away` from the middle, where the base bends by `toward`, 1/m, towards it.
+
+    On a curved base heights over it are felt as a ball of curvature 1/r + k feels them over a plane.
+    """
+    bins, nodes = away.shape
+    # a hollow base as tight as the ball has no trace of its own
+    least = -0.999 / tip
+    low, high, far = np.inf, -np.inf, 1e-3 * tip
+    for i in range(bins):
+        for q in range(nodes):
+            low, high, far = min(low, toward[i, q]), max(high, toward[i, q]), max(far, away[i, q])
+    low, high = max(low, least), max(high, least)
+    bends = TABLE_BENDS if (high - low) * tip > 1e-6 else 1
+    gap = (high - low) / (bends - 1) if bends > 1 else 1.0
+    table, spacing = np.zeros((bends, TABLE_PLACES)), far / (TABLE_PLACES - 2)
+    for b in range(bends):
+        smooth_trace(depth, half, taper, tip / (1.0 + tip * (low + b * gap)), table[b], spacing)
+    for i in range(bins):
+        total = 0.0
+        for q in range(nodes):
+            place = away[i, q] / spacing
+            k = min(int(place), TABLE_PLACES - 2)
+            x = place - k
+            way = min(max((toward[i, q] - low) / gap, 0.0), bends - 1.0)
+            b = int(way)
+            height = table[b, k] + x * (table[b, k + 1] - table[b, k])
+            if b + 1 < bends:
+                beside = table[b + 1, k] + x * (table[b + 1, k + 1] - table[b + 1, k])
+                height += (way - b) * (beside - height)
+            total += height
+        out[i] = total / nodes
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def smooth_groove_heights(
+    s: FloatArray,
+    lateral: FloatArray,
+    basis: FloatArray,
+    bend: FloatArray,
+    bend_along: FloatArray,
+    courses: FloatArray,
+    ends: FloatArray,
+    depths: FloatArray,
+    halves: FloatArray,
+    tapers: FloatArray,
+    tip: float,
+    out: FloatArray,
+) -> None:
+    """Heights (W, n) of W smooth grooves over bins with q nodes; the first arguments as for `groove_heights`.
+
+    An end is half of a pit with the same section.
+
+    Args:
+        depths, halves, tapers: (W,) m, m, and 1: see `smooth_trace`.
+    """
+    walkers, bins = out.shape
+    modes, nodes = basis.shape[0], s.shape[1]
+    away, toward = np.empty((bins, nodes)), np.empty((bins, nodes))
+    for w in range(walkers):
+        for i in range(bins):
+            for q in range(nodes):
+                aside = lateral[i, q]
+                for m in range(modes):
+                    aside -= courses[w, m] * basis[m, i, q]
+                beyond = max(ends[w, 0] - s[i, q], s[i, q] - ends[w, 1], 0.0)
+                square = aside * aside + beyond * beyond
+                turned = beyond * beyond / square if square > 0.0 else 0.0
+                away[i, q] = np.sqrt(square)
+                toward[i, q] = (1.0 - turned) * bend[i, q] + turned * bend_along[i, q]
+        _means(away, toward, depths[w], halves[w], tapers[w], tip, out[w])
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def smooth_pit_heights(
+    x: FloatArray,
+    y: FloatArray,
+    bends: FloatArray,
+    places: FloatArray,
+    depths: FloatArray,
+    halves: FloatArray,
+    tapers: FloatArray,
+    tip: float,
+    out: FloatArray,
+) -> None:
+    """Heights (W, n) of W smooth pits over bins with q nodes; the first arguments as for `pit_heights`."""
+    walkers, bins = out.shape
+    nodes = x.shape[1]
+    away, toward = np.empty((bins, nodes)), np.empty((bins, nodes))
+    for w in range(walkers):
+        for i in range(bins):
+            for q in range(nodes):
+                along, across = x[i, q] - places[w, 0], y[i, q] - places[w, 1]
+                square = along * along + across * across
+                share = along * along / square if square > 0.0 else 0.5
+                away[i, q] = np.sqrt(square)
+                toward[i, q] = share * bends[0] + (1.0 - share) * bends[1]
+        _means(away, toward, depths[w], halves[w], tapers[w], tip, out[w])

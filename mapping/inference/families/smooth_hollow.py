@@ -1,0 +1,138 @@
+"""Smooth hollows: grooves and pits whose walls run out into the base, from a cosine to the paper's bump upside down."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.inference.curves import Chart, CurveModes
+from mapping.inference.families.bump import Spot
+from mapping.inference.families.hollow import GrooveShape, PitShape, bin_nodes, line_nodes
+from mapping.inference.families.problem import Sizes
+from mapping.inference.likelihood import Prior, Uniform, Window
+
+# Tapers from walls that meet the base all but at once (a cosine's is -0.4) to the paper's bump upside down
+TAPERS = (-0.65, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothGrooveShape:
+    """Smooth grooves: lateral modes, ends, log half width at half depth, log depth, taper (theory section 8.5).
+
+    An end is round: half of a pit with the groove's section.
+    """
+
+    window: Window
+    chart: Chart
+    modes: CurveModes
+    tip_radius: float
+    priors: tuple[Prior, ...]
+    start: FloatArray
+    step: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        ends = () if self.chart.closed else ("start", "end")
+        return (*self.modes.names, *ends, "log half width", "log depth", "taper")
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        ends = () if self.chart.closed else ("m", "m")
+        return (*self.modes.units, *ends, "ln m", "ln m", "")
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights (negative) over the base's trace, m."""
+        from mapping.geometry.templates import smooth_groove_heights
+
+        first = self.modes.count
+        closed = np.tile([-1e300, 1e300], (len(theta), 1))
+        ends = closed if self.chart.closed else np.ascontiguousarray(theta[:, first : first + 2])
+        courses = np.ascontiguousarray(theta[:, :first])
+        out = np.empty((len(theta), len(self.window)))
+        smooth_groove_heights(*self._places, courses, ends, *smooth_section(theta), self.tip_radius, out)
+        return out
+
+    @cached_property
+    def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        return line_nodes(self.window, self.chart, self.modes)
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothPitShape:
+    """Smooth round pits: position (`free` coordinates), log half width at half depth, log depth, taper."""
+
+    window: Window
+    spot: Spot
+    tip_radius: float
+    free: int
+    priors: tuple[Prior, ...]
+    start: FloatArray
+    step: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*("along", "across")[: self.free], "log half width", "log depth", "taper")
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return (*("m", "m")[: self.free], "ln m", "ln m", "")
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights (negative) over the base's trace, m."""
+        from mapping.geometry.templates import smooth_pit_heights
+
+        place = np.zeros((len(theta), 2))
+        place[:, : self.free] = theta[:, : self.free]
+        out = np.empty((len(theta), len(self.window)))
+        smooth_pit_heights(*self._places, self.spot.bends, place, *smooth_section(theta), self.tip_radius, out)
+        return out
+
+    @cached_property
+    def _places(self) -> tuple[FloatArray, FloatArray]:
+        nodes = bin_nodes(self.window) - self.spot.point
+        return nodes @ self.spot.axes[0], nodes @ self.spot.axes[1]
+
+
+def smooth_section(theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(W,) depths, half widths at half depth, m, and tapers."""
+    return np.exp(theta[:, -2]), np.exp(theta[:, -3]), np.ascontiguousarray(theta[:, -1])
+
+
+def smooth_groove_beside(groove: GrooveShape, sizes: Sizes) -> SmoothGrooveShape:
+    """The family on an upright groove's window, with its course, its ends, and the priors of both."""
+    return SmoothGrooveShape(groove.window, groove.chart, groove.modes, groove.tip_radius, *_about(groove, sizes))
+
+
+def smooth_pit_beside(pit: PitShape, sizes: Sizes) -> SmoothPitShape:
+    """The family on an upright pit's window, about its spot."""
+    return SmoothPitShape(pit.window, pit.spot, pit.tip_radius, pit.free, *_about(pit, sizes))
+
+
+def smooth_beginnings(beginnings: FloatArray, sizes: Sizes) -> FloatArray:
+    """Starts from narrow to wide, from what was felt to twice as deep, with an edge and with a skirt.
+
+    Args:
+        beginnings: (B, P) of the upright family: the places of the first are kept.
+        sizes: preliminary ones.
+    """
+    places = beginnings[0, :-2]
+    starts = [
+        [*places, np.log(part * sizes.radius), np.log(more * sizes.height), taper]
+        for part in (0.25, 0.5, 1.0)
+        for more in (1.0, 2.0)
+        for taper in (-0.4, 0.3)
+    ]
+    return np.array(starts)
+
+
+def _about(upright: GrooveShape | PitShape, sizes: Sizes) -> tuple[tuple[Prior, ...], FloatArray, FloatArray]:
+    """Priors, start and step: the places as in the upright family; half of its mouth is as wide as any half width."""
+    half = float(np.log(0.5 * sizes.radius))
+    depth = upright.priors[-1]
+    priors = (*upright.priors[:-2], Uniform(half - 2.0, half + 2.0), depth, Uniform(*TAPERS))
+    start = np.array([*upright.start[:-2], half, np.log(sizes.height), -0.2])
+    step = np.array([*upright.step[:-2], 0.02, 0.05, 0.05])
+    return priors, start, step
