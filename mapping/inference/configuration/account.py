@@ -28,6 +28,7 @@ LOOKS = 2
 TOLD_SHARE = 0.01
 # Draws of the Gaussian that preliminary intervals are taken from
 PRELIMINARY_DRAWS = 400
+ENDED_EARLY = "so much is felt together here that the search for what it may be ended before all was tried"
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
@@ -91,12 +92,13 @@ def _improved(
     ]
     found = searched(start, [part_of(feature, place) for feature in group], np.array(points).reshape(-1, 3), proposals)
     odds = _told(found)
+    noted = (ENDED_EARLY,) if found.bounded else ()
     # a section alone is the posterior's to choose, and what explains the trace only in part adds nothing
     adds = len(found.best.kinds) > len(found.start.kinds)
     if (adds and not found.best.fits) or (set(found.accepted) <= {"section"} and found.best.kinds == found.start.kinds):
-        return [_with_odds(feature, odds if found.best.fits else ()) for feature in group]
+        return [_with_odds(feature, odds if found.best.fits else (), noted) for feature in group]
     algorithms = group[0].evidence.algorithms if group else ()
-    features = [_with_odds(feature, odds) for feature in _described(found.best, around, algorithms)]
+    features = [_with_odds(feature, odds, noted) for feature in _described(found.best, around, algorithms)]
     return _meeting(features, around.trace.tip_radius)
 
 
@@ -239,5 +241,5 @@ def count_in(words: str) -> int:
     return sum(NUMBERS.index(word) if word in NUMBERS else int(word) for word in first)
 
 
-def _with_odds(feature: Feature, odds: tuple[tuple[str, float], ...]) -> Feature:
-    return replace(feature, details=replace(feature.details, account=odds or None))
+def _with_odds(feature: Feature, odds: tuple[tuple[str, float], ...], noted: tuple[str, ...]) -> Feature:
+    return replace(feature, details=replace(feature.details, account=odds or None), notes=(*feature.notes, *noted))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mapping import FloatArray
+from mapping import FloatArray, IntArray
 from mapping.inference.families import StepShape, TwinShape
 from mapping.inference.likelihood import LogPosterior, Prior, Shape
 
@@ -66,28 +66,20 @@ class JoinedShape:
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights over the base's trace, m."""
         own = [theta[:, columns] for columns in self.columns]
-        ground = np.zeros((len(theta), self.fine * self.bins))
-        for k, shape in enumerate(self.shapes):
-            if not _stands_out(shape):
-                ground += self._alone(shape, own[k])
+        hollows = [_Distinct.of(shape, own[k]) for k, shape in enumerate(self.shapes) if not _stands_out(shape)]
+        felt = np.tile(sum((each.heights[0] for each in hollows), np.zeros(self.fine * self.bins)), (len(theta), 1))
+        for hollow in hollows:
+            felt[hollow.other] += hollow.heights[hollow.which[hollow.other]] - hollow.heights[0]
         # a crest beside a hollow holds the ball that sinks into it: crests are known as far down as it does
-        sunk = np.maximum(-ground.min(axis=1), 0.0)
-        felt = ground
-        for k, shape in enumerate(self.shapes):
-            if _stands_out(shape):
-                for piece, lift in [(own[k], np.zeros(len(theta))), *self._on_steps(k, own)]:
-                    felt = np.maximum(felt, self._alone(shape, _raised(shape, piece, lift + sunk)) - sunk[:, None])
+        sunk = max(-float(felt.min(initial=0.0)), 0.0)
+        crests = [
+            _Distinct.of(shape, _raised(shape, piece, lift + sunk))
+            for k, shape in enumerate(self.shapes)
+            if _stands_out(shape)
+            for piece, lift in [(own[k], np.zeros(len(theta))), *self._on_steps(k, own)]
+        ]
+        _rest_on(felt, crests, sunk)
         return np.asarray(felt.reshape(len(theta), self.bins, self.fine).mean(axis=2))
-
-    @staticmethod
-    def _alone(shape: Shape, theta: FloatArray) -> FloatArray:
-        """The heights of one shape: most rows of one difference quotient are the last one's in its parameters."""
-        own = (theta != theta[-1]).any(axis=1)
-        own[-1] = True
-        found = shape.templates(np.ascontiguousarray(theta[own]))
-        heights = np.tile(found[-1], (len(theta), 1))
-        heights[own] = found
-        return heights
 
     def _on_steps(self, k: int, own: Sequence[FloatArray]) -> Iterator[tuple[FloatArray, FloatArray]]:
         """What of the k-th shape stands on the high side of each step: its parameters (W, P), and the (W,) lift, m."""
@@ -127,6 +119,53 @@ class JoinedShape:
     @cached_property
     def _known(self) -> dict[tuple[int, int], tuple[FloatArray, FloatArray, FloatArray]]:
         return {}
+
+
+@dataclass(frozen=True, eq=False)
+class _Distinct:
+    """Heights of one shape: most rows of a difference quotient have the same, and differ in the others' parameters.
+
+    Args:
+        heights: (U, n) of parameters that differ, the commonest ones first, m.
+        which: (W,) of them for each row.
+        other: rows that do not have the commonest ones.
+    """
+
+    heights: FloatArray
+    which: IntArray
+    other: IntArray
+
+    @classmethod
+    def of(cls, shape: Shape, theta: FloatArray) -> _Distinct:
+        rows, which, counts = np.unique(theta, axis=0, return_inverse=True, return_counts=True)
+        order = np.argsort(-counts, kind="stable")
+        place = np.empty(len(order), dtype=np.int64)
+        place[order] = np.arange(len(order))
+        which = place[which.reshape(-1)]
+        return cls(shape.templates(np.ascontiguousarray(rows[order])), which, np.flatnonzero(which))
+
+
+def _rest_on(felt: FloatArray, crests: Sequence[_Distinct], sunk: float) -> None:
+    """Raise ground (W, n) to the highest of crests that are `sunk` (m) too high."""
+    if not crests:
+        return
+    commonest = np.array([each.heights[0] for each in crests])
+    top = commonest.argmax(axis=0)
+    highest = np.take_along_axis(commonest, top[None], axis=0)[0]
+    changed: list[list[int]] = [[] for _ in felt]
+    for k, crest in enumerate(crests):
+        for row in crest.other:
+            changed[row].append(k)
+    without: dict[tuple[int, ...], FloatArray] = {(): highest}
+    for row, own in enumerate(changed):
+        if (key := tuple(own)) not in without:
+            rest = np.delete(commonest, own, axis=0)
+            where = np.isin(top, own)
+            without[key] = highest.copy()
+            without[key][where] = rest[:, where].max(axis=0, initial=-np.inf)
+        np.maximum(felt[row], without[key] - sunk, out=felt[row])
+        for k in own:
+            np.maximum(felt[row], crests[k].heights[crests[k].which[row]] - sunk, out=felt[row])
 
 
 def _first_above(s: FloatArray, values: FloatArray) -> FloatArray:

@@ -11,8 +11,9 @@ from mapping import FloatArray, MappingError
 from mapping.inference.configuration.configuration import Configuration, Part, fitted, laid
 from mapping.inference.configuration.proposals import JOIN, PROPOSALS, Parts, Proposal
 
-# Configurations that are fitted in one neighbourhood: a bound on the time, which crowded ones reach
-MOST_FITTED = 40
+# Configurations that are fitted in one neighbourhood, of so many details each: a bound on the time, which crowded ones
+# reach. A fit takes a time that grows with the square of the details: as many of 10 take as long as 6 of 26
+MOST_FITTED, CROWDED = 40, 10
 # A proposal must be better by this log odds: less is rounding, or the same configuration found again
 WORTH = 0.5
 # What is less likely than the best by this log odds is not gone on from, nor told
@@ -28,12 +29,14 @@ class Account:
         best: the configuration of the highest odds.
         visited: the best of each set of kinds, the best of all first.
         accepted: names of the proposals that led from the beginning to the best.
+        bounded: True if the search ended for want of time, with proposals left.
     """
 
     start: Configuration
     best: Configuration
     visited: tuple[Configuration, ...]
     accepted: tuple[str, ...]
+    bounded: bool = False
 
     @property
     def shares(self) -> list[tuple[tuple[str, ...], float]]:
@@ -54,15 +57,16 @@ def searched(
         points: (M, 3) of crests in the neighbourhood, m.
         proposals: the generators that are asked, in order.
     """
-    place, best, accepted, count, idle = start.place, start, list[str](), 1, 0
+    place, best, accepted, idle = start.place, start, list[str](), 0
+    left = MOST_FITTED - _cost(start.parts)
     visited = {start.kinds: start}
     whole, joining = laid(parts, place), True
     # pieces of one line hide each other once they are fitted: they are joined as the rules left them
-    while joining and count < MOST_FITTED:
+    while joining and left > 0.0:
         joining = False
         for other_parts in _yielded(JOIN, whole, points) if JOIN in proposals else ():
             other = fitted(other_parts, place)
-            count += 1
+            left -= _cost(other_parts)
             if other is not None and other.log_odds > best.log_odds + WORTH:
                 best, whole, joining = other, laid(other_parts, place), True
                 visited[other.kinds] = other
@@ -72,9 +76,9 @@ def searched(
         for proposal in proposals:
             found = best
             for proposed in _yielded(proposal, best, points):
-                if count >= MOST_FITTED:
+                if left <= 0.0:
                     break
-                count += 1
+                left -= _cost(proposed)
                 other = fitted(proposed, best.place, best)
                 if other is None:
                     continue
@@ -91,7 +95,12 @@ def searched(
                 break
     order = sorted(visited.values(), key=lambda each: -each.log_odds)
     likely = [each for each in order if each.log_odds > best.log_odds - NEGLIGIBLE_ODDS]
-    return Account(start, best, tuple(likely), tuple(accepted))
+    return Account(start, best, tuple(likely), tuple(accepted), left <= 0.0)
+
+
+def _cost(parts: Sequence[Part]) -> float:
+    """Of fitting a configuration, in those of few details."""
+    return max(1.0, (len(parts) / CROWDED) ** 2)
 
 
 def _yielded(proposal: Proposal, now: Configuration, points: FloatArray) -> Iterator[Parts]:
