@@ -11,7 +11,7 @@ from mapping import FloatArray
 from mapping.geometry.templates.bell_kernels import GONE, SHARE_A_STEP, TABLE_PLACES, TURN_A_STEP
 
 # Tables for balls of so many curvatures, between which the trace changes evenly: where they differ by a half of the
-# ball's own it errs by 4e-4 of the depth
+# ball's own it errs by 1.2e-3 of the depth at most (five sections, five places)
 TABLE_BENDS = 5
 # Share of the way to the edge of a section that has one that a step covers at most: there its bend may be anything
 SHARE_TO_EDGE = 0.25
