@@ -149,13 +149,16 @@ def solve(
     problems = _rough(pose_problem(feature, around), around)
     first, optima = account_for_misfit(problems[0], list(problems[0].beginnings))
     first = replace(first, beginnings=np.array(optima))
+    found = None
     if first.misfit == 0.0:
-        return _likeliest([first, *problems[1:]], rng, confirm)
+        found = _likeliest([first, *problems[1:]], rng, confirm)
+        if not _pooled(found, noise).remarked(feature.height.median):
+            return found
     # None of them fits: what the others would say is no better founded
     better = better_section(first, around, rng)
-    if better is None:
-        return solve_problem(first, rng, confirm=confirm, adapt=False)
-    return solve_problem(better, rng, confirm=confirm)
+    if better is not None:
+        return solve_problem(better, rng, confirm=confirm)
+    return solve_problem(first, rng, confirm=confirm, adapt=False) if found is None else found
 
 
 def _rough(first: PosteriorProblem, around: Surroundings) -> list[PosteriorProblem]:
