@@ -28,7 +28,7 @@ LOOKS = 2
 TOLD_SHARE = 0.01
 # Draws of the Gaussian that preliminary intervals are taken from
 PRELIMINARY_DRAWS = 400
-ENDED_EARLY = "so much is felt together here that the search for what it may be ended before all was tried"
+ENDED_EARLY = "the search for what is felt here, and what beside it, ended before all was tried"
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
