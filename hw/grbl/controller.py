@@ -431,7 +431,9 @@ class GrblController:
                 answer = self._answers.popleft()
                 if self._sent:
                     self._sent.popleft()
-                if answer != "ok":
+                # between two jogs grblHAL now and then calls the next one a cycle ("Run"), and refuses what is said in
+                # it: as with a line that was lost, whoever sent it sees that the machine stays behind
+                if answer not in ("ok", protocol.NOT_IDLE):
                     raise FingerError(f"{self.link.port}: a jog was refused: {protocol.describe(answer)}")
 
     def left(self, count: int) -> None:

@@ -233,6 +233,10 @@ def parse_offset(parameters: Iterable[str], modes: Iterable[str]) -> FloatArray:
     return offset
 
 
+# What a machine answers to a jog while it does something else
+NOT_IDLE = "error:8"
+
+
 def describe(line: str) -> str:
     """An error or alarm line in words."""
     kind, _, code = line.partition(":")

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from struck_machine import BAUD, FRAME, machine_over, plate
 
+from hw.emulated.gcode import Block, GcodeError
 from hw.emulated.grbl import GrblEmulator
 from hw.emulated.pty_server import PtyServer
 from hw.emulated.wire import Wire
-from hw.errors import StoppedError
+from hw.errors import FingerError, StoppedError
 from hw.grbl.controller import GrblController
 from hw.grbl.guarded_stage import GuardedStage
 
@@ -46,6 +47,39 @@ def test_a_thousand_jogs_arrive_where_the_last_was_to_end(latency: float) -> Non
         went = stage.motion.position - begun
     # half of a digit of what was sent; that a step hides where it began is common to all
     assert np.abs(went - 1000 * np.array([3.333e-6, -1.111e-6, 2.2222e-6])).max() < 0.5 * STEP + 5e-8
+
+
+def test_a_jog_that_is_refused_in_the_midst_of_others_is_made_up_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    with machine() as (stage, controller):
+        jog, refused = stage._jog, []
+
+        def jog_but_once(block: Block) -> None:  # grblHAL between two jogs: its state is Run for some milliseconds
+            if not refused:
+                refused.append(block)
+                raise GcodeError(8)
+            jog(block)
+
+        guarded = GuardedStage(controller, FRAME, controller.settings.bounds, 0.02, 4e-4)
+        here = guarded.resting()
+        monkeypatch.setattr(stage, "_jog", jog_but_once)
+        guarded.creep(here + np.array([1e-4, 0.0, 0.0]))
+        guarded.creep(here + np.array([2e-4, 0.0, 0.0]))
+        assert refused
+        assert np.abs(FRAME.to_object(stage.motion.position) - here - [2e-4, 0.0, 0.0]).max() < STEP
+        assert stage.motion.travelled < 2.1e-4
+
+
+def test_a_jog_that_leads_nowhere_is_refused_out_loud(monkeypatch: pytest.MonkeyPatch) -> None:
+    with machine() as (stage, controller):
+
+        def beyond(block: Block) -> None:
+            raise GcodeError(15)
+
+        monkeypatch.setattr(stage, "_jog", beyond)
+        here = controller.resting_position()
+        with pytest.raises(FingerError, match="a jog was refused: error:15"):
+            controller.jog(here + np.array([1e-4, 0.0, 0.0]), 5e-3)
+            controller.wait_idle(2.0)
 
 
 def test_a_jog_whose_line_was_lost_is_made_up_for_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:

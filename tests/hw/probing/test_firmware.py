@@ -2,7 +2,7 @@
 
 Where one is said in GRBL_SIMULATOR (grblHAL_sim or grbl_sim.exe; several with os.pathsep between them). A simulator
 that the host keeps waiting falls silent, and what falls silent is stopped: give them priority over all else. With jumps
-of 20 ms grblHAL's covers less of a sweep than is asked here: build it with control_frame_ns = 2000000.
+of 20 ms grblHAL's covers less of a sweep than is asked here: build it with control_frame_ns = 2 * 1000 * 1000.
 
     chrt -f 20 python -m pytest -m slow tests/hw/probing/test_firmware.py     # grblHAL_sim
     nice -n -15 python -m pytest -m slow tests/hw/probing/test_firmware.py    # grbl_sim.exe: its threads never sleep

@@ -34,6 +34,9 @@ SETTINGS = {110: 6000, 111: 6000, 112: 3000, 120: 500, 121: 500, 122: 500, 130: 
 PLACE = re.compile(rb"\|MPos:" + b",".join([rb"(-?\d+\.\d{3})"] * 3) + rb"[|>]")
 # A firmware answers a setting within so many s, its host being busy otherwise
 ANSWERING = 5.0
+# Of some thousand questions grblHAL's simulator leaves one without an answer, and then stands waiting for the next; the
+# others it answers in 5 to 60 ms. So it is asked again after so long, s
+UNHEARD = 0.2
 
 
 class Firmware:
@@ -57,6 +60,7 @@ class Firmware:
         self._socket: socket.socket | None = None
         self._steps: int | None = None
         self._asked: deque[bool] = deque()  # for each report that is to come: was it the host that asked?
+        self._asked_at = 0.0
         self._waiting = 0  # the host's questions, while our own is under way: one report would answer both
         self._rest = b""
 
@@ -172,11 +176,14 @@ class Firmware:
 
     def _ask(self) -> None:
         """One question at a time, the host's before our own: a second one before the answer would get none."""
-        if self._asked:
+        now = time.monotonic()
+        if self._asked and now - self._asked_at < UNHEARD:
             return
-        hosts = self._waiting > 0
-        self._waiting -= hosts
-        self._asked.append(hosts)
+        if not self._asked:
+            hosts = self._waiting > 0
+            self._waiting -= hosts
+            self._asked.append(hosts)
+        self._asked_at = now
         self._write(b"?")
 
     def _without_our_own(self, said: bytes, now: float) -> bytes:
@@ -185,7 +192,8 @@ class Firmware:
         told = b""
         for line in lines:
             self._note(line, now)
-            ours = line.startswith(b"<") and bool(self._asked) and not self._asked.popleft()
+            # one that nobody waits for answers a question that was asked twice
+            ours = line.startswith(b"<") and not (self._asked and self._asked.popleft())
             told += b"" if ours else line + b"\n"
         return told
 
