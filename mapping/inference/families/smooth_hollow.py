@@ -11,9 +11,9 @@ from mapping.inference.families.hollow import GrooveShape, PitShape
 from mapping.inference.families.problem import Sizes
 from mapping.inference.likelihood import Prior, Uniform
 
-# At -1, a parabola, the walls meet the base in an edge, which the upright family has; of 32 cosine hollows (depths of 0.2
-# to 0.6 mm, mouths of 2.5 to 4.5 mm, ball of 3 mm) the tapers found were -0.58 to -0.22. The widest skirt is the paper's
-# bump upside down.
+# At -1, a parabola, the walls meet the base in an edge, which the upright family has; of 32 cosine hollows (depths of
+# 0.2 to 0.6 mm, mouths of 2.5 to 4.5 mm, ball of 3 mm) the tapers found were -0.58 to -0.22. The widest skirt is the
+# paper's bump upside down.
 TAPERS = (-0.65, 1.0)
 
 

@@ -15,7 +15,7 @@ from mapping.inference.likelihood import Shape
 # A ball that sinks to within this share of the depth rests on the bottom: ten times what its trace errs by
 REACHED = 1e-5
 # Places along a line that stand for all of them, where how far the ball sinks depends on how the base bends there: 8,
-# 16 and 128 say 0.4005, 0.4020 and 0.4034 mm of the groove of double_ring, whose facets are the coarsest
+# 16 and 128 say 0.4005, 0.4020 and 0.4034 mm of the groove of double_ring
 FEW_BENDS = 16
 NO_EDGE = "its walls run out without an edge: width at half of the depth"
 
