@@ -181,7 +181,7 @@ class Details:
     Args:
         trace_curvature: of the trace over the crest, 1/m.
         radius: of a protruding section's cap, m.
-        scale, exponent: of a bump of revolution with a skirt (m, 1).
+        scale, exponent: of a bump of revolution whose flank runs out (m, 1).
         taper, bottom: of a hollow whose walls run out without an edge (1, and the depth that they lead to, m); scale is
             then its half width at half of that.
         top, run: width of a flat top and run of each flank beside it, m.

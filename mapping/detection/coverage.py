@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Surface
+from mapping.geometry.mesh import NEAREST_COST, by_shares
 
 # Samples of faces looked at, at most
 MOST_FACE_SAMPLES = 2_000_000
@@ -88,10 +89,11 @@ def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limi
     while _sample_count(surface, step) > MOST_FACE_SAMPLES:
         step *= 1.5  # a coarser answer is a more cautious one
     points, owner = face_samples(surface, step)
-    distance, _ = cKDTree(touched).query(points, distance_upper_bound=0.9 * tip_radius, workers=-1)
+    tree, most = cKDTree(touched), 0.9 * tip_radius
+    distance = by_shares(lambda at: np.asarray(tree.query(at, distance_upper_bound=most)[0]), points, NEAREST_COST)
     # as far as a place of the face may lie from the nearest sample
     parts = _parts(surface, step)
-    distance = np.asarray(distance) + 0.55 * (_longest_sides(surface) / parts)[owner]
+    distance = distance + 0.55 * (_longest_sides(surface) / parts)[owner]
     passed = distance < tip_radius
     lost = np.full(len(points), np.inf)
     lost[passed] = distance[passed] ** 2 / (tip_radius + np.sqrt(tip_radius**2 - distance[passed] ** 2))

@@ -1,9 +1,9 @@
 """Evidence: the marginal likelihood of the trace under one family of shapes, its parameters integrated out.
 
-By it a section is chosen: of a bump a cap, or a bell with a skirt. A ball of 10 mm feels the top of a line and bridges
-its flanks: a round wire, a bar and a roof may leave one trace. Each family's weight is its evidence; heights are drawn
-from all that remain likely, and where a flank was not touched in them the width is a bound. Where the round section
-alone remains, its width is a number, as that of a wire is.
+By it a section is chosen. A ball of 10 mm feels the top of a line and bridges its flanks: a round wire, a bar and a
+roof may leave one trace, and so may a cap and a bell. Each family's weight is its evidence; heights are drawn from all
+that remain likely, and where a flank was not touched in them the width is a bound. Where the round section alone
+remains, its width is a number, as that of a wire is.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Interval, Posterior, length_text
 from mapping.inference.families import (
+    BellShape,
     PosteriorProblem,
     Surroundings,
     TrapezoidShape,
@@ -107,11 +108,13 @@ def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, P
         parts.append(np.column_stack([kind.draws_of_height(shape, some), *kind.widths_felt(shape, some)]))
     height, touched, bridged = np.concatenate(parts).T
     interval = Interval.from_draws(height)
+    names = ", ".join(f"{name_of(problem)} {100 * share / total:.0f} %" for share, problem, _ in likely)
     if np.mean(bridged > touched) <= UNLIKELY_FAMILY:
-        return replace(feature, height=interval, width=Interval.from_draws(touched))
+        half_way = any(isinstance(_shape(problem), BellShape) for _, problem, _ in likely)
+        notes = (f"sections that leave this trace: {names}; width at half height",) if half_way else ()
+        return replace(feature, height=interval, width=Interval.from_draws(touched), notes=(*feature.notes, *notes))
     low, median = np.quantile(touched, [0.05, 0.5])
     width = Interval(float(median), float(low), float(np.quantile(bridged, 0.95)), censored=True, bounded=True)
-    names = ", ".join(f"{name_of(problem)} {100 * share / total:.0f} %" for share, problem, _ in likely)
     note = (
         f"the tip bridged its flanks: it touched a width of {length_text(float(median), 2)}, and the foot may be "
         f"anything up to {length_text(width.high, 2)} wide (sections that leave this trace: {names})"
@@ -122,6 +125,8 @@ def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, P
 def name_of(problem: PosteriorProblem) -> str:
     """What people call a problem's section."""
     shape = _shape(problem)
+    if isinstance(shape, BellShape):
+        return "bell"
     if not isinstance(shape, TrapezoidShape):
         return "round"
     return "triangular" if shape.roof else "flat-topped"

@@ -79,7 +79,7 @@ def run_case(case: Case) -> Row:
     heights = kind_named(case.kind).heights(blank.target.shape, truth, feet, up)
     trace = record(paths, heights + simulate_noise(noise, paths, rng))
     believed = noise if case.assumed == "true" else Noise(noise.sd)
-    problem = _with_priors(pose_problem(feature, Surroundings(trace, plate(), believed)))
+    problem = _with_priors(_about(blank, pose_problem(feature, Surroundings(trace, plate(), believed))))
     # Believing noise to be white is to show that the test can fail: the misfit test would mend it.
     solution = solve_problem(problem, rng, confirm=case.method == "emcee", adapt=case.assumed == "true")
     return Row(case, _places(solution, truth), solution.importance.k_hat, solution.posterior.status)
@@ -141,6 +141,15 @@ def record(paths: list[FloatArray], heights: FloatArray) -> Trace:
     centers[:, 2] += TIP_RADIUS + heights
     sweep = np.repeat(np.arange(len(paths)), [len(path) for path in paths])
     return Trace(2e-4 * np.arange(float(len(centers))), centers, sweep, TIP_RADIUS)
+
+
+def _about(blank: PosteriorProblem, problem: PosteriorProblem) -> PosteriorProblem:
+    """The problem with a point's place as the blank one has it: a spot at the optimum's place moves with the data."""
+    shape: Any = problem.target.shape
+    if not hasattr(shape, "spot"):
+        return problem
+    frame: Any = blank.target.shape
+    return replace(problem, target=replace(problem.target, shape=replace(shape, spot=frame.spot)))
 
 
 def _with_priors(problem: PosteriorProblem) -> PosteriorProblem:

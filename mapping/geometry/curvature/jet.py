@@ -11,7 +11,7 @@ import numpy as np
 
 from mapping import BoolArray, CurvatureError, FloatArray, IntArray, Surface
 from mapping.geometry.curvature.curvature import Curvature, from_operators
-from mapping.geometry.mesh import cores
+from mapping.geometry.mesh import NEAREST_COST, by_shares, cores
 
 # Neighbourhoods from which points choose. Regular grids are symmetric in 25, 37, 49, 69 and 97 neighbours, which
 # cancels odd errors; 33 are the fewest that a jet of degree 6 needs with some to spare.
@@ -208,7 +208,7 @@ class _Jets:
         a, b, c = np.einsum("msd,msdk->km", weights, np.nan_to_num(found.operators))
         mean, half = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
         larger = np.nan_to_num(np.where(mean < 0, mean - half, mean + half))
-        self.bends = larger[tree.query(self.place, workers=-1)[1]]
+        self.bends = larger[by_shares(lambda place: np.asarray(tree.query(place)[1]), self.place, NEAREST_COST)]
 
     def worthwhile(self, sizes: IntArray, noise: float) -> IntArray:
         """The sizes that points of a sample give most weight to, with those that judge them."""
@@ -331,7 +331,7 @@ def _smoothed_normals(place: FloatArray, rough: FloatArray, tree: Any) -> FloatA
     """Mean normals over the nearest points: noise tilts single triangles."""
     smooth = np.empty_like(rough)
     for part in np.array_split(np.arange(len(place)), max(1, len(place) * SMOOTHING // CHUNK_VALUES)):
-        near = tree.query(place[part], k=min(SMOOTHING, len(place)), workers=-1)[1]
+        near = by_shares(lambda at: tree.query(at, k=min(SMOOTHING, len(place)))[1], place[part], SMOOTHING)
         same = np.einsum("ijk,ik->ij", rough[near], rough[part]) > 0
         smooth[part] = np.einsum("ijk,ij->ik", rough[near], same.astype(np.float64))
     length = np.linalg.norm(smooth, axis=1, keepdims=True)

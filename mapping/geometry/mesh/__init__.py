@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     )
     from mapping.geometry.mesh.spline import Spline as Spline, spline_design as spline_design
     from mapping.geometry.mesh.threads import (
+        NEAREST_COST as NEAREST_COST,
         algebra_in_one_thread as algebra_in_one_thread,
         by_shares as by_shares,
         cores as cores,
@@ -53,7 +54,7 @@ _PUBLIC = {
     "nearest": ("MovedNearestPoint", "NearestPoint"),
     "open3d_import": ("open3d",),
     "polyline": ("arclengths", "directions", "distances", "middle", "nearest_on", "resample"),
-    "threads": ("algebra_in_one_thread", "by_shares", "cores"),
+    "threads": ("NEAREST_COST", "algebra_in_one_thread", "by_shares", "cores"),
     "tree": ("TriangleTree",),
     "triangle_kernels": ("closest_on_triangle", "closing_step", "enter_face", "enter_triangle"),
     "triangle_row_kernels": ("QUERIES_PER_BLOCK", "closest", "corners"),

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
+from typing import TypeVar
 
 import numpy as np
 
-from mapping import FloatArray
+from mapping import FloatArray, IntArray
 
 # Values that a share must produce to be worth a thread: some ten times what handing it over costs.
 WORTHWHILE = 15_000
@@ -18,11 +19,17 @@ WORTHWHILE = 15_000
 # 15,000 bins took 2.2 GB; in shares of 32 MB the paper's wire takes 45 MB more, in shares of 2 MB 3 % more time.
 MOST_VALUES = 2**20
 
+Rows = TypeVar("Rows", FloatArray, IntArray)
+# What a query of the nearest of some points is worth, in values: it takes about 1 us
+NEAREST_COST = 30
 
-def by_shares(work: Callable[[FloatArray], FloatArray], rows: FloatArray, each: int) -> FloatArray:
+
+def by_shares(work: Callable[[FloatArray], Rows], rows: FloatArray, each: int) -> Rows:
     """What `work` makes of the rows, the same bit for bit as at once: no row's result depends on another row.
 
-    The memory that it takes does not grow with the rows.
+    The memory that it takes does not grow with the rows. Work that a signal breaks off is waited for before the program
+    ends; scipy's own threads of cKDTree are not, and read on in a tree that is gone, which ended a run by SIGTERM with
+    a segmentation fault.
 
     Args:
         work: takes (M, P) and returns M rows; its compiled parts must release the interpreter.

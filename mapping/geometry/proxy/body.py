@@ -277,7 +277,9 @@ def _check(part: Part) -> None:
                 raise ContactError(f"a bar's {name} must be finite and at least 0; found {size!r}")
         if part.top + part.run == 0.0:
             raise ContactError("a bar needs a top or flanks that run; found both 0")
-    for name in ("height", "radius", "scale", "exponent", "width", "depth"):
+    if isinstance(part, Bell) and not (np.isfinite(part.exponent) and (part.exponent > 0.0 or part.exponent < -1.0)):
+        raise ContactError(f"a bell's exponent must be positive, or below -1, and finite; found {part.exponent!r}")
+    for name in ("height", "radius", "scale", "width", "depth"):
         size = getattr(part, name, 1.0)
         if not (np.isfinite(size) and size > 0.0):
             raise ContactError(f"a {type(part).__name__.lower()}'s {name} must be positive and finite; found {size!r}")

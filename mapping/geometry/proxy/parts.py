@@ -48,11 +48,11 @@ class Bar:
 
 @dataclass(frozen=True, eq=False)
 class Bell:
-    """A bump with a skirt, z = height (1 + u^2 / (p scale^2))^-p about the normal (theory equation 2.7).
+    """A bump whose flank runs out, z = height (1 + u^2 / (p scale^2))^-p about the normal (theory equation 2.7).
 
     Args:
         point, normal: (3,) m, and the outward unit normal.
-        height, scale: m, positive; exponent: p, positive.
+        height, scale: m, positive; exponent: p, positive, or below -1: it then ends at an edge without a kink.
     """
 
     point: FloatArray

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     )
     from mapping.geometry.templates.smooth_kernels import (
         smooth_groove_heights as smooth_groove_heights,
-        smooth_pit_heights as smooth_pit_heights,
+        smooth_point_heights as smooth_point_heights,
     )
 
 _PUBLIC = {
@@ -52,6 +52,6 @@ _PUBLIC = {
         "step_height",
     ),
     "small_heights": ("CREST_OUTLIER_SDS", "SHAPE_ERROR", "crest_trace", "robust_cost"),
-    "smooth_kernels": ("smooth_groove_heights", "smooth_pit_heights"),
+    "smooth_kernels": ("smooth_groove_heights", "smooth_point_heights"),
 }
 doorway(__name__, _PUBLIC)

@@ -1,4 +1,4 @@
-"""Compiled traces of bells: bumps of revolution with a skirt, dilated by the ball along their meridian."""
+"""Compiled heights of a ball over bells: bumps of revolution whose flank runs out, where they stand in space."""
 
 # mypy: disable-error-code="untyped-decorator"
 
@@ -8,82 +8,106 @@ import numpy as np
 from numba import njit
 
 from mapping import FloatArray
+from mapping.geometry.templates.smooth_kernels import GAUSSIAN, GONE, TABLE_PLACES, section_scale, smooth_trace
 
-# Places of the table of the trace: between them it errs by 1e-5 of the bump's height or less where the trace is smooth.
-TABLE_PLACES = 500
-# A step along the meridian turns it by so much at most, rad, and is at most this share of the length over which the
-# bell changes: the cubics between the points then err by 1e-6 of its height, 2e-5 at worst, against steps of 1e-3,
-# and on needles of a hundredth of the tip's radius, too, where 600 steps by one rule erred by 1e-2. A shallow bell
-# takes 60 steps.
-TURN_A_STEP = 0.03
-SHARE_A_STEP = 0.07
-# Beyond the place where a bell is so small a part of its height there is nothing left to walk.
-GONE = 1e-8
+# The ball's centre is sought along the foot's normal, which leans from the bell's axis by a tenth or so: each round
+# leaves about that part, times the trace's slope, of what it was off by, until that is so small a part of the height
+CENTRE_ROUNDS, CENTRE_SETTLED = 6, 1e-5
+# A hollow base has at least this share of the ball's curvature to spare, or the reach would be no bound
+LEAST_ROOM = 0.01
+# Share by which the table goes further than the furthest of the bins
+TABLE_SPARE = 0.05
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def bell_trace(height: float, scale: float, exponent: float, tip: float, table: FloatArray, spacing: float) -> None:
-    """Heights of the ball over the plane at distances 0, spacing, ... from the axis, written to `table`.
+@njit(cache=True, error_model="numpy", inline="always")
+def _reach(height, half, taper, curvature, tip):  # type: ignore[no-untyped-def]
+    """Distance from the axis beyond which the ball on the base touches no more of a bell than is GONE, m."""
+    scale, level = section_scale(half, taper), -np.log(GONE)
+    out = scale * np.sqrt(level if abs(taper) < GAUSSIAN else np.expm1(taper * level) / taper)
+    return out + np.sqrt(height * (2.0 * tip + height) / max(1.0 + curvature * tip, LEAST_ROOM))
 
-    The meridian z = H (1 + u^2 / (p w^2))^-p is walked in steps that follow its bend and its scale; the ball's centre
-    over each point is on the parallel curve (paper, equation 11), and where that crosses itself the highest branch is
-    the trace (interference points).
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _place(level, square, curvature):  # type: ignore[no-untyped-def]
+    """Distance from the axis, along the ball that a bell stands on, and height over it, m, of a place in space.
+
+    It is `level` up the axis, m, and the root of `square` away from where the bell stands.
     """
-    table[:] = 0.0
-    last = spacing * (len(table) - 1)
-    u, z, base, slope = 0.0, height, 1.0, 0.0
-    rho0, t0, slope0 = 0.0, height, 0.0
-    while u < last and abs(z) > GONE * abs(height):
-        squeeze = scale * scale * base
-        bend = -2.0 * z / squeeze * (1.0 - 2.0 * (exponent + 1.0) / exponent * u * u / squeeze)
-        step = SHARE_A_STEP * scale * np.sqrt(base)
-        if step * abs(bend) > TURN_A_STEP * (1.0 + slope * slope):
-            step = TURN_A_STEP * (1.0 + slope * slope) / abs(bend)
-        u += step
-        base = 1.0 + (u / scale) ** 2 / exponent
-        z = height * base**-exponent
-        slope = -2.0 * z * u / (scale * scale * base)
-        stretch = np.sqrt(1.0 + slope * slope)
-        rho = u - tip * slope / stretch
-        # r/c - r in the form that keeps its digits on the flat skirt
-        t = z - tip * slope * slope / (stretch * (1.0 + stretch))
-        low, high = min(rho0, rho), max(rho0, rho)
-        first = int(np.ceil(low / spacing))
-        for k in range(first, min(int(high / spacing), len(table) - 1) + 1):
-            # a cubic: the parallel curve has the slope of the meridian, and few points over a sharp crest
-            run = rho - rho0
-            x = (k * spacing - rho0) / run if run != 0.0 else 0.0
-            bow = (1.0 - x) * (slope0 * run - (t - t0)) + x * ((t - t0) - slope * run)
-            table[k] = max(table[k], t0 + x * (t - t0) + x * (1.0 - x) * bow)
-        rho0, t0, slope0 = rho, t, slope
+    aside = np.sqrt(max(square - level * level, 0.0))
+    toward = 1.0 + curvature * level
+    over = (2.0 * level + curvature * square) / (np.sqrt(toward**2 + (curvature * aside) ** 2) + 1.0)
+    return (aside if curvature == 0.0 else np.arctan2(curvature * aside, toward) / curvature), over
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _between(table, k, x):  # type: ignore[no-untyped-def]
+    """Of a table at a share x of the way from place k to the next: cubic, with the slopes of its neighbours."""
+    here, there = table[k], table[k + 1]
+    before = table[k - 1] if k > 0 else there
+    after = table[k + 2] if k + 2 < len(table) else -np.inf
+    if before == -np.inf or after == -np.inf:
+        return here + x * (there - here)
+    start, stop = 0.5 * (there - before), 0.5 * (after - here)
+    bow = (1.0 - x) * (start - (there - here)) + x * ((there - here) - stop)
+    return here + x * (there - here) + x * (1.0 - x) * bow
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def bell_heights(
-    x: FloatArray,
-    y: FloatArray,
-    places: FloatArray,
+    nodes: FloatArray,
+    normals: FloatArray,
+    points: FloatArray,
+    axes: FloatArray,
+    curvature: float,
     heights: FloatArray,
-    scales: FloatArray,
-    exponents: FloatArray,
+    halves: FloatArray,
+    tapers: FloatArray,
     tip: float,
     out: FloatArray,
 ) -> None:
-    """Heights (W, n) of W bells over bins with nodes at tangent coordinates x, y (n, q); `places` (W, 2)."""
+    """Heights (W, n) of W bells over n bins.
+
+    The bell stands on a ball of a curvature. A mesh has facets instead: its feet and normals say where the tip's centre
+    is, and what the bell does not lift rests on the mesh.
+
+    Args:
+        nodes: (n, q, 3) feet within each bin, m, and normals (n, 3) there.
+        points, axes: (W, 3) places on the base, m, and unit axes of the bells.
+        curvature: of the base under them, 1/m, positive where it is convex.
+        heights, halves, tapers: (W,) m, m (half width at half height), and 1: the sections of `smooth_trace`.
+        tip: m.
+    """
     walkers, bins = out.shape
-    nodes = x.shape[1]
-    table = np.zeros(TABLE_PLACES)
+    count, table = nodes.shape[1], np.empty(TABLE_PLACES)
     for w in range(walkers):
-        far = 0.0
+        px, py, pz = points[w, 0], points[w, 1], points[w, 2]
+        ax, ay, az = axes[w, 0], axes[w, 1], axes[w, 2]
+        far = 1e-3 * tip
+        for i in range(bins):  # nodes of one bin lie closer together than the table has to spare
+            x = nodes[i, 0, 0] + tip * normals[i, 0] - px
+            y = nodes[i, 0, 1] + tip * normals[i, 1] - py
+            z = nodes[i, 0, 2] + tip * normals[i, 2] - pz
+            far = max(far, _place(x * ax + y * ay + z * az, x * x + y * y + z * z, curvature)[0])
+        far = min((1.0 + TABLE_SPARE) * far + heights[w], _reach(heights[w], halves[w], tapers[w], curvature, tip))
+        spacing = far / (TABLE_PLACES - 2)
+        smooth_trace(heights[w], halves[w], tapers[w], tip, curvature, table, spacing)
         for i in range(bins):
-            for q in range(nodes):
-                far = max(far, (x[i, q] - places[w, 0]) ** 2 + (y[i, q] - places[w, 1]) ** 2)
-        spacing = max(np.sqrt(far), 1e-3 * tip) / (TABLE_PLACES - 2)
-        bell_trace(heights[w], scales[w], exponents[w], tip, table, spacing)
-        for i in range(bins):
-            total = 0.0
-            for q in range(nodes):
-                away = np.sqrt((x[i, q] - places[w, 0]) ** 2 + (y[i, q] - places[w, 1]) ** 2) / spacing
-                k = int(away)
-                total += table[k] + (away - k) * (table[k + 1] - table[k])
-            out[w, i] = total / nodes
+            nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
+            upward, total = nx * ax + ny * ay + nz * az, 0.0
+            for q in range(count):
+                x, y, z = nodes[i, q, 0] + tip * nx - px, nodes[i, q, 1] + tip * ny - py, nodes[i, q, 2] + tip * nz - pz
+                level, square, along = x * ax + y * ay + z * az, x * x + y * y + z * z, x * nx + y * ny + z * nz
+                rise = 0.0
+                for _ in range(CENTRE_ROUNDS):
+                    place, over = _place(level + rise * upward, square + rise * (2.0 * along + rise), curvature)
+                    place /= spacing
+                    k = int(place)
+                    if k >= TABLE_PLACES - 1 or table[k] == -np.inf or table[k + 1] == -np.inf:
+                        rise = 0.0
+                        break
+                    more = _between(table, k, place - k) - (over - tip)
+                    rise += more
+                    if abs(more) < CENTRE_SETTLED * heights[w]:
+                        break
+                total += max(rise, 0.0)
+            out[w, i] = total / count

@@ -1,4 +1,4 @@
-"""Compiled traces of hollows whose walls run out smoothly, dilated by the ball across the hollow."""
+"""Compiled traces of bells and of hollows whose flanks run out into the base, dilated by the ball across them."""
 
 # mypy: disable-error-code="untyped-decorator"
 
@@ -8,8 +8,16 @@ import numpy as np
 from numba import njit
 
 from mapping import FloatArray
-from mapping.geometry.templates.bell_kernels import GONE, SHARE_A_STEP, TABLE_PLACES, TURN_A_STEP
 
+# Places of the table of the trace: between them it errs by 1e-5 of the height or less where the trace is smooth.
+TABLE_PLACES = 500
+# A step along the section turns it by so much at most, rad, and is at most this share of the length over which it
+# changes: the cubics between the points then err by 1e-6 of its height, 2e-5 at worst, against steps of 1e-3, and on
+# needles of a hundredth of the tip's radius, too, where 600 steps by one rule erred by 1e-2. A shallow one takes 60.
+TURN_A_STEP = 0.03
+SHARE_A_STEP = 0.07
+# Beyond the place where so small a part of the height is left there is nothing to walk.
+GONE = 1e-8
 # Tables for balls of so many curvatures, between which the trace changes evenly: where they differ by a half of the
 # ball's own it errs by 1.2e-3 of the depth at most (five sections, five places)
 TABLE_BENDS = 5
@@ -22,7 +30,7 @@ GAUSSIAN = 1e-5
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _share(square, taper):  # type: ignore[no-untyped-def]
+def share_left(square, taper):  # type: ignore[no-untyped-def]
     """The part of the depth that is left at a squared distance in scales, and the base of its power."""
     base = 1.0 + taper * square
     if abs(taper) < GAUSSIAN:
@@ -32,59 +40,72 @@ def _share(square, taper):  # type: ignore[no-untyped-def]
     return base ** (-1.0 / taper), base
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def smooth_trace(depth: float, half: float, taper: float, tip: float, table: FloatArray, spacing: float) -> None:
-    """Heights (negative) of the ball over the plane at distances 0, spacing, ... from the middle, written to `table`.
+@njit(cache=True, error_model="numpy", inline="always")
+def section_scale(half, taper):  # type: ignore[no-untyped-def]
+    """The scale w of a section that has half of its height at u = `half`."""
+    doubled = np.log(2.0) if abs(taper) < GAUSSIAN else np.expm1(taper * np.log(2.0)) / taper
+    return half / np.sqrt(doubled)
 
-    The section z = -H (1 + k u^2 / w^2)^(-1/k) of taper k has half of its depth at u = `half`: a cosine nearly at
-    k = -0.4, a Gaussian at 0, the paper's bump upside down at 1. It is walked from the middle outwards; the ball's
-    centre over each point is on the parallel curve (paper, equation 11), and where that crosses itself the highest
-    branch is the trace. What is beyond the middle touches lower, for both sides are alike.
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def smooth_trace(
+    height: float, half: float, taper: float, tip: float, curvature: float, table: FloatArray, spacing: float
+) -> None:
+    """Heights of the ball over the base at distances 0, spacing, ... along it from the middle, written to `table`.
+
+    The section z = H (1 + k u^2 / w^2)^(-1/k) of taper k has half of its height H, negative of a hollow, at u = `half`:
+    a cosine nearly at k = -0.4, a Gaussian at 0, the paper's bump at 1. It stands on a circle of `curvature`, 1/m,
+    positive where the base is convex. It is walked from the middle outwards; the ball's centre over each point is on
+    the parallel curve (paper, equation 11; theory 4.10b), and where that crosses itself the highest branch is the trace
+    (interference points). What is beyond the middle touches lower, for both sides are alike. Where the ball meets
+    nothing of the section the table is -inf.
     """
     table[:] = -np.inf
     last = spacing * (len(table) - 1)
-    doubled = np.log(2.0) if abs(taper) < GAUSSIAN else np.expm1(taper * np.log(2.0)) / taper
-    scale = half / np.sqrt(doubled)
+    scale = section_scale(half, taper)
     edge = scale / np.sqrt(-taper) if taper < 0.0 else np.inf
-    u, rho0, t0, slope0 = 0.0, 0.0, -depth, 0.0
+    u, rho0, t0, slope0 = 0.0, 0.0, height, 0.0
     base, left = 1.0, 1.0
-    while rho0 < last and left > GONE:
+    while min(u, rho0) < last and left > GONE:
         square = (u / scale) ** 2
-        bend = 2.0 * depth * left / (scale * scale * base) * (1.0 - 2.0 * (1.0 + taper) * square / base)
-        slope = 2.0 * depth * left * u / (scale * scale * base)
+        bend = -2.0 * height * left / (scale * scale * base) * (1.0 - 2.0 * (1.0 + taper) * square / base)
+        slope = -2.0 * height * left * u / (scale * scale * base)
         step = min(SHARE_A_STEP * scale * np.sqrt(base), SHARE_TO_EDGE * (edge - u))
         if step * abs(bend) > TURN_A_STEP * (1.0 + slope * slope):
             step = TURN_A_STEP * (1.0 + slope * slope) / abs(bend)
         u += step
         square = (u / scale) ** 2
-        left, base = _share(square, taper)
-        slope = 2.0 * depth * left * u / (scale * scale * base)
+        left, base = share_left(square, taper)
+        slope = -2.0 * height * left * u / (scale * scale * base) / (1.0 + curvature * height * left)
         stretch = np.sqrt(1.0 + slope * slope)
-        rho = u - tip * slope / stretch
-        # r/c - r in the form that keeps its digits on a flat wall
-        t = -depth * left - tip * slope * slope / (stretch * (1.0 + stretch))
+        # the centre, along the base and over the point's foot, less the ball's radius: r/c - r in the form that keeps
+        # its digits on a flat wall
+        aside = -tip * slope / stretch
+        over = height * left - tip * slope * slope / (stretch * (1.0 + stretch))
+        square = (1.0 + curvature * (tip + over)) ** 2 + (curvature * aside) ** 2
+        t = 2.0 * over * (1.0 + curvature * tip) + curvature * (over * over + aside * aside)
+        t /= np.sqrt(square) + 1.0 + curvature * tip
+        rho, turned = u + aside, 0.0
+        if curvature != 0.0:
+            turned = curvature * aside / (1.0 + curvature * (tip + over))
+            rho = u + np.arctan(turned) / curvature
+        slope = (1.0 + curvature * (tip + t)) * (slope + turned) / (1.0 - slope * turned)
         run = rho - rho0
         for k in range(max(int(np.ceil(min(rho0, rho) / spacing)), 0), len(table)):
             if k * spacing > max(rho0, rho):
                 break
-            # a cubic: the parallel curve has the slope of the section
+            # a cubic: the parallel curve has the slope of the section, and few points over a sharp crest
             x = (k * spacing - rho0) / run if run != 0.0 else 0.0
             bow = (1.0 - x) * (slope0 * run - (t - t0)) + x * ((t - t0) - slope * run)
             table[k] = max(table[k], t0 + x * (t - t0) + x * (1.0 - x) * bow)
         rho0, t0, slope0 = rho, t, slope
-    for k in range(len(table)):
-        if table[k] == -np.inf:
-            table[k] = 0.0
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _means(
-    away: FloatArray, toward: FloatArray, depth: float, half: float, taper: float, tip: float, out: FloatArray
+    away: FloatArray, toward: FloatArray, height: float, half: float, taper: float, tip: float, out: FloatArray
 ) -> None:
-    """Mean heights (n,) over nodes (n, q) `away` from the middle, where the base bends by `toward`, 1/m, towards it.
-
-    On a curved base heights over it are felt as a ball of curvature 1/r + k feels them over a plane.
-    """
+    """Mean heights (n,) over nodes (n, q) `away` from the middle, where the base bends by `toward`, 1/m, towards it."""
     bins, nodes = away.shape
     # a hollow base as tight as the ball has no trace of its own
     least = -0.999 / tip
@@ -97,7 +118,10 @@ def _means(
     gap = (high - low) / (bends - 1) if bends > 1 else 1.0
     table, spacing = np.zeros((bends, TABLE_PLACES)), far / (TABLE_PLACES - 2)
     for b in range(bends):
-        smooth_trace(depth, half, taper, tip / (1.0 + tip * (low + b * gap)), table[b], spacing)
+        smooth_trace(height, half, taper, tip, low + b * gap, table[b], spacing)
+        for k in range(TABLE_PLACES):
+            if table[b, k] == -np.inf or (height > 0.0 and table[b, k] < 0.0):
+                table[b, k] = 0.0  # on the base
     for i in range(bins):
         total = 0.0
         for q in range(nodes):
@@ -106,11 +130,11 @@ def _means(
             x = place - k
             way = min(max((toward[i, q] - low) / gap, 0.0), bends - 1.0)
             b = int(way)
-            height = table[b, k] + x * (table[b, k + 1] - table[b, k])
+            felt = table[b, k] + x * (table[b, k + 1] - table[b, k])
             if b + 1 < bends:
                 beside = table[b + 1, k] + x * (table[b + 1, k + 1] - table[b + 1, k])
-                height += (way - b) * (beside - height)
-            total += height
+                felt += (way - b) * (beside - felt)
+            total += felt
         out[i] = total / nodes
 
 
@@ -123,7 +147,7 @@ def smooth_groove_heights(
     bend_along: FloatArray,
     courses: FloatArray,
     ends: FloatArray,
-    depths: FloatArray,
+    heights: FloatArray,
     halves: FloatArray,
     tapers: FloatArray,
     tip: float,
@@ -134,7 +158,7 @@ def smooth_groove_heights(
     An end is half of a pit with the same section.
 
     Args:
-        depths, halves, tapers: (W,) m, m, and 1: see `smooth_trace`.
+        heights (negative), halves, tapers: (W,) m, m, and 1: see `smooth_trace`.
     """
     walkers, bins = out.shape
     modes, nodes = basis.shape[0], s.shape[1]
@@ -150,22 +174,22 @@ def smooth_groove_heights(
                 turned = beyond * beyond / square if square > 0.0 else 0.0
                 away[i, q] = np.sqrt(square)
                 toward[i, q] = (1.0 - turned) * bend[i, q] + turned * bend_along[i, q]
-        _means(away, toward, depths[w], halves[w], tapers[w], tip, out[w])
+        _means(away, toward, heights[w], halves[w], tapers[w], tip, out[w])
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def smooth_pit_heights(
+def smooth_point_heights(
     x: FloatArray,
     y: FloatArray,
     bends: FloatArray,
     places: FloatArray,
-    depths: FloatArray,
+    heights: FloatArray,
     halves: FloatArray,
     tapers: FloatArray,
     tip: float,
     out: FloatArray,
 ) -> None:
-    """Heights (W, n) of W smooth pits over bins with q nodes; the first arguments as for `pit_heights`."""
+    """Heights (W, n) of W bells, or smooth pits of negative heights; the first arguments as for `pit_heights`."""
     walkers, bins = out.shape
     nodes = x.shape[1]
     away, toward = np.empty((bins, nodes)), np.empty((bins, nodes))
@@ -177,4 +201,4 @@ def smooth_pit_heights(
                 share = along * along / square if square > 0.0 else 0.5
                 away[i, q] = np.sqrt(square)
                 toward[i, q] = share * bends[0] + (1.0 - share) * bends[1]
-        _means(away, toward, depths[w], halves[w], tapers[w], tip, out[w])
+        _means(away, toward, heights[w], halves[w], tapers[w], tip, out[w])

@@ -15,7 +15,7 @@ from mapping.geometry.templates import crest_trace
 from mapping.inference.configuration.joined_shape import JoinedShape
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood
 from mapping.inference.curves import HIGHEST_DEGREE
-from mapping.inference.families import RidgeShape, TwinShape, bell_shape, trapezoid_beside, twin_beside
+from mapping.inference.families import RidgeShape, TwinShape, bell_beside, trapezoid_beside, twin_beside
 from mapping.inference.kinds import LineKind, PointKind, kind_of, sizes_of
 from mapping.inference.likelihood import LogPosterior, Shape
 from mapping.inference.sampler import Laplace, find_optima, laplace
@@ -164,12 +164,11 @@ def as_bar(part: Part, place: Neighbourhood, top: float) -> Part:
     return Part(part.feature, bar, np.concatenate([kept, np.log([top, 0.02 * place.half_width])]))
 
 
-def as_bell(part: Part, place: Neighbourhood, scale: float) -> Part:
-    """A round bump as one with a skirt, of a scale (m)."""
+def as_bell(part: Part, half: float) -> Part:
+    """A round bump as one whose flank runs out, of a half width (m)."""
     cap: Any = part.shape
-    sizes, height = sizes_of(part.feature, cap.tip_radius), cap.priors[cap.free]
-    bell = bell_shape(cap.window, cap.spot, sizes, cap.tip_radius, cap.free, cap.priors[0], height)
-    start = np.concatenate([part.start[: cap.free + 1], [np.log(scale), bell.start[-1]]])
+    bell = bell_beside(cap, sizes_of(part.feature, cap.tip_radius))
+    start = np.concatenate([part.start[: cap.free + 1], [np.log(half), bell.start[-1]]])
     return Part(part.feature, bell, start)
 
 

@@ -22,7 +22,7 @@ from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 Parts = list[Part]
 # Tops of a bar and gaps of a twin, in half-widths of the disturbance, that their optima are searched from
 TOPS, GAPS = (0.5,), (0.2, 0.7)
-# Scales of a bump with a skirt, in half-widths, that its optimum is searched from
+# Half widths of a bump whose flank runs out, in those of the disturbance, that its optimum is searched from
 SKIRTS = (0.3, 0.8)
 # Points so near to a straight line, in half-widths, may be of it
 ON_LINE = 0.35
@@ -50,7 +50,7 @@ def sections(now: Configuration) -> Iterator[Parts]:
         if isinstance(part.shape, BumpShape):
             half = sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
             for share in SKIRTS:
-                yield [*now.parts[:k], as_bell(part, now.place, share * half), *now.parts[k + 1 :]]
+                yield [*now.parts[:k], as_bell(part, share * half), *now.parts[k + 1 :]]
         ridge = _ridge_of(part, now.place)
         if ridge is None or now.as_narrow_as_wires[k]:
             continue

@@ -7,7 +7,8 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from mapping.inference.families.bell import (
         BellShape as BellShape,
-        bell_shape as bell_shape,
+        bell_beside as bell_beside,
+        bell_section as bell_section,
         width_at_half_height as width_at_half_height,
     )
     from mapping.inference.families.broken_ridge import BrokenRidgeShape as BrokenRidgeShape
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
     from mapping.inference.families.twin import TwinShape as TwinShape, twin_beside as twin_beside
 
 _PUBLIC = {
-    "bell": ("BellShape", "bell_shape", "width_at_half_height"),
+    "bell": ("BellShape", "bell_beside", "bell_section", "width_at_half_height"),
     "broken_ridge": ("BrokenRidgeShape",),
     "bump": ("BumpShape", "Spot", "spot_at"),
     "free_tip": ("with_free_tip", "with_nominal_tip"),

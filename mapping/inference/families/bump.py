@@ -10,6 +10,12 @@ from mapping import FloatArray
 from mapping.base import Base
 from mapping.inference.likelihood import Prior, Window
 
+# Height over the base that a spot is looked for from, in tip radii
+SPOT_LIFT = 0.01
+# Feet that a spot's paraboloid is laid through: directions, and distances in its reach; and the cosine by which the
+# normal of one may lean from that of the spot
+SPOT_DIRECTIONS, SPOT_SHARES, SPOT_LEAN = 12, (0.4, 0.7, 1.0), 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class Spot:
@@ -33,24 +39,48 @@ class Spot:
         sideways = place + height[:, None] * place * self.bends
         return np.asarray(self.point + sideways @ self.axes + (height - sag)[:, None] * self.normal)
 
+    def normals(self, place: FloatArray) -> FloatArray:
+        """(W, 3) outward unit normals at tangent coordinates (W, 2), to first order."""
+        leaning = self.normal + (place * self.bends) @ self.axes
+        return np.asarray(leaning / np.linalg.norm(leaning, axis=1, keepdims=True))
+
 
 def spot_at(point: FloatArray, normal: FloatArray, along: FloatArray, base: Base, tip: float, reach: float) -> Spot:
-    """The spot of the base below a point, its curvature taken from the sag at `reach`, m."""
-    foot = base.foot((point + tip * normal)[None], tip)
+    """The spot of the base below a point; its normal and curvatures are those of a paraboloid over `reach`, m.
+
+    The paraboloid is laid through feet all around: on a mesh each of them tells its own facet, all of them the body.
+    """
+    # from near by: a normal that is not the facet's would lead a ball's centre to the foot of another place
+    foot = base.foot((point + SPOT_LIFT * tip * normal)[None], tip)
     center, up = foot.points[0], foot.normals[0] * np.sign(foot.normals[0] @ normal)
+    axes = _tangents(up, along)
+    turn = 2.0 * np.pi * np.arange(SPOT_DIRECTIONS) / SPOT_DIRECTIONS
+    disc = np.concatenate([share * reach * np.column_stack([np.cos(turn), np.sin(turn)]) for share in SPOT_SHARES])
+    feet = base.foot(center + disc @ axes + tip * up, tip)
+    offset = feet.points - center
+    # a foot on another side of the body, or over an edge, says nothing of this one
+    own = (feet.normals @ up > SPOT_LEAN) & (np.linalg.norm(offset, axis=1) < 2.0 * reach)
+    if own.sum() < SPOT_DIRECTIONS:
+        return Spot(center, axes, up, np.zeros(2))
+    for _ in range(2):  # in the frame of the foot's facet, then in its own
+        u, v = (offset[own] @ axes.T).T
+        design = np.column_stack([np.ones_like(u), u, v, -0.5 * u**2, -0.5 * v**2, -u * v])
+        _, lean_u, lean_v, *bends, _ = np.linalg.lstsq(design, offset[own] @ up, rcond=None)[0]
+        found = Spot(center, axes, up, np.array(bends))
+        up = up - lean_u * axes[0] - lean_v * axes[1]
+        up /= np.linalg.norm(up)
+        axes = _tangents(up, along)
+    return found
+
+
+def _tangents(up: FloatArray, along: FloatArray) -> FloatArray:
+    """(2, 3) unit tangents, the first as near to a direction as it may be."""
     first = along - (along @ up) * up
     if np.linalg.norm(first) < 1e-9:
         first = np.eye(3)[int(np.argmin(np.abs(up)))]
         first = first - (first @ up) * up
     first = first / np.linalg.norm(first)
-    axes = np.stack([first, np.cross(up, first)])
-    around = np.concatenate([axes, -axes]) * reach + center
-    offset = base.foot(around + tip * up, tip).points - center
-    across = np.einsum("ij,ij->i", offset, np.concatenate([axes, -axes]))
-    sag = np.where(across > 0.5 * reach, -2.0 * (offset @ up) / np.maximum(across, 0.5 * reach) ** 2, np.nan)
-    known = np.isfinite(sag.reshape(2, 2))
-    bends = np.where(known, sag.reshape(2, 2), 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    return Spot(center, axes, up, bends)
+    return np.stack([first, np.cross(up, first)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,9 +52,7 @@ class PitShape:
 
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray]:
-        """(n, nodes) tangent coordinates of the nodes of each bin, m."""
-        nodes = bin_nodes(self.window) - self.spot.point
-        return nodes @ self.spot.axes[0], nodes @ self.spot.axes[1]
+        return point_nodes(self.window, self.spot, self.tip_radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +107,21 @@ def line_nodes(
     basis = modes.basis(s).reshape(-1, *shape)
     bend, bend_along = (each[leg].reshape(shape) for each in (chart.bend, chart.bend_along))
     return s.reshape(shape), lateral.reshape(shape), basis, bend, bend_along
+
+
+def point_nodes(window: Window, spot: Spot, tip: float) -> tuple[FloatArray, FloatArray]:
+    """(n, nodes) coordinates about a spot of the nodes of each bin, m: their distance from it is along the base.
+
+    Towards each node the base is taken for a circle of its curvature there, whose foot under the ball's centre counts:
+    the centre is where it was felt, while the foot on a facet of a coarse mesh is r sin(tilt) beside it.
+    """
+    centers = bin_nodes(window) + ((tip + window.height)[:, None] * window.normals)[:, None] - spot.point
+    x, y, z = centers @ spot.axes[0], centers @ spot.axes[1], centers @ spot.normal
+    flat = np.sqrt(np.maximum(x**2 + y**2, np.finfo(float).tiny))
+    bend = (x**2 * spot.bends[0] + y**2 * spot.bends[1]) / flat**2
+    turned = np.arctan2(bend * flat, 1.0 + bend * z)
+    longer = np.where(bend == 0.0, 1.0, turned / np.where(bend == 0.0, 1.0, bend * flat))
+    return x * longer, y * longer
 
 
 def bin_nodes(window: Window) -> FloatArray:

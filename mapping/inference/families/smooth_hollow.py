@@ -59,18 +59,18 @@ class SmoothPitShape(PitShape):
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights (negative) over the base's trace, m."""
-        from mapping.geometry.templates import smooth_pit_heights
+        from mapping.geometry.templates import smooth_point_heights
 
         place = np.zeros((len(theta), 2))
         place[:, : self.free] = theta[:, : self.free]
         out = np.empty((len(theta), len(self.window)))
-        smooth_pit_heights(*self._places, self.spot.bends, place, *smooth_section(theta), self.tip_radius, out)
+        smooth_point_heights(*self._places, self.spot.bends, place, *smooth_section(theta), self.tip_radius, out)
         return out
 
 
 def smooth_section(theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(W,) depths, half widths at half depth, m, and tapers."""
-    return np.exp(theta[:, -2]), np.exp(theta[:, -3]), np.ascontiguousarray(theta[:, -1])
+    """(W,) heights (negative), half widths at half depth, m, and tapers."""
+    return -np.exp(theta[:, -2]), np.exp(theta[:, -3]), np.ascontiguousarray(theta[:, -1])
 
 
 def smooth_groove_beside(groove: GrooveShape, sizes: Sizes) -> SmoothGrooveShape:

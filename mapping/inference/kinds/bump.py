@@ -1,34 +1,39 @@
-"""Bump: a round detail that stands on the base, a cap, or with a skirt a bell."""
+"""Bump: a round detail that stands on the base, a cap, or where its flank runs out a bell."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
 from mapping.geometry.proxy import Bell, Part
-from mapping.geometry.templates import chain_height
+from mapping.geometry.templates import chain_height, width_of_cap
 from mapping.inference.families import (
     BellShape,
     BumpShape,
     PosteriorProblem,
     Sizes,
     Spot,
-    Surroundings,
-    bell_shape,
+    bell_beside,
+    bell_section,
     width_at_half_height,
 )
 from mapping.inference.kinds.crests import Crest
 from mapping.inference.kinds.kind import Section
-from mapping.inference.kinds.points import PointKind, Seen, seen_about
-from mapping.inference.kinds.posing import height_prior, place_prior, pose, radius_prior
+from mapping.inference.kinds.points import PointKind, Seen
+from mapping.inference.kinds.posing import height_prior, place_prior, radius_prior
 from mapping.inference.likelihood import Shape, Window
+
+# Tapers that a bell's optimum is searched from: with an edge, nearly a Gaussian, and with a long skirt
+BEGUN_TAPERS = (-0.4, 0.1, 1.0)
+RUNS_OUT = "its flank runs out into the base: width at half height"
 
 
 class Bump(Crest, PointKind):
-    """Sphere caps, and bells where no cap fits."""
+    """Sphere caps and bells, which compete."""
 
     def trace(self, feature: Feature, feet: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
         """(N,) heights of a cap, or of the bell that the feature's details describe, m; see `Kind.trace`."""
@@ -49,22 +54,34 @@ class Bump(Crest, PointKind):
     def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
         return float(np.log(4.0 * sizes.radius)), float(np.log(0.5 * sizes.height))
 
-    def alternatives(self, problem: PosteriorProblem, around: Surroundings) -> Sequence[PosteriorProblem]:
-        """A bump with a skirt."""
-        seen = seen_about(problem.feature, around, problem.window)
-        priors = place_prior(seen.sizes), height_prior(seen.sizes)
-        bell = bell_shape(seen.window, seen.spot, seen.sizes, seen.tip_radius, seen.free, *priors)
-        return (pose(problem.feature, seen.sizes, bell, seen.window, around, _bell_beginnings(bell.start)),)
+    def rivals(self, problem: PosteriorProblem, optimum: FloatArray) -> Sequence[PosteriorProblem]:
+        """Bumps whose flank runs out, where the cap lies."""
+        cap: Any = problem.target.shape
+        bell = bell_beside(cap, problem.sizes)
+        begun = [
+            [*optimum[:-1], bell.start[-2] + wider, taper] for wider in (-1.5, -0.5, 0.5) for taper in BEGUN_TAPERS
+        ]
+        return (replace(problem, target=replace(problem.target, shape=bell), beginnings=np.array(begun)),)
+
+    def draws_of_height(self, shape: Shape, draws: FloatArray) -> FloatArray:
+        return draws[:, -3] if isinstance(shape, BellShape) else draws[:, -2]
+
+    def widths_felt(self, shape: Shape, draws: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """At half height, where caps and bells are alike: each family's own."""
+        if isinstance(shape, BellShape):
+            width = 2.0 * np.exp(draws[:, -2])
+        else:
+            width = width_of_cap(0.5 * draws[:, -2], np.exp(draws[:, -1]))
+        return width, width
 
     def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
         """Of a cap, or of a bell: its width at half height, scale and exponent."""
         if not isinstance(shape, BellShape):
             return super().section(feature, shape, draws)
-        scale, exponent = np.exp(draws[:, -2]), np.exp(draws[:, -1])
-        full = Interval.from_draws(width_at_half_height(scale, exponent))
-        bell = {"scale": float(np.median(scale)), "exponent": float(np.median(exponent))}
-        note = "its flank runs out in a skirt: width at half height"
-        return Section(Interval.from_draws(draws[:, -3]), full, bell, note)
+        width = Interval.from_draws(2.0 * np.exp(draws[:, -2]))
+        scale, exponent = bell_section(float(np.exp(np.median(draws[:, -2]))), float(np.median(draws[:, -1])))
+        bell = {"scale": float(scale), "exponent": float(exponent)}
+        return Section(Interval.from_draws(draws[:, -3]), width, bell, RUNS_OUT)
 
     def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
         place = np.zeros(2)
@@ -85,24 +102,14 @@ def bump_shape(window: Window, spot: Spot, sizes: Sizes, tip: float, free: int) 
 
 def _bell(feature: Feature, feet: FloatArray, tip_radius: float) -> FloatArray:
     """(N,) heights that a bump of revolution with the feature's scale and exponent leaves, m."""
-    from mapping.geometry.templates import bell_heights
+    from mapping.geometry.templates import smooth_point_heights
 
-    away = np.linalg.norm(feet - feature.axis[0], axis=1)[:, None]
-    height, scale = np.array([feature.height.median]), np.array([feature.details.scale], dtype=np.float64)
-    exponent, out = np.array([feature.details.exponent], dtype=np.float64), np.empty((1, len(feet)))
-    bell_heights(away, np.zeros_like(away), np.zeros((1, 2)), height, scale, exponent, tip_radius, out)
+    details, away = feature.details, np.linalg.norm(feet - feature.axis[0], axis=1)[:, None]
+    scale, exponent = float(details.scale or 0.0), float(details.exponent or 0.0)
+    known = feature.height.median, 0.5 * float(width_at_half_height(scale, exponent)), 1.0 / exponent
+    section, out = [np.array([each]) for each in known], np.empty((1, len(feet)))
+    smooth_point_heights(away, np.zeros_like(away), np.zeros(2), np.zeros((1, 2)), *section, tip_radius, out)
     return np.asarray(out[0])
-
-
-def _bell_beginnings(start: FloatArray) -> FloatArray:
-    """Starts from slender to wide, with a long skirt and with none."""
-    starts = []
-    for scale in (-1.5, -0.5, 0.5):
-        for exponent in (0.0, 2.0):
-            other = start.copy()
-            other[-2:] = start[-2] + scale, exponent
-            starts.append(other)
-    return np.array(starts)
 
 
 BUMP = Bump(

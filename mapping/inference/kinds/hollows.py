@@ -56,7 +56,8 @@ class Hollow(Kind):
 
 def _smooth_section(shape: SmoothGrooveShape | SmoothPitShape, draws: FloatArray) -> Section:
     """Of a hollow without an edge: how wide it is at half of the depth that is stated, where its walls were touched."""
-    depth, half, taper = smooth_section(draws)
+    bottom, half, taper = smooth_section(draws)
+    depth = -bottom
     height = _depth(depth, _dips(shape, draws))
     share = np.clip(-0.5 * height.median / depth, 1e-3, 1.0 - 1e-3)
     # u of half the depth times the root of (share^-k - 1) / (2^k - 1), which is log2(1 / share) at k = 0
@@ -83,7 +84,7 @@ def _remark(height: Interval) -> str:
 
 def _dips(shape: SmoothGrooveShape | SmoothPitShape, draws: FloatArray) -> FloatArray:
     """(S,) how far the ball sinks into the middle of smooth hollows, of a line in the mean along it, m."""
-    from mapping.geometry.templates import smooth_pit_heights
+    from mapping.geometry.templates import smooth_point_heights
 
     if isinstance(shape, SmoothPitShape):
         bends = shape.spot.bends.mean(keepdims=True)
@@ -96,17 +97,17 @@ def _dips(shape: SmoothGrooveShape | SmoothPitShape, draws: FloatArray) -> Float
     nowhere, out = np.zeros((len(draws), 2)), np.empty((len(draws), 1))
     some = bends[:: max(1, len(bends) // FEW_BENDS)]
     for bend in some:
-        smooth_pit_heights(middle, middle, np.full(2, bend), nowhere, *smooth_section(draws), shape.tip_radius, out)
+        smooth_point_heights(middle, middle, np.full(2, bend), nowhere, *smooth_section(draws), shape.tip_radius, out)
         dips -= out[:, 0] / len(some)
     return dips
 
 
 def _smooth(feature: Feature, away: FloatArray, tip_radius: float) -> FloatArray:
     """(N,) heights at distances from the axis that a hollow with the feature's taper leaves, m."""
-    from mapping.geometry.templates import smooth_pit_heights
+    from mapping.geometry.templates import smooth_point_heights
 
-    known = (feature.details.bottom, feature.details.scale, feature.details.taper)
+    known = (-(feature.details.bottom or 0.0), feature.details.scale, feature.details.taper)
     section = [np.array([each], dtype=np.float64) for each in known]
     nowhere, out = np.zeros((len(away), 1)), np.empty((1, len(away)))
-    smooth_pit_heights(away[:, None], nowhere, np.zeros(2), np.zeros((1, 2)), *section, tip_radius, out)
+    smooth_point_heights(away[:, None], nowhere, np.zeros(2), np.zeros((1, 2)), *section, tip_radius, out)
     return np.asarray(out[0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +12,7 @@ from mapping.inference.families import PosteriorProblem, Sizes, Spot, Surroundin
 from mapping.inference.kinds.kind import Kind, sizes_of
 from mapping.inference.kinds.posing import pose
 from mapping.inference.likelihood import Shape, Window
+from mapping.inference.sampler import find_optima
 
 # A position across the sweeps is asked for only if they spread over this share of the disturbance.
 SPREAD = 0.1
@@ -74,7 +75,21 @@ class PointKind(Kind):
         return self.shape(seen_about(feature, around, window))
 
     def problem(self, feature: Feature, around: Surroundings) -> PosteriorProblem:
+        """About the place of the optimum: from where it was detected the base is known to second order only."""
         seen = seen_about(feature, around)
+        detected = self._posed(feature, seen, around)
+        best, spot = find_optima(detected.target, detected.beginnings)[0], seen.spot
+        place = np.zeros((1, 2))
+        place[0, : seen.free] = best[: seen.free]
+        point, normal = spot.lifted(place, np.zeros(1))[0], spot.normals(place)[0]
+        reach = seen.sizes.half_width
+        return self._posed(
+            feature,
+            replace(seen, spot=spot_at(point, normal, spot.axes[0], around.base, seen.tip_radius, reach)),
+            around,
+        )
+
+    def _posed(self, feature: Feature, seen: Seen, around: Surroundings) -> PosteriorProblem:
         shape = self.shape(seen)
         return pose(feature, seen.sizes, shape, seen.window, around, self._beginnings(shape, seen.sizes))
 

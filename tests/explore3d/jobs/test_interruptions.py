@@ -21,6 +21,7 @@ from calibration_sphere import sphere_scene
 from in_process import explore3d_main
 from interrupting import Ended, bare_tile, digests, explore3d
 
+import hw
 from explore3d.errors import UserError
 from explore3d.jobs.merge import load
 from explore3d.jobs.run import run
@@ -286,3 +287,11 @@ def test_another_scene_needs_overwrite_and_is_refused_before_anything_moves(
         assert digests(out) == before and not list(out.glob("unfinished-*"))
     run(other, out, overwrite=True)
     assert "seed = 6" in (out / "scene.toml").read_text() and state(out)["state"] == "complete"
+
+
+def test_no_thread_reads_on_in_what_a_signal_took_away() -> None:
+    """scipy's trees leave their own threads behind when a signal breaks a query off: a run ended with status -11."""
+    top = Path(hw.__file__).parents[1]
+    files = [path for name in ("explore3d", "planners", "mapping", "hw") for path in (top / name).rglob("*.py")]
+    assert len(files) > 300
+    assert [path for path in files if re.search(r"query\w*\([^)]*workers=", path.read_text())] == []

@@ -1,4 +1,4 @@
-"""Smooth hollows against brute-force dilation of their sections."""
+"""Bells and smooth hollows against brute-force dilation of their sections."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mapping import FloatArray
-from mapping.geometry.templates import smooth_groove_heights, smooth_pit_heights
+from mapping.geometry.templates import smooth_groove_heights, smooth_point_heights
+from mapping.geometry.templates.smooth_kernels import smooth_trace
 
 TIP = 3e-3
 
@@ -27,14 +28,39 @@ def rolled(at: FloatArray, tip: float, *shape: float) -> FloatArray:
     return np.array([(z[m] + np.sqrt(tip**2 - (u[m] - x) ** 2) - tip).max() for m, x in zip(near, at, strict=True)])
 
 
+def on_a_circle(at: float, curvature: float, height: float, half: float, taper: float) -> float:
+    """Height at which a ball rests over a place of a circle, along it, by trying every place of the section."""
+    radius = 1.0 / curvature if curvature != 0.0 else 1e3
+    u = np.linspace(-10e-3, 10e-3, 400_001)
+    up = np.column_stack([np.sin(u / radius), np.cos(u / radius)])
+    points = (radius - section(u, height, half, taper))[:, None] * up
+    way = np.array([np.sin(at / radius), np.cos(at / radius)])
+    foot = radius * way
+    beside = (points - foot) @ np.array([way[1], -way[0]])
+    near = np.abs(beside) < TIP
+    return float(((points[near] - foot) @ way + np.sqrt(TIP**2 - beside[near] ** 2) - TIP).max())
+
+
+@pytest.mark.parametrize("curvature", [-120.0, -40.0, 60.0, 200.0])
+@pytest.mark.parametrize(
+    ("height", "half", "taper"), [(0.6e-3, 1e-3, -0.4), (0.3e-3, 0.3e-3, 1.0), (-0.5e-3, 1e-3, 0.2)]
+)
+def test_a_round_base_is_a_circle_and_no_other_ball(curvature: float, height: float, half: float, taper: float) -> None:
+    spacing, table = 0.05e-3, np.empty(80)
+    smooth_trace(height, half, taper, TIP, curvature, table, spacing)
+    expected = [on_a_circle(k * spacing, curvature, height, half, taper) for k in range(0, 80, 4)]
+    felt = np.maximum(table[::4], 0.0) if height > 0.0 else table[::4]
+    np.testing.assert_allclose(felt, np.maximum(expected, 0.0) if height > 0.0 else expected, atol=3e-5 * abs(height))
+
+
 @pytest.mark.parametrize("taper", [-0.6, -0.4, 0.0, 0.3, 1.0])
 @pytest.mark.parametrize(("depth", "half"), [(0.5e-3, 0.9e-3), (0.5e-3, 0.3e-3), (0.1e-3, 2e-3), (2e-3, 0.9e-3)])
 def test_a_ball_rests_on_a_smooth_pit_as_on_each_of_its_points(taper: float, depth: float, half: float) -> None:
     at = np.concatenate([np.linspace(0.0, 0.5e-3, 11), np.linspace(0.6e-3, 6e-3, 31)])
     out = np.empty((1, len(at)))
     nodes = at[:, None]
-    shape = np.array([depth]), np.array([half]), np.array([taper])
-    smooth_pit_heights(nodes, 0.0 * nodes, np.zeros(2), np.zeros((1, 2)), *shape, TIP, out)
+    shape = np.array([-depth]), np.array([half]), np.array([taper])
+    smooth_point_heights(nodes, 0.0 * nodes, np.zeros(2), np.zeros((1, 2)), *shape, TIP, out)
     np.testing.assert_allclose(out[0], rolled(at, TIP, depth, half, taper), atol=2e-5 * depth)
     assert (out[0] < -0.02 * depth).sum() > 4
 
@@ -44,14 +70,32 @@ def test_a_groove_is_felt_as_its_section_as_the_base_bends_and_ends_round() -> N
     depth, half, taper = 0.4e-3, 0.8e-3, -0.4
     bend = np.linspace(-40.0, 120.0, 33)[:, None]
     s, aside = np.full_like(bend, 5e-3), np.full_like(bend, 0.5e-3)
-    shape = np.array([depth]), np.array([half]), np.array([taper])
+    shape = np.array([-depth]), np.array([half]), np.array([taper])
     line = np.zeros((0, *bend.shape)), bend, 0.0 * bend, np.zeros((1, 0)), np.array([[0.0, 10e-3]])
     out = np.empty((1, len(bend)))
     smooth_groove_heights(s, aside, *line, *shape, TIP, out)
-    expected = [rolled(np.array([0.5e-3]), 1.0 / (1.0 / TIP + k), depth, half, taper)[0] for k in bend[:, 0]]
+    expected = [on_a_circle(0.5e-3, k, -depth, half, taper) for k in bend[:, 0]]
     np.testing.assert_allclose(out[0], expected, atol=1e-3 * depth)
-    assert np.ptp(expected) > 0.1 * depth
+    assert np.ptp(expected) > 0.05 * depth
     beyond = np.linspace(0.0, 2e-3, 33)[:, None]
     flat = np.zeros((0, *bend.shape)), 0.0 * bend, 0.0 * bend, np.zeros((1, 0)), np.array([[0.0, 10e-3]])
     smooth_groove_heights(10e-3 + beyond, 0.0 * beyond, *flat, *shape, TIP, out)
     np.testing.assert_allclose(out[0], rolled(beyond[:, 0], TIP, depth, half, taper), atol=2e-5 * depth)
+
+
+@pytest.mark.parametrize("taper", [-0.6, -0.4, 0.0, 1.0 / 30.0, 1.0, 2.0])
+@pytest.mark.parametrize(
+    ("height", "scale"), [(0.003, 0.03), (0.1, 1.0), (0.1, 0.01), (1.0, 0.01), (0.5, 0.1), (3.0, 1.0), (1e-6, 10.0)]
+)
+def test_the_trace_of_a_bell_is_the_highest_place_of_the_ball(height: float, scale: float, taper: float) -> None:
+    """From needles to swells, the ball's radius 1."""
+    spacing, table = 0.01, np.empty(200)
+    half = scale * np.sqrt(np.log(2.0) if taper == 0.0 else (2.0**taper - 1.0) / taper)
+    smooth_trace(height, half, taper, 1.0, 0.0, table, spacing)
+    places = spacing * np.arange(len(table))
+    u = np.unique(np.concatenate([s * np.linspace(-1.0, 1.0, 20_001) for s in (scale, 10.0 * scale, 2.5)]))
+    z = -section(u, height, half, taper)
+    for x, traced in zip(places[::5], table[::5], strict=True):
+        under = u[np.abs(u - x) < 1.0]
+        felt = (z[np.abs(u - x) < 1.0] + np.sqrt(1.0 - (under - x) ** 2) - 1.0).max()
+        assert max(traced, 0.0) == pytest.approx(max(felt, 0.0), abs=3e-5 * height + 1e-9)
