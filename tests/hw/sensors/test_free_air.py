@@ -69,3 +69,32 @@ def test_a_sensor_that_falls_silent_meanwhile_is_no_zero() -> None:
     sensor = LineSensor("nowhere", rate=1000.0)
     with Late(sensor, 0.15), pytest.raises(LinkError, match="no samples"):
         sensor.free_air()
+
+
+class Interrupted(int):
+    """A count in the midst of whose reading another thread does something, if it may."""
+
+    def __new__(cls, value: int, meanwhile: threading.Thread) -> Interrupted:
+        count = super().__new__(cls, value)
+        count.meanwhile = meanwhile  # type: ignore[attr-defined]
+        return count
+
+    def __mul__(self, period: float) -> float:
+        product = int(self) * period
+        if self.meanwhile.ident is None:  # type: ignore[attr-defined]
+            self.meanwhile.start()  # type: ignore[attr-defined]
+            self.meanwhile.join(0.1)  # type: ignore[attr-defined]
+        return product
+
+
+def test_a_period_that_is_learnt_while_a_sample_is_heard_makes_none_old() -> None:
+    """It would be 1.6 s older than it is, and the machine be stopped for the silence of a sensor that sends."""
+    sensor = LineSensor("nowhere", rate=1000.0)
+    sensor._retime(1e-3)
+    learns = threading.Thread(target=sensor._retime, args=(1e-3 - 2e-5,))
+    now = time.monotonic()
+    sensor._stamp(now, Interrupted(80_000, learns))
+    learns.join()
+    for later in range(1, 100):
+        sensor._stamp(now + 1e-3 * later, 80_000 + later)
+        assert abs(now + 1e-3 * later - sensor.heard) < 0.05
