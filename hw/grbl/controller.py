@@ -41,6 +41,10 @@ OFFSET_CHANGED = (
     "the work offset changed: another program, or a pendant, set G92, G10 or G54 to G59; end it, check the machine's "
     "position and run again"
 )
+LOCKED_UNSAID = (
+    "the controller is locked (state Alarm): it restarted, or met an alarm whose message was lost on the way, so "
+    "nobody knows where it stands; check its supply and cables, home it ($H) and run again with --resume"
+)
 
 # A printer's firmware names itself within so many s
 NAMING = 1.0
@@ -245,8 +249,21 @@ class GrblController:
         with self._news:
             answer, feedback = self._answers.popleft(), list(self._feedback)
         if answer != "ok":
-            raise FingerError(f"{self.link.port}: {line!r} refused: {protocol.describe(answer)}")
+            raise self._refused(repr(line), answer)
         return feedback
+
+    def _refused(self, what: str, answer: str) -> FingerError:
+        """Why a line was refused: a machine that restarted, or met an alarm, refuses all, and that is said first.
+
+        Raises:
+            StoppedError, LinkError: what stopped the machine, if anything did.
+        """
+        self.check()
+        if answer == protocol.LOCKED and self.vouched and self.status().state == "Alarm":
+            self.check()
+            self._lose_trust(LOCKED_UNSAID)
+            self.check()
+        return FingerError(f"{self.link.port}: {what} was refused: {protocol.describe(answer)}")
 
     def status(self, within: float = LONGEST_CONTROLLER_SILENCE) -> Status:
         """A report asked for now. Raises LinkError."""
@@ -426,15 +443,17 @@ class GrblController:
         return sum(list(self._sent)[len(self._answers) :]) < room
 
     def _settle_answers(self) -> None:
+        refused = ""
         with self._news:
-            while self._answers:
+            while self._answers and not refused:
                 answer = self._answers.popleft()
                 if self._sent:
                     self._sent.popleft()
                 # between two jogs grblHAL now and then calls the next one a cycle ("Run"), and refuses what is said in
                 # it: as with a line that was lost, whoever sent it sees that the machine stays behind
-                if answer not in ("ok", protocol.NOT_IDLE):
-                    raise FingerError(f"{self.link.port}: a jog was refused: {protocol.describe(answer)}")
+                refused = "" if answer in ("ok", protocol.NOT_IDLE) else answer
+        if refused:
+            raise self._refused("a jog", refused)
 
     def left(self, count: int) -> None:
         """The machine is known to have at most `count` jogs before it: what came before was answered, heard or not."""
@@ -510,7 +529,7 @@ class GrblController:
         # no status is answered while homing: only the port itself is watched
         self._wait(lambda: bool(self._answers), within, "the end of homing", restarts, None, stale=within)
         if (answer := self._answers.popleft()) != "ok":
-            raise FingerError(f"{self.link.port}: homing refused: {protocol.describe(answer)}")
+            raise FingerError(f"{self.link.port}: homing was refused: {protocol.describe(answer)}")
         self.vouched, self.distrust = True, None
         self.set_up()
 
