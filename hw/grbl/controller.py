@@ -742,11 +742,18 @@ class GrblController:
         alarm: str | None,
         stale: float = LONGEST_CONTROLLER_SILENCE,
     ) -> None:
-        """Wait for news, asking for a status meanwhile, so that silence is noticed soon."""
+        """Wait for news, asking for a status meanwhile, so that silence is noticed soon.
+
+        A question that is not answered in the usual time was lost, or its answer was, and is asked again then: thirty
+        bytes lost in a row are no silence. A machine that is silent for long is asked no oftener than others.
+        """
         patience, silence, heard = Patience(within), Patience(stale), self.link.heard
         idle, seen, garbled = 0, len(self.reports) and self.reports[-1].at, self.garbled
+        asked, told = time.monotonic(), True  # whether what was asked last has been answered
         while True:
-            again = POLL if self.garbled == garbled else self._again  # it may have been the answer
+            late = not told and time.monotonic() - self.link.heard < LONGEST_CONTROLLER_SILENCE
+            late = late or self.garbled != garbled  # it may have been the answer
+            again = self._again if late else max(0.0, asked + POLL - time.monotonic())
             with self._news:
                 if self._news.wait_for(lambda: done() or self._trouble(restarts, alarm), timeout=again) and done():
                     return
@@ -769,6 +776,10 @@ class GrblController:
                 raise LinkError(
                     f"{self.link.port}: {silent}{patience.held_up}; check cable and power, reset the controller"
                 )
+            told = self._fresh(asked)
+            if told and self.garbled == garbled and time.monotonic() - asked < POLL:
+                continue
+            asked, told = time.monotonic(), False
             self._request()
 
     def _trouble(self, restarts: int, alarm: str | None) -> bool:
