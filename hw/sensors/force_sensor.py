@@ -24,6 +24,9 @@ from mapping.instrument import MAD_TO_SD
 FREE_AIR = 0.2
 # A sensor silent for so long is taken for lost, s
 LONGEST_SENSOR_SILENCE = 1.0
+# A reading thread that is held up is waited for so much longer, s: with the second above pauses of 3 s are survived,
+# and giving up takes less than 5 s
+LONGEST_HELD_UP = 2.5
 # Samples that are kept: a minute at 5 kHz
 KEPT_SAMPLES = 300_000
 # Samples of a fast sensor are taken together for so long, s: to be woken for each packet takes more than what is done
@@ -199,12 +202,20 @@ class ForceSensor:
         return np.asarray(self.turned @ newest)
 
     def wait(self, done: Callable[[], bool], within: float) -> bool:
-        """Wait for samples until `done`; False if that took too long."""
-        patience = Patience(within)
+        """Wait for samples until `done`; False if that took too long.
+
+        Only time in which the reading thread had its turns is the sensor's silence. What it has not read while this
+        program was held up is not waited for beyond LONGEST_HELD_UP more.
+        """
+        begun, patience, late = self.link.listened, Patience(within), Patience(within + LONGEST_HELD_UP)
         with self._news:
             while not self._news.wait_for(done, timeout=min(0.05, within)):
-                if patience.over():
+                unread = within - self.link.listened + begun if self.link.is_open else 0.0
+                too_late = late.over()  # each looks at the clock every time
+                if patience.over() and (unread <= 0.0 or too_late):
                     self.held_up = patience.held_up
+                    if unread > 0.0:
+                        self.held_up = " (this program was held up, and did not read what was sent: is the host busy?)"
                     return False
         return True
 
