@@ -13,7 +13,7 @@ from typing import Any
 
 from hw.errors import LinkError
 from hw.framing import Framing
-from hw.patience import Patience
+from hw.patience import LONGEST_LOOK, Patience
 
 # Read in one go, bytes: what a port's buffer in the system holds
 MOST_AT_ONCE = 65536
@@ -57,6 +57,7 @@ class Link:
         self.reconnections = 0
         self.error: str | None = None
         self.heard = time.monotonic()
+        self.listened = 0.0  # s in which the reading thread had its turns: a device is silent in these alone
         self._receive, self._lost = receive, lost
         self._baudrate, self._write_timeout, self._still = baudrate, write_timeout, still
         self._writing = threading.RLock()  # a signal may strike while a write goes on, and stop the machine
@@ -163,10 +164,13 @@ class Link:
         from serial import SerialException
 
         serial = self._serial
+        looked = time.monotonic()
         try:
             while not self._closing:
                 if data := _received(serial, self.gather):
                     self._take(data)
+                before, looked = looked, time.monotonic()
+                self.listened += min(looked - before, LONGEST_LOOK)
         except (SerialException, OSError, TypeError) as error:  # pyserial: TypeError if closed while it reads
             if not self._closing:
                 self._break(f"{self.port}: connection lost ({error})")

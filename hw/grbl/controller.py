@@ -41,6 +41,10 @@ OFFSET_CHANGED = (
     "the work offset changed: another program, or a pendant, set G92, G10 or G54 to G59; end it, check the machine's "
     "position and run again"
 )
+LOCKED_UNSAID = (
+    "the controller is locked (state Alarm): it restarted, or met an alarm whose message was lost on the way, so "
+    "nobody knows where it stands; check its supply and cables, home it ($H) and run again with --resume"
+)
 
 # A printer's firmware names itself within so many s
 NAMING = 1.0
@@ -245,8 +249,21 @@ class GrblController:
         with self._news:
             answer, feedback = self._answers.popleft(), list(self._feedback)
         if answer != "ok":
-            raise FingerError(f"{self.link.port}: {line!r} refused: {protocol.describe(answer)}")
+            raise self._refused(repr(line), answer)
         return feedback
+
+    def _refused(self, what: str, answer: str) -> FingerError:
+        """Why a line was refused: a machine that restarted, or met an alarm, refuses all, and that is said first.
+
+        Raises:
+            StoppedError, LinkError: what stopped the machine, if anything did.
+        """
+        self.check()
+        if answer == protocol.LOCKED and self.vouched and self.status().state == "Alarm":
+            self.check()
+            self._lose_trust(LOCKED_UNSAID)
+            self.check()
+        return FingerError(f"{self.link.port}: {what} was refused: {protocol.describe(answer)}")
 
     def status(self, within: float = LONGEST_CONTROLLER_SILENCE) -> Status:
         """A report asked for now. Raises LinkError."""
@@ -426,15 +443,17 @@ class GrblController:
         return sum(list(self._sent)[len(self._answers) :]) < room
 
     def _settle_answers(self) -> None:
+        refused = ""
         with self._news:
-            while self._answers:
+            while self._answers and not refused:
                 answer = self._answers.popleft()
                 if self._sent:
                     self._sent.popleft()
                 # between two jogs grblHAL now and then calls the next one a cycle ("Run"), and refuses what is said in
                 # it: as with a line that was lost, whoever sent it sees that the machine stays behind
-                if answer not in ("ok", protocol.NOT_IDLE):
-                    raise FingerError(f"{self.link.port}: a jog was refused: {protocol.describe(answer)}")
+                refused = "" if answer in ("ok", protocol.NOT_IDLE) else answer
+        if refused:
+            raise self._refused("a jog", refused)
 
     def left(self, count: int) -> None:
         """The machine is known to have at most `count` jogs before it: what came before was answered, heard or not."""
@@ -510,7 +529,7 @@ class GrblController:
         # no status is answered while homing: only the port itself is watched
         self._wait(lambda: bool(self._answers), within, "the end of homing", restarts, None, stale=within)
         if (answer := self._answers.popleft()) != "ok":
-            raise FingerError(f"{self.link.port}: homing refused: {protocol.describe(answer)}")
+            raise FingerError(f"{self.link.port}: homing was refused: {protocol.describe(answer)}")
         self.vouched, self.distrust = True, None
         self.set_up()
 
@@ -723,11 +742,18 @@ class GrblController:
         alarm: str | None,
         stale: float = LONGEST_CONTROLLER_SILENCE,
     ) -> None:
-        """Wait for news, asking for a status meanwhile, so that silence is noticed soon."""
+        """Wait for news, asking for a status meanwhile, so that silence is noticed soon.
+
+        A question that is not answered in the usual time was lost, or its answer was, and is asked again then: thirty
+        bytes lost in a row are no silence. A machine that is silent for long is asked no oftener than others.
+        """
         patience, silence, heard = Patience(within), Patience(stale), self.link.heard
         idle, seen, garbled = 0, len(self.reports) and self.reports[-1].at, self.garbled
+        asked, told = time.monotonic(), True  # whether what was asked last has been answered
         while True:
-            again = POLL if self.garbled == garbled else self._again  # it may have been the answer
+            late = not told and time.monotonic() - self.link.heard < LONGEST_CONTROLLER_SILENCE
+            late = late or self.garbled != garbled  # it may have been the answer
+            again = self._again if late else max(0.0, asked + POLL - time.monotonic())
             with self._news:
                 if self._news.wait_for(lambda: done() or self._trouble(restarts, alarm), timeout=again) and done():
                     return
@@ -750,6 +776,10 @@ class GrblController:
                 raise LinkError(
                     f"{self.link.port}: {silent}{patience.held_up}; check cable and power, reset the controller"
                 )
+            told = self._fresh(asked)
+            if told and self.garbled == garbled and time.monotonic() - asked < POLL:
+                continue
+            asked, told = time.monotonic(), False
             self._request()
 
     def _trouble(self, restarts: int, alarm: str | None) -> bool:

@@ -235,6 +235,8 @@ def parse_offset(parameters: Iterable[str], modes: Iterable[str]) -> FloatArray:
 
 # What a machine answers to a jog while it does something else
 NOT_IDLE = "error:8"
+# and, if it is locked, or jogs while it is sent a line of G-code, to any line
+LOCKED = "error:9"
 
 
 def describe(line: str) -> str:

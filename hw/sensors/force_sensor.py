@@ -24,6 +24,9 @@ from mapping.instrument import MAD_TO_SD
 FREE_AIR = 0.2
 # A sensor silent for so long is taken for lost, s
 LONGEST_SENSOR_SILENCE = 1.0
+# A reading thread that is held up is waited for so much longer, s: with the second above pauses of 3 s are survived,
+# and giving up takes less than 5 s
+LONGEST_HELD_UP = 2.5
 # Samples that are kept: a minute at 5 kHz
 KEPT_SAMPLES = 300_000
 # Samples of a fast sensor are taken together for so long, s: to be woken for each packet takes more than what is done
@@ -199,12 +202,20 @@ class ForceSensor:
         return np.asarray(self.turned @ newest)
 
     def wait(self, done: Callable[[], bool], within: float) -> bool:
-        """Wait for samples until `done`; False if that took too long."""
-        patience = Patience(within)
+        """Wait for samples until `done`; False if that took too long.
+
+        Only time in which the reading thread had its turns is the sensor's silence. What it has not read while this
+        program was held up is not waited for beyond LONGEST_HELD_UP more.
+        """
+        begun, patience, late = self.link.listened, Patience(within), Patience(within + LONGEST_HELD_UP)
         with self._news:
             while not self._news.wait_for(done, timeout=min(0.05, within)):
-                if patience.over():
+                unread = within - self.link.listened + begun if self.link.is_open else 0.0
+                too_late = late.over()  # each looks at the clock every time
+                if patience.over() and (unread <= 0.0 or too_late):
                     self.held_up = patience.held_up
+                    if unread > 0.0:
+                        self.held_up = " (this program was held up, and did not read what was sent: is the host busy?)"
                     return False
         return True
 
@@ -238,8 +249,7 @@ class ForceSensor:
         heard = self.wait(lambda: self.heard > until, duration + LONGEST_SENSOR_SILENCE)
         ticks, arrivals, forces = self.recorded(since - HISTORY)
         if len(ticks) > 1 and arrivals[-1] - arrivals[0] > PERIOD_SPAN:
-            self._period = SensorClock.estimate(ticks.astype(float), arrivals, self.tick).period
-            self._least = [np.inf, np.inf]
+            self._retime(SensorClock.estimate(ticks.astype(float), arrivals, self.tick).period)
         lately = arrivals > since - DELAY_BLOCK
         ticks, arrivals, forces = ticks[lately], arrivals[lately], forces[lately]
         offset = float(np.min(arrivals - self._period * ticks, initial=np.inf))
@@ -284,8 +294,8 @@ class ForceSensor:
             return False
         (counts, forces), (newest, strongest) = told, judged
         self._heed(strongest)
-        self._stamp(now, newest)
         with self._news:
+            self._stamp(now, newest)
             self._samples.extend(zip([now] * len(counts), counts.tolist(), *forces.T.tolist(), strict=True))
             self._news.notify_all()
         return True
@@ -312,9 +322,9 @@ class ForceSensor:
                 kept.append((at, count, x, y, z))
                 strongest = max(strongest, (x - u) ** 2 + (y - v) ** 2 + (z - w) ** 2)
         self._heed(strongest**0.5)
-        if newest is not None:
-            self._stamp(now, newest)
         with self._news:
+            if newest is not None:
+                self._stamp(now, newest)
             self._samples.extend(kept)
             for _ in range(min(taken_back, len(self._samples))):
                 self._samples.pop()
@@ -334,11 +344,21 @@ class ForceSensor:
 
     def _stamp(self, now: float, count: int) -> None:
         """When was the sample of this running count taken, at the earliest?"""
-        delay = now - count * self._period
-        if now > self._block_ends:
-            self._block_ends, self._least = now + DELAY_BLOCK, [self._least[1], np.inf]
-        self._least[1] = min(self._least[1], delay)
-        self._newest = count * self._period + min(self._least)
+        with self._news:
+            delay = now - count * self._period
+            if now > self._block_ends:
+                self._block_ends, self._least = now + DELAY_BLOCK, [self._least[1], np.inf]
+            self._least[1] = min(self._least[1], delay)
+            self._newest = count * self._period + min(self._least)
+
+    def _retime(self, period: float) -> None:
+        """From now on its clock has this period, s.
+
+        Delays by two periods compare to nothing (2e-5 s are 1.6 s after 80,000 samples): the thread that reads must not
+        be in the midst of a sample.
+        """
+        with self._news:
+            self._period, self._least = period, [np.inf, np.inf]
 
     def _strike(self, reason: str) -> None:
         """Halt, but once: the way out of what it stopped must stay open."""

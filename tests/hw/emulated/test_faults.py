@@ -31,8 +31,11 @@ from mapping.surface import Surface
 R, STIFFNESS, LIMIT = 0.005, 1e4, 4.0
 FRAME = StageFrame.of((-0.15, -0.15, -0.05))
 DOWN = np.array([0.0, 0.0, -1.0])
-# Connecting, sweeping, giving up and leaving must all be over by then, s, on a host that is busy otherwise
+# Connecting, sweeping, giving up and leaving must all be over by then, s, on a host that is busy otherwise: without
+# a fault they take half of it
 LONGEST = 30.0
+# Emulated seconds a second while it pecks: the sweeps last 100 s, for the tip may run on by no more than 0.1 mm
+PECKING_PACE = 10.0
 
 
 def plate() -> Surface:
@@ -52,7 +55,7 @@ def survive(fault: Fault, slide: bool, folder: Path) -> str:
     links = [folder / "stage", folder / "sensor"]
     devices = [stage, sensor] if slide else [stage]
     said, begun, written = "", time.monotonic(), 0
-    with PtyServer(devices, pace=1.0 if slide else 5.0, links=links[: len(devices)], faults=[fault]) as server:
+    with PtyServer(devices, pace=1.0 if slide else PECKING_PACE, links=links[: len(devices)], faults=[fault]) as server:
         touch = (
             {"slide": Slide(OptoForce(str(links[1]), 400.0), STIFFNESS, approach_speed=5e-3)}
             if slide
