@@ -116,9 +116,7 @@ def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, P
     interval = Interval.from_draws(height)
     names = ", ".join(f"{name_of(problem)} {100 * share / total:.0f} %" for share, problem, _ in likely)
     if np.mean(bridged > touched) <= UNLIKELY_FAMILY:
-        half_way = any(isinstance(_shape(problem), BellShape) for _, problem, _ in likely)
-        notes = (f"sections that leave this trace: {names}; width at half height",) if half_way else ()
-        return replace(feature, height=interval, width=Interval.from_draws(touched), notes=(*feature.notes, *notes))
+        return _with_bells(feature, interval, parts[0][:, 1], touched, likely, names)
     low, median = np.quantile(touched, [0.05, 0.5])
     width = Interval(float(median), float(low), float(np.quantile(bridged, 0.95)), censored=True, bounded=True)
     note = (
@@ -126,6 +124,29 @@ def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, P
         f"anything up to {length_text(width.high, 2)} wide (sections that leave this trace: {names})"
     )
     return replace(feature, height=interval, width=width, notes=(*feature.notes, note))
+
+
+def _with_bells(
+    feature: Feature,
+    height: Interval,
+    first: FloatArray,
+    touched: FloatArray,
+    likely: Sequence[tuple[float, PosteriorProblem, Posterior]],
+    names: str,
+) -> Feature:
+    """The feature with the width that all families agree on; that of bumps is drawn at half height, (S,) m.
+
+    What is most probably a cap is said to be as wide as at its foot, a bell among its draws as a cap that is as wide
+    half way up.
+    """
+    bells = [isinstance(_shape(problem), BellShape) for _, problem, _ in likely]
+    if not any(bells):
+        return replace(feature, height=height, width=Interval.from_draws(touched))
+    note = f"sections that leave this trace: {names}"
+    if not bells[0]:
+        touched = touched * (feature.width.median / float(np.median(first)))
+    note += "; width at half height" if bells[0] else ""
+    return replace(feature, height=height, width=Interval.from_draws(touched), notes=(*feature.notes, note))
 
 
 def name_of(problem: PosteriorProblem) -> str:

@@ -67,7 +67,7 @@ def test_where_the_ball_touches_the_top_only_cap_and_bell_stay_likely_and_that_i
     high = 0.3e-3
     found, _ = found_in(lambda away: cap_height(away, high, 0.5 * high, TIP), high, high)
     (said,) = [note for note in found.notes if note.startswith("sections that leave this trace")]
-    assert "round" in said and "bell" in said and said.endswith("width at half height")
+    assert "round" in said and "bell" in said and "half height" not in said  # most probably round: at its foot
     assert found.height.low < high < found.height.high + 1e-6
     assert found.width.low < high < found.width.high and found.width.high > 1.3 * found.width.median
 
