@@ -90,7 +90,13 @@ def _blank(kind: str) -> PosteriorProblem:
     """The problem of a feature's nominal shape over a bare plate: it holds the prior and the chart."""
     feature, paths = nominal(kind)
     bare = record(paths, np.zeros(sum(len(path) for path in paths)))
-    return _with_priors(pose_problem(feature, Surroundings(bare, plate(), Noise(0.2e-3))))
+    problem = _with_priors(pose_problem(feature, Surroundings(bare, plate(), Noise(0.2e-3))))
+    shape: Any = problem.target.shape
+    if not hasattr(shape, "spot"):
+        return problem
+    # nothing was felt yet: where the optimum of that lies is chance
+    placed = replace(shape, spot=replace(shape.spot, point=feature.axis[0]))
+    return replace(problem, target=replace(problem.target, shape=placed))
 
 
 def nominal(kind: str) -> tuple[Feature, list[FloatArray]]:
