@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,8 +37,10 @@ def on_the_way(
     along: FloatArray,
     queued: int,
     off: float,
-) -> BoolArray:
+) -> tuple[BoolArray, FloatArray]:
     """(M,) which reports are believed: those on the straight ways between the places where it was sent, in order.
+
+    And (M,) how many of these ways lie behind each; a share of a way counts.
 
     A stage goes exactly where it is sent, and never back along its path; a digit garbled on the way puts it aside, or
     before what it reports next. Of all that disagree in order the fewest are left out.
@@ -50,7 +53,7 @@ def on_the_way(
         off: farthest from the line that it was sent along, m.
     """
     last = np.maximum(np.searchsorted(sent, times) - 1, 0)
-    nearest, reached = np.full(len(times), np.inf), np.zeros(len(times))
+    nearest, reached, gone = np.full(len(times), np.inf), np.zeros(len(times)), np.zeros(len(times))
     for back in range(queued):
         end = np.maximum(last - back, 0)
         begin = np.maximum(end - 1, 0)
@@ -62,9 +65,10 @@ def on_the_way(
         nearer = distance < nearest
         nearest = np.where(nearer, distance, nearest)
         reached = np.where(nearer, along[begin] + share * (along[end] - along[begin]), reached)
+        gone = np.where(nearer, begin + share * (end - begin), gone)
     keep = nearest <= off
     keep[keep] = _rising(reached[keep])
-    return keep
+    return keep, gone
 
 
 def _rising(values: FloatArray) -> BoolArray:
@@ -97,40 +101,73 @@ def no_spikes(forces: FloatArray, noise: FloatArray) -> BoolArray:
     return keep
 
 
-def positions_at(times: FloatArray, reported: FloatArray, positions: FloatArray) -> FloatArray:
-    """(N, 3) stage positions at times (N,) s, between the reports (M,) s, (M, 3) m; NaN outside of them."""
-    inside = (times >= reported[0]) & (times <= reported[-1])
-    found = np.column_stack([np.interp(times, reported, positions[:, k]) for k in range(3)])
-    found[~inside] = np.nan
-    return found
-
-
-def known_at(
-    times: FloatArray,
-    reported: FloatArray,
-    doubts: FloatArray,
-    positions: FloatArray,
-    normals: FloatArray,
-    longest: float,
-    apart: float,
-) -> BoolArray:
-    """(N,) whether the reports tell where the stage was across the surface, and not only where along it.
-
-    Between two reports the stage may have turned, or stood for a while, and a report may have been true sooner than it
-    came: that matters as far as they differ along the normal.
+@dataclass(frozen=True)
+class Progress:
+    """How many of the ways that a stage was sent lay behind it at N times, and from where to where it may have been.
 
     Args:
-        times: (N,) s.
-        reported, doubts, positions: (M,) s, (M,) s and (M, 3) m of the reports: how much longer than need be each took.
-        normals: (N, 3) unit normals of the contact.
-        longest: time between two reports that hides nothing, s.
-        apart: distance along the normal that hides nothing, m.
+        likely, least, most: (N,); a share of a way counts. NaN outside of the reports.
+    """
+
+    likely: FloatArray
+    least: FloatArray
+    most: FloatArray
+
+
+def progress_at(
+    times: FloatArray, reported: FloatArray, doubts: FloatArray, ways: FloatArray, period: float
+) -> Progress:
+    """How far a stage was at times (N,), s, between its reports.
+
+    A way takes one period or more, and what was reported was true when it was asked for or later: so it cannot have
+    gone further than this allows since the report before, nor less if it is to be where the next one found it. Where it
+    never stood, both are the same.
+
+    Args:
+        reported, doubts: (M,) s, when the reports were asked for, and how much longer than need be each took.
+        ways: (M,) how many ways lay behind each.
+        period: shortest time for a way, s.
     """
     after = np.clip(np.searchsorted(reported, times), 1, len(reported) - 1)
-    between = np.abs(np.einsum("ij,ij->i", positions[after] - positions[after - 1], normals))
-    lasted, doubt = reported[after] - reported[after - 1], np.maximum(doubts[after], doubts[after - 1])
-    hidden = np.where(lasted <= longest, np.minimum(doubt / np.maximum(lasted, 1e-9), 1.0) * between, between)
-    return np.asarray(hidden <= apart)
+    before = after - 1
+    most = np.minimum(ways[after], ways[before] + (times - reported[before]) / period)
+    least = np.minimum(
+        most,
+        np.maximum(*(ways[k] - np.maximum(reported[k] + doubts[k] - times, 0.0) / period for k in (before, after))),
+    )
+    likely = np.clip(np.interp(times, reported, ways), least, most)
+    outside = (times < reported[0]) | (times > reported[-1])
+    for values in (likely, least, most):
+        values[outside] = np.nan
+    return Progress(likely, least, most)
+
+
+def rows_at(where: FloatArray, known: FloatArray, rows: FloatArray) -> FloatArray:
+    """(N, 3) rows between those (M, 3) that are known at rising values (M,), for each of `where` (N,)."""
+    return np.column_stack([np.interp(where, known, rows[:, k]) for k in range(3)])
+
+
+def places_at(ways: FloatArray, ends: FloatArray) -> FloatArray:
+    """(N, 3) where a stage was, m, that had gone so many ways (N,) of those that end at `ends` (K, 3), m."""
+    return rows_at(ways, np.arange(float(len(ends))), ends)
+
+
+def known_at(progress: Progress, ends: FloatArray, normals: FloatArray, apart: float) -> BoolArray:
+    """(N,) whether it is known where the stage was across the surface, and not only where along it.
+
+    Wherever it may have been on its ways, which end at `ends` (K, 3), m: no two of these places lie further apart than
+    `apart`, m, along the normals (N, 3) of the contact.
+    """
+    inside = np.isfinite(progress.likely)
+    least, most, normals = progress.least[inside], progress.most[inside], normals[inside]
+    low, high = np.full(len(least), np.inf), np.full(len(least), -np.inf)
+    joints = int(np.max(np.ceil(most) - np.floor(least), initial=0.0))
+    for ways in (least, most, *(np.clip(np.floor(least) + k, least, most) for k in range(1, joints))):
+        height = np.einsum("ij,ij->i", places_at(ways, ends), normals)
+        low, high = np.minimum(low, height), np.maximum(high, height)
+    known = np.zeros(len(inside), dtype=bool)
+    known[inside] = high - low <= apart
+    return known
 
 
 def rigid_centers(positions: FloatArray, forces: FloatArray, stiffness: float) -> FloatArray:

@@ -21,9 +21,11 @@ from hw.probing.fusion import (
     known_at,
     no_spikes,
     on_the_way,
-    positions_at,
+    places_at,
+    progress_at,
     prompt,
     rigid_centers,
+    rows_at,
 )
 from hw.probing.lag import EXPECTED, Lag
 from hw.probing.peck import Touched, spaced
@@ -52,9 +54,6 @@ BATCH = 0.5
 EASE, SLOWEST = 0.25, 0.1
 # A sweep begins when the force is this near to the wanted one, in its share, or after so many control periods
 SETTLED_FORCE_SHARE, SETTLING = 0.2, 50
-# Reports further apart than this, in control periods, hide a turn or a stand; than this many usual gaps, if it is more;
-# unless they differ by no more than so many steps of the stage along the normal
-BLIND, UNUSUAL, HARMLESS_STAGE_STEPS = 0.5, 2.0, 2.0
 # Reports from so long before the samples are looked at: the last one may be that old, s
 BEFORE = 0.1
 # A body presses, it never pulls: friction at a steep side may, by less than this share of the force (0.5 on steel)
@@ -135,17 +134,17 @@ class Slide:
                     last = time.monotonic()  # what the tip feels while it settles is no sweep
                 elif time.monotonic() > told + BATCH:
                     told = time.monotonic()
-                    batch = self._fused(stage, approach, sent, last, told - self.sensor.watch.blind)
+                    batch = self._fused(stage, approach, sent, period, last, told - self.sensor.watch.blind)
                     if len(batch.times):
                         last = float(batch.times[-1])
                         yield batch
         except (StoppedError, LinkError):
-            yield self._fused(stage, approach, sent, last, time.monotonic() - HELD_BACK)
+            yield self._fused(stage, approach, sent, period, last, time.monotonic() - HELD_BACK)
             raise
         finally:
             if stage.controller.link.is_open and stage.controller.stop_reason is None:
                 stage.controller.cancel_jog()
-        yield self._fused(stage, approach, sent, last)
+        yield self._fused(stage, approach, sent, period, last)
 
     def _tare(self, stage: GuardedStage, duration: float) -> None:
         """Take the zero anew; in free air it must be about where it was, and stay there for the next sweep.
@@ -272,15 +271,16 @@ class Slide:
         return -float(force @ inwards)
 
     def _fused(
-        self, stage: GuardedStage, approach: FloatArray, sent: _Sent, after: float, until: float = np.inf
+        self, stage: GuardedStage, approach: FloatArray, sent: _Sent, period: float, after: float, until: float = np.inf
     ) -> Touched:
         """Samples in contact taken between these times, as far as the stage has reported where it was.
 
-        One that pulls where a body can only press is no contact.
+        It was sent along a way every `period` (s). A sample that pulls where a body can only press is none.
         """
         reports = prompt(stage.controller.reported(after - BEFORE))
+        nothing = Touched(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
         if len(reports) < 2:
-            return Touched(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+            return nothing
         came = np.array([report.at for report in reports])
         stamps = np.array([report.asked for report in reports])
         doubts = came - stamps - stage.controller.shortest_round_trip
@@ -288,7 +288,7 @@ class Slide:
             np.array([stage.controller.machine_position(report.status) for report in reports])
         )
         off = OFF_THE_LINE_STEPS * stage.controller.settings.resolution
-        good = on_the_way(
+        good, ways = on_the_way(
             came,
             places,
             np.array(sent.times),
@@ -302,7 +302,12 @@ class Slide:
                 f"{np.sum(~good)} of {len(good)} reports of the machine's place lie more than {1e6 * off:.0f} um off "
                 "the way that it was sent: check its cable, and whether another program or a pendant steers it"
             )
-        stamps, places, doubts = stamps[good], places[good], doubts[good]
+        if np.sum(good) < 2:
+            return nothing
+        stamps, places, doubts, ways = stamps[good], places[good], doubts[good], ways[good]
+        ends = np.array(sent.ends)
+        # it goes by steps of its motors: where they were aside of the way, they are likely to be between two reports
+        aside = places - places_at(ways, ends)
         # with those that the first ones are judged by
         times, forces = self.sensor.timed(after - BEFORE - JUDGED_BY * self.sensor.watch.spacing)
         whole = no_spikes(forces, np.abs(self.sensor.turned) @ self.sensor.watch.noise)
@@ -313,14 +318,14 @@ class Slide:
         rows = np.interp(times, sent.times, sent.along)
         inwards = np.column_stack([np.interp(rows, np.arange(len(approach)), column) for column in approach.T])
         presses = np.einsum("ij,ij->i", forces, inwards) < PULL * pressing
-        longest = max(BLIND * self.period, UNUSUAL * float(np.median(np.diff(stamps))))
-        step = HARMLESS_STAGE_STEPS * stage.controller.settings.resolution
+        # what a step of the motors hides anyway
+        apart = stage.controller.settings.resolution
 
         def touching(delay: float) -> tuple[BoolArray, FloatArray]:
-            centers = positions_at(times - delay, stamps, places)
-            sound = presses & (pressing > self.contact) & np.isfinite(centers).all(axis=1) & (times > after)
-            sound &= times < until
-            return sound & known_at(times - delay, stamps, doubts, places, normals, longest, step), centers
+            progress = progress_at(times - delay, stamps, doubts, ways, period)
+            sound = presses & (pressing > self.contact) & (times > after) & (times < until)
+            centers = places_at(progress.likely, ends) + rows_at(times - delay, stamps, aside)
+            return sound & known_at(progress, ends, normals, apart), centers
 
         self.lag.expected = max(EXPECTED, stage.controller.round_trip)
         sound, centers = touching(self.delay)

@@ -13,7 +13,16 @@ from hw.grbl.controller import GrblController, Report
 from hw.grbl.frame import StageFrame
 from hw.grbl.guarded_stage import GuardedStage
 from hw.grbl.protocol import parse_status
-from hw.probing.fusion import estimate_delay, known_at, no_spikes, on_the_way, positions_at, prompt, rigid_centers
+from hw.probing.fusion import (
+    estimate_delay,
+    known_at,
+    no_spikes,
+    on_the_way,
+    places_at,
+    progress_at,
+    prompt,
+    rigid_centers,
+)
 from hw.probing.lag import measured_delay
 from hw.sensors.clock import SensorClock, missing, unwrapped
 from hw.sensors.optoforce import OptoForce
@@ -56,29 +65,52 @@ def test_the_delay_is_found_from_one_touch_whatever_the_height_of_contact() -> N
     assert found == pytest.approx(delay, abs=2e-4)
 
 
-def test_positions_between_reports_are_interpolated_and_outside_unknown() -> None:
-    stamps, places = np.array([0.0, 1.0]), np.array([[0.0, 0, 0], [1.0, 2.0, 3.0]])
-    found = positions_at(np.array([-0.1, 0.25, 1.1]), stamps, places)
-    assert found[1].tolist() == [0.25, 0.5, 0.75]
-    assert np.isnan(found[[0, 2]]).all()
-    assert rigid_centers(found[1:2], np.array([[0.0, 0.0, 2.0]]), 1e4)[0, 2] == pytest.approx(0.75 + 2e-4)
+PERIOD = 0.01  # s
+NO_DOUBT = np.zeros(2)
 
 
-def test_a_long_silence_hides_the_way_on_a_flank_and_nothing_on_the_flat() -> None:
-    stamps, up = np.array([0.0, 0.01, 0.5, 0.51, 1.0]), np.tile([0.0, 0.0, 1.0], (5, 1))
-    places = np.array([[0.0, 0, 0], [1e-4, 0, 0], [5e-3, 0, 0], [5e-3, 0, 0], [8e-3, 0, 1e-3]])
-    times = np.array([0.005, 0.2, 0.5, 0.505, 0.7])
-    assert known_at(times, stamps, np.zeros(5), places, up, 0.02, 1e-5).tolist() == [True, True, True, True, False]
+def test_between_two_reports_a_stage_goes_the_ways_that_it_was_sent() -> None:
+    ends = 1e-4 * np.array([[0.0, 0, 0], [1, 0, 1], [2, 0, 3], [3, 0, 0], [4, 0, 0]])
+    times = np.array([0.0, 0.005, 0.01, 0.025, 0.04])
+    progress = progress_at(times, np.array([0.0, 0.04]), NO_DOUBT, np.array([0.0, 4.0]), PERIOD)
+    assert progress.least == pytest.approx(times / PERIOD)
+    assert progress.most == pytest.approx(times / PERIOD)
+    # where the straight line between the two reports would be 0.15 mm off
+    found = places_at(progress.likely, ends)
+    assert found[:, 2] == pytest.approx(1e-4 * np.array([0.0, 0.5, 1.0, 1.5, 0.0]))
+    assert known_at(progress, ends, np.tile([0.0, 0.0, 1.0], (5, 1)), 1e-9).all()
+    assert rigid_centers(found[1:2], np.array([[0.0, 0.0, 2.0]]), 1e4)[0, 2] == pytest.approx(0.5e-4 + 2e-4)
+
+
+def test_outside_of_the_reports_nothing_is_known() -> None:
+    progress = progress_at(np.array([-0.01, 0.05]), np.array([0.0, 0.04]), NO_DOUBT, np.array([0.0, 4.0]), PERIOD)
+    assert np.isnan(progress.likely).all()
+    assert not known_at(progress, np.zeros((5, 3)), np.tile([0.0, 0.0, 1.0], (2, 1)), 1.0).any()
+
+
+def test_a_stand_hides_the_way_on_a_flank_and_nothing_on_the_flat() -> None:
+    # three ways in 60 ms: it stood for half of the time, and nobody knows when
+    times, up = np.linspace(0.0, 0.06, 13), np.tile([0.0, 0.0, 1.0], (13, 1))
+    progress = progress_at(times, np.array([0.0, 0.06]), NO_DOUBT, np.array([0.0, 3.0]), PERIOD)
+    for stand in np.linspace(0.0, 0.03, 7):
+        true = np.interp(times, [0.0, 0.015, 0.015 + stand, 0.03 + stand, 0.06], [0.0, 1.5, 1.5, 3.0, 3.0])
+        assert (progress.least <= true + 1e-12).all()
+        assert (true <= progress.most + 1e-12).all()
+    flank = 1e-4 * np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 1]])
+    known = known_at(progress, flank, up, 1e-5)
+    assert known[[0, -1]].all()
+    assert not known[6:-2].any()
+    assert known_at(progress, flank * [1.0, 1.0, 0.0], up, 1e-9).all()
 
 
 def test_a_report_that_took_its_time_hides_what_the_stage_moved_across_the_surface_meanwhile() -> None:
-    stamps = np.array([0.0, 0.01, 0.02, 0.03])
-    places, up = np.zeros((4, 3)), np.tile([0.0, 0.0, 1.0], (3, 1))
-    places[:, 0], places[2:, 2] = [0.0, 1e-4, 2e-4, 3e-4], 5e-5  # 5 mm/s for 10 ms
+    stamps, ways = np.array([0.0, 0.01, 0.02, 0.03]), np.array([0.0, 1.0, 2.0, 3.0])
+    ends, up = np.zeros((4, 3)), np.tile([0.0, 0.0, 1.0], (3, 1))
+    ends[:, 0], ends[2:, 2] = [0.0, 1e-4, 2e-4, 3e-4], 5e-5  # 5 mm/s for 10 ms
     times = np.array([0.005, 0.015, 0.025])
     for doubt, known in ((0.0, True), (1e-3, True), (4e-3, False)):
-        told = known_at(times, stamps, np.array([0.0, 0.0, doubt, 0.0]), places, up, 0.02, 1e-5)
-        assert told.tolist() == [True, known, True]
+        progress = progress_at(times, stamps, np.array([0.0, 0.0, doubt, 0.0]), ways, PERIOD)
+        assert known_at(progress, ends, up, 1e-5).tolist() == [True, known, True]
 
 
 def test_reports_that_came_late_to_a_busy_host_are_not_trusted() -> None:
@@ -137,9 +169,10 @@ def test_reports_that_a_garbled_digit_puts_aside_or_out_of_their_order_are_left_
     # a digit of hundredths of millimetres across the path, or of tenths along it; two next to one another as well
     told[wrong[:40], 2] += 4e-5
     told[wrong[40:], 0] -= 2e-4
-    keep = on_the_way(times, told, sent, ends, np.arange(101.0), queued=4, off=8e-6)
+    keep, ways = on_the_way(times, told, sent, ends, np.arange(101.0), queued=4, off=8e-6)
     assert not keep[wrong].any()
     assert keep.sum() >= 800 - len(wrong) - 2
+    assert ways[keep] == pytest.approx(at[keep].clip(0.0), abs=1e-6)
 
 
 def test_a_stage_that_presses_in_and_out_on_the_spot_is_on_its_way() -> None:
@@ -147,7 +180,8 @@ def test_a_stage_that_presses_in_and_out_on_the_spot_is_on_its_way() -> None:
     ends = np.column_stack([np.zeros(9), np.zeros(9), -depth])
     times = np.linspace(0.0, 0.08, 200)
     places = np.column_stack([np.zeros(200), np.zeros(200), np.interp(times - 0.012, 0.01 * np.arange(9), -depth)])
-    assert on_the_way(times, places, 0.01 * np.arange(9), ends, np.zeros(9), queued=4, off=1e-9).all()
+    keep, _ = on_the_way(times, places, 0.01 * np.arange(9), ends, np.zeros(9), queued=4, off=1e-9)
+    assert keep.all()
 
 
 def test_a_lone_sample_off_its_neighbours_is_no_force() -> None:
