@@ -1,0 +1,53 @@
+"""Reports of a place where nothing sent the machine: a few that agree end the trust, as many as are not garbled."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from struck_machine import machine_over, plate
+
+from hw.emulated.pty_server import PtyServer
+from hw.grbl.controller import IF_GARBLED_BEFORE, OFF_THE_WAY_IN_A_ROW, GrblController
+
+# Millimetres; the machine stands at -150, -150, -30
+AWAY, ELSEWHERE = [-50.0, -150.0, -30.0], [-15.0, -150.0, -30.0]
+
+
+def report(place: list[float]) -> bytes:
+    return "<Idle|MPos:{:.3f},{:.3f},{:.3f}|FS:0,0>\r\n".format(*place).encode("ascii")
+
+
+def heard(controller: GrblController, count: int) -> None:
+    until = time.monotonic() + 2.0
+    while controller.implausible < count and controller.distrust is None and time.monotonic() < until:
+        time.sleep(0.001)
+
+
+@pytest.mark.parametrize("before", [0, 2])
+def test_reports_off_the_way_end_the_trust_if_so_many_agree_as_no_garbling_makes(before: int) -> None:
+    stage = machine_over(plate(), 0.02)
+    with PtyServer([stage]) as server:
+        controller = GrblController(server.ports[0])
+        controller.open()
+        controller.vouch()
+        try:
+            controller.jog(controller.resting_position() + np.array([1e-3, 0.0, 0.0]), 0.01)
+            controller.resting_position()
+            for k in range(before):  # garbled, here and there
+                stage.out += report(AWAY if k % 2 else ELSEWHERE)
+                heard(controller, k + 1)
+                controller.status()
+            enough = IF_GARBLED_BEFORE if before else OFF_THE_WAY_IN_A_ROW
+            for _ in range(enough - 1):
+                stage.out += report(AWAY)
+            heard(controller, before + enough - 1)
+            assert controller.distrust is None
+            stage.out += report(AWAY)
+            heard(controller, before + enough)
+            assert controller.distrust is not None
+            assert "nothing sent it" in controller.distrust
+        finally:
+            controller.close()
+    assert server.error is None, server.error
