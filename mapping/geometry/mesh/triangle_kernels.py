@@ -25,10 +25,7 @@ def unit_normal(a, b, c):  # type: ignore[no-untyped-def]
     uu, vv, ww = dot(u, u), dot(v, v), dot(w, w)
     longest = max(uu, vv, ww)
     # the two shorter sides give the most accurate product
-    if uu == longest:
-        n = accurate_cross(v, w)
-    else:
-        n = accurate_cross(u, w) if vv == longest else accurate_cross(u, v)
+    n = accurate_cross(v, w) if uu == longest else accurate_cross(u, w) if vv == longest else accurate_cross(u, v)
     length = sqrt(dot(n, n))
     if not length > SLIVER * longest:
         return (0.0, 0.0, 0.0)
@@ -82,8 +79,8 @@ def closest_on_segment(a, b):  # type: ignore[no-untyped-def]
     """Point of the segment ab closest to the origin; inside the segment it is square to ab.
 
     One projection leaves of `a` along ab what rounding makes of it, a few epsilons of its length. Far from the corners,
-    that turns a short p so that p d no longer tells whether a ball that moves along the edge comes closer. What a second
-    projection leaves over is epsilons of p ("twice is enough": Parlett 1980, section 6.9, who quotes Kahan).
+    that turns a short p so that p d no longer tells whether a ball that moves along the edge comes closer. What a
+    second projection leaves over is epsilons of p ("twice is enough": Parlett 1980, section 6.9, who quotes Kahan).
     """
     e = sub(b, a)
     square, along = dot(e, e), -dot(a, e)
