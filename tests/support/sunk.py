@@ -54,7 +54,7 @@ def segment_triangle(p: FloatArray, u: FloatArray, a: FloatArray, b: FloatArray,
     square = np.minimum(point_triangle(p, a, b, c), point_triangle(p + u, a, b, c))
     for x, y in sides:
         square = np.minimum(square, segment_segment(p, u, x, y - x))
-    n = np.cross(b - a, c - a)
+    n = cross(b - a, c - a)
     before, after = dot(p - a, n), dot(p + u - a, n)
     crossed = before * after < 0
     f = p + quotient(before, before - after, crossed)[:, None] * u
@@ -64,7 +64,7 @@ def segment_triangle(p: FloatArray, u: FloatArray, a: FloatArray, b: FloatArray,
 def point_triangle(p: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
     """(N,) squared distance."""
     sides = ((a, b), (b, c), (c, a))
-    n = np.cross(b - a, c - a)
+    n = cross(b - a, c - a)
     area, height = dot(n, n), dot(a - p, n)
     foot = p + quotient(height, area, area > 0)[:, None] * n
     flat = np.where((area > 0) & holds(sides, n, foot), quotient(height * height, area, area > 0), np.inf)
@@ -94,6 +94,30 @@ def segment_segment(p: FloatArray, u: FloatArray, q: FloatArray, v: FloatArray) 
 def holds(sides: tuple[tuple[FloatArray, FloatArray], ...], n: FloatArray, f: FloatArray) -> BoolArray:
     """(N,) True where the triangle holds the point f of its plane."""
     return np.logical_and.reduce([dot(np.cross(y - x, f - x), n) >= 0 for x, y in sides])
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """(N, 3) vector products, each component exact to rounding of its own: else the planes of thin triangles tilt."""
+    (x, y, z), (u, v, w) = a.T, b.T
+    return np.stack([less(y, w, z, v), less(z, u, x, w), less(x, v, y, u)], axis=1)
+
+
+def less(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
+    """(N,) a b - c d with what rounding takes from both products (Jeannerod, Louvet and Muller 2013)."""
+    return (a * b - c * d) + (lost(a, b) - lost(c, d))
+
+
+def lost(a: FloatArray, b: FloatArray) -> FloatArray:
+    """(N,) what rounding takes from a b, exactly: the factors in halves (Dekker 1971)."""
+    (high, low), (tall, short) = halves(a), halves(b)
+    return ((high * tall - a * b) + high * short + low * tall) + low * short
+
+
+def halves(a: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Both halves of the digits."""
+    far = a * a.dtype.type(2 ** (np.finfo(a.dtype).nmant // 2 + 1) + 1)
+    high = far - (far - a)
+    return high, a - high
 
 
 def dot(a: FloatArray, b: FloatArray) -> FloatArray:

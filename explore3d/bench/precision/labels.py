@@ -40,7 +40,9 @@ class LabelCase:
         method: "positions" alone, or "contacts".
         tolerance: within which points are called touched: the distance between sweeps, or STRICT with contacts.
         samples: of the raster.
-        touched: share of the samples' points that are called touched.
+        fine: share of the samples on faces that the raster, as it falls on them, could prove to the tolerance if they
+            were planes (see `plane_proof`); oblique faces are sampled less finely than the raster is.
+        touched: share of the samples' points that are called touched, and of those on such faces.
         strict: share of the samples' points that are proven to be within STRICT.
         worst, worst_strict: largest distance of touched points, and of those within STRICT, from the body.
         beyond: touched points further from the body than the tolerance.
@@ -55,7 +57,9 @@ class LabelCase:
     method: str
     tolerance: float
     samples: int
+    fine: float
     touched: float
+    touched_fine: float
     strict: float
     worst: float
     worst_strict: float
@@ -102,7 +106,11 @@ def bench_labels(
                             spacing=0.0,
                             tolerance=tolerance * radius,
                         )
-                        found = _judged(estimate, nearest, radius, tolerance)
+                        best = np.zeros(len(trace))  # recorded contacts prove themselves
+                        if method == "positions":
+                            assert recorded.normals is not None  # a raster has them
+                            best = plane_proof(recorded.normals, radius / count, np.array(way), radius) / radius
+                        found = _judged(estimate, nearest, best, radius, tolerance)
                         yield LabelCase(name, ratio, count, k, method, tolerance, len(trace), *found)
 
 
@@ -119,10 +127,7 @@ def label_raster(mesh: Surface, ball: BallContact, pitch: float, way: FloatArray
 
     Sweeps turn about at their ends; where the ball passes the body there is no sample.
     """
-    way = way / np.linalg.norm(way)
-    along = np.cross(way, [0.3, 0.5, 0.8])
-    along /= np.linalg.norm(along)
-    across = np.cross(way, along)
+    way, along, across = _axes(way)
     u, v = mesh.vertices @ along, mesh.vertices @ across
     start = float((mesh.vertices @ way).min()) - 3 * ball.tip_radius
     x = np.arange(u.min(), u.max(), pitch / SAMPLES_PER_PITCH)
@@ -137,16 +142,55 @@ def label_raster(mesh: Surface, ball: BallContact, pitch: float, way: FloatArray
     ), -way
 
 
+def _axes(way: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Unit vectors along a way, and along and across the sweeps of its raster."""
+    way = way / np.linalg.norm(way)
+    along = np.cross(way, [0.3, 0.5, 0.8])
+    along /= np.linalg.norm(along)
+    return way, along, np.cross(way, along)
+
+
+def plane_proof(normals: FloatArray, pitch: float, way: FloatArray, radius: float) -> FloatArray:
+    """(N,) how far below its points a plane of each normal (N, 3) may be, for all that a raster's positions say, m.
+
+    The contacts are a lattice on the plane. A ball's patch is what is nearer to its contact than to others: needles at
+    its far corners, one for each ball, give the same positions (theory 4.8). A corner is as far as the circumradius R
+    of the lattice's least oblique triangle and lies on the ball, r - sqrt(r^2 - R^2) above the plane (equation 4.17).
+    Infinite where balls so far apart leave places between them untouched.
+    """
+    way, along, across = _axes(way)
+    facing = normals @ way
+    a, b = (
+        step * (axis - (normals @ axis / facing)[:, None] * way)
+        for axis, step in ((along, pitch / SAMPLES_PER_PITCH), (across, pitch))
+    )
+    while True:  # Gauss's reduction of a lattice of two dimensions
+        short = ((a * a).sum(axis=1) <= (b * b).sum(axis=1))[:, None]
+        a, b = np.where(short, a, b), np.where(short, b, a)
+        turns = np.round((a * b).sum(axis=1) / (a * a).sum(axis=1))
+        if not turns.any():
+            break
+        b = b - turns[:, None] * a
+    b = np.where(((a * b).sum(axis=1) < 0)[:, None], -b, b)
+    sides = np.prod([np.linalg.norm(side, axis=1) for side in (a, b, a - b)], axis=0)
+    corner = sides / (2.0 * np.linalg.norm(np.cross(a, b), axis=1))
+    sag = radius - np.sqrt(np.maximum(radius**2 - corner**2, 0.0))
+    return np.where(corner < radius, np.hypot(corner, sag), np.inf)
+
+
 def _judged(
-    estimate: Estimate, nearest: NearestPoint, radius: float, tolerance: float
-) -> tuple[float, float, float, float, int, int, float]:
-    """The numbers of a LabelCase from `touched` on."""
+    estimate: Estimate, nearest: NearestPoint, best: FloatArray, radius: float, tolerance: float
+) -> tuple[float, float, float, float, float, float, int, int, float]:
+    """The numbers of a LabelCase from `fine` on; `best` is what each sample's face allows to prove, in radii."""
     found = nearest.query(estimate.points)
     off = found.side * found.distance / radius
     below, above = estimate.below / radius, estimate.above / radius
     own, touched, strict = estimate.sample >= 0, estimate.labels == TOUCHED, below <= STRICT
+    fine = own & (best[estimate.sample] <= tolerance)
     return (
+        float(fine[own].mean()),
         float(touched[own].mean()),
+        float(touched[fine].mean()) if fine.any() else np.nan,
         float(strict[own].mean()),
         float(off[touched].max(initial=0.0)),
         float(off[strict].max(initial=0.0)),

@@ -6,11 +6,12 @@ import numpy as np
 from numba import njit
 
 from mapping import FloatArray
-from mapping.geometry.mesh import inlined
+from mapping.geometry.mesh import borrowing, inlined
 
 # Centres to a box. Neighbours along a sweep lie in small boxes without any sorting; of 8, 16 and 32 on a raster of 1e5
 # samples, 16 took least time
 CENTERS_PER_BOX = 16
+MOST_WAITING = 64  # one box a level at most, and fewer levels than bits of a number
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -36,33 +37,42 @@ def boxes_of(centers: FloatArray) -> FloatArray:
 @njit(cache=True, error_model="numpy", nogil=True)
 def nearest_within(centers: FloatArray, boxes: FloatArray, points: FloatArray, reach: float) -> FloatArray:
     """(N,) distance of each point (N, 3) from the nearest centre (M, 3) that is nearer than `reach`, else infinite."""
-    leaves = len(boxes) // 2
     out = np.empty(len(points))
-    waiting = np.empty(64, np.int64)  # one box a level at most, and fewer levels than bits of a number
+    waiting = np.empty(MOST_WAITING, np.int64)
     for n in range(len(points)):
-        x, y, z = points[n, 0], points[n, 1], points[n, 2]
-        best = reach * reach
-        found = False
-        top, waiting[0] = 1, 1
-        while top:
-            top -= 1
-            box = waiting[top]
-            if _apart(boxes, box, x, y, z) >= best:
-                continue
-            if box < leaves:
-                first, second = 2 * box, 2 * box + 1
-                if _apart(boxes, second, x, y, z) < _apart(boxes, first, x, y, z):
-                    first, second = second, first
-                waiting[top], waiting[top + 1] = second, first  # the nearer next
-                top += 2
-                continue
-            start = (box - leaves) * CENTERS_PER_BOX
-            for i in range(start, min(start + CENTERS_PER_BOX, len(centers))):
-                square = (centers[i, 0] - x) ** 2 + (centers[i, 1] - y) ** 2 + (centers[i, 2] - z) ** 2
-                if square < best:
-                    best, found = square, True
-        out[n] = np.sqrt(best) if found else np.inf
+        out[n] = np.inf
+        square, found = nearest_center(centers, boxes, points[n, 0], points[n, 1], points[n, 2], reach * reach, waiting)
+        if found >= 0:
+            out[n] = np.sqrt(square)
     return out
+
+
+@borrowing
+def nearest_center(centers, boxes, x, y, z, best, waiting):  # type: ignore[no-untyped-def]
+    """(squared distance, index) of the centre nearest to a point, of those whose square is below `best`; else -1.
+
+    `waiting`: (MOST_WAITING,) to work in.
+    """
+    leaves, found = len(boxes) // 2, -1
+    top, waiting[0] = 1, 1
+    while top:
+        top -= 1
+        box = waiting[top]
+        if _apart(boxes, box, x, y, z) >= best:
+            continue
+        if box < leaves:
+            first, second = 2 * box, 2 * box + 1
+            if _apart(boxes, second, x, y, z) < _apart(boxes, first, x, y, z):
+                first, second = second, first
+            waiting[top], waiting[top + 1] = second, first  # the nearer next
+            top += 2
+            continue
+        start = (box - leaves) * CENTERS_PER_BOX
+        for i in range(start, min(start + CENTERS_PER_BOX, len(centers))):
+            square = (centers[i, 0] - x) ** 2 + (centers[i, 1] - y) ** 2 + (centers[i, 2] - z) ** 2
+            if square < best:
+                best, found = square, i
+    return best, found
 
 
 @inlined

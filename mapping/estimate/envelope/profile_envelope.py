@@ -77,15 +77,7 @@ def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[Float
 
     @cache
     def boxed() -> tuple[FloatArray, FloatArray]:
-        from mapping.estimate.envelope.penetration_kernels import CENTERS_PER_BOX, boxes_of
-
-        laid = np.ascontiguousarray(centers)
-        steps = np.linalg.norm(np.diff(laid, axis=0), axis=1)
-        if len(steps) and CENTERS_PER_BOX * np.median(steps) > 0.5 * float(np.ptp(laid, axis=0).max()):
-            from scipy.spatial import cKDTree
-
-            laid = np.ascontiguousarray(laid[cKDTree(laid, leafsize=CENTERS_PER_BOX).indices])
-        return laid, boxes_of(laid)
+        return boxed_centers(centers)
 
     def depth(points: FloatArray, least: float) -> FloatArray:
         if len(points) == 0:
@@ -99,6 +91,19 @@ def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[Float
         return np.asarray(tip_radius - nearest_within(laid, boxes, np.ascontiguousarray(points), near))
 
     return depth
+
+
+def boxed_centers(centers: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The centres (M, 3) in an order in which neighbours lie together, and (K, 6) boxes about pieces of it."""
+    from mapping.estimate.envelope.penetration_kernels import CENTERS_PER_BOX, boxes_of
+
+    laid = np.ascontiguousarray(centers)
+    steps = np.linalg.norm(np.diff(laid, axis=0), axis=1)
+    if len(steps) and CENTERS_PER_BOX * np.median(steps) > 0.5 * float(np.ptp(laid, axis=0).max()):
+        from scipy.spatial import cKDTree
+
+        laid = np.ascontiguousarray(laid[cKDTree(laid, leafsize=CENTERS_PER_BOX).indices])
+    return laid, boxes_of(laid)
 
 
 def _below_profile(points: FloatArray, centers: FloatArray, tip_radius: float) -> FloatArray:

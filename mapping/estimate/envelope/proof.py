@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import FloatArray, IntArray
+from mapping.estimate.envelope.profile_envelope import boxed_centers
 from mapping.estimate.sweeps import unit
 
 
@@ -59,6 +60,7 @@ class Balls:
             starts,
             ring,
             np.ascontiguousarray(self.centers),
+            *boxed_centers(self.centers),
             np.ascontiguousarray(self.sweep),
             unit(self.outward),
             np.zeros((0, 3)) if across is None else np.ascontiguousarray(across),

@@ -5,15 +5,22 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from mapping.estimate.envelope.penetration_kernels import MOST_WAITING, nearest_center
+from mapping.geometry.mesh import borrowing, vector
+
 # Constraints to a ball: the more, the sharper the bound and the slower (pairs of them are met). A raster gives six to
-# eight; leaving some out is allowed, for it only widens the bound.
-MOST_CONSTRAINTS = 16
+# eight, and some more where it is oblique to the body; leaving some out is allowed, for it only widens the bound. Of an
+# oblique raster of a plate with holes 16 prove 39.0 % of the points within the distance of the sweeps, 32 39.1 %.
+MOST_CONSTRAINTS = 32
 # Rounding of a direction, by which corners of a patch may miss its other borders
 DIRECTION_ROUNDING = 1e-12
+# Share of a squared radius by which a contact must be within another ball for that ball to cut it off: more than
+# rounding leaves of corners on its border, which would be cut again and again, and less than any bound tells
+DENIAL = 1e-9
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def farthest_contact(place, axes, bounds, count):  # type: ignore[no-untyped-def]
+@borrowing
+def farthest_contact(place, axes, bounds, count, contact):  # type: ignore[no-untyped-def]
     """Largest distance from `place` (3,) of the unit vectors m with axes m <= bounds; infinite if there are none.
 
     The set is a sphere without caps. The distance is largest where m points away from the place, at the far side of
@@ -22,12 +29,14 @@ def farthest_contact(place, axes, bounds, count):  # type: ignore[no-untyped-def
     Args:
         place: (3,) in tip radii, from the ball's centre.
         axes, bounds: (K, 3) unit vectors and (K,) cosines, of which `count` are meant.
+        contact: (3,) to write the farthest of them to.
     """
     x, y, z = place[0], place[1], place[2]
     square = x * x + y * y + z * z
     length = np.sqrt(square)
     best = np.inf  # the smallest product of m and place
     if length > 0.0 and _allowed(-x / length, -y / length, -z / length, axes, bounds, count, -1, -1):
+        contact[0], contact[1], contact[2] = -x / length, -y / length, -z / length
         return length + 1.0
     for j in range(count):
         u, v, w, t = axes[j, 0], axes[j, 1], axes[j, 2], bounds[j]
@@ -41,8 +50,10 @@ def farthest_contact(place, axes, bounds, count):  # type: ignore[no-untyped-def
         product = t * along - side * (x * ax + y * ay + z * az) / aside
         if product < best:
             share = side / aside
-            if _allowed(t * u - share * ax, t * v - share * ay, t * w - share * az, axes, bounds, count, j, j):
+            m = (t * u - share * ax, t * v - share * ay, t * w - share * az)
+            if _allowed(m[0], m[1], m[2], axes, bounds, count, j, j):
                 best = product
+                contact[0], contact[1], contact[2] = m
     for j in range(count):
         for k in range(j):
             cosine = axes[j, 0] * axes[k, 0] + axes[j, 1] * axes[k, 1] + axes[j, 2] * axes[k, 2]
@@ -63,10 +74,13 @@ def farthest_contact(place, axes, bounds, count):  # type: ignore[no-untyped-def
             cy = height * (axes[j, 2] * axes[k, 0] - axes[j, 0] * axes[k, 2])
             cz = height * (axes[j, 0] * axes[k, 1] - axes[j, 1] * axes[k, 0])
             middle, reach = x * fx + y * fy + z * fz, x * cx + y * cy + z * cz
-            if middle - reach < best and _allowed(fx - cx, fy - cy, fz - cz, axes, bounds, count, j, k):
-                best = middle - reach
-            if middle + reach < best and _allowed(fx + cx, fy + cy, fz + cz, axes, bounds, count, j, k):
-                best = middle + reach
+            for sign in (-1.0, 1.0):
+                product = middle + sign * reach
+                if product < best:
+                    m = (fx + sign * cx, fy + sign * cy, fz + sign * cz)
+                    if _allowed(m[0], m[1], m[2], axes, bounds, count, j, k):
+                        best = product
+                        contact[0], contact[1], contact[2] = m
     return np.inf if best == np.inf else np.sqrt(max(square + 1.0 - 2.0 * best, 0.0))
 
 
@@ -83,8 +97,9 @@ def _allowed(x, y, z, axes, bounds, count, own, other):  # type: ignore[no-untyp
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def proven_reach(  # type: ignore[no-untyped-def]
-    points, owners, spot, starts, ring, centers, sweep, outward, across, radius, slack, known, enough, below, above
-):
+    points, owners, spot, starts, ring, centers, laid, boxes, sweep, outward, across, radius, slack, known, enough,
+    below, above,
+):  # fmt: skip
     """How far below each point its body may be, and how far above it may stand: written to `below` and `above`, m.
 
     Each ball of a sample touches the body somewhere on its own sphere, outside of all others, on the side that
@@ -96,13 +111,14 @@ def proven_reach(  # type: ignore[no-untyped-def]
         spot: (V,) sample of each vertex, -1 where it has none that is known to touch.
         starts, ring: neighbours of vertex v are ring[starts[v] : starts[v + 1]].
         centers, sweep, outward: (N, 3), (N,) and (N, 3) of the samples, outward of length one.
+        laid, boxes: the centres once more, and the boxes about them (see `nearest_center`).
         across: (V, 3) unit vectors across a lone sweep, in whose plane the contact is taken to be; else (0, 3).
         slack: by which two balls may overlap a contact of either, m.
         known: (N, 3) contacts, or (0, 3) if only positions are known.
-        enough: further owners are not asked below this, m.
+        enough: what is below this is made no sharper, m.
     """
     axes, bounds = np.empty((MOST_CONSTRAINTS, 3)), np.empty(MOST_CONSTRAINTS)
-    place = np.empty(3)
+    place, contact, waiting = np.empty(3), np.empty(3), np.empty(MOST_WAITING, np.int64)
     for m in range(len(points)):
         below[m], above[m] = np.inf, np.inf
         for p in range(owners.shape[1]):
@@ -120,7 +136,28 @@ def proven_reach(  # type: ignore[no-untyped-def]
                 below[m] = min(below[m], np.sqrt(off))
                 continue
             count = _constraints(v, s, spot, starts, ring, centers, sweep, outward, across, radius, slack, axes, bounds)
-            below[m] = min(below[m], radius * farthest_contact(place, axes, bounds, count))
+            reach = radius * farthest_contact(place, axes, bounds, count, contact)
+            before = 0
+            while enough < reach < np.inf and before < count < MOST_CONSTRAINTS:
+                deepest = _holding(centers, s, contact, laid, boxes, radius, slack, waiting)
+                if deepest < 0:
+                    break  # no ball denies that contact: the bound is reached
+                before = count
+                count = _constraint(s, deepest, centers, laid, radius, slack, axes, bounds, count)
+                reach = radius * farthest_contact(place, axes, bounds, count, contact)
+            below[m] = min(below[m], reach)
+
+
+@borrowing
+def _holding(centers, s, contact, laid, boxes, radius, slack, waiting):  # type: ignore[no-untyped-def]
+    """Which of the laid centres' balls denies ball s a contact in this direction most clearly; -1 if none does."""
+    square = radius * radius * (1.0 - DENIAL) - 4.0 * radius * slack
+    if square <= 0.0:
+        return -1
+    x, y, z = vector(centers, s)
+    return nearest_center(
+        laid, boxes, x + radius * contact[0], y + radius * contact[1], z + radius * contact[2], square, waiting
+    )[1]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -146,23 +183,23 @@ def _constraints(  # type: ignore[no-untyped-def]
             if distance >= near * near:
                 break
         if k != s:  # the last of the sweep, if none lies far enough
-            count = _constraint(s, k, centers, radius, slack, axes, bounds, count)
+            count = _constraint(s, k, centers, centers, radius, slack, axes, bounds, count)
             before, after = (k, after) if way < 0 else (before, k)
     for e in range(starts[v], starts[v + 1]):
         if count == MOST_CONSTRAINTS:
             break
         k = spot[ring[e]]
         if k >= 0 and k != s and k != before and k != after:
-            count = _constraint(s, k, centers, radius, slack, axes, bounds, count)
+            count = _constraint(s, k, centers, centers, radius, slack, axes, bounds, count)
     return count
 
 
 @njit(cache=True, error_model="numpy", nogil=True, inline="always")
-def _constraint(s, k, centers, radius, slack, axes, bounds, count):  # type: ignore[no-untyped-def]
+def _constraint(s, k, centers, others, radius, slack, axes, bounds, count):  # type: ignore[no-untyped-def]
     """Write that the contact of ball s is not inside ball k, if that says anything."""
     square = 0.0
     for i in range(3):
-        square += (centers[k, i] - centers[s, i]) ** 2
+        square += (others[k, i] - centers[s, i]) ** 2
     distance = np.sqrt(square)
     if distance == 0.0:
         return count
@@ -170,7 +207,7 @@ def _constraint(s, k, centers, radius, slack, axes, bounds, count):  # type: ign
     if bound >= 1.0:
         return count
     for i in range(3):
-        axes[count, i] = (centers[k, i] - centers[s, i]) / distance
+        axes[count, i] = (others[k, i] - centers[s, i]) / distance
     bounds[count] = bound
     return count + 1
 

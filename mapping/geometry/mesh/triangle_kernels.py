@@ -14,6 +14,7 @@ from mapping.geometry.mesh.vector_kernels import cross, dot, moved, scaled, sub
 # What remains of a gap that closes to a tangent shrinks fourfold a step, from 1 to 1e-16 in 27 steps, and as many again
 # at most for a graze beyond it: 54; any other is faster. Rounding may cost a few more
 MOST_TANGENTS = 64
+HALVES = 2.0**27 + 1.0  # splits a float64 of 53 bits into two of at most 26, whose products are exact
 SLIVER = 1e-14  # height over longest side below which a triangle is a segment: narrower than rounding
 
 
@@ -24,11 +25,41 @@ def unit_normal(a, b, c):  # type: ignore[no-untyped-def]
     uu, vv, ww = dot(u, u), dot(v, v), dot(w, w)
     longest = max(uu, vv, ww)
     # the two shorter sides give the most accurate product
-    n = cross(v, w) if uu == longest else cross(u, w) if vv == longest else cross(u, v)
+    n = accurate_cross(v, w) if uu == longest else accurate_cross(u, w) if vv == longest else accurate_cross(u, v)
     length = sqrt(dot(n, n))
     if not length > SLIVER * longest:
         return (0.0, 0.0, 0.0)
     return scaled(1.0 / length, n)
+
+
+@borrowing
+def accurate_cross(a, b):  # type: ignore[no-untyped-def]
+    """Vector product of which every component is exact to epsilons of itself, however parallel a and b are.
+
+    The plain product is exact to epsilons of |a| |b|. By those the plane of a flat triangle tilts along its longest
+    side: over a length L and a height h its far end would be off by epsilons of L L/h, not of L.
+    """
+    return (
+        difference_of_products(a[1], b[2], a[2], b[1]),
+        difference_of_products(a[2], b[0], a[0], b[2]),
+        difference_of_products(a[0], b[1], a[1], b[0]),
+    )
+
+
+@borrowing
+def difference_of_products(a, b, c, d):  # type: ignore[no-untyped-def]
+    """a b - c d with what rounding takes from both products (Kahan's, see Jeannerod, Louvet and Muller 2013)."""
+    p, q = a * b, c * d
+    return (p - q) + (product_error(a, b, p) - product_error(c, d, q))
+
+
+@borrowing
+def product_error(a, b, p):  # type: ignore[no-untyped-def]
+    """a b - p without any error for p = a b as rounded: the factors are split into halves (Dekker 1971)."""
+    high, tall = HALVES * a, HALVES * b
+    high, tall = high - (high - a), tall - (tall - b)
+    low, short = a - high, b - tall
+    return ((high * tall - p) + high * short + low * tall) + low * short
 
 
 @borrowing
@@ -45,14 +76,20 @@ def holds(a, b, c, n, f):  # type: ignore[no-untyped-def]
 
 @borrowing
 def closest_on_segment(a, b):  # type: ignore[no-untyped-def]
-    """Point of the segment ab closest to the origin."""
+    """Point of the segment ab closest to the origin; inside the segment it is square to ab.
+
+    One projection leaves of `a` along ab what rounding makes of it, a few epsilons of its length. Far from the corners,
+    that turns a short p so that p d no longer tells whether a ball that moves along the edge comes closer. What a
+    second projection leaves over is epsilons of p ("twice is enough": Parlett 1980, section 6.9, who quotes Kahan).
+    """
     e = sub(b, a)
     square, along = dot(e, e), -dot(a, e)
     if not along > 0.0 or square == 0.0:
         return a
     if along >= square:
         return b
-    return moved(a, along / square, e)
+    p = moved(a, along / square, e)
+    return moved(p, -dot(p, e) / square, e)
 
 
 @borrowing

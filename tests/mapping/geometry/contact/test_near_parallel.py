@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from contact_bodies import box, merged, shared
-from sunk import sunk
+from sunk import point_triangle, sunk
 
 from mapping.arrays import FloatArray
 from mapping.geometry.contact.first_contact import BallContact
@@ -51,7 +53,30 @@ def slivers() -> Surface:
     )
 
 
-BODIES = {"fandisk": lambda: shared("fandisk.off"), "part": part, "slivers": slivers}
+def caps() -> Surface:
+    """A plate in strips of four triangles: the flattest, 1e-3 down to 1e-12 high, has a side that all but holds it."""
+    points, faces = [], []
+    for k in range(10):
+        y, n = 0.2 * k - 1.0, len(points)
+        points += [(-1.0, y), (1.0, y), (0.1, y + 10.0 ** (-3 - k)), (1.0, y + 0.2), (-1.0, y + 0.2)]
+        faces += [(n, n + 1, n + 2), (n + 2, n + 1, n + 3), (n + 2, n + 3, n + 4), (n, n + 2, n + 4)]
+    x, y = np.array(points).T
+    return Surface(np.column_stack([x, y, 1e-3 * x + 2e-3 * y]), np.array(faces))
+
+
+def turned(body: Surface) -> Surface:
+    """Oblique to all axes: along them products have few digits to lose."""
+    axes, _ = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))
+    return Surface(body.vertices @ axes.T, body.faces)
+
+
+BODIES = {
+    "fandisk": lambda: shared("fandisk.off"),
+    "part": part,
+    "slivers": slivers,
+    "turned_slivers": lambda: turned(slivers()),
+    "turned_caps": lambda: turned(caps()),
+}
 JITTERS = (0.0, 1e-12, 1e-9, 1e-6)
 
 
@@ -93,3 +118,22 @@ def test_a_ball_that_moves_almost_along_a_face_does_not_sink_in(name: str, jitte
         assert free.mean() > 0.2
         ends = np.where((contacts.count > 0)[:, None], contacts.centers, starts + 1.5 * body.size * d)
         assert sunk(body, radius, starts[free], ends[free]).max() <= allowed
+
+
+def exact_height(p: FloatArray, corners: FloatArray) -> float:
+    """Squared distance of p from a triangle's plane, in rational numbers."""
+    a, u, v = ([Fraction(float(x)) for x in row] for row in (p, *corners[:2]))
+    w = [Fraction(float(x)) for x in corners[2]]
+    e, f, g = ([x - y for x, y in zip(q, u, strict=True)] for q in (v, w, a))
+    n = [e[i - 2] * f[i - 1] - e[i - 1] * f[i - 2] for i in range(3)]
+    return float(sum(x * y for x, y in zip(n, g, strict=True)) ** 2 / sum(x * x for x in n))
+
+
+def test_the_judge_knows_planes_of_flat_triangles() -> None:
+    body = turned(caps())
+    flattest = np.arange(0, 32, 4)  # 1e-3 to 1e-10 high: feet of points over flatter ones slip off by rounding
+    corners = body.vertices[body.faces[flattest]]
+    points = corners.mean(axis=1) + 1e-3 * body.face_normals[flattest]
+    found = point_triangle(*(array.astype(np.longdouble) for array in (points, *np.moveaxis(corners, 1, 0))))
+    expected = [exact_height(*case) for case in zip(points, corners, strict=True)]
+    np.testing.assert_allclose(np.sqrt(found.astype(float)), np.sqrt(expected), rtol=0, atol=1e-15)
