@@ -64,7 +64,7 @@ def section_trial(body: str, noise: str, seed: int) -> dict[str, Any]:
     main = max(features, key=lambda feature: feature.evidence.snr)
     judged = {"height": _judged(main.height, (truth.height,) * 2), "width": _judged(main.width, truth.widths)}
     flagged = is_flagged(main)
-    if main.kind != truth.kind or len(features) > 1:
+    if record["kinds"] != truth.count * [truth.kind]:
         whole = "flagged" if flagged else "miscounted"
     elif "wrong" in judged.values():
         whole = "flagged" if flagged else "wrong"

@@ -11,7 +11,7 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray
 from mapping.base import SweepHeights
-from mapping.detection.cap_fit import Disturbance, fit_cap
+from mapping.detection.cap_fit import PHYSICAL, Disturbance, fit_cap
 from mapping.detection.empirical_null import NullScale
 from mapping.detection.filters import Bank
 from mapping.instrument import Noise, running_mean
@@ -28,9 +28,6 @@ DUG_BY_NOISE = 1e-3
 SIDE_LOBE = 0.12
 # Share of the threshold that the fitted height must reach too: at the ends of a sweep the fit knows less.
 MEASURED = 0.5
-# The tip draws no cap higher than w^2 / (2 r); twice as much is no contact but a disturbance of the measurement: a run
-# of readings that are off, or a single one.
-PHYSICAL = 2.0
 LARGEST_SHARE = 0.6
 # A disturbance weaker than this many thresholds hides no other: its residual is its own side lobes.
 HIDING = 1.5
@@ -89,16 +86,12 @@ class Searched:
     @property
     def disturbances(self) -> tuple[Disturbance, ...]:
         """Above the threshold, the strongest first; what no ball felt is left out."""
-        return tuple(each for each in self._measured if self._felt(each))
+        return tuple(each for each in self._measured if each.felt)
 
     @property
     def unfelt(self) -> int:
-        """How many are higher than a ball makes them that are no wider."""
-        return sum(not self._felt(each) for each in self._measured)
-
-    def _felt(self, found: Disturbance) -> bool:
-        low = abs(found.height) <= PHYSICAL * found.highest(self.tip_radius, self.profile.spacing)
-        return low or not found.tells_flanks(self.tip_radius)
+        """How many are such as no ball draws."""
+        return sum(not each.felt for each in self._measured)
 
     @cached_property
     def _measured(self) -> tuple[Disturbance, ...]:

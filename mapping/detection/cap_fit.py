@@ -8,6 +8,7 @@ import numpy as np
 
 from mapping import FloatArray
 from mapping.base import SweepHeights
+from mapping.detection.outliers import LEANING
 from mapping.instrument import Noise
 
 # Improvement in twice the log-likelihood that a plateau must bring over a cap.
@@ -23,8 +24,12 @@ FLANK_ROUNDS = 4
 SPREAD_PLACES, SPREAD_WIDTHS = 24, np.geomspace(1 / 1.5, 1.5, 7)
 # Standard deviations of its place by which a crest may be wider than it seems.
 UNSURE = 3.0
-# Of the square of a flank 1 - x^2 what is left beside the step that is nearest to it, which ends at x = sqrt(1/2)
-FLANK_MISS = 0.062
+# The ball draws no cap higher than w^2 / (2 r); up to twice as high is no reason to ask what it draws instead.
+PHYSICAL = 2.0
+# Nodes of a bin over which what a ball draws is averaged: beside a wall it is upright.
+DRAWN_NODES = 4
+# Steps in which its best is looked for: of 4 values, a start near and one of the least radius
+DRAWN_STEPS = 300
 # A dip between two rims is a cusp (1 - |x| / w)^2: the best cap has 0.61 of its width and 0.77 of its depth, so many
 # times the height of a crest's so wide.
 CUSP = 2.08
@@ -84,7 +89,8 @@ def fit_cap(
     window = _whitened(height, low, high, profile, noise, drift, neighbours)
     spacing = profile.spacing
     half = max(0.5 * (high - low) * spacing, 1.5 * spacing)
-    sharpest = float(np.sqrt(2 * tip_radius * np.abs(height[low:high]).max()))
+    # up a wall the ball goes straight, r before the edge
+    sharpest = min(float(np.sqrt(2 * tip_radius * np.abs(height[low:high]).max())), tip_radius)
     crest = _zoom(window, sign, low * spacing, (high - 1) * spacing, half, 0.0)
     if half > 1.5 * sharpest and not any(neighbours):
         plateau = _plateau(window, sign, low * spacing, (high - 1) * spacing, half)
@@ -97,7 +103,7 @@ def fit_cap(
     )
     bend = float(sign * (2 * around[1] - around[0] - around[2])) / shift**2
     sharp = min(float(np.sqrt(2 / bend)) if bend > 0 else half_width, half_width)
-    return Disturbance(
+    found = Disturbance(
         place=place + profile.start,
         start=low * spacing + profile.start,
         stop=(high - 1) * spacing + profile.start,
@@ -109,6 +115,44 @@ def fit_cap(
         curvature=2 * float(heights[1]) / (half_width * (1 - flat)) ** 2,
         snr=float(np.sqrt(max(gain, 0.0))),
     )
+    if abs(found.height) <= PHYSICAL * found.highest(tip_radius, spacing):
+        return found
+    drawn = _drawn_gain(window, place, found, tip_radius)
+    return replace(found, unlike_ball=float(np.sqrt(max(gain - drawn, 0.0))))
+
+
+def _drawn_gain(window: _Whitened, place: float, found: Disturbance, tip_radius: float) -> float:
+    """Gain in twice the log-likelihood of the best detail that a ball draws over one with upright walls.
+
+    Nothing is narrower than those: arcs about both edges, as high as they are (theory equations 4.7 and 4.8). Free
+    are the edges, the height, and the arcs' radius, which is that of the ball or, where it leans, less.
+    """
+    from scipy.optimize import minimize
+
+    from mapping.geometry.templates import rim_height, step_height
+
+    nodes = ((np.arange(DRAWN_NODES) + 0.5) / DRAWN_NODES - 0.5) * window.step
+    x = window.x[:, None] + nodes
+    least, height = LEANING * tip_radius, abs(found.height)
+    # flanks of one height are half as high at one place
+    half = found.flat + np.sqrt(0.5) * (found.half_width - found.flat)
+
+    def loss(asked: FloatArray) -> float:
+        middle, rest, high, sharp = asked * scale
+        radius = min(max(sharp, least), tip_radius)
+        inside = max(rest, 0.0) - np.abs(x - middle)
+        up = found.height > 0
+        drawn = step_height(inside, max(high, 0.0), radius) if up else rim_height(inside, radius, max(high, 0.0))
+        seen = window.root @ drawn.mean(axis=1)
+        return float(seen @ seen - 2.0 * seen @ window.values)
+
+    scale = np.array([found.half_width, found.half_width, height, tip_radius])
+    best = np.inf
+    for radius in (tip_radius, least):
+        flank = np.sqrt(radius**2 - max(radius - 0.5 * height, 0.0) ** 2)
+        start = np.array([place, max(half - np.sign(found.height) * flank, 0.0), height, radius]) / scale
+        best = min(best, float(minimize(loss, start, method="Nelder-Mead", options={"maxiter": DRAWN_STEPS}).fun))
+    return -best
 
 
 def _spread(window: _Whitened, sign: float, crest: tuple[float, float, float, float], sharp: float) -> float:
@@ -206,6 +250,8 @@ class Disturbance:
         flat: half-length of the flat top, m; 0 for a crest.
         curvature: of the trace at the crest (of the flanks for a plateau), 1/m.
         snr: signal-to-noise ratio.
+        unlike_ball: standard deviations by which the data speak for it, against the best that a ball draws; 0 where it
+            is as wide as the ball makes it.
     """
 
     place: float
@@ -218,6 +264,12 @@ class Disturbance:
     flat: float
     curvature: float
     snr: float
+    unlike_ball: float = 0.0
+
+    @property
+    def felt(self) -> bool:
+        """False for what no ball draws, beyond doubt."""
+        return self.unlike_ball <= UNSURE
 
     def highest(self, tip_radius: float, spacing: float) -> float:
         """Height of the highest cap that fits what a ball draws with flanks as wide as these may be, m.
@@ -233,15 +285,12 @@ class Disturbance:
             return np.inf
         return (CUSP if self.height < 0 else 1.0) * (tip_radius - float(np.sqrt(tip_radius**2 - flank**2)))
 
-    def tells_flanks(self, tip_radius: float) -> bool:
-        """True if the data tell a ball's flanks, sqrt(2 r h) wide, from upright ones; those of a crest are all of it.
-
-        Best placed, an upright flank misses a ball's by FLANK_MISS h^2 times its width; all of a plateau is h^2 times
-        its length, which the signal-to-noise ratio squared stands for.
-        """
-        flank = min(float(np.sqrt(2.0 * tip_radius * abs(self.height))), tip_radius)
-        return self.flat <= flank or self.snr * float(np.sqrt(FLANK_MISS * flank / self.flat)) > UNSURE
-
     def at_scale(self, scale: float) -> Disturbance:
         """The same where the noise is that many times what it was taken for."""
-        return replace(self, height_sd=scale * self.height_sd, place_sd=scale * self.place_sd, snr=self.snr / scale)
+        return replace(
+            self,
+            height_sd=scale * self.height_sd,
+            place_sd=scale * self.place_sd,
+            snr=self.snr / scale,
+            unlike_ball=self.unlike_ball / scale,
+        )

@@ -1,10 +1,10 @@
 """Outliers: runs of readings that no ball on any surface can give, and readings that do not change.
 
 The centre of a ball of radius r that touches from outside traces the upper envelope of spheres of that radius about
-the points of the body: along any path its second derivative is at least -1/r (a dilation; the trace of a crest is as
-wide as the ball makes it, and the same goes for the brim of a dip). Bursts, spikes, sentinels and lost contact begin
-and end with a bend that is sharper, in whichever direction they go. What bends sharper than that, by far more than
-the noise does, was not felt. (Serra, Image Analysis and Mathematical Morphology, 1982; theory section 3.)
+the points of the body (a dilation): all that lies under a sweep is a union of the ball's circles, so that the opening
+by this circle changes nothing. Crests, brims and walls of any height stay; bursts, spikes, sentinels and lost contact
+begin and end with a bend that no circle fits under, in whichever direction they go. What stands out of its opening by
+far more than the noise does was not felt. (Serra, Image Analysis and Mathematical Morphology, 1982; theory 6.7.)
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray
+from mapping import BoolArray, FloatArray, IntArray
 from mapping.base import LaidSweep, SweepHeights
 from mapping.instrument import FEATURE_RESIDUAL_SDS, MAD_TO_SD, robust_sd
 
@@ -23,11 +23,14 @@ BLOCKS = (1, 3, 9, 27, 81)
 # Longest run that is recognised, in tip radii: of 84 simulated bursts of a tenth to two fifths, 3 were taken for
 # something felt (5 with a fifth); what is longer may be a part of the body.
 LONGEST_RUN = 0.5
-# Bends of the trace, in those of the ball, that the body's own curvature and the sampling allow.
-ALLOWED_BEND = 3.0
-# Tip radii over which the slope beside a sample is taken: where the ball's own arc is at 45 degrees, the slope changes
-# by 0.14 within (0.05 / cos^3), so that its mean is off by 0.07 and the bound by a tenth
-SLOPE_SPAN = 0.05
+# Share of the tip's radius that the circle under a sweep has at least: a ball that leans by 70 degrees to the side,
+# against what the sweep passes, turns about it on a circle of r cos 70. Means over blocks want a half: of steps,
+# blades, grooves and pits up to 2 r high, at 5e-4 to 0.05 r between samples, they stand above their opening by up to
+# 4e-3 r at 0.8 r, and nowhere at 0.5 r.
+LEANING = 1.0 / 3.0
+# Ways to either side in which the circle is tried to lean, beside that through both neighbours, and the factor between
+# the distances of what it must stay below: the same shapes stand above nothing with 12 nor with 24 ways.
+LEANS, ARMS = 12, 3.0
 # Standard deviations beyond that: at 5 kHz a Gaussian law has one such sample in 10^6 hours.
 OUT = 7.0
 # A single sample is out by less where so many more are than a Gaussian law lets: of those left out, it may have made
@@ -36,6 +39,9 @@ OUT = 7.0
 FALSELY_OUT, LEAST_OUT, MANY_OUT = 0.01, 3.5, 3
 # Samples over which the level of the noise is taken; a burst must not fill half of them.
 LEVEL_SAMPLES = 256
+# Samples over which a slope is taken out of it: an arc turns little over them, and their median takes a fiftieth of
+# the scatter with it.
+SLOPE_SAMPLES = 32
 # Share of a run's height at which it begins and ends.
 FOOT = 0.25
 # Share of the usual step between readings below which a reading counts as the one before, and how many such in a row
@@ -97,15 +103,20 @@ def _sample_heights(sweep: LaidSweep, profile: SweepHeights, begin: int, end: in
 
 
 def _level(differences: FloatArray, resolution: float) -> FloatArray | None:
-    """(N,) sd of the differences of neighbouring samples around each; None where they do not scatter at all."""
+    """(N,) sd of the differences of neighbouring samples around each; None where they do not scatter at all.
+
+    Differences (N - 1,) are taken about the slope near them, which on a flank is no scatter.
+    """
     cells = max(1, len(differences) // LEVEL_SAMPLES)
-    whole = len(differences) // cells * cells
-    levels = MAD_TO_SD * np.median(np.abs(differences[:whole]).reshape(cells, -1), axis=1)
+    size = len(differences) // cells // SLOPE_SAMPLES * SLOPE_SAMPLES
+    pieces = differences[: cells * size].reshape(-1, SLOPE_SAMPLES)
+    about = np.abs(pieces - np.median(pieces, axis=1, keepdims=True))
+    levels = MAD_TO_SD * np.median(about.reshape(cells, -1), axis=1)
     usual = float(np.median(levels))
     if usual <= resolution:
         return None
     levels = np.maximum(levels, 0.2 * usual)
-    middles = (np.arange(cells) + 0.5) * whole / cells
+    middles = (np.arange(cells) + 0.5) * size
     return np.asarray(np.interp(np.arange(len(differences) + 1), middles, levels))
 
 
@@ -125,16 +136,13 @@ def _impossible(height: FloatArray, level: FloatArray, step: float, tip_radius: 
         sd = robust_sd(bend[::every])
         if sd * level.max() <= np.finfo(float).eps * tip_radius:
             continue  # most of the path does not bend but by rounding: there is no scatter to stand out of
-        span = max(size, int(SLOPE_SPAN * tip_radius / step))
-        slope = _slopes(means, level[: len(means)] / np.sqrt(size), span, step)[size:-size]
-        allowed = ALLOWED_BEND * (size * step) ** 2 / tip_radius * (1.0 + slope**2) ** 1.5
-        # where the arc is upright within the block, the ball comes up a wall: there is no bound
-        turned = 2.0 * (size + 0.5 * span) * step / tip_radius
-        allowed[slope / np.sqrt(1.0 + slope**2) + turned >= 1.0] = np.inf
         excess = bend / sd
-        if excess.max() <= (LEAST_OUT if size == 1 else OUT):
+        least = LEAST_OUT if size == 1 else OUT
+        asked = np.flatnonzero(excess > least)
+        if not len(asked):
             continue
-        excess -= allowed / (sd * level[size : 1 - 2 * size])
+        allowed = _allowed_bend(means, asked + size, size, step, level[asked + size], tip_radius)
+        excess[asked] -= allowed / (sd * level[asked + size])
         out = _out(excess) if size == 1 else OUT
         for at in np.flatnonzero((excess > out) & (excess >= np.roll(excess, 1)) & (excess > np.roll(excess, -1))):
             low, high = _run(height, int(at) + size, size)
@@ -144,21 +152,46 @@ def _impossible(height: FloatArray, level: FloatArray, step: float, tip_radius: 
     return off, runs
 
 
-def _slopes(means: FloatArray, sd: FloatArray, span: int, step: float) -> FloatArray:
-    """(N,) slope of the means at each, over a span on the side that is less steep; 0 on tops, in dips, and in noise.
+def _allowed_bend(
+    means: FloatArray, at: IntArray, size: int, step: float, level: FloatArray, tip_radius: float
+) -> FloatArray:
+    """(C,) bend that the opening by the ball's circle leaves at some blocks, in the unit of heights, m.
 
-    A height bends by (1 + slope^2)^1.5 of what the path does: on the flank of a crest the ball's arc bends the heights
-    the more the steeper it is, while a run that was not felt is flat, or turns back, on one side at least.
+    Under a block fits the highest of all circles, leaning to either side, that stay below the blocks before and behind,
+    near and far: on level ground one about upright; up a wall and over a brim one that leans, where what is beside goes
+    on as the circle does. A rise that noise may have made is none: it would lean the circle where the path is level.
+
+    Args:
+        means: (n,) of blocks that begin at every sample, m.
+        at: (C,) of these, one block or more from either end.
+        size, step: samples of a block, and their distance, m.
+        level: (C,) sd of the differences of neighbouring samples there.
+        tip_radius: m.
     """
-    slope = np.zeros(len(means))
-    if len(means) <= 2 * span:
-        return slope
-    rise = (means[span:] - means[:-span]) / (span * step)
-    before, behind = rise[:-span], rise[span:]
-    gentler = np.minimum(np.abs(before), np.abs(behind))
-    least = FEATURE_RESIDUAL_SDS * sd[span:-span] / (span * step)
-    slope[span:-span] = np.where(before * behind > 0.0, np.maximum(gentler - least, 0.0), 0.0)
-    return slope
+    near, radius = size * step, LEANING * tip_radius
+    if radius <= near:
+        return np.full(len(at), np.inf)
+    unsure = FEATURE_RESIDUAL_SDS * level / np.sqrt(size)
+    low, high = means[at - size], means[at + size]
+    middle = 0.5 * (low + high)
+    rise = np.sign(high - low) * np.maximum(np.abs(high - low) - unsure, 0.0)
+    ends = np.column_stack([middle - 0.5 * rise, middle + 0.5 * rise])
+    farther = np.arange(1, 1 + int(np.log(2.0 * radius / near) / np.log(ARMS)))
+    blocks = np.outer([-1, 1], np.rint(ARMS**farther)).astype(np.int64).ravel()
+    beside = at[:, None] + size * blocks
+    inside = (beside >= 0) & (beside < len(means))
+    far = np.where(inside, means[np.clip(beside, 0, len(means) - 1)] + unsure[:, None] / np.sqrt(2.0), np.inf)
+    heights, away = np.column_stack([ends, far]), near * np.concatenate([[-1, 1], blocks])
+    # from one that does not lean to one that is upright just behind the block before, or just before the block behind
+    aside = radius - np.geomspace(radius, 0.99 * near, LEANS)
+    half = np.hypot(near, 0.5 * rise)  # of the chord of the circle through both
+    through = np.sqrt(np.clip(radius**2 - half**2, 0.0, None)) * 0.5 * rise / half
+    best = middle + radius - np.sqrt(radius**2 - near**2)
+    for top in [*aside, *-aside[1:], np.clip(through, -aside[-1], aside[-1])[:, None]]:
+        under = radius**2 - (away - top) ** 2
+        arcs = np.where(under >= 0.0, np.sqrt(np.maximum(under, 0.0)) - np.sqrt(radius**2 - top**2), -np.inf)
+        best = np.maximum(best, (heights - arcs).min(axis=1))
+    return np.asarray(2.0 * (best - middle))
 
 
 def _out(excess: FloatArray) -> float:
@@ -190,10 +223,11 @@ def _run(height: FloatArray, begin: int, size: int) -> tuple[int, int]:
 def _stuck(height: FloatArray, level: FloatArray, resolution: float) -> tuple[BoolArray, int]:
     """(N,) True where the reading did not change, and the number of such runs; rounded readings may repeat."""
     stuck = np.zeros(len(height), dtype=bool)
+    steps = np.abs(np.diff(height))
     # a smooth path has flat places: readings are stuck where others scatter from one to the next
-    if resolution > 0 or robust_sd(np.diff(height, 2)) < UNCHANGED * float(np.median(level)):
+    if resolution > 0 or robust_sd(np.diff(height, 2)) < UNCHANGED * MAD_TO_SD * float(np.median(steps)):
         return stuck, 0
-    same = np.concatenate([[False], np.abs(np.diff(height)) < UNCHANGED * level[1:], [False]])
+    same = np.concatenate([[False], steps < UNCHANGED * level[1:], [False]])
     edges = np.flatnonzero(np.diff(same.astype(np.int8)))
     runs = [(first + 1, last + 1) for first, last in edges.reshape(-1, 2) if last - first >= STUCK]
     for first, last in runs:

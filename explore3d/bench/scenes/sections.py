@@ -42,6 +42,7 @@ class SectionBody:
         widths: least and largest width that is true of it, m: of upright walls one, of skirts from half height to a
             twentieth of it.
         factor: height at the places s (N,) along the line over that of the profile.
+        count: how many alike it is.
     """
 
     kind: str
@@ -50,6 +51,7 @@ class SectionBody:
     height: float
     widths: tuple[float, float]
     factor: Profile | None = None
+    count: int = 1
 
 
 def _wire(size: float) -> SectionBody:
@@ -96,14 +98,14 @@ def _filleted(size: float) -> SectionBody:
 
 
 def _burrs(size: float) -> SectionBody:
-    """A crack between two burrs, which the ball feels as a ridge with a dent: as high as the burrs, as wide as both."""
+    """A crack between two burrs: the ball rests on either or on both, and never on what is between, so they are two."""
     height, width, burr = 0.15e-3 * size, 2e-3 * size, 0.3e-3 * size
 
     def profile(x: FloatArray) -> FloatArray:
         out = np.abs(x) - 0.5 * width
         return np.where(out < 0.0, -1e-3, height * np.clip(1.0 - np.abs(2.0 * out / burr - 1.0), 0.0, 1.0))
 
-    return SectionBody("ridge", profile, 0.5 * width + burr, height, (width, width + 2.0 * burr))
+    return SectionBody("ridge", profile, 0.5 * width + burr, height, (burr, burr), count=2)
 
 
 def _bead(size: float) -> SectionBody:

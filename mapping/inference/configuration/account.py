@@ -21,6 +21,7 @@ from mapping.inference.configuration.search import Account, searched
 from mapping.inference.families import MEETING_REACH, PosteriorProblem, RidgeShape, Surroundings, TwinShape
 from mapping.inference.kinds import kind_named, kind_of, sizes_of
 from mapping.inference.likelihood import Nuisance
+from mapping.inference.sampler import root_of
 
 # A line that was found reaches what was a neighbourhood of its own: both are looked at once more, together
 LOOKS = 2
@@ -177,7 +178,8 @@ def _described(best: Configuration, around: Surroundings, algorithms: tuple[int,
         return []
     theta, rng = best.found.mean, np.random.default_rng(0)
     likelihood = best.place.levels[best.level][0]
-    draws = rng.multivariate_normal(theta, best.found.covariance, PRELIMINARY_DRAWS, method="eigh")
+    # by the triangular root, which goes with the covariance: axes of equal variance are turned by rounding alone
+    draws = theta + rng.standard_normal((PRELIMINARY_DRAWS, len(theta))) @ root_of(best.found.covariance).T
     features = []
     for k, (part, own) in enumerate(zip(best.parts, best.shape.columns, strict=True)):
         others = [other.shape for other in best.parts if other is not part]

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mapping import Feature, FloatArray, Interval, Support
+from mapping import BoolArray, Feature, FloatArray, Interval, Support
 from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_bell, as_twin, laid, part_of
 from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, Neighbourhood
@@ -32,6 +32,8 @@ SHORT_LINE = 0.3
 POINTS_APART = 0.3
 # Points of a leg that distances between lines are taken at
 POINTS_OF_LEG = 65
+# Half-widths by which a line goes on beyond what it is extended to: the end is sought from there
+EXTENDED = 0.3
 # Points that two lines are drawn through, at least
 FEWEST_POINTS = 4
 # Standard deviations by which a place must stand off a configuration to be looked at; how wrong one is, is then asked
@@ -175,6 +177,40 @@ def straight(now: Configuration, points: FloatArray) -> Iterator[Parts]:
         yield [*rest, *(_line(model, line, now.place) for line in found)]
 
 
+def extended(now: Configuration) -> Iterator[Parts]:
+    """A line that goes on beyond an end, to the nearest or to the farthest of what stands off there.
+
+    No optimum leads from one sweep to the next: between two of them the trace does not depend on where an end is.
+    """
+    window = now.place.window
+    for k, part in enumerate(now.parts):
+        kind = kind_of(part.feature)
+        if not kind.line or not kind.has_ends or part.feature.closed:
+            continue
+        places = window.feet[_peaks(now, float(kind.sign))]
+        half, course = sizes_of(part.feature, now.place.around.trace.tip_radius).half_width, axis_of(part)
+        for axis in (course, course[::-1]):
+            way = axis[-1] - axis[-2]
+            way /= max(float(np.linalg.norm(way)), np.finfo(float).tiny)
+            along = (places - axis[-1]) @ way
+            off = np.linalg.norm(places - axis[-1] - along[:, None] * way, axis=1)
+            beyond = along[(along > 0.0) & (off < half)]
+            for reach in sorted({float(beyond.min()), float(beyond.max())}) if len(beyond) else ():
+                longer = _alike(part, np.vstack([axis, axis[-1] + (reach + EXTENDED * half) * way]), now.place)
+                yield [*now.parts[:k], longer, *now.parts[k + 1 :]]
+
+
+def _alike(part: Part, axis: FloatArray, place: Neighbourhood) -> Part:
+    """A line of a part's section along another axis."""
+    shape: Any = part.shape
+    line = _line(part.feature, axis, place, most=8)
+    if isinstance(shape, TwinShape):
+        return as_twin(line, place, float(np.exp(part.start[0])))
+    if isinstance(shape, TrapezoidShape):
+        return as_bar(line, place, float(shape.parts(part.start[None])[1][0]))
+    return line
+
+
 def more(now: Configuration) -> Iterator[Parts]:
     """Whatever stands off the configuration most: a point there, or a straight line through several such places.
 
@@ -199,12 +235,7 @@ def _more(now: Configuration) -> Iterator[Parts]:
     """The same for one configuration."""
     window, tip = now.place.window, now.place.around.trace.tip_radius
     for sign in (1.0, -1.0):
-        over = sign * now.residual
-        peak = np.zeros(len(window), dtype=bool)
-        for start, stop in zip(window.starts[:-1], window.starts[1:], strict=True):
-            own = over[start:stop]
-            peak[start + 1 : stop - 1] = (own[1:-1] >= own[:-2]) & (own[1:-1] > own[2:])
-        peak &= sign * now.standing_off > PEAK_SDS
+        over, peak = sign * now.residual, _peaks(now, sign)
         if not peak.any():
             continue
         places, heights = window.feet[peak], over[peak]
@@ -222,6 +253,16 @@ def _more(now: Configuration) -> Iterator[Parts]:
                     _line(_sized(model, line.name, model.height.median, abs(model.height.median)), axis, now.place),
                 ]
         yield [*now.parts, part_of(replace(model, kind=spot.name), now.place)]
+
+
+def _peaks(now: Configuration, sign: float) -> BoolArray:
+    """(n,) True where the residual is highest (or, for the sign -1, lowest) along a run, and stands off."""
+    window, over = now.place.window, sign * now.residual
+    peak = np.zeros(len(window), dtype=bool)
+    for start, stop in zip(window.starts[:-1], window.starts[1:], strict=True):
+        own = over[start:stop]
+        peak[start + 1 : stop - 1] = (own[1:-1] >= own[:-2]) & (own[1:-1] > own[2:])
+    return np.asarray(peak & (sign * now.standing_off > PEAK_SDS))
 
 
 def straight_lines(points: FloatArray, tolerance: float) -> list[FloatArray]:
@@ -274,6 +315,7 @@ PROPOSALS = (
     Proposal("apart", lambda now, points: apart(now)),
     Proposal("between", lambda now, points: between(now)),
     Proposal("kind", lambda now, points: other_kinds(now)),
+    Proposal("extend", lambda now, points: extended(now)),
     Proposal("add", lambda now, points: more(now)),
     Proposal("remove", lambda now, points: without(now)),
 )

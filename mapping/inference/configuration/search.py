@@ -63,17 +63,19 @@ def searched(
     left = MOST_FITTED - _cost(start.parts)
     visited = {start.kinds: start}
     whole, joining = laid(parts, place), True
-    # pieces of one line hide each other once they are fitted: they are joined as the rules left them
+    # pieces of one line hide each other once they are fitted: they are joined as the rules left them, those first that
+    # gain most by it: both flanks of a wide line may be one step to some extent, and no longer a line after that
     while joining and left > 0.0:
         joining = False
         for other_parts in _yielded(JOIN, whole, points) if JOIN in proposals else ():
             other = fitted(other_parts, place)
             left -= _cost(other_parts)
             if other is not None and other.log_odds > best.log_odds + WORTH:
-                best, whole, joining = other, laid(other_parts, place), True
-                visited[other.kinds] = other
-                accepted.append(JOIN.name)
-                break
+                best, joined, joining = other, laid(other_parts, place), True
+        if joining:
+            whole = joined
+            visited[best.kinds] = best
+            accepted.append(JOIN.name)
     while idle < len(proposals):
         for proposal in proposals:
             found = best

@@ -78,7 +78,7 @@ def _first_proposal(modes: Sequence[Laplace]) -> Proposal:
     means = np.repeat([mode.mean for mode in modes], 2, axis=0)
     roots = np.array([width * root_of(mode.covariance) for mode in modes for width in (1.0, 2.0)])
     shares = np.tile([0.7, 0.3], len(modes)) / len(modes)
-    return Proposal(shares, means, roots)
+    return Proposal(shares, means, roots).rounded()
 
 
 def _weigh(

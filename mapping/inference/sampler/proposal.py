@@ -13,6 +13,9 @@ from mapping import FloatArray
 DEGREES = 6.0
 # A component that explains less than this share of the draws is left as it is, to keep watch.
 LEAST_SHARE = 0.01
+# Binary digits that a proposal is told with. Learning makes ten times of a difference of 1e-10 in each round: of two
+# forms of one recording that differ in the last digit the medians were a fiftieth of a standard deviation apart.
+TOLD_DIGITS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +31,21 @@ class Proposal:
     shares: FloatArray
     means: FloatArray
     roots: FloatArray
+
+    def rounded(self) -> Proposal:
+        """The same, to TOLD_DIGITS: what it is learnt from may differ by rounding errors, and it does not.
+
+        Weights make up for whatever a proposal is. Places are told in parts of their spread, spreads in parts of
+        themselves, all by powers of two, so that a change of units by one of these changes nothing else.
+        """
+        spread = np.linalg.norm(self.roots, axis=2)
+        grid = np.exp2(np.frexp(spread)[1] - TOLD_DIGITS)
+        diagonal = np.einsum("cii->ci", self.roots)
+        mantissa, power = np.frexp(diagonal)
+        roots = np.rint(self.roots / grid[:, :, None]) * grid[:, :, None]
+        np.einsum("cii->ci", roots)[:] = np.ldexp(np.rint(np.ldexp(mantissa, TOLD_DIGITS)), power - TOLD_DIGITS)
+        shares = np.rint(np.ldexp(self.shares, TOLD_DIGITS))
+        return Proposal(shares / shares.sum(), np.rint(self.means / grid) * grid, roots)
 
     def draw(self, uniform: FloatArray, normal: FloatArray, chi_square: FloatArray) -> FloatArray:
         """(S, P) draws from uniform (S,), standard normal (S, P) and chi-square (S,) variates."""
@@ -85,7 +103,7 @@ class Proposal:
             trust = 1.0 / (1.0 + 3.0 * count * float(seen @ seen))
             roots[c] = root_of(trust * scatter + (1.0 - trust) * self.roots[c] @ self.roots[c].T)
         shares = np.maximum(shares, LEAST_SHARE)
-        return Proposal(shares / shares.sum(), means, roots)
+        return Proposal(shares / shares.sum(), means, roots).rounded()
 
 
 def root_of(covariance: FloatArray) -> FloatArray:

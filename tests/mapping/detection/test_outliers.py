@@ -9,8 +9,8 @@ from mapping.arrays import FloatArray
 from mapping.base.base import Base
 from mapping.detection.cap_fit import CUSP
 from mapping.detection.detect import Detections, detect
-from mapping.detection.outliers import LEAST_OUT, OUT, _out
-from mapping.geometry.templates import step_height
+from mapping.detection.outliers import BLOCKS, LEAST_OUT, LONGEST_RUN, OUT, _allowed_bend, _out
+from mapping.geometry.templates import cap_height, rim_height, step_height
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -100,14 +100,46 @@ def test_a_dip_between_two_rims_is_felt(width: float) -> None:
     assert [(c.sweep, c.kind) for c in result.crossings] == [(1, "concave")]
 
 
-@pytest.mark.parametrize("height", [0.5, 0.8, 2.0])
-def test_steps_as_high_as_the_ball_are_felt_from_end_to_end(height: float) -> None:
-    # hardly any noise and samples far apart: the arc about the edge bends the heights the more the steeper it is
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 5e-3])
+@pytest.mark.parametrize("height", [0.3, 0.6, 0.8, 0.95, 0.99, 2.0])
+def test_steps_of_any_height_are_felt_from_end_to_end(height: float, noise: float) -> None:
+    # samples far apart: the arc about the edge bends the heights the more the steeper it is
     x = np.arange(-30e-3, 30e-3, 0.05 * TIP)
-    heights = step_height(x - 3e-3, height * TIP, TIP) + 0.0005 * TIP * np.random.default_rng(4).standard_normal(len(x))
+    heights = step_height(x - 3e-3, height * TIP, TIP) + noise * TIP * np.random.default_rng(4).standard_normal(len(x))
     centers = np.column_stack([x, np.zeros_like(x), TIP + heights])
     result = detect(Trace(np.arange(len(x)) * 1e-3, centers, np.zeros(len(x), dtype=np.int64), TIP), PLATE)
-    assert result.unfelt == ()
+    assert result.unfelt == () and not any("not felt" in said for said in result.left_out)
+    (crossing,) = result.crossings
+    assert crossing.kind == "step up" and crossing.height == pytest.approx(height * TIP, rel=0.03)
+
+
+@pytest.mark.parametrize("step", [5e-4, 5e-3, 5e-2])
+@pytest.mark.parametrize("height", [0.3, 0.9, 0.99, 1.5])
+def test_no_block_of_what_a_ball_traces_stands_above_its_opening(height: float, step: float) -> None:
+    x = np.arange(-1.6, 1.6, step)
+    bodies = {
+        "step": step_height(x - 0.3 * step, height, 1.0),
+        "blades": np.maximum(cap_height(x, height, 0.0, 1.0), cap_height(x - 0.4, 0.8 * height, 0.0, 1.0)),
+        "pit": rim_height(1.2 - np.abs(x - 0.3 * step), 1.0, height),
+    }
+    for name, heights in bodies.items():
+        sums = np.concatenate([[0.0], np.cumsum(heights)])
+        for size in (size for size in BLOCKS if size * step < LONGEST_RUN):
+            means = (sums[size:] - sums[:-size]) / size
+            bend = 2 * means[size:-size] - means[: -2 * size] - means[2 * size :]
+            at = np.flatnonzero(bend > 1e-9)
+            allowed = _allowed_bend(means, at + size, size, step, np.zeros(len(at)), 1.0)
+            assert (bend[at] <= allowed + 1e-12).all(), (name, size)
+
+
+def test_a_hole_in_level_ground_stands_below_its_opening() -> None:
+    # the ball sinks into nothing that has no rounded brim: before and behind the hole no circle fits
+    heights = np.zeros(201)
+    heights[100] = -0.05
+    at = np.array([99, 101])
+    bend = 2 * heights[at] - heights[at - 1] - heights[at + 1]
+    allowed = _allowed_bend(heights, at, 1, 2e-3, np.zeros(2), 1.0)
+    assert (allowed < 0.01 * bend).all()
 
 
 def test_places_of_crossings_count_all_samples() -> None:
