@@ -46,13 +46,13 @@ def with_faint_lines(
     half_width = _least_half_width(detections, trace.tip_radius)
     spacing = faint_spacing(detections, trace.tip_radius)
     inspection = (inspections or Inspections.of(trace, base, detections.noise, [spacing])).at(spacing)
-    weak = [f for f in features if _is_weak(f, detections)]
+    weak = [f for f in features if _is_weak(f, detections, trace.tip_radius)]
     # what one place alone shows is not faint
     masked = np.abs(inspection.height) > PLAIN_PLACE_SDS * inspection.sd
     for feature in features:
         if feature not in weak:
-            reach = 1.3 * np.sqrt(2 * trace.tip_radius * abs(feature.height.median)) + 0.5 * feature.width.high
-            near = inspection.near(feature.axis, float(reach))
+            reach = _reach(feature, trace.tip_radius)
+            near = inspection.near(feature.axis, reach)
             masked[near] |= distances(inspection.points[near], feature.axis) < reach
     alarms = false_alarms_per_metre * detections.inspected_length
     inflation = _inflation(inspection, detections, len(trace), half_width)
@@ -88,10 +88,19 @@ def _least_half_width(detections: Detections, tip_radius: float) -> float:
     return float(np.sqrt(2 * tip_radius * detections.detection_limit))
 
 
-def _is_weak(feature: Feature, detections: Detections) -> bool:
-    few = feature.evidence.crossings <= FEW_CROSSINGS and feature.evidence.snr < CLEAR_THRESHOLDS * detections.threshold
+def _reach(feature: Feature, tip_radius: float) -> float:
+    """How far from its axis a feature explains what was felt, m."""
+    return float(1.3 * np.sqrt(2 * tip_radius * abs(feature.height.median)) + 0.5 * feature.width.high)
+
+
+def _is_weak(feature: Feature, detections: Detections, tip_radius: float) -> bool:
+    # the sweeps that passed over it, which an account of a neighbourhood counts, need not have shown it one by one
+    shown = np.array([c.point for c in detections.crossings]).reshape(-1, 3)
+    shown_by = int((distances(shown, feature.axis) < _reach(feature, tip_radius)).sum())
+    crossings = min(feature.evidence.crossings, shown_by)
+    few = crossings <= FEW_CROSSINGS and feature.evidence.snr < CLEAR_THRESHOLDS * detections.threshold
     # sweeps that leave a groove by its end feel a dip there, each for itself
-    alone = len(feature.axis) == 1 or feature.evidence.crossings <= SOME
+    alone = len(feature.axis) == 1 or crossings <= SOME
     # a piece of a line, which by itself may be nothing
     doubtful = any(words == in_words(()) for words, _ in feature.details.account or ())
     return few or doubtful or (alone and abs(feature.height.median) < detections.detection_limit)

@@ -28,9 +28,10 @@ UNLIKELY = 10.0
 # Samples that the noise is first estimated from, and blocks that it is fitted to.
 RAW_SAMPLES = 40_000
 NOISE_FIT_BLOCKS = 8000
-# Rounds in which noise and quiet path settle; where one process is not enough, as many again: a first look through one
-# process takes the slow parts of 1/f noise for features, and two fifths of the path for quiet.
-QUIET_NOISE_ROUNDS = 3
+# Most rounds in which noise and quiet path settle: they end as soon as nothing changes, of most laws after 2 to 5, of
+# what a finger explored, most of it on details, after 5 to 9. Where one process is not enough, as many again: a first
+# look through one process takes the slow parts of 1/f noise for features, and two fifths of the path for quiet.
+QUIET_NOISE_ROUNDS = 12
 GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
 
 

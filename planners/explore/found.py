@@ -12,7 +12,6 @@ from mapping.instrument import Noise
 from planners.explore.faint_search import FaintLead
 from planners.follow import AxisTrack, BumpSize, is_step, slender
 from planners.paths import tangential
-from planners.survey import CERTAIN_CREST_SDS
 
 # Standard deviations by which a crossing must be lower than what is asked for to be none of it
 LOWER_SDS = 2.0
@@ -24,12 +23,14 @@ class Found:
 
     `surveyed` says whether the survey was finished; `actions` names everything that was done after it, with its
     outcome; `left_out` what was not, `unseen` what the survey may have missed. `asked` is the height (m) that the
-    smallest feature asked for shows at least on some sweep.
+    smallest feature asked for shows at least on some sweep; `reported` the signal-to-noise ratio from which on the
+    analysis of all sweeps may report a crossing.
     """
 
     tip_radius: float
     surveyed: bool = False
     asked: float = 0.0
+    reported: float = 0.0
     survey: Coverage | None = None
     noise: Noise | None = None
     tracks: list[AxisTrack] = field(default_factory=list)
@@ -61,13 +62,13 @@ class Found:
         return [c for c in self.crossings if not any(k.explains(c) for k in known) and not self._tried(c)]
 
     def _worth_a_look(self, crossing: Crossing) -> bool:
-        """True for what may be a feature asked for, and for whatever else is certainly there.
+        """True for what may be a feature asked for, and for whatever else would be reported.
 
         What is asked for shows somewhere as high as `asked`; what is lower there by two standard deviations is none,
         and most often noise: more false alarms are let through to here than in the end.
         """
         highest = abs(crossing.height) * (1.0 + LOWER_SDS / max(crossing.snr, LOWER_SDS))
-        return highest >= self.asked or crossing.snr >= CERTAIN_CREST_SDS
+        return highest >= self.asked or crossing.snr >= self.reported
 
     def step_heading(self, seed: Crossing, reach: float) -> FloatArray | None:
         """Direction from a step to the nearest one on another sweep, or None if the seed is no open step.

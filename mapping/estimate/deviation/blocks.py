@@ -35,6 +35,9 @@ DRIFTING_TIMES = 4.0
 TINY = float(np.finfo(float).tiny)
 # A sweep of fewer bins tells nothing of long wavelengths
 FEWEST_BINS = 3
+# Blocks whose middles are nearer than half of one lie in one place; two sides of a wall are two places: normals count
+# as so many tip radii
+PLACE, SIDES_APART = 0.5 * BIN * BINS_PER_BLOCK, 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +54,8 @@ class Blocks:
         t: (B,) when it was felt, s.
         steepness: (B,) largest slope of the height between the bins of a block and on to the next, beyond noise.
         edge: (B,) whether the height jumps there, however little.
+        weight: (B,) what each counts, so that no place counts more than the usual one, however often it was passed: a
+            finger that explores goes where the details are, and of the model it learns there no more than elsewhere.
         noise: standard deviation of one block by the differences of neighbouring bins, m.
     """
 
@@ -63,6 +68,7 @@ class Blocks:
     t: FloatArray
     steepness: FloatArray
     edge: BoolArray
+    weight: FloatArray
     noise: float
 
     @classmethod
@@ -80,14 +86,15 @@ class Blocks:
             nothing = np.zeros(0)
             none = nothing.astype(np.int64)
             empty = np.zeros((0, 3))
-            return cls(empty, empty, nothing, none, none, nothing, nothing, nothing, none > 0, 0.0)
+            return cls(empty, empty, nothing, none, none, nothing, nothing, nothing, none > 0, nothing, 0.0)
         points, normals, height, piece, place, steepness, edge = map(np.concatenate, zip(*parts, strict=True))
         sweep = np.array([p.sweep for p in profiles])[piece]
         own = {s.number: s for s in laid.laid_sweeps}
         felt = [(own[profile.sweep], part[4]) for profile, part in zip(profiles, parts, strict=True)]
         t = np.concatenate([np.interp(where, of.arclength, of.trace.t) for of, where in felt])
         noise = sd / np.sqrt(BINS_PER_BLOCK)
-        return cls(points, normals, height, sweep, piece, place, t, steepness, edge, noise)
+        weight = _weights(points, normals, tip)
+        return cls(points, normals, height, sweep, piece, place, t, steepness, edge, weight, noise)
 
     def __len__(self) -> int:
         return len(self.height)
@@ -165,6 +172,23 @@ def _grouped(
     steep, edge = (np.maximum.reduceat(np.append(values, 0), starts) for values in (rise, jumps))
     height, place = (np.add.reduceat(values, starts) / counts for values in (profile.height, profile.s))
     return points, normals, height, np.full(len(starts), number), place, steep, edge > 0
+
+
+def _weights(points: FloatArray, normals: FloatArray, tip: float) -> FloatArray:
+    """(B,) of blocks at places (B, 3): 1 where no more of them lie than in the usual place, else in proportion less."""
+    from scipy.spatial import cKDTree
+
+    places = np.column_stack([points, SIDES_APART * tip * normals])
+    counts = cKDTree(places).query_ball_point(places, PLACE * tip, return_length=True)
+    passes = np.asarray(counts, dtype=np.float64)
+    return np.asarray(np.minimum(weighted_median(passes, 1.0 / passes) / passes, 1.0))
+
+
+def weighted_median(values: FloatArray, weight: FloatArray) -> float:
+    """The value (N,) up to which half of the weight (N,) lies."""
+    order = np.argsort(values, kind="stable")
+    below = np.cumsum(weight[order])
+    return float(values[order[np.searchsorted(below, 0.5 * below[-1])]])
 
 
 def _jumps(height: FloatArray) -> FloatArray:

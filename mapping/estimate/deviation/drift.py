@@ -99,28 +99,31 @@ class Drift:
         return {"sweep": self.sweep.tolist(), "line": self.line.tolist()}
 
 
-def drift(sweep: IntArray, place: FloatArray, height: FloatArray, noise: float, step: float) -> Drift:
+def drift(
+    sweep: IntArray, place: FloatArray, height: FloatArray, weight: FloatArray, noise: float, step: float
+) -> Drift:
     """The likeliest lines of the sweeps.
 
     Args:
         sweep: (B,) number of each block's sweep.
         place: (B,) arclengths, m, increasing along a sweep.
         height: (B,) m.
+        weight: (B,) what each block counts (see Blocks).
         noise: standard deviation of a block by its neighbours, m.
         step: between blocks, m.
     """
     order = np.argsort(sweep, kind="stable")
-    sweep, place, height = sweep[order], place[order], height[order]
+    sweep, place, height, weight = sweep[order], place[order], height[order], weight[order]
     numbers, first, row, counts = np.unique(sweep, return_index=True, return_inverse=True, return_counts=True)
     middle = 0.5 * (place[first] + place[first + counts - 1])
     half = np.maximum(0.5 * (place[first + counts - 1] - place[first]), step)
     columns = np.column_stack([height, np.ones(len(height)), (place - middle[row]) / half[row]])
     best: _Best | None = None
-    nothing = -np.inf
+    nothing, told = -np.inf, np.add.reduceat(weight, first)
     for law in laws():
-        flat, log_scale = decorrelated(columns, sweep, place / step, *law)
-        products = np.add.reduceat(flat[:, :, None] * flat[:, None, :], first, axis=0)
-        grams = _Grams(products, counts, log_scale)
+        flat, log_gain = decorrelated(columns, sweep, place / step, *law)
+        products = np.add.reduceat(weight[:, None, None] * flat[:, :, None] * flat[:, None, :], first, axis=0)
+        grams = _Grams(products, told, float(weight @ log_gain))
         for white in noise * NOISE_GRID:
             log = _likelihoods(grams, white, noise)
             nothing = max(nothing, float(log[0, 0]))
@@ -142,10 +145,11 @@ def _lowered(laid: LaidTrace, height: FloatArray) -> Trace:
 
 @dataclass(frozen=True, eq=False)
 class _Grams:
-    """Products of whitened heights, ones and places, of each sweep (S, 3, 3), and what whitening did to the density."""
+    """Products of whitened heights, ones and places, of each sweep (S, 3, 3), its weight (S,), and what whitening did
+    to the density."""
 
     products: FloatArray
-    counts: IntArray
+    counts: FloatArray
     log_scale: float
 
 

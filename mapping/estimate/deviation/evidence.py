@@ -24,14 +24,14 @@ class Whitened:
         moment: (K,) of columns and heights.
         square: of the heights.
         log_scale: sum of the logarithms of the filter's gains.
-        count: blocks.
+        count: weight of all blocks.
     """
 
     gram: FloatArray
     moment: FloatArray
     square: float
     log_scale: float
-    count: int
+    count: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,27 +61,31 @@ def every_law() -> list[int]:
     return list(range(len(laws())))
 
 
-def whitened(columns: FloatArray, piece: IntArray, place: FloatArray, step: float) -> list[Whitened]:
+def whitened(
+    columns: FloatArray, piece: IntArray, place: FloatArray, weight: FloatArray, step: float
+) -> list[Whitened]:
     """One for each law of noise.
 
     Args:
         columns: (B, 1 + K) heights first.
         piece: (B,) number of the stretch of each block, not decreasing.
         place: (B,) arclength in it, m.
+        weight: (B,) what each block counts (see Blocks).
         step: between blocks, m.
     """
-    found = []
+    found, root = [], np.sqrt(weight)[:, None]
     for level, length in laws():
-        white, log_scale = decorrelated(columns, piece, place / step, level, length)
+        white, log_gain = decorrelated(columns, piece, place / step, level, length)
+        white = white * root
         y, a = white[:, 0], white[:, 1:]
-        found.append(Whitened(a.T @ a, a.T @ y, float(y @ y), log_scale, len(y)))
+        found.append(Whitened(a.T @ a, a.T @ y, float(y @ y), float(weight @ log_gain), float(weight.sum())))
     return found
 
 
 def decorrelated(
     columns: FloatArray, piece: IntArray, place: FloatArray, level: float, length: float
-) -> tuple[FloatArray, float]:
-    """(B, K) columns as noise of one law would be white with unit variance, and the logarithm of the filter's gain.
+) -> tuple[FloatArray, FloatArray]:
+    """(B, K) columns as noise of one law would be white with unit variance, and (B,) logarithms of the filter's gain.
 
     A Kalman filter of one state along all pieces at once: its innovations are independent.
 
@@ -92,9 +96,9 @@ def decorrelated(
         level, length: of the law (see `laws`).
     """
     if level == 0.0:
-        return columns, 0.0
+        return columns, np.zeros(len(columns))
     _, starts, counts = np.unique(piece, return_index=True, return_counts=True)
-    white, log_scale = np.empty_like(columns), 0.0
+    white, log_gain = np.empty_like(columns), np.empty(len(columns))
     mean, spread = np.zeros((len(starts), columns.shape[1])), np.full(len(starts), level**2)
     for k in range(int(counts.max())):
         here = np.flatnonzero(counts > k)
@@ -109,8 +113,8 @@ def decorrelated(
         gain = spread[here] / total
         mean[here] += gain[:, None] * innovation
         spread[here] *= 1.0 - gain
-        log_scale += 0.5 * float(np.log(total).sum())
-    return white, log_scale
+        log_gain[which] = 0.5 * np.log(total)
+    return white, log_gain
 
 
 def best_fit(seen: list[Whitened], which: IntArray, prior: FloatArray, noise: float, among: list[int]) -> Fit:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidTrace, Pose
-from mapping.estimate.deviation.blocks import BIN, BINS_PER_BLOCK, Blocks
+from mapping.estimate.deviation.blocks import BIN, BINS_PER_BLOCK, SIDES_APART, Blocks, weighted_median
 from mapping.estimate.deviation.drift import Drift, SteadyDrift, drift
 from mapping.estimate.deviation.evidence import Fit, Whitened, best_fit, every_law, whitened
 from mapping.estimate.deviation.fields import RigidFrame, SmoothField, spread
@@ -23,10 +23,10 @@ from mapping.instrument import MAD_TO_SD
 FEWEST_BLOCKS = 24
 # Less noise than this many tip radii is rounding
 ROUNDING = 1e-9
-# Cells over which heights are averaged to see whether anything is wrong, in tip radii; a quantile of their squares,
-# which a fine feature in some cells does not move, with its value for unit white noise; and by how much noise that is
-# correlated within a block may exceed that
-CELL, AGREEING_SHARE, AGREEING_SQUARE, AS_EXPECTED = 2.0, 0.8, 1.642, 4.0
+# Cells whose median heights say whether anything is wrong, in tip radii; a quantile of their squares, which a fine
+# feature in some cells does not move, with its value for unit white noise; by how much noise that is correlated within
+# a block may exceed that; and the variance of a median over that of a mean
+CELL, AGREEING_SHARE, AGREEING_SQUARE, AS_EXPECTED, OF_MEDIAN = 2.0, 0.8, 1.642, 4.0, 0.5 * np.pi
 # Of a turn at the body's edge, a shift, a scale, an offset, in tip radii: what is expected before anything is felt
 EXPECTED_SHARE = 0.1
 # Heights without noise scatter so little, in expected departures: its square still counts beside 1 in float64
@@ -118,7 +118,8 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
         told = (keep & seen.apart(SHORTEST_FIELD * tip)).sum() >= FEWEST_BLOCKS
         # where more of the surface agrees with the model than hangs together beside it, that is a plateau
         level = whole & (np.abs(seen.height) <= FAR_OFF * seen.noise)
-        if not told or _agrees(seen, seen.height, keep, tip) or level.sum() > keep.sum():
+        plateau = seen.weight[level].sum() > seen.weight[keep].sum()
+        if not told or _agrees(seen, seen.height, keep, tip) or plateau:
             break
         step, own = _explanation(seen, whole, base, tip), _drift(seen, whole, tip)
         if own is not None and (step is None or own.gain > step.gain):
@@ -165,17 +166,18 @@ def _unfelt(commanded: Sequence[FloatArray], trace: Trace) -> FloatArray:
 
 
 def _agrees(blocks: Blocks, height: FloatArray, keep: BoolArray, tip: float) -> bool:
-    """True if the mean heights of cells are no larger than noise makes them."""
+    """True if the median heights of cells are no larger than noise makes them: a line covers less than half of one."""
     from scipy.spatial import cKDTree
 
     if keep.sum() < FEWEST_BLOCKS:
         return False
-    places = np.column_stack([blocks.points, CELL * tip * blocks.normals])[keep]
-    _, cell = cKDTree(spread(places, CELL * tip, len(places))).query(places)
-    count = np.bincount(cell)
-    mean = np.bincount(cell, height[keep]) / np.maximum(count, 1)
-    square = count[count > 0] * mean[count > 0] ** 2
-    allowed = AS_EXPECTED * AGREEING_SQUARE * (blocks.noise**2 + (ROUNDING * tip) ** 2)
+    places = np.column_stack([blocks.points, SIDES_APART * tip * blocks.normals])[keep]
+    cell = np.asarray(cKDTree(spread(places, CELL * tip, len(places))).query(places)[1])
+    order = np.argsort(cell, kind="stable")
+    cells = np.split(order, np.flatnonzero(np.diff(cell[order])) + 1)
+    height, weight = height[keep], blocks.weight[keep]
+    square = [weight[own].sum() * weighted_median(height[own], weight[own]) ** 2 for own in cells]
+    allowed = OF_MEDIAN * AS_EXPECTED * AGREEING_SQUARE * (blocks.noise**2 + (ROUNDING * tip) ** 2)
     return bool(np.quantile(square, AGREEING_SHARE) <= allowed)
 
 
@@ -185,17 +187,18 @@ def _explanation(blocks: Blocks, whole: BoolArray, base: Base, tip: float) -> _E
     causes = (frame.offset, frame.pose, frame.scale)
     rigid = np.column_stack([*(make(blocks.points, blocks.normals) for make in causes), _elapsed(blocks)])
     everything = np.ones(len(blocks), dtype=bool)
-    keep = whole & blocks.smooth(blocks.height - _robust(rigid, blocks.height, everything, EXPECTED_SHARE * tip))
+    prior = EXPECTED_SHARE * tip
+    keep = whole & blocks.smooth(blocks.height - _robust(rigid, blocks.height, blocks.weight, everything, prior))
     if keep.sum() < FEWEST_BLOCKS:
         return None
     fields = _fields(blocks.points[keep], frame, tip)
     flexible = np.column_stack([rigid, *(each.columns(blocks.points, blocks.normals) for each in fields[:1])])
-    left = blocks.height - _robust(flexible, blocks.height, keep, EXPECTED_SHARE * tip)
-    keep = _near(left, keep, blocks.noise)
+    left = blocks.height - _robust(flexible, blocks.height, blocks.weight, keep, prior)
+    keep = _near(left, keep, blocks, tip)
     best = _most_probable(blocks, keep, frame, rigid, fields, tip)
     if best is not None:
         left = blocks.height - best.heights(blocks)
-        near = _near(left, keep, blocks.noise)
+        near = _near(left, keep, blocks, tip)
         if near.sum() < keep.sum():
             best = _most_probable(blocks, near, frame, rigid, fields, tip)
     return best
@@ -205,16 +208,17 @@ def _drift(blocks: Blocks, whole: BoolArray, tip: float) -> Drift | None:
     """Lines of the sweeps' own that make the heights of blocks outside of parts (B,) more probable; None if none do."""
     keep = whole & blocks.smooth(blocks.height, drifting=True)
     if keep.any():  # one sweep that stands apart is on a step
-        keep = _near(blocks.height - np.median(blocks.height[keep]), keep, blocks.noise)
+        usual = weighted_median(blocks.height[keep], blocks.weight[keep])
+        keep = _near(blocks.height - usual, keep, blocks, tip)
     if keep.sum() < FEWEST_BLOCKS:
         return None
     noise, step = max(blocks.noise, ROUNDING * tip), BIN * BINS_PER_BLOCK * tip
-    found = drift(blocks.sweep[keep], blocks.place[keep], blocks.height[keep], noise, step)
+    found = drift(blocks.sweep[keep], blocks.place[keep], blocks.height[keep], blocks.weight[keep], noise, step)
     # what stands off the lines does not speak for them
     left = blocks.height - found.at(blocks.sweep, blocks.place)
-    near = _near(left, keep, blocks.noise)
+    near = _near(left, keep, blocks, tip)
     if near.sum() < keep.sum():
-        found = drift(blocks.sweep[near], blocks.place[near], blocks.height[near], noise, step)
+        found = drift(blocks.sweep[near], blocks.place[near], blocks.height[near], blocks.weight[near], noise, step)
     return found if found.gain + float(np.log(LIKELY_CAUSE)) >= LEAST_GAIN else None
 
 
@@ -226,21 +230,28 @@ def _fields(points: FloatArray, frame: RigidFrame, tip: float) -> list[SmoothFie
     return [field for field in (SmoothField.over(points, float(length)) for length in lengths) if field is not None]
 
 
-def _near(left: FloatArray, keep: BoolArray, noise: float) -> BoolArray:
-    """(B,) True for blocks to keep whose remaining heights (B,) are no outliers; for all of them if these are few."""
-    sd = max(MAD_TO_SD * float(np.median(np.abs(left[keep]))), noise)
+def _near(left: FloatArray, keep: BoolArray, blocks: Blocks, tip: float) -> BoolArray:
+    """(B,) True for blocks to keep whose remaining heights (B,) are no outliers, and that do not lie beside one, on the
+    flank of what it is on; for all of them if these are few."""
+    from scipy.spatial import cKDTree
+
+    if not keep.any():
+        return keep
+    sd = max(MAD_TO_SD * weighted_median(np.abs(left[keep]), blocks.weight[keep]), blocks.noise)
     near = keep & (np.abs(left) <= FAR_OFF * sd)
+    if (far := keep & ~near).any():
+        near &= cKDTree(blocks.points[far]).query(blocks.points)[0] > BIN * BINS_PER_BLOCK * tip
     return near if near.sum() >= FEWEST_BLOCKS else keep
 
 
-def _robust(columns: FloatArray, height: FloatArray, keep: BoolArray, prior: float) -> FloatArray:
-    """(B,) heights of the columns (B, K) that leave the least absolute heights of the blocks to keep."""
-    a, y = columns[keep], height[keep]
+def _robust(columns: FloatArray, height: FloatArray, weight: FloatArray, keep: BoolArray, prior: float) -> FloatArray:
+    """(B,) heights of the columns (B, K) that leave the least absolute heights, weighed, of the blocks to keep."""
+    a, y, weight = columns[keep], height[keep], weight[keep]
     found = np.zeros(columns.shape[1])
     for _ in range(ROBUST_ROUNDS):
         left = np.abs(y - a @ found)
-        sd = max(MAD_TO_SD * float(np.median(left)), LEAST_SCATTER * prior)
-        weighted = a / np.maximum(left / sd, LEAST_ROBUST)[:, None]
+        sd = max(MAD_TO_SD * weighted_median(left, weight), LEAST_SCATTER * prior)
+        weighted = a * (weight / np.maximum(left / sd, LEAST_ROBUST))[:, None]
         found[:] = np.linalg.solve(weighted.T @ a + np.eye(a.shape[1]) * (sd / prior) ** 2, weighted.T @ y)
     return np.asarray(columns @ found)
 
@@ -269,6 +280,7 @@ class _Kept:
     normals: FloatArray
     piece: IntArray
     place: FloatArray
+    weight: FloatArray
     rigid: FloatArray
     noise: float
     tip: float
@@ -277,12 +289,12 @@ class _Kept:
     def of(cls, blocks: Blocks, keep: BoolArray, rigid: FloatArray, tip: float) -> _Kept:
         height, points, normals = blocks.height[keep], blocks.points[keep], blocks.normals[keep]
         piece, place, noise = blocks.piece[keep], blocks.place[keep], max(blocks.noise, ROUNDING * tip)
-        return cls(height, points, normals, piece, place, rigid[keep], noise, tip)
+        return cls(height, points, normals, piece, place, blocks.weight[keep], rigid[keep], noise, tip)
 
     def whitened(self, smooth: FloatArray) -> list[Whitened]:
         """Heights, rigid columns and those of a smooth field (B, J) under each law of noise."""
         columns = np.column_stack([self.height, self.rigid, smooth])
-        return whitened(columns, self.piece, self.place, BIN * BINS_PER_BLOCK * self.tip)
+        return whitened(columns, self.piece, self.place, self.weight, BIN * BINS_PER_BLOCK * self.tip)
 
     def rigid_fits(self) -> dict[tuple[str, ...], Fit]:
         """One for every set of rigid causes."""
@@ -416,7 +428,7 @@ def _deviation(
         if np.isfinite(part.height):
             heights[part.covers(now.surface.vertices)] += part.height
     keep = seen.smooth(seen.height)
-    unexplained = float(np.mean(stands_off(seen.height, seen.noise, tip)))
+    unexplained = float(np.average(stands_off(seen.height, seen.noise, tip), weights=seen.weight))
     middle = RigidFrame.of(before.surface).middle
     old, new = Pose.of(before), Pose.of(now)
     shift, turn = np.zeros(3), 0.0

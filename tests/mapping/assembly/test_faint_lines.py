@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from mapping import Feature, Interval, Support
+from mapping.assembly.faint_features import _is_weak
 from mapping.assembly.faint_lines import faint_lines, threshold
 from mapping.assembly.inspection import Inspection, inspect
 from mapping.base.base import Base
@@ -125,3 +129,16 @@ def test_slow_sweeps_are_known_better_than_fast_ones():
     both = inspect(Trace.concatenate(parts), base, Noise(1e-5), [1e-3])[1e-3]
     assert np.median(both.sd[both.sweep == 0]) == pytest.approx(1e-5 / np.sqrt(10), rel=1e-6)
     assert np.median(both.sd[both.sweep == 1]) == pytest.approx(1e-5 / np.sqrt(100), rel=1e-6)
+
+
+@pytest.mark.parametrize("shown", [3, 30])
+def test_what_few_sweeps_show_one_by_one_is_weak_however_many_passed_over_it(shown):
+    """Of a groove 0.04 mm deep three of hundreds of sweeps felt a dip: their piece of it is a part of the line."""
+    axis = np.array([[0.0, 0.0, 0.0], [0.004, 0.0, 0.0]])
+    size = Interval(-4e-5, -5e-5, -3e-5)
+    piece = Feature("groove", axis, np.tile([0.0, 0.0, 1.0], (2, 1)), size, Interval(2e-3, 1e-3, 3e-3),
+                    Interval(4e-3, 4e-3, 4e-3), Support(14.0, 446), True, 1e-4)  # fmt: skip
+    points = np.linspace(axis[0], axis[1], shown)
+    crossings = [SimpleNamespace(point=point) for point in (*points, np.array([0.05, 0.0, 0.0]))]
+    detections = SimpleNamespace(crossings=crossings, threshold=4.7, detection_limit=0.2e-3)
+    assert _is_weak(piece, detections, 0.01) == (shown == 3)

@@ -331,10 +331,10 @@ def test_what_is_lower_than_asked_for_and_hardly_above_the_noise_is_passed_over(
         kind = "convex" if height > 0 else "concave"
         return Crossing(number, 0.0, place, up, along, kind, height, sd, 1e-4, 1e-3, 0.0, snr, True, 0, 1)
 
-    found = Found(R, asked=1e-4)
-    # as high as asked for; lower by one standard deviation; a dip as deep; lower, and certainly there
+    found = Found(R, asked=1e-4, reported=5.3)
+    # as high as asked for; lower by one standard deviation; a dip as deep; lower, but the analysis would report it
     found.crossings = [
-        crossing(0, 2e-4, 4.7), crossing(1, 8e-5, 5.0), crossing(2, -8e-5, 5.0), crossing(3, 4e-5, 20.0)
+        crossing(0, 2e-4, 4.7), crossing(1, 8e-5, 5.0), crossing(2, -8e-5, 5.0), crossing(3, 4e-5, 5.4)
     ]  # fmt: skip
     assert len(found.unexplained()) == 4 and found.passed_over() == 0
     found.crossings += [crossing(4, 4e-5, 4.8), crossing(5, -3e-5, 5.2)]  # what noise makes
