@@ -8,7 +8,8 @@ import numpy as np
 
 from mapping import FloatArray
 from mapping.base import SweepHeights
-from mapping.detection.outliers import LEANING
+from mapping.detection.outliers import LEANT
+from mapping.geometry.templates import rim_height, step_height
 from mapping.instrument import Noise
 
 # Improvement in twice the log-likelihood that a plateau must bring over a cap.
@@ -22,6 +23,8 @@ FLANK_ROUNDS = 4
 # Places to either side of the best, from a tenth of its own standard deviation to a half-width, and half-widths about
 # the best, over which its likelihood is averaged.
 SPREAD_PLACES, SPREAD_WIDTHS = 24, np.geomspace(1 / 1.5, 1.5, 7)
+# A stretch is fitted with this share of its length to either side; twice as much where the base may drift.
+FITTED_BESIDE = 0.25
 # Standard deviations of its place by which a crest may be wider than it seems.
 UNSURE = 3.0
 # The ball draws no cap higher than w^2 / (2 r); up to twice as high is no reason to ask what it draws instead.
@@ -89,12 +92,15 @@ def fit_cap(
     window = _whitened(height, low, high, profile, noise, drift, neighbours)
     spacing = profile.spacing
     half = max(0.5 * (high - low) * spacing, 1.5 * spacing)
-    # up a wall the ball goes straight, r before the edge
-    sharpest = min(float(np.sqrt(2 * tip_radius * np.abs(height[low:high]).max())), tip_radius)
+    # of the arc about an edge; up a wall the ball goes straight, r before it
+    up = min(float(np.abs(height[low:high]).max()), tip_radius)
+    sharpest = float(np.sqrt(up * (2.0 * tip_radius - up)))
     crest = _zoom(window, sign, low * spacing, (high - 1) * spacing, half, 0.0)
-    if half > 1.5 * sharpest and not any(neighbours):
+    # half of an arc between both edges, or they are one crest: by the window, which is wider, and by the fit
+    widest = 1.5 * sharpest
+    if half > widest and not any(neighbours):
         plateau = _plateau(window, sign, low * spacing, (high - 1) * spacing, half)
-        if plateau[0] > crest[0] + PLATEAU_GAIN:
+        if plateau[0] > crest[0] + PLATEAU_GAIN and plateau[2] > widest:
             crest = plateau
     gain, place, half_width, flat = crest
     shift = 0.05 * half_width
@@ -129,11 +135,9 @@ def _drawn_gain(window: _Whitened, place: float, found: Disturbance, tip_radius:
     """
     from scipy.optimize import minimize
 
-    from mapping.geometry.templates import rim_height, step_height
-
     nodes = ((np.arange(DRAWN_NODES) + 0.5) / DRAWN_NODES - 0.5) * window.step
     x = window.x[:, None] + nodes
-    least, height = LEANING * tip_radius, abs(found.height)
+    least, height = LEANT * tip_radius, abs(found.height)
     # flanks of one height are half as high at one place
     half = found.flat + np.sqrt(0.5) * (found.half_width - found.flat)
 
@@ -183,7 +187,7 @@ def _whitened(
     drift: int,
     neighbours: tuple[bool, bool],
 ) -> _Whitened:
-    margin = max(4, (high - low) // (2 if drift else 4))
+    margin = max(4, int((2.0 if drift else 1.0) * FITTED_BESIDE * (high - low)))
     begin = low if neighbours[0] else max(0, low - margin)
     end = high if neighbours[1] else min(len(height), high + margin)
     if end - begin < 5:

@@ -10,7 +10,7 @@ import numpy as np
 from mapping import BoolArray, DetectionError, FloatArray, IntArray, Trace, length_text
 from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
 from mapping.detection.candidates import LARGEST_SHARE, Searched, search, without
-from mapping.detection.cap_fit import Disturbance
+from mapping.detection.cap_fit import FITTED_BESIDE, Disturbance
 from mapping.detection.crossing import STEP_CROSSINGS, Crossing
 from mapping.detection.empirical_null import NullScale, effective_noise, limit_along, null_scales
 from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH, Bank, smallest_half_width, threshold_for
@@ -410,7 +410,7 @@ def _judged(crossings: list[Crossing], usable: list[LaidSweep], algorithm: int, 
 
 
 def _crossings(found: Disturbance, profile: SweepHeights, base: Base, tip: float) -> list[Crossing]:
-    """A crest as one crossing; a plateau as the step up and the step down at its ends."""
+    """A crest as one crossing; a plateau as the step up and the step down at its ends, where they were looked at."""
     if found.flat == 0.0:
         kind = "convex" if found.height > 0 else "concave"
         return [_crossing(found, kind, found.place, found.start, found.stop, profile, base, tip)]
@@ -420,13 +420,14 @@ def _crossings(found: Disturbance, profile: SweepHeights, base: Base, tip: float
     rim = found.flat if found.height > 0 else found.half_width
     edges = (found.place - rim, found.place + rim)
     low, high = profile.start + profile.spacing, profile.start + profile.length - 2 * profile.spacing
+    beside = FITTED_BESIDE * (found.stop - found.start)
     bounds = ((found.start, found.place), (found.place, found.stop))
     return [
         _crossing(found, kind, edge, *bound, profile, base, tip)
         for kind, edge, bound, outside in zip(
             kinds, edges, bounds, (found.start <= low, found.stop >= high), strict=True
         )
-        if not outside and low <= edge <= high
+        if not outside and low <= edge <= high and found.start - beside <= edge <= found.stop + beside
     ]
 
 

@@ -27,10 +27,10 @@ LONGEST_RUN = 0.5
 # against what the sweep passes, turns about it on a circle of r cos 70. Means over blocks want a half: of steps,
 # blades, grooves and pits up to 2 r high, at 5e-4 to 0.05 r between samples, they stand above their opening by up to
 # 4e-3 r at 0.8 r, and nowhere at 0.5 r.
-LEANING = 1.0 / 3.0
+LEANT = 1.0 / 3.0
 # Ways to either side in which the circle is tried to lean, beside that through both neighbours, and the factor between
 # the distances of what it must stay below: the same shapes stand above nothing with 12 nor with 24 ways.
-LEANS, ARMS = 12, 3.0
+LEANT_PLACES, ARMS = 12, 3.0
 # Standard deviations beyond that: at 5 kHz a Gaussian law has one such sample in 10^6 hours.
 OUT = 7.0
 # A single sample is out by less where so many more are than a Gaussian law lets: of those left out, it may have made
@@ -168,7 +168,7 @@ def _allowed_bend(
         level: (C,) sd of the differences of neighbouring samples there.
         tip_radius: m.
     """
-    near, radius = size * step, LEANING * tip_radius
+    near, radius = size * step, LEANT * tip_radius
     if radius <= near:
         return np.full(len(at), np.inf)
     unsure = FEATURE_RESIDUAL_SDS * level / np.sqrt(size)
@@ -183,7 +183,7 @@ def _allowed_bend(
     far = np.where(inside, means[np.clip(beside, 0, len(means) - 1)] + unsure[:, None] / np.sqrt(2.0), np.inf)
     heights, away = np.column_stack([ends, far]), near * np.concatenate([[-1, 1], blocks])
     # from one that does not lean to one that is upright just behind the block before, or just before the block behind
-    aside = radius - np.geomspace(radius, 0.99 * near, LEANS)
+    aside = radius - np.geomspace(radius, 0.99 * near, LEANT_PLACES)
     half = np.hypot(near, 0.5 * rise)  # of the chord of the circle through both
     through = np.sqrt(np.clip(radius**2 - half**2, 0.0, None)) * 0.5 * rise / half
     best = middle + radius - np.sqrt(radius**2 - near**2)
