@@ -116,7 +116,7 @@ def runs_straight(centers: FloatArray, reach: float, step: float, sharp: float, 
 def rolled_out(
     trace: Trace, base: Base, step: float, reach: float, sharp: float, known: Feet | None = None
 ) -> RolledOut | None:
-    """Roll a sweep out into a plane; None if it hardly moves.
+    """Roll a sweep out into a plane; None if it hardly moves, or not for as long as one block.
 
     Blocks and the reach are made longer until the scatter of the blocks leaves a turn by `sharp` certain. Independent
     samples that scatter by sigma need a reach of (BLOCKS_PER_REACH 6 (CERTAIN_TURN_SDS sigma / sharp)^2 step)^(1/3);
@@ -131,6 +131,8 @@ def rolled_out(
         known: where the samples stand over the base, if that is known; else the blocks are laid on it.
     """
     size = max(1, int(reach / (BLOCKS_PER_REACH * step)))
+    if len(trace) < size:
+        return None
     # medians bear readings that are thrown off for a moment
     if known is None:
         feet = base.foot(block_medians(trace.centers, size), trace.tip_radius)

@@ -159,6 +159,16 @@ def test_a_finger_set_down_elsewhere_begins_another_sweep() -> None:
     assert cuts.tolist() == np.flatnonzero(np.diff(number[lines])).tolist()
 
 
+@pytest.mark.parametrize("few", [3, 4, 7])
+def test_a_few_samples_felt_elsewhere_are_a_sweep_of_their_own(few: int) -> None:
+    # fewer than a block, and not in a line: a machine that is stopped leaves so many
+    places, _ = along([[0.0, 0.0], [24e-3, 0.0]], BUILT_ON.spacing)
+    elsewhere = np.array([12e-3, 15e-3]) + BUILT_ON.spacing * np.random.default_rng(0).standard_normal((few, 2))
+    sound = sound_sweeps(traced(np.concatenate([places, elsewhere]), BUILT_ON), plate())
+    assert sound.cuts == (("jump", 1),)
+    assert (sound.trace.sweep[-few:] != sound.trace.sweep[0]).all()
+
+
 def test_a_gap_that_the_times_tell_of_is_no_cut_and_no_path() -> None:
     places, _ = along([[0.0, -12e-3], [0.0, 12e-3]], BUILT_ON.spacing)
     kept = np.abs(places[:, 1] - 5e-3) > 2e-3
