@@ -47,6 +47,13 @@ LOCKED_UNSAID = (
     "nobody knows where it stands; check its supply and cables, home it ($H) and run again with --resume"
 )
 
+ANOTHERS_LINE = (
+    "a line that this program did not send was refused (error:9): another program, or a pendant, sends lines to the "
+    "controller; end it, check the machine's position and run again with --resume"
+)
+
+A_JOG = "a jog"
+
 # A printer's firmware names itself within so many s
 NAMING = 1.0
 # After a reset the controller greets within so many s; a greeting that was garbled is not waited for longer
@@ -260,9 +267,11 @@ class GrblController:
             StoppedError, LinkError: what stopped the machine, if anything did.
         """
         self.check()
-        if answer == protocol.LOCKED and self.vouched and self.status().state == "Alarm":
+        if answer == protocol.LOCKED and self.vouched:
+            locked = self.status().state == "Alarm"
             self.check()
-            self._lose_trust(LOCKED_UNSAID)
+            if locked or what == A_JOG:  # one that is not locked refuses so what is no jog, while it jogs
+                self._lose_trust(LOCKED_UNSAID if locked else ANOTHERS_LINE)
             self.check()
         return FingerError(f"{self.link.port}: {what} was refused: {protocol.describe(answer)}")
 
@@ -454,7 +463,7 @@ class GrblController:
                 # it: as with a line that was lost, whoever sent it sees that the machine stays behind
                 refused = "" if answer in ("ok", protocol.NOT_IDLE) else answer
         if refused:
-            raise self._refused("a jog", refused)
+            raise self._refused(A_JOG, refused)
 
     def left(self, count: int) -> None:
         """The machine is known to have at most `count` jogs before it: what came before was answered, heard or not."""

@@ -80,6 +80,15 @@ def test_a_locked_controller_whose_greeting_was_lost_is_trusted_no_more() -> Non
         assert stage.motion.travelled == 0.0
 
 
+def test_a_jog_that_seems_refused_by_a_controller_that_is_not_locked_was_anothers_line() -> None:
+    with machine() as (stage, controller):
+        controller.jog(controller.resting_position() + np.array([1e-2, 0.0, 0.0]), 0.01)
+        stage.receive(b"G10L20P1Z0\n", stage.motion.time)
+        with pytest.raises(StoppedError, match=r"another program, or a pendant"):
+            controller.wait_idle(3.0)
+        assert not controller.vouched
+
+
 def test_a_line_that_a_locked_controller_refuses_says_so_too() -> None:
     with machine() as (stage, controller):
         lock(stage, "")
