@@ -27,6 +27,8 @@ from mapping.inference.sampler import root_of
 LOOKS = 2
 # What is less likely than this is not told
 TOLD_SHARE = 0.01
+# Proposals that change what the posterior weighs once more
+CHOSEN_LATER = {"section", "smoother"}
 # Draws of the Gaussian that preliminary intervals are taken from
 PRELIMINARY_DRAWS = 400
 ENDED_EARLY = "the search for what is felt here, and what beside it, ended before all was tried"
@@ -94,9 +96,11 @@ def _improved(
     found = searched(start, [part_of(feature, place) for feature in group], np.array(points).reshape(-1, 3), proposals)
     odds = _told(found)
     noted = (ENDED_EARLY,) if found.bounded else ()
-    # a section alone is the posterior's to choose, and what explains the trace only in part adds nothing
+    # a section or a course alone is the posterior's to choose, and what explains the trace only in part adds nothing
     adds = len(found.best.kinds) > len(found.start.kinds)
-    if (adds and not found.best.fits) or (set(found.accepted) <= {"section"} and found.best.kinds == found.start.kinds):
+    if (adds and not found.best.fits) or (
+        set(found.accepted) <= CHOSEN_LATER and found.best.kinds == found.start.kinds
+    ):
         return [_with_odds(feature, odds if found.best.fits else (), noted) for feature in group]
     algorithms = group[0].evidence.algorithms if group else ()
     features = [_with_odds(feature, odds, noted) for feature in _described(found.best, around, algorithms)]

@@ -137,17 +137,17 @@ class Configuration:
         return off
 
 
-def part_of(feature: Feature, place: Neighbourhood, most: int = HIGHEST_DEGREE) -> Part:
+def part_of(feature: Feature, place: Neighbourhood, most: int = HIGHEST_DEGREE, least: int = 1) -> Part:
     """The part of a feature, in the first family of its kind.
 
     Args:
         feature: of a kind with a posterior.
         place: the neighbourhood.
-        most: highest degree of the course of a line.
+        most, least: degrees that the course of a line may have.
     """
     kind = kind_of(feature)
     if isinstance(kind, LineKind):
-        line, _ = kind.shape_on(place.fine, feature, place.around, most)
+        line, _ = kind.shape_on(place.fine, feature, place.around, most, least)
         return Part(feature, line, line.start)
     if not isinstance(kind, PointKind):
         raise TypeError(f"a {feature.kind} has no family of shapes")

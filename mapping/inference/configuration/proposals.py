@@ -16,6 +16,7 @@ from mapping import BoolArray, Feature, FloatArray, Interval, Support
 from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_bell, as_twin, laid, part_of
 from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, Neighbourhood
+from mapping.inference.curves import HIGHEST_DEGREE
 from mapping.inference.families import BumpShape, GrooveShape, RidgeShape, TrapezoidShape, TwinShape
 from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 
@@ -41,6 +42,8 @@ FEWEST_POINTS = 4
 PEAK_SDS = 4.0
 # Logarithm by which the radius of a crest exceeds a wire's where the thin one is asked as well: the prior's scale
 THINNER = 1.0
+# Degrees that a line's course is asked to have instead of a higher one: each is half of the next, up to the highest
+FEW_BENDS = (1, 2, 4)
 # Most points that straight lines are drawn through: two by two, which is the square of that
 MOST_DRAWN_THROUGH = 60
 
@@ -200,10 +203,22 @@ def extended(now: Configuration) -> Iterator[Parts]:
                 yield [*now.parts[:k], longer, *now.parts[k + 1 :]]
 
 
-def _alike(part: Part, axis: FloatArray, place: Neighbourhood) -> Part:
+def smoother(now: Configuration) -> Iterator[Parts]:
+    """A line that bends less: an axis that no smooth course follows within its doubt was laid as it was felt, point by
+    point, and pays for every bend."""
+    for k, part in enumerate(now.parts):
+        if not kind_of(part.feature).line or part.feature.closed:
+            continue
+        shape: Any = part.shape.midway if isinstance(part.shape, TwinShape) else part.shape
+        for degree in FEW_BENDS:
+            if degree < shape.modes.degree:
+                yield [*now.parts[:k], _alike(part, axis_of(part), now.place, degree, degree), *now.parts[k + 1 :]]
+
+
+def _alike(part: Part, axis: FloatArray, place: Neighbourhood, most: int = HIGHEST_DEGREE, least: int = 1) -> Part:
     """A line of a part's section along another axis."""
     shape: Any = part.shape
-    line = _line(part.feature, axis, place, most=8)
+    line = _line(part.feature, axis, place, most, least)
     if isinstance(shape, TwinShape):
         return as_twin(line, place, float(np.exp(part.start[0])))
     if isinstance(shape, TrapezoidShape):
@@ -310,6 +325,7 @@ class Proposal:
 JOIN = Proposal("join", lambda now, points: joined(now))
 PROPOSALS = (
     Proposal("section", lambda now, points: sections(now)),
+    Proposal("smoother", lambda now, points: smoother(now)),
     Proposal("straight lines", straight),
     JOIN,
     Proposal("apart", lambda now, points: apart(now)),
@@ -421,13 +437,13 @@ def _shortened(axis: FloatArray, point: FloatArray, like: Feature, place: Neighb
     return short
 
 
-def _line(like: Feature, axis: FloatArray, place: Neighbourhood, most: int = 1) -> Part:
-    """A part of a feature's kind and sizes along another axis."""
+def _line(like: Feature, axis: FloatArray, place: Neighbourhood, most: int = 1, least: int = 1) -> Part:
+    """A part of a feature's kind and sizes along another axis, of a course of these degrees."""
     base, tip = place.around.base, place.around.trace.tip_radius
     up = like.normals[np.linalg.norm(axis[:, None] - like.axis[None], axis=2).argmin(axis=1)]
     feet = base.foot(axis + tip * up, tip)
     laid = replace(like, axis=axis if place.window.flat else feet.points, normals=feet.normals)
-    return part_of(_plainly(laid), place, most)
+    return part_of(_plainly(laid), place, most, least)
 
 
 def _plainly(feature: Feature) -> Feature:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,10 +18,10 @@ from mapping.assembly import assemble
 from mapping.base import Base, LaidTrace
 from mapping.detection import detect
 from mapping.inference.configuration import Places, count_in, in_words
-from mapping.inference.configuration.configuration import part_of
+from mapping.inference.configuration.configuration import fitted, part_of
 from mapping.inference.configuration.joined_shape import JoinedShape
-from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, neighbourhood
-from mapping.inference.configuration.proposals import straight_lines
+from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood
+from mapping.inference.configuration.proposals import smoother, straight_lines
 from mapping.inference.families import Surroundings
 from mapping.instrument import Noise
 
@@ -44,18 +46,8 @@ def test_an_end_that_one_sweep_alone_felt_belongs_to_its_line() -> None:
 def test_details_together_leave_what_the_ball_feels_of_them(body: str, off: float) -> None:
     # the flank of two crests within a bin is off by 0.02 of their 0.14 mm; the wire climbs the step over half a
     # millimetre, its capsules at once: under a ball that leans by 0.3 a quarter of it is 75 um
-    seed = FIRST_BUILT_WITH
-    scene = classified_body(body, seed)
-    base, trace = Base(scene.base), touched(body, "two ways", seed)
-    feet = trace.centers - [0.0, 0.0, trace.tip_radius]
-    feet = feet * [1.0, 1.0, 0.0]
-    places = Places(feet[::20], np.tile([0.0, 0.0, 1.0], (len(feet[::20]), 1)),
-                    trace.centers[::20, 2] - trace.tip_radius, np.ones(len(feet[::20]), dtype=np.int64),
-                    trace.sweep[::20], 20 * 6e-6)  # fmt: skip
-    features = [_true(true) for true in scene.truth]
-    around = Surroundings(trace, base, Noise(1e-6, 0.0, 1e-3))
-    place = neighbourhood(features, [], places, around, 0.01)
-    assert place is not None
+    features = [_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth]
+    place = _weighed_on(body, features)
     parts = [part_of(feature, place, 1) for feature in features]
     start = [part.start.copy() for part in parts]
     for part, own, feature in zip(parts, start, features, strict=True):
@@ -70,6 +62,36 @@ def test_details_together_leave_what_the_ball_feels_of_them(body: str, off: floa
     ends = np.concatenate([feature.axis[[0, -1]] for feature in features])
     away = np.min(np.linalg.norm(place.window.feet[:, None] - ends[None], axis=2), axis=1) > 4e-3
     assert np.quantile(inner[away], 0.999) < off
+
+
+def test_a_line_laid_as_it_was_felt_is_asked_for_fewer_bends() -> None:
+    body = "flat bar"
+    (bar,) = (_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth)
+    # crossings that scatter by more than their doubt: no smooth course follows them
+    axis = np.linspace(bar.axis[0], bar.axis[-1], 13)
+    axis[:, :2] += 6e-4 * np.random.default_rng(0).standard_normal((13, 2))
+    jagged = replace(bar, axis=axis, normals=np.tile([0.0, 0.0, 1.0], (13, 1)))
+    place = _weighed_on(body, [jagged])
+    start = fitted([part_of(jagged, place)], place)
+    assert start is not None
+    others = [other for parts in smoother(start) if (other := fitted(parts, place)) is not None]
+    assert len(others) == 3
+    best = max(others, key=lambda other: other.log_odds)
+    assert best.log_odds > start.log_odds + 5.0
+    assert len(best.shape.names) < len(start.shape.names)
+
+
+def _weighed_on(body: str, features: list[Feature]) -> Neighbourhood:
+    """What was felt of a body without noise."""
+    scene = classified_body(body, FIRST_BUILT_WITH)
+    base, trace = Base(scene.base), touched(body, "two ways", FIRST_BUILT_WITH)
+    feet = (trace.centers - [0.0, 0.0, trace.tip_radius]) * [1.0, 1.0, 0.0]
+    places = Places(feet[::20], np.tile([0.0, 0.0, 1.0], (len(feet[::20]), 1)),
+                    trace.centers[::20, 2] - trace.tip_radius, np.ones(len(feet[::20]), dtype=np.int64),
+                    trace.sweep[::20], 20 * 6e-6)  # fmt: skip
+    place = neighbourhood(features, [], places, Surroundings(trace, base, Noise(1e-6, 0.0, 1e-3)), 0.01)
+    assert place is not None
+    return place
 
 
 def _true(true: TrueFeature) -> Feature:
@@ -93,7 +115,7 @@ def test_details_that_hide_each_other_are_counted() -> None:
 
 
 def test_where_the_trace_hardly_decides_both_counts_are_stated() -> None:
-    seed = FIRST_BUILT_WITH
+    seed = FIRST_BUILT_WITH + 1
     scene = classified_body("wires 1 mm apart", seed)
     trace, base = (
         noisy(touched("wires 1 mm apart", "two ways", seed), NOISE_SOURCES["apparatus"], seed),
