@@ -43,7 +43,7 @@ PEAK_SDS = 4.0
 # Logarithm by which the radius of a crest exceeds a wire's where the thin one is asked as well: the prior's scale
 THINNER = 1.0
 # Degrees that a line's course is asked to have instead of a higher one: each is half of the next, up to the highest
-FEW_BENDS = (1, 2, 4)
+LOWER_DEGREES = (1, 2, 4)
 # Most points that straight lines are drawn through: two by two, which is the square of that
 MOST_DRAWN_THROUGH = 60
 
@@ -210,7 +210,7 @@ def smoother(now: Configuration) -> Iterator[Parts]:
         if not kind_of(part.feature).line or part.feature.closed:
             continue
         shape: Any = part.shape.midway if isinstance(part.shape, TwinShape) else part.shape
-        for degree in FEW_BENDS:
+        for degree in LOWER_DEGREES:
             if degree < shape.modes.degree:
                 yield [*now.parts[:k], _alike(part, axis_of(part), now.place, degree, degree), *now.parts[k + 1 :]]
 
