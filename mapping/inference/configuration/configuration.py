@@ -213,8 +213,7 @@ def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | N
         evidence = found.log_evidence
     moved = tuple(Part(part.feature, part.shape, theta[own]) for part, own in zip(parts, shape.columns, strict=True))
     plain = sum(_plain(part, found.covariance[own, own]) for part, own in zip(moved, shape.columns, strict=True))
-    # a twin is told as two, and the second may be invented as any other may
-    prior = sum(len(part.kinds) * _log_prior(part, place) for part in parts)
+    prior = sum(_log_prior(part, place) for part in parts)
     odds = evidence + float(constants[level]) - float(np.log(len(constants))) + plain + prior
     return Configuration(moved, place, found, level, float(odds))
 
