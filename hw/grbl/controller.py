@@ -51,7 +51,7 @@ ANOTHERS_LINE = (
     "a line that this program did not send was refused (error:9): another program, or a pendant, sends lines to the "
     "controller; end it, check the machine's position and run again with --resume"
 )
-
+# What is sent as one, where it is said that it was refused
 A_JOG = "a jog"
 
 # A printer's firmware names itself within so many s

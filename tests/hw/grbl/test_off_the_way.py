@@ -6,9 +6,8 @@ import time
 
 import numpy as np
 import pytest
-from struck_machine import machine_over, plate
+from struck_machine import standing_machine
 
-from hw.emulated.pty_server import PtyServer
 from hw.grbl.controller import IF_GARBLED_BEFORE, OFF_THE_WAY_IN_A_ROW, GrblController
 
 # Millimetres; the machine stands at -150, -150, -30
@@ -27,27 +26,19 @@ def heard(controller: GrblController, count: int) -> None:
 
 @pytest.mark.parametrize("before", [0, 2])
 def test_reports_off_the_way_end_the_trust_if_so_many_agree_as_no_garbling_makes(before: int) -> None:
-    stage = machine_over(plate(), 0.02)
-    with PtyServer([stage]) as server:
-        controller = GrblController(server.ports[0])
-        controller.open()
-        controller.vouch()
-        try:
-            controller.jog(controller.resting_position() + np.array([1e-3, 0.0, 0.0]), 0.01)
-            controller.resting_position()
-            for k in range(before):  # garbled, here and there
-                stage.out += report(AWAY if k % 2 else ELSEWHERE)
-                heard(controller, k + 1)
-                controller.status()
-            enough = IF_GARBLED_BEFORE if before else OFF_THE_WAY_IN_A_ROW
-            for _ in range(enough - 1):
-                stage.out += report(AWAY)
-            heard(controller, before + enough - 1)
-            assert controller.distrust is None
+    with standing_machine() as (stage, controller):
+        controller.jog(controller.resting_position() + np.array([1e-3, 0.0, 0.0]), 0.01)
+        controller.resting_position()
+        for k in range(before):  # garbled, here and there
+            stage.out += report(AWAY if k % 2 else ELSEWHERE)
+            heard(controller, k + 1)
+            controller.status()
+        enough = IF_GARBLED_BEFORE if before else OFF_THE_WAY_IN_A_ROW
+        for _ in range(enough - 1):
             stage.out += report(AWAY)
-            heard(controller, before + enough)
-            assert controller.distrust is not None
-            assert "nothing sent it" in controller.distrust
-        finally:
-            controller.close()
-    assert server.error is None, server.error
+        heard(controller, before + enough - 1)
+        assert controller.distrust is None
+        stage.out += report(AWAY)
+        heard(controller, before + enough)
+        assert controller.distrust is not None
+        assert "nothing sent it" in controller.distrust

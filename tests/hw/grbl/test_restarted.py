@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from fault_campaign import struck_case
-from struck_machine import PHASES, machine_over, plate
+from struck_machine import PHASES, standing_machine
 
 from hw.emulated.grbl import GrblEmulator
-from hw.emulated.pty_server import PtyServer
 from hw.errors import StoppedError
 from hw.grbl.controller import GrblController
 
@@ -23,21 +20,6 @@ GREETINGS = (
     "GrblHAL 1.1f ['$' or '$HELP' for help]",
     "Grbl 3.7 [FluidNC v3.7.8 (wifi) '$' for help]",
 )
-
-
-@contextmanager
-def machine() -> Iterator[tuple[GrblEmulator, GrblController]]:
-    """A controller that stands high over a plate, where it was homed."""
-    stage = machine_over(plate(), 0.02)
-    with PtyServer([stage]) as server:
-        controller = GrblController(server.ports[0])
-        controller.open()
-        controller.vouch()
-        try:
-            yield stage, controller
-        finally:
-            controller.close()
-    assert server.error is None, server.error
 
 
 def lock(stage: GrblEmulator, greeting: str) -> None:
@@ -59,7 +41,7 @@ def sent_jog(controller: GrblController, after: int) -> None:
 
 @pytest.mark.parametrize("greeting", GREETINGS)
 def test_a_jog_that_a_restarted_controller_refuses_says_that_it_restarted(greeting: str) -> None:
-    with machine() as (stage, controller):
+    with standing_machine() as (stage, controller):
         lock(stage, greeting)
         sent_jog(controller, 0)
         with pytest.raises(StoppedError, match=r"restarted.*home it"):
@@ -69,7 +51,7 @@ def test_a_jog_that_a_restarted_controller_refuses_says_that_it_restarted(greeti
 
 
 def test_a_locked_controller_whose_greeting_was_lost_is_trusted_no_more() -> None:
-    with machine() as (stage, controller):
+    with standing_machine() as (stage, controller):
         lock(stage, "")
         sent_jog(controller, 0)
         with pytest.raises(StoppedError, match=r"is locked \(state Alarm\).*nobody knows where it stands.*home it"):
@@ -81,7 +63,7 @@ def test_a_locked_controller_whose_greeting_was_lost_is_trusted_no_more() -> Non
 
 
 def test_a_jog_that_seems_refused_by_a_controller_that_is_not_locked_was_anothers_line() -> None:
-    with machine() as (stage, controller):
+    with standing_machine() as (stage, controller):
         controller.jog(controller.resting_position() + np.array([1e-2, 0.0, 0.0]), 0.01)
         stage.receive(b"G10L20P1Z0\n", stage.motion.time)
         with pytest.raises(StoppedError, match=r"another program, or a pendant"):
@@ -90,7 +72,7 @@ def test_a_jog_that_seems_refused_by_a_controller_that_is_not_locked_was_another
 
 
 def test_a_line_that_a_locked_controller_refuses_says_so_too() -> None:
-    with machine() as (stage, controller):
+    with standing_machine() as (stage, controller):
         lock(stage, "")
         with pytest.raises(StoppedError, match="is locked"):
             controller.command("G90G4P0.001")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from hw.emulated.grbl import GrblEmulator
 from hw.emulated.pty_server import PtyServer
 from hw.emulated.stage import PROBE_FAULTS
 from hw.emulated.touched_body import TouchedBody
+from hw.grbl.controller import GrblController
 from hw.grbl.frame import StageFrame
 from mapping.surface import Surface
 
@@ -47,6 +50,21 @@ def plate(x: float = 0.03, y: float = 0.03) -> Surface:
 def machine_over(surface: Surface, height: float) -> GrblEmulator:
     """A machine whose tip stands so high, m, above the middle of a body."""
     return GrblEmulator(TouchedBody(surface, R, FRAME, STIFFNESS), FRAME.to_machine(np.array([0.0, 0.0, height])))
+
+
+@contextmanager
+def standing_machine() -> Iterator[tuple[GrblEmulator, GrblController]]:
+    """A controller that stands high over a plate, where it was homed."""
+    stage = machine_over(plate(), 0.02)
+    with PtyServer([stage]) as server:
+        controller = GrblController(server.ports[0])
+        controller.open()
+        controller.vouch()
+        try:
+            yield stage, controller
+        finally:
+            controller.close()
+    assert server.error is None, server.error
 
 
 def own_faults(touch: str) -> tuple[str, ...]:
