@@ -29,7 +29,8 @@ LONGEST_RUN = 0.5
 # 4e-3 r at 0.8 r, and nowhere at 0.5 r.
 LEANT = 1.0 / 3.0
 # Ways to either side in which the circle is tried to lean, beside that through both neighbours, and the factor between
-# the distances of what it must stay below: the same shapes stand above nothing with 12 nor with 24 ways.
+# the distances of what it must stay below: the same shapes stand above nothing with 12 nor with 24 ways. Factors of 2,
+# 3, 4 and 6 find the same crossings of 160 simulated details and of 120 bursts; 2 takes a third longer.
 LEANT_PLACES, ARMS = 12, 3.0
 # Standard deviations beyond that: at 5 kHz a Gaussian law has one such sample in 10^6 hours.
 OUT = 7.0
@@ -39,8 +40,9 @@ OUT = 7.0
 FALSELY_OUT, LEAST_OUT, MANY_OUT = 0.01, 3.5, 3
 # Samples over which the level of the noise is taken; a burst must not fill half of them.
 LEVEL_SAMPLES = 256
-# Samples over which a slope is taken out of it: an arc turns little over them, and their median takes a fiftieth of
-# the scatter with it.
+# Samples over which a slope is taken out of it: their median takes some of the scatter with it, and an arc turns over
+# them. Of white noise 8, 32 and 128 leave 0.84, 0.97 and 0.99; up a step of 0.9 r, a hundredth of r between samples and
+# a noise of a tenth of that, the largest level is 0.98, 1.22 and 1.65 times the true one.
 SLOPE_SAMPLES = 32
 # Share of a run's height at which it begins and ends.
 FOOT = 0.25

@@ -35,8 +35,10 @@ DRIFTING_TIMES = 4.0
 TINY = float(np.finfo(float).tiny)
 # A sweep of fewer bins tells nothing of long wavelengths
 FEWEST_BINS = 3
-# Blocks whose middles are nearer than half of one lie in one place; two sides of a wall are two places: normals count
-# as so many tip radii
+# Blocks whose middles are nearer than half of one have more than half of their path in common, and lie in one place;
+# which share it is hardly matters, for passes are counted against the usual number of them. Two sides of a wall are two
+# places: normals count as so many tip radii, so that faces at right angles are 2.8 apart, farther than any place or
+# cell (2) is wide
 PLACE, SIDES_APART = 0.5 * BIN * BINS_PER_BLOCK, 2.0
 
 

@@ -24,8 +24,9 @@ FEWEST_BLOCKS = 24
 # Less noise than this many tip radii is rounding
 ROUNDING = 1e-9
 # Cells whose median heights say whether anything is wrong, in tip radii; a quantile of their squares, which a fine
-# feature in some cells does not move, with its value for unit white noise; by how much noise that is correlated within
-# a block may exceed that; and the variance of a median over that of a mean
+# feature in some cells does not move, with its value for unit white noise (of chi-square with one degree of freedom);
+# by how much noise that is correlated within a block may exceed that; and the variance of a median over that of a mean,
+# of many Gaussian values
 CELL, AGREEING_SHARE, AGREEING_SQUARE, AS_EXPECTED, OF_MEDIAN = 2.0, 0.8, 1.642, 4.0, 0.5 * np.pi
 # Of a turn at the body's edge, a shift, a scale, an offset, in tip radii: what is expected before anything is felt
 EXPECTED_SHARE = 0.1

@@ -33,7 +33,8 @@ SHORT_LINE = 0.3
 POINTS_APART = 0.3
 # Points of a leg that distances between lines are taken at
 POINTS_OF_LEG = 65
-# Half-widths by which a line goes on beyond what it is extended to: the end is sought from there
+# Half-widths by which a line goes on beyond what it is extended to: the end is sought from there. With 0.1 and 0.3
+# three cracks with burrs of the building seeds are two ridges each; with 1 one of them is a single one, with a remark
 EXTENDED = 0.3
 # Points that two lines are drawn through, at least
 FEWEST_POINTS = 4
