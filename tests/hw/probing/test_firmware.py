@@ -1,11 +1,12 @@
 """Real firmwares: what runs on our emulator runs on grblHAL's and Grbl's own simulators.
 
 Where one is said in GRBL_SIMULATOR (grblHAL_sim or grbl_sim.exe; several with os.pathsep between them). A simulator
-that the host keeps waiting falls silent, and what falls silent is stopped: give them priority over all else. With jumps
-of 20 ms grblHAL's covers less of a sweep than is asked here: build it with control_frame_ns = 2 * 1000 * 1000.
+that the host keeps waiting falls silent, and what falls silent is stopped: give it and us priority over all else, but
+no fixed order among ourselves (with chrt -f, whose threads do not share a core, grblHAL's slides passed 1 time in 4;
+with nice or chrt -r 5 in 5). With jumps of 20 ms grblHAL's covers less of a sweep than is asked here: build it with
+control_frame_ns = 2 * 1000 * 1000.
 
-    chrt -f 20 python -m pytest -m slow tests/hw/probing/test_firmware.py     # grblHAL_sim
-    nice -n -15 python -m pytest -m slow tests/hw/probing/test_firmware.py    # grbl_sim.exe: its threads never sleep
+    nice -n -15 python -m pytest -m slow tests/hw/probing/test_firmware.py
 """
 
 from __future__ import annotations
