@@ -77,7 +77,7 @@ def slotted_plate(long: float, short: float, low: FloatArray, high: FloatArray, 
     faces += [[16, 17, 18], [16, 18, 19]]
     for k in range(4):
         a, b, c, d = rim[k], rim[(k + 1) % 4], bottom[(k + 1) % 4], bottom[k]
-        faces += [[a, d, c], [a, c, b]]
+        faces += [[a, b, c], [a, c, d]]
     return np.concatenate([grid, floor]), np.array(faces)
 
 
