@@ -86,6 +86,7 @@ class SurfaceAccount:
             moves=len(made),
             causes=_causes([str(d["what"]) for d in refused]),
             shortest_ridge=scene.survey.shortest_ridge,
+            is_plan=False,
         )
 
     @classmethod

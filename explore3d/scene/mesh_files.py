@@ -109,7 +109,7 @@ def _is_inside_out(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
     middle = a.mean(axis=0)
     parts = np.einsum("fi,fi->f", a - middle, np.cross(b - middle, c - middle))
     rounding = np.finfo(float).eps * len(parts) * float(np.abs(parts).sum())
-    return float(parts.sum()) < -rounding
+    return bool(float(parts.sum()) < -rounding)
 
 
 def _read(path: Path) -> tuple[np.ndarray, np.ndarray]:
