@@ -23,7 +23,7 @@ from explore3d.report.findings import (
 )
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.report.pictures import Pictures, is_profile
-from mapping import UNKNOWN_TEXT, Feature, Interval, length_text
+from mapping import UNKNOWN_TEXT, Feature, Interval, length_text, place_decimals
 from mapping.geometry.mesh import arclengths
 from mapping.inference.kinds import kind_named, kind_of
 from mapping.model import FAIL, PASS, UNDECIDED
@@ -179,7 +179,8 @@ def _place(feature: Feature, analysis: Analysis) -> Html:
     point = feature.axis[0] if feature.anchor is None else feature.anchor.position
     factor, name = (1e-3, "mm") if analysis.base.surface.size < 10.0 else (1.0, "m")
     values = point[:1] if is_profile(analysis) else point
-    text = ", ".join(f"{value / factor:.{4 if is_profile(analysis) else 2}f}" for value in values)
+    decimals = 4 if is_profile(analysis) else max(2, place_decimals(analysis.trace.tip_radius))
+    text = ", ".join(f"{value / factor:.{decimals}f}" for value in values)
     where = "along" if is_profile(analysis) else "across"
     known = f"± {length_text(1.645 * feature.position_sd, 2)} {where}" if feature.position_sd > 0 else ""
     return Html(element("span", f"{text} {name}") + element("small", known))

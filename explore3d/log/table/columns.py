@@ -79,7 +79,8 @@ def length_factors(
         asked = units if isinstance(units, str) else (units or {}).get(role, "")
         if asked and known is not None and not np.isclose(unit_factor(asked), known, rtol=1e-9):
             raise UserError(
-                f"{table.path}: field units: {asked!r} is asked for, but the file states {stated!r} for column {column}"
+                f"{table.path}: field units: {asked!r} is asked for, but the file states {stated!r} for column "
+                f"{column}; leave the unit out to take the file's own"
             )
         if not (asked or known is not None):
             raise UserError(

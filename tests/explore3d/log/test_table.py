@@ -157,6 +157,12 @@ def test_a_map_is_recognised_as_one_in_a_line_that_can_be_read(tmp_path: Path) -
     assert len(str(error.value)) < 500 + len(str(tmp_path))
 
 
+def test_a_table_without_times_says_that_no_clock_went_with_it(tmp_path: Path) -> None:
+    rows = [f"{k},{k % 3}.5" for k in range(20)]
+    assert not read(tmp_path, "x,z\n" + "\n".join(rows)).timed
+    assert read(tmp_path, "t,x,z\n" + "\n".join(f"{0.1 * k:.1f},{row}" for k, row in enumerate(rows))).timed
+
+
 def test_a_unit_that_the_user_tells_is_said_by_its_name(tmp_path: Path) -> None:
     log = read(tmp_path, "x,z\n" + "".join(f"{k},{k % 3}.5\n" for k in range(20)), units="mm")
     assert log.metadata["read_as"][0].startswith("x = 'x' mm (as told), z = 'z' mm (as told), 20 rows")
