@@ -71,9 +71,11 @@ def found_sentence(analysis: Analysis) -> str:
 def facts(analysis: Analysis) -> Html:
     """Boxes with the figures that everything else rests on."""
     trace, detections = analysis.trace, analysis.detections
+    # the account of the path where there is one: what is left out of it is told beside it
+    inspected = detections.inspected_length if analysis.path is None else analysis.path.inspected
     pairs = [
         (length_text(trace.tip_radius), "radius of the fingertip"),
-        (length_text(detections.inspected_length), "of path inspected"),
+        (length_text(inspected), "of path inspected"),
         (f"{len(trace):,}", "samples in contact"),
         (length_text(detections.noise.sd, 2), "noise of a sample (estimated)"),
         (length_text(detections.detection_limit, 2), "detection limit of a sharp crest"),
