@@ -53,6 +53,8 @@ if TYPE_CHECKING:
         Support as Support,
         length_text as length_text,
         length_unit as length_unit,
+        place_decimals as place_decimals,
+        place_text as place_text,
     )
     from mapping.geometry.contact.first_contact import BallContact as BallContact
     from mapping.geometry.contact.interference_points import interference_points as interference_points
@@ -107,6 +109,8 @@ _PUBLIC = {
         "LeftOut",
         "Support",
         "length_text",
+        "place_decimals",
+        "place_text",
         "length_unit",
     ),
     "geometry.contact.first_contact": ("BallContact",),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -37,6 +37,18 @@ def length_text(value: float, digits: int = 3) -> str:
         return UNKNOWN_TEXT
     factor, name = length_unit(value)
     return f"{_rounded(value / factor, digits)} {name}"
+
+
+def place_decimals(tip_radius: float) -> int:
+    """Decimals of a millimetre that tell places apart: two features a hundredth of the tip's radius apart are one."""
+    return max(0, math.ceil(round(-math.log10(10.0 * tip_radius), 9)))  # rounded, so that 10 mm are one decimal
+
+
+def place_text(point: Sequence[float] | FloatArray, tip_radius: float) -> str:
+    """A place such as "(12, -4.9, 0) mm", as finely as a tip of that radius (m) tells places apart."""
+    decimals = place_decimals(tip_radius)
+    values = (round(1e3 * float(value), decimals) + 0.0 for value in point)  # + 0.0: no "-0.0"
+    return f"({', '.join(f'{value:.{decimals}f}' for value in values)}) mm"
 
 
 def _unit(name: str) -> tuple[float, str]:

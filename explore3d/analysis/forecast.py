@@ -24,7 +24,8 @@ class Forecast:
     """Errors over the finger's time.
 
     Args:
-        seconds: of the finger, as it was.
+        seconds: of the finger, as it was; None where nobody recorded times.
+        samples: as it was.
         error: then, m: the true one where the truth is known, else the largest standard deviation of a feature's
             place or height.
         half, double: the same for half and twice the time, m.
@@ -32,7 +33,8 @@ class Forecast:
         how: one sentence on how it was predicted.
     """
 
-    seconds: float
+    seconds: float | None
+    samples: int
     error: float
     half: float
     double: float
@@ -42,30 +44,35 @@ class Forecast:
     def record(self) -> dict[str, Any]:
         """JSON values for the model's record."""
         return {
-            "finger_seconds": self.seconds, "error": self.error, "error_at_half_the_time": self.half,
+            "finger_seconds": self.seconds, "samples": self.samples,
+            "error": self.error, "error_at_half_the_time": self.half,
             "error_at_double_the_time": self.double, "exponent": self.exponent, "how": self.how,
         }  # fmt: skip
 
 
 def forecast(analysis: Analysis) -> Forecast | None:
-    """The forecast of a run or a log; None where nothing was found, or the clock did not run."""
+    """The forecast of a run or a log; None where nothing was found, or the clock stood.
+
+    Of a log without times the finger's time is not known: what counts is how many samples it gave.
+    """
     trace = analysis.trace
-    seconds = float(trace.t[-1] - trace.t[0]) if len(trace) else 0.0
-    if not analysis.model.features or seconds <= 0:
+    length = float(trace.t[-1] - trace.t[0]) if len(trace) else 0.0
+    if not analysis.model.features or length <= 0:
         return None
+    spent = (length if analysis.model.provenance.get("timed", True) else None, len(trace))
     curve = [(t, e) for t, e in analysis.time_curve if t > 0 and e > 0]
     if len(curve) >= FEWEST_SLOPE_POINTS:
         t, e = np.log(np.array(curve)).T
         exponent = float(np.clip(-np.polyfit(t, e, 1)[0], 0.0, STEEPEST_ERROR_SLOPE))
         how = f"by the slope of this run's own error over time, {len(curve)} moments of it"
-        return _spread(seconds, curve[-1][1], exponent, how)
+        return _spread(spent, curve[-1][1], exponent, how)
     sd = _largest_sd(analysis.model.features)
     if not (np.isfinite(sd) and sd > 0):
         return None
     how = "from the standard deviations of the posteriors: noise averages out as the root of the time"
     if analysis.detections.noise.correlated_sd > analysis.detections.noise.white:
         how += "; much of this noise is correlated, so that only new passes count, not slower ones"
-    return _spread(seconds, sd, 0.5, how)
+    return _spread(spent, sd, 0.5, how)
 
 
 def worst_errors(errors: Sequence[Comparison]) -> dict[str, float] | None:
@@ -81,8 +88,8 @@ def worst_errors(errors: Sequence[Comparison]) -> dict[str, float] | None:
     return counts | {name: float(max(values)) for name, values in worst.items() if values}
 
 
-def _spread(seconds: float, error: float, exponent: float, how: str) -> Forecast:
-    return Forecast(seconds, error, error * 2.0**exponent, error * 2.0**-exponent, exponent, how)
+def _spread(spent: tuple[float | None, int], error: float, exponent: float, how: str) -> Forecast:
+    return Forecast(*spent, error, error * 2.0**exponent, error * 2.0**-exponent, exponent, how)
 
 
 def _largest_sd(features: Sequence[Feature]) -> float:

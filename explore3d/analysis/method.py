@@ -22,7 +22,7 @@ from explore3d.analysis.time_curve import time_curve
 from explore3d.analysis.truth import TrueFeature
 from explore3d.log import Log, stop_of
 from explore3d.scene import AnalysisSettings, Scene
-from mapping import Dropped, EnvelopeError, Feature, LeftOut, Trace, length_text
+from mapping import Dropped, EnvelopeError, Feature, LeftOut, Trace, length_text, place_text
 from mapping.assembly import Inspections, assemble, inspected_for, why_none_sought
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
@@ -394,8 +394,8 @@ def believed(work: Work, share: Share) -> None:
     lone = dropped_crossings(work.detections.crossings, work.features, work.trace.tip_radius)
     work.dropped = (*unlikely, *lone)
     for each in unlikely:
-        x, y, z = np.round(1e3 * each.point, 2)
-        work.stages.left_out.append(LeftOut(f"a {each.kind} at ({x:g}, {y:g}, {z:g}) mm", each.reason))
+        at = place_text(each.point, work.trace.tip_radius)
+        work.stages.left_out.append(LeftOut(f"a {each.kind} at {at}", each.reason))
     # what is said of a neighbourhood counts what was just dropped
     gone = {feature.details.account for feature in work.features if not feature.evidence.likely} - {None}
     work.features = tuple(
@@ -593,6 +593,7 @@ def _provenance(work: Work) -> dict[str, Any]:
         "tip_radius": log.trace.tip_radius,
         "tip_sd": work.settings.tip_sd,
         "tip_sd_assumed": log.tip_sd_assumed,
+        "timed": log.timed,
         "form": asdict(log.form),
         "recorded": log.metadata.get("started"),
         "about": {name: value for name, value in vars(work.scene.about).items() if value} if work.scene else {},

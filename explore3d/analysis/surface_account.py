@@ -46,6 +46,7 @@ class SurfaceAccount:
         moves: executed.
         causes: (why, how many moves were refused for it), the most frequent first.
         shortest_ridge: m, where only lines of that length were asked for: then most of a surface need not be swept.
+        is_plan: True if nothing was moved yet.
     """
 
     area: float
@@ -60,6 +61,7 @@ class SurfaceAccount:
     moves: int
     causes: tuple[tuple[str, int], ...]
     shortest_ridge: float | None = None
+    is_plan: bool = False
 
     @classmethod
     def of_log(cls, log: Log, trace: Trace, base: Base, scene: Scene | None) -> SurfaceAccount | None:
@@ -84,6 +86,7 @@ class SurfaceAccount:
             moves=len(made),
             causes=_causes([str(d["what"]) for d in refused]),
             shortest_ridge=scene.survey.shortest_ridge,
+            is_plan=False,
         )
 
     @classmethod
@@ -111,6 +114,7 @@ class SurfaceAccount:
             moves=len(moves),
             causes=_causes([why for _, why in refused]),
             shortest_ridge=scene.survey.shortest_ridge,
+            is_plan=True,
         )
 
     @property
@@ -136,16 +140,19 @@ class SurfaceAccount:
         if not self.short:
             return ""
         why = f", most often because {self.causes[0][0]}" if self.causes else ""
-        return f"NOT INSPECTED: {100 * self.unswept:.0f} % of the surface that the finger can reach was not swept{why}."
+        is_missed = "would not be swept" if self.is_plan else "was not swept"
+        return f"NOT INSPECTED: {100 * self.unswept:.0f} % of the surface that the finger can reach {is_missed}{why}."
 
     def sentence(self) -> str:
         """The account in one or two sentences."""
         refused = sum(count for _, count in self.causes)
+        is_swept, is_missed = "was swept", "was not inspected"
+        if self.is_plan:
+            is_swept, is_missed = "would be swept", "would not be inspected"
         sentence = (
-            f"Of the surface {100 * self.swept:.1f} % was swept ({length_text(self.swept_path)} of sweeps, which see "
+            f"Of the surface {100 * self.swept:.1f} % {is_swept} ({length_text(self.swept_path)} of sweeps, which see "
             f"{length_text(self.reach, 2)} to either side), {100 * self.refused:.1f} % refused, "
-            f"{100 * self.unreachable:.1f} % the finger cannot reach, {100 * self.not_inspected:.1f} % was not "
-            "inspected."
+            f"{100 * self.unreachable:.1f} % the finger cannot reach, {100 * self.not_inspected:.1f} % {is_missed}."
         )
         if self.shortest_ridge is not None:
             sentence += f" Only lines of {length_text(self.shortest_ridge, 2)} or longer were asked for."

@@ -46,7 +46,7 @@ def init(
     """
     from json import dumps
 
-    from explore3d.scene import FINGER_KINDS, begin_scene
+    from explore3d.scene import FINGER_KINDS, begin_scene, load_mesh, mesh_text
 
     if finger not in FINGER_KINDS:
         raise UserError(f"--finger {finger!r}: there is no such finger; possible: {', '.join(FINGER_KINDS)}")
@@ -57,6 +57,7 @@ def init(
             "Mesh of your object (empty: the example of a wire on a plate)", "--mesh FILE or --example NAME"
         )
         example, mesh = (None, Path(answer)) if answer else (DEMO, None)
+    about = ""
     if example is not None:
         scene = copy_example(example, folder)[0]
     else:
@@ -64,16 +65,17 @@ def init(
         units = units or _asked(f"Unit of length in {mesh.name} (m, mm, in)", "--units")
         tip_radius = tip_radius or _asked("Radius of the spherical tip, with its unit (5 mm)", "--tip-radius")
         scene = begin_scene(folder, mesh, units, tip_radius, finger, port)
+        about = f"\nthe mesh: {mesh_text(load_mesh(mesh, units))}"
     plan = shlex.join(["explore3d", "plan", str(scene)])
     explore = shlex.join(["explore3d", "run", str(scene), "--out", str(scene.parent / "out")])
     if must_compile():
         if not json:
-            print(f"written: {scene}\n{COMPILING}", file=sys.stderr, flush=True)
+            print(f"written: {scene}{about}\n{COMPILING}", file=sys.stderr, flush=True)
         compile_kernels(quiet=json)
     if json:
         print(dumps({"scene": str(scene), "plan": plan, "run": explore}))
         return
-    print(f"written: {scene}\nthe sweeps, before anything moves: {plan}\nexplore: {explore}")
+    print(f"written: {scene}{about}\nthe sweeps, before anything moves: {plan}\nexplore: {explore}")
 
 
 def _asked(question: str, option: str) -> str:

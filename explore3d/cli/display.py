@@ -100,7 +100,7 @@ def vibrate(
 ) -> None:
     """Write what a fingertip that crosses a model feels as a vibration, and say how it stands to people's thresholds.
 
-    Example: explore3d vibrate out/wire --path "0 mm, -10 mm, 0 mm; 0 mm, 10 mm, 0 mm" --out wire.wav
+    Example: explore3d vibrate out/wire --path "0 mm, -15 mm, -10 mm; 0 mm, 15 mm, 10 mm" --out wire.wav
     """
     from json import dumps
 

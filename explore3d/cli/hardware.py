@@ -35,7 +35,9 @@ def emulate(
 ) -> None:
     """Emulate a Grbl machine with a round tip on a pseudo-terminal, until interrupted.
 
-    Example: explore3d emulate grbl --mesh wire/wire_on_plate.ply --tip-radius "5 mm" --sensor optoforce
+    `explore3d init tile --example grbl_peck` writes a mesh that fits into its travel.
+
+    Example: explore3d emulate grbl --mesh tile/wire_on_tile.ply --tip-radius "5 mm" --sensor optoforce
     """
     import time
     from contextlib import suppress

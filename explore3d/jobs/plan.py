@@ -16,7 +16,7 @@ from explore3d.jobs.expedition import Explorer, explorer
 from explore3d.jobs.run import open_scene, scene_digest, scene_finger
 from explore3d.jobs.session import Job, Session
 from explore3d.pictures import plan_picture
-from explore3d.scene import Scene
+from explore3d.scene import Scene, mesh_text
 from hw import Finger, Move
 from hw.probing import GrblFinger
 from hw.simulated import SimulatedFinger
@@ -78,6 +78,7 @@ class DryRun:
         assumed: what had to be assumed of the object, and what the plan falls short of; a sentence or "".
         pecking: s that the moves will take by the finger's own forecast, where it touches point by point; else None.
         detail: what each detail that is found adds; None where that cannot be rehearsed.
+        mesh: size, faces and borders of the global model's mesh in words, "" without one.
     """
 
     base: Base
@@ -93,10 +94,12 @@ class DryRun:
     assumed: str = ""
     pecking: float | None = None
     detail: DetailTime | None = None
+    mesh: str = ""
 
     def record(self) -> dict[str, Any]:
         """The plan in JSON values: SI units."""
         return {
+            "mesh": self.mesh,
             "sweeps": sum(move.purpose == "sweep" for move in self.moves),
             "moves": [{"purpose": move.purpose, "path": move.path.tolist()} for move in self.moves],
             "length": self.metres,
@@ -126,7 +129,9 @@ class DryRun:
         warning = [self.account.warning()] if self.account is not None and self.account.short else []
         told = [] if self.pecking is None else [f"pecking takes it about {seconds_text(self.pecking)}, ways included"]
         more = [] if self.detail is None else [self.detail.sentence()]
-        return [*warning, *assumed, first, *more, *told, *within, *account, *(broken or ["no move breaks a limit"])]
+        mesh = [f"the mesh: {self.mesh}"] if self.mesh else []
+        before = [*warning, *mesh, *assumed]
+        return [*before, first, *more, *told, *within, *account, *(broken or ["no move breaks a limit"])]
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""
@@ -214,6 +219,7 @@ def _planned(scene: Scene, finger: Finger, stages: Stages) -> DryRun:
         assumed,
         sum(map(finger.forecast, moves)) if isinstance(finger, GrblFinger) and finger.peck is not None else None,
         detail,
+        "" if planned.given is None else mesh_text(planned.given.surface),
     )
 
 

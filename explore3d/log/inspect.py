@@ -240,7 +240,7 @@ def _with_log(found: Inspection, log: Log, assumed: set[str]) -> Inspection:
         found.kind,
         found.size,
         found.columns,
-        read_as if metres else read_as.replace(" x 1 m", " (unit not stated)"),
+        read_as if metres else read_as.replace(" m (as told)", " (unit not stated)"),
         len(log.trace),
         len(np.unique(sweep)),
         tuple(float(size) for size in np.ptp(centers, axis=0)),
@@ -299,4 +299,6 @@ def _habit(values: FloatArray) -> str:
         even = np.ptp(steps) <= 2 * EVEN * abs(float(np.median(steps)))
         return ("advances evenly" if even else "advances") + more
     back = float((steps < 0).mean()) if len(steps) else 0.0
+    if back == 0.0 or (steps <= 0).all():
+        return f"goes {'down' if back else 'up'}, and stands between" + more
     return f"goes up and down ({back:.0%} of the steps down)" + more

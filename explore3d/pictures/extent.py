@@ -9,7 +9,6 @@ import numpy as np
 from explore3d.pictures.chart import DASHED, Panel, sheet
 from explore3d.pictures.figure import BAND, ESTIMATED, INK, TRUTH
 from mapping import Feature, FloatArray, length_text, length_unit
-from mapping.geometry.mesh import arclengths
 
 EXTENTS_PER_ROW = 2
 EXTENT_SIZE = (530.0, 250.0)  # of a panel, px
@@ -86,5 +85,5 @@ def _plane(feature: Feature) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _worst(feature: Feature, sd: FloatArray) -> str:
-    length = length_text(float(arclengths(feature.axis)[-1]))
-    return f"{length} long, known across to ±{length_text(NORMAL_QUANTILE_95 * float(sd.max()), 2)}"
+    widest = length_text(NORMAL_QUANTILE_95 * float(sd.max()), 2)
+    return f"{feature.length.text()[0]} long, known across to ±{widest} at its worst"

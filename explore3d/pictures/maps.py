@@ -27,7 +27,9 @@ BLUE_TO_RED = (
 )  # fmt: skip
 BAR = (16.0, 220.0)  # width and height of the scale of colours, px
 BAR_ROOM = 90.0  # px
-CURVATURE_TITLE = 28.0  # px
+# Two views side by side are shown on the page at half of their size: their letters and scale are drawn twice as large
+SIDE_BY_SIDE = 2.0
+CURVATURE_TITLE = 28.0 * SIDE_BY_SIDE  # px
 # A map is read once for so many pixels of the drawing each way: its values change over several samples
 MAP_PIXELS = 2
 # Points that a value is read from: those of a ring about the nearest in a mesh of triangles, and of the ring about it
@@ -88,15 +90,17 @@ def curvature_picture(
             strict=True,
         ):
             if not right:
-                content += text_at(left + 4.0, 18.0, f"Principal curvature, {name}", size=1.1 * FONT_SIZE, bold=True)
+                title, size = f"Principal curvature, {name}", 1.1 * FONT_SIZE * SIDE_BY_SIDE
+                content += text_at(left + 4.0, 18.0 * SIDE_BY_SIDE, title, size=size, bold=True)
             pixels = np.rint(255.0 * lit * colours[: lit.shape[0], : lit.shape[1]]).astype(np.uint8)
             content += shifted(image(pixels_png(pixels), 0.0, 0.0, width, height), left, down)
         down, right = down + height, max(right, 2.0 * width)
-    bar = min(BAR[1], down - CURVATURE_TITLE)
+    bar = min(BAR[1], (down - CURVATURE_TITLE) / SIDE_BY_SIDE)
     marks = [f"{share * top:.2g}" for share in MARKS]
-    middle = 0.5 * (CURVATURE_TITLE + down - bar)
-    content += shifted(_bar(marks, "curvature × tip radius", bar), right + 14.0, middle)
-    return drawing(right + BAR_ROOM, down + 10.0, content)
+    middle = 0.5 * (CURVATURE_TITLE + down - SIDE_BY_SIDE * bar)
+    scale = f'<g transform="scale({SIDE_BY_SIDE:g})">{_bar(marks, "curvature × tip radius", bar)}</g>'
+    content += shifted(scale, right + 14.0, middle)
+    return drawing(right + SIDE_BY_SIDE * BAR_ROOM, down + 10.0, content)
 
 
 @dataclass(frozen=True, eq=False)

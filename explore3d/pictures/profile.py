@@ -36,7 +36,7 @@ def profile_picture(trace: Trace, base: Base, features: Sequence[Feature], limit
     x_factor, x_name = length_unit(float(np.abs(x).max()))
     z_factor, z_name = length_unit(float(np.ptp(z)))
     low = float(z.min())
-    upper = Panel("The profile as it was recorded", y_name=f"height ({z_name})", x_ticks=10)
+    upper = Panel("The profile, levelled", y_name=f"height ({z_name})", x_ticks=10)
     upper.line(*thinned(x[order] / x_factor, (z[order] - low) / z_factor), TRACED, width=1.0, name="trace")
     upper.line(*thinned(x[order] / x_factor, (floor[order] - low) / z_factor), INK, width=1.3, name="base, fitted")
     lower = _heights(x[order] / x_factor, feet.height[order], features, limit, (origin, heading, x_factor))

@@ -70,16 +70,21 @@ def _what_time_buys(analysis: Analysis) -> list[Html]:
     if known is None:
         return []
     kind = "error of the worst axis" if analysis.time_curve else "largest standard deviation of a place or height"
+    what, told = ("time", "finger") if known.seconds is not None else ("path", "samples")
+
+    def spent(share: float) -> str:
+        return f"{share * known.samples:,.0f}" if known.seconds is None else seconds_text(share * known.seconds)
+
     rows: list[Row] = [
-        (name, seconds_text(share * known.seconds), length_text(error, 2))
+        (name, spent(share), length_text(error, 2))
         for name, share, error in (
-            ("half the time (predicted)", 0.5, known.half),
+            (f"half the {what} (predicted)", 0.5, known.half),
             ("as it was", 1.0, known.error),
-            ("twice the time (predicted)", 2.0, known.double),
+            (f"twice the {what} (predicted)", 2.0, known.double),
         )
     ]
     how = f"Predicted {known.how} (error ~ time^{-known.exponent:.2f}). Computing grows in proportion to the samples."
-    return [table(("what the finger's time buys", "finger", kind), rows, numeric=(1, 2)), paragraph(how)]
+    return [table((f"what the finger's {what} buys", told, kind), rows, numeric=(1, 2)), paragraph(how)]
 
 
 def provenance(analysis: Analysis) -> Html:

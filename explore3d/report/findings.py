@@ -8,7 +8,7 @@ from pathlib import Path
 
 from explore3d import count_text
 from explore3d.analysis import ABSORBED, FAILED, Analysis, swept_share
-from mapping import Feature, length_text
+from mapping import Feature, length_text, place_text
 from mapping.detection import CLEAR
 from mapping.detection.path import PathLedger
 
@@ -147,10 +147,10 @@ def dropped_warning(analysis: Analysis) -> list[str]:
         return []
     number = count_text(len(plain), "detection")
     top = plain[0]
-    at = ", ".join(f"{1e3 * value:.1f}" for value in top.point)
+    at = place_text(top.point, analysis.trace.tip_radius)
     return [
         f"Warning: {number} clear of the noise became no feature, the plainest a {top.kind} "
-        f"of {length_text(abs(top.height), 2)} at ({at}) mm: {top.reason}."
+        f"of {length_text(abs(top.height), 2)} at {at}: {top.reason}."
     ]
 
 

@@ -23,7 +23,7 @@ from explore3d.report.findings import (
 )
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.report.pictures import Pictures, is_profile
-from mapping import UNKNOWN_TEXT, Feature, Interval, length_text
+from mapping import UNKNOWN_TEXT, Feature, Interval, length_text, place_decimals
 from mapping.geometry.mesh import arclengths
 from mapping.inference.kinds import kind_named, kind_of
 from mapping.model import FAIL, PASS, UNDECIDED
@@ -71,9 +71,11 @@ def found_sentence(analysis: Analysis) -> str:
 def facts(analysis: Analysis) -> Html:
     """Boxes with the figures that everything else rests on."""
     trace, detections = analysis.trace, analysis.detections
+    # the account of the path where there is one: what is left out of it is told beside it
+    inspected = detections.inspected_length if analysis.path is None else analysis.path.inspected
     pairs = [
         (length_text(trace.tip_radius), "radius of the fingertip"),
-        (length_text(detections.inspected_length), "of path inspected"),
+        (length_text(inspected), "of path inspected"),
         (f"{len(trace):,}", "samples in contact"),
         (length_text(detections.noise.sd, 2), "noise of a sample (estimated)"),
         (length_text(detections.detection_limit, 2), "detection limit of a sharp crest"),
@@ -179,7 +181,8 @@ def _place(feature: Feature, analysis: Analysis) -> Html:
     point = feature.axis[0] if feature.anchor is None else feature.anchor.position
     factor, name = (1e-3, "mm") if analysis.base.surface.size < 10.0 else (1.0, "m")
     values = point[:1] if is_profile(analysis) else point
-    text = ", ".join(f"{value / factor:.{4 if is_profile(analysis) else 2}f}" for value in values)
+    decimals = 4 if is_profile(analysis) else max(2, place_decimals(analysis.trace.tip_radius))
+    text = ", ".join(f"{value / factor:.{decimals}f}" for value in values)
     where = "along" if is_profile(analysis) else "across"
     known = f"± {length_text(1.645 * feature.position_sd, 2)} {where}" if feature.position_sd > 0 else ""
     return Html(element("span", f"{text} {name}") + element("small", known))

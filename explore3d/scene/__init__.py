@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         MachineTable as MachineTable,
         OptoForceTable as OptoForceTable,
     )
-    from explore3d.scene.mesh_files import load_mesh as load_mesh
+    from explore3d.scene.mesh_files import load_mesh as load_mesh, mesh_text as mesh_text
     from explore3d.scene.scene import (
         Scene as Scene,
         load_scene as load_scene,
@@ -68,7 +68,7 @@ _PUBLIC = {
         "Setting",
     ),
     "machine": ("EMULATOR", "LineSensorTable", "MachineTable", "OptoForceTable"),
-    "mesh_files": ("load_mesh",),
+    "mesh_files": ("load_mesh", "mesh_text"),
     "scene": ("Scene", "load_scene", "parse_scene", "recorded_scene"),
     "settings": ("AnalysisSettings",),
     "simulated": ("SimulatedFingerTable",),

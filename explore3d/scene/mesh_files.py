@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from explore3d import MeshFileError, unit_factor
-from mapping import Surface, SurfaceError
+from explore3d import MeshFileError, count_text, unit_factor
+from mapping import Surface, SurfaceError, length_text
 
 # Sides of the smallest and the largest body that a fingertip explores, m: the apex of a probe microscope's tip, and
 # what no unit but a wrong one gives
@@ -31,7 +31,7 @@ def load_mesh(path: Path | str, units: str = "m") -> Surface:
 
     Raises:
         MeshFileError: no such file, not a mesh, no faces, coordinates that are not finite, no area, no size that a
-            body can have, or faces that are turned inside and out.
+            body can have, faces that are turned inside and out, or a solid whose faces all look inwards.
         UnitError: an unknown unit.
     """
     factor = unit_factor(units)
@@ -47,6 +47,25 @@ def load_mesh(path: Path | str, units: str = "m") -> Surface:
         return Surface(vertices * factor, faces)
     except SurfaceError as error:
         raise MeshFileError(f"{path}: {error}") from error
+
+
+def mesh_text(surface: Surface) -> str:
+    """What a mesh is, in words by which a wrong unit, a hole and doubled faces are noticed; one line."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    extent = " x ".join(length_text(float(size)) for size in np.ptp(surface.vertices, axis=0))
+    ways = np.sort(np.concatenate([surface.faces[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]), axis=1)
+    edges, faces = np.unique(ways, axis=0, return_counts=True)
+    border, shared = edges[faces == 1], int((faces > 2).sum())
+    state = "closed"
+    if len(border):
+        corners, ends = np.unique(border, return_inverse=True)
+        first, second = ends.reshape(-1, 2).T
+        graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(corners), len(corners)))
+        state = f"open, with {count_text(int(connected_components(graph)[0]), 'border')}"
+    crowded = f"; {count_text(shared, 'edge')} with more than two faces" if shared else ""
+    return f"{extent}, {count_text(len(surface.faces), 'face')}, {state}{crowded}"
 
 
 def _no_body(vertices: np.ndarray, faces: np.ndarray) -> str:
@@ -73,7 +92,24 @@ def _no_body(vertices: np.ndarray, faces: np.ndarray) -> str:
             f"{turned} of the {len(pairs)} edges between its faces join an outer side to an inner one: the faces are "
             "turned both ways; orient them alike in a mesh program"
         )
+    is_closed = turned == 0 and len(pairs) == len(first)
+    if is_closed and _is_inside_out(a, b, c):
+        return (
+            "the mesh is closed and its faces look inwards: a solid turned inside out, which a finger would touch from "
+            "within; flip the faces in a mesh program"
+        )
     return ""
+
+
+def _is_inside_out(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
+    """True if triangles with corners (F, 3) that close a surface bound a volume below zero, rounding allowed for.
+
+    Cavities count against the solid that they lie in, so that a body with bores and hollows is none.
+    """
+    middle = a.mean(axis=0)
+    parts = np.einsum("fi,fi->f", a - middle, np.cross(b - middle, c - middle))
+    rounding = np.finfo(float).eps * len(parts) * float(np.abs(parts).sum())
+    return bool(float(parts.sum()) < -rounding)
 
 
 def _read(path: Path) -> tuple[np.ndarray, np.ndarray]:

@@ -31,7 +31,7 @@ from explore3d.scene.values import (
     Time,
 )
 from hw import Finger
-from mapping import KINDS, Surface
+from mapping import KINDS, Surface, length_text
 from mapping.inference.kinds import kind_named
 from mapping.instrument import Noise, StatedNoise
 from mapping.model import Tolerance
@@ -347,8 +347,9 @@ class Scene(Table):
         radius = self.tip.radius
         if not size / LARGEST_TIPS <= radius <= LARGEST_TIP_SHARE * size:
             raise SceneError(
-                f"{self._path}: tip.radius: {radius:g} m for a body of {size:g} m ({field}); possible: "
-                f"{size / LARGEST_TIPS:g} to {LARGEST_TIP_SHARE * size:g} m"
+                f"{self._path}: tip.radius: {length_text(radius)} for a body of {length_text(size)} ({field}); "
+                f"possible: {length_text(size / LARGEST_TIPS)} to {length_text(LARGEST_TIP_SHARE * size)}; are the "
+                "units of both the right ones?"
             )
 
 

@@ -12,10 +12,13 @@ from explore3d import UserError, __version__, count_text
 from explore3d.jobs import cause, open_scene, scene_finger
 from explore3d.log import LOG, Log, LogWriter, read_log
 from hw import Move
-from mapping import BoolArray, FloatArray, Trace, length_text
+from mapping import BoolArray, FloatArray, ObjectModel, Trace, length_text
+from mapping.instrument import Noise
 
 # Samples this close to the place, in tip radii, were taken of it
 SAME_PLACE_REACH = 5e-3
+# Standard deviations within which an offset is noise: 95 of 100 of a normal distribution
+NOISE_REACH = 1.96
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +32,7 @@ class Reprobed:
         approach: (3,) unit direction in which it was pressed.
         felt: (N, 3) centres now, one for each touch.
         log: file with the touches; `explore3d analyze` takes it beside the session's log.
+        noise: of one sample, as the session's model states it; None without a model.
     """
 
     sample: int
@@ -37,11 +41,23 @@ class Reprobed:
     approach: FloatArray
     felt: FloatArray
     log: Path
+    noise: Noise | None = None
 
     @property
     def offsets(self) -> FloatArray:
         """(N,) how much further out of the body than then each touch was, m."""
         return np.asarray((self.felt - self.recorded) @ -self.approach)
+
+    @property
+    def offset_sd(self) -> float | None:
+        """Standard deviation of the mean offset if nothing moved, m; None where the noise is not known.
+
+        White noise averages over samples and touches, what is correlated along a path does not over one place.
+        """
+        if self.noise is None:
+            return None
+        white = self.noise.white**2 * (1.0 / self.neighbours + 1.0 / len(self.felt))
+        return float(np.sqrt(white + 2.0 * self.noise.correlated_sd**2))
 
     def record(self) -> dict[str, object]:
         """JSON values, SI units."""
@@ -51,6 +67,7 @@ class Reprobed:
             "recorded": self.recorded.tolist(),
             "felt": self.felt.tolist(),
             "offset": float(self.offsets.mean()),
+            "offset_sd": self.offset_sd,
             "offsets": self.offsets.tolist(),
             "log": str(self.log),
         }
@@ -66,8 +83,19 @@ class Reprobed:
         return [
             f"recorded then: the ball's centre at ({where}) mm, by {near} about number {self.sample}",
             f"felt again {count_text(len(offsets), 'time')}: {off} on average{spread}",
+            *self._verdict(middle),
             f"log: {self.log}",
         ]
+
+    def _verdict(self, offset: float) -> list[str]:
+        """Whether noise explains the offset, if that is known."""
+        sd = self.offset_sd
+        if not sd:
+            return []
+        told = f"the session's noise alone gives {length_text(sd, 2)} (standard deviation)"
+        if abs(offset) <= NOISE_REACH * sd:
+            return [f"no sign that it moved: {told}"]
+        return [f"it differs by more than noise: {abs(offset) / sd:.1f} times what {told[4:]}"]
 
 
 def reprobe(
@@ -122,7 +150,18 @@ def reprobe(
                 raise
     if not felt:
         raise UserError(f"{folder}: nothing is met any more at {np.round(1e3 * center, 3).tolist()} mm")
-    return Reprobed(sample, int(there.sum()), center, approach, np.array(felt), path)
+    return Reprobed(sample, int(there.sum()), center, approach, np.array(felt), path, _noise(folder))
+
+
+def _noise(folder: Path) -> Noise | None:
+    """The noise that the session's model states, its correlated parts as one."""
+    if not (folder / "model.json").is_file():
+        return None
+    stated = ObjectModel.load(folder).provenance.get("noise")
+    if stated is None:
+        return None
+    correlated = [stated["correlated"], *(term["sd"] for term in stated.get("further", []))]
+    return Noise(stated["white"], float(np.linalg.norm(correlated)), stated["length"])
 
 
 def _nearest(log: Log, at: FloatArray) -> int:

@@ -70,6 +70,7 @@ class Log:
         tip_sd: standard deviation of the tip's radius, m; None: the scene says it.
         tip_sd_assumed: True if nobody stated it.
         form: what the base is, where it is fitted.
+        timed: False if nobody recorded times: `trace.t` counts the samples then, for no clock went with them.
     """
 
     trace: Trace
@@ -84,6 +85,7 @@ class Log:
     tip_sd: float | None = None
     tip_sd_assumed: bool = False
     form: Form = Form()  # noqa: RUF009
+    timed: bool = True
 
 
 def merge(logs: Sequence[Log]) -> Log:
@@ -122,6 +124,7 @@ def merge(logs: Sequence[Log]) -> Log:
         tip_sd=max((log.tip_sd for log in logs if log.tip_sd is not None), default=None),
         tip_sd_assumed=any(log.tip_sd_assumed for log in logs),
         form=next((log.form for log in logs if log.form != Form()), Form()),
+        timed=all(log.timed for log in logs),
     )
 
 

@@ -16,6 +16,7 @@ Role = Literal["x", "y", "z", "t", "sweep", "valid", "nx", "ny", "nz", "cx", "cy
 POSITION: tuple[Role, ...] = ("x", "y", "z")
 VECTORS = {"normals": ("nx", "ny", "nz"), "contacts": ("cx", "cy", "cz"), "force": ("fx", "fy", "fz")}
 LENGTH_ROLES: tuple[Role, ...] = (*POSITION, "cx", "cy", "cz")
+MOST_LABELS = 16  # columns that a message names one by one: more than there are roles
 EVEN = 0.01  # share of the usual step by which the steps of a scan may differ and still be called even
 
 
@@ -78,7 +79,8 @@ def length_factors(
         asked = units if isinstance(units, str) else (units or {}).get(role, "")
         if asked and known is not None and not np.isclose(unit_factor(asked), known, rtol=1e-9):
             raise UserError(
-                f"{table.path}: field units: {asked!r} is asked for, but the file states {stated!r} for column {column}"
+                f"{table.path}: field units: {asked!r} is asked for, but the file states {stated!r} for column "
+                f"{column}; leave the unit out to take the file's own"
             )
         if not (asked or known is not None):
             raise UserError(
@@ -188,9 +190,11 @@ def advances(column: FloatArray) -> bool:
 
 
 def _cannot_tell(table: TableText, why: str) -> UserError:
+    is_map = not any(table.names) and not table.texts and len(table.names) > len(POSITION)
+    heights = '; if it is a map of heights, say how far its pixels are apart: --pixel "1 um"' if is_map else ""
     return UserError(
         f"{table.path}: field columns: cannot tell x, y, z or x, z among {_labels(table)}{': ' * bool(why)}{why}; "
-        'say which with --columns "x=1, z=2" (names or numbers)'
+        f'say which with --columns "x=1, z=2" (names or numbers){heights}'
     )
 
 
@@ -230,7 +234,9 @@ def _index(table: TableText, role: str, column: str | int) -> int:
 
 
 def _labels(table: TableText) -> str:
-    return ", ".join(label(table, index) for index in range(len(table.names)))
+    count = len(table.names)
+    labels = [label(table, index) for index in range(min(count, MOST_LABELS))]
+    return ", ".join(labels) + (f" and {count - MOST_LABELS} more" if count > MOST_LABELS else "")
 
 
 def label(table: TableText, index: int) -> str:

@@ -66,7 +66,8 @@ def read_table(
         jump: a longer step begins a new sweep; None: ten median steps.
         reference: "centre" (default) or "bottom": the point of the ball that the coordinates give.
         decimal: "." or ",", where the file leaves open what "1,234" is.
-        pixel: "1 um" or ("1 um", "2 um"): the file is a map of heights, with these distances of columns and rows.
+        pixel: "1 um" or ("1 um", "2 um"): the file is a map of heights, with these distances of columns and rows; one
+            column or one row of heights is a profile.
         average: runs of so many rows become one sample each, their mean; the file is read in pieces (see `averaged`).
 
     Raises:
@@ -89,9 +90,12 @@ def read_table(
         _must_know_the_tip(path, settings)
         share = min(1.0, TEXT_PIECE / path.stat().st_size) if path.is_file() else 1.0
         return _log(averaged(read_pieces(path, settings.decimal), settings, share), settings, sidecar)
-    text = read_text(path, settings.decimal)
     if settings.pixel is not None:
-        return heights_log(path, text.rows, settings.pixel, "", settings, sidecar, said=text.said)
+        text = read_text(path, settings.decimal, least=1)
+        unit = text.units[0] if len(set(text.units)) == 1 else ""
+        heights = text.rows.T if text.rows.shape[1] == 1 else text.rows  # one column is one profile
+        return heights_log(path, heights, settings.pixel, unit, settings, sidecar, said=text.said)
+    text = read_text(path, settings.decimal)
     return table_log(text, settings, sidecar)
 
 
@@ -126,6 +130,8 @@ def heights_log(
     if rows == 1:
         table, names, units = [along, heights[0]], ("x", "z"), ("m", unit)
     size = f"a map of {columns} x {rows} heights at {length_text(pixel[0])} x {length_text(pixel[1])}"
+    if rows == 1:
+        size = f"a profile of {columns} heights at {length_text(pixel[0])}"
     text = TableText(path, names, units, np.column_stack(table), said=(size, *said), kind=kind)
     asked = settings.units if isinstance(settings.units, str) else (settings.units or {}).get("z")
     return table_log(text, settings.model_copy(update={"units": {"z": asked} if asked else None}), sidecar)
@@ -195,6 +201,7 @@ def _log(found: Samples, settings: TableSettings, sidecar: Path | None) -> Log:
         tip_sd=TIP_DOUBT * settings.tip_radius if settings.tip_sd is None else settings.tip_sd,
         tip_sd_assumed=settings.tip_sd is None,
         form=Form.read(settings.form, settings.mask),
+        timed="t" in roles,
     )
 
 

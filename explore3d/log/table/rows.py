@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d import UserError
+from explore3d import UNITS, UserError
 from explore3d.log.table.columns import LENGTH_ROLES, POSITION, VECTORS, label
 from explore3d.log.table.order import Order, clipped, cloud_order, profile_order, sentinels
 from explore3d.log.table.settings import TableSettings
@@ -77,11 +77,16 @@ def read_as(
         unit = ""
         if role in factors:
             # the unit as it is written, where it is what was used
-            unit = text.units[index] if length_factor(text.units[index]) else f"x {factors[role]:g} m"
+            unit = text.units[index] if length_factor(text.units[index]) else f"{_unit_of(factors[role])} (as told)"
         names.append(f"{role} = {label(text, index)} {unit}".rstrip())
     sweeps = len(np.unique(trace.sweep[np.flatnonzero(np.diff(trace.sweep, prepend=trace.sweep[0] - 1))]))
     parts = [*names, f"{len(trace)} rows in {sweeps} sweep{'s' * (sweeps != 1)}", *(short for _, short in dropped)]
     return "; ".join([", ".join(parts), *said])
+
+
+def _unit_of(factor: float) -> str:
+    """The name of the unit of so many metres."""
+    return next(name for name, metres in UNITS["length"].items() if np.isclose(metres, factor, rtol=1e-9, atol=0.0))
 
 
 def with_texts(

@@ -38,12 +38,13 @@ class Dialect:
     numeric: tuple[bool, ...]
 
 
-def find_dialect(lines: Sequence[str], decimal: str | None = None) -> Dialect | None:
-    """The dialect in which most of the lines are alike rows with two numbers or more; None if there is none.
+def find_dialect(lines: Sequence[str], decimal: str | None = None, least: int = 2) -> Dialect | None:
+    """The dialect in which most of the lines are alike rows with so many numbers or more; None if there is none.
 
     Args:
         lines: of the file, a sample, without comments and blank ones.
         decimal: the sign, if somebody says it.
+        least: numbers in a row.
     """
     best: tuple[tuple[float, ...], Dialect] | None = None
     cells: dict[str | None, list[list[str]]] = {}
@@ -56,9 +57,9 @@ def find_dialect(lines: Sequence[str], decimal: str | None = None) -> Dialect | 
                 continue
             if delimiter not in cells:
                 cells[delimiter] = [split(line, delimiter) for line in lines]
-            if max(map(len, cells[delimiter]), default=0) < 2:
+            if max(map(len, cells[delimiter]), default=0) < least:
                 continue
-            found = _judged(cells[delimiter], sign, thousands)
+            found = _judged(cells[delimiter], sign, thousands, least)
             if found is None:
                 continue
             good, share, numeric = found
@@ -70,21 +71,23 @@ def find_dialect(lines: Sequence[str], decimal: str | None = None) -> Dialect | 
     return None if best is None else best[1]
 
 
-def _judged(cells: Sequence[Sequence[str]], decimal: str, thousands: str) -> tuple[int, float, tuple[bool, ...]] | None:
+def _judged(
+    cells: Sequence[Sequence[str]], decimal: str, thousands: str, least: int
+) -> tuple[int, float, tuple[bool, ...]] | None:
     """(lines that are alike, share of their columns that are numbers, which columns are)."""
     patterns = [tuple(is_number(cell, decimal, thousands) for cell in row) for row in cells]
-    # rows of one kind have one number of cells, two of them numbers; empty and missing ones are either
-    counts = Counter(len(pattern) for pattern in patterns if sum(hit is True for hit in pattern) >= 2)
+    # rows of one kind have one number of cells, `least` of them numbers; empty and missing ones are either
+    counts = Counter(len(pattern) for pattern in patterns if sum(hit is True for hit in pattern) >= least)
     if not counts:
         return None
     columns = max(counts, key=lambda count: (counts[count], count))
-    rows = [each for each in patterns if len(each) == columns and sum(hit is True for hit in each) >= 2]
+    rows = [each for each in patterns if len(each) == columns and sum(hit is True for hit in each) >= least]
     numeric = []
     for column in range(columns):
         hits = Counter(row[column] for row in rows)
         numeric.append((hits[True] > 0 and hits[True] >= hits[False]) or hits[False] == 0)
     good = sum(
-        sum(hit is True for hit in row) >= 2
+        sum(hit is True for hit in row) >= least
         and all(hit is not False for hit, number in zip(row, numeric, strict=True) if number)
         for row in patterns
         if len(row) == columns

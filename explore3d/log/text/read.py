@@ -61,12 +61,13 @@ class TableText:
     kind: str = "a table"
 
 
-def read_text(path: Path, decimal: str | None = None) -> TableText:
+def read_text(path: Path, decimal: str | None = None, least: int = 2) -> TableText:
     """Read a table of numbers with two columns or more.
 
     Args:
         path: the file.
         decimal: its decimal sign, if the file leaves it open.
+        least: 1 takes a file of one column, too, where it can be no wider table.
 
     Raises:
         UserError: no such file, empty, not text, no rows of numbers, a row that does not fit, or numbers that mean
@@ -77,11 +78,11 @@ def read_text(path: Path, decimal: str | None = None) -> TableText:
     whole = data.endswith(b"\n")
     if not whole:
         data += b"\n"
-    dialect = dialect_of(path, data, decimal)
+    dialect = dialect_of(path, data, decimal, least)
     return Reading(path, data, whole, dialect, decimal).table()
 
 
-def dialect_of(path: Path, data: bytes, decimal: str | None) -> Dialect:
+def dialect_of(path: Path, data: bytes, decimal: str | None, least: int = 2) -> Dialect:
     """The dialect of a text.
 
     Raises:
@@ -89,10 +90,14 @@ def dialect_of(path: Path, data: bytes, decimal: str | None) -> Dialect:
     """
     sample = _sample(data)
     dialect = find_dialect(sample, decimal)
+    one = find_dialect(sample, decimal, least=1) if dialect is None else None
+    dialect = one if dialect is None and least == 1 else dialect
     if dialect is None:
         some = next((line.strip() for line in sample), "")
+        heights = '; heights alone are a profile whose points lie so far apart: --pixel "0.5 um"' if one else ""
         raise UserError(
             f"{path}: holds no line of two or more numbers; expected columns x, y, z or x, z; it begins {some[:40]!r}"
+            f"{heights}"
         )
     return dialect
 
@@ -218,6 +223,9 @@ class Reading:
                 break
         if limit == first:
             limit = self._without_counts(lines, first, columns)
+        if limit == first:  # rows like the others but for their missing numbers: left out and counted as others are
+            while limit and self._lacks_a_number(lines[limit - 1][1], columns):
+                limit -= 1
         if not self.said and (above := [line.strip() for _, line in lines[:limit] if self._is_numbers(line)]):
             self.said.append(f"numbers above the rows left out: {above[0][:30]!r}")
         start = lines[limit][0] if limit < len(lines) else len(self.data)
@@ -250,7 +258,12 @@ class Reading:
         at = next(index for index, (_, line) in enumerate(lines) if index >= first and line == texts[0])
         return at + 1
 
-    def _is_row(self, line: str, columns: int) -> bool:
+    def _lacks_a_number(self, line: str, columns: int) -> bool:
+        """True for a row that says in a cell that it has no number there; a number alone, such as a count, is none."""
+        is_whole = len(split(line, self.dialect.delimiter)) == columns
+        return is_whole and self._is_row(line, columns, least=1)
+
+    def _is_row(self, line: str, columns: int, least: int = 2) -> bool:
         if _blank_or_comment(line):
             return False
         cells = split(line, self.dialect.delimiter)
@@ -258,7 +271,7 @@ class Reading:
         if len(cells) != columns:
             return False
         values = [self._value(cell) for cell, number in zip(cells, self.dialect.numeric, strict=True) if number]
-        return None not in values and sum(value == value for value in values) >= min(2, len(values))
+        return None not in values and sum(value == value for value in values) >= min(least, len(values))
 
     def _is_numbers(self, line: str) -> bool:
         """True for a line of nothing but numbers, two or more."""

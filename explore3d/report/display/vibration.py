@@ -83,6 +83,11 @@ class Vibration:
 
     def lines(self) -> list[str]:
         """What the terminal is told."""
+        if self.amplitude <= PRESSING:
+            return [
+                f"{self.duration:.3g} s, {len(self.height)} samples at {self.rate:g} Hz",
+                "the path crosses no feature, and the fingertip feels nothing; features.csv says where they are",
+            ]
         low, high = self.band()
         most = self.above_threshold()
         felt = f"{most:.3g} times" if most >= 1.0 else f"only {most:.2g} times"

@@ -11,6 +11,7 @@ import pytest
 
 from explore3d.analysis.forecast import forecast, worst_errors
 from explore3d.analysis.truth import Comparison, TrueFeature
+from explore3d.report.account import _what_time_buys
 from mapping.feature import Feature, Interval, Support
 from mapping.instrument.noise import Noise
 from mapping.trace import Trace
@@ -24,7 +25,7 @@ RIDGE = Feature(
 def analysis(curve: tuple[tuple[float, float], ...] = (), features: tuple[Feature, ...] = (RIDGE,)) -> Any:
     trace = Trace(np.linspace(0.0, 80.0, 9), np.zeros((9, 3)), np.zeros(9), 0.01)
     return SimpleNamespace(
-        trace=trace, model=SimpleNamespace(features=features), time_curve=curve,
+        trace=trace, model=SimpleNamespace(features=features, provenance={}), time_curve=curve,
         detections=SimpleNamespace(noise=Noise(1e-4)),
     )  # fmt: skip
 
@@ -62,3 +63,13 @@ def test_the_worst_errors_are_those_of_what_was_found():
     assert worst_errors(rows) == {"found": 1, "missed": 1, "invented": 0, "axis_rms": 2e-5, "height_error": 3e-5}
     assert worst_errors([]) is None
     assert worst_errors([replace(rows[0], axis_rms=4e-5), rows[0]])["axis_rms"] == 4e-5  # type: ignore[index]
+
+
+def test_where_nobody_recorded_times_no_time_is_told() -> None:
+    untimed = analysis()
+    untimed.model.provenance["timed"] = False
+    found = forecast(untimed)
+    assert found is not None and found.seconds is None and found.samples == 9
+    assert found.record()["finger_seconds"] is None and found.half == pytest.approx(3e-5 * np.sqrt(2))
+    text = " ".join(_what_time_buys(untimed))
+    assert "half the path (predicted)" in text and "samples" in text and "min" not in text and " s<" not in text

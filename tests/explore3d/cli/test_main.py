@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import re
+import shlex
 from inspect import signature
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from typer.testing import CliRunner
 from explore3d import __version__
 from explore3d.cli.bench import bench
 from explore3d.cli.main import command_line
+from explore3d.scene import copy_example
 
 SCENES = Path(__file__).parents[3] / "assets" / "scenes"
 COMMANDS = [command.callback.__name__ for command in command_line().registered_commands if command.callback]
@@ -239,3 +241,15 @@ def test_benches_and_merging_refuse_what_they_do_not_know(
     assert message in error
     assert len(error.splitlines()) == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_the_example_of_emulate_serves_the_mesh_that_init_writes(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    from explore3d.cli.hardware import emulate
+
+    words = shlex.split((emulate.__doc__ or "").split("Example: explore3d ")[1].splitlines()[0])
+    copy_example("grbl_peck", tmp_path / "tile")
+    monkeypatch.chdir(tmp_path)
+    assert explore3d_main(monkeypatch, *words, "--seconds", "0.1", "--folder", tmp_path / "ports") == 0
+    assert "stage: " in capsys.readouterr().out

@@ -45,6 +45,10 @@ def test_what_a_detail_adds_is_foretold(tmp_path: Path) -> None:
     assert plan.detail is not None and plan.detail.bump is not None
     assert 0.5 < plan.detail.bump < plan.detail.ridge
     assert plan.detail.sentence() in plan.lines()
+    # nothing was moved, and what was read can be held against the drawing
+    account = next(line for line in plan.lines() if line.startswith("Of the surface"))
+    assert "% would be swept" in account and "% would not be inspected" in account
+    assert plan.lines()[0] == f"the mesh: {plan.mesh}" and plan.mesh.startswith("60 mm x 40 mm x 0 mm")
     scene = parse_scene(text, WIRE)
     with scene_finger(scene) as finger:
         expedition = explorer(scene, finger.workspace)

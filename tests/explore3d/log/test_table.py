@@ -133,6 +133,41 @@ def test_rows_that_are_invalid_or_lack_a_number_are_left_out_counted_and_said(tm
     assert np.unique(log.trace.sweep).tolist() == [0]
 
 
+def test_rows_without_a_number_at_the_beginning_are_counted_like_all_others(tmp_path: Path) -> None:
+    rows = "".join(f"{0.1 * k:.1f},{'nan' if k in (0, 1, 5) else 0.2}\n" for k in range(20))
+    log = read(tmp_path, "# units: mm\nPosition,Height\n" + rows)
+    assert len(log.trace) == 17 and "3 of 20 rows lack a number" in log.recovered
+
+
+def test_heights_alone_are_a_profile_if_their_distance_is_said(tmp_path: Path) -> None:
+    text = "z (um)\n" + "".join(f"{value:.1f}\n" for value in range(20))
+    refused(tmp_path, text, "no line of two or more numbers", '--pixel "0.5 um"')
+    log = read(tmp_path, text, pixel="0.5 um", units=None)
+    assert np.allclose(log.trace.centers[:, 0], 0.5e-6 * np.arange(20))
+    assert np.allclose(log.trace.centers[:, 2], 1e-6 * np.arange(20))
+    assert "a profile of 20 heights at 0.5 µm" in log.metadata["read_as"][0]
+    refused(tmp_path, text, "'mm' is asked for, but the file states 'um'", pixel="0.5 um", units="mm")
+
+
+def test_a_map_is_recognised_as_one_in_a_line_that_can_be_read(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    text = "".join(" ".join(f"{value:.4f}" for value in row) + "\n" for row in rng.normal(size=(12, 400)))
+    with pytest.raises(UserError, match=r"15, 16 and 384 more; .* a map of heights, .* --pixel") as error:
+        read(tmp_path, text, units="mm")
+    assert len(str(error.value)) < 500 + len(str(tmp_path))
+
+
+def test_a_table_without_times_says_that_no_clock_went_with_it(tmp_path: Path) -> None:
+    rows = [f"{k},{k % 3}.5" for k in range(20)]
+    assert not read(tmp_path, "x,z\n" + "\n".join(rows)).timed
+    assert read(tmp_path, "t,x,z\n" + "\n".join(f"{0.1 * k:.1f},{row}" for k, row in enumerate(rows))).timed
+
+
+def test_a_unit_that_the_user_tells_is_said_by_its_name(tmp_path: Path) -> None:
+    log = read(tmp_path, "x,z\n" + "".join(f"{k},{k % 3}.5\n" for k in range(20)), units="mm")
+    assert log.metadata["read_as"][0].startswith("x = 'x' mm (as told), z = 'z' mm (as told), 20 rows")
+
+
 def test_a_table_with_no_sample_left_is_refused(tmp_path: Path) -> None:
     refused(tmp_path, "x;z;valid\n1;1;0\n2;2;0\n", "samples", "2 of 2 rows are marked invalid")
     refused(tmp_path, "x;y;z\n1;1;nan\n2;2;\n", "samples", "2 of 2 rows lack a number")

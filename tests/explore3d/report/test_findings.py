@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from explore3d.report.findings import summary, warnings
-from mapping import Dropped, Posterior
+from mapping import Dropped, Posterior, place_text
 from mapping.detection.path import PathLedger
 from mapping.feature import Interval
 
@@ -117,6 +117,12 @@ def test_what_is_clear_of_the_noise_and_in_no_feature_is_said() -> None:
         "Warning: 2 detections clear of the noise became no feature, the plainest a step up of 0.6 mm"
     )
     assert "(20.0, 0.0, 1.0) mm: no line." in said
+
+
+def test_a_place_is_told_as_finely_as_the_tip_tells_places_apart() -> None:
+    point = np.array([1.5001e-3, 0.0, -1e-9])
+    assert place_text(point, 2e-6) == "(1.50010, 0.00000, 0.00000) mm"
+    assert place_text(point, 1e-2) == "(1.5, 0.0, 0.0) mm"
 
 
 def test_intervals_that_rest_on_a_chain_that_did_not_settle_are_said_not_to_be_trusted() -> None:

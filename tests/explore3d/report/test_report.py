@@ -11,17 +11,24 @@ from reported_wire import AXIS, BASE, HEIGHT, TIP, UP, crossing, ridge, sweeps
 
 from explore3d.analysis.result import Analysis, TipCount
 from explore3d.analysis.truth import TrueFeature, compare
+from explore3d.pictures import curvature_picture, extent_picture
+from explore3d.pictures.chart import FONT_SIZE
 from explore3d.report.pictures import Pictures
 from explore3d.report.report import report_page, write_report
 from mapping.base.base import Base
 from mapping.detection.detect import Detections
+from mapping.detection.path import PathLedger
+from mapping.estimate.envelope import estimate_surface
 from mapping.feature import Feature, Interval, LeftOut, Support
+from mapping.geometry.curvature import principal_curvatures
 from mapping.geometry.templates.shapes import chain_height
 from mapping.instrument.noise import Noise
 from mapping.model.conformity import Tolerance, judged
 from mapping.model.object_model import ObjectModel
 from mapping.surface import Surface
 from mapping.trace import Trace
+
+PAGE_WIDTH = 1155.0  # px, of a picture on a screen of 1200
 
 
 def analysis(features: tuple[Feature, ...] = (ridge(),), title: str = "A wire") -> Analysis:
@@ -181,3 +188,28 @@ def test_a_profile_is_drawn_as_a_profile(tmp_path: Path) -> None:
     text = words(write_report(whole, tmp_path).read_text())
     assert {each.stem for each in (tmp_path / "pictures").iterdir()} == {"profile", "sections"}
     assert "1 bump was found. It is 1.000 µm" in text and "Against the truth" not in text
+
+
+def test_the_picture_of_extents_says_the_length_that_the_table_says() -> None:
+    cut = replace(ridge(), length=Interval(0.04, 0.0393, 0.041, censored=True))
+    cut = replace(cut, details=replace(cut.details, axis_sd=np.full(len(cut.axis), 1e-5)))
+    picture = extent_picture([cut], [None])
+    assert picture is not None and "at least 39.3 mm long" in picture.decode()
+
+
+def test_the_path_inspected_is_one_number_on_the_page() -> None:
+    known = replace(analysis(), path=PathLedger(recorded=0.6, inspected=0.5))
+    page = words(report_page(known, Pictures({}), ()))
+    assert "500 mm of path inspected" in page and "500 mm of 600 mm of path recorded" in page
+    assert "550 mm" not in page  # what the detection takes for it, which counts a sweep's ends otherwise
+
+
+def test_letters_of_the_map_of_curvature_are_as_large_on_the_page_as_those_of_other_pictures() -> None:
+    estimate = estimate_surface(sweeps(), base=BASE)
+    assert estimate.surface is not None
+    curvature = principal_curvatures(estimate.surface)
+    drawing = ElementTree.fromstring(curvature_picture(estimate, curvature, TIP, BASE.surface, [ridge()]))
+    shown = PAGE_WIDTH / float(drawing.get("viewBox", "").split()[2])
+    titles = [each for each in drawing.iter("{http://www.w3.org/2000/svg}text") if "Principal" in (each.text or "")]
+    assert len(titles) == 2
+    assert all(float(each.get("font-size", "nan")) * shown > 0.9 * FONT_SIZE for each in titles)

@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from explore3d.errors import MeshFileError, UnitError
-from explore3d.scene.mesh_files import FORMATS, load_mesh
+from explore3d.errors import MeshFileError, SceneError, UnitError
+from explore3d.scene.begin import begin_scene
+from explore3d.scene.mesh_files import FORMATS, load_mesh, mesh_text
+from mapping import Surface
 
 TRIANGLE = "OFF\n3 1 0\n0 0 0\n10 0 0\n0 20 0\n3 0 1 2\n"
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(range(256))
@@ -91,3 +93,40 @@ def test_a_missing_file_a_folder_and_a_wrong_unit_are_told_apart(tmp_path: Path)
         load_mesh(tmp_path)
     with pytest.raises(UnitError, match="unknown unit of length 'mmm'"):
         load_mesh(written(tmp_path, "a.off", TRIANGLE), "mmm")
+
+
+def test_a_closed_solid_turned_inside_out_is_named_and_a_solid_with_a_hollow_is_not(tmp_path: Path) -> None:
+    import trimesh
+
+    outer, inner = trimesh.creation.box((60, 40, 20)), trimesh.creation.box((30, 20, 10))
+    inner.invert()
+    hollow = trimesh.util.concatenate([outer, inner])
+    load_mesh(written(tmp_path, "hollow.stl", hollow.export(file_type="stl")), "mm")
+    outer.invert()
+    with pytest.raises(MeshFileError, match="closed and its faces look inwards"):
+        load_mesh(written(tmp_path, "inverted.stl", outer.export(file_type="stl")), "mm")
+    lid_off = trimesh.Trimesh(outer.vertices, outer.faces[2:], process=False)
+    load_mesh(written(tmp_path, "bin.ply", lid_off.export(file_type="ply")), "mm")  # a bin, felt from inside
+
+
+def test_a_wrong_unit_a_hole_and_doubled_faces_are_seen_in_one_line(tmp_path: Path) -> None:
+    import trimesh
+
+    box = trimesh.creation.box((60, 40, 20))
+    path = written(tmp_path, "box.stl", box.export(file_type="stl"))
+    assert mesh_text(load_mesh(path, "mm")) == "60 mm x 40 mm x 20 mm, 12 faces, closed"
+    assert mesh_text(load_mesh(path, "m")).startswith("60 m x 40 m x 20 m")
+    apart = next(k for k in range(1, 12) if not set(box.faces[k]) & set(box.faces[0]))
+    holed = Surface(box.vertices, np.delete(box.faces, [0, apart], axis=0))
+    assert mesh_text(holed).endswith("10 faces, open, with 2 borders")
+    doubled = Surface(box.vertices, np.concatenate([box.faces, box.faces[:1]]))
+    assert mesh_text(doubled).endswith("13 faces, closed; 3 edges with more than two faces")
+
+
+def test_a_tip_out_of_proportion_is_told_in_fitting_units_and_the_units_are_doubted(tmp_path: Path) -> None:
+    import trimesh
+
+    box = trimesh.creation.box((0.06, 0.04, 0.02))
+    path = written(tmp_path, "metres.ply", box.export(file_type="ply"))
+    with pytest.raises(SceneError, match=r"tip\.radius: 5 mm for a body of 60 µm .* are the units of both the right"):
+        begin_scene(tmp_path / "mine", path, "mm", "5 mm")

@@ -15,6 +15,8 @@ from explore3d.log.own.reader import read_log
 from explore3d.log.own.writer import LogWriter
 from explore3d.scene.scene import load_scene
 from hw.move import Move
+from mapping import ObjectModel
+from mapping.base import Base
 
 MESHES = Path(__file__).parents[4] / "assets" / "meshes"
 R = 0.01
@@ -61,6 +63,23 @@ def test_a_mishap_is_told_from_what_is_there(session: Path) -> None:
     assert np.array_equal(found.approach, [0.0, 0.0, -1.0])
     untouched = reprobe(session, (x + 1e-3, 0.002, 0.0), touches=2)
     assert untouched.offsets == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_whether_it_moved_is_said_by_the_sessions_own_noise(session: Path) -> None:
+    place = (-0.01 + 200 * 3e-5, 0.002, 0.0)
+    assert reprobe(session, place).offset_sd is None  # nothing says how much noise there was
+    for white, correlated, said in (
+        (2e-4, 0.0, "no sign that it moved: "),
+        (1e-6, 1e-6, "it differs by more than noise: "),
+    ):
+        base = Base(load_scene(session / "scene.toml").base_surface())
+        noise = {"white": white, "correlated": correlated, "length": 1e-3}
+        ObjectModel.attach(base, [], provenance={"noise": noise}).save(session)
+        found = reprobe(session, place)
+        n = found.neighbours
+        assert found.offset_sd == pytest.approx(np.sqrt(white**2 * (1 / n + 1 / 3) + 2 * correlated**2))
+        assert found.record()["offset_sd"] == found.offset_sd
+        assert any(line.startswith(said) for line in found.lines())
 
 
 def test_the_touches_are_a_log_of_their_own(session: Path) -> None:

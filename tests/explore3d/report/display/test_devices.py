@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -13,8 +14,11 @@ import pytest
 from typer.testing import CliRunner
 
 from explore3d import UserError
+from explore3d.cli.display import vibrate
 from explore3d.cli.main import command_line
+from explore3d.cli.options import point
 from explore3d.report.display import devices, display_device
+from explore3d.scene import examples as all_examples, load_scene
 from hw.display import SimulatedDisplay
 from mapping import Feature, Interval, ObjectModel, Support, Surface
 from mapping.base import Base
@@ -77,6 +81,25 @@ def test_vibrate_writes_each_format(folder: Path) -> None:
         told = CliRunner().invoke(command_line(), ["vibrate", str(folder), "--path", path, "--out", str(out)])
         assert told.exit_code == 0 and "2 events" in told.stdout
         assert out.stat().st_size > 1000
+
+
+def test_a_crossing_of_nothing_is_called_that_and_the_helps_own_crosses(folder: Path) -> None:
+    beside = "-6 mm, 20 mm, 0 mm; 6 mm, 20 mm, 0 mm"
+    words = ["vibrate", str(folder), "--path", beside, "--out", str(folder / "a.wav")]
+    told = CliRunner().invoke(command_line(), words)
+    assert told.exit_code == 0 and "the path crosses no feature" in told.stdout and "amplitude" not in told.stdout
+    # the example of the help is over the example scene's plate, and crosses its wire
+    example = re.search(r'--path "(.*?)"', vibrate.__doc__ or "")
+    assert example is not None
+    scene = load_scene(all_examples()["wire_on_plate"].scene)
+    surface = scene.base_surface()
+    assert surface is not None
+    path = np.array([point("--path", each) for each in example[1].split(";")])
+    apart = np.linalg.norm(path - Base(surface).foot(path, 0.0).points, axis=1)
+    assert (apart < 5e-3).all()
+    start, end = np.array(scene.truth[0].axis)[[0, -1]]
+    sides = np.sign(np.cross(end - start, path - start) @ surface.face_normals[0])
+    assert sides[0] != sides[1]
 
 
 @pytest.mark.parametrize(
