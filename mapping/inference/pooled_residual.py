@@ -23,6 +23,7 @@ from mapping.geometry.mesh import spline_design
 from mapping.inference.families import PRECISE, PosteriorProblem, with_nominal_tip
 from mapping.inference.kinds import kind_of
 from mapping.inference.likelihood import LogPosterior
+from mapping.inference.sampler import linearised
 
 # Splines over the disturbance, to this many half-widths of it on either side: caps, bars and skirts differ over no less
 # than a fifth of a half-width
@@ -71,12 +72,12 @@ def pooled_residual(problem: PosteriorProblem, theta: FloatArray) -> PooledResid
     ways = [each for each in (section, _lengthwise(problem, theta, places) * section.any(axis=0)) if len(each)]
     if not len(section):
         return PooledResidual(1.0, 0.0, False, -np.inf)
-    residual, jacobian = _linearised(target, theta)
+    residual, slopes = linearised(target, theta)
     fits = []
     for columns in ways:
         white = _whitened(target, columns)
         white = np.pad(white, ((0, 0), (0, len(residual) - white.shape[1])))
-        chance, amplitudes = _score(residual, jacobian, white, OFF_BY * problem.sizes.height)
+        chance, amplitudes = _score(residual, slopes, white, OFF_BY * problem.sizes.height)
         fits.append((chance, float(np.abs(amplitudes @ columns).max())))
     # each of the two had its chance (Bonferroni)
     chance, worst = min(fits)
@@ -158,32 +159,20 @@ def _lengthwise(problem: PosteriorProblem, theta: FloatArray, places: FloatArray
     return np.array([trace * np.polynomial.legendre.Legendre.basis(degree)(places) for degree in degrees])
 
 
-def _linearised(target: LogPosterior, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Residual (m,) at the optimum, and its derivatives (P, m), priors as data."""
-    step = 0.1 * target.shape.step
-    up, down = np.minimum(theta + step, target.high), np.maximum(theta - step, target.low)
-    moved = np.tile(theta, (2 * len(theta) + 1, 1))
-    number = np.arange(len(theta))
-    moved[number, number], moved[number + len(theta), number] = up, down
-    residuals = target.residuals(moved)
-    span = np.maximum(up - down, np.finfo(float).tiny)[:, None]
-    return residuals[-1], (residuals[: len(theta)] - residuals[len(theta) : -1]) / span
-
-
 def _whitened(target: LogPosterior, columns: FloatArray) -> FloatArray:
     """(K, n) columns of heights as the likelihood sees them."""
     return target.likelihood.residuals(target.likelihood.window.height - columns)
 
 
-def _score(residual: FloatArray, jacobian: FloatArray, columns: FloatArray, prior: float) -> tuple[float, FloatArray]:
+def _score(residual: FloatArray, slopes: FloatArray, columns: FloatArray, prior: float) -> tuple[float, FloatArray]:
     """Chance of as large a score as that of the residual (m,) along columns (K, m), and their amplitudes (K,).
 
     The amplitudes' prior (standard deviation, m) keeps those small that the data hardly know.
     """
     from scipy.special import fdtrc
 
-    scale = np.linalg.norm(jacobian, axis=1, keepdims=True)
-    left, strength, _ = np.linalg.svd((jacobian / np.where(scale > 0.0, scale, 1.0)).T, full_matrices=False)
+    scale = np.linalg.norm(slopes, axis=0)
+    left, strength, _ = np.linalg.svd(slopes / np.where(scale > 0.0, scale, 1.0), full_matrices=False)
     own = left[:, strength > 1e-9 * strength.max(initial=1.0)]
     free = columns.T - own @ (own.T @ columns.T)
     basis, strength, turn = np.linalg.svd(free, full_matrices=False)

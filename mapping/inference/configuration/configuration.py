@@ -12,6 +12,7 @@ import numpy as np
 from mapping import Feature, FloatArray
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import crest_trace
+from mapping.inference.configuration.common_deviation import Deviation, Fitted, common_deviation
 from mapping.inference.configuration.joined_shape import JoinedShape
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood
 from mapping.inference.curves import HIGHEST_DEGREE
@@ -67,6 +68,7 @@ class Configuration:
         found: the optimum of all their parameters together, and the Gaussian there.
         level: number of the most likely one of the levels of misfit.
         log_odds: log of evidence times prior, up to one constant of the neighbourhood.
+        deviation: what all crossings of a detail show alike beyond its family.
     """
 
     parts: tuple[Part, ...]
@@ -74,6 +76,7 @@ class Configuration:
     found: Laplace
     level: int
     log_odds: float
+    deviation: Deviation
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -98,9 +101,11 @@ class Configuration:
 
     @property
     def fits(self) -> bool:
-        """True if what it leaves over is no more than noise and the least misfit."""
+        """True if what it leaves over is no more than noise, the least misfit, and what all crossings show alike."""
         white = self.place.levels[0][0].residuals(self.template[None])[0]
-        return (float(white @ white) - len(white)) / float(np.sqrt(2.0 * len(white))) < FITTING_EXCESS
+        return (float(white @ white) - self.deviation.explained - len(white)) / float(
+            np.sqrt(2.0 * len(white))
+        ) < FITTING_EXCESS
 
     @cached_property
     def as_narrow_as_wires(self) -> list[bool]:
@@ -184,7 +189,8 @@ def as_twin(part: Part, place: Neighbourhood, gap: float) -> Part:
 def laid(parts: Sequence[Part], place: Neighbourhood) -> Configuration:
     """The configuration of these parts as they begin, of no odds: what proposals may begin with."""
     theta = np.concatenate([np.zeros(0), *(part.start for part in parts)])
-    return Configuration(tuple(parts), place, Laplace(theta, np.zeros((0, 0)), -np.inf), len(place.levels) - 1, -np.inf)
+    nowhere = Laplace(theta, np.zeros((0, 0)), -np.inf)
+    return Configuration(tuple(parts), place, nowhere, len(place.levels) - 1, -np.inf, Deviation())
 
 
 def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | None = None) -> Configuration | None:
@@ -207,15 +213,18 @@ def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | N
         if level == before or not len(theta):
             break
     found = Laplace(theta, np.zeros((0, 0)), float(values[level] - constants[level]))
-    evidence = found.log_density
-    if len(theta):
-        found = laplace(LogPosterior(shape, place.levels[level][0]), theta, scanned=False)
-        evidence = found.log_evidence
+    evidence, deviation = found.log_density, Deviation()
     moved = tuple(Part(part.feature, part.shape, theta[own]) for part, own in zip(parts, shape.columns, strict=True))
+    if len(theta):
+        target = LogPosterior(shape, place.levels[level][0])
+        found = laplace(target, theta, scanned=False)
+        details = [Fitted(part.feature, part.shape, part.start) for part in moved]
+        deviation = common_deviation(details, target, PARTS_OF_BIN, place.around.trace.tip_radius)
+        evidence = found.log_evidence + deviation.log_factor
     plain = sum(_plain(part, found.covariance[own, own]) for part, own in zip(moved, shape.columns, strict=True))
     prior = sum(_log_prior(part, place) for part in parts)
     odds = evidence + float(constants[level]) - float(np.log(len(constants))) + plain + prior
-    return Configuration(moved, place, found, level, float(odds))
+    return Configuration(moved, place, found, level, float(odds), deviation)
 
 
 def _log_prior(part: Part, place: Neighbourhood) -> float:

@@ -66,7 +66,7 @@ class JoinedShape:
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights over the base's trace, m."""
         own = [theta[:, columns] for columns in self.columns]
-        hollows = [_Distinct.of(shape, own[k]) for k, shape in enumerate(self.shapes) if not _stands_out(shape)]
+        hollows = [_Distinct.of(shape, own[k]) for k, shape in enumerate(self.shapes) if not stands_out(shape)]
         felt = np.tile(sum((each.heights[0] for each in hollows), np.zeros(self.fine * self.bins)), (len(theta), 1))
         for hollow in hollows:
             felt[hollow.other] += hollow.heights[hollow.which[hollow.other]] - hollow.heights[0]
@@ -75,7 +75,7 @@ class JoinedShape:
         crests = [
             _Distinct.of(shape, _raised(shape, piece, lift + sunk))
             for k, shape in enumerate(self.shapes)
-            if _stands_out(shape)
+            if stands_out(shape)
             for piece, lift in [(own[k], np.zeros(len(theta))), *self._on_steps(k, own)]
         ]
         _rest_on(felt, crests, sunk)
@@ -178,7 +178,7 @@ def _first_above(s: FloatArray, values: FloatArray) -> FloatArray:
     return np.where(above[:, 0], -np.inf, np.where(above.any(axis=1), place, np.inf))
 
 
-def _stands_out(shape: Shape) -> bool:
+def stands_out(shape: Shape) -> bool:
     """True of what the ball rests on beside the base: crests, not steps nor hollows."""
     return "height" in shape.names and not isinstance(shape, StepShape)
 

@@ -15,14 +15,19 @@ if TYPE_CHECKING:
         Importance as Importance,
         importance_sample as importance_sample,
     )
-    from mapping.inference.sampler.laplace import Laplace as Laplace, find_optima as find_optima, laplace as laplace
+    from mapping.inference.sampler.laplace import (
+        Laplace as Laplace,
+        find_optima as find_optima,
+        laplace as laplace,
+        linearised as linearised,
+    )
     from mapping.inference.sampler.proposal import root_of as root_of
     from mapping.inference.sampler.psis import resample as resample
 
 _PUBLIC = {
     "ensemble": ("Chain", "sample_ensemble", "walkers_for"),
     "importance": ("Importance", "TRUSTED_K_HAT", "importance_sample"),
-    "laplace": ("Laplace", "find_optima", "laplace"),
+    "laplace": ("Laplace", "find_optima", "laplace", "linearised"),
     "proposal": ("root_of",),
     "psis": ("resample",),
 }

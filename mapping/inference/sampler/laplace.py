@@ -85,6 +85,11 @@ def laplace(target: LogPosterior, optimum: FloatArray, *, scanned: bool = True) 
     return Laplace(optimum, covariance, float(target.log_density(optimum[None])[0]))
 
 
+def linearised(target: LogPosterior, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Residuals (m,) at parameters (P,), priors as data, and their derivatives (m, P)."""
+    return _jacobian(target, theta, 0.1 * target.shape.step)
+
+
 def _descend(target: LogPosterior, start: FloatArray, iterations: int) -> FloatArray:
     low, high, scale = target.low, target.high, target.shape.step
     theta = np.clip(start, low, high)
