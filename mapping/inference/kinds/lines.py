@@ -103,7 +103,9 @@ class LineKind(Kind):
         """Pose the posterior.
 
         The trace decides how freely the axis bends over the base (BIC): few crossings cannot tell a gentle bend from
-        their own scatter, and one that a neighbour displaced fits bends that are not there.
+        their own scatter, and one that a neighbour displaced fits bends that are not there. A bend that does not pay
+        for itself is not none, though, and a course without it is stated too surely where it lies: the next bend is a
+        parameter as well, as large as may have been overlooked.
         """
         tip = around.trace.tip_radius
         sizes = sizes_of(feature, tip)
@@ -114,26 +116,34 @@ class LineKind(Kind):
         laid = replace(feature, axis=axis, normals=normals, evidence=replace(feature.evidence, crossings=crossings))
         beside = replace(around, others=[other for other in around.others if other is not feature])
 
-        def posed(most: int, least: int = 1) -> tuple[PosteriorProblem, int]:
-            shape, degree = self.shape_on(window, laid, beside, most, least)
+        def posed(most: int, least: int = 1, *, overlooked: bool = False) -> tuple[PosteriorProblem, int]:
+            shape, degree = self.shape_on(window, laid, beside, most, least, overlooked=overlooked)
             return pose(feature, sizes, shape, window, around, self._beginnings(shape, sizes)), degree
 
         best, asked = first = posed(HIGHEST_DEGREE)
         if len(axis) < 3:
             return best
-        least, costs = _cost(best), list[float]()
+        bends, least, costs = (HIGHEST_DEGREE, 1), _cost(best), list[float]()
         for degree in range(1, HIGHEST_DEGREE + 1):
             other, reached = first if degree == asked else posed(degree, degree)
             if reached < degree:
                 break
             costs.append(least if other is best else _cost(other))
-            best, least = (other, costs[-1]) if costs[-1] < least else (best, least)
+            if costs[-1] < least:
+                bends, best, least = (degree, degree), other, costs[-1]
             if len(costs) > FUTILE_DEGREES and min(costs[-FUTILE_DEGREES:]) >= min(costs[:-FUTILE_DEGREES]):
                 break
-        return best
+        return posed(*bends, overlooked=True)[0]
 
     def shape_on(
-        self, window: Window, feature: Feature, around: Surroundings, most: int = HIGHEST_DEGREE, least: int = 1
+        self,
+        window: Window,
+        feature: Feature,
+        around: Surroundings,
+        most: int = HIGHEST_DEGREE,
+        least: int = 1,
+        *,
+        overlooked: bool = False,
     ) -> tuple[LineShape, int]:
         """The family about a feature's axis of two points or more, over any window, and the degree of its course.
 
@@ -142,6 +152,7 @@ class LineKind(Kind):
             feature: of this kind.
             around: base, tip, and the neighbours that its ends may meet.
             most, least: degrees that its course may have.
+            overlooked: True if an open course has one bend more, of a size that its degree leaves out.
         """
         axis, normals, crossings = feature.axis, feature.normals, feature.evidence.crossings
         tip, sizes = around.trace.tip_radius, sizes_of(feature, around.trace.tip_radius)
@@ -152,10 +163,11 @@ class LineKind(Kind):
                 axis, normals, sizes.position_sd, most, least, around.base, tip, sizes.half_width
             )
         lift = normals_along(line, axis, normals)
-        chart = self._chart(line, lift, sizes, crossings, degree, around, bends=not window.flat)
+        spare = int(overlooked)
+        chart = self._chart(line, lift, sizes, crossings, degree + spare, around, bends=not window.flat)
         ends = chart.coordinates(axis[[0, -1]])[0]
-        modes = _modes(chart, ends, degree, crossings, sizes)
-        laterals, along = _laterals(modes, crossings, sizes), Parameters()
+        modes = _modes(chart, ends, degree, spare, crossings, sizes)
+        laterals, along = _laterals(modes, degree, len(window), crossings, sizes), Parameters()
         if self.has_ends and not chart.closed:
             along = _ends(ends, _end_limits(axis, chart, ends, feature, sizes, around), sizes)
         return self.shape(Traced(window, chart, modes, sizes, tip, laterals, along)), degree
@@ -224,14 +236,14 @@ def _axis_of(feature: Feature, sizes: Sizes, around: Surroundings) -> tuple[Floa
     return np.stack([axis[0] - half, axis[0] + half]), np.repeat(normals[:1], 2, axis=0), 1
 
 
-def _modes(chart: Chart, ends: FloatArray, degree: int, crossings: int, sizes: Sizes) -> CurveModes:
+def _modes(chart: Chart, ends: FloatArray, degree: int, spare: int, crossings: int, sizes: Sizes) -> CurveModes:
     if chart.closed:
         # Offsets of a ring whose coordinates have a degree have harmonics one higher: an ellipse differs from a
         # circle by the second.
         highest = max(0, min(degree + 1, (crossings - 1) // 2, HIGHEST_MODE))
         return CurveModes(highest, 0.5 * chart.length, 0.5 * chart.length, True)
     reach = max(0.5 * abs(float(ends[1] - ends[0])), 0.5 * sizes.half_width)
-    highest = min(max(degree, 1), max(crossings - 1, 1), HIGHEST_MODE)
+    highest = min(max(degree, 1) + spare, max(crossings - 1, 1), HIGHEST_MODE)
     return CurveModes(highest, float(ends.mean()), reach, False)
 
 
@@ -271,17 +283,25 @@ def _ends(places: FloatArray, limits: list[tuple[float, float]], sizes: Sizes) -
     )
 
 
-def _laterals(modes: CurveModes, crossings: int, sizes: Sizes) -> Parameters:
+def _laterals(modes: CurveModes, degree: int, bins: int, crossings: int, sizes: Sizes) -> Parameters:
     """Parameters of the course: within 1.5 half widths of where it was detected; the heading of a single crossing may
-    be anything to 60 degrees."""
+    be anything to 60 degrees.
+
+    The bend beyond the degree that was chosen is one that the criterion leaves out: with a standard deviation sd it may
+    be anything to sqrt(ln n) sd, n bins, which a normal law of that over sqrt(3) stands for. For c crossings side by
+    side (2 k + 1) / c of a crossing's variance are that of Legendre's coefficient k.
+    """
     bound = 1.5 * sizes.half_width
     priors: list[Prior] = []
-    for name in modes.names:
+    for k, name in enumerate(modes.names):
         if name == "offset":
             priors.append(Uniform(-bound, bound))
         elif name == "heading":
             limit = 1.7 if crossings < 2 else max(2.0 * bound / modes.reach, 0.1)
             priors.append(Uniform(-limit, limit))
+        elif not modes.closed and k > max(degree, 1):
+            sd = sizes.position_sd * np.sqrt((2 * k + 1) / crossings * np.log(bins) / 3.0)
+            priors.append(Normal(0.0, min(float(sd), 0.5 * sizes.half_width)))
         else:
             priors.append(Normal(0.0, 0.5 * sizes.half_width))
     step = tuple(float(each) for each in 0.02 * sizes.half_width * modes.scale)

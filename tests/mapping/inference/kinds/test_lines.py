@@ -10,6 +10,7 @@ from mapping.feature import Feature, Interval, Support
 from mapping.geometry.templates.shapes import chain_height
 from mapping.inference.families.problem import Surroundings
 from mapping.inference.feature_posterior import pose_problem, refine
+from mapping.inference.sampler import find_optima
 from mapping.instrument.noise import Noise
 from mapping.surface import Surface
 from mapping.trace import Trace
@@ -57,8 +58,21 @@ def test_a_crossing_that_was_pulled_aside_bends_nothing() -> None:
     pulled = course(0.0)[[0, 8, 16, 24, 33, 42, 51, 59]].copy()
     pulled[5:7, 1] += [0.9e-3, -0.4e-3]
     around = Surroundings(crossed(course(0.0)), PLATE, NOISE)
-    names = pose_problem(guess(pulled, 0.06e-3), around).target.shape.names
-    assert [name for name in names if name.startswith("bend")] == []
+    problem = pose_problem(guess(pulled, 0.06e-3), around)
+    names = problem.target.shape.names
+    assert [name for name in names if name.startswith("bend")] == ["bend 2"]  # the one that may have been overlooked
+    best = find_optima(problem.target, problem.beginnings[:1])[0]
+    assert abs(best[names.index("bend 2")]) < 0.06e-3
+
+
+def test_a_bend_may_have_been_overlooked_by_as_much_as_the_criterion_does_not_ask_for() -> None:
+    around = Surroundings(crossed(course(0.0)), PLATE, NOISE)
+    straight = np.linspace([-0.018, 0.0, 0.0], [0.018, 0.0, 0.0], 7)
+    shape = pose_problem(guess(straight, 0.06e-3), around).target.shape
+    number, bins = shape.names.index("bend 2"), len(shape.window)
+    # seven crossings of one doubt tell the coefficient of P2, whose mean square is 1/5, to within sqrt(5 / 7) of it
+    known = 0.06e-3 * np.sqrt(5.0 / 7.0)
+    assert shape.priors[number].sd == pytest.approx(known * np.sqrt(np.log(bins) / 3.0), rel=1e-9)
 
 
 @pytest.mark.slow
