@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         FloatArray as FloatArray,
         IntArray as IntArray,
         ShortArray as ShortArray,
+        read_only as read_only,
     )
     from mapping.assembly.assemble import assemble as assemble
     from mapping.base.base import Base as Base
@@ -72,7 +73,7 @@ if TYPE_CHECKING:
     from mapping.trace import Trace as Trace
 
 _PUBLIC = {
-    "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray", "ShortArray"),
+    "arrays": ("BoolArray", "ComplexArray", "FloatArray", "IntArray", "ShortArray", "read_only"),
     "assembly.assemble": ("assemble",),
     "base.base": ("Base",),
     "base.fit": ("fit_base",),

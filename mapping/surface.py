@@ -85,7 +85,7 @@ class Surface:
 
 
 def _checked_vertices(vertices: ArrayLike) -> FloatArray:
-    array = np.array(vertices, dtype=np.float64)
+    array = np.array(vertices, dtype=np.float64, order="C")
     if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
         raise SurfaceError(f"a mesh needs vertices of shape (V, 3), V >= 1; found shape {array.shape}")
     bad = ~np.isfinite(array).all(axis=1)
@@ -108,6 +108,6 @@ def _checked_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
         raise SurfaceError(
             f"mesh faces index vertices 0 to {vertex_count - 1}; found indices from {array.min()} to {array.max()}"
         )
-    array = array.astype(np.int64)
+    array = array.astype(np.int64, order="C")
     array.setflags(write=False)
     return array

@@ -154,13 +154,15 @@ def _failure(load: Callable[[], object]) -> str:
 
 
 def compile_kernels(quiet: bool) -> None:
-    """Explore an example and analyse tables in folders of their own; what was compiled stays in numba's cache.
+    """Explore an example, analyse tables in folders of their own and display a body; what was compiled stays in numba's
+    cache.
 
     So does Python's own bytecode, which an editable installation does not have and some environments do not write: 0.3
     of the 1.7 CPU s of a quick analysis went into compiling 350 files anew.
     """
     from compileall import compile_dir
 
+    from explore3d.bench.display import bench_stepping
     from explore3d.cli.progress import shown
     from explore3d.jobs import run
     from explore3d.jobs.batch import rehearse
@@ -170,6 +172,7 @@ def compile_kernels(quiet: bool) -> None:
         run(example(COMPILES).scene, Path(folder) / "out", progress=progress)
     load_sample_kernels()
     rehearse(quick=False)
+    next(bench_stepping([1000.0], 0.01))  # over a body that has details of every kind
     for package in (explore3d, planners, hw, mapping):
         compile_dir(package.__path__[0], quiet=2)
     with contextlib.suppress(OSError):  # where it cannot be written nothing was kept, either

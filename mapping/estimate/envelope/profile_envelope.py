@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapping import EnvelopeError, FloatArray, IntArray
+from mapping import EnvelopeError, FloatArray, IntArray, read_only
 
 # Share by which the bound of a search is widened: its rounding, and that of distances, is some 1e-16
 BOUND_ROUNDING = 1e-12
@@ -88,7 +88,7 @@ def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[Float
         from mapping.estimate.envelope.penetration_kernels import nearest_within
 
         laid, boxes = boxed()
-        return np.asarray(tip_radius - nearest_within(laid, boxes, np.ascontiguousarray(points), near))
+        return np.asarray(tip_radius - nearest_within(laid, boxes, read_only(points), near))
 
     return depth
 
@@ -97,12 +97,12 @@ def boxed_centers(centers: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The centres (M, 3) in an order in which neighbours lie together, and (K, 6) boxes about pieces of it."""
     from mapping.estimate.envelope.penetration_kernels import CENTERS_PER_BOX, boxes_of
 
-    laid = np.ascontiguousarray(centers)
+    laid = read_only(centers)
     steps = np.linalg.norm(np.diff(laid, axis=0), axis=1)
     if len(steps) and CENTERS_PER_BOX * np.median(steps) > 0.5 * float(np.ptp(laid, axis=0).max()):
         from scipy.spatial import cKDTree
 
-        laid = np.ascontiguousarray(laid[cKDTree(laid, leafsize=CENTERS_PER_BOX).indices])
+        laid = read_only(laid[cKDTree(laid, leafsize=CENTERS_PER_BOX).indices])
     return laid, boxes_of(laid)
 
 

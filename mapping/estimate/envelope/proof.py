@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import FloatArray, IntArray
+from mapping import FloatArray, IntArray, read_only
 from mapping.estimate.envelope.profile_envelope import boxed_centers
 from mapping.estimate.sweeps import unit
 
@@ -51,23 +51,24 @@ class Balls:
         """
         from mapping.estimate.envelope.proof_kernels import proven_reach, rings
 
-        starts, ring = rings(np.ascontiguousarray(faces), len(spot))
+        nothing = np.zeros((0, 3))
+        starts, ring = rings(read_only(faces), len(spot))
         below, above = np.empty((2, len(points)))
         proven_reach(
-            np.ascontiguousarray(points),
-            np.ascontiguousarray(owners),
-            np.ascontiguousarray(spot),
+            read_only(points),
+            read_only(owners),
+            read_only(spot),
             starts,
             ring,
-            np.ascontiguousarray(self.centers),
+            read_only(self.centers),
             *boxed_centers(self.centers),
-            np.ascontiguousarray(self.sweep),
-            unit(self.outward),
-            np.zeros((0, 3)) if across is None else np.ascontiguousarray(across),
-            self.tip_radius,
-            self.slack,
-            np.zeros((0, 3)) if self.known is None else np.ascontiguousarray(self.known),
-            enough,
+            read_only(self.sweep),
+            read_only(unit(self.outward)),
+            read_only(nothing if across is None else across),
+            float(self.tip_radius),
+            float(self.slack),
+            read_only(nothing if self.known is None else self.known),
+            float(enough),
             below,
             above,
         )

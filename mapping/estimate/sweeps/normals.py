@@ -39,7 +39,8 @@ def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple
         else cross_slope(trace.centers, along, outward, rows, _curves(trace, row, rows))
     )
     lost = np.flatnonzero(np.isnan(slope.doubt))
-    slope.tangents[lost], slope.doubt[lost] = _fitted(trace, lost, along[lost], outward[lost])
+    if len(lost):
+        slope.tangents[lost], slope.doubt[lost] = _fitted(trace, lost, along[lost], outward[lost])
     across = slope.tangents[row.nearest]
     ends, continued = at_kinks(trace, row, slope.tangents)
     across[ends] = continued

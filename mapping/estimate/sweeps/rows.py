@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray
+
+# Places along a line from which its distance to another is taken
+PROBES = 65
 
 
 def parallel_rows(points: FloatArray, sweep: IntArray) -> list[IntArray] | None:
@@ -14,12 +18,17 @@ def parallel_rows(points: FloatArray, sweep: IntArray) -> list[IntArray] | None:
     rows = _of_each(sweep)
     if len(rows) < 2 or min(len(row) for row in rows) < 2:
         return None
-    found = []
-    for order in (rows, _across(points, rows)):
-        distances = [_distance_beside(points[first], points[second]) for first, second in pairwise(order)]
-        if not np.isnan(distances).any():
-            found.append((sum(distances) * (1 - 1e-9 * (order is rows)), order))
-    return min(found, key=lambda pair: pair[0])[1] if found else None
+    beside, as_felt = _Beside([points[row] for row in rows]), [*range(len(rows))]
+    found: list[tuple[float, list[int]]] = []
+    for order in (as_felt, _across(points, rows)):
+        total = 0.0
+        for first, second in pairwise(order):
+            total += beside.distance(first, second)
+            if np.isnan(total):
+                break  # explored crosswise: the first pair or two tell
+        else:
+            found.append((total * (1 - 1e-9 * (order is as_felt)), order))
+    return [rows[k] for k in min(found, key=lambda pair: pair[0])[1]] if found else None
 
 
 def _of_each(sweep: IntArray) -> list[IntArray]:
@@ -29,25 +38,42 @@ def _of_each(sweep: IntArray) -> list[IntArray]:
     return [each[k] for k in np.argsort(first)]
 
 
-def _across(points: FloatArray, rows: list[IntArray]) -> list[IntArray]:
-    """Rows sorted by their middle along the direction in which the middles spread most."""
+def _across(points: FloatArray, rows: list[IntArray]) -> list[int]:
+    """Numbers of the rows, sorted by their middle along the direction in which the middles spread most."""
     middles = np.array([points[row].mean(axis=0) for row in rows])
     spread = np.linalg.svd(middles - middles.mean(axis=0), full_matrices=False)[2][0]
-    return [rows[k] for k in np.argsort(middles @ spread, kind="stable")]
+    return [int(k) for k in np.argsort(middles @ spread, kind="stable")]
 
 
-def _distance_beside(first: FloatArray, second: FloatArray) -> float:
-    """Usual distance of two polylines that run side by side; NaN if they do not keep one distance or meet."""
-    from scipy.spatial import cKDTree
+class _Beside:
+    """How far polylines are apart: each has one tree, and what a pair was asked for once is known."""
 
-    probes = first[np.linspace(0, len(first) - 1, min(len(first), 65)).astype(int)]
-    distance = cKDTree(second).query(probes)[0]
-    usual = float(np.median(distance))
-    back = cKDTree(first).query(second[np.linspace(0, len(second) - 1, min(len(second), 65)).astype(int)])[0]
-    near, far = min(np.min(distance), np.min(back)), max(np.quantile(distance, 0.8), np.quantile(back, 0.8))
-    reach = np.linalg.norm(first[-1] - first[0])
-    beside = usual > 0 and near > 0.2 * usual and far < 2.5 * usual and (reach == 0 or usual < 2 * reach + far)
-    return usual if beside else float("nan")
+    def __init__(self, lines: list[FloatArray]) -> None:
+        self.lines = lines
+        self._trees: dict[int, Any] = {}
+        self._ways: dict[tuple[int, int], tuple[float, float, float]] = {}
+
+    def distance(self, first: int, second: int) -> float:
+        """Usual distance of two lines that run side by side; NaN if they do not keep one distance or meet."""
+        (usual, near, far), (_, near_back, far_back) = self._way(first, second), self._way(second, first)
+        near, far = min(near, near_back), max(far, far_back)
+        reach = np.linalg.norm(self.lines[first][-1] - self.lines[first][0])
+        beside = usual > 0 and near > 0.2 * usual and far < 2.5 * usual and (reach == 0 or usual < 2 * reach + far)
+        return usual if beside else float("nan")
+
+    def _way(self, first: int, second: int) -> tuple[float, float, float]:
+        """Distances from places along one line to another: usual, least, and the one that a fifth is beyond."""
+        from scipy.spatial import cKDTree
+
+        if (first, second) not in self._ways:
+            if second not in self._trees:
+                self._trees[second] = cKDTree(self.lines[second])
+            line = self.lines[first]
+            places = np.linspace(0, len(line) - 1, min(len(line), PROBES)).astype(int)
+            distance = self._trees[second].query(line[places])[0]
+            told = float(np.median(distance)), float(np.min(distance)), float(np.quantile(distance, 0.8))
+            self._ways[first, second] = told
+        return self._ways[first, second]
 
 
 def pitch(points: FloatArray, sweep: IntArray) -> float:

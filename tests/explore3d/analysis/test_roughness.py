@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from changed_scans import NOISE, TIP, changed_pair
+from changed_scans import NOISE, PITCH, TIP, scan
 from in_process import explore3d_main
 
 from explore3d.analysis import Stages, build_model
@@ -34,8 +34,14 @@ def raster(rows: int = 25, columns: int = 500, step: float = 4e-6) -> Log:
     return Log(Trace(1e-3 * np.arange(len(centers)), centers, np.repeat(np.arange(rows), columns), TIP))
 
 
+def profile(crests: int) -> Log:
+    """A profile of nine pitches over so many crests."""
+    places = PITCH * (2.5 + 2.0 * np.arange(crests))
+    return scan(places, np.full(crests, 1e-6), np.random.default_rng(3), count=9)
+
+
 def test_a_profile_is_as_rough_as_its_noise_beside_the_crests() -> None:
-    log = changed_pair(3, 8, 5).first
+    log = profile(crests=3)
     found = build_model(log, None, None, Stages(quick=True, forced=("roughness",), cutoffs=(0.08e-3, None))).roughness
     assert found is not None and found.sections >= 5 and found.short_cutoff == 2.5e-6
     white = build_model(log, None, None, Stages(quick=True, forced=("roughness",), cutoffs=(0.08e-3, 1e-6))).roughness
@@ -67,7 +73,7 @@ def test_the_command_prints_a_table_and_refuses_what_it_cannot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "a.csv"
-    centers = 1e3 * changed_pair(3, 8, 5).first.trace.centers[:, [0, 2]]
+    centers = 1e3 * profile(crests=1).trace.centers[:, [0, 2]]
     np.savetxt(path, centers, delimiter=",", header="x [mm],z [mm]", comments="", fmt="%.9f")
     words = ["roughness", path, "--tip-radius", f"{TIP} m", "--cutoff"]
     assert explore3d_main(monkeypatch, *words, "0.08 mm") == 0

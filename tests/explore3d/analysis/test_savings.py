@@ -208,19 +208,42 @@ def test_savings_are_labelled_as_estimates_and_only_given_where_there_is_one():
     assert saved == ["about 4.2 s (estimated: 2.1 times the detection)", "", "3 s (measured)"]
 
 
-FORBIDDEN = {
-    "nothing found": {"emcee", "matplotlib", "plotly", "open3d", "trimesh", "igl", "serial"},
-    "a wire": {"emcee", "matplotlib", "plotly", "open3d", "serial"},
+# What is done in one process, what it must load, and what it must not
+LOADED = {
+    "nothing found": (
+        "from explore3d.analyze import analyze; analyze({bare!r})",
+        "mapping.detection.detect",
+        {"emcee", "matplotlib", "plotly", "open3d", "trimesh", "igl", "serial"},
+    ),
+    "a flat base planned over": (
+        "from explore3d.bench.scenes import plate; from planners.explore import Explore;"
+        "next(Explore(base=plate(0.03), tip_radius=0.01, smallest=3e-4).plan())",
+        "planners.survey.level_field",
+        {"igl"},
+    ),
+    "a wire": (
+        "analyze({wired!r})",
+        "mapping.estimate.envelope.envelope",
+        {"emcee", "matplotlib", "plotly", "open3d", "serial"},
+    ),
 }
 
 
-@pytest.mark.parametrize("case", list(FORBIDDEN))
-def test_positions_alone_load_nothing_that_only_contact_data_chains_or_viewers_need(record, wired, case):
-    path = record(flat, 0.1e-3) if case == "nothing found" else wired[0]
-    code = f"import sys; from explore3d.analyze import analyze; analyze({str(path)!r}); print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert "mapping.detection.detect" in loaded
-    assert not FORBIDDEN[case] & set(loaded)
+@pytest.fixture(scope="module")
+def loaded(record: Record, wired: tuple[Path, Analysis]) -> dict[str, list[str]]:
+    """All modules that one process has loaded after each."""
+    bare = record(flat, 0.1e-3)
+    code = "; ".join(f"{what}; print(*sys.modules)" for what, _, _ in LOADED.values())
+    code = f"import sys; {code.format(bare=str(bare), wired=str(wired[0]))}"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    return dict(zip(LOADED, (line.split() for line in told.splitlines()), strict=True))
+
+
+@pytest.mark.parametrize("case", LOADED)
+def test_positions_alone_load_nothing_that_only_contact_data_chains_geodesics_or_viewers_need(loaded, case):
+    _, needed, needless = LOADED[case]
+    assert needed in loaded[case]
+    assert not needless & set(loaded[case])
 
 
 def test_a_flat_base_needs_no_geodesics_and_they_would_space_the_sweeps_alike():
@@ -240,13 +263,3 @@ def test_a_flat_base_needs_no_geodesics_and_they_would_space_the_sweeps_alike():
     # its level sets lie as far apart as those of a coordinate
     assert np.abs(distance - straight).max() < 0.05 * straight.max()
     assert _slope(flat_mesh.vertices, flat_mesh.faces, flat_mesh.vertices[:, 0]) == pytest.approx(1.0)
-
-
-def test_planning_over_a_flat_base_loads_no_geodesics():
-    code = (
-        "import sys; from explore3d.bench.scenes import plate; from planners.explore import Explore;"
-        "next(Explore(base=plate(0.03), tip_radius=0.01, smallest=3e-4).plan()); print(*sys.modules)"
-    )
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert "planners.survey.level_field" in loaded
-    assert "igl" not in loaded

@@ -25,7 +25,7 @@ def test_lines_become_a_table_csv_json_and_a_picture(tmp_path):
     lines = [
         bench.measure(method, body, 400, 0.0)
         for body in bench.BODIES_OF_KNOWN_CURVATURE
-        for method in ("explore3d", "libigl, 2 rings")
+        for method in ("plain jet, degree 4, 48 points", "libigl, 2 rings")
     ]
     assert len(list(bench.curvature_table(lines))) == 5
     files = bench.write_bench(lines, tmp_path / "new")

@@ -7,6 +7,7 @@ import json
 import math
 import re
 import shlex
+from functools import cache
 from inspect import signature
 from pathlib import Path
 
@@ -144,12 +145,17 @@ def test_a_wrong_call_is_refused_with_status_2(
 def test_a_plan_is_told_in_words_and_as_json(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
+    from explore3d import jobs
+
+    plan_into = cache(jobs.plan_into)  # told twice, planned once
+    monkeypatch.setattr(jobs, "plan_into", lambda scene, *others: plan_into(scene, tmp_path / "plan"))
     assert explore3d_main(monkeypatch, "plan", SCENES / "step.toml", "--out", tmp_path / "plan") == 0
     words = capsys.readouterr().out
     assert "no move breaks a limit" in words
     assert (tmp_path / "plan" / "plan.png").read_bytes().startswith(b"\x89PNG")
     assert explore3d_main(monkeypatch, "plan", SCENES / "step.toml", "--json") == 0
     record = json.loads(capsys.readouterr().out)
+    assert record == json.loads((tmp_path / "plan" / "plan.json").read_text())
     # the plate is 100 x 60 mm: sweeps whose strips are 2 x reach wide must cover it
     swept = sum(2 * record["reach"] * _length(move["path"]) for move in record["moves"])
     assert swept > 0.95 * 0.100 * 0.060

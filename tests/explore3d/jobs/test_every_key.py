@@ -189,6 +189,18 @@ def concluded(scene: Scene) -> Any:
     return told((analysis.title, analysis.truth, analysis.judgements))
 
 
+@cache
+def tables_of(text: str, schema: type[BaseModel]) -> dict[str, Any]:
+    """What a scene says, in the words of the schema that reads it."""
+    return parse_scene(text, "scene.toml", files_from=[MESHES]).model_dump(mode="json", by_alias=True)
+
+
+@cache
+def seen(text: str, schema: type[BaseModel], looks: Callable[[Scene], Any]) -> Any:
+    """What is seen of a scene as it is, which all its keys are held against."""
+    return looks(parse_scene(text, "scene.toml", files_from=[MESHES]))
+
+
 def has_effect(key: Key, info: FieldInfo, looks: Callable[[Scene], Any]) -> bool:
     """True if some other value of a key changes what is seen of some scene.
 
@@ -196,13 +208,11 @@ def has_effect(key: Key, info: FieldInfo, looks: Callable[[Scene], Any]) -> bool
     """
     accepted, refused = 0, 0
     for text in SCENES.values():
-        scene = parse_scene(text, "scene.toml", files_from=[MESHES])
-        tables = scene.model_dump(mode="json", by_alias=True)
+        tables = tables_of(text, scene_file.Scene)
         try:
             value = value_at(tables, key)
         except KeyError:
             continue
-        before = None
         for other in others(value, info):
             try:
                 after = looks(
@@ -212,8 +222,7 @@ def has_effect(key: Key, info: FieldInfo, looks: Callable[[Scene], Any]) -> bool
                 refused += 1
                 continue
             accepted += 1
-            before = looks(scene) if before is None else before
-            if after != before:
+            if after != seen(text, scene_file.Scene, looks):
                 return True
     assert accepted or refused, f"{'.'.join(key)}: no scene of this test has the key; add one"
     assert accepted or choices(info.annotation), f"{'.'.join(key)}: this test has no other value for it; add one"

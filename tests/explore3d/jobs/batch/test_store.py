@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from shutil import copytree
 from typing import Any
 
 import pyarrow.parquet as pq
@@ -29,6 +30,14 @@ def filled(path: Path, numbers: range) -> Store:
     return store
 
 
+@pytest.fixture(scope="module")
+def many(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of as many runs as are put together; to be copied, not changed."""
+    path = tmp_path_factory.mktemp("store")
+    filled(path, range(PACKED_FROM))
+    return path
+
+
 def rows(path: Path, table: str) -> list[dict[str, Any]]:
     return [row for file in sorted((path / table).glob("*.parquet")) for row in pq.read_table(file).to_pylist()]
 
@@ -39,8 +48,9 @@ def test_what_stands_there_is_known_to_whoever_opens_it_next(tmp_path: Path) -> 
     assert f"{2:016x}" in store and f"{3:016x}" not in store and store.status(f"{2:016x}") == "done"
 
 
-def test_many_loose_runs_are_put_together_and_lose_nothing(tmp_path: Path) -> None:
-    store = filled(tmp_path, range(PACKED_FROM))
+def test_many_loose_runs_are_put_together_and_lose_nothing(many: Path, tmp_path: Path) -> None:
+    copytree(many, tmp_path, dirs_exist_ok=True)
+    store = Store(Folder(tmp_path))
     store.add(run(1000, "refused"), [])
     before = sorted(map(str, rows(tmp_path, "runs"))), sorted(map(str, rows(tmp_path, "features")))
     assert store.pack() == PACKED_FROM and store.pack() == 0
@@ -76,8 +86,10 @@ class Fragile(Folder):
 
 
 @pytest.mark.parametrize("changes", [0, 1, 2, 3, 4, 17, 50])
-def test_a_kill_while_runs_are_put_together_is_mended_by_the_next_to_open(tmp_path: Path, changes: int) -> None:
-    filled(tmp_path, range(PACKED_FROM))
+def test_a_kill_while_runs_are_put_together_is_mended_by_the_next_to_open(
+    many: Path, tmp_path: Path, changes: int
+) -> None:
+    copytree(many, tmp_path, dirs_exist_ok=True)
     with pytest.raises(Killed):
         Store(Fragile(tmp_path, changes)).pack()
     store = Store(Folder(tmp_path))

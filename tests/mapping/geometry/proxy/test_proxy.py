@@ -55,7 +55,7 @@ def bell_form(scale: float, exponent: float) -> Form:
         out = np.empty((1, len(x)))
         half = 0.5 * float(width_at_half_height(scale, exponent))
         size = [np.array([each]) for each in (0.2e-3, half, 1.0 / exponent)]
-        smooth_point_heights(x[:, None], y[:, None], np.zeros(2), np.zeros((1, 2)), *size, r, out)
+        smooth_point_heights(np.c_[x], np.c_[y], np.zeros(2), np.zeros((1, 2)), *size, r, out)
         return np.asarray(out[0])
 
     return form
@@ -68,7 +68,7 @@ def bar_form(top: float, run: float) -> Form:
         nothing, out = np.zeros((len(x), 1)), np.empty((1, len(x)))
         corners = np.array([[0.5 * top, 0.5 * top + run]]), np.array([[0.2e-3, 0.0]])
         section_heights(
-            nothing, x[:, None], np.zeros((0, len(x), 1)), nothing, nothing, np.zeros((1, 0)),
+            nothing, np.c_[x], np.zeros((0, len(x), 1)), nothing, nothing, np.zeros((1, 0)),
             np.array([[-1e300, 1e300]]), *corners, r, out,
         )  # fmt: skip
         return np.asarray(out[0])
