@@ -20,9 +20,14 @@ from explore3d.analysis import Stages, build_model
 from explore3d.bench.scenes import TRUE_FAMILIES, section_body, section_trace
 from explore3d.log import Log
 from mapping import Feature, Interval
+from mapping.inference.configuration import in_words
 
-# What each judgement of a trial's line means
+# What a trial's line may be judged to be: right; right as far as anybody can tell, for what is true is among what was
+# said to make 90 %; and wrong
 JUDGED_RIGHT = ("true", "bounded", "flagged")
+JUDGED_OPEN = ("undecided",)
+JUDGED_WRONG = ("wrong", "miscounted", "missed")
+STATED_SHARE = 0.9
 
 
 def bench_sections(
@@ -65,7 +70,8 @@ def section_trial(body: str, noise: str, seed: int) -> dict[str, Any]:
     judged = {"height": _judged(main.height, (truth.height,) * 2), "width": _judged(main.width, truth.widths)}
     flagged = is_flagged(main)
     if record["kinds"] != truth.count * [truth.kind]:
-        whole = "flagged" if flagged else "miscounted"
+        stated = is_stated(features, truth.count * [truth.kind])
+        whole = "flagged" if flagged else "undecided" if stated else "miscounted"
     elif "wrong" in judged.values():
         whole = "flagged" if flagged else "wrong"
     else:
@@ -86,6 +92,15 @@ def is_flagged(feature: Feature) -> bool:
     return feature.details.misfit is not None
 
 
+def is_stated(features: Sequence[Feature], kinds: Sequence[str]) -> bool:
+    """True if these kinds are among the likeliest of what the features were said to be, to 90 % together."""
+    told = {feature.details.account for feature in features}
+    (account,) = told if len(told) == 1 else (None,)
+    shares = dict(account or ())
+    true = shares.get(in_words(kinds), 0.0)
+    return true > 0.0 and sum(share for share in shares.values() if share > true) < STATED_SHARE
+
+
 def _judged(interval: Interval, truth: tuple[float, float]) -> str:
     """Whether the interval holds one of the true values ("true"), or is a bound that they keep to, or is "wrong"."""
     if interval.censored:
@@ -100,10 +115,11 @@ def section_lines(records: Sequence[dict[str, Any]]) -> Iterator[str]:
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for record in records:
         groups.setdefault((record["body"], record["noise"]), []).append(record)
-    yield "section,noise,trials,right %,true,bounded,flagged,wrong,miscounted,missed,covered %,bias %,posterior s"
+    judged = (*JUDGED_RIGHT, *JUDGED_OPEN, *JUDGED_WRONG)
+    yield ",".join(["section", "noise", "trials", "right %", *judged, "covered %", "bias %", "posterior s"])
     for (body, noise), some in groups.items():
         counts = {name: sum(each["judged"] == name for each in some) for name in JUDGED_RIGHT}
-        rest = {name: sum(each["judged"] == name for each in some) for name in ("wrong", "miscounted", "missed")}
+        rest = {name: sum(each["judged"] == name for each in some) for name in JUDGED_OPEN + JUDGED_WRONG}
         shares = [100.0 * sum(counts.values()) / len(some), *counts.values(), *rest.values()]
         sized = [each for each in some if "sizes" in each and not each["sizes"]["height"][3]]
         covered = 100.0 * float(np.mean([each["height_judged"] == "true" for each in sized])) if sized else np.nan

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from explore3d.bench import bench_sections, section_lines, section_trial
+from explore3d.bench.posterior.counts import drawn
 from explore3d.bench.scenes import FIRST_BUILT_WITH, SECTION_BODIES, dilated, section_body
+from explore3d.bench.sections import JUDGED_OPEN, JUDGED_RIGHT, is_stated
 from mapping.geometry.templates import cap_height
 
 SEED = FIRST_BUILT_WITH + 1  # five sweeps
@@ -36,15 +39,31 @@ def test_a_bar_gets_its_height_and_bounds_of_its_width(tmp_path: Path) -> None:
     # what is in the store is not run again
     assert list(bench_sections(["trapezoid"], ["white"], range(SEED, SEED + 1), store)) == [record]
     lines = list(section_lines([record]))
-    assert lines[1].startswith("trapezoid,white,1,100,0,1,0,0,0,0,100,")
+    assert lines[1].startswith("trapezoid,white,1,100,0,1,0,0,0,0,0,100,")
     assert lines[-1] == "remarks on sections of a family that the house has: 0 of 1"
+
+
+def test_what_was_said_to_be_likely_is_undecided_and_no_error() -> None:
+    feature = drawn(np.random.default_rng(0))
+
+    def said(*account: tuple[str, float]) -> list:
+        return [replace(feature, details=replace(feature.details, account=account or None))] * 2
+
+    close = said(("two ridges", 0.55), ("one ridge", 0.4), ("one groove", 0.05))
+    assert is_stated(close, ["ridge"]) and is_stated(close, ["ridge", "ridge"]) and not is_stated(close, ["groove"])
+    assert not is_stated(close, ["bump"])
+    assert not is_stated(said(("two ridges", 0.95), ("one ridge", 0.05)), ["ridge"])
+    # a further feature that nobody doubts is one too many
+    assert not is_stated([*close, feature], ["ridge"]) and not is_stated(said(), ["ridge"])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("body", [name for name in SECTION_BODIES if name != "rectangle"])
 def test_no_line_gets_sizes_that_are_wrong_and_sure(body: str) -> None:
+    # whether a bar with filleted edges or two wires 1 mm apart this noise lets nobody tell (theory, section 5.3)
+    open_ = JUDGED_OPEN if body == "filleted" else ()
     record = section_trial(body, "white", SEED)
-    assert record["judged"] in ("true", "bounded", "flagged"), record
+    assert record["judged"] in JUDGED_RIGHT + open_, record
 
 
 def test_a_line_that_grows_is_remarked_upon() -> None:
