@@ -50,6 +50,7 @@ from explore3d.analysis.truth import compare
 from explore3d.log import Log, stop_of
 from explore3d.scene import Scene, SimulatedFingerTable
 from mapping.base import Base
+from mapping.geometry.mesh import algebra_in_one_thread
 
 
 def _never(work: Work) -> bool:
@@ -84,6 +85,7 @@ METHOD = (
 )
 
 
+@algebra_in_one_thread()
 def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages) -> Analysis:
     """From samples to the annotated model.
 
