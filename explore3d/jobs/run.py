@@ -157,6 +157,8 @@ def _explore(
             session.settle()  # there is no earlier log, or nothing in it
         if hasattr(finger, "notice"):
             finger.notice = log.felt  # a slow sweep's samples are on disk before it ends
+        if hasattr(finger, "waiting"):
+            finger.waiting = lambda what: stages.progress(what, 0.0)
         touch: Callable[[Move], Trace] = finger.execute
         if replay is not None:
             log.event("resumed", {"samples": replay.samples})

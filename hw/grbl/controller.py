@@ -51,6 +51,9 @@ ANOTHERS_LINE = (
     "a line that this program did not send was refused (error:9): another program, or a pendant, sends lines to the "
     "controller; end it, check the machine's position and run again with --resume"
 )
+HELD_BY_SOMEBODY = "the machine is held, or its door open: let it go on (cycle start, ~), or end with Ctrl-C"
+# A hold that lasts so many s is told of: those of our own are over, with the retreat, within one
+SHORTEST_TOLD_HOLD = 2.0
 # What is sent as one, where it is said that it was refused
 A_JOG = "a jog"
 
@@ -139,6 +142,8 @@ class GrblController:
         self._from: FloatArray | None = None  # where the last motion that was sent ends; None: to be asked
         self._anew = True  # the next motion begins from a stand
         self._jogged = False  # jogs were sent that it may not have looked at
+        self.waiting: Callable[[str], None] | None = None
+        self._held: Patience | None = None  # runs out when a hold has lasted long enough to be told of
         self._moves_until = -np.inf  # at the latest, if nothing stops it, but for one ramp
 
     # connection
@@ -333,6 +338,19 @@ class GrblController:
         """True while the operator holds the machine or its door is open."""
         return bool(self.reports) and self.reports[-1].status.state in ("Hold", "Door")
 
+    def _wait_for_operator(self, patience: Patience) -> None:
+        """While the machine is held the clock stands; who listens is told once a hold what would end it.
+
+        A line disturbed on its way to the machine may hold it, too (`!`): then nobody knows that he is waited for.
+        """
+        if not self.paused:
+            self._held = None
+            return
+        patience.at_least(1.0)
+        self._held = self._held or Patience(SHORTEST_TOLD_HOLD)
+        if self.waiting is not None and self._held.left > 0.0 and self._held.over():
+            self.waiting(HELD_BY_SOMEBODY)
+
     def position(self) -> FloatArray:
         """(3,) machine position now, m."""
         return self.machine_position(self.status())
@@ -517,8 +535,7 @@ class GrblController:
             if idle > UNANSWERED:
                 self._sent.clear()  # their answers were lost, or they were
                 self._from = None
-            if self.paused:
-                patience.at_least(1.0)
+            self._wait_for_operator(patience)
             if patience.over():
                 raise LinkError(f"{self.link.port}: the motion does not end within {within:g} s")
             time.sleep(0.1 * POLL)
@@ -780,8 +797,7 @@ class GrblController:
                     raise _Unanswered(f"{self.link.port}: no answer while waiting for {what}; use a shielded cable")
             if self.link.heard != heard:
                 heard, silence = self.link.heard, Patience(stale)
-            if self.paused:
-                patience.at_least(1.0)  # by the operator: the clock stands
+            self._wait_for_operator(patience)
             if patience.over() or silence.over():
                 silent = f"{time.monotonic() - self.link.heard:.1f} s of silence while waiting for {what}"
                 raise LinkError(

@@ -65,6 +65,7 @@ class GrblFinger:
         home: send $H on connecting. MOVES the machine; needs `armed`.
         baudrate: of the port.
         notice: told of what was touched within a second of it: so that a log has it before the sweep ends.
+        waiting: told in words when the machine waits for somebody, as while it is held.
         beside: a context that lives as long as the connection (an emulator).
     """
 
@@ -86,6 +87,7 @@ class GrblFinger:
     ask: Callable[[str], None] | None = None
     baudrate: int = 115200
     notice: Callable[[Trace], None] | None = None
+    waiting: Callable[[str], None] | None = None
     beside: AbstractContextManager[Any] = field(default_factory=nullcontext)
     _stage: GuardedStage | None = field(init=False, default=None, repr=False)
     _open: ExitStack = field(init=False, repr=False, default_factory=ExitStack)
@@ -110,6 +112,7 @@ class GrblFinger:
         with ExitStack() as undo:
             undo.enter_context(self.beside)
             controller = GrblController(self.port, baudrate=self.baudrate)
+            controller.waiting = lambda text: self.waiting(text) if self.waiting is not None else None
             self._signals = undo.enter_context(StopOnSignal(controller.halt))
             undo.callback(controller.close)
             controller.open()

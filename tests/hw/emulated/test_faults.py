@@ -71,6 +71,8 @@ def survive(fault: Fault, slide: bool, folder: Path) -> str:
             over_travel=1e-4,
             **touch,
         )
+        # a garbled byte may hold the machine (`!`), and only somebody beside it can let it go on
+        finger.waiting = lambda what: stage.receive(b"~", stage.motion.time)
         with ExitStack() as stack:
             log = stack.enter_context(LogWriter(folder / "log.mcap", tip_radius=R))
             try:

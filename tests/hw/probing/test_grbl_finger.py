@@ -139,6 +139,24 @@ def test_a_locked_machine_is_refused_with_the_remedy_and_unlocked_only_when_told
         assert stage.state == "Idle"
 
 
+def test_whoever_holds_the_machine_is_told_that_it_waits_for_him() -> None:
+    told: list[str] = []
+    with machine() as (server, stage), pecker(server) as finger:
+        whole = len(finger.execute(across(x=0.005)))
+
+        def hold(_: Trace) -> None:
+            finger.notice = None
+            stage.receive(b"!", stage.motion.time)
+
+        def go_on(what: str) -> None:
+            told.append(what)
+            stage.receive(b"~", stage.motion.time)
+
+        finger.notice, finger.waiting = hold, go_on
+        assert len(finger.execute(across(x=0.005))) == whole
+    assert len(told) == 1 and "cycle start" in told[0]
+
+
 def test_work_offsets_and_inches_do_not_move_where_it_probes() -> None:
     results = []
     for prepare in ((), ("G10L2P2X10Y-20Z5", "G55", "G92X1Y2Z3"), ("$13=1",), ("$10=2",)):
