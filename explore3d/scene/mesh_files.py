@@ -41,12 +41,22 @@ def load_mesh(path: Path | str, units: str = "m") -> Surface:
         raise MeshFileError(
             f"{path}: the mesh is empty ({len(vertices)} vertices, {len(faces)} faces); at least one triangle is needed"
         )
-    if complaint := _no_body(vertices * factor, faces):
-        raise MeshFileError(f"{path}: {complaint}")
     try:
-        return Surface(vertices * factor, faces)
+        surface = Surface(vertices * factor, faces)
     except SurfaceError as error:
         raise MeshFileError(f"{path}: {error}") from error
+    return checked_mesh(path, surface)
+
+
+def checked_mesh(path: Path | str, surface: Surface) -> Surface:
+    """The surface that a file holds, or that memory holds by its name.
+
+    Raises:
+        MeshFileError: it can be no body's, as for `load_mesh`.
+    """
+    if complaint := _no_body(surface.vertices, surface.faces):
+        raise MeshFileError(f"{path}: {complaint}")
+    return surface
 
 
 def mesh_text(surface: Surface) -> str:
@@ -70,8 +80,6 @@ def mesh_text(surface: Surface) -> str:
 
 def _no_body(vertices: np.ndarray, faces: np.ndarray) -> str:
     """Why vertices (m) and faces can be no body's surface, "" if nothing speaks against it."""
-    if not np.isfinite(vertices).all() or faces.min() < 0 or faces.max() >= len(vertices):
-        return ""  # the surface itself says that
     size = float(np.ptp(vertices, axis=0).max())
     if not SMALLEST_BODY <= size <= LARGEST_BODY:
         possible = f"possible: {SMALLEST_BODY:g} to {LARGEST_BODY:g} m"

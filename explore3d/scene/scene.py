@@ -14,7 +14,7 @@ from pydantic import ConfigDict, Field, PrivateAttr, SerializeAsAny, ValidationE
 from explore3d import MeshFileError, SceneError, UnitError
 from explore3d.scene.complaint import complaint
 from explore3d.scene.finger import FingerTable, Setting, finger_table
-from explore3d.scene.mesh_files import load_mesh
+from explore3d.scene.mesh_files import checked_mesh, load_mesh
 from explore3d.scene.named_files import NamedFiles, with_files
 from explore3d.scene.to_toml import scene_text
 from explore3d.scene.values import (
@@ -321,14 +321,13 @@ class Scene(Table):
         return self.model_copy(update={"finger": finger})
 
     def _surface(self, field: str, mesh: Path, units: str) -> Surface:
-        if mesh in self._meshes:
-            return self._meshes[mesh]
-        if self._is_recorded:
+        held = self._meshes.get(mesh)
+        if held is None and self._is_recorded:
             raise SceneError(
                 f"{self._path}: {field}: {mesh} is named by a recording; only a scene's own files are read"
             )
         try:
-            surface = load_mesh(mesh, units)
+            surface = load_mesh(mesh, units) if held is None else checked_mesh(mesh, held)
         except (MeshFileError, UnitError) as error:
             raise SceneError(f"{self._path}: {field}: {error}") from error
         self.check_size(field, float(np.ptp(surface.vertices, axis=0).max()))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from explore3d import UserError
 from explore3d.bench.exploration import exploring as bench_explore
 from explore3d.bench.scenes.bodies import tube
 from explore3d.bench.scenes.exploring import SCENES, misplaced
@@ -16,6 +18,7 @@ from explore3d.jobs.plan import plan_scene
 from explore3d.jobs.run import run, scene_finger
 from explore3d.scene.scene import load_scene
 from mapping.geometry.mesh.nearest import NearestPoint
+from mapping.surface import Surface
 
 
 def test_every_tube_is_closed_and_has_the_volume_of_a_capsule() -> None:
@@ -37,6 +40,23 @@ def test_the_features_of_a_scene_lie_on_its_base_within_what_the_finger_can_reac
     tallest = max((feature.height for feature in scene.truth), default=0.0)
     assert (scene.object.bounds[1] <= high + max(tallest, 0.0) + off).all()
     assert scene.shortest_ridge is None or all(span(f.axis) > scene.shortest_ridge for f in scene.truth)
+
+
+@pytest.mark.parametrize("name", sorted(SCENES))
+def test_a_bench_scene_has_meshes_that_a_scene_file_may_have(name: str) -> None:
+    scene = bench_explore.bench_scene(SCENES[name](np.random.default_rng(1)), "explore", 1)
+    with scene_finger(scene) as finger:
+        assert finger.tip_radius == scene.tip.radius
+    assert (scene.base_surface() is None) == (name in ("unknown fold", "unknown form"))
+
+
+def test_a_mesh_in_memory_is_refused_as_one_in_a_file_is() -> None:
+    body = SCENES["groove"](np.random.default_rng(1))
+    faces = body.object.faces.copy()
+    faces[-8:] = faces[-8:, ::-1]  # the groove's walls look into the plate
+    turned = replace(body, object=Surface(body.object.vertices, faces))
+    with pytest.raises(UserError, match="join an outer side to an inner one"):
+        scene_finger(bench_explore.bench_scene(turned, "explore", 1))
 
 
 def test_a_misplaced_body_is_moved_with_its_features_by_3_mm_and_2_degrees() -> None:
