@@ -3,43 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from struck_machine import BAUD, FRAME, machine_over, plate
+from struck_machine import FRAME, standing_machine
 
 from hw.emulated.gcode import Block, GcodeError
-from hw.emulated.grbl import GrblEmulator
-from hw.emulated.pty_server import PtyServer
-from hw.emulated.wire import Wire
 from hw.errors import FingerError, StoppedError
-from hw.grbl.controller import GrblController
 from hw.grbl.guarded_stage import GuardedStage
 
 # Grbl's motors stand on steps of 4 um
 STEP = 4e-6
 
 
-@contextmanager
-def machine(latency: float = 0.0) -> Iterator[tuple[GrblEmulator, GrblController]]:
-    """A controller that stands high over a plate, where it was homed."""
-    stage = machine_over(plate(), 0.02)
-    with PtyServer([stage], wires={0: Wire(BAUD, latency)}) as server:
-        controller = GrblController(server.ports[0])
-        controller.open()
-        controller.vouch()
-        try:
-            yield stage, controller
-        finally:
-            controller.close()
-    assert server.error is None, server.error
-
-
 @pytest.mark.parametrize("latency", [0.0, pytest.param(5e-3, marks=pytest.mark.slow)])
 def test_a_thousand_jogs_arrive_where_the_last_was_to_end(latency: float) -> None:
-    with machine(latency) as (stage, controller):
+    with standing_machine(latency) as (stage, controller):
         begun = controller.resting_position()
         for number in range(1, 1001):
             controller.jog(begun + number * np.array([3.333e-6, -1.111e-6, 2.2222e-6]), 5e-3)
@@ -50,7 +29,7 @@ def test_a_thousand_jogs_arrive_where_the_last_was_to_end(latency: float) -> Non
 
 
 def test_a_jog_that_is_refused_in_the_midst_of_others_is_made_up_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    with machine() as (stage, controller):
+    with standing_machine(0.0) as (stage, controller):
         jog, refused = stage._jog, []
 
         def jog_but_once(block: Block) -> None:  # grblHAL between two jogs: its state is Run for some milliseconds
@@ -70,7 +49,7 @@ def test_a_jog_that_is_refused_in_the_midst_of_others_is_made_up_for(monkeypatch
 
 
 def test_a_jog_that_leads_nowhere_is_refused_out_loud(monkeypatch: pytest.MonkeyPatch) -> None:
-    with machine() as (stage, controller):
+    with standing_machine(0.0) as (stage, controller):
 
         def beyond(block: Block) -> None:
             raise GcodeError(15)
@@ -83,7 +62,7 @@ def test_a_jog_that_leads_nowhere_is_refused_out_loud(monkeypatch: pytest.Monkey
 
 
 def test_a_jog_whose_line_was_lost_is_made_up_for_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    with machine() as (stage, controller):
+    with standing_machine(0.0) as (stage, controller):
         lost = bytearray()
         receive = stage.receive
 
@@ -107,7 +86,7 @@ def test_a_jog_whose_line_was_lost_is_made_up_for_and_no_more(monkeypatch: pytes
 @pytest.mark.parametrize("how", ["move", *(pytest.param(how, marks=pytest.mark.slow) for how in ("jog", "probe"))])
 def test_a_machine_that_restarts_before_a_motion_goes_no_further_than_it_was_sent(how: str) -> None:
     """The restart is not heard of: the motion is written before the greeting arrives."""
-    with machine(latency=0.2) as (stage, controller):
+    with standing_machine(latency=0.2) as (stage, controller):
         begun = controller.resting_position()
         stage.power_cycle()  # takes where it stands for zero
         target = begun + np.array([-1e-4, 0.0, -2e-4])

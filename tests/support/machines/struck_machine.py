@@ -14,6 +14,7 @@ from hw.emulated.grbl import GrblEmulator
 from hw.emulated.pty_server import PtyServer
 from hw.emulated.stage import PROBE_FAULTS
 from hw.emulated.touched_body import TouchedBody
+from hw.emulated.wire import Wire
 from hw.grbl.controller import GrblController
 from hw.grbl.frame import StageFrame
 from mapping.surface import Surface
@@ -53,10 +54,13 @@ def machine_over(surface: Surface, height: float) -> GrblEmulator:
 
 
 @contextmanager
-def standing_machine() -> Iterator[tuple[GrblEmulator, GrblController]]:
-    """A controller that stands high over a plate, where it was homed."""
+def standing_machine(latency: float | None = None) -> Iterator[tuple[GrblEmulator, GrblController]]:
+    """A controller that stands high over a plate, where it was homed.
+
+    Over a line of 115200 baud with some latency, s, if one is told; else without a line.
+    """
     stage = machine_over(plate(), 0.02)
-    with PtyServer([stage]) as server:
+    with PtyServer([stage], wires={} if latency is None else {0: Wire(BAUD, latency)}) as server:
         controller = GrblController(server.ports[0])
         controller.open()
         controller.vouch()
