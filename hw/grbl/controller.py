@@ -52,7 +52,8 @@ ANOTHERS_LINE = (
     "controller; end it, check the machine's position and run again with --resume"
 )
 HELD_BY_SOMEBODY = "the machine is held, or its door open: let it go on (cycle start, ~), or end with Ctrl-C"
-# A hold that lasts so many s is told of: those of our own are over, with the retreat, within one
+# A hold that lasts so many s is told of: who holds the machine and lets it go on sooner knows it. Those of our own are
+# not waited for here, but end with what they stop (halt)
 SHORTEST_TOLD_HOLD = 2.0
 # What is sent as one, where it is said that it was refused
 A_JOG = "a jog"
@@ -142,7 +143,7 @@ class GrblController:
         self._from: FloatArray | None = None  # where the last motion that was sent ends; None: to be asked
         self._anew = True  # the next motion begins from a stand
         self._jogged = False  # jogs were sent that it may not have looked at
-        self.waiting: Callable[[str], None] | None = None
+        self.waiting: Callable[[str], None] | None = None  # told in words when it waits for somebody
         self._held: Patience | None = None  # runs out when a hold has lasted long enough to be told of
         self._moves_until = -np.inf  # at the latest, if nothing stops it, but for one ramp
 

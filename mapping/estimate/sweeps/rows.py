@@ -9,7 +9,8 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray
 
-# Places along a line from which its distance to another is taken
+# Places along a line from which its distance to another is taken: the distance that a fifth of them lie beyond is then
+# that of a fifth of the line to within 5 % of it (binomial)
 PROBES = 65
 
 

@@ -60,7 +60,7 @@ def test_what_was_said_to_be_likely_is_undecided_and_no_error() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("body", [name for name in SECTION_BODIES if name != "rectangle"])
 def test_no_line_gets_sizes_that_are_wrong_and_sure(body: str) -> None:
-    # whether a bar with filleted edges or two wires 1 mm apart this noise lets nobody tell (theory, section 5.3)
+    # whether five sweeps crossed a bar with filleted edges or two crests this noise lets nobody tell (theory, 5.3)
     open_ = JUDGED_OPEN if body == "filleted" else ()
     record = section_trial(body, "white", SEED)
     assert record["judged"] in JUDGED_RIGHT + open_, record
