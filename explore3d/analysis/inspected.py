@@ -29,7 +29,8 @@ class Inspected:
     Args:
         height: (F,) m: a sharp crest at least so high anywhere on the face would have been found; infinity where
             no sweep passed within a tip radius.
-        place, area: (N,) the same at places all over the surface, m, and what each stands for, m^2.
+        place, area: (N,) the same at places all over the surface, m, and what each stands for, m^2; without those
+            where a fitted base goes on beyond what was felt.
         limit: height found where a sweep crosses it, m.
         probability: with which all this holds.
         asked: height of the smallest feature that the scene asks for, m, or None.
@@ -53,6 +54,11 @@ class Inspected:
         if not np.isfinite(limit):
             places = places[:0]
         found = found_heights(base.surface, places, trace.tip_radius, limit)
+        # what a fit added beyond the samples is no part of a body that was asked to be inspected
+        told = np.isfinite(found.place)
+        if told.any():
+            told[~told] = ~base.beyond(found.points[~told], trace.tip_radius)
+            return cls(found.face, found.place[told], found.area[told], limit, detections.probability, asked)
         return cls(found.face, found.place, found.area, limit, detections.probability, asked)
 
     def share(self, height: float) -> float:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 
+import numpy as np
+
 from explore3d import count_text
 from explore3d.analysis import ABSORBED, FAILED, Analysis, swept_share
 from mapping import Feature, length_text, place_text
@@ -52,7 +54,7 @@ def summary(analysis: Analysis) -> list[str]:
     account = analysis.account
     if features:
         lines[0] += f", {finer} of them finer than the tip of {length_text(analysis.trace.tip_radius)}"
-    lines = [*(f"read as: {line}" for line in analysis.model.provenance.get("read_as", [])), *lines]
+    lines = [*read_lines(analysis), *lines]
     if analysis.recovered:
         lines.append(analysis.recovered)
     more = (
@@ -71,6 +73,15 @@ def summary(analysis: Analysis) -> list[str]:
         *warnings(analysis),
         *([account.sentence()] if account is not None else []),
     ]
+
+
+def read_lines(analysis: Analysis) -> list[str]:
+    """How the tables were read, and how far their samples reach: a wrong unit is seen by it at once."""
+    read_as = [f"read as: {line}" for line in analysis.model.provenance.get("read_as", [])]
+    if not read_as:
+        return []
+    reach = " x ".join(length_text(float(each)) for each in np.ptp(analysis.trace.centers, axis=0))
+    return [*read_as, f"extent of the samples: {reach}"]
 
 
 def account_lines(analysis: Analysis) -> list[str]:

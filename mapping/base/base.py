@@ -10,9 +10,14 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapping import FloatArray, IntArray, Surface
+from mapping import BoolArray, FloatArray, IntArray, Surface
 from mapping.geometry.mesh import MovedNearestPoint, NearestPoint
 from mapping.instrument import neighbour_scatter, robust_sd
+
+# The mesh of a fitted base goes on so many tip radii beyond the samples: every ball that felt it stands over its inside
+FIT_MARGIN = 2.0
+# Places of a surface closer together than this hang together, in tip radii; a sweep's own strip is 1.8 wide
+HANGING = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +80,38 @@ class Base:
     def known(self) -> bool:
         """True of a given mesh and of a base that predicted further sweeps: what it does not explain is a feature."""
         return self.kind == "mesh" or self.missed is not None
+
+    def beyond(self, bare: FloatArray, tip_radius: float) -> BoolArray:
+        """(N,) True of places that a fit has added beyond what was felt: nobody knows of a body there.
+
+        They hang together with the border. A given model has none: its border is the body's.
+
+        Args:
+            bare: (N, 3) places all over what no sweep came near, m.
+        """
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+        from scipy.spatial import cKDTree
+
+        face, corner = np.nonzero(self.surface.open_sides)
+        if self.kind == "mesh" or not len(face) or not len(bare):
+            return np.zeros(len(bare), dtype=bool)
+        ends = self.surface.vertices[self.surface.faces]
+        start, stop = ends[face, corner - 2], ends[face, corner - 1]
+        # a fit's triangles are alike, and so are the distances of places on them: some tell all
+        some = bare[:: 1 + len(bare) // 1000]
+        spacing = float(np.median(np.asarray(cKDTree(bare).query(some, k=[2])[0]))) if len(bare) > 1 else 0.0
+        apart = max(HANGING * tip_radius, 3.0 * spacing)
+        cells, number = np.unique(np.round(bare / (0.5 * apart)), axis=0, return_inverse=True)
+        cells *= 0.5 * apart
+        pairs = cKDTree(cells).query_pairs(apart, output_type="ndarray")
+        graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(cells), len(cells)))
+        part = connected_components(graph, directed=False)[1]
+        longest = float(np.linalg.norm(stop - start, axis=1).max())
+        along = np.linspace(0.0, 1.0, 1 + int(np.ceil(2.0 * longest / apart)))[:, None, None]
+        border = (start + along * (stop - start)).reshape(-1, 3)
+        at_border = np.isfinite(cKDTree(border).query(cells, distance_upper_bound=apart)[0])
+        return np.asarray(np.isin(part, part[at_border])[number.ravel()])
 
     @property
     def levels(self) -> FloatArray:

@@ -125,7 +125,7 @@ def _bounded(normals: FloatArray, offsets: FloatArray, cloud: Cloud) -> tuple[Fl
     from scipy.optimize import linprog
     from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-    low, high = cloud.extent + 2.0 * cloud.tip_radius * np.array([[-1.0], [1.0]])
+    low, high = cloud.extent + cloud.margin * np.array([[-1.0], [1.0]])
     everything = np.vstack([normals, np.eye(3), -np.eye(3)])
     limits = np.concatenate([offsets, high, -low])
     # the middle of the largest ball inside

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from mapping import FloatArray, IntArray, Surface, Trace
-from mapping.base.base import FitValue
+from mapping.base.base import FIT_MARGIN, FitValue
 from mapping.base.cells import Cells
 from mapping.base.profiles import SHORTEST_BEND
 from mapping.geometry.mesh import spline_design
@@ -78,6 +78,11 @@ class Cloud:
     def floor(self) -> float:
         """The scale, but no less than rounding errors, m."""
         return max(self.scale, 1e-12 * float(np.abs(self.points).max()), float(np.finfo(float).tiny))
+
+    @property
+    def margin(self) -> float:
+        """By which a base goes on beyond the points, m."""
+        return FIT_MARGIN * self.tip_radius
 
     @property
     def extent(self) -> FloatArray:
@@ -163,7 +168,7 @@ def _height_mesh(
 ) -> Surface:
     """A grid over the cloud's extent, moved one tip radius inward along the sheet's normals."""
     low, high = cloud.extent
-    margin = 2.0 * cloud.tip_radius
+    margin = cloud.margin
     ends = [(float(low[i]) - margin, float(high[i]) + margin) for i in range(2)]
     u, v = (np.linspace(*end, 1 + max(cells, pieces_of(end[1] - end[0], spacing))) for end in ends)
     # Beyond the data a polynomial says nothing: the sheet goes on straight from its border.
@@ -333,7 +338,7 @@ def _cylinder_mesh(
 ) -> Surface:
     """A tube over the cloud's length; its facets stay within a millionth of the radius (20 with a spacing)."""
     height = (cloud.points - point) @ direction
-    margin = 2.0 * cloud.tip_radius
+    margin = cloud.margin
     helper = np.eye(3)[np.abs(direction).argmin()]
     u = np.cross(direction, helper)
     u /= np.linalg.norm(u)

@@ -78,7 +78,7 @@ def _pipe(
     spacing: float | None,
 ) -> Surface:
     """The tube that the ball touches; beyond the centres it goes straight on."""
-    margin = 2.0 * cloud.tip_radius
+    margin = cloud.margin
     low, high = ends[0] - margin, ends[1] + margin
     rings = max(RINGS, pieces_of(high - low, spacing))
     level = np.repeat(np.linspace(low, high, rings + 1), CORNERS_AROUND)

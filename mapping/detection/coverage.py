@@ -59,11 +59,13 @@ class FoundHeights:
         face: (F,) anywhere on each face, m.
         place: (N,) at each of many places all over the surface, m.
         area: (N,) that each place stands for, m^2.
+        points: (N, 3) the places, m.
     """
 
     face: FloatArray
     place: FloatArray
     area: FloatArray
+    points: FloatArray
 
 
 def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limit: float) -> FoundHeights:
@@ -84,7 +86,7 @@ def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limi
 
     if not len(touched):
         nowhere = np.full(len(surface.faces), np.inf)
-        return FoundHeights(nowhere, nowhere, surface.face_areas)
+        return FoundHeights(nowhere, nowhere, surface.face_areas, surface.vertices[surface.faces].mean(axis=1))
     step = 0.06 * tip_radius
     while _sample_count(surface, step) > MOST_FACE_SAMPLES:
         step *= 1.5  # a coarser answer is a more cautious one
@@ -99,7 +101,7 @@ def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limi
     lost[passed] = distance[passed] ** 2 / (tip_radius + np.sqrt(tip_radius**2 - distance[passed] ** 2))
     worst = np.zeros(len(surface.faces))
     np.maximum.at(worst, owner, lost)
-    return FoundHeights(limit + worst, limit + lost, (surface.face_areas / parts**2)[owner])
+    return FoundHeights(limit + worst, limit + lost, (surface.face_areas / parts**2)[owner], points)
 
 
 def found_probability(

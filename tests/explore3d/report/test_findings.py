@@ -84,6 +84,16 @@ def test_each_feature_has_a_line_with_its_intervals() -> None:
     assert cut.endswith("length at least 40 mm")
 
 
+def test_a_table_says_how_it_was_read_and_how_far_its_samples_reach() -> None:
+    found = analysis()
+    found.model.provenance["read_as"] = ["x = 'X' mm, z = 'Z' mm, 2 rows in 1 sweep"]
+    found.trace.centers = np.array([[0.0, 0.0, 1e-3], [4.8e-3, 0.0, 1.014e-3]])
+    assert summary(found)[:2] == [
+        "read as: x = 'X' mm, z = 'Z' mm, 2 rows in 1 sweep",
+        "extent of the samples: 4.8 mm x 0 mm x 14 µm",
+    ]
+
+
 def test_a_recovered_log_is_mentioned() -> None:
     assert "12 samples lost" in summary(analysis(recovered="12 samples lost"))
 

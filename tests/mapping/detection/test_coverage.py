@@ -11,6 +11,7 @@ from explore3d.analysis.inspected import Inspected
 from hw.simulated.finger import SimulatedFinger
 from mapping import length_text
 from mapping.base.base import Base
+from mapping.base.fit import fit_base
 from mapping.detection.coverage import found_heights, found_probability
 from mapping.detection.detect import detect
 from mapping.geometry.templates.shapes import cap_height
@@ -82,6 +83,24 @@ def test_a_survey_inspects_what_it_was_asked_for() -> None:
     assert part.share(part.limit) < 0.01
     assert part.share(half_of_it) == pytest.approx(0.5 * (1.0 - part.untouched), rel=0.01)
     assert f"on half of it above {length_text(half_of_it, 2)} and on nine tenths" in unasked.sentence()
+
+
+def test_what_a_fit_added_beyond_the_samples_is_not_called_unswept_but_a_gap_amid_them_is() -> None:
+    finger = SimulatedFinger(object=plate(), tip_radius=R, rate=2000.0, white=1e-4, seed=1)
+    sweeps = Survey(base=Base(plate()), tip_radius=R, smallest=4e-4).sweeps()
+    trace = Trace.concatenate([finger.execute(move) for move in sweeps])
+    gap = np.abs(trace.centers[:, :2] - 0.03).max(axis=1) < 1.5 * R
+    # what lies behind the gap is another sweep, as the ledger of the path would have it
+    quarter = (trace.centers[:, :2] > 0.03) @ [1000, 2000]
+    behind = replace(trace, sweep=trace.sweep + quarter).select(~gap)
+    for felt, least, most in ((trace, 0.0, 0.001), (behind, 0.02, (3 * R) ** 2 / 0.06**2)):
+        base = fit_base(felt)
+        assert base.kind == "plane"
+        untouched = Inspected.of(felt, base, detect(felt, base), 4e-4).untouched
+        assert least <= untouched < most
+    # a mesh that was given is the body, to its border
+    assert not Base(base.surface).beyond(base.surface.vertices, R).any()
+    assert base.beyond(base.surface.vertices, R).all()
 
 
 def test_the_share_that_was_passed_does_not_depend_on_how_large_the_faces_are():
