@@ -63,6 +63,7 @@ def left(analysis: Analysis) -> dict[str, LeftOut]:
     return {each.stage: each for each in analysis.left_out}
 
 
+@pytest.mark.slow
 def test_a_regular_posterior_needs_no_long_chain_and_one_changes_it_by_less_than_a_third_of_its_width(wired):
     path, short = wired
     assert "k-hat" in left(short)["long chain"].reason

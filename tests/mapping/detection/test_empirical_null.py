@@ -55,6 +55,7 @@ def found(law: Callable[[np.random.Generator], FloatArray], seed: int, height: f
     return detect(trace, PLATE, false_alarms_per_metre=1.0)
 
 
+@pytest.mark.slow
 def test_a_path_without_noise_is_no_quieter_than_rounding() -> None:
     def every_other_silent(rng: np.random.Generator) -> FloatArray:
         return white(rng) * (np.arange(SWEEPS) % 2)[:, None]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import pytest
+
 from explore3d.bench.display import bench_stepping, stepping_body, stepping_lines
 
 
+@pytest.mark.slow
 def test_the_body_is_as_large_as_asked_and_the_clock_is_kept() -> None:
     body = stepping_body()
     assert len(body.parts) == 20 and len(body.base.surface.faces) == 20_000

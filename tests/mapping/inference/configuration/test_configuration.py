@@ -25,8 +25,10 @@ from mapping.inference.configuration.proposals import smoother, straight_lines
 from mapping.inference.families import Surroundings
 from mapping.instrument import Noise
 
+SLOW_PAIRS = [pytest.param(body, marks=pytest.mark.slow) for body in ("acute crossing", "wire over a step")]
 
-@pytest.mark.parametrize("body", ["wires 2 mm apart", "acute crossing", "flat bar", "wire over a step"])
+
+@pytest.mark.parametrize("body", ["wires 2 mm apart", "flat bar", *SLOW_PAIRS])
 def test_neighbours_are_told_apart_and_a_bar_is_not_taken_for_two(body: str) -> None:
     result = trial(body, "apparatus", "two ways", FIRST_BUILT_WITH)
     assert result["right"], result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from mapping import FloatArray
 from mapping.base import Base
@@ -50,6 +51,7 @@ def guess(kind: str, axis: FloatArray, length: float) -> Feature:
     return Feature(kind, axis, np.tile(UP, (len(axis), 1)), *sizes, Support(200.0, 9), True, 0.05e-3)
 
 
+@pytest.mark.slow
 def test_a_cosine_groove_has_its_width_and_length_and_no_remark() -> None:
     feet, sweep = lines(12e-3, 13)
     beyond = np.maximum(np.abs(feet[:, 0]) - 0.5 * LENGTH, 0.0)
