@@ -103,7 +103,7 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
 
 def _result(work: Work) -> Analysis:
     """What the stages led to, and what they cost."""
-    log, scene, trace, truth, stages = work.log, work.scene, work.trace, work.truth, work.stages
+    log, scene, trace, truth, stages = work.log, work.scene, work.laid, work.truth, work.stages
     simulated = scene is not None and isinstance(scene.finger, SimulatedFingerTable)
     model = replace(work.model, left_out=tuple(stages.left_out), timings=dict(stages.timings))
     return Analysis(

@@ -73,7 +73,7 @@ class Analysis:
 
     Args:
         title: of the report.
-        trace: every sample that was used.
+        trace: every sample that was used, on its base.
         base: the global model.
         detections: what the detectors said, with noise and detection limit.
         model: the annotated model.

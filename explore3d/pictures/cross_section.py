@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import BoolArray, Feature, FloatArray, IntArray, Interval, Trace
-from mapping.base import Base, over_levels
+from mapping.base import Base, LaidTrace, over_levels
 from mapping.detection import Crossing
 from mapping.estimate.envelope import Estimate
 from mapping.estimate.sweeps import BRIDGED
@@ -76,7 +76,7 @@ def cross_section(
     window = _window(feature, crossing, trace)
     if len(window) == 0:
         return None
-    feet = base.foot(trace.centers[window], trace.tip_radius)
+    feet = LaidTrace.of(trace, base).feet(window)
     x, beside = _place(feature, feet.points, feet.normals)
     half = max(half_width(feature, trace.tip_radius), 0.0 if crossing is None else crossing.half_width)
     near = (np.abs(x) < SECTION_REACH * half) & (beside < half)

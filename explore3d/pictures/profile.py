@@ -9,7 +9,7 @@ import numpy as np
 from explore3d.pictures.chart import DASHED, Panel, sheet
 from explore3d.pictures.figure import ESTIMATED, INK, MUTED, TRACED
 from mapping import Feature, FloatArray, Trace, length_text, length_unit
-from mapping.base import Base
+from mapping.base import Base, LaidTrace
 
 PROFILE_WIDTH = 1060.0  # px
 PROFILE_HEIGHT = 300.0  # of each of its two panels, px
@@ -26,7 +26,7 @@ def profile_picture(trace: Trace, base: Base, features: Sequence[Feature], limit
         features: what was found.
         limit: detection limit, m; drawn if finite.
     """
-    feet = base.foot(trace.centers, trace.tip_radius)
+    feet = LaidTrace.of(trace, base).feet()
     origin, heading = profile_line(trace)
     x = (trace.centers - origin) @ heading
     up = feet.normals.mean(axis=0)

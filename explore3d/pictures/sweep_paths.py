@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from mapping import BoolArray, Feature, FloatArray, Trace
-from mapping.base import Base
+from mapping.base import Base, LaidTrace
 from mapping.detection import Crossing
 from mapping.geometry.contact import BallContact
 from mapping.geometry.mesh import arclengths
@@ -38,7 +38,7 @@ def sweep_paths(trace: Trace, base: Base, crossings: Sequence[Crossing] = ()) ->
     """Every sweep on the base, averaged over stretches that the eye cannot tell apart.
 
     Args:
-        trace: all samples.
+        trace: all samples; what of them is laid on the base already is not laid again.
         base: the global model.
         crossings: detections; the samples that they cover count as noticed.
     """
@@ -48,17 +48,16 @@ def sweep_paths(trace: Trace, base: Base, crossings: Sequence[Crossing] = ()) ->
         np.linalg.norm(np.ptp(trace.centers[:: 1 + len(trace) // SIZE_SAMPLES], axis=0))
     )
     marked = _noticed(trace, crossings)
-    means, middles = [], []
-    for start, stop in _runs(trace):
-        firsts = np.arange(start, stop, _block(trace.centers[start:stop], spacing))
-        count = np.diff(np.append(firsts, stop))
-        means.append(np.add.reduceat(trace.centers[:stop], firsts, axis=0) / count[:, None])
-        middles.append(firsts + count // 2)
-    feet = base.foot(np.concatenate(means), trace.tip_radius)
-    cuts = np.cumsum([len(each) for each in means])[:-1]
-    noticed = marked[np.concatenate(middles)]
-    parts = (np.split(array, cuts) for array in (feet.points, feet.normals, noticed))
-    return [SweepPath(*each) for each in zip(*parts, strict=True)]
+    paths, start = [], 0
+    for sweep in LaidTrace.of(trace, base).laid_sweeps:
+        centers = sweep.trace.centers
+        firsts = np.arange(0, len(centers), _block(centers, spacing))
+        count = np.diff(np.append(firsts, len(centers)))
+        means = np.add.reduceat(centers, firsts, axis=0) / count[:, None]
+        points, normals, _ = sweep.feet_of_means(means, firsts, len(centers))
+        paths.append(SweepPath(points, normals, marked[start + firsts + count // 2]))
+        start += len(centers)
+    return paths
 
 
 def over_features(paths: Sequence[SweepPath], features: Sequence[Feature]) -> list[SweepPath]:

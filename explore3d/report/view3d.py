@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from explore3d.pictures import SweepPath, profile_line, thinned, view_directions
 from explore3d.report.markup import Html, data_script, element, script, text
 from mapping import Feature, FloatArray, Surface, Trace, length_unit
-from mapping.base import Base
+from mapping.base import Base, LaidTrace
 from mapping.inference.kinds import kind_of, sizes_of
 from mapping.model import drawn_at_least, feature_mesh
 
@@ -83,7 +83,7 @@ def object_view(
 
 def profile_view(trace: Trace, base: Base, features: Sequence[Feature]) -> Html:
     """The height over the base along a profile, to be zoomed by hand, with the features marked."""
-    height = base.foot(trace.centers, trace.tip_radius).height
+    height = LaidTrace.of(trace, base).feet().height
     origin, heading = profile_line(trace)
     place = (trace.centers - origin) @ heading
     order = np.argsort(place, kind="stable")
