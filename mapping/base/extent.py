@@ -14,9 +14,8 @@ from mapping.base.laid_trace import LaidTrace
 from mapping.instrument import robust_scale
 
 MOST_EXTENT_CELLS = 4000
-# Samples that are asked where a trace leaves the base. The border is known to the base's triangles, half a tip radius:
-# a survey of a body 40 radii across, of as many sweeps, is 1600 radii of path, and asked every 0.8 of one; between two
-# that answer differently every sample is asked
+# Samples that are asked where a trace leaves the base, at most: a survey of a body 40 tip radii across, of as many
+# sweeps, is 1600 radii of path, and asked every 0.8 of one; between two that answer differently every sample is asked
 MOST_BORDER_SAMPLES = 2000
 # Places by whose median two fits are compared: it is known to 1.25 / sqrt(1000) = 4 % of their scatter
 MOST_FIT_PLACES = 1000
@@ -34,6 +33,9 @@ BESIDE_BASE_ANGLE = float(np.radians(5.0))
 ON_SIDE = 1e-6
 # Triangles that sweeps are planned on, and how far a better fit may lie from the first, in tip radii
 BASE_TRIANGLE_SIZE, AWAY = 0.5, 0.5
+# Distance along the path of samples that are asked where it leaves the base, in tip radii. A straight sweep that leaves
+# it at a right corner and is back at the next of them was half as far beyond it: a triangle, by which the border is known
+BORDER_STEP = 2.0 * BASE_TRIANGLE_SIZE
 
 
 def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray, sides: FloatArray) -> Base:
@@ -101,6 +103,7 @@ def _over_base(laid: LaidTrace) -> tuple[BoolArray, IntArray]:
     """Which samples (N,) stand over the base, and the indices of those that were asked first."""
     first = np.flatnonzero(np.diff(laid.sweep, prepend=-1))  # of each sweep
     step = max(1, -(-len(laid) // MOST_BORDER_SAMPLES))
+    step *= max(1, int(BORDER_STEP * laid.tip_radius / max(_apart(laid, step), np.finfo(float).tiny)))
     asked = np.unique(np.concatenate([np.arange(0, len(laid), step), first, first[1:] - 1, np.arange(len(laid))[-1:]]))
     here = ~_beyond(laid.base, laid.feet(asked))
     over = np.repeat(here, np.diff(np.append(asked, len(laid))))
@@ -111,6 +114,12 @@ def _over_base(laid: LaidTrace) -> tuple[BoolArray, IntArray]:
     if len(index):
         over[index] = ~_beyond(laid.base, laid.feet(index))
     return over, asked
+
+
+def _apart(trace: Trace, step: int) -> float:
+    """Mean distance of every step-th sample from the one before it in its sweep, m; 0 where there are none."""
+    legs = np.linalg.norm(np.diff(trace.centers[::step], axis=0), axis=1)[np.diff(trace.sweep[::step]) == 0]
+    return float(legs.mean()) if len(legs) else 0.0
 
 
 def _beyond(base: Base, feet: Feet) -> BoolArray:
@@ -127,17 +136,19 @@ def refined(base: Base, trace: Trace) -> Base:
     """
     laid = LaidTrace.of(trace, base)
     over, asked = _over_base(laid)
-    again = fit_base(trace.select(over), spacing=BASE_TRIANGLE_SIZE * trace.tip_radius)
+    again = fit_base(trace.select(over), spacing=BASE_TRIANGLE_SIZE * trace.tip_radius, tested=False)
     compared = asked[over[asked]]
     compared = compared[:: -(-len(compared) // MOST_FIT_PLACES)]
     feet = laid.feet(compared), again.foot(trace.centers[compared], trace.tip_radius)
     missed = [float(np.median(np.abs(each.height))) for each in feet]
     if missed[1] > missed[0]:
         return base
-    middle = again.surface.vertices[again.surface.faces].mean(axis=1)
-    below = base.foot(middle, trace.tip_radius)
-    near = np.abs(below.height + trace.tip_radius) < AWAY * trace.tip_radius
-    keep = near & ~_beyond(base, below)
+    middle, reach = again.surface.vertices[again.surface.faces].mean(axis=1), AWAY * trace.tip_radius
+    low, high = base.surface.bounds
+    keep = ((middle >= low - reach) & (middle <= high + reach)).all(axis=1)
+    below = base.foot(middle[keep], trace.tip_radius)
+    near = np.abs(below.height + trace.tip_radius) < reach
+    keep[keep] = near & ~_beyond(base, below)
     if not keep.any():
         return base
     return part_of(replace(again, missed=base.missed), keep)

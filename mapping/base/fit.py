@@ -54,7 +54,7 @@ AREAL_FORMS: dict[str, tuple[Family, ...]] = {
 }
 
 
-def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO) -> Base:
+def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO, *, tested: bool = True) -> Base:
     """The smooth body that explains most of a trace; details shorter than about eight tip radii are left out.
 
     A trace along one line gives a profile. Otherwise every family is fitted to the ball centres by robust
@@ -71,6 +71,7 @@ def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO) -> B
         spacing: longest side of the mesh's triangles, m, for bases that sweeps are planned on; None: as long as the
             shape allows.
         form: of a profile; over an area "auto", "line" (a plane) or "arc" (a cylinder or a sphere).
+        tested: False to spare the test whether a fit to half of the sweeps foretells the others (Base.missed is None).
 
     Raises:
         FormError: a form that is not possible over an area, or not for this profile.
@@ -99,7 +100,8 @@ def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO) -> B
             fits += _last_resort(FREE, cloud)
     scale, share = _noise_of(min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual, cloud.floor)
     best = min(fits, key=lambda fitted: fitted.cost(scale, share))
-    return Base(best.surface(cloud, spacing), best.kind, best.parameters, missed=_foretold(best, trace))
+    missed = _foretold(best, trace) if tested else None
+    return Base(best.surface(cloud, spacing), best.kind, best.parameters, missed=missed)
 
 
 def _walked_through(body: Fitted, cloud: Cloud, trace: Trace) -> bool:

@@ -33,15 +33,17 @@ def onto_base(
     feet = base.foot(points + tip_radius * normals, tip_radius)
     sign = np.where(np.einsum("ij,ij->i", feet.normals, normals) < 0.0, -1.0, 1.0)
     up = averaged(feet.normals * sign[:, None], smooth)
-    found = feet.points.copy()
+    found, moving = feet.points.copy(), np.ones(len(points), dtype=bool)
     for done in range(MOST_PROJECTION_ROUNDS):
         gap = points - found
         sideways = gap - np.einsum("ij,ij->i", gap, up)[:, None] * up
-        left = np.flatnonzero(np.abs(sideways).max(axis=1, initial=0.0) > SIDEWAYS_ROUNDING * tip_radius)
+        left = np.flatnonzero(moving & (np.abs(sideways).max(axis=1, initial=0.0) > SIDEWAYS_ROUNDING * tip_radius))
         if not len(left):
             break
         before = found[left]
         found[left] = base.foot(before + sideways[left] + 1e-3 * tip_radius * up[left], tip_radius).points
+        # a foot that stays, as on the border of a base that ends before the point, is found again by every round
+        moving[left] = (found[left] != before).any(axis=1)
         move = float(np.abs(found[left] - before).max())
         if done + 1 >= FEWEST_PROJECTION_ROUNDS and move < SETTLED_POINT_MOVE * tip_radius:
             break

@@ -83,7 +83,8 @@ def _improved(
     if place is None:
         return group
     try:
-        start = fitted([part_of(feature, place) for feature in group], place)
+        parts = [part_of(feature, place) for feature in group]
+        start = fitted(parts, place)
     except MappingError:  # a feature over whose axis the base does not go on has no family here
         return group
     assert start is not None
@@ -93,7 +94,7 @@ def _improved(
     points += [
         point for feature in group if kind_of(feature).line and kind_of(feature).sign > 0 for point in feature.axis
     ]
-    found = searched(start, [part_of(feature, place) for feature in group], np.array(points).reshape(-1, 3), proposals)
+    found = searched(start, parts, np.array(points).reshape(-1, 3), proposals)
     odds = _told(found)
     noted = (ENDED_EARLY,) if found.bounded else ()
     # a section or a course alone is the posterior's to choose, and what explains the trace only in part adds nothing
