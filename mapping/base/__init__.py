@@ -16,7 +16,11 @@ if TYPE_CHECKING:
         touched_part as touched_part,
     )
     from mapping.base.fit import FORETOLD as FORETOLD, fit_base as fit_base
-    from mapping.base.height_profile import UNEVEN as UNEVEN, SweepHeights as SweepHeights
+    from mapping.base.height_profile import (
+        FEW_SAMPLES_PER_BIN as FEW_SAMPLES_PER_BIN,
+        UNEVEN as UNEVEN,
+        SweepHeights as SweepHeights,
+    )
     from mapping.base.laid_trace import LaidSweep as LaidSweep, LaidTrace as LaidTrace
     from mapping.base.pose import Pose as Pose, estimate_pose as estimate_pose
     from mapping.base.profiles import SHORTEST_LEVEL as SHORTEST_LEVEL, Form as Form
@@ -29,7 +33,7 @@ _PUBLIC = {
     "cells": ("Cells",),
     "extent": ("BASE_TRIANGLE_SIZE", "over_base", "refined", "rolled_off", "touched_part"),
     "fit": ("FORETOLD", "fit_base"),
-    "height_profile": ("UNEVEN", "SweepHeights"),
+    "height_profile": ("FEW_SAMPLES_PER_BIN", "UNEVEN", "SweepHeights"),
     "laid_trace": ("LaidSweep", "LaidTrace"),
     "pose": ("Pose", "estimate_pose"),
     "profiles": ("SHORTEST_LEVEL", "Form"),

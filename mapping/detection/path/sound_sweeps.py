@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Trace
-from mapping.base import UNEVEN, Base, LaidSweep, LaidTrace
+from mapping.base import FEW_SAMPLES_PER_BIN, UNEVEN, Base, LaidSweep, LaidTrace
 from mapping.detection import LADDER, smallest_crest
+from mapping.detection.filters import FILTER_BINS_PER_HALF_WIDTH
 from mapping.detection.path.rolled_out import RolledOut, rolled_out, runs_straight, usual_step
 
 # A path that turns evenly by the angle a over the half-width w of a crest crosses it over w (1 + a^2 / 6). A turn is
@@ -70,7 +71,10 @@ def sound_sweeps(trace: Trace, base: Base) -> SoundSweeps:
     moving = [step for step in steps if step > 0]
     if not moving:
         return SoundSweeps(laid)
-    reach = smallest_crest(laid, float(np.median(moving)))
+    usual = float(np.median(moving))
+    reach = smallest_crest(laid, usual)
+    if reach < FEW_SAMPLES_PER_BIN * FILTER_BINS_PER_HALF_WIDTH * usual:
+        laid.feet()  # detection's bins are going to hold so few samples that each is asked for: blocks follow from them
     reasons: Counter[str] = Counter()
     numbers, seen, following = [], set[int](), int(trace.sweep.max()) + 1
     for sweep, step in zip(laid.laid_sweeps, steps, strict=True):
