@@ -33,8 +33,8 @@ BESIDE_BASE_ANGLE = float(np.radians(5.0))
 ON_SIDE = 1e-6
 # Triangles that sweeps are planned on, and how far a better fit may lie from the first, in tip radii
 BASE_TRIANGLE_SIZE, AWAY = 0.5, 0.5
-# Distance along the path of samples that are asked where it leaves the base, in tip radii. A straight sweep that leaves
-# it at a right corner and is back at the next of them was half as far beyond it: a triangle, by which the border is known
+# Distance along the path of samples that are asked where it leaves the base, in tip radii. A straight sweep that cuts a
+# right corner off between two of them is half as far beyond the border at most: a triangle, by which that is known
 BORDER_STEP = 2.0 * BASE_TRIANGLE_SIZE
 
 

@@ -14,21 +14,29 @@ from explore3d.analysis.stages import Stages
 from explore3d.analysis.truth import TrueFeature
 from explore3d.bench.scenes.plate_sweeps import DIAMETER, plate, scaled, sweeps, wire
 from explore3d.log.own.record import Log
+from explore3d.report import write_report
+from mapping import Trace
 from mapping.assembly import inspection
-from mapping.base import laid_trace
+from mapping.base import BASE_TRIANGLE_SIZE, fit_base, laid_trace
 from mapping.base.base import Base
 from mapping.base.laid_trace import LaidTrace
 from mapping.detection import RAW_SAMPLES
 
 
-def test_of_few_samples_each_is_laid_once_and_hardly_any_mean(monkeypatch):
-    laid, foot = [], Base.foot
+@pytest.fixture
+def laid(monkeypatch):
+    """How many points were laid on a base, call by call."""
+    counts, foot = [], Base.foot
 
     def counted_foot(self, centers, tip_radius):
-        laid.append(len(np.asarray(centers)))
+        counts.append(len(np.asarray(centers)))
         return foot(self, centers, tip_radius)
 
     monkeypatch.setattr(Base, "foot", counted_foot)
+    return counts
+
+
+def test_of_few_samples_each_is_laid_once_and_hardly_any_mean(laid):
     trace = sweeps(wire(), white=0.02e-3, spacing=0.1e-3)
     work = Work(Log(trace), None, plate(), Stages())
     for stage in (deviated, kept_over_base, made_sound, detected):
@@ -52,28 +60,21 @@ def test_roughness_lays_nothing_that_is_laid_already(monkeypatch):
     assert found is not None and found.profile["Rq"].low < 0.02e-3
 
 
-def test_what_is_measured_for_roughness_too_is_laid_sample_by_sample_once(monkeypatch):
-    laid, foot = [], Base.foot
-
-    def counted_foot(self, centers, tip_radius):
-        laid.append(len(np.asarray(centers)))
-        return foot(self, centers, tip_radius)
-
-    monkeypatch.setattr(Base, "foot", counted_foot)
+def test_what_is_measured_for_roughness_too_is_laid_sample_by_sample_once_its_pictures_included(laid, tmp_path):
     trace = scaled(sweeps(wire(), white=0.02e-3, spacing=10e-6, half=80e-3), 0.5)
     assert len(trace) > RAW_SAMPLES
-    analysis = build_model(Log(trace), None, plate(), Stages())
-    assert analysis.roughness is not None
+    felt = fit_base(trace, spacing=BASE_TRIANGLE_SIZE * trace.tip_radius)
+    laid.clear()
+    analysis = build_model(Log(trace), None, felt, Stages())
+    assert analysis.roughness is not None and analysis.model.features
+    assert analysis.base is not felt  # it was fitted again to all that was felt on it
+    write_report(analysis, tmp_path)
     assert sum(laid) <= 1.05 * len(trace)
 
 
-def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height_twice(monkeypatch):
-    laid, profiles, inspected = [], Counter(), []
-    foot, heights, looked = Base.foot, laid_trace.height_profiles, inspection.inspect
-
-    def counted_foot(self, centers, tip_radius):
-        laid.append(len(np.asarray(centers)))
-        return foot(self, centers, tip_radius)
+def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height_twice(monkeypatch, laid):
+    profiles, inspected = Counter(), []
+    heights, looked = laid_trace.height_profiles, inspection.inspect
 
     def counted_heights(number, trace, s, base, spacing, *kept):
         profiles[number, spacing] += 1
@@ -84,7 +85,6 @@ def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height
         return looked(trace, base, noise, spacings)
 
     monkeypatch.setattr(inspection, "inspect", counted_look)
-    monkeypatch.setattr(Base, "foot", counted_foot)
     monkeypatch.setattr(laid_trace, "height_profiles", counted_heights)
     places = np.linspace(-30e-3, 30e-3, 10)
     trace = sweeps(wire(), white=0.1e-3, places=places, spacing=5e-6, half=20e-3)
@@ -99,3 +99,13 @@ def test_an_analysis_lays_hardly_more_points_than_samples_and_looks_at_no_height
     # one width of bins for detection, one for lines of crossings, one for lines that no sweep shows, and one for the
     # blocks that the model itself is held against
     assert len({spacing for _, spacing in profiles}) <= 4
+
+
+def test_with_its_report_an_analysis_of_a_profile_lays_hardly_more_points_than_samples(laid, tmp_path):
+    tip, x = 2e-6, np.arange(0.0, 10e-3, 0.5e-6)
+    crest = 1e-6 * np.maximum(0.0, 1.0 - ((x - 4e-3) / 30e-6) ** 2)
+    trace = Trace.from_profile(x, tip + crest + 2e-9 * np.random.default_rng(3).standard_normal(len(x)), tip)
+    analysis = build_model(Log(trace), None, None, Stages())
+    assert analysis.model.features
+    write_report(analysis, tmp_path)
+    assert sum(laid) <= 1.05 * len(trace)
