@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import FloatArray
+from mapping import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +64,12 @@ class Camera:
         """Size of a pixel at distance one."""
         return float(2.0 * np.tan(0.5 * self.field) / self.height)
 
-    def rays(self) -> FloatArray:
-        """(height, width, 3) directions through the pixels' middles, of forward component one; row 0 is the top."""
+    def rays(self, row: IntArray, column: IntArray) -> FloatArray:
+        """(N, 3) directions through the middles of pixels (N,), of forward component one; row 0 is the top."""
         right, up, forward = self.frame
-        x = (np.arange(self.width) + 0.5 - 0.5 * self.width) * self.pixel
-        y = (0.5 * self.height - np.arange(self.height) - 0.5) * self.pixel
-        return np.asarray(forward + x[None, :, None] * right + y[:, None, None] * up)
+        x = (column + 0.5 - 0.5 * self.width) * self.pixel
+        y = (0.5 * self.height - row - 0.5) * self.pixel
+        return np.asarray(forward + x[:, None] * right + y[:, None] * up)
 
     def project(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Column and row (N, 2) in pixels, the middle of the first pixel at 0, and depth (N,) along forward, m."""

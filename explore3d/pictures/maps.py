@@ -235,7 +235,7 @@ def _seen(picture: Picture, block: int) -> tuple[FloatArray, FloatArray, BoolArr
     tile = np.flatnonzero(sees)
     row = block * (tile // (width // block)) + best[sees] // block
     column = block * (tile % (width // block)) + best[sees] % block
-    places = picture.camera.eye + picture.depth[row, column][:, None] * picture.camera.rays()[row, column]
+    places = picture.camera.eye + picture.depth[row, column][:, None] * picture.camera.rays(row, column)
     return places, picture.normals(row, column), sees.reshape(height // block, width // block)
 
 

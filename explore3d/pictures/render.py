@@ -49,7 +49,7 @@ class Picture:
     def normals(self, row: IntArray, column: IntArray) -> FloatArray:
         """(N, 3) unit normals of what pixels see, turned towards the camera; all must see something."""
         normals = self.flat[self.seen[row, column]]
-        away = np.einsum("ij,ij->i", normals, self.camera.rays()[row, column]) > 0.0
+        away = np.einsum("ij,ij->i", normals, self.camera.rays(row, column)) > 0.0
         return np.where(away[:, None], -normals, normals)
 
     def splat(self, points: FloatArray, colours: FloatArray, radius: float, bias: float) -> None:

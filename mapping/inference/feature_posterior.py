@@ -53,6 +53,7 @@ class Solution:
         importance: the fast answer, with its evidence.
         chain: what emcee did, or None if it did not run.
         likely: further families that remain likely, each with its probability over that of this one.
+        pooled: what all crossings together say against it under the noise of the trace; None: nobody asked yet.
     """
 
     problem: PosteriorProblem
@@ -60,6 +61,7 @@ class Solution:
     importance: Importance
     chain: Chain | None
     likely: tuple[tuple[float, Solution], ...] = ()
+    pooled: PooledResidual | None = None
 
 
 def sample_posterior(
@@ -123,7 +125,7 @@ def refine(
         return replace(feature, evidence=nothing, notes=(*feature.notes, f"no posterior: {error}"))
     families = [(share, each.problem, each.posterior) for share, each in [(1.0, solution), *solution.likely]]
     found = averaged(describe(solution.problem, solution.posterior, base), families)
-    pooled = _pooled(solution, noise.rounded(trace.resolution))
+    pooled = solution.pooled or _pooled(solution, noise.rounded(trace.resolution))
     found = with_remark(found, pooled, raised=solution.problem.misfit > 0.0)
     odds = odds_against_nothing(solution)
     if solution.problem.misfit > 0.0:  # under noise that was raised to the misfit existence is not judged
@@ -152,7 +154,9 @@ def solve(
     found = None
     if first.misfit == 0.0:
         found = _likeliest([first, *problems[1:]], rng, confirm)
-        if not _pooled(found, noise).remarked(feature.height.median):
+        pooled = _pooled(found, noise)
+        found = replace(found, pooled=pooled)
+        if not pooled.remarked(feature.height.median):
             return found
     # None of them fits: what the others would say is no better founded
     better = better_section(first, around, rng)

@@ -77,12 +77,13 @@ def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Poste
     if chart.closed:
         axis[-1], normals[-1] = axis[0], normals[0]
     section = kind_of(problem.feature).section(problem.feature, shape, draws)
-    length, notes = _length(problem, shape, draws, has_ends)
+    seen = explored(problem, draws) if has_ends else None
+    length, notes = _length(problem, shape, draws, seen)
     # Along the axis: how well it is known across itself, and its two ends along itself (first, last).
     known: dict[str, Any] = {"axis_sd": courses.std(axis=0)}
     if has_ends:
         spans = np.quantile(draws[:, ends], [0.05, 0.95], axis=0) - [low, high]
-        known |= {"end_intervals": spans.T, "ends_seen": explored(problem, draws)}
+        known |= {"end_intervals": spans.T, "ends_seen": seen}
     return replace(
         problem.feature,
         axis=axis,
@@ -103,13 +104,14 @@ def _ends(problem: PosteriorProblem) -> list[int]:
 
 
 def _length(
-    problem: PosteriorProblem, shape: LineShape, draws: FloatArray, has_ends: bool
+    problem: PosteriorProblem, shape: LineShape, draws: FloatArray, seen: tuple[bool, bool] | None
 ) -> tuple[Interval, list[str]]:
+    """The length, and what is to be said of it; `seen` as of `explored`, None of a line without ends."""
     chart, modes = shape.chart, shape.modes
     some = draws[:: max(1, len(draws) // FEW_DRAWS)]
     lengths = np.empty(len(some))
     for i, theta in enumerate(some):
-        first, last = theta[_ends(problem)] if has_ends else chart.s[[0, -1]]
+        first, last = chart.s[[0, -1]] if seen is None else theta[_ends(problem)]
         s = np.linspace(first, last, AXIS_POINTS if len(chart.s) > 8 or modes.degree > 1 else 2)
         points, laterals, _, _ = chart.at(s)
         course = points + modes.lateral(theta[None, : modes.count], s)[0][:, None] * laterals
@@ -117,11 +119,10 @@ def _length(
     interval = Interval.from_draws(lengths)
     if chart.closed:
         return interval, []
-    if not has_ends:
+    if seen is None:
         return replace(interval, censored=True), [
             f"the length of a {problem.feature.kind} is what was explored of it: at least this"
         ]
-    seen = explored(problem, draws)
     return (interval, []) if all(seen) else (replace(interval, censored=True), [*with_open_ends((), seen)])
 
 

@@ -18,10 +18,9 @@ SQUARE = Surface([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1
 @pytest.mark.parametrize("direction", [[0.0, 0, 1], [1, -1, 0.4], [-0.3, 0.2, -2]])
 def test_rays_and_projection_agree(direction: list[float]) -> None:
     camera = Camera.facing(SQUARE.vertices, np.array(direction), 64, 48)
-    rays = camera.rays()
-    points = camera.eye + 3.7 * rays.reshape(-1, 3)
+    rows, columns = np.divmod(np.arange(camera.width * camera.height), camera.width)
+    points = camera.eye + 3.7 * camera.rays(rows, columns)
     place, depth = camera.project(points)
-    rows, columns = np.divmod(np.arange(rays.shape[0] * rays.shape[1]), rays.shape[1])
     np.testing.assert_allclose(place, np.column_stack([columns, rows]), atol=1e-9)
     np.testing.assert_allclose(depth, 3.7)
 
