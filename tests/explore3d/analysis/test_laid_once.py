@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from explore3d.log.own.record import Log
 from explore3d.report import write_report
 from mapping import Trace
 from mapping.assembly import inspection
-from mapping.base import BASE_TRIANGLE_SIZE, fit_base, laid_trace
+from mapping.base import laid_trace
 from mapping.base.base import Base
 from mapping.base.laid_trace import LaidTrace
 from mapping.detection import RAW_SAMPLES
@@ -63,8 +64,7 @@ def test_roughness_lays_nothing_that_is_laid_already(monkeypatch):
 def test_what_is_measured_for_roughness_too_is_laid_sample_by_sample_once_its_pictures_included(laid, tmp_path):
     trace = scaled(sweeps(wire(), white=0.02e-3, spacing=10e-6, half=80e-3), 0.5)
     assert len(trace) > RAW_SAMPLES
-    felt = fit_base(trace, spacing=BASE_TRIANGLE_SIZE * trace.tip_radius)
-    laid.clear()
+    felt = replace(plate(at=(0.0, 0.0, 0.1e-3)), kind="plane")  # by few sweeps, and not quite where it is
     analysis = build_model(Log(trace), None, felt, Stages())
     assert analysis.roughness is not None and analysis.model.features
     assert analysis.base is not felt  # it was fitted again to all that was felt on it
