@@ -25,7 +25,7 @@ from planners.paths import Strokes, to_and_fro
 # Probability that a place says the line is there where it is not, or is not where it is: a line is asked at ten places
 # or so, and one in a hundred then ends wrongly
 WRONG_DECISIONS = 1e-3
-# Log odds at which passes over a place end for it (Wald, Annals of Mathematical Statistics 16, 1945)
+# Log odds at which passes over a place end (theory section 11; Wald, Annals of Mathematical Statistics 16, 1945)
 DECIDED = float(np.log((1.0 - WRONG_DECISIONS) / WRONG_DECISIONS))
 # Squared signal-to-noise ratio of all passes at which a test that looks once is wrong as seldom: (2 x 3.09)^2, with the
 # quantile of WRONG_DECISIONS. So many passes are made at most, and a third of them on average
