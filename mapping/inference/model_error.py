@@ -82,8 +82,8 @@ def _noise_of_residual(problem: PosteriorProblem, optimum: FloatArray) -> Noise:
     for start, stop in zip(window.starts[:-1], window.starts[1:], strict=True):
         over[start:stop] -= over[start:stop].mean()
     given = problem.noise
-    level = max(float(np.std(over)), MODEL_FLOOR * problem.sizes.height)
-    whites = [given.white, *(level * np.sqrt(window.count.mean()) * np.array([0.1, 0.3, 1.0]))]
+    level = max(float(np.std(over * np.sqrt(window.passes))), MODEL_FLOOR * problem.sizes.height)
+    whites = [given.white, *(level * np.sqrt((window.count / window.passes).mean()) * np.array([0.1, 0.3, 1.0]))]
     best, best_value = given, -np.inf
     for white in whites:
         for correlated in (given.correlated, 0.5 * level, level, 1.5 * level):

@@ -13,7 +13,7 @@ from mapping.base import Base
 from mapping.detection import Crossing
 from mapping.instrument import Noise, StatedNoise
 from planners import Outcome, Plan, PlannerError, Spent, within
-from planners.explore.faint_search import CloserLook, FaintLead, FaintSearch
+from planners.explore.faint_search import CloserLook, FaintSearch
 from planners.explore.found import Found
 from planners.explore.surveyor import CANDIDATES, SurveyCount, Surveyor
 from planners.explore.warm_up import get_ready
@@ -24,6 +24,8 @@ from planners.follow import (
     Circuit,
     Crest,
     EndFinder,
+    FaintFollower,
+    FaintLead,
     RidgeFollower,
     Sense,
     headings,
@@ -35,8 +37,6 @@ from planners.survey import Survey
 
 # Slides off one end, at most; and so many in a row that do not show it say that no more will
 MOST_SLIDES, VAIN_SLIDES = 150, 8
-# A faint line is straight, and every crossing of it costs many passes: the step, in its length so far
-LEAD_STEP = 0.25
 # Why a detection is passed over (see Found.passed_over)
 LOWER = "lower than the smallest feature asked for and hardly above the noise"
 
@@ -208,11 +208,10 @@ class Explore:
         found.leads.remove(lead)
         if any(track.distance(lead.seed.point) < 1.5 * track.half_width for track in found.tracks):
             return Outcome("known", "it lies on an axis that was followed before")
-        step = max(LEAD_STEP * lead.length, self.tip_radius)
-        follower = replace(self._follower(found, sense), passes=lead.passes, first_step=step, longest_step=step)
-        followed = yield from follower.follow(lead.seed, [lead.way, -lead.way])
+        follower = FaintFollower(self.strokes, sense, found.noise or Noise(0.0), _known(found))
+        followed = yield from follower.follow(lead)
         found.tracks.extend([] if followed.value is None else [followed.value])
-        return Outcome(f"by {lead.passes} passes", followed.detail)
+        return Outcome(f"by up to {lead.passes} passes", followed.detail)
 
     def _actions(self, found: Found, sense: Sense) -> list[Action]:
         actions = []
@@ -277,13 +276,8 @@ class Explore:
         return Outcome(circled.reason, followed.detail)
 
     def _follower(self, found: Found, sense: Sense) -> RidgeFollower:
-        tracks = tuple(found.tracks)
-
-        def known(point: FloatArray) -> bool:
-            return any(track.distance(point) < 0.5 * track.half_width for track in tracks)
-
         noise = found.noise or Noise(0.0)
-        return RidgeFollower(self.strokes, sense, noise, self.wanted_sd, known=known)
+        return RidgeFollower(self.strokes, sense, noise, self.wanted_sd, known=_known(found))
 
     def _slide(self, index: int, which: int, found: Found) -> Plan:
         """Sweeps to and fro off an end until it is known well enough; the way to it is paid once for all."""
@@ -298,6 +292,12 @@ class Explore:
         found.slides[index, which] = done
         found.tracks[index] = track.with_end(which, end)
         return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")
+
+
+def _known(found: Found) -> Callable[[FloatArray], bool]:
+    """Tells whether a point lies on an axis that was found by now."""
+    tracks = tuple(found.tracks)
+    return lambda point: any(track.distance(point) < 0.5 * track.half_width for track in tracks)
 
 
 def _counted(number: int, noun: str) -> str:

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mapping import Feature, FloatArray, Trace
+from mapping import Feature, Trace
 from mapping.assembly import with_faint_lines
 from mapping.base import Base
 from mapping.detection import Crossing, Detections, detect
 from mapping.instrument import Noise, StatedNoise
 from planners import Outcome, Plan
-from planners.follow import SEEN_CHI_SQUARE_FALL
+from planners.follow import DECISIVE, FaintLead
 from planners.survey import Survey
 
 # A line may lie anywhere and run in any direction: together its crossings must say so much more (in squares of the
@@ -26,23 +26,9 @@ ANYWHERE = 1.3
 LEADS, FALSE_LEADS = 0.75, 3.0
 # A need of fewer sweeps more, once the noise is known better, is not seen to
 FEW_MORE = 0.1
-# Passes over a line show it by so many times what a crossing is believed for
-SURE = 1.5
-MOST_PASSES = 60
 # Signal-to-noise ratio of a dip between two rims against that of a crest as high, in white noise (theory section 4:
 # the integrals of (1 - x)^4 and (1 - x^2)^2)
 DIP = float(np.sqrt(3.0 / 8.0))
-
-
-@dataclass(frozen=True, eq=False)
-class FaintLead:
-    """Where to begin following a faint line: a crossing, the way (3,) that the line goes, passes that show it, and
-    its length so far, m."""
-
-    seed: Crossing
-    way: FloatArray
-    passes: int
-    length: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +137,7 @@ def lead(line: Feature, seen: Detections, base: Base, tip_radius: float) -> Fain
         start=0,
         stop=0,
     )
-    passes = int(np.clip(np.ceil(SURE * SEEN_CHI_SQUARE_FALL / one**2), 1, MOST_PASSES))
+    passes = int(np.ceil(DECISIVE / one**2))
     return FaintLead(seed, way, passes, float(np.linalg.norm(line.axis[-1] - line.axis[0])))
 
 

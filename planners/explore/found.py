@@ -9,8 +9,7 @@ import numpy as np
 from mapping import FloatArray
 from mapping.detection import Coverage, Crossing
 from mapping.instrument import Noise
-from planners.explore.faint_search import FaintLead
-from planners.follow import AxisTrack, BumpSize, is_step, slender
+from planners.follow import AxisTrack, BumpSize, FaintLead, is_step, slender
 from planners.paths import tangential
 
 # Standard deviations by which a crossing must be lower than what is asked for to be none of it

@@ -9,11 +9,12 @@ if TYPE_CHECKING:
     from planners.follow.bump import BumpSize as BumpSize, BumpSizer as BumpSizer
     from planners.follow.circuit import Circuit as Circuit, headings as headings
     from planners.follow.end_finder import Crest as Crest, EndFinder as EndFinder
-    from planners.follow.recross import (
-        SEEN_CHI_SQUARE_FALL as SEEN_CHI_SQUARE_FALL,
-        is_step as is_step,
-        slender as slender,
+    from planners.follow.faint_follower import (
+        DECISIVE as DECISIVE,
+        FaintFollower as FaintFollower,
+        FaintLead as FaintLead,
     )
+    from planners.follow.recross import is_step as is_step, slender as slender
     from planners.follow.ridge_follower import RidgeFollower as RidgeFollower
     from planners.follow.sense import Sense as Sense
 
@@ -22,7 +23,8 @@ _PUBLIC = {
     "bump": ("BumpSize", "BumpSizer"),
     "circuit": ("Circuit", "headings"),
     "end_finder": ("Crest", "EndFinder"),
-    "recross": ("SEEN_CHI_SQUARE_FALL", "is_step", "slender"),
+    "faint_follower": ("DECISIVE", "FaintFollower", "FaintLead"),
+    "recross": ("is_step", "slender"),
     "ridge_follower": ("RidgeFollower",),
     "sense": ("Sense",),
 }

@@ -34,7 +34,6 @@ def seen_again(
     way: FloatArray,
     like: Crossing,
     reach: float,
-    least_gain: float = SEEN_CHI_SQUARE_FALL,
 ) -> Crossing | None:
     """The crossing of a known line by a sweep across it, or None if the sweep does not show it.
 
@@ -49,7 +48,6 @@ def seen_again(
         way: (3,) unit direction of the sweep.
         like: an earlier crossing of the same line.
         reach: how far from `point` it may lie, m.
-        least_gain: fall of chi-squared that it must bring.
     """
     feet = base.foot(trace.centers, trace.tip_radius)
     place = (feet.points - point) @ way
@@ -62,7 +60,7 @@ def seen_again(
     fit, kind, half_width = _fitted(wide * place[window], height[window], trace.tip_radius, noise, like, wide * reach)
     fit, half_width = replace(fit, place=fit.place / wide, sd=fit.sd / wide), half_width / wide
     # a fit at the rim of its range follows the flank of something else
-    if fit.gain < least_gain or abs(fit.place) > 0.97 * reach:
+    if fit.gain < SEEN_CHI_SQUARE_FALL or abs(fit.place) > 0.97 * reach:
         return None
     near = int(np.abs(place - fit.place).argmin())
     foot = base.foot((point + fit.place * way + trace.tip_radius * normals[near])[None], trace.tip_radius)

@@ -15,24 +15,19 @@ from planners import Outcome, Plan
 from planners.follow.axis_track import AxisEnd, Course, course
 from planners.follow.end_finder import Crest, EndFinder
 from planners.follow.line import Line, joined, mean_height, returned
-from planners.follow.recross import SEEN_CHI_SQUARE_FALL, is_step, seen_again
+from planners.follow.recross import is_step, seen_again
 from planners.follow.sense import Sense
-from planners.paths import Strokes, tangential, to_and_fro
+from planners.paths import Strokes, tangential
 
 Crossed = Generator[Move, Trace, Crossing | None]
 
-# A crossing lower than this share of the ridge's last heights lies beyond its end; a faint line's height is too
-# uncertain for more than the middle between all and nothing
-STILL_HIGH, STILL_SEEN = 0.7, 0.5
+# A crossing lower than this share of the ridge's last heights lies beyond its end
+STILL_HIGH = 0.7
 FALLING_HEIGHT_SHARE = 0.9
-# In tip radii: the first step and the longest unless they are given, and how closely crossings bracket an end before a
-# slide finds it; once more, more closely, where the slide did not
+# In tip radii: the first step and the longest, and how closely crossings bracket an end before a slide finds it; once
+# more, more closely, where the slide did not
 FIRST_STEP, LONGEST_STEP = 0.4, 2.0
 BRACKETS = (0.6, 0.15)
-# How far from a faint line's supposed place its first crossing may be, in half-widths
-LEAD_REACH = 2.5
-# Passes over a faint line are looked at in so many batches; they leave it open if chi-squared falls by so much
-BATCHES, LEFT_OPEN = 3, 4.0
 # Standard deviation of a crossing's place, against the precision wanted of an end, from which steps are shorter
 DOUBT = 1.9
 # By how much the heading may turn in one step, rad
@@ -51,19 +46,14 @@ class RidgeFollower:
         strokes, sense: how to touch and to feel.
         noise: of the samples.
         precision: wanted standard deviation of an end, m.
-        first_step, longest_step: distance between the first two crossings and the largest between any two, m.
         known: tells whether a point lies on an axis found before (there the ridge joins it).
-        passes: sweeps to and fro at every crossing, taken together: a single one does not show a faint line.
     """
 
     strokes: Strokes
     sense: Sense
     noise: Noise
     precision: float
-    first_step: float | None = None
-    longest_step: float | None = None
     known: Callable[[FloatArray], bool] = lambda point: False
-    passes: int = 1
 
     def follow(self, seed: Crossing, ways: list[FloatArray]) -> Plan:
         """Follow from a seed in one or two directions (3,); the outcome's value is an AxisTrack or None."""
@@ -84,19 +74,16 @@ class RidgeFollower:
 
     @property
     def _longest(self) -> float:
-        return LONGEST_STEP * self.strokes.tip_radius if self.longest_step is None else self.longest_step
+        return LONGEST_STEP * self.strokes.tip_radius
 
     def _told_by(self, crossing: Crossing) -> float:
         """Longest step after which as uncertain crossings still tell the course, m."""
-        if self.passes > 1:
-            return np.inf
         share = min(1.0, (DOUBT * self.precision / max(crossing.position_sd, np.finfo(float).tiny)) ** 2)
         return max(share * self._longest, FIRST_STEP * self.strokes.tip_radius)
 
     def _begun(self, first: Crossing, way: FloatArray, halves: list[tuple[Line, AxisEnd | None]]) -> Line:
         """A line that begins at the seed; where it only goes on backwards, what was crossed so far leads it."""
-        step = FIRST_STEP * self.strokes.tip_radius if self.first_step is None else self.first_step
-        step = min(step, self._longest)
+        step = FIRST_STEP * self.strokes.tip_radius
         if not halves or len(halves[0][0].crossings) < 3:
             return Line([first], step)
         forth = halves[0][0]
@@ -118,7 +105,7 @@ class RidgeFollower:
             if walk.cut and walk.along[-1] < 0.5 * step:
                 return AxisEnd(walk.points[-1], 0.0, "edge of the model", walk.directions[-1])
             reach = max(0.6 * line.half_width, 0.2 * step)
-            lowest = (STILL_HIGH if self.passes == 1 else STILL_SEEN) * line.height
+            lowest = STILL_HIGH * line.height
             heading = walk.directions[-1] if len(line.crossings) % 2 else -walk.directions[-1]
             found = yield from self._cross(walk.points[-1], heading, last, sign, reach, lowest)
             if found is None:
@@ -185,9 +172,6 @@ class RidgeFollower:
     def _first(self, seed: Crossing, heading: FloatArray, sign: float) -> Crossed:
         """The seed crossed squarely: a sweep that met the ridge at a slant saw it too wide."""
         half = 2.5 * seed.half_width
-        if self.passes > 1:
-            reach = LEAD_REACH * seed.half_width
-            return (yield from self._cross(seed.point, heading, seed, sign, reach, 0.3 * abs(seed.height)))
         trace = yield self.strokes.line(seed.point, np.cross(seed.normal, heading), half, half)
         if is_step(seed) and self._stays_high(trace, sign * abs(seed.height)):
             return seed
@@ -209,42 +193,18 @@ class RidgeFollower:
     ) -> Crossed:
         """Cross the ridge at a predicted point, square to its heading, from the right to the left.
 
-        A sweep that felt nothing is repeated once. The passes over a faint line end as soon as they show it; they go
-        on for as long again only if they leave it open whether it is there.
+        A sweep that felt nothing is repeated once.
         """
         _, normal = self.strokes.onto(point)
         way = np.cross(normal, heading)
         half = (2.5 if is_step(like) else 1.6) * like.half_width + reach
         move = self.strokes.line(point, way, half, half)
-        felt: list[Trace] = []
-        batches = min(self.passes, BATCHES)
-        for number in range(1, 2 * batches + 1):
-            felt.extend((yield from to_and_fro(move, int(np.ceil(self.passes / batches)))))
-            if not felt:
-                continue
-            found = self._seen(felt, point, way, like, reach, SEEN_CHI_SQUARE_FALL)
-            if found is not None:
-                return found if sign * found.height >= lowest else None
-            if number >= batches and not self._is_open(felt, point, way, like, reach, sign * lowest):
-                return None
+        for _ in range(2):
+            trace = yield move
+            if len(trace):
+                found = seen_again(trace, self.sense.base, self.noise, point, way, like, reach)
+                return found if found is not None and sign * found.height >= lowest else None
         return None
-
-    def _seen(
-        self, felt: list[Trace], point: FloatArray, way: FloatArray, like: Crossing, reach: float, gain: float
-    ) -> Crossing | None:
-        """The crossing that several sweeps over one line show together."""
-        # the correlated part of the noise averages out over the passes, not along them
-        noise = self.noise.of_passes(len(felt))
-        return seen_again(Trace.concatenate(felt), self.sense.base, noise, point, way, like, reach, gain)
-
-    def _is_open(
-        self, felt: list[Trace], point: FloatArray, way: FloatArray, like: Crossing, reach: float, lowest: float
-    ) -> bool:
-        """True if passes over a faint line leave it open whether it is there."""
-        if self.passes == 1:
-            return False
-        faint = self._seen(felt, point, way, like, reach, LEFT_OPEN)
-        return faint is not None and abs(faint.height) + 2.0 * faint.height_sd > abs(lowest)
 
     def _end(self, line: Line, ahead: Course, gone: float, sign: float) -> Generator[Move, Trace, AxisEnd]:
         """Slide along the crest and off the end, where the crossings have bracketed it."""
@@ -259,7 +219,7 @@ class RidgeFollower:
         gone += float(np.linalg.norm(farthest - last.point))
         ahead = course(line.points, last.normal, ahead.heading, self.strokes.tip_radius)
         rough = AxisEnd(ahead.point, np.inf, "end", ahead.heading, gone, ahead.turn)
-        finder = EndFinder(self.strokes, self.sense.base, self.noise, self.passes)
+        finder = EndFinder(self.strokes, self.sense.base, self.noise)
         # the last crossing may lie beyond the end already
         height, sd = mean_height(line.crossings[:-1] or line.crossings)
         end = yield from finder.slide(rough, Crest(height, sd, line.half_width, sign))
@@ -269,6 +229,4 @@ class RidgeFollower:
 
     def _is_falling(self, line: Line) -> bool:
         """True if the last crossing is lower than the line."""
-        last = line.crossings[-1]
-        doubt = 0.0 if self.passes == 1 else 2.0 * last.height_sd
-        return abs(last.height) + doubt < FALLING_HEIGHT_SHARE * line.height
+        return abs(line.crossings[-1].height) < FALLING_HEIGHT_SHARE * line.height

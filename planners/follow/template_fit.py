@@ -63,8 +63,8 @@ def fit_shape(
     from scipy.linalg import solve_triangular
     from scipy.optimize import least_squares
 
-    place, mean, samples = _binned(s, height)
-    root = np.linalg.cholesky(_covariance(place, samples, noise))
+    place, mean, samples = means_in_bins(s, height)
+    root = np.linalg.cholesky(covariance_of_means(place, samples, noise))
 
     def whitened(values: FloatArray) -> FloatArray:
         return np.asarray(solve_triangular(root, values, lower=True, check_finite=False))
@@ -113,8 +113,8 @@ def edge_shape(tip_radius: float) -> Shape:
     return lambda x, h: cap_height(np.maximum(x, 0.0), h, 0.0, tip_radius)
 
 
-def _binned(s: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Means of place and height in at most SHAPE_FIT_BINS bins of equal length, and the samples in each."""
+def means_in_bins(s: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means of place and height in at most SHAPE_FIT_BINS bins of equal length, m, and the samples in each."""
     count = int(min(SHAPE_FIT_BINS, max(FEWEST_FIT_BINS, len(s) // 4)))
     cell = np.clip(((s - s[0]) / (s[-1] - s[0]) * count).astype(int), 0, count - 1)
     samples = np.bincount(cell, minlength=count).astype(float)
@@ -123,7 +123,8 @@ def _binned(s: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, 
     return sums[0] / samples[used], sums[1] / samples[used], samples[used]
 
 
-def _covariance(place: FloatArray, samples: FloatArray, noise: Noise) -> FloatArray:
+def covariance_of_means(place: FloatArray, samples: FloatArray, noise: Noise) -> FloatArray:
+    """(B, B) of means over so many samples (B,) at places (B,), m: m^2."""
     correlated = replace(noise, white=0.0).covariance(place)
     # a noise-free trace still carries rounding, and the shapes are not exact
     floor = 1e-12 * float(np.ptp(place)) ** 2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mapping import FloatArray
@@ -23,14 +25,16 @@ def bin_filter(window: Window, noise: Noise, floor: float, inflation: FloatArray
             of the base leaves out; a noise-free log is read with it.
         inflation: (n,) factors >= 1 on the bins' own variance (outliers), or None.
     """
-    count = window.count.astype(np.float64)
+    # of one pass; of a mean over several all variances are less by their number
+    count = window.count / np.asarray(window.passes, dtype=np.float64)
     own = (noise.white**2 + floor**2) / count
     if inflation is not None:
         own = own * inflation + (inflation - 1.0) * noise.correlated_sd**2
     begins = np.zeros(len(count), dtype=bool)
     begins[window.starts[:-1]] = True
-    steps = mean_steps(noise.terms, _distance_from_previous(window), own, count)
-    return steps.filter(np.arange(len(count)), begins, np.ones(len(count), dtype=bool))
+    steps = mean_steps(noise.terms, _distance_from_previous(window), own, np.maximum(count, 1.0))
+    one = steps.filter(np.arange(len(count)), begins, np.ones(len(count), dtype=bool))
+    return replace(one, scale=one.scale * np.sqrt(window.passes))
 
 
 def _distance_from_previous(window: Window) -> FloatArray:

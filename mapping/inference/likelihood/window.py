@@ -15,6 +15,12 @@ from mapping.base import Base, Feet, LaidTrace, over_levels
 SAMPLES_PER_BLOCK = 64
 # Rounding of a plane's faces: by how much their normals may differ, and the feet on them rise off it for their reach
 PLANE_ROUNDING = 1e-9
+# Legs that a run's course is compared by; a run has four samples to each of them at least
+COURSE_LEGS = 4
+# Passes over one line share this part of the longer of them: noise scatters samples about the rim of a window
+SHARED_SPAN = 0.5
+# Standard deviations of its noise by which a pass may seem to lie farther off
+APART_SDS = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +39,7 @@ class Window:
         starts: (runs + 1,) first bin of each run, and n.
         samples: number of raw samples behind the bins.
         flat: True if all of them stand on one plane of the base: it neither bends nor folds between them.
+        passes: (n,) passes over one line, of which the bin is the mean.
     """
 
     feet: FloatArray
@@ -46,6 +53,7 @@ class Window:
     starts: IntArray
     samples: int
     flat: bool = False
+    passes: IntArray | int = 1
 
     def __len__(self) -> int:
         return len(self.height)
@@ -118,7 +126,10 @@ def _on_one_plane(feet: Feet, base: Base) -> bool:
 
 
 def bin_samples(samples: Samples, width: float, noise_level: float, scale: float) -> Window:
-    """Bin samples along their runs.
+    """Bin samples along their runs; passes over one line, one after the other, are one run, their mean.
+
+    Noise is independent between passes, and they felt the same: nothing that tells of the feature is in them beside
+    their mean, whose noise is that of one pass less by the root of their number (theory section 8.1).
 
     Args:
         samples: what `gather` found.
@@ -132,8 +143,106 @@ def bin_samples(samples: Samples, width: float, noise_level: float, scale: float
     for start, stop in zip([0, *samples.breaks], [*samples.breaks, count], strict=True):
         own = slice(int(start), int(stop))
         path = distance_along(feet.points[own], noise_level)
-        runs.append(_bin(feet.points[own], feet.normals[own], feet.height[own], path, width, noise_level, scale))
-    return replace(_join(runs), flat=samples.flat)
+        runs.append(_Run(feet.points[own], feet.normals[own], feet.height[own], path))
+    binned = [_mean_of_passes(passes, width, noise_level, scale) for passes in _over_one_line(runs, width, noise_level)]
+    return replace(_join(binned), flat=samples.flat)
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """Feet on the base and their normals (N, 3), heights (N,) and distances (N,) along a line, m."""
+
+    points: FloatArray
+    normals: FloatArray
+    height: FloatArray
+    path: FloatArray
+
+    @property
+    def backwards(self) -> _Run:
+        path = self.path[0] + self.path[-1] - self.path
+        return _Run(self.points[::-1], self.normals[::-1], self.height[::-1], path[::-1])
+
+    @property
+    def course(self) -> tuple[FloatArray, FloatArray]:
+        """(COURSE_LEGS, 3) means of feet one after the other, and (COURSE_LEGS,) their distances, m."""
+        edges = np.linspace(0, len(self.path), COURSE_LEGS + 1).astype(np.int64)
+        means = np.add.reduceat(np.column_stack([self.points, self.path]), edges[:-1]) / np.diff(edges)[:, None]
+        return means[:, :3], means[:, 3]
+
+
+def _over_one_line(runs: list[_Run], width: float, noise_level: float) -> list[list[_Run]]:
+    """The runs, those that went over one line one after the other together, by distances from where its first began."""
+    lines: list[list[_Run]] = []
+    for run in runs:
+        again = _along(lines[-1][0], run, width, noise_level) if lines else None
+        if again is None:
+            lines.append([run])
+        else:
+            lines[-1].append(again)
+    return lines
+
+
+def _along(first: _Run, run: _Run, width: float, noise_level: float) -> _Run | None:
+    """A run with distances along another one, whichever way it went; None if it lies beside it by more than a bin."""
+    if min(len(first.path), len(run.path)) < 4 * COURSE_LEGS:
+        return None
+    line, at = first.course
+    if (run.points[-1] - run.points[0]) @ (line[-1] - line[0]) < 0.0:
+        run = run.backwards
+    points, own = run.course
+    for _ in range(2):  # the second time tells how well the first did
+        leg = np.clip(np.searchsorted(at, own) - 1, 0, COURSE_LEGS - 2)
+        way = (line[leg + 1] - line[leg]) / np.maximum(at[leg + 1] - at[leg], np.finfo(float).tiny)[:, None]
+        off = points - line[leg] - (own - at[leg])[:, None] * way
+        shift = float((off * way).sum(axis=1).mean())
+        own = own + shift
+    path = run.path + (own[0] - run.course[1][0])
+    shared = min(path[-1], first.path[-1]) - max(path[0], first.path[0])
+    if shared < SHARED_SPAN * max(np.ptp(path), np.ptp(first.path)):
+        return None
+    # the ends of a straight line through all are known half as well as its middle
+    sd = 2.0 * noise_level * float(np.hypot(len(first.path) ** -0.5, len(path) ** -0.5))
+    trend = np.column_stack([np.ones(COURSE_LEGS), own])
+    beside = trend[[0, -1]] @ np.linalg.lstsq(trend, off, rcond=None)[0]
+    if np.linalg.norm(beside, axis=1).max() > width + APART_SDS * sd:
+        return None
+    return replace(run, path=path)
+
+
+def _mean_of_passes(passes: list[_Run], width: float, noise_level: float, scale: float) -> Window:
+    """The window of one line."""
+    each = [_bin(run, width, noise_level, scale) for run in passes]
+    if len(each) == 1:
+        return each[0]
+    cells = np.concatenate([np.floor(one.place / width).astype(np.int64) for one in each])
+    count = np.concatenate([one.count for one in each])
+    cell, where = np.unique(cells, return_inverse=True)
+    total = np.bincount(where, count)
+
+    def mean(name: str) -> FloatArray:
+        values = np.concatenate([getattr(one, name) for one in each])
+        sums = np.zeros((len(cell), *values.shape[1:]))
+        np.add.at(sums, where, values * count.reshape(-1, *[1] * (values.ndim - 1)))
+        return np.asarray(sums / total.reshape(-1, *[1] * (values.ndim - 1)))
+
+    feet, normals = mean("feet"), mean("normals")
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    # a pass without a sample in a cell went over it all the same
+    went = [(np.floor(run.path[0] / width) <= cell) & (cell <= np.floor(run.path[-1] / width)) for run in passes]
+    last, half = (cell + 1.0) * width, np.full(len(cell), 0.5 * width)
+    return Window(
+        feet,
+        normals,
+        _tangents(feet),
+        mean("height"),
+        total.astype(np.int64),
+        mean("place"),
+        last,
+        half,
+        np.array([0, len(cell)], dtype=np.int64),
+        sum(one.samples for one in each),
+        passes=np.sum(went, axis=0),
+    )
 
 
 def _whole_runs(index: IntArray, sweep: IntArray) -> tuple[IntArray, IntArray]:
@@ -162,6 +271,7 @@ def _join(runs: list[Window]) -> Window:
         every("half"),
         starts.astype(np.int64),
         sum(run.samples for run in runs),
+        passes=np.concatenate([np.broadcast_to(run.passes, len(run)) for run in runs]),
     )
 
 
@@ -188,25 +298,18 @@ def distance_along(points: FloatArray, noise_level: float) -> FloatArray:
     return np.asarray(along - along[0])
 
 
-def _bin(
-    points: FloatArray,
-    normals: FloatArray,
-    height: FloatArray,
-    path: FloatArray,
-    width: float,
-    noise_level: float,
-    scale: float,
-) -> Window:
+def _bin(run: _Run, width: float, noise_level: float, scale: float) -> Window:
     """The window of one run."""
+    points, normals, height, path = run.points, run.normals, run.height, run.path
     cell = np.floor(path / width).astype(np.int64)
-    edges = np.flatnonzero(np.diff(cell, prepend=-1))
+    edges = np.flatnonzero(np.diff(cell, prepend=cell[0] - 1))
     count = np.diff(np.append(edges, len(path)))
     share = _shares(path, edges, count)
     feet = np.add.reduceat(share[:, None] * points, edges)
     mean_normals = np.add.reduceat(share[:, None] * normals, edges)
     place = np.add.reduceat(share * path, edges)
     last = path[edges + count - 1]
-    spacing = float(path[-1]) / max(len(path) - 1, 1)
+    spacing = float(path[-1] - path[0]) / max(len(path) - 1, 1)
     # a single sample was felt at a point, however far the next one is (a machine that pecks)
     extent = np.where(count > 1, last - path[edges] + spacing, 0.0)
     if noise_level > 0.0:
@@ -229,8 +332,8 @@ def _shares(path: FloatArray, edges: IntArray, count: IntArray) -> FloatArray:
     A template is averaged over the way; a finger that slows down at a flank leaves most samples of a bin there.
     """
     way = (
-        np.maximum(np.gradient(path), 1e-3 * path[-1] / len(path))
-        if len(path) > 1 and path[-1] > 0
+        np.maximum(np.gradient(path), 1e-3 * (path[-1] - path[0]) / len(path))
+        if len(path) > 1 and path[-1] > path[0]
         else 0.0 * path + 1.0
     )
     return np.asarray(way / np.repeat(np.add.reduceat(way, edges), count))

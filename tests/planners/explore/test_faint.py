@@ -63,7 +63,7 @@ def test_a_lead_begins_in_the_middle_with_passes_that_follow_from_the_height() -
     assert np.linalg.norm(begun.seed.point - axis.mean(axis=0)) < 1e-9
     assert abs(begun.seed.tangent @ begun.way) < 1e-9 and begun.seed.kind == "concave"
     alone = np.sqrt(3.0 / 8.0) * 6.445 * (4.5 / 13.0) ** 1.25  # signal-to-noise ratio of one pass over such a dip
-    assert begun.passes == np.ceil(1.5 * 25.0 / alone**2)
+    assert begun.passes == np.ceil(38.2 / alone**2)
     assert lead(line(30.0), seen, PLATE, 0.01).passes == begun.passes  # a sweep along it tells nothing of a crossing
 
 

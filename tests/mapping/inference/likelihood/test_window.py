@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mapping.base.base import Base
 from mapping.geometry.templates.shapes import cap_height
+from mapping.inference.likelihood.gaussian import Nuisance, build_likelihood
 from mapping.inference.likelihood.window import bin_samples, gather
+from mapping.instrument.noise import Noise
 from mapping.surface import Surface
 from mapping.trace import Trace
 
@@ -68,3 +72,56 @@ def test_a_single_sample_was_felt_at_a_point() -> None:
     window = window_of(crossing(spacing=0.3e-3))  # far wider than a bin
     assert (window.count == 1).all() and (window.half == 0.0).all()
     assert (window_of(crossing()).half > 0.4 * WIDTH).sum() > 100
+
+
+def passes_of(order: list[float], noise: Noise, beside: float = 0.0) -> Trace:
+    """Sweeps of 10 mm to and fro across a wire along y, at these places along it, m; the last one's may be off."""
+    rng, parts = np.random.default_rng(2), []
+    x = np.arange(-5e-3, 5e-3, 25e-6)
+    root = np.linalg.cholesky(replace(noise, white=0.0).covariance(x) + noise.white**2 * np.eye(len(x)))
+    felt = dict.fromkeys(order, 0)
+    for y in order:
+        draw = np.random.default_rng([int(1e6 * y), felt[y]]).standard_normal(len(x))
+        height = cap_height(x, 2.0 * RADIUS, RADIUS, R) + root @ draw
+        way = slice(None, None, 1 if felt[y] % 2 == 0 else -1)
+        parts.append(np.column_stack([x, np.full_like(x, y), R + height])[way])
+        felt[y] += 1
+    parts[-1][:, 1] += beside
+    centers = np.concatenate(parts) + 1e-9 * rng.standard_normal((len(parts) * len(x), 3))
+    return Trace(1e-3 * np.arange(len(centers)), centers, np.repeat(np.arange(len(parts)), len(x)), R)
+
+
+def test_passes_over_one_line_are_one_run() -> None:
+    noise = Noise(5e-5)
+    window = window_of(passes_of([0.0] * 6 + [1e-3] * 3, noise))
+    assert len(window.starts) == 3
+    inner = np.abs(window.feet[:, 0]) < 3e-3
+    assert set(window.passes[inner & (window.run == 0)]) == {6} and set(window.passes[inner & (window.run == 1)]) == {3}
+    off = window.height - cap_height(np.linspace(-1.0, 1.0, 51) * window.half[:, None] + window.feet[:, :1],
+                                     2.0 * RADIUS, RADIUS, R).mean(axis=1)  # fmt: skip
+    z = (off / (noise.white / np.sqrt(window.count)))[inner]
+    assert np.std(z) == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_pass_beside_a_line_is_a_run_of_its_own() -> None:
+    assert len(window_of(passes_of([0.0] * 4, Noise(1e-6), beside=0.5 * WIDTH)).starts) == 2
+    assert len(window_of(passes_of([0.0] * 4, Noise(1e-6), beside=2.0 * WIDTH)).starts) == 3
+
+
+@pytest.mark.parametrize("noise", [Noise(5e-5), Noise(5e-5, 2e-5, 0.7e-3)])
+def test_a_mean_says_what_its_passes_say(noise: Noise) -> None:
+    """The same sweeps, those over one line one after the other or in turns with those over another."""
+    together = window_of(passes_of([0.0] * 5 + [1e-3] * 5, noise))
+    apart = window_of(passes_of([0.0, 1e-3] * 5, noise))
+    assert (len(together.starts), len(apart.starts)) == (3, 11)
+    places = 2e-5 * np.array([-1.0, 0.0, 1.0])
+    known = []
+    for window in (together, apart):
+        likelihood = build_likelihood(window, noise, Nuisance(1e-3, 1e-3), 1e-9)
+        nodes = np.linspace(-1.0, 1.0, 21) * window.half[:, None] + window.feet[:, :1]
+        templates = np.array([cap_height(nodes - at, 2.0 * RADIUS, RADIUS, R).mean(axis=1) for at in places])
+        bend, slope, _ = np.polyfit(places, likelihood.log_density(templates), 2)
+        known.append((-0.5 * slope / bend, (-2.0 * bend) ** -0.5))
+    (place, sd), (other, other_sd) = known
+    assert sd == pytest.approx(other_sd, rel=0.03)
+    assert abs(place - other) < 0.25 * sd  # what begins a bin in one begins none in the other
