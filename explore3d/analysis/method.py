@@ -28,7 +28,7 @@ from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, o
 from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
 from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
 from mapping.estimate.deviation import Deviation, UnclimbedLevel, explain, left_standing, unclimbed_levels
-from mapping.estimate.envelope import estimate_surface
+from mapping.estimate.envelope import RefutedTip, estimate_surface, refuted_tip
 from mapping.geometry.curvature import principal_curvatures
 from mapping.geometry.mesh import distances
 from mapping.inference import refine_all
@@ -101,6 +101,7 @@ class Work:
         deviation: what the given model gets wrong; None if nothing is known to be.
         judgements: what became of the scene's tolerances.
         apart: samples left out for that.
+        refuted_tip: what the trace says against the radius of the tip; None if nothing.
         roughness: what the surface is like beside the features.
         standard_heights: what its ridges, grooves and steps measure by the standards.
         asked: whether a stage was asked for, by its name.
@@ -127,6 +128,7 @@ class Work:
     path: PathLedger | None = None
     deviation: Deviation | None = None
     apart: int = 0
+    refuted_tip: RefutedTip | None = None
     roughness: Roughness | None = None
     standard_heights: tuple[StandardHeight, ...] = ()
     time_curve: tuple[tuple[float, float], ...] = ()
@@ -289,6 +291,13 @@ def made_sound(work: Work, share: Share) -> None:
     work.sound = sound_sweeps(work.laid, work.base)
     if work.sound.cuts:
         work.laid = work.trace = work.sound.trace
+
+
+def tip_asked(work: Work, share: Share) -> None:
+    """The radius of the tip, held against the trace while all of it is there: a tip told too large takes what it feels
+    for outliers."""
+    if not work.log.detections:
+        work.refuted_tip = refuted_tip(work.laid, work.settings.tip_sd)
 
 
 def why_no_contact_algorithms(work: Work) -> str | None:
@@ -510,6 +519,7 @@ def modelled(work: Work, share: Share) -> None:
     path = {} if work.path is None else {"path": work.path.record()}
     rough = {} if work.roughness is None else {"roughness": work.roughness.record()}
     deviation = {} if work.deviation is None else {"deviation": work.deviation.record()}
+    refuted = {} if work.refuted_tip is None else {"refuted_tip": work.refuted_tip.record()}
     curved = {} if work.curvature is None else {"curvature": work.curvature.record()}
     proven = {} if work.estimate is None else {"estimated_surface": work.estimate.certainty()}
     work.model = ObjectModel.attach(
@@ -520,6 +530,7 @@ def modelled(work: Work, share: Share) -> None:
         | surface
         | path
         | deviation
+        | refuted
         | curved
         | proven
         | rough,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from mapping.detection import Detections
     from mapping.detection.path import PathLedger
     from mapping.estimate.deviation import Deviation
-    from mapping.estimate.envelope import Estimate
+    from mapping.estimate.envelope import Estimate, RefutedTip
     from mapping.geometry.curvature import Curvature
 
 
@@ -95,6 +95,7 @@ class Analysis:
         account: which part of the surface was swept, and what became of the rest; None without a scene.
         path: what became of the path that was recorded; None for a log that was searched while it was read.
         deviation: what the given model gets wrong at long wavelengths, None if nothing.
+        refuted_tip: what the trace says against the radius of the tip, None if nothing.
         judgements: what became of each tolerance of the scene.
         roughness: what the surface is like beside the features; None where a trace cannot tell.
         standard_heights: what its ridges, grooves and steps measure by the standards.
@@ -124,6 +125,7 @@ class Analysis:
     account: SurfaceAccount | None = None
     path: PathLedger | None = None
     deviation: Deviation | None = None
+    refuted_tip: RefutedTip | None = None
     judgements: tuple[Judgement, ...] = ()
     roughness: Roughness | None = None
     standard_heights: tuple[StandardHeight, ...] = ()

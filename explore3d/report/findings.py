@@ -63,6 +63,7 @@ def summary(analysis: Analysis) -> list[str]:
         else []
     )
     return [
+        *tip_warning(analysis),
         *([account.warning()] if account is not None and account.short else []),
         *lines,
         *(feature_line(feature) for feature in features[:MOST_LISTED_FEATURES]),
@@ -107,6 +108,18 @@ def warnings(analysis: Analysis) -> list[str]:
         *posterior_warnings(analysis),
         *dropped_warning(analysis),
         *warning_lines(analysis),
+    ]
+
+
+def tip_warning(analysis: Analysis) -> list[str]:
+    """What must be read before anything else that was found: that the tip was none of the radius that was told."""
+    refuted = analysis.refuted_tip
+    if refuted is None:
+        return []
+    where = "--tip-radius" if analysis.scene is None else "tip.radius in the scene"
+    return [
+        f"Warning: {refuted.sentence()}. All that follows rests on that radius and is not to be believed: is its unit "
+        f"right? Give the right one with {where}, or with --tip-sd how far it may be off."
     ]
 
 

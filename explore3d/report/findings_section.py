@@ -19,6 +19,7 @@ from explore3d.report.findings import (
     path_warning,
     stop_lines,
     swept_part,
+    tip_warning,
     warning_lines,
 )
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
@@ -39,6 +40,7 @@ def headline(analysis: Analysis) -> Html:
         element("p", _when_and_who(analysis), class_="kind"),
         element("h1", analysis.title or "Untitled"),
         *(element("p", f"{_capital(sentence)}.", class_="warning") for sentence in warnings),
+        *(element("p", sentence, class_="warning") for sentence in tip_warning(analysis)),
         element("p", found_sentence(analysis), class_="lead"),
     )
 

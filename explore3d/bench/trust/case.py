@@ -173,6 +173,7 @@ def _common(analysis: Analysis, seconds: float) -> dict[str, Any]:
     found, deviation = analysis.detections, analysis.deviation
     warnings = [*found.remarks, *(why for why in found.left_out if "limit is computed" not in why)]
     warnings += [] if deviation is None else [deviation.sentence()]
+    warnings += [] if analysis.refuted_tip is None else [analysis.refuted_tip.sentence()]
     warnings += [f"the path was cut: {reason}" for reason, _ in analysis.path.cuts] if analysis.path else []
     return {
         "crossings": len(found.crossings),

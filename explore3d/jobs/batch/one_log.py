@@ -120,6 +120,7 @@ def _analysed(job: Job) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 def _known(analysis: Analysis) -> dict[str, Any]:
     detections = analysis.detections
     noise, limit = detections.noise, float(detections.detection_limit)
+    refuted = () if analysis.refuted_tip is None else (analysis.refuted_tip.sentence(),)
     return {
         "samples": int(analysis.model.provenance["samples"]),
         "features": len(analysis.model.features),
@@ -129,5 +130,5 @@ def _known(analysis: Analysis) -> dict[str, Any]:
         "noise_length": float(noise.length),
         "detection_limit": limit if limit < float("inf") else None,
         "base": analysis.base.kind,
-        "warnings": "; ".join(detections.remarks) or None,
+        "warnings": "; ".join((*refuted, *detections.remarks)) or None,
     }

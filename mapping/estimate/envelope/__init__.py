@@ -8,10 +8,12 @@ if TYPE_CHECKING:
     from mapping.estimate.envelope.envelope import estimate_surface as estimate_surface
     from mapping.estimate.envelope.estimate import Estimate as Estimate
     from mapping.estimate.envelope.profile_envelope import envelope_heights as envelope_heights
+    from mapping.estimate.envelope.refuted_tip import RefutedTip as RefutedTip, refuted_tip as refuted_tip
 
 _PUBLIC = {
     "envelope": ("estimate_surface",),
     "estimate": ("Estimate",),
     "profile_envelope": ("envelope_heights",),
+    "refuted_tip": ("RefutedTip", "refuted_tip"),
 }
 doorway(__name__, _PUBLIC)

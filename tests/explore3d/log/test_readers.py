@@ -264,3 +264,41 @@ def test_the_export_of_a_dektak_is_read_with_its_stylus(tmp_path: Path) -> None:
     assert log.trace.tip_radius == pytest.approx(2.5e-6)
     assert log.trace.centers[:, 0] == pytest.approx(0.2e-6 * np.arange(300))
     assert log.trace.centers[:, 2] == pytest.approx(1e-6 * heights)
+
+
+@pytest.mark.parametrize(
+    ("words", "radius"),
+    [
+        ("# Tip radius: 2 um", 2e-6),
+        ("Stylus radius (µm): 2,5", 2.5e-6),
+        ("Tip radius;5;µm", 5e-6),
+        ("Probe tip radius 2 um", 2e-6),
+        ("Ball diameter: 6 mm", 3e-3),
+    ],
+)
+def test_a_tip_radius_that_a_table_states_is_taken_and_said(tmp_path: Path, words: str, radius: float) -> None:
+    (tmp_path / "scan.csv").write_text(f"{words}\nx [um];z [um]\n" + "".join(f"{k};{k % 7}\n" for k in range(90)))
+    log = load_logs([tmp_path / "scan.csv"])
+    assert log.trace.tip_radius == pytest.approx(radius) and len(log.trace) == 90
+    assert log.metadata["read_as"][0].endswith("is stated in it")
+    with pytest.raises(UserError, match="but the file states"):
+        load_logs([tmp_path / "scan.csv"], tip_radius=2.0 * radius)
+
+
+@pytest.mark.parametrize(
+    "words", ["Tip radius: 2", "Tip radius: 2 um\nStylus radius: 5 um", "Tip radius: 0 um", "Tip radius: 3 V"]
+)
+def test_a_tip_radius_that_leaves_something_open_is_not_taken_and_that_is_said(tmp_path: Path, words: str) -> None:
+    (tmp_path / "scan.csv").write_text(f"{words}\nx [um];z [um]\n" + "".join(f"{k};{k % 7}\n" for k in range(90)))
+    with pytest.raises(UserError, match="tip_radius"):
+        load_logs([tmp_path / "scan.csv"])
+    log = load_logs([tmp_path / "scan.csv"], tip_radius="2 um")
+    said = f"no radius was taken from {', '.join(map(repr, words.splitlines()))}"
+    assert log.trace.tip_radius == 2e-6 and log.metadata["read_as"][0].endswith(said)
+
+
+def test_what_speaks_of_a_tip_otherwise_is_no_radius(tmp_path: Path) -> None:
+    words = "tip radius compensation: 3 mm\nstylus shaft diameter: 1 mm\nx [um];z [um];tip radius\n"
+    (tmp_path / "scan.csv").write_text(words + "".join(f"{k};{k % 7};1\n" for k in range(90)))
+    log = load_logs([tmp_path / "scan.csv"], tip_radius="2 um")
+    assert "radius was" not in log.metadata["read_as"][0]

@@ -11,6 +11,7 @@ import numpy as np
 from explore3d.report.findings import summary, warnings
 from mapping import Dropped, Posterior, place_text
 from mapping.detection.path import PathLedger
+from mapping.estimate.envelope import RefutedTip
 from mapping.feature import Interval
 
 
@@ -41,6 +42,8 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
         base=SimpleNamespace(kind="mesh"),
         account=None,
         deviation=None,
+        refuted_tip=None,
+        scene=None,
         path=None,
         left_out=(),
         judgements=(),
@@ -51,6 +54,20 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
 
 def test_nothing_found_is_said_so() -> None:
     assert summary(analysis())[0] == "no features found"
+
+
+def test_a_refuted_tip_is_told_once_and_before_anything_else() -> None:
+    found = analysis(feature("bump-1", True, Interval(0.0, 0.0, 0.0)))
+    found.refuted_tip = RefutedTip(told=2e-3, largest=3.1e-6, places=17, chance=1e-20)
+    first, *others = summary(found)
+    assert first == (
+        "Warning: the tip was no ball of 2 mm: the trace bends more sharply than such a ball can at 17 places, and "
+        "3.1 µm is the largest radius that fits. All that follows rests on that radius and is not to be believed: is "
+        "its unit right? Give the right one with --tip-radius, or with --tip-sd how far it may be off."
+    )
+    assert not any("no ball" in line for line in others)
+    found.scene = SimpleNamespace()
+    assert "tip.radius in the scene" in summary(found)[0]
 
 
 def test_what_would_have_been_seen_is_said_with_every_result() -> None:

@@ -1,0 +1,298 @@
+"""Refuted tip: a trace that bends outwards more sharply, at many places, than the ball that is said to have made it.
+
+All that lies under the path of a ball's centre is a union of balls: under each place fits a circle of the ball's
+radius that no other place lies in. So three places with the middle one on top lie on a circle no smaller than that. A
+smaller one is noise, an outlier, or the trace of a smaller ball. Bends are measured over blocks of 4, 8, 16, ...
+samples and held against the scatter of all others; a jump, which bends as far over fewer samples, is an outlier's.
+
+Reference: theory section 4.9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from mapping import BoolArray, FloatArray, IntArray, length_text
+from mapping.base import Base, LaidSweep, LaidTrace
+from mapping.instrument import robust_scale
+
+# Chance, at most, that a radius which is right is refuted, whatever body was touched.
+REFUTED_BY_CHANCE = 1e-4
+# Standard deviations by which a bend may be gentler than it is measured, and the fewest places that refute a radius:
+# of 10^5 places of Gaussian noise three exceed that with a chance of (10^5 * 2.9e-7)^3 / 6, 4e-6.
+BEND_SDS, FEWEST_BENDS = 5.0, 3
+# Standard deviations of its radius by which the ball may be smaller than told.
+RADIUS_SDS = 3.0
+# Share by which means over blocks bend more than the path: of random pins and plateaus up to 2 r high, 5e-4 to 0.5 r
+# between samples, blocks of up to r without noise bend on circles of 0.913 r and more where nothing is steeper than
+# LEVEL_ENOUGH (rise over run against the base): up a wall the samples of a table stand far apart.
+MEANS_BEND_MORE, LEVEL_ENOUGH = 0.1, 0.5
+# Share of a radius below which a bend counts as sharper: along a right-angled groove a ball leans by 45 degrees
+# all the way.
+LEANT_ALONG = 0.7
+# Of the block's size, the least share over which a jump is looked for by its bend alone: a run as long as the block
+# bends by half over half of it, which no round crest does over a quarter. Over less noise is as high, and only what is
+# so many standard deviations higher is a jump.
+SHORTEST_JUMP_SHARE, SURE_JUMP_SDS = 0.25, 3.0
+# Half blocks to either side in which a bend has come down to the path beside it: an arc of the height h under a circle
+# of the radius c is 2 sqrt(2 c h) wide, and told best over blocks of a third of that.
+BESIDE_BLOCKS = 8
+# Samples over which the level of the noise is taken; the fewest bends that tell their scatter, and how many do.
+LEVEL_WINDOW, FEWEST_SCATTERED, SCATTERED = 256, 40, 4000
+# Points of the base under a sweep that tell which way is up, and bends that are held against each other.
+UP_PLACES, MOST_BENDS = 24, 2000
+# Factor between the radii that are tried.
+RADIUS_STEP = 1.02
+
+
+@dataclass(frozen=True)
+class RefutedTip:
+    """A radius of the tip that the trace refutes.
+
+    Args:
+        told: the radius, m.
+        largest: the largest radius that the trace allows, m.
+        places: where the trace bends more sharply than a ball of the told radius can.
+        chance: of so many so sharp ones under the told radius, at most.
+    """
+
+    told: float
+    largest: float
+    places: int
+    chance: float
+
+    def record(self) -> dict[str, Any]:
+        """JSON values, SI units."""
+        return asdict(self) | {"sentence": self.sentence()}
+
+    def sentence(self) -> str:
+        """What is wrong, for people."""
+        return (
+            f"the tip was no ball of {length_text(self.told)}: the trace bends more sharply than such a ball can at "
+            f"{self.places} places, and {length_text(self.largest, 2)} is the largest radius that fits"
+        )
+
+
+def refuted_tip(laid: LaidTrace, tip_sd: float = 0.0) -> RefutedTip | None:
+    """Hold the radius of the tip against how sharply its trace bends.
+
+    A radius that is too small cannot be refuted: every trace of a ball could be one of a smaller ball.
+
+    Args:
+        laid: the trace, outliers included: to a ball that is too large, fine features are such.
+        tip_sd: standard deviation of the radius, m.
+
+    Returns:
+        What refutes it; None if nothing does.
+    """
+    smallest = laid.tip_radius - RADIUS_SDS * tip_sd
+    bends = _apart(_measured(laid)) if smallest > 0.0 else None
+    if bends is None or len(bends.most) < FEWEST_BENDS:
+        return None
+    chance, places = _by_chance(bends, smallest)
+    if chance >= REFUTED_BY_CHANCE:
+        return None
+    largest = smallest
+    while _by_chance(bends, largest)[0] < REFUTED_BY_CHANCE:
+        largest /= RADIUS_STEP
+    return RefutedTip(laid.tip_radius, largest, places, chance)
+
+
+@dataclass(frozen=True, eq=False)
+class _Bends:
+    """Places where the trace bends outwards, K of them.
+
+    Args:
+        at: (K, 3) m.
+        reach: (K,) half the length over which each was measured, m.
+        least, most: (K,) radii between which that of the bend lies, m.
+        height: (K,) by which it stands above the path beside it, at most, m.
+    """
+
+    at: FloatArray
+    reach: FloatArray
+    least: FloatArray
+    most: FloatArray
+    height: FloatArray
+
+    def select(self, index: IntArray | BoolArray | slice) -> _Bends:
+        return _Bends(*(getattr(self, each.name)[index] for each in fields(self)))
+
+
+_NO_BENDS = _Bends(np.zeros((0, 3)), *(np.zeros(0) for _ in range(4)))
+
+
+def _by_chance(bends: _Bends, radius: float) -> tuple[float, int]:
+    """Chance, at most, of bends so sharp under a ball of this radius, and how many are sharper than it can bend.
+
+    A ball that leans to the side by the angle a, against what the sweep passes, turns about it on a circle of r cos a.
+    Of slender pins of one height that are passed at any distance, sharper than c r and lower than h above the path
+    beside is the share 1 - sqrt((1 - c^2) / (1 - max(0, c - h / r)^2)) at most, whatever their height (theory equation
+    4.19); thicker things and other ways to pass them bend less. So the number of sharp ones is a binomial draw at most.
+    """
+    from scipy.special import betainc
+
+    of = int((bends.least <= radius).sum())
+    sharp = bends.select(bends.most < LEANT_ALONG * radius)
+    if len(sharp.most) < FEWEST_BENDS:
+        return 1.0, len(sharp.most)
+    sharp = sharp.select(np.argsort(sharp.most))
+    cosine, height = sharp.most / radius, np.maximum.accumulate(sharp.height) / radius
+    share = 1.0 - np.sqrt((1.0 - cosine**2) / (1.0 - np.maximum(cosine - height, 0.0) ** 2))
+    # each number of the sharpest is asked, and the least chance counts as often as that
+    number = np.arange(1, len(share) + 1)
+    chances = betainc(number, of - number + 1.0, share)[FEWEST_BENDS - 1 :]
+    return float(min(1.0, len(chances) * chances.min())), len(share)
+
+
+def _apart(bends: _Bends) -> _Bends:
+    """Of bends that overlap the sharpest: blocks of several sizes, and sweeps side by side, may see one thing."""
+    kept: list[int] = []
+    for i in np.argsort(bends.most):
+        away = np.linalg.norm(bends.at[kept] - bends.at[i], axis=1)
+        if (away >= np.maximum(bends.reach[kept], bends.reach[i])).all():
+            kept.append(int(i))
+    return bends.select(np.array(kept, dtype=np.int64))
+
+
+class _Path:
+    """One sweep as its bends are measured.
+
+    Args:
+        sweep: its samples.
+        base: tells which way is up.
+    """
+
+    def __init__(self, sweep: LaidSweep, base: Base) -> None:
+        centers = sweep.trace.centers
+        count = len(centers)
+        self.origin = centers[0]
+        self.sums = np.zeros((count + 1, 3))
+        np.cumsum(centers - self.origin, axis=0, out=self.sums[1:])
+        # over many samples, which noise does not lengthen
+        many = max(1, count // UP_PLACES)
+        self.step = float(np.median(np.linalg.norm(np.diff(centers[::many], axis=0), axis=1))) / many
+        knots = np.unique(np.linspace(0, count - 1, min(count, UP_PLACES)).astype(np.int64))
+        up = base.foot(centers[knots], sweep.trace.tip_radius).normals
+        level = np.abs(up - up[0]).max() < np.sqrt(np.finfo(float).eps)
+        nearest = np.searchsorted(0.5 * (knots[1:] + knots[:-1]), np.arange(count))
+        self.up = np.array(up[:1] if level else up[nearest])  # of one kind for the compiler
+        self.scales: list[_Scale] = []
+        self.levels = np.zeros(0)
+
+    def __len__(self) -> int:
+        return len(self.sums) - 1
+
+    def bent(self, size: int) -> None:
+        """Measure the bends over blocks of so many samples, too; their sd but for a factor that all paths share."""
+        from mapping.estimate.envelope.bend_kernels import block_bends
+
+        stride = max(1, size // 2)
+        rise, product, usable = block_bends(self.sums, self.up, size, stride, self.step, LEVEL_ENOUGH)
+        if size == 1:
+            self.levels = _levels(rise, np.finfo(float).eps * float(np.abs(self.sums).max()))
+        cells = np.arange(len(rise)) * stride * len(self.levels) // len(self)
+        self.scales.append(_Scale(size, stride, rise, product, usable, self.levels[cells]))
+
+    def told(self, radius: float, resolution: float) -> _Bends:
+        """Bends of the largest blocks that noise cannot have made, nor a jump, and a ball of the radius hardly."""
+        scale = self.scales[-1]
+        unsure = BEND_SDS * scale.sd + resolution
+        surely = scale.rise - unsure
+        bent = scale.usable & (surely > 0.0) & (2.0 * radius * (scale.rise + unsure) >= scale.product)
+        if not bent.any():
+            return _NO_BENDS
+        sharp = np.where(bent, surely / np.where(bent, scale.product, 1.0), -np.inf)
+        around = np.concatenate([[-np.inf], sharp, [-np.inf]])
+        peaks = np.flatnonzero(bent & (sharp >= around[:-2]) & (sharp > around[2:]))
+        peaks = peaks[~self._jumps(peaks)]
+        product, beside = scale.product[peaks], np.arange(-BESIDE_BLOCKS, BESIDE_BLOCKS + 1)
+        at = self._means(peaks)
+        path = self._means(np.clip(peaks[:, None] + beside, 0, len(scale.rise) - 1))
+        up = self.up if len(self.up) == 1 else self.up[scale.middle(peaks)]
+        height = np.einsum("kij,kj->ki", at[:, None] - path, np.broadcast_to(up, at.shape)).max(axis=1, initial=0.0)
+        least = 0.5 * product / (scale.rise + unsure)[peaks]
+        most = (1.0 + MEANS_BEND_MORE) * 0.5 * product / surely[peaks]
+        return _Bends(at + self.origin, np.sqrt(product), least, most, height)
+
+    def _means(self, k: IntArray) -> FloatArray:
+        """(..., 3) means of the middle blocks of the largest scale's bends k, m, from the first sample on."""
+        scale = self.scales[-1]
+        begin = k * scale.stride + scale.size
+        return np.asarray((self.sums[begin + scale.size] - self.sums[begin]) / scale.size)
+
+    def _jumps(self, peaks: IntArray) -> BoolArray:
+        """(K,) True where smaller blocks within those of a bend bend as far, as a jump does and no circle.
+
+        Over a share q of the distance a circle rises by q^2, a jump by 1; q is between them.
+        """
+        scale = self.scales[-1]
+        jumps = np.zeros(len(peaks), dtype=bool)
+        for part in self.scales[:-1]:
+            share = part.size / scale.size
+            within = np.arange(3 * (scale.size - part.size) // part.stride + 1)
+            inside = np.minimum((peaks * scale.stride // part.stride)[:, None] + within, len(part.rise) - 1)
+            rise = part.rise if share >= SHORTEST_JUMP_SHARE else part.rise - SURE_JUMP_SDS * part.sd
+            jumps |= rise[inside].max(axis=1) >= share * scale.rise[peaks]
+        return jumps
+
+
+@dataclass(eq=False)
+class _Scale:
+    """Bends of a sweep over blocks of so many samples; arrays as in `block_bends`, and the sd (K,) of the first, m."""
+
+    size: int
+    stride: int
+    rise: FloatArray
+    product: FloatArray
+    usable: BoolArray
+    sd: FloatArray
+
+    def middle(self, k: IntArray) -> IntArray:
+        """Samples in the middle of bends."""
+        return np.asarray(k * self.stride + self.size + self.size // 2)
+
+
+def _measured(laid: LaidTrace) -> _Bends:
+    """Every bend that may be sharper than the tip, over blocks of all sizes."""
+    paths = [_Path(sweep, laid.base) for sweep in laid.laid_sweeps if len(sweep.trace) > 3]
+    return _joined(list(_over_all_sizes(paths, laid.tip_radius, laid.resolution)))
+
+
+def _over_all_sizes(paths: list[_Path], radius: float, resolution: float) -> Iterator[_Bends]:
+    size = 1
+    while True:
+        paths = [path for path in paths if len(path) >= 4 * size]
+        for path in paths:
+            path.bent(size)
+        scattered = [path.scales[-1].rise / path.scales[-1].sd for path in paths]
+        count = sum(map(len, scattered))
+        if count < FEWEST_SCATTERED:
+            return
+        scatter = robust_scale(np.concatenate(scattered)[:: 1 + count // SCATTERED])
+        for path in paths:
+            path.scales[-1].sd *= scatter
+            if SHORTEST_JUMP_SHARE * size >= 1.0:
+                yield path.told(radius, resolution)
+        size *= 2
+
+
+def _joined(parts: list[_Bends]) -> _Bends:
+    """All together, or every so many-th: those that are too many are alike."""
+    columns = ([getattr(each, one.name) for each in (_NO_BENDS, *parts)] for one in fields(_Bends))
+    joined = _Bends(*(np.concatenate(column) for column in columns))
+    return joined.select(slice(None, None, 1 + len(joined.most) // MOST_BENDS))
+
+
+def _levels(rise: FloatArray, rounding: float) -> FloatArray:
+    """(cells,) usual bend of three samples in equal parts of a sweep, m; what rounding brings to nothing apart."""
+    cells = max(1, len(rise) // LEVEL_WINDOW)
+    size = len(rise) // cells
+    rows = np.sort(np.abs(rise[: cells * size]).reshape(cells, size), axis=1)
+    none = np.minimum((rows <= rounding).sum(axis=1), size - 1)
+    levels = rows[np.arange(cells), none + (size - none) // 2]
+    return np.asarray(np.maximum(levels, max(0.2 * float(np.median(levels)), rounding)))
