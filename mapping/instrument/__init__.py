@@ -12,8 +12,8 @@ if TYPE_CHECKING:
         perturbed as perturbed,
         relative_sd as relative_sd,
     )
-    from mapping.instrument.fit import fit_noise as fit_noise
     from mapping.instrument.noise import Noise as Noise, estimate_noise as estimate_noise
+    from mapping.instrument.noise_fit import fit_noise as fit_noise
     from mapping.instrument.robust import (
         BISQUARE as BISQUARE,
         FEATURE_RESIDUAL_SDS as FEATURE_RESIDUAL_SDS,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "averaging": ("Means", "RunMeans", "running_mean"),
     "block_likelihood": ("Blocks", "NoiseFit", "perturbed", "relative_sd"),
-    "fit": ("fit_noise",),
+    "noise_fit": ("fit_noise",),
     "noise": ("Noise", "estimate_noise"),
     "robust": (
         "BISQUARE",

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         Traced as Traced,
     )
     from mapping.inference.kinds.points import PointKind as PointKind, PointShape as PointShape, Seen as Seen
-    from mapping.inference.kinds.posing import height_prior as height_prior, place_prior as place_prior
+    from mapping.inference.kinds.posterior_density import height_prior as height_prior, place_prior as place_prior
 
 _PUBLIC = {
     "bump": ("bump_shape",),
@@ -43,6 +43,6 @@ _PUBLIC = {
     ),
     "lines": ("LineKind", "LineShape", "Parameters", "Traced"),
     "points": ("PointKind", "PointShape", "Seen"),
-    "posing": ("height_prior", "place_prior"),
+    "posterior_density": ("height_prior", "place_prior"),
 }
 doorway(__name__, _PUBLIC)

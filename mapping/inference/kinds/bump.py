@@ -24,7 +24,7 @@ from mapping.inference.families import (
 from mapping.inference.kinds.crests import Crest
 from mapping.inference.kinds.kind import Section
 from mapping.inference.kinds.points import PointKind, Seen
-from mapping.inference.kinds.posing import height_prior, place_prior, radius_prior
+from mapping.inference.kinds.posterior_density import height_prior, place_prior, radius_prior
 from mapping.inference.likelihood import Shape, Window
 
 # Tapers that a bell's optimum is searched from: with an edge, nearly a Gaussian, and with a long skirt

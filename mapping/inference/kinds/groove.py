@@ -20,7 +20,7 @@ from mapping.inference.families import (
 )
 from mapping.inference.kinds.hollows import Hollow
 from mapping.inference.kinds.lines import LineKind, Parameters, Traced
-from mapping.inference.kinds.posing import hollow_priors
+from mapping.inference.kinds.posterior_density import hollow_priors
 
 
 class Groove(Hollow, LineKind):

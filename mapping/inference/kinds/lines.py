@@ -19,7 +19,7 @@ from mapping.inference.curves import (
 )
 from mapping.inference.families import MEETING_REACH, PosteriorProblem, Sizes, Surroundings, touches, window_for
 from mapping.inference.kinds.kind import Kind, sizes_of
-from mapping.inference.kinds.posing import pose
+from mapping.inference.kinds.posterior_density import pose
 from mapping.inference.likelihood import Normal, Prior, Shape, Uniform, Window
 from mapping.inference.sampler import find_optima
 

@@ -20,7 +20,7 @@ from mapping.inference.families import (
 )
 from mapping.inference.kinds.hollows import Hollow
 from mapping.inference.kinds.points import PointKind, Seen
-from mapping.inference.kinds.posing import hollow_priors, place_prior
+from mapping.inference.kinds.posterior_density import hollow_priors, place_prior
 
 
 class Pit(Hollow, PointKind):

@@ -10,7 +10,7 @@ import numpy as np
 from mapping import Feature, FloatArray
 from mapping.inference.families import PosteriorProblem, Sizes, Spot, Surroundings, spot_at, window_for
 from mapping.inference.kinds.kind import Kind, sizes_of
-from mapping.inference.kinds.posing import pose
+from mapping.inference.kinds.posterior_density import pose
 from mapping.inference.likelihood import Shape, Window
 from mapping.inference.sampler import find_optima
 

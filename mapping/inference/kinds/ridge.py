@@ -22,7 +22,7 @@ from mapping.inference.families import (
 from mapping.inference.kinds.crests import Crest
 from mapping.inference.kinds.kind import Section
 from mapping.inference.kinds.lines import LineKind, Parameters, Traced
-from mapping.inference.kinds.posing import height_prior, radius_prior
+from mapping.inference.kinds.posterior_density import height_prior, radius_prior
 from mapping.inference.likelihood import Shape, Uniform
 
 # Widths of a flat top and runs of a flank, in half-widths of the disturbance, from which their optimum is searched:

@@ -12,7 +12,7 @@ from mapping.geometry.templates import contact_half_width, step_height
 from mapping.inference.families import Sizes, StepShape
 from mapping.inference.kinds.kind import Section, place_sd, preliminary
 from mapping.inference.kinds.lines import LineKind, Parameters, Traced
-from mapping.inference.kinds.posing import height_prior
+from mapping.inference.kinds.posterior_density import height_prior
 from mapping.inference.likelihood import Shape
 
 

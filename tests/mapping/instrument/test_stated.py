@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mapping.errors import NoiseError
-from mapping.instrument.fit import Blocks, NoiseFit, fit_noise
 from mapping.instrument.noise import Noise, estimate_noise
+from mapping.instrument.noise_fit import Blocks, NoiseFit, fit_noise
 from mapping.instrument.stated import StatedNoise
 
 TRUTH, STEP, COUNT = Noise(0.0, 2e-4, 1e-3), 2e-5, 3000

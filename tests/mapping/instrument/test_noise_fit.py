@@ -7,8 +7,8 @@ import pytest
 
 from mapping.detection.filters.toeplitz_kernels import leading_solutions
 from mapping.instrument.block_likelihood import Blocks, relative_sd
-from mapping.instrument.fit import fit_noise
 from mapping.instrument.noise import Noise, estimate_noise
+from mapping.instrument.noise_fit import fit_noise
 from mapping.instrument.noise_kernels import block_likelihood
 
 

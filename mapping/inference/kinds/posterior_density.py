@@ -1,4 +1,4 @@
-"""Posing: shape, window, noise and neighbours joined to a posterior density; priors that several kinds share."""
+"""Posterior density: shape, window, noise and neighbours joined to one; priors that several kinds share."""
 
 from __future__ import annotations
 
