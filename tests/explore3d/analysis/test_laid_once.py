@@ -61,6 +61,7 @@ def test_roughness_lays_nothing_that_is_laid_already(monkeypatch):
     assert found is not None and found.profile["Rq"].low < 0.02e-3
 
 
+@pytest.mark.slow
 def test_what_is_measured_for_roughness_too_is_laid_sample_by_sample_once_its_pictures_included(laid, tmp_path):
     trace = scaled(sweeps(wire(), white=0.02e-3, spacing=10e-6, half=80e-3), 0.5)
     assert len(trace) > RAW_SAMPLES
