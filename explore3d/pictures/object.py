@@ -198,7 +198,7 @@ def _drawn(picture: Picture, features: Sequence[Feature]) -> str:
         hidden = not (0 <= row < picture.depth.shape[0] and 0 <= column < picture.depth.shape[1])
         if hidden or depth[0] > 1.02 * picture.depth[row, column]:
             continue
-        words = f"{feature.id}  {length_text(feature.height.median)}"
+        words = f"{feature.id}  {feature.height.text()[0]}"
         x, y = (place[0] / SUPERSAMPLING).tolist()
         wide = text_width(words, LABEL_SIZE) + 6.0
         left = min(max(x + 30.0, 2.0), width - wide - 2.0)

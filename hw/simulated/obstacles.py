@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hw import Move, StoppedError
-from mapping import BoolArray, FloatArray
+from mapping import BoolArray, FloatArray, place_text
 from mapping.geometry.contact import BallContact, Contacts
 from mapping.geometry.mesh import NearestPoint, cores
 
@@ -65,8 +65,8 @@ class Obstacles:
         depth = radius - self.nearest.query(points).distance
         hit = depth > YIELDS * self.tip_radius
         if hit.any():
-            where = np.round(centers[hit.argmax()], 6).tolist()
-            raise StoppedError(f"{what} runs into the body with the ball at {where} m; the finger has drawn back")
+            where = place_text(centers[hit.argmax()], self.tip_radius)
+            raise StoppedError(f"{what} runs into the body with the ball at {where}; the finger has drawn back")
 
 
 def pressed_from(
