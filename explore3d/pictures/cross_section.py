@@ -32,8 +32,8 @@ class CrossSection:
         sweep: number of the sweep.
         x, height: (N,) samples: distance across the feature, and height over the base, or its level, m.
         bin_x, bin_height, bin_sd: (M,) means over equal bins, and their standard errors, m.
-        grid, predicted, low, high: (G,) places, and the trace of the recorded feature there: median, and the
-            5 % and 95 % quantiles of its height.
+        grid, predicted, low, high: (G,) places, and the trace of the recorded feature there, on the level of the
+            samples about it: median, and the 5 % and 95 % quantiles of its height.
         body_x, body_z, bridged: (B,) the estimated surface over the base along the sweep, m, and where the tip
             bridged it; empty if no surface was estimated.
         across: True if x is measured across a line, False if along the sweep over a point.
@@ -91,8 +91,11 @@ def cross_section(
     height = over_levels(feet.height[index], np.zeros(0, dtype=np.int64), base.levels)
     level = float(feet.height[index][0] - height[0])
     bins = _binned(x, height)
+    felt = np.interp(grid, x, height)
     if kind_of(feature).sided:
-        curves = _aligned(curves, np.interp(grid, x, height))
+        curves = _aligned(curves, felt)
+    else:  # the level about it is the fit's own: noise that is correlated and drifts move it
+        curves = [curve + float(np.median(felt - curves[0])) for curve in curves]
     sweep = int(trace.sweep[window[0]])
     return CrossSection(
         feature,
@@ -240,10 +243,15 @@ def _binned(x: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, 
 def _body(
     feature: Feature, sweep: int, half: float, estimate: Estimate | None, base: Base, tip_radius: float, level: float
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """The estimated surface along the sweep: places, heights over the base's level, and where it was bridged."""
+    """The estimated surface along the sweep: places, heights over the base's level, and where it was bridged.
+
+    What balls between this sweep and its neighbours would leave lies beside it, and is left out: it comes after all
+    that stems from samples.
+    """
     if estimate is None:
         return np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool)
     own = np.flatnonzero(estimate.sweep == sweep)
+    own = own[own <= np.flatnonzero(estimate.sample >= 0)[-1]]
     near = np.linalg.norm(estimate.points[own] - nearest_on(estimate.points[own], feature.axis)[0], axis=1)
     own = own[near < 2.0 * SECTION_REACH * half]
     foot = base.foot(estimate.points[own], tip_radius)

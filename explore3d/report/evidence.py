@@ -22,8 +22,8 @@ def cross_sections(analysis: Analysis, pictures: Pictures) -> Html:
     )
     caption = (
         "Height over the base where a sweep crosses each feature. Dots: what the finger traced. Red: the trace that "
-        "the feature found would leave, with its 90 % band. Black: the body itself, as the balls allow it; dotted "
-        "where the tip bridged it and nothing was touched." + more
+        "the feature found would leave, on the level of the samples about it, with its 90 % band. Black: the body "
+        "itself, as the balls allow it; dotted where the tip bridged it and nothing was touched." + more
     )
     picture = figure(pictures.files["sections"], "Profiles across the features", caption)
     return section("Traced and estimated profiles", "profiles", picture)

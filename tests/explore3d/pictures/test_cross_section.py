@@ -5,6 +5,7 @@ import pytest
 from reported_wire import AXIS, BASE, HEIGHT, TIP, crossing, ridge, sweeps
 
 from explore3d.pictures.cross_section import cross_section
+from mapping.estimate.envelope import estimate_surface
 from mapping.feature import Feature, Interval, Support
 from mapping.geometry.templates.shapes import cap_height, step_height
 from mapping.trace import Trace
@@ -31,6 +32,35 @@ def test_a_feature_that_no_sweep_came_near_has_no_section() -> None:
     size = Interval.normal(1e-4, 1e-6)
     far = Feature("bump", np.array([[0.0, 0.5, 0.0]]), UP[None], size, size, size, Support(9.0, 1), True, 1e-5)
     assert cross_section(far, sweeps(), BASE, []) is None
+
+
+def test_the_body_lies_nowhere_above_the_trace_of_the_sweep_that_felt_it() -> None:
+    """A ball over a place has that place under it: what stands higher in a section was felt beside it."""
+    high, noise, rng = 0.08 * TIP, 2e-4 * TIP, np.random.default_rng(4)
+    x = np.arange(-2.0 * TIP, 2.0 * TIP, 0.05 * TIP)
+    rows = 0.3 * TIP * np.arange(-4, 5)
+    feet = np.concatenate([np.column_stack([x, np.full_like(x, y), 0 * x]) for y in rows])
+    slant = np.array([0.2, 1.0, 0.0]) / np.hypot(0.2, 1.0)
+    away = feet @ np.array([slant[1], -slant[0], 0.0])
+    height = cap_height(away, high, 1e-9, TIP) + noise * rng.standard_normal(len(x) * len(rows))
+    trace = Trace(
+        np.arange(float(len(feet))), feet + (TIP + height)[:, None] * UP, np.repeat(np.arange(9), len(x)), TIP
+    )
+    size = Interval.normal(high, 1e-6)
+    axis = np.outer([-1.2 * TIP, 1.2 * TIP], slant)
+    line = Feature("ridge", axis, np.tile(UP, (2, 1)), size, Interval(0, 0, 0), size, Support(99.0, 9), True, 1e-5)
+    section = cross_section(line, trace, BASE, [], estimate_surface(trace, base=BASE))
+    assert section is not None and len(section.body_x) > 10
+    above = section.body_z - np.interp(section.body_x, section.x, section.height)
+    assert above.max() < 4.0 * noise
+
+
+def test_the_prediction_lies_on_the_level_of_the_samples_about_it() -> None:
+    lifted = Trace(sweeps().t, sweeps().centers + 2e-5 * UP, sweeps().sweep, TIP)
+    section = cross_section(ridge(), lifted, BASE, [crossing(4, -0.006)])
+    assert section is not None
+    exact = 2e-5 + cap_height(section.grid, HEIGHT, 0.5 * HEIGHT, TIP)
+    np.testing.assert_allclose(section.predicted, exact, atol=1e-7)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
