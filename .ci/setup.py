@@ -29,7 +29,10 @@ def main(extras: list[str]) -> None:
     project = f".[{','.join(extras)}]" if extras else "."
     print(f"setup: installing {project} and what it depends on (some 1 GB; minutes the first time)", flush=True)
     quiet = {**os.environ, "PYTHONWARNINGS": "ignore", "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
-    subprocess.run([*pip(), "install", "--quiet", "--editable", project], cwd=ROOT, env=quiet, check=True)
+    # By a path alone: the usual hook is asked last, so that the checkout's own folder, which has the package's name,
+    # would stand for the package wherever Python is begun beside it
+    by_path = ["--config-settings", "editable_mode=compat"]
+    subprocess.run([*pip(), "install", "--quiet", *by_path, "--editable", project], cwd=ROOT, env=quiet, check=True)
     system_libraries.provide(PYTHON, VENV / "lib" / "explore3d-syslibs")
     print("setup: compiling, so that the first run is as quick as the second (a minute or two)", flush=True)
     compiling = [str(PYTHON), "-m", "explore3d", "doctor", "--compile", "--json"]
