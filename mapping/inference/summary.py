@@ -109,25 +109,33 @@ def _length(
     """The length, and what is to be said of it; `seen` as of `explored`, None of a line without ends."""
     chart, modes = shape.chart, shape.modes
     some = draws[:: max(1, len(draws) // FEW_DRAWS)]
-    lengths = np.empty(len(some))
-    for i, theta in enumerate(some):
-        first, last = chart.s[[0, -1]] if seen is None else theta[_ends(problem)]
+
+    def of(theta: FloatArray, first: float, last: float) -> float:
         s = np.linspace(first, last, AXIS_POINTS if len(chart.s) > 8 or modes.degree > 1 else 2)
         points, laterals, _, _ = chart.at(s)
         course = points + modes.lateral(theta[None, : modes.count], s)[0][:, None] * laterals
-        lengths[i] = np.linalg.norm(np.diff(course, axis=0), axis=1).sum()
-    interval = Interval.from_draws(lengths)
+        return float(np.linalg.norm(np.diff(course, axis=0), axis=1).sum())
+
+    ends = np.tile(chart.s[[0, -1]], (len(some), 1)) if seen is None else some[:, _ends(problem)]
+    interval = Interval.from_draws(np.array([of(*each) for each in zip(some, *ends.T, strict=True)]))
     if chart.closed:
         return interval, []
     if seen is None:
         return replace(interval, censored=True), [
             f"the length of a {problem.feature.kind} is what was explored of it: at least this"
         ]
-    return (interval, []) if all(seen) else (replace(interval, censored=True), [*with_open_ends((), seen)])
+    if all(seen):
+        return interval, []
+    first, last = demanded(problem, draws, seen)
+    sure = np.sort(np.column_stack([np.maximum(ends[:, 0], first), np.minimum(ends[:, 1], last)]), axis=1)
+    low = float(np.quantile([of(*each) for each in zip(some, *sure.T, strict=True)], 0.05))
+    return replace(interval, low=min(low, interval.low), censored=True), [*with_open_ends((), seen)]
 
 
 # An end that may as well lie at the limit of what was looked at was not seen: no more log density against it.
 UNSEEN = 3.0
+# Places between which an end that was not seen is looked for, from the limit to the other end
+PLACES_OF_END = 200
 GOES_ON = "the axis goes on beyond what was explored"
 
 
@@ -145,6 +153,26 @@ def explored(problem: PosteriorProblem, draws: FloatArray) -> tuple[bool, bool]:
     at_limit[2, columns[1]] = target.high[columns[1]]
     value = target.log_density(at_limit)
     return bool(value[0] - value[1] > UNSEEN), bool(value[0] - value[2] > UNSEEN)
+
+
+def demanded(problem: PosteriorProblem, draws: FloatArray, seen: tuple[bool, bool]) -> tuple[float, float]:
+    """How far the data demand that the axis goes, along it, m; infinitely far out of an end that was seen.
+
+    Beyond what was looked at all places of an end are alike, and draws are of the prior there: their 5 % quantile lies
+    where nothing was felt. The best of the draws is moved in from the limit until the density speaks against it.
+    """
+    target, columns = problem.target, _ends(problem)
+    best = draws[int(np.argmax(target.log_density(draws)))]
+    limits, places = (target.low[columns[0]], target.high[columns[1]]), [-np.inf, np.inf]
+    for i, column in enumerate(columns):
+        if not seen[i]:
+            tried = np.linspace(limits[i], best[columns[1 - i]], PLACES_OF_END)[:-1]
+            moved = np.tile(best, (len(tried), 1))
+            moved[:, column] = tried
+            value = target.log_density(moved)
+            denied = np.flatnonzero(value < value[0] - UNSEEN)
+            places[i] = float(tried[denied[0] if len(denied) else -1])
+    return places[0], places[1]
 
 
 def with_open_ends(notes: Sequence[str], seen: Sequence[bool]) -> tuple[str, ...]:

@@ -82,6 +82,8 @@ def test_an_end_that_was_not_explored_is_censored():
     trace = record(CROSSINGS, wire([(-80e-3, 0, 0), (4e-3, 0, 0)]))
     found = refine(GUESS, trace, np.random.default_rng(0), base=plate(), noise=WHITE, confirm=False)
     assert found.length.censored and any("beyond what was explored" in note for note in found.notes)
+    # it is sure as far as it was felt: from the first crossing to the end that was seen, and no farther
+    assert 10e-3 < found.length.low < 4e-3 - min(path[0, 0] for path in CROSSINGS) + 0.1e-3
 
 
 def test_zigzag_leaves_the_end_anywhere_between_two_sweeps():
