@@ -22,7 +22,7 @@ from explore3d.jobs.resume import BROKEN_OFF, Replay, replay_of
 from explore3d.jobs.session import Job, Session, unchanged_files
 from explore3d.log import EXPLORATION, OUTCOME, Log, read_base, stop_of
 from explore3d.scene import FingerNoise, GivenFingerTable, Scene, load_scene
-from hw import Finger, Move
+from hw import Finger, Move, wrong_trace
 from mapping import Trace, length_text
 from mapping.geometry.mesh import algebra_in_one_thread
 from planners import Outcome
@@ -159,13 +159,20 @@ def _explore(
             finger.notice = log.felt  # a slow sweep's samples are on disk before it ends
         if hasattr(finger, "waiting"):
             finger.waiting = lambda what: stages.progress(what, 0.0)
-        touch: Callable[[Move], Trace] = finger.execute
+
+        def touch(move: Move) -> Trace:
+            trace = finger.execute(move)
+            if wrong := wrong_trace(move, trace, finger.workspace):
+                raise UserError(wrong)  # no refusal of one move: a driver does the same to every one
+            return trace
+
+        touched: Callable[[Move], Trace] = touch
         if replay is not None:
             log.event("resumed", {"samples": replay.samples})
-            touch = replay.before(finger.execute, getattr(finger, "skip", None), log.write)
+            touched = replay.before(touch, getattr(finger, "skip", None), log.write)
 
         cut_short: list[str] = []
-        waits = Waits(touch)
+        waits = Waits(touched)
 
         def execute(move: Move) -> Trace:
             trace = waits(move)
