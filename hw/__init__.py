@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         StoppedError as StoppedError,
         UntrueForceError as UntrueForceError,
     )
+    from hw.felt import wrong_trace as wrong_trace
     from hw.finger import Finger as Finger, Workspace as Workspace
     from hw.framing import Frames as Frames, Framing as Framing, Lines as Lines
     from hw.link import Link as Link
@@ -37,6 +38,7 @@ _PUBLIC = {
         "StoppedError",
         "UntrueForceError",
     ),
+    "felt": ("wrong_trace",),
     "finger": ("Finger", "Workspace"),
     "framing": ("Frames", "Framing", "Lines"),
     "link": ("Link",),

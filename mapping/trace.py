@@ -165,6 +165,17 @@ class Trace:
         for start, stop in zip([0, *cuts], [*cuts, len(self)], strict=True):
             yield int(self.sweep[start]), self._view(slice(int(start), int(stop)))
 
+    def backwards(self) -> str:
+        """Where times decrease within a sweep, as a sentence; "" if none does."""
+        back = 1 + np.flatnonzero((np.diff(self.t) < 0) & (np.diff(self.sweep) == 0))
+        if not len(back):
+            return ""
+        first = int(back[0])
+        return (
+            f"{len(back)} of {len(self)} samples lie before their predecessor, the first is sample {first} of sweep "
+            f"{int(self.sweep[first])}, {self.t[first - 1] - self.t[first]:.3g} s before"
+        )
+
     def _view(self, cut: slice | BoolArray) -> Trace:
         """Some samples; not checked again, and sharing the memory of these if they are consecutive."""
         part = object.__new__(Trace)

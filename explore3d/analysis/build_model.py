@@ -49,7 +49,7 @@ from explore3d.analysis.savings import with_savings
 from explore3d.analysis.stages import Stages
 from explore3d.analysis.truth import compare
 from explore3d.log import Log, stop_of
-from explore3d.scene import Scene, SimulatedFingerTable
+from explore3d.scene import Scene
 from mapping.base import Base
 from mapping.geometry.mesh import algebra_in_one_thread
 
@@ -106,7 +106,6 @@ def build_model(log: Log, scene: Scene | None, base: Base | None, stages: Stages
 def _result(work: Work) -> Analysis:
     """What the stages led to, and what they cost."""
     log, scene, trace, truth, stages = work.log, work.scene, work.laid, work.truth, work.stages
-    simulated = scene is not None and isinstance(scene.finger, SimulatedFingerTable)
     model = replace(work.model, left_out=tuple(stages.left_out), timings=dict(stages.timings))
     return Analysis(
         title=(scene.title if scene else "") or ", ".join(Path(source).name for source in log.sources),
@@ -118,7 +117,7 @@ def _result(work: Work) -> Analysis:
         estimate=work.estimate,
         curvature=work.curvature,
         truth=truth,
-        errors=compare(model, truth, trace.tip_radius) if truth or simulated else (),
+        errors=compare(model, truth, trace.tip_radius) if work.truth_known else (),
         timings=dict(stages.timings),
         left_out=with_savings(stages.left_out, stages.timings),
         recovered=log.recovered,

@@ -144,9 +144,17 @@ class Work:
 
     @property
     def truth(self) -> tuple[TrueFeature, ...]:
-        """True features of a simulated scene."""
+        """True features that the scene states."""
         true = self.scene.truth if self.scene else ()
         return tuple(TrueFeature(t.kind, t.axis, t.height, t.width, t.length or None) for t in true)
+
+    @property
+    def truth_known(self) -> bool:
+        """True if the scene states true features, or its simulated finger touches the very model: nothing is on it."""
+        scene = self.scene
+        if scene is None or scene.finger.is_real:
+            return bool(self.truth)
+        return bool(self.truth) or scene.finger.touched == (scene.model.mesh, scene.model.units)
 
     @property
     def smallest_feature(self) -> float | None:
@@ -576,7 +584,7 @@ def in_model_frame(features: tuple[Feature, ...], base: Base) -> tuple[Feature, 
 
 def why_no_time_curve(work: Work) -> str:
     """Errors need a truth."""
-    return "" if work.truth and work.model.features else "the truth is not known, or nothing was found"
+    return "" if work.truth and work.model.features else "no true feature is stated, or nothing was found"
 
 
 def compared_in_time(work: Work, share: Share) -> None:

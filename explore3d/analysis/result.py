@@ -80,7 +80,7 @@ class Analysis:
         scene: None for a log without one.
         estimate: the estimated surface, None if it was left out.
         curvature: principal curvatures at the vertices of `estimate.surface`, None if left out.
-        truth: true features of a simulated scene.
+        truth: true features that the scene states.
         errors: found features against the true ones.
         timings: seconds per stage, in the order of the stages.
         left_out: stages that were not needed or could not be done.

@@ -68,10 +68,11 @@ def export(
     from json import dumps
 
     from explore3d.jobs import Told
-    from explore3d.jobs.export import export as write
+    from explore3d.jobs.export import export as write, may_be_written
 
     table = {"units": units, "columns": columns, "pixel": pixel, "part": part}
     told = Told(tip_radius, table={name: value for name, value in table.items() if value is not None})
+    may_be_written(source, *to, overwrite=overwrite)  # all or none
     written = []
     for path in to:
         written.append(str(write(source, path, told, overwrite=overwrite)))

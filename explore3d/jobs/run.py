@@ -22,7 +22,7 @@ from explore3d.jobs.resume import BROKEN_OFF, Replay, replay_of
 from explore3d.jobs.session import Job, Session, unchanged_files
 from explore3d.log import EXPLORATION, OUTCOME, Log, read_base, stop_of
 from explore3d.scene import FingerNoise, GivenFingerTable, Scene, load_scene
-from hw import Finger, Move
+from hw import Finger, Move, wrong_trace
 from mapping import Trace, length_text
 from mapping.geometry.mesh import algebra_in_one_thread
 from planners import Outcome
@@ -68,10 +68,10 @@ def run(
         report: False to write no report and no pictures.
 
     Raises:
-        UserError: a scene or folder that cannot be used.
+        UserError: a scene or folder that cannot be used; a finger that returns what it cannot have felt.
         FingerError: the finger cannot be opened or is lost.
     """
-    stages = Stages(progress, force)
+    stages, given = Stages(progress, force), finger is not None
     with stages.stage("setting up"):
         scene = open_scene(scene, files_from)
         known_base(scene)  # a mesh that cannot be used is refused before a folder is made
@@ -79,10 +79,7 @@ def run(
             finger = scene_finger(without_needless_dynamics(scene, stages), arm)
         else:
             scene = _with_given(scene, finger)
-    words = [part for name in force for part in ("--force", name)] + ["--arm"] * arm + ["--no-report"] * (not report)
-    words += [part for folder in files_from for part in ("--files-from", str(folder))]
-    again = shlex.join(["explore3d", "run", str(scene.path), "--out", str(out), *words])
-    go_on = f"{again} --resume"
+    again, go_on = _calls(scene, out, force, files_from, arm=arm, report=report, given=given)
     job = Job("run", scene_digest(scene), ("plan",), go_on, again, scene.files)
     with Session(out, job, resume=resume, overwrite=overwrite) as session:
         replay = None if session.source is None else replay_of(session.source)
@@ -94,6 +91,28 @@ def run(
             key, base = run_key(log.sha256, Told(force=tuple(force)).record([])), read_base(log.events)
             analysis = conclude(session, log, scene, base, stages, go_on, report=report, run=key, waits=waits)
     return replace(analysis, folder=session.place)
+
+
+def _calls(
+    scene: Scene,
+    out: Path | str,
+    force: Collection[str],
+    files_from: Collection[Path | str],
+    *,
+    arm: bool,
+    report: bool,
+    given: bool,
+) -> tuple[str, str]:
+    """What begins a run again, and what goes on with it: commands, or calls where a program hands the finger in."""
+    if given:
+        words = [repr(str(scene.path)), repr(str(out)), "finger=..."]
+        words += [f"force={[*force]}"] * bool(force) + ["report=False"] * (not report)
+        words += [f"files_from={[*map(str, files_from)]}"] * bool(files_from)
+        return f"explore3d.run({', '.join(words)})", f"explore3d.run({', '.join([*words, 'resume=True'])})"
+    words = [part for name in force for part in ("--force", name)] + ["--arm"] * arm + ["--no-report"] * (not report)
+    words += [part for folder in files_from for part in ("--files-from", str(folder))]
+    again = shlex.join(["explore3d", "run", str(scene.path), "--out", str(out), *words])
+    return again, f"{again} --resume"
 
 
 def open_scene(scene: Scene | Path | str, files_from: Collection[Path | str] = ()) -> Scene:
@@ -159,13 +178,20 @@ def _explore(
             finger.notice = log.felt  # a slow sweep's samples are on disk before it ends
         if hasattr(finger, "waiting"):
             finger.waiting = lambda what: stages.progress(what, 0.0)
-        touch: Callable[[Move], Trace] = finger.execute
+
+        def touch(move: Move) -> Trace:
+            trace = finger.execute(move)
+            if wrong := wrong_trace(move, trace, finger.workspace):
+                raise UserError(wrong)  # no refusal of one move: a driver does the same to every one
+            return trace
+
+        touched: Callable[[Move], Trace] = touch
         if replay is not None:
             log.event("resumed", {"samples": replay.samples})
-            touch = replay.before(finger.execute, getattr(finger, "skip", None), log.write)
+            touched = replay.before(touch, getattr(finger, "skip", None), log.write)
 
         cut_short: list[str] = []
-        waits = Waits(touch)
+        waits = Waits(touched)
 
         def execute(move: Move) -> Trace:
             trace = waits(move)

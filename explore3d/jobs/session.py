@@ -393,13 +393,18 @@ class Session:
         shutil.rmtree(commit)
 
     def _mark(self, state: str, of: dict[str, Any] | None = None, files: Sequence[str] | None = None) -> None:
-        about = {"job": self.job.name, "subject": self.job.subject, "reads": self._reads} if of is None else of
+        about = (
+            {"job": self.job.name, "command": self.job.again, "subject": self.job.subject, "reads": self._reads}
+            if of is None
+            else of
+        )
         now = datetime.now(UTC)
         record = {
             "schema": SESSION_SCHEMA,
             "state": state,
             "stopped": self.stopped or about.get("stopped"),
             "job": about.get("job"),
+            "command": about.get("command", ""),
             "subject": about.get("subject"),
             "reads": about.get("reads", {}),
             "version": __version__,

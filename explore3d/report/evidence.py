@@ -105,7 +105,7 @@ def compared_with_truth(analysis: Analysis, pictures: Pictures) -> Html:
     if not analysis.errors:
         content.append(paragraph("Nothing was there to be found, and nothing was invented."))
     else:
-        content.append(paragraph(_verdict(analysis.errors)))
+        content.append(paragraph(_verdict(analysis)))
         head = ("feature", "", "axis, rms", "axis, worst", "ends", "height", "width", "length")
         content.append(table(head, [_row(row) for row in analysis.errors]))
     if "sizes" in pictures.files:
@@ -120,15 +120,17 @@ def compared_with_truth(analysis: Analysis, pictures: Pictures) -> Html:
     return section("Against the truth", "truth", *content)
 
 
-def _verdict(errors: tuple[Comparison, ...]) -> str:
+def _verdict(analysis: Analysis) -> str:
+    errors, scene = analysis.errors, analysis.scene
+    simulated = scene is not None and not scene.finger.is_real
     number = {status: sum(row.status == status for row in errors) for status in BADGES}
     true = number["found"] + number["missed"]
     inside = [
         flag for row in errors for flag in (row.height_inside, row.width_inside, row.length_inside) if flag is not None
     ]
+    why = "The object is simulated, so the truth is known" if simulated else "The scene states the truth"
     sentence = (
-        f"The object is simulated, so the truth is known: {number['found']} of {true} features found, "
-        f"{number['missed']} missed, {number['invented']} invented."
+        f"{why}: {number['found']} of {true} features found, {number['missed']} missed, {number['invented']} invented."
     )
     if inside:
         sentence += f" The truth lies within the 90 % interval for {sum(inside)} of {len(inside)} sizes."

@@ -185,8 +185,8 @@ def tip_sentence(analysis: Analysis) -> list[str]:
         return []
     sd = float(provenance["tip_sd"])
     return [
-        f"The tip's radius is taken for {length_text(radius)} ± {length_text(sd, 2)} ({100 * sd / radius:.2g} %, "
-        "assumed: nobody stated it, --tip-sd does). Widths and heights carry that doubt."
+        f"The tip's radius is {length_text(radius)} as stated; how far that can be trusted nobody stated (--tip-sd "
+        f"does): ± {length_text(sd, 2)} ({100 * sd / radius:.2g} %) is assumed. Widths and heights carry that doubt."
     ]
 
 

@@ -6,7 +6,7 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from explore3d.jobs.export.crate import CRATE as CRATE
-    from explore3d.jobs.export.export import export as export
+    from explore3d.jobs.export.export import export as export, may_be_written as may_be_written
 
-_PUBLIC = {"crate": ("CRATE",), "export": ("export",)}
+_PUBLIC = {"crate": ("CRATE",), "export": ("export", "may_be_written")}
 doorway(__name__, _PUBLIC)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from importlib.util import find_spec
 from pathlib import Path
 
 from explore3d import UserError
@@ -21,6 +22,14 @@ CREST_COLUMNS = {
     "id": "string", "kind": "string", "vertex": "int64", "x": "float64", "y": "float64", "z": "float64",
     "nx": "float64", "ny": "float64", "nz": "float64", "height": "float64", "position_sd": "float64",
 }  # fmt: skip
+# Package that a form needs beside ours, and how to install it
+FORMS = {
+    ".csv": ("", ""),
+    ".dxf": ("ezdxf", 'pip install "explore3d[cad]"'),
+    ".qif": ("", ""),
+    ".mcap": ("", ""),
+    ".x3p": ("x3pio", 'pip install "explore3d[formats]"'),
+}
 # Drawings are in millimetres, as DXF's header says (INSUNITS 4)
 _DXF_MILLIMETRES = 4
 
@@ -42,11 +51,9 @@ def export(source: Path | str, to: Path | str, told: Told | None = None, *, over
             file that would be lost.
     """
     path = Path(to)
+    may_be_written(source, path, overwrite=overwrite)
     if path.name == CRATE:
-        if path.parent.resolve() != Path(source).resolve():
-            raise UserError(f"{path}: a record of {source} stands in that folder: {Path(source) / CRATE}")
         return write_whole(path, json.dumps(crate(path.parent), indent=1, ensure_ascii=False) + "\n")
-    _nothing_lost(Path(source), path, overwrite)
     if path.suffix == ".csv":
         return write_whole(path, crests_csv(ObjectModel.load(source)))
     if path.suffix == ".dxf":
@@ -56,11 +63,35 @@ def export(source: Path | str, to: Path | str, told: Told | None = None, *, over
     if path.suffix == ".mcap":
         log = _log_of(Path(source))
         return write_features_log(ObjectModel.load(source), log if log.is_file() else None, path)
-    if path.suffix == ".x3p":
-        return write_whole(path, residual_x3p(source, told or Told()))
-    raise UserError(
-        f"{path}: its name says no form; possible: NAME.csv, NAME.dxf, NAME.qif, NAME.mcap, NAME.x3p, {CRATE}"
-    )
+    return write_whole(path, residual_x3p(source, told or Told()))
+
+
+def may_be_written(source: Path | str, *targets: Path | str, overwrite: bool = False) -> None:
+    """Refuse targets before the first of them is written.
+
+    Args:
+        source: what is exported.
+        targets: as `to` of export.
+        overwrite: files that are there may be replaced.
+
+    Raises:
+        UserError: a name that says no form or is given twice, a package that is missing, a file that would be lost.
+    """
+    paths = [Path(each) for each in targets]
+    for path in paths:
+        if paths.count(path) > 1:
+            raise UserError(f"{path}: is given twice; give each target a name of its own")
+        if path.name == CRATE:
+            if path.parent.resolve() != Path(source).resolve():
+                raise UserError(f"{path}: a record of {source} stands in that folder: {Path(source) / CRATE}")
+            continue
+        if path.suffix not in FORMS:
+            names = ", ".join(f"NAME{suffix}" for suffix in FORMS)
+            raise UserError(f"{path}: its name says no form; possible: {names}, {CRATE}")
+        package, install = FORMS[path.suffix]
+        if package and find_spec(package) is None:
+            raise UserError(f"{path}: needs {package}, and nothing was written; install it: {install}")
+        _nothing_lost(Path(source), path, overwrite)
 
 
 def _log_of(source: Path) -> Path:
@@ -91,10 +122,8 @@ def crests_csv(model: ObjectModel) -> str:
 
 def crests_dxf(model: ObjectModel) -> bytes:
     """A drawing in mm: lines as 3D polylines, points as points, a layer for each kind; sizes as extended data."""
-    try:
-        import ezdxf
-    except ImportError as error:
-        raise UserError('a drawing needs ezdxf; install it: pip install "explore3d[cad]"') from error
+    import ezdxf
+
     drawing = ezdxf.new("R2010", units=_DXF_MILLIMETRES)
     drawing.appids.new("EXPLORE3D")
     space = drawing.modelspace()
@@ -118,10 +147,8 @@ def crests_dxf(model: ObjectModel) -> bytes:
 
 def residual_x3p(source: Path | str, told: Told) -> bytes:
     """Heights over the base beside the features, of a profile or a raster, by ISO 25178-72."""
-    try:
-        import x3pio
-    except ImportError as error:
-        raise UserError('X3P needs x3pio; install it: pip install "explore3d[formats]"') from error
+    import x3pio
+
     analysis = analyze(
         [source], tip_radius=told.tip_radius, model=told.model, model_units=told.model_units, quick=True, **told.table
     )

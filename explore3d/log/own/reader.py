@@ -268,9 +268,12 @@ def _trace(batches: list[NDArray[np.void]], reading: Reading) -> Trace:
     try:
         t, sweep = column(["t"])[:, 0], np.concatenate([batch["sweep"] for batch in batches])
         resolution = float(reading.start.get("resolution", 0.0))
-        return Trace(t, column("xyz"), sweep, reading.tip_radius, **optional, resolution=resolution)
+        trace = Trace(t, column("xyz"), sweep, reading.tip_radius, **optional, resolution=resolution)
     except TraceError as error:
         raise UserError(f"{reading.path}: {error}") from error
+    if back := trace.backwards():
+        raise UserError(f"{reading.path}: field t: within a sweep times must not decrease; found that {back}")
+    return trace
 
 
 def _loss(reading: Reading, prefix: str = "") -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import entry_points
@@ -67,6 +68,19 @@ def reader_of(path: Path) -> Reader:
     return max(readers(), key=lambda each: each.sniff(first))
 
 
+def _instead(folder: Path) -> str:
+    """What to give instead of a folder without a log: of an analysis elsewhere, the recording that it read."""
+    try:
+        record = json.loads((folder / "session.json").read_text("utf-8"))
+        job, command = str(record["job"]), str(record.get("command", ""))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return "expected a log, a table, or the folder of a session with one"
+    made = (
+        f"what is in it was made by: {command}" if command else f"it is what explore3d {job} made of a file elsewhere"
+    )
+    return f"{made}; give the recording that it was made from"
+
+
 def read_recording(path: Path, settings: Mapping[str, Any]) -> Log:
     """What a file or a session's folder holds.
 
@@ -79,7 +93,7 @@ def read_recording(path: Path, settings: Mapping[str, Any]) -> Log:
     """
     if path.is_dir():
         if not (path / LOG).is_file():
-            raise UserError(f"{path}: is a folder without {LOG}; expected a log, a table, or the folder of a session")
+            raise UserError(f"{path}: is a folder without {LOG}; {_instead(path)}")
         path = path / LOG
     given = {key: value for key, value in settings.items() if value is not None}
     length = given.get("average")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from time import process_time
 
@@ -124,6 +125,35 @@ def test_a_finger_that_refuses_every_move_says_why_nothing_was_felt(tmp_path: Pa
     scene = write_scene(tmp_path, f'mesh = "{tile}"', tile)
     with pytest.raises(UserError, match="nothing was felt: the cable is loose; plug it in"):
         run(scene, tmp_path / "out", finger=LooseFinger(object=load_mesh(tile, "m"), tip_radius=5e-3))
+
+
+class MillimetreFinger(SimulatedFinger):
+    def execute(self, move: Move) -> Trace:
+        trace = super().execute(move)
+        return replace(trace, centers=1e3 * trace.centers)
+
+
+class BackwardsFinger(SimulatedFinger):
+    def execute(self, move: Move) -> Trace:
+        trace = super().execute(move)
+        return replace(trace, t=trace.t[::-1])
+
+
+@pytest.mark.parametrize(
+    ("kind", "wrong"),
+    [
+        (MillimetreFinger, "outside of its own workspace.* in millimetres instead of metres"),
+        (BackwardsFinger, "run backwards"),
+    ],
+)
+def test_a_finger_that_returns_nonsense_stops_the_run_at_its_first_sweep(
+    tmp_path: Path, kind: type[SimulatedFinger], wrong: str
+) -> None:
+    tile = ASSETS / "meshes" / "tile.ply"
+    scene = write_scene(tmp_path, f'mesh = "{tile}"', tile)
+    with pytest.raises(UserError, match=wrong):
+        run(scene, tmp_path / "out", finger=kind(object=load_mesh(tile, "m"), tip_radius=5e-3))
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

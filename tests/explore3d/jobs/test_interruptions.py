@@ -26,6 +26,7 @@ from explore3d.errors import UserError
 from explore3d.jobs.merge import load
 from explore3d.jobs.run import run
 from explore3d.log.own.reader import read_log
+from explore3d.scene.scene import load_scene
 from hw.errors import LinkError
 from hw.move import Move
 from hw.simulated.finger import SimulatedFinger
@@ -267,6 +268,27 @@ def test_a_pulled_cable_is_said_first_with_status_3(
     )
     assert warning.startswith("NOT INSPECTED: ")
     assert second.startswith("no features found on the ") and second.endswith(" % of the surface that was swept")
+
+
+def test_what_is_said_of_a_finger_that_was_handed_in_goes_on(tmp_path: Path) -> None:
+    scene = load_scene(bare_tile(tmp_path))
+    finger = scene.open_finger()
+    touch, made = finger.execute, [0]
+
+    def execute(move: Move) -> Trace:
+        made[0] += move.purpose == "sweep"
+        if made[0] == 4:
+            raise RuntimeError("the robot's program ended")
+        return touch(move)
+
+    finger.execute = execute  # type: ignore[method-assign]
+    with pytest.raises(RuntimeError) as ended:
+        run(scene, tmp_path / "out", finger=finger, report=False)
+    call = ended.value.__notes__[-1].partition("go on with: ")[2]
+    assert call.startswith("explore3d.run(") and call.endswith(", finger=..., report=False, resume=True)")
+    names = {"explore3d": importlib.import_module("explore3d"), "again": scene.open_finger()}
+    analysis = eval(call.replace("finger=...", "finger=again"), names)
+    assert analysis.stopped is None and state(tmp_path / "out")["state"] == "complete"
 
 
 def test_another_scene_needs_overwrite_and_is_refused_before_anything_moves(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from sample_logs import MOVE, RADIUS, trace_of, write_log
+from small_profiles import TIP, write_profile
 
 from explore3d.errors import UserError
+from explore3d.jobs.analyze import analyze
 from explore3d.log.load import load_logs
 from explore3d.log.own import format as log_format
 from explore3d.log.own.reader import iter_log, read_log
@@ -54,6 +57,20 @@ def test_a_missing_log_and_a_folder_without_one_are_refused(tmp_path: Path) -> N
         with pytest.raises(UserError) as error:
             load_logs([path])
         one_line(error, str(path))
+
+
+def test_the_folder_of_what_was_made_from_a_table_says_from_which(tmp_path: Path) -> None:
+    path = write_profile(tmp_path / "a.csv")
+    analyze(path, tmp_path / "out", tip_radius=TIP, quick=True)
+    with pytest.raises(UserError) as error:
+        load_logs([tmp_path / "out"])
+    one_line(error, f"explore3d analyze {path}", "give the recording that it was made from")
+    record = json.loads((tmp_path / "out" / "session.json").read_text())
+    del record["command"]  # as of older versions
+    (tmp_path / "out" / "session.json").write_text(json.dumps(record))
+    with pytest.raises(UserError) as error:
+        load_logs([tmp_path / "out"])
+    one_line(error, "what it holds is what explore3d analyze made of a file elsewhere", "give the recording")
 
 
 def test_a_log_of_somebody_else_is_refused(tmp_path: Path) -> None:

@@ -168,4 +168,6 @@ def test_intervals_that_rest_on_a_chain_that_did_not_settle_are_said_not_to_be_t
 def test_a_doubt_of_the_tip_that_was_assumed_is_said() -> None:
     found = analysis()
     found.model.provenance = {"tip_sd_assumed": True, "tip_sd": 1e-4}
-    assert summary(found)[-1].startswith("The tip's radius is taken for 10 mm ± 0.1 mm (1 %, assumed")
+    said = summary(found)[-1]
+    assert said.startswith("The tip's radius is 10 mm as stated; how far that can be trusted nobody stated")
+    assert "± 0.1 mm (1 %) is assumed" in said

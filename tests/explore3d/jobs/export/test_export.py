@@ -18,7 +18,7 @@ from two_features import two_features
 from explore3d import load
 from explore3d.jobs.analyze import Told, analyze
 from explore3d.jobs.export.crate import CRATE
-from explore3d.jobs.export.export import crests_csv, crests_dxf, export
+from explore3d.jobs.export.export import FORMS, crests_csv, crests_dxf, export
 
 
 def test_crest_lines_as_a_table_hold_every_vertex() -> None:
@@ -46,6 +46,25 @@ def test_the_residual_leaves_the_features_out_and_keeps_the_rest(tmp_path: Path)
     # a crest of 1 um under a parabola of 6 um radius is 2 x 3.46 um wide, 14 samples; there are two
     assert 26 <= np.isnan(heights).sum() <= 36
     assert np.nanstd(heights) == pytest.approx(10e-9, rel=0.2) and np.nanmax(heights) < 100e-9
+
+
+def test_nothing_is_written_where_one_of_the_targets_cannot_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, good, there = tmp_path / "out", tmp_path / "a.csv", tmp_path / "there.qif"
+    two_features().save(out)
+    there.write_text("somebody's")
+    monkeypatch.setitem(FORMS, ".dxf", ("no_such_package", 'pip install "explore3d[cad]"'))
+    for bad, said in (
+        (tmp_path / "p.dxf", "needs no_such_package"),
+        (there, "is there already"),
+        (tmp_path / "p.png", "its name says no form"),
+        (good, "is given twice"),
+    ):
+        assert explore3d_main(monkeypatch, "export", out, "--to", good, "--to", bad) == 2
+        assert said in capsys.readouterr().err and not good.exists()
+    assert explore3d_main(monkeypatch, "export", out, "--to", good, "--to", there, "--overwrite") == 0
+    assert good.exists() and there.read_text() != "somebody's"
 
 
 def test_the_record_of_a_session_names_its_files_by_their_digests(

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from sample_logs import MOVE, RADIUS, assert_same_samples, trace_of, write_log
 
+from explore3d.errors import UserError
 from explore3d.log.load import load_logs
 from explore3d.log.own import format as log_format, point_cloud
 from explore3d.log.own.reader import iter_log, read_log
@@ -91,6 +92,14 @@ def test_what_was_felt_of_a_move_that_never_ended_is_recovered(tmp_path: Path) -
     assert "15 of them of a move that was broken off" in broken.recovered
     assert broken.trace.resolution == 4e-6
     assert sum(map(len, iter_log(path, samples=10))) == 35
+
+
+def test_a_sweep_whose_times_run_backwards_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    trace = Trace([2.0, 1.0, 0.0], np.zeros((3, 3)), [4, 4, 4], RADIUS)
+    with LogWriter(tmp_path / "log.mcap", tip_radius=RADIUS) as log:
+        log.write(MOVE, trace)
+    with pytest.raises(UserError, match=r"log\.mcap: field t: .* 2 of 3 samples lie before their predecessor"):
+        read_log(tmp_path / "log.mcap")
 
 
 def test_the_same_samples_give_the_same_bytes(tmp_path: Path) -> None:
