@@ -10,7 +10,14 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidTrace, Pose
-from mapping.estimate.deviation.blocks import BIN, BINS_PER_BLOCK, SAME_SIDE_COSINE, SIDES_APART, Blocks, weighted_median
+from mapping.estimate.deviation.blocks import (
+    BIN,
+    BINS_PER_BLOCK,
+    SAME_SIDE_COSINE,
+    SIDES_APART,
+    Blocks,
+    weighted_median,
+)
 from mapping.estimate.deviation.drift import Drift, SteadyDrift, drift
 from mapping.estimate.deviation.evidence import Fit, Whitened, best_fit, every_law, whitened
 from mapping.estimate.deviation.fields import RigidFrame, SmoothField, spread
@@ -53,8 +60,8 @@ FAR_OFF = 5.0
 # More of the felt surface than this that nothing explains: the model is another body's. A step across the body, which
 # is a fine feature, leaves less than a half of it off the rest.
 BEYOND_REPAIR = 0.5
-# A ball further off than its own diameter does not touch the place where it would stand: on which side of the body it was
-# and over which place, heights alone do not tell. A level that far off is named, and nothing is looked for; in tip radii
+# A ball further off than its own diameter does not touch the place where it would stand: on which side of the body it
+# was and over which place, heights alone do not tell. A level so far off is named, and nothing is looked for; tip radii
 OWN_DIAMETER = 2.0
 # One sample of so many is asked first whether a place was felt: recorded samples lie a thousandth of a tip radius
 # apart, so these leave no place of a swept path open, and a tree of all takes a second for 1.4 million
@@ -167,12 +174,12 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
 
 def _common_level(blocks: Blocks, base: Base, tip: float) -> tuple[float, float]:
     """How far off the model most of what was felt lies together, m, if as a part of it that would be deep, and the
-    logarithm of how much more probable the heights are with it; zeros if it is not. Most of it lies nearer to that level
-    than to the model, and no further from it than the other causes reach.
+    logarithm of how much more probable the heights are with it; zeros if it is not. Most of it lies nearer to that
+    level than to the model, and no further from it than the other causes reach.
 
-    A tip or a frame that is not as said may be wrong by any amount. What the model expects of its causes, EXPECTED_SHARE
-    of a tip radius, is no measure of it: with that prior a level of many tip radii comes out as whatever bends enough,
-    and one below the model as a part that is missing everywhere.
+    A tip or a frame that is not as said may be wrong by any amount. What the model expects of its causes,
+    EXPECTED_SHARE of a tip radius, is no measure of it: with that prior a level of many tip radii comes out as whatever
+    bends enough, and one below the model as a part that is missing everywhere.
     """
     level = weighted_median(blocks.height, blocks.weight)
     near = np.abs(blocks.height - level) <= min(0.5 * abs(level), FAR_OFF * EXPECTED_SHARE * tip)

@@ -74,8 +74,8 @@ class Deviation:
         heights: (V,) departure at each vertex of `base`, m, positive where the body stands out of its model.
         unexplained: share of the felt surface that stands off the corrected model, parts included.
         beyond_repair: whether nothing can be looked for; `offset` is then by how much it lies off, not corrected.
-        facing: (3,) unit direction that the felt side of the model faces, where an offset of a quarter of a tip radius or more
-            was named; zeros else, and where it faces many.
+        facing: (3,) unit direction that the felt side of the model faces, where an offset of a quarter of a tip radius
+            or more was named; zeros else, and where it faces many.
     """
 
     base: Base
@@ -156,8 +156,8 @@ class Deviation:
     def needs(self) -> str:
         """What would make it possible to look for features, where nothing else does."""
         return (
-            'a mesh of this very object where it stands, pose = "estimate" with a shift and a turn that reach it, or no '
-            "mesh but a region, in which the body is found by feeling"
+            'a mesh of this very object where it stands, pose = "estimate" with a shift and a turn that reach it, or '
+            "no mesh but a region, in which the body is found by feeling"
         )
 
     def record(self) -> dict[str, Any]:
