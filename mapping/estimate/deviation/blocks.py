@@ -12,6 +12,8 @@ from mapping.instrument import MAD_TO_SD
 
 # Width of a bin in tip radii, and bins in a block: a crest of 0.06 tip radii spans three blocks under its whole width
 BIN, BINS_PER_BLOCK = 0.1, 5
+# Bins are no narrower than the samples are apart: one without a sample would be filled from its neighbours, curved by
+# nothing, and most of them being so would say that there is no noise, and that the surface jumps at every sample.
 # Of a long trace bins are wider: so many blocks tell any smooth deviation
 MOST_DEVIATION_BLOCKS = 4000
 # A smooth deviation is no steeper than this. The trace of an edge of height h rises by it within sqrt(2 r h), with the
@@ -77,9 +79,11 @@ class Blocks:
     def of(cls, laid: LaidTrace) -> Blocks:
         """The blocks of all sweeps over the base that they are laid on."""
         tip = laid.tip_radius
-        length = sum(float(s.arclength[-1]) for s in laid.laid_sweeps if len(s.trace) > 1)
-        spacing = max(BIN * tip, length / (BINS_PER_BLOCK * MOST_DEVIATION_BLOCKS))
-        profiles = [p for s in laid.laid_sweeps if len(s.trace) > 1 for p in s.heights(spacing)]
+        sweeps = [sweep for sweep in laid.laid_sweeps if len(sweep.trace) > 1]
+        lengths = [float(sweep.arclength[-1]) for sweep in sweeps]
+        spacing = max(BIN * tip, sum(lengths) / (BINS_PER_BLOCK * MOST_DEVIATION_BLOCKS))
+        apart = [length / (len(sweep.trace) - 1) for length, sweep in zip(lengths, sweeps, strict=True)]
+        profiles = [p for sweep, step in zip(sweeps, apart, strict=True) for p in sweep.heights(max(spacing, step))]
         profiles = [p for p in profiles if len(p.height) >= FEWEST_BINS]
         curved = np.concatenate([np.zeros(0), *(np.diff(p.height, 2) for p in profiles)])
         sd = MAD_TO_SD * float(np.median(np.abs(curved))) / np.sqrt(6.0) if len(curved) else 0.0

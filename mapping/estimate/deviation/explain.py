@@ -10,11 +10,18 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Trace
 from mapping.base import Base, LaidTrace, Pose
-from mapping.estimate.deviation.blocks import BIN, BINS_PER_BLOCK, SIDES_APART, Blocks, weighted_median
+from mapping.estimate.deviation.blocks import (
+    BIN,
+    BINS_PER_BLOCK,
+    SAME_SIDE_COSINE,
+    SIDES_APART,
+    Blocks,
+    weighted_median,
+)
 from mapping.estimate.deviation.drift import Drift, SteadyDrift, drift
 from mapping.estimate.deviation.evidence import Fit, Whitened, best_fit, every_law, whitened
 from mapping.estimate.deviation.fields import RigidFrame, SmoothField, spread
-from mapping.estimate.deviation.parts import parts_of, stands_off
+from mapping.estimate.deviation.parts import DEEP, parts_of, stands_off
 from mapping.estimate.deviation.reshaped import fine_enough, reshaped
 from mapping.estimate.deviation.result import Deviation, Part
 from mapping.instrument import MAD_TO_SD
@@ -53,6 +60,9 @@ FAR_OFF = 5.0
 # More of the felt surface than this that nothing explains: the model is another body's. A step across the body, which
 # is a fine feature, leaves less than a half of it off the rest.
 BEYOND_REPAIR = 0.5
+# A ball further off than its own diameter does not touch the place where it would stand: on which side of the body it
+# was and over which place, heights alone do not tell. A level so far off is named, and nothing is looked for; tip radii
+OWN_DIAMETER = 2.0
 # One sample of so many is asked first whether a place was felt: recorded samples lie a thousandth of a tip radius
 # apart, so these leave no place of a swept path open, and a tree of all takes a second for 1.4 million
 FEW_SAMPLES = 32
@@ -103,13 +113,20 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
     """
     if base.kind != "mesh":
         return None
-    blocks = Blocks.of(LaidTrace.of(trace, base))
+    given, blocks = base, Blocks.of(LaidTrace.of(trace, base))
     if len(blocks) < FEWEST_BLOCKS:
         return None
-    tip, keep = trace.tip_radius, blocks.smooth(blocks.height)
+    tip = trace.tip_radius
+    level, level_gain = _common_level(blocks, base, tip)
+    if abs(level) > OWN_DIAMETER * tip:
+        return _out_of_reach(base, blocks, level, level_gain, tip)
+    seen = blocks
+    if level:
+        base = replace(base, offset=base.offset + level)
+        seen = Blocks.of(LaidTrace.of(trace, base))
     missed = base.foot(_unfelt(commanded, trace), tip)
-    parts = parts_of(blocks, blocks.height, keep, tip, missed)
-    before, now, seen = base, base, blocks
+    parts = parts_of(seen, seen.height, seen.smooth(seen.height), tip, missed)
+    before, now = base, base
     found: list[_Explanation] = []
     lines: list[Drift | SteadyDrift] = []
     for _ in range(MOST_ROUNDS):
@@ -118,8 +135,8 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
         # near what is steep a height may be the skirt of a feature: of the model it says something if enough lies apart
         told = (keep & seen.apart(SHORTEST_FIELD * tip)).sum() >= FEWEST_BLOCKS
         # where more of the surface agrees with the model than hangs together beside it, that is a plateau
-        level = whole & (np.abs(seen.height) <= FAR_OFF * seen.noise)
-        plateau = seen.weight[level].sum() > seen.weight[keep].sum()
+        flat = whole & (np.abs(seen.height) <= FAR_OFF * seen.noise)
+        plateau = seen.weight[flat].sum() > seen.weight[keep].sum()
         if not told or _agrees(seen, seen.height, keep, tip) or plateau:
             break
         step, own = _explanation(seen, whole, base, tip), _drift(seen, whole, tip)
@@ -139,9 +156,64 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
             break
         seen = Blocks.of(LaidTrace.of(trace, now))
         parts = parts_of(seen, seen.height, seen.smooth(seen.height), tip, missed)
-    if not found and not lines and not parts:
+    if not found and not lines and not parts and not level:
         return None
-    return _deviation(before, now, blocks, seen, found, lines, parts, tip)
+    deviation = _deviation(before, now, blocks, seen, found, lines, parts, tip)
+    if not level:
+        return deviation
+    return replace(
+        deviation,
+        causes=tuple(dict.fromkeys(["offset", *deviation.causes])),
+        instead=(),
+        offset=now.offset - given.offset,
+        heights=deviation.heights + level,
+        gain=level_gain,
+        facing=_facing(blocks),
+    )
+
+
+def _common_level(blocks: Blocks, base: Base, tip: float) -> tuple[float, float]:
+    """How far off the model most of what was felt lies together, m, if as a part of it that would be deep, and the
+    logarithm of how much more probable the heights are with it; zeros if it is not. Most of it lies nearer to that
+    level than to the model, and no further from it than the other causes reach.
+
+    A tip or a frame that is not as said may be wrong by any amount. What the model expects of its causes,
+    EXPECTED_SHARE of a tip radius, is no measure of it: with that prior a level of many tip radii comes out as whatever
+    bends enough, and one below the model as a part that is missing everywhere.
+    """
+    level = weighted_median(blocks.height, blocks.weight)
+    near = np.abs(blocks.height - level) <= min(0.5 * abs(level), FAR_OFF * EXPECTED_SHARE * tip)
+    together = blocks.weight[near].sum() > BEYOND_REPAIR * blocks.weight.sum()
+    if abs(level) <= DEEP * tip or not together or near.sum() < FEWEST_BLOCKS:
+        return 0.0, 0.0
+    kept = _Kept.of(blocks, near, _rigid_columns(blocks, RigidFrame.of(base.surface)), tip)
+    seen, none = kept.whitened(np.zeros((len(kept.height), 0))), np.zeros(0, dtype=np.int64)
+    nothing = best_fit(seen, none, np.zeros(0), kept.noise, every_law()).log_evidence
+    shifted = best_fit(seen, RIGID["offset"], np.array([abs(level)]), kept.noise, every_law())
+    # the width of the prior was chosen for these heights: half a logarithm of their number
+    chosen = _before(shifted, 1).log_evidence - 0.5 * float(np.log(len(kept.height)))
+    return (level, chosen - nothing) if chosen - nothing >= LEAST_GAIN else (0.0, 0.0)
+
+
+def _facing(blocks: Blocks) -> FloatArray:
+    """(3,) unit direction that the felt side of the model faces; zeros where it faces many."""
+    mean = np.average(blocks.normals, axis=0, weights=blocks.weight)
+    length = float(np.linalg.norm(mean))
+    return np.asarray(mean / length if length > SAME_SIDE_COSINE else np.zeros(3))
+
+
+def _out_of_reach(base: Base, blocks: Blocks, level: float, gain: float, tip: float) -> Deviation:
+    """What was felt lies so far off the model that it is named and nothing else can be said."""
+    deviation = _deviation(base, base, blocks, blocks, [], [], (), tip)
+    return replace(
+        deviation,
+        causes=("offset",),
+        offset=level,
+        heights=deviation.heights + level,
+        gain=gain,
+        beyond_repair=True,
+        facing=_facing(blocks),
+    )
 
 
 def _covered(parts: Sequence[Part], points: FloatArray) -> BoolArray:
@@ -185,8 +257,7 @@ def _agrees(blocks: Blocks, height: FloatArray, keep: BoolArray, tip: float) -> 
 def _explanation(blocks: Blocks, whole: BoolArray, base: Base, tip: float) -> _Explanation | None:
     """The most probable causes of the heights of blocks outside of parts (B,), None if none is probable enough."""
     frame = RigidFrame.of(base.surface)
-    causes = (frame.offset, frame.pose, frame.scale)
-    rigid = np.column_stack([*(make(blocks.points, blocks.normals) for make in causes), _elapsed(blocks)])
+    rigid = _rigid_columns(blocks, frame)
     everything = np.ones(len(blocks), dtype=bool)
     prior = EXPECTED_SHARE * tip
     keep = whole & blocks.smooth(blocks.height - _robust(rigid, blocks.height, blocks.weight, everything, prior))
@@ -261,6 +332,12 @@ def _elapsed(blocks: Blocks) -> FloatArray:
     """(B, 1) share of the recording's time that had passed when each was felt."""
     whole = max(float(np.ptp(blocks.t)), np.finfo(float).tiny)
     return np.asarray((blocks.t - blocks.t.min()) / whole)[:, None]
+
+
+def _rigid_columns(blocks: Blocks, frame: RigidFrame) -> FloatArray:
+    """(B, 9) heights of a unit of each of the causes that do not bend the body (see RIGID)."""
+    causes = (frame.offset, frame.pose, frame.scale)
+    return np.column_stack([*(make(blocks.points, blocks.normals) for make in causes), _elapsed(blocks)])
 
 
 # Columns of the causes that do not bend the body

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -73,6 +73,9 @@ class Deviation:
         gain: logarithm of how much more probable the heights are than without a deviation.
         heights: (V,) departure at each vertex of `base`, m, positive where the body stands out of its model.
         unexplained: share of the felt surface that stands off the corrected model, parts included.
+        beyond_repair: whether nothing can be looked for; `offset` is then by how much it lies off, not corrected.
+        facing: (3,) unit direction that the felt side of the model faces, where an offset of a quarter of a tip radius
+            or more was named; zeros else, and where it faces many.
     """
 
     base: Base
@@ -92,6 +95,7 @@ class Deviation:
     heights: FloatArray
     unexplained: float
     beyond_repair: bool = False
+    facing: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def of_the_model(self) -> bool:
@@ -137,9 +141,12 @@ class Deviation:
             return f"the object is {100 * abs(self.scale - 1.0):.2g} % {size}: scaled"
         if cause == "offset":
             sign = "large" if self.offset > 0 else "small"
+            facing = ", ".join(f"{value:g}" for value in np.round(self.facing, 2) + 0.0)
+            side = f" over the side that faces ({facing})" if self.facing.any() else ""
+            done = "further than the ball is wide: not taken off" if self.beyond_repair else "taken off"
             return (
-                f"all heights are too {sign} by {length_text(abs(self.offset), 2)}, as of a tip or a frame that is "
-                "not as said: taken off"
+                f"all heights{side} are too {sign} by {length_text(abs(self.offset), 2)}, as of a tip or a frame that "
+                f"is not as said: {done}"
             )
         return (
             f"the object is bent by up to {length_text(self.bent, 2)} over {length_text(self.length, 2)} and more: "
@@ -149,8 +156,8 @@ class Deviation:
     def needs(self) -> str:
         """What would make it possible to look for features, where nothing else does."""
         return (
-            'a mesh of this very object, pose = "estimate" with a shift and a turn that reach it, or no mesh but a '
-            "region, in which the body is found by feeling"
+            'a mesh of this very object where it stands, pose = "estimate" with a shift and a turn that reach it, or '
+            "no mesh but a region, in which the body is found by feeling"
         )
 
     def record(self) -> dict[str, Any]:
@@ -162,6 +169,7 @@ class Deviation:
             "turn": self.turn,
             "scale": self.scale,
             "offset": self.offset,
+            "facing": self.facing.tolist(),
             "bent": self.bent,
             "length": self.length,
             "rms": self.rms,
