@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         pose_problem as pose_problem,
         refine as refine,
         sample_posterior as sample_posterior,
+        solve as solve,
         solve_problem as solve_problem,
     )
     from mapping.inference.joint import refine_all as refine_all
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "evidence": ("log_evidence", "log_evidence_of_nothing"),
-    "feature_posterior": ("Solution", "pose_problem", "refine", "sample_posterior", "solve_problem"),
+    "feature_posterior": ("Solution", "pose_problem", "refine", "sample_posterior", "solve", "solve_problem"),
     "joint": ("refine_all",),
     "kind_odds": ("as_broken", "as_bump"),
     "summary": ("describe",),
