@@ -170,12 +170,14 @@ def _shares(
 ) -> dict[str, float]:
     """Area, reach, and the four shares."""
     tip = scene.tip.radius
-    reach = 0.55 * Survey(base=base, tip_radius=tip, smallest=scene.survey.smallest_feature).pitch
-    surface = base.surface
+    survey = Survey(base=base, tip_radius=tip, smallest=scene.survey.smallest_feature, region=scene.model.part)
+    surface, reach = survey.surface, 0.55 * survey.pitch
+    if surface is None:  # the body stands elsewhere than its mesh said
+        nothing = {"swept": 0.0, "refused": 0.0, "unreachable": 0.0, "not_inspected": 1.0}
+        return nothing | {"area": 0.0, "reach": reach}
     spacing = max(reach / 3.0, float(np.sqrt(surface.face_areas.sum() / MOST_ACCOUNT_PLACES)))
     points, owner = face_samples(surface, spacing)
     weights = surface.face_areas[owner] / np.bincount(owner, minlength=len(surface.faces))[owner]
-    weights = weights * _inside(scene, points)
     normals = surface.face_normals[owner]
     swept = _near(points, normals, *touched, reach)
     feet = base.foot(np.concatenate([*refused, np.zeros((0, 3))]), tip)
@@ -191,14 +193,6 @@ def _shares(
         "reach": reach,
         "not_inspected": max(0.0, 1.0 - sum(shares.values())),
     }
-
-
-def _inside(scene: Scene, points: FloatArray) -> BoolArray:
-    """(N,) True where a place lies in the region that was to be inspected."""
-    region = scene.model.region
-    if region is None or scene.model.mesh is None:
-        return np.ones(len(points), dtype=bool)
-    return np.asarray(((points >= np.array(region.low)) & (points <= np.array(region.high))).all(axis=1))
 
 
 def _near(points: FloatArray, normals: FloatArray, touched: FloatArray, up: FloatArray, reach: float) -> BoolArray:

@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from explore3d import SceneError
 from explore3d.analysis import Computing
 from explore3d.log import KIND, SURVEY, Stop, base_event
 from hw import FingerError, Move, Workspace
-from mapping import Trace
+from mapping import FloatArray, Trace
 from mapping.base import Base
+from mapping.geometry.mesh import clipped
 from planners import Outcome, Plan, Spent, drive, within
 from planners.explore import Discover, Explore, Locate, SurveyCount
 from planners.paths import Limits, Ways, routed
@@ -141,18 +143,21 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
     """All that a scene says of exploring with a finger of that workspace.
 
     Raises:
-        SceneError: a mesh that cannot be read, or a speed that cannot be known.
+        SceneError: a mesh that cannot be read, a region without surface, or a speed that cannot be known.
     """
     model, tip, smallest = scene.model, scene.tip.radius, scene.survey.smallest_feature
     speed, force = scene.sweep_speed, scene.survey.force
-    base, region = known_base(scene), None
-    if model.region is not None:
-        region = np.array(model.region.low), np.array(model.region.high)
+    base = known_base(scene)
     discover = locate = None
-    if base is None and region is not None:
-        low, high = region
+    if base is None and model.region is not None:
         discover = Discover(
-            low=low, high=high, tip_radius=tip, smallest=smallest, sides=model.sides, speed=speed, force=force
+            low=np.array(model.region.low),
+            high=np.array(model.region.high),
+            tip_radius=tip,
+            smallest=smallest,
+            sides=model.sides,
+            speed=speed,
+            force=force,
         )
     elif base is not None and model.pose == "estimate":
         locate = Locate(
@@ -169,7 +174,7 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
         tip_radius=tip,
         smallest=smallest,
         precision=scene.explore.precision,
-        region=None if base is None else region,
+        region=model.part,
         speed=speed,
         force=force,
         shortest_ridge=scene.survey.shortest_ridge,
@@ -181,9 +186,26 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
 
 
 def known_base(scene: Scene) -> Base | None:
-    """The global model that the scene gives, None if it gives a region alone. Raises SceneError."""
-    surface = scene.base_surface()
-    return None if surface is None else Base(surface)
+    """The global model that the scene gives, None if it gives a region alone.
+
+    Raises:
+        SceneError: a mesh that cannot be used, or none of its surface lies in the region.
+    """
+    surface, part = scene.base_surface(), scene.model.part
+    if surface is None:
+        return None
+    if part is not None and clipped(surface, *part) is None:
+        raise SceneError(
+            f"{scene.path}: model.region: the mesh has no surface in it; found {_box_text(*part)}, possible is what "
+            f"meets the mesh, {_box_text(*surface.bounds)}"
+        )
+    return Base(surface)
+
+
+def _box_text(low: FloatArray, high: FloatArray) -> str:
+    """The extent of a box along each axis in words, mm."""
+    sides = zip("xyz", 1e3 * low, 1e3 * high, strict=True)
+    return ", ".join(f"{axis} from {start:.6g} to {stop:.6g} mm" for axis, start, stop in sides)
 
 
 @dataclass(frozen=True, eq=False)

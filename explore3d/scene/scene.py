@@ -31,7 +31,7 @@ from explore3d.scene.values import (
     Time,
 )
 from hw import Finger
-from mapping import KINDS, Surface, length_text
+from mapping import KINDS, FloatArray, Surface, length_text
 from mapping.inference.kinds import kind_named
 from mapping.instrument import Noise, StatedNoise
 from mapping.model import Tolerance
@@ -99,6 +99,13 @@ class GlobalModel(Table):
         if self.mesh is None and self.region is None:
             raise ValueError("give mesh, region, or both; without a mesh the base is fitted to the survey")
         return self
+
+    @property
+    def part(self) -> tuple[FloatArray, FloatArray] | None:
+        """Corners (3,), m, of the box that the part of the mesh to be explored lies in; None: all, or no mesh."""
+        if self.mesh is None or self.region is None:
+            return None
+        return np.array(self.region.low), np.array(self.region.high)
 
 
 class SurveyTable(Table):

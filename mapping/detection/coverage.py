@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, IntArray, Surface
+from mapping import FloatArray, IntArray, Surface
 from mapping.geometry.mesh import NEAREST_COST, by_shares
 
 # Samples of faces looked at, at most
@@ -19,7 +19,7 @@ class Coverage:
 
     Args:
         share: (F,) inspected share of each face, 0 to 1.
-        fraction: inspected share of the area of all faces (of the region).
+        fraction: inspected share of the area of all faces.
         reach: distance from a sweep up to which a feature is seen, m.
     """
 
@@ -28,14 +28,11 @@ class Coverage:
     reach: float
 
 
-def coverage(surface: Surface, touched: FloatArray, reach: float, region: BoolArray | None = None) -> Coverage:
+def coverage(surface: Surface, touched: FloatArray, reach: float) -> Coverage:
     """Coverage of a mesh by the points (N, 3) that sweeps touched.
 
     Every face is sampled three times as finely as `reach`; a sample is inspected if a touched point lies within
     `reach` of it in space.
-
-    Args:
-        region: (F,) faces that were to be inspected; all if None.
     """
     from scipy.spatial import cKDTree
 
@@ -46,7 +43,7 @@ def coverage(surface: Surface, touched: FloatArray, reach: float, region: BoolAr
         near = np.isfinite(distance)
     count = len(surface.faces)
     share = np.bincount(owner, weights=near, minlength=count) / np.bincount(owner, minlength=count)
-    areas = surface.face_areas if region is None else surface.face_areas * region
+    areas = surface.face_areas
     total = float(areas.sum())
     return Coverage(share, float((share * areas).sum() / total) if total > 0 else 0.0, reach)
 

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapping import BoolArray, IntArray, Surface
+from mapping import IntArray, Surface
 
 CREASE_ANGLE = float(np.radians(30.0))
 
 
-def crease_charts(surface: Surface, inside: BoolArray | None = None, crease: float = CREASE_ANGLE) -> list[IntArray]:
+def crease_charts(surface: Surface, crease: float = CREASE_ANGLE) -> list[IntArray]:
     """Faces grouped into charts whose neighbours turn by less than `crease` rad, largest area first.
 
-    Args:
-        inside: (F,) faces that belong to the region; all if None. Degenerate faces belong to no chart.
+    Degenerate faces belong to no chart.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
     count = len(surface.faces)
     wanted = surface.face_areas > 0
-    if inside is not None:
-        wanted &= inside
     first, second = surface.neighbours
     turn = (surface.face_normals[first] * surface.face_normals[second]).sum(axis=1)
     smooth = (turn > np.cos(crease)) & wanted[first] & wanted[second]

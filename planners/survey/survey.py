@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from hw import Move
-from mapping import BoolArray, FloatArray, IntArray
+from mapping import FloatArray, IntArray, Surface
 from mapping.base import Base
 from mapping.detection import Coverage, coverage
+from mapping.geometry.mesh import clipped
 from planners import Outcome, Plan, PlannerError, executed
 from planners.paths import Carrier, Isoline, isolines, pressed_sweep, sound_parts, thinned, touched_points
 from planners.survey.charts import crease_charts
@@ -35,7 +36,7 @@ class Survey:
         smallest: height D of the smallest feature to be found, m.
         speed, force: of the sweeps, m/s and N.
         shortest_ridge: distance between the ends of the shortest ridge to be found, m; None: bumps as well.
-        region: (low, high) corners in m of the part to be inspected; everything if None.
+        region: (low, high) corners in m of the box whose part of the surface is inspected; everything if None.
         visible: share of the smallest feature's height that every sweep pair must leave visible.
         crossings: how often a straight ridge of the shortest span must be crossed.
     """
@@ -67,6 +68,11 @@ class Survey:
         """Width of the strip in which a sweep sees a share of the smallest feature, m."""
         return float(min(2.0 * np.sqrt(2.0 * self.smallest * (1.0 - visible) * self.tip_radius), self.tip_radius))
 
+    @cached_property
+    def surface(self) -> Surface | None:
+        """What is to be inspected: the base's surface, or its part inside the region; None if there is none."""
+        return self.base.surface if self.region is None else clipped(self.base.surface, *self.region)
+
     def plan(self) -> Plan:
         """Yield every sweep; the outcome's value is the planned Coverage."""
         touched: list[FloatArray] = []
@@ -86,7 +92,9 @@ class Survey:
         pitch = pitch or self.pitch
         dense = [_dense(path, 0.2 * pitch) for path in paths]
         points = np.concatenate(dense) if dense else np.zeros((0, 3))
-        return coverage(self.base.surface, points, 0.55 * pitch, self._inside())
+        if self.surface is None:
+            return Coverage(np.zeros(0), 0.0, 0.55 * pitch)
+        return coverage(self.surface, points, 0.55 * pitch)
 
     def crossed(self, visible: float) -> Slices | None:
         """The crossed plane sections that see a visible share, or None where strips are asked for or are shorter."""
@@ -100,11 +108,12 @@ class Survey:
 
     @cached_property
     def _axes(self) -> FloatArray:
-        return slice_axes(self.base.surface, np.concatenate(self._charts))
+        assert self.surface is not None  # it has charts
+        return slice_axes(self.surface, np.concatenate(self._charts))
 
     @cached_property
     def _charts(self) -> list[IntArray]:
-        return crease_charts(self.base.surface, self._inside())
+        return [] if self.surface is None else crease_charts(self.surface)
 
     def sweeps(self, visible: float | None = None) -> Iterator[Move]:
         """All sweeps, each begun near the end of the one before it; another visible share may be given."""
@@ -113,13 +122,16 @@ class Survey:
 
     def lines(self, visible: float | None = None) -> Iterator[Isoline]:
         """Where the sweeps touch the base; what ball and stem can make of each is worked out by `pressed`."""
+        if self.surface is None:
+            return iter(())
         visible = visible or self.visible
         slices = self.crossed(visible)
-        return self._strips(self.strip(visible)) if slices is None else self._sections(slices)
+        if slices is None:
+            return self._strips(self.surface, self.strip(visible))
+        return self._sections(self.surface, slices)
 
-    def _sections(self, slices: Slices) -> Iterator[Isoline]:
+    def _sections(self, surface: Surface, slices: Slices) -> Iterator[Isoline]:
         """Lines along one family of plane sections after the other."""
-        surface = self.base.surface
         used = surface.vertices[np.unique(surface.faces[np.concatenate(self._charts)])]
         here: FloatArray | None = None
         for axis in slices.axes:
@@ -139,9 +151,8 @@ class Survey:
         """The fields solved so far, by the number of the chart."""
         return {}
 
-    def _strips(self, pitch: float) -> Iterator[Isoline]:
+    def _strips(self, surface: Surface, pitch: float) -> Iterator[Isoline]:
         """Lines along the level sets of one chart after the other, a pitch apart."""
-        surface = self.base.surface
         here: FloatArray | None = None
         done = np.zeros(len(surface.faces), dtype=bool)
         for number, chart in enumerate(self._charts):
@@ -162,7 +173,8 @@ class Survey:
 
     def pressed(self, line: Isoline) -> Iterator[Move]:
         """The sweeps along a line that ball and stem can make."""
-        points, normals = touched_points(line, self.base.surface)
+        assert self.surface is not None  # the line lies on it
+        points, normals = touched_points(line, self.surface)
         points, normals = thinned(points, normals, min(0.1 * self.tip_radius, 0.5 * self.pitch))
         sweep = pressed_sweep(points, normals, self.tip_radius, self.speed, self.force)
         # one by one: what is sent to a plan of sweeps must not reach a list
@@ -172,13 +184,6 @@ class Survey:
     @cached_property
     def _carrier(self) -> Carrier:
         return Carrier.of(self.base, self.tip_radius)
-
-    def _inside(self) -> BoolArray | None:
-        if self.region is None:
-            return None
-        middle = self.base.surface.vertices[self.base.surface.faces].mean(axis=1)
-        low, high = self.region
-        return np.asarray(((middle >= low) & (middle <= high)).all(axis=1))
 
 
 def _in_turn(lines: list[Isoline], here: FloatArray | None, pitch: float) -> Iterator[Isoline]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
 from scene_files import write_scene_file
 
 from explore3d.errors import SceneError
 from explore3d.jobs.expedition import explorer
 from explore3d.jobs.plan import DryRun, plan_scene
-from explore3d.jobs.run import scene_finger
+from explore3d.jobs.run import run, scene_finger
 from explore3d.scene.scene import parse_scene
 from hw.simulated import SimulatedFinger
 
@@ -56,6 +59,54 @@ def test_what_a_detail_adds_is_foretold(tmp_path: Path) -> None:
         assert isinstance(finger, SimulatedFinger)
         # one ridge of 27 mm
         assert finger.clock == pytest.approx(plan.seconds + plan.detail.ridge, rel=0.1)
+
+
+def block_scene(folder: Path, low: float, high: float) -> Path:
+    """A block of 60 x 40 x 6 mm, two triangles a side, and a region of 14 x 8 mm from low to high (mm)."""
+    trimesh.creation.box(extents=[60.0, 40.0, 6.0]).export(folder / "block.stl")
+    region = f'{{ low = ["3 mm", "-4 mm", "{low} mm"], high = ["17 mm", "4 mm", "{high} mm"] }}'
+    text = f"""
+schema = "explore3d/scene/1"
+[tip]
+radius = "1 mm"
+[model]
+mesh = "block.stl"
+units = "mm"
+region = {region}
+[finger]
+kind = "simulated"
+object = "block.stl"
+units = "mm"
+[survey]
+smallest_feature = "0.1 mm"
+speed = "20 mm/s"
+"""
+    path = folder / "scene.toml"
+    path.write_text(text)
+    return path
+
+
+def test_a_region_inside_the_triangles_of_a_side_is_planned_and_accounted_for(tmp_path: Path) -> None:
+    plan = plan_scene(block_scene(tmp_path, 2.0, 4.0))
+    assert plan.account is not None and plan.account.area == pytest.approx(14e-3 * 8e-3)
+    assert plan.covered == plan.account.swept == 1.0 and not plan.account.short
+    ways = np.concatenate([move.path for move in plan.moves if move.purpose == "sweep"])
+    assert (ways[:, :2] >= np.array([3e-3, -4e-3]) - 1e-9).all() and (
+        ways[:, :2] <= np.array([17e-3, 4e-3]) + 1e-9
+    ).all()
+
+
+def test_a_region_without_surface_is_refused_before_anything_moves(tmp_path: Path) -> None:
+    scene = block_scene(tmp_path, 10.5, 18.0)
+    told = (
+        "model.region: the mesh has no surface in it; found x from 3 to 17 mm, y from -4 to 4 mm, z from 10.5 to 18 "
+        "mm, possible is what meets the mesh, x from -30 to 30 mm, y from -20 to 20 mm, z from -3 to 3 mm"
+    )
+    with pytest.raises(SceneError, match=re.escape(told)):
+        plan_scene(scene)
+    with pytest.raises(SceneError, match=re.escape(told)):
+        run(scene, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

@@ -115,6 +115,27 @@ def test_a_region_limits_the_survey() -> None:
     assert sum(sweep.length for sweep in sweeps) == pytest.approx(0.1 * 0.15 / part.pitch, rel=0.1)
 
 
+def test_a_region_is_cut_out_of_triangles_larger_than_it() -> None:
+    low, high = np.array([0.05, 0.04, -0.01]), np.array([0.13, 0.09, 0.01])
+    coarse, fine = (
+        Survey(base=Base(plate(parts=parts)), tip_radius=R, smallest=3e-4, region=(low, high)) for parts in (1, 30)
+    )
+    lengths = []
+    for part in (coarse, fine):
+        sweeps = list(part.sweeps())
+        paths = np.concatenate([sweep.path for sweep in sweeps])[:, :2]
+        assert (paths >= low[:2] - 1e-9).all() and (paths <= high[:2] + 1e-9).all()
+        assert part.covered([part.touched(sweep) for sweep in sweeps]).fraction > 0.99
+        lengths.append(sum(sweep.length for sweep in sweeps))
+    assert lengths[0] == pytest.approx(lengths[1]) == pytest.approx(0.08 * np.ceil(0.05 / coarse.pitch))
+
+
+def test_a_region_without_surface_has_no_sweeps_and_nothing_covered() -> None:
+    above = Survey(base=Base(plate()), tip_radius=R, smallest=3e-4, region=(np.full(3, 0.01), np.full(3, 0.1)))
+    _, outcome = dry_run(above.plan(), EMPTY)
+    assert not list(above.sweeps()) and outcome.value.fraction == 0.0
+
+
 def test_an_isoline_lies_on_its_level_and_closes_round_a_cylinder() -> None:
     body = cylinder()
     lines = isolines(body.vertices, body.faces, np.arange(len(body.faces)), body.vertices[:, 2], 0.0173)
