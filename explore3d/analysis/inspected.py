@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from mapping.base import Base, LaidTrace
 from mapping.detection import Detections, found_heights
 from mapping.estimate.envelope import Estimate
 from mapping.estimate.sweeps import EXTRAPOLATED, pitch
+from mapping.geometry.mesh import clipped
 
 # Places that tell which of the surface was touched
 MOST_SURFACE_CELLS = 20_000
@@ -29,8 +30,8 @@ class Inspected:
     Args:
         height: (F,) m: a sharp crest at least so high anywhere on the face would have been found; infinity where
             no sweep passed within a tip radius.
-        place, area: (N,) the same at places all over the surface, m, and what each stands for, m^2; without those
-            where a fitted base goes on beyond what was felt.
+        place, area: (N,) the same at places all over what was to be inspected, m, and what each stands for, m^2;
+            without those where a fitted base goes on beyond what was felt.
         limit: height found where a sweep crosses it, m.
         probability: with which all this holds.
         asked: height of the smallest feature that the scene asks for, m, or None.
@@ -44,8 +45,19 @@ class Inspected:
     asked: float | None = None
 
     @classmethod
-    def of(cls, trace: Trace, base: Base, detections: Detections, asked: float | None) -> Inspected:
-        """What a trace inspected of a base, by the noise and the threshold of its detection."""
+    def of(
+        cls,
+        trace: Trace,
+        base: Base,
+        detections: Detections,
+        asked: float | None,
+        box: tuple[FloatArray, FloatArray] | None = None,
+    ) -> Inspected:
+        """What a trace inspected of a base, by the noise and the threshold of its detection.
+
+        Args:
+            box: (low, high) corners (3,), m: what was to be inspected lies in it; all if None or empty.
+        """
         limit = detections.detection_limit
         if base.kind == "profile":  # a strip as wide as one likes: all of it lies under the one sweep
             height = np.full(len(base.surface.faces), limit)
@@ -54,6 +66,9 @@ class Inspected:
         if not np.isfinite(limit):
             places = places[:0]
         found = found_heights(base.surface, places, trace.tip_radius, limit)
+        part = None if box is None else clipped(base.surface, *box)
+        if part is not None and part is not base.surface:
+            found = replace(found_heights(part, places, trace.tip_radius, limit), face=found.face)
         # what a fit added beyond the samples is no part of a body that was asked to be inspected
         told = np.isfinite(found.place)
         if told.any():

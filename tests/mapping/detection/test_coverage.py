@@ -76,6 +76,11 @@ def test_a_survey_inspects_what_it_was_asked_for() -> None:
     part = Inspected.of(half, base, detect(half, base), 4e-4)
     assert 0.2 < part.share(4e-4) < 0.5 and part.untouched > 0.4
     assert "No sweep came near" in part.sentence()
+    # of the box that was to be inspected everything was, and only its area counts
+    box = np.array([-1.0, -1.0, -1.0]), np.array([1.0, 0.02, 1.0])
+    boxed = Inspected.of(half, base, detect(half, base), 4e-4, box)
+    assert boxed.untouched == 0.0 and boxed.share(4e-4) > 0.9 and np.array_equal(boxed.height, part.height)
+    assert boxed.area.sum() == pytest.approx(0.02 / 0.06 * part.area.sum())
     # where no height is asked for, heights are told that hold on some area: the limit holds on none
     unasked = replace(part, asked=None)
     half_of_it, most_of_it = unasked.above(0.5), unasked.above(0.9)
