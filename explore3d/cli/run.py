@@ -37,9 +37,11 @@ def run(
     from explore3d.jobs import open_scene
 
     if not arm and open_scene(scene, files_from or ()).finger.is_real:
-        plan(scene, out, json, overwrite, files_from)
+        short = _planned(scene, out, json, overwrite, files_from)
         if not json:
             print("dry run: connected and checked, nothing was moved; add --arm to explore with the real machine")
+        if short:
+            raise typer.Exit(INCOMPLETE)
         return
     from explore3d.cli.progress import shown
     from explore3d.jobs import run as explore
@@ -81,6 +83,12 @@ def plan(
 
     Example: explore3d plan wire/scene.toml --out out/plan
     """
+    if _planned(scene, out, json, overwrite, files_from):
+        raise typer.Exit(INCOMPLETE)
+
+
+def _planned(scene: Path, out: Path | None, json: bool, overwrite: bool, files_from: list[Path] | None) -> bool:
+    """Show the plan; True if a run by it would leave so much unswept that it ends as incomplete."""
     from json import dumps
     from shlex import quote
 
@@ -91,6 +99,7 @@ def plan(
         planned = plan_into(scene, out, overwrite, files_from or (), progress)
     if json:
         print(dumps(planned.record()))
-        return
-    picture = [] if out is None else [f"picture: {out / 'plan.png'}"]
-    print("\n".join([*planned.lines(), *picture, f"next: explore3d run {quote(str(scene))} --out FOLDER"]))
+    else:
+        picture = [] if out is None else [f"picture: {out / 'plan.png'}"]
+        print("\n".join([*planned.lines(), *picture, f"next: explore3d run {quote(str(scene))} --out FOLDER"]))
+    return planned.account is not None and planned.account.short

@@ -7,6 +7,7 @@ import json
 import math
 import re
 import shlex
+from dataclasses import replace
 from functools import cache
 from inspect import signature
 from pathlib import Path
@@ -161,6 +162,14 @@ def test_a_plan_is_told_in_words_and_as_json(
     assert swept > 0.95 * 0.100 * 0.060
     assert record["covered"] > 0.99
     assert f"{record['sweeps']} sweeps" in words
+    # one that would leave a tenth of the surface is incomplete, as its run would be
+    plan = jobs.plan_into(SCENES / "step.toml", None)
+    assert plan.account is not None
+    short = replace(plan, account=replace(plan.account, swept=0.9, not_inspected=0.1))
+    monkeypatch.setattr(jobs, "plan_into", lambda *others: short)
+    for options in ([], ["--json"]):
+        assert explore3d_main(monkeypatch, "plan", SCENES / "step.toml", *options) == 3
+    assert capsys.readouterr().out.startswith("NOT INSPECTED: 10 %")
 
 
 def _length(path: list[list[float]]) -> float:
