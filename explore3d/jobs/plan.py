@@ -258,7 +258,8 @@ def _rehearsed(scene: Scene, planned: Explorer, base: Base, finger: SimulatedFin
         shown = not details or (found is not None and bool(found.tracks or found.bumps))
         return spent if shown else float("nan")
 
-    places, _ = face_samples(base.surface, float(np.sqrt(base.surface.face_areas.sum() / WAY_PLACES)))
+    surface = planned.explore(base=base).survey.surface or base.surface
+    places, _ = face_samples(surface, float(np.sqrt(surface.face_areas.sum() / WAY_PLACES)))
     less = seconds() - float(pdist(places).mean()) / planned.workspace.max_speed
     ridge, bump = seconds(wire) - less, None if ridges_only else seconds(cap) - less
     return DetailTime(bump, ridge, length, height) if np.isfinite([ridge, bump or 0.0]).all() else None
