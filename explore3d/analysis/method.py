@@ -333,17 +333,28 @@ def detected(work: Work, share: Share) -> None:
         work.trace, work.laid = work.trace.select(keep), work.laid.within(keep)
         found = detect(work.laid, work.base, **work.settings.detection)
         work.detections = replace(found, left_out=(*work.detections.left_out, *found.left_out))
+    refused = work.deviation is not None and work.deviation.beyond_repair
     if work.sound is not None:
-        work.path = path_ledger(work.sound, work.detections, beyond, work.apart)
-    if work.deviation is not None and work.deviation.beyond_repair:
+        work.path = path_ledger(work.sound, work.detections, beyond, work.apart, refused)
+    if work.deviation is not None and refused:
         crossings = len(work.detections.crossings)
-        refused = f"the model is wrong: of {crossings} places that stand off it, none is called a feature"
-        refused += f"; what is needed is {work.deviation.needs()}"
-        work.detections = replace(work.detections, crossings=(), left_out=(*work.detections.left_out, refused))
+        said = f"the model is wrong: of {crossings} places that stand off it, none is called a feature"
+        said += f"; what is needed is {work.deviation.needs()}"
+        # nothing was looked for, so nothing would have been seen
+        work.detections = replace(
+            work.detections,
+            crossings=(),
+            detection_limit=np.inf,
+            inspected_length=0.0,
+            inspected_sweeps=(),
+            left_out=(*work.detections.left_out, said),
+        )
 
 
 def why_no_injection(work: Work) -> str:
     """Where the noise is as the fitted law says, the computed limit is the measured one, to within a few per cent."""
+    if work.deviation is not None and work.deviation.beyond_repair:
+        return "the model is shown to be wrong beyond repair"
     if work.log.detections:
         return "the log was detected in while it was read"
     return "" if work.detections.remarks or work.detections.left_out else "the noise is as the fitted law says"

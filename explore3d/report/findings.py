@@ -50,7 +50,9 @@ def summary(analysis: Analysis) -> list[str]:
     """One line on the whole, one a feature, and one on what would have been seen."""
     features = analysis.model.features
     finer = sum(feature.curvature_feature for feature in features)
-    lines = [f"{count_text(len(features), 'feature')} found{swept_part(analysis)}"]
+    refused = analysis.deviation is not None and analysis.deviation.beyond_repair
+    looked = f"{count_text(len(features), 'feature')} found{swept_part(analysis)}"
+    lines = ["no features were looked for" if refused else looked]
     account = analysis.account
     if features:
         lines[0] += f", {finer} of them finer than the tip of {length_text(analysis.trace.tip_radius)}"
@@ -62,8 +64,10 @@ def summary(analysis: Analysis) -> list[str]:
         if len(features) > MOST_LISTED_FEATURES
         else []
     )
+    told = deviation_warning(analysis) if refused else []  # then nothing else means anything: said first
     return [
         *tip_warning(analysis),
+        *told,
         *([account.warning()] if account is not None and account.short else []),
         *lines,
         *(feature_line(feature) for feature in features[:MOST_LISTED_FEATURES]),
@@ -71,7 +75,7 @@ def summary(analysis: Analysis) -> list[str]:
         *account_lines(analysis),
         *tolerance_lines(analysis),
         limit_sentence(analysis),
-        *warnings(analysis),
+        *[line for line in warnings(analysis) if line not in told],
         *([account.sentence()] if account is not None else []),
     ]
 
@@ -213,6 +217,8 @@ def path_sentence(path: PathLedger) -> str:
 def limit_sentence(analysis: Analysis) -> str:
     """What would have been seen."""
     detections = analysis.detections
+    if analysis.deviation is not None and analysis.deviation.beyond_repair:
+        return "Nothing was looked for over this model, so nothing would have been seen."
     if not isfinite(detections.detection_limit):
         return "The trace is too short, or its samples too far apart, to say what would have been seen."
     return (

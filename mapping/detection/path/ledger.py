@@ -52,7 +52,9 @@ class PathLedger:
         }
 
 
-def path_ledger(sound: SoundSweeps, detections: Detections, beyond: int = 0, apart: int = 0) -> PathLedger:
+def path_ledger(
+    sound: SoundSweeps, detections: Detections, beyond: int = 0, apart: int = 0, refused: bool = False
+) -> PathLedger:
     """The account of a trace that was inspected.
 
     Args:
@@ -60,6 +62,7 @@ def path_ledger(sound: SoundSweeps, detections: Detections, beyond: int = 0, apa
         detections: of that.
         beyond: samples that were recorded beyond the base's border, and not looked at.
         apart: samples on parts that the body has and its model has not, or the other way round, and not looked at.
+        refused: whether the model is wrong beyond repair, and nothing was looked for over it.
     """
     inspected_of = dict(detections.inspected_sweeps)
     path = few = inspected = 0.0
@@ -83,5 +86,7 @@ def path_ledger(sound: SoundSweeps, detections: Detections, beyond: int = 0, apa
         "ends of sweeps, and pieces too short for the smallest crest": path - few - inspected,
     }
     recorded = path + sum(outside.values())
+    if refused:
+        inspected, lost = 0.0, {"over a model that is wrong beyond repair": recorded}
     left_out = tuple((reason, length) for reason, length in lost.items() if length > WORTH_A_LINE * recorded)
     return PathLedger(recorded, inspected, left_out, sound.cuts)
