@@ -111,7 +111,7 @@ def test_tolerances_and_who_stand_on_the_page_as_text() -> None:
 
 def test_every_figure_lies_beside_the_page_as_an_svg_with_its_words(folder: Path) -> None:
     said = {
-        "object": {"ridge-1  0.65 mm"},
+        "object": {"ridge-1  0.650 mm"},
         "sections": {"ridge-1, sweep 5", "across the feature (mm)", "trace of the feature found", "true height"},
         "sizes": {"Height", "Length", "found minus true (µm)"},
         "time": {"time of the finger (s)", "error of the axis (mm)"},
