@@ -104,5 +104,5 @@ def test_two_tips_are_not_compared(tmp_path: Path) -> None:
     log = table(tmp_path / "bare.csv", scan(nothing, nothing, np.random.default_rng(0), count=3))
     for name, radius in (("x", TIP), ("y", 2 * TIP)):
         analyze(log, tmp_path / name, tip_radius=radius, quick=True)
-    with pytest.raises(UserError, match="not comparable"):
+    with pytest.raises(UserError, match=r"with a tip of 10 µm, .* with one of 20 µm: not comparable"):
         compare(tmp_path / "x", tmp_path / "y", told=Told(quick=True))
