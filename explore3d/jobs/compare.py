@@ -164,6 +164,12 @@ def _compared(
         here, there = (length_text(radius, 6) for radius in radii)  # two that differ by little are told apart
         raise UserError(f"{first} was felt with a tip of {here}, {second} with one of {there}: not comparable")
     comparison = compare_models(one, other, most_shift)
+    if comparison.apart > 0.0:
+        raise UserError(
+            f"{first} and {second} have nothing in common to compare: no feature is in both, and their surfaces lie "
+            f"{length_text(comparison.apart)} farther from each other than their frames may be shifted; possible are "
+            "two scans of one object in one frame, or a larger --shift"
+        )
     off = deviation(one, other, comparison.registration)
     return Compared(str(first), str(second), comparison, replace(one, deviation=off))
 
