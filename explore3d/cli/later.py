@@ -138,7 +138,10 @@ def _lines(found: Compared, least: float) -> list[str]:
     by = count_text(motion.pairs, "feature")
     how = f"registered by {by} (shifted by {shift}{turn})" if motion.pairs else "frames taken as they are"
     pairs = count_text(comparison.pairs, "feature is", "features are")
-    lines = [f"{count_text(len(likely), 'change')}; {pairs} in both; {how}"]
+    changes = count_text(len(likely), "change")
+    if not likely and 0 < len(found.model.features) == len(comparison.unseen):
+        changes = "nothing of the first is known to have stayed or changed"
+    lines = [f"{changes}; {pairs} in both; {how}"]
     for change in likely[:MOST_LISTED_CHANGES]:
         amount = change.amount
         if change.kind == "shrunk":

@@ -17,7 +17,7 @@ from explore3d.analysis import Progress, silent
 from explore3d.jobs.analyze import Told, analyze, digest_of, log_path
 from explore3d.jobs.session import Job, Session
 from explore3d.log import LOG
-from mapping import FloatArray
+from mapping import FloatArray, length_text
 from mapping.model import Comparison, ObjectModel, Registration, compare_models
 
 COMPARISON = "comparison.json"
@@ -160,11 +160,16 @@ def _compared(
 ) -> Compared:
     one, other = _model(first, told, progress), _model(second, told, progress)
     if one.provenance.get("tip_radius") != other.provenance.get("tip_radius"):
-        radii = [model.provenance.get("tip_radius") for model in (one, other)]
-        raise UserError(
-            f"{first} was felt with a tip of {radii[0]} m, {second} with one of {radii[1]} m: not comparable"
-        )
+        radii = [float(model.provenance.get("tip_radius", np.nan)) for model in (one, other)]
+        here, there = (length_text(radius, 6) for radius in radii)  # two that differ by little are told apart
+        raise UserError(f"{first} was felt with a tip of {here}, {second} with one of {there}: not comparable")
     comparison = compare_models(one, other, most_shift)
+    if comparison.apart > 0.0:
+        raise UserError(
+            f"{first} and {second} have nothing in common to compare: no feature is in both, and their surfaces lie "
+            f"{length_text(comparison.apart)} farther from each other than their frames may be shifted; possible are "
+            "two scans of one object in one frame, or a larger --shift"
+        )
     off = deviation(one, other, comparison.registration)
     return Compared(str(first), str(second), comparison, replace(one, deviation=off))
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from explore3d.log import Log, read_base
+from mapping import length_text
 from mapping.base import Base, fit_base
 
 # Two surfaces, or a trace and the base under it, may lie so far apart in tip radii, and in sds of the pose
@@ -32,12 +33,16 @@ def unlike(log: Log, base: Base, pose_sd: float = 0.0) -> str:
     if own is not None and own.kind == base.kind == "mesh":
         gap = max(_gap(own, base), _gap(base, own))
         if gap > limit:
-            return f"the mesh that it was recorded for lies {_mm(gap)} off the other; at most {_mm(limit)} is possible"
+            most = length_text(limit)
+            return (
+                f"the mesh that it was recorded for lies {length_text(gap)} off the other; at most {most} is possible"
+            )
     some = np.linspace(0, len(log.trace) - 1, min(MOST_COMPARED_PLACES, len(log.trace))).astype(np.int64)
     height = base.foot(log.trace.centers[some], log.trace.tip_radius).height
     off = float(np.median(np.abs(height)))
     if off > limit:
-        return f"half of its samples lie more than {_mm(off)} off the base; at most {_mm(limit)} is possible"
+        most = length_text(limit)
+        return f"half of its samples lie more than {length_text(off)} off the base; at most {most} is possible"
     return ""
 
 
@@ -46,10 +51,6 @@ def _gap(one: Base, other: Base) -> float:
     middles = one.surface.vertices[one.surface.faces].mean(axis=1)
     some = middles[np.linspace(0, len(middles) - 1, min(MOST_COMPARED_PLACES, len(middles))).astype(np.int64)]
     return float(np.quantile(other.nearest.query(some).distance, MATCHING_FACE_SHARE))
-
-
-def _mm(length: float) -> str:
-    return f"{1e3 * length:.3g} mm"
 
 
 def not_one_object(logs: Sequence[Log]) -> str:
@@ -62,7 +63,8 @@ def not_one_object(logs: Sequence[Log]) -> str:
     for log in logs[1:]:
         name = ", ".join(log.sources)
         if log.trace.tip_radius != first.trace.tip_radius:
-            return f"{name} was felt with a tip of {_mm(log.trace.tip_radius)}, not {_mm(first.trace.tip_radius)}"
+            tips = [length_text(each.trace.tip_radius, 6) for each in (log, first)]
+            return f"{name} was felt with a tip of {tips[0]}, not {tips[1]}"
     boxes = [(log.trace.centers.min(axis=0), log.trace.centers.max(axis=0)) for log in logs]
     for number, (low, high) in enumerate(boxes):
         room = first.trace.tip_radius

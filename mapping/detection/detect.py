@@ -337,7 +337,7 @@ def _resolved(crossings: list[Crossing], resolution: float) -> tuple[list[Crossi
     if not lost:
         return kept, ()
     low = UNRESOLVED * resolution
-    return kept, (f"{lost} details of at most {low:.3g} m may be rounding: the positions come in steps",)
+    return kept, (f"{lost} details of at most {length_text(low)} may be rounding: the positions come in steps",)
 
 
 def _usable(laid: LaidTrace) -> tuple[list[LaidSweep], tuple[str, ...]]:
@@ -349,7 +349,7 @@ def _usable(laid: LaidTrace) -> tuple[list[LaidSweep], tuple[str, ...]]:
             usable.append(sweep)
         else:
             length = s[-1] if len(s) else 0
-            left_out.append(f"sweep {sweep.number}: {count} samples over {length:.3g} m are too few to inspect")
+            left_out.append(f"sweep {sweep.number}: {count} samples over {length_text(length)} are too few to inspect")
     return usable, tuple(left_out)
 
 

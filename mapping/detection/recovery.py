@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, Trace
+from mapping import BoolArray, FloatArray, Trace, length_text
 from mapping.base import LaidTrace
 from mapping.detection.detect import Detections, detect
 
@@ -64,10 +64,11 @@ def recovered(
     remarks = detections.remarks
     if height > detections.detection_limit:
         enough = "" if found >= _fewest(injected, probability) else "at least "
+        limits = [length_text(each, 2) for each in (detections.detection_limit, height)]
         remarks = (
             *remarks,
-            f"the detection limit was raised from {1e3 * detections.detection_limit:.2g} mm, as computed, to {enough}"
-            f"{1e3 * height:.2g} mm: {found} of the last {injected} crests that were put into this log were found",
+            f"the detection limit was raised from {limits[0]}, as computed, to {enough}{limits[1]}: {found} of the "
+            f"last {injected} crests that were put into this log were found",
         )
     return replace(detections, detection_limit=height, recovered=found, injected=injected, remarks=remarks)
 

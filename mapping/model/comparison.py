@@ -64,12 +64,15 @@ class Comparison:
         changes: all that were weighed, likely or not; the likeliest first.
         unseen: ids of the first scan's features where the second did not look.
         pairs: features that both scans show.
+        apart: by how much the surfaces lie farther from each other, where they are nearest, than the frames may be
+            shifted, m; 0 if they do not, or features are in both.
     """
 
     registration: Registration
     changes: tuple[Change, ...]
     unseen: tuple[str, ...]
     pairs: int
+    apart: float = 0.0
 
     def likely(self, least: float) -> tuple[Change, ...]:
         """The changes that are at least so probable."""
@@ -90,7 +93,8 @@ def compare_models(first: ObjectModel, second: ObjectModel, most_shift: float | 
         most_shift: largest shift between the two frames that is looked for, m; None: a tenth of the object.
     """
     size = max(first.base.surface.size, second.base.surface.size)
-    motion = register(first.features, second.features, SHIFT_SHARE * size if most_shift is None else most_shift)
+    shift = SHIFT_SHARE * size if most_shift is None else most_shift
+    motion = register(first.features, second.features, shift)
     moved = [motion.applied(each) for each in second.features]
     pairs = matched(first.features, moved)
     both = [(first.features[i], moved[j]) for i, j in pairs]
@@ -102,7 +106,15 @@ def compare_models(first: ObjectModel, second: ObjectModel, most_shift: float | 
         for number, each in enumerate(first.features)
         if number not in {i for i, _ in pairs} and not _was_inspected(each, second, motion, back=False)
     ]
-    return Comparison(motion, tuple(sorted(changes, key=lambda c: -c.probability)), tuple(unseen), len(pairs))
+    apart = 0.0 if pairs else max(0.0, _nearest(first, second) - shift)
+    return Comparison(motion, tuple(sorted(changes, key=lambda c: -c.probability)), tuple(unseen), len(pairs), apart)
+
+
+def _nearest(first: ObjectModel, second: ObjectModel) -> float:
+    """Distance of the two surfaces where a vertex of either is nearest to the other, m."""
+    one, other = first.base, second.base
+    there, back = other.nearest.query(one.surface.vertices), one.nearest.query(other.surface.vertices)
+    return float(min(np.min(there.distance), np.min(back.distance)))
 
 
 def changed(differences: FloatArray, sds: FloatArray, dimensions: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hw import Move
-from mapping import FloatArray, SurfaceError, Trace, TraceError
+from mapping import FloatArray, SurfaceError, Trace, TraceError, length_text
 from mapping.base import BASE_TRIANGLE_SIZE, FORETOLD, Base, Cells, fit_base, rolled_off, touched_part
 from planners import Outcome, Plan, PlannerError
 from planners.explore.feel_line import Felt, FeltLine, empty_at, facing
@@ -85,8 +85,8 @@ class Discover:
             base = self._fit(felt)
             if miss <= allowed:
                 tested = replace(base, missed=miss)
-                return Outcome("done", f"a {base.kind} that missed the last sweeps by {1e3 * miss:.3f} mm", tested)
-        return Outcome("done", f"a {base.kind} that still missed the last sweeps by {1e3 * miss:.3f} mm", base)
+                return Outcome("done", f"a {base.kind} that missed the last sweeps by {length_text(miss)}", tested)
+        return Outcome("done", f"a {base.kind} that still missed the last sweeps by {length_text(miss)}", base)
 
     def _lines(self, side: str) -> Iterator[FeltLine]:
         """Lines along the longer way over a side of the box, then some across, to and fro."""

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from mapping import FloatArray
+from mapping import FloatArray, length_text
 from mapping.base import Base
 from mapping.detection import Crossing
 from mapping.instrument import Noise, StatedNoise
@@ -291,7 +291,7 @@ class Explore:
             end, done = slid, MOST_SLIDES if vain == VAIN_SLIDES else done + 1
         found.slides[index, which] = done
         found.tracks[index] = track.with_end(which, end)
-        return Outcome(end.reason, f"end known to {1e3 * end.sd:.3f} mm")
+        return Outcome(end.reason, f"end known to {length_text(end.sd)}")
 
 
 def _known(found: Found) -> Callable[[FloatArray], bool]:

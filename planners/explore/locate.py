@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import Trace, TraceError
+from mapping import Trace, TraceError, length_text
 from mapping.base import Base, estimate_pose
 from planners import Outcome, Plan
 from planners.explore.warm_up import get_ready
@@ -54,7 +54,7 @@ class Locate:
             pose = estimate_pose(Trace.concatenate(felt), self.base, shift=self.shift, turn=self.turn)
         except TraceError as error:
             return Outcome("lost", f"the object was not met where its model is: {error}")
-        off = f"{1e3 * float(np.linalg.norm(pose.shift)):.2f} mm and {np.degrees(pose.turn):.2f} degrees off its model"
+        off = f"{length_text(float(np.linalg.norm(pose.shift)))} and {np.degrees(pose.turn):.2f} degrees off its model"
         if not pose.within(BEYOND * self.shift, BEYOND * self.turn):
             allowed = f"{1e3 * self.shift:g} mm and {np.degrees(self.turn):g} degrees"
             return Outcome("misplaced", f"the object stands {off}; the scene allows {allowed}")

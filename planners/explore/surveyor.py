@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hw import Move
-from mapping import FloatArray, Trace
+from mapping import FloatArray, Trace, length_text
 from mapping.base import LaidTrace
 from mapping.detection import Coverage, detect
 from mapping.estimate.deviation import Deviation, explain
@@ -157,10 +157,10 @@ class Surveyor:
         smallest = self.survey.smallest
         limit = detect(first, self.survey.base, noise=self.found.noise, stated=self.stated).detection_limit
         if limit > smallest:
-            shown = f"features lower than {1e3 * limit:.2g} mm: a single sweep does not show them through the noise"
+            shown = f"features lower than {length_text(limit, 2)}: a single sweep does not show them through the noise"
             if not np.isfinite(limit):
                 shown = "some features of any height: samples lie too far apart for a single sweep to show them all"
-            self.found.unseen.append(f"{shown}, though {1e3 * smallest:.2g} mm were asked for")
+            self.found.unseen.append(f"{shown}, though {length_text(smallest, 2)} was asked for")
         self.visible = float(
             np.clip(VISIBLE_HEIGHT_MARGIN * limit / smallest, LEAST_VISIBLE_SHARE, self.survey.visible)
         )

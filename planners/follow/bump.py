@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import FloatArray
+from mapping import FloatArray, length_text
 from mapping.detection import Crossing
 from planners import Outcome, Plan
 from planners.follow.sense import Sense
@@ -92,7 +92,7 @@ class BumpSizer:
         if not all(found):
             return Outcome("lost", "the bump was not found again", None)
         sized = self._sized(point, seed, found)
-        return Outcome("done", f"a bump {1e3 * sized.height:.3f} mm high", sized)
+        return Outcome("done", f"a bump {length_text(sized.height)} high", sized)
 
     def _precise(self, found: list[list[Crossing]]) -> bool:
         return max(_sd(group) for group in found) <= self.precision

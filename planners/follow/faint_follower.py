@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hw import Move
-from mapping import FloatArray, Trace
+from mapping import FloatArray, Trace, length_text
 from mapping.detection import Crossing
 from mapping.instrument import Noise
 from planners import Outcome, Plan
@@ -139,7 +139,7 @@ class FaintFollower:
         height = float(np.exp(course.log_height))
         track = replace(track, height=height, height_sd=course.log_height_sd * height)
         reasons = "closed" if track.closed else " and ".join(end.reason for end in track.ends)
-        return Outcome("done", f"{1e3 * track.length:.2f} mm in {len(track.points)} points: {reasons}", track)
+        return Outcome("done", f"{length_text(track.length)} in {len(track.points)} points: {reasons}", track)
 
     def _one_way(
         self, lead: FaintLead, course: Straight, line: Line, side: float

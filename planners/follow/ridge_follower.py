@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hw import Move
-from mapping import FloatArray, Trace
+from mapping import FloatArray, Trace, length_text
 from mapping.detection import Crossing
 from mapping.instrument import Noise
 from planners import Outcome, Plan
@@ -70,7 +70,7 @@ class RidgeFollower:
                 break
         track = joined(halves, sign)
         reasons = "closed" if track.closed else " and ".join(end.reason for end in track.ends)
-        return Outcome("done", f"{1e3 * track.length:.2f} mm in {len(track.points)} points: {reasons}", track)
+        return Outcome("done", f"{length_text(track.length)} in {len(track.points)} points: {reasons}", track)
 
     @property
     def _longest(self) -> float:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from hw import Move, Workspace
-from mapping import FloatArray
+from mapping import FloatArray, length_text
 from mapping.base import Base
 from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
 from planners.paths.sound import FIELD, PRESSED, held_up, resampled
@@ -102,11 +102,11 @@ class Limits:
             highest = float(held_up(path, approach, base, self.tip_radius).max())
             if highest <= PRESSED * self.tip_radius:
                 return None
-            return f"another part of the body is in the sweep's way and holds the ball up by {1e3 * highest:.3f} mm"
+            return f"another part of the body is in the sweep's way and holds the ball up by {length_text(highest)}"
         deepest = sunk(move.path, base, self.tip_radius)
         if deepest <= MOST_SINKING * self.tip_radius:
             return None
-        return f"the way through free space sinks {1e3 * deepest:.3f} mm into the body"
+        return f"the way through free space sinks {length_text(deepest)} into the body"
 
     def _stem(self, move: Move, base: Base) -> str | None:
         path, approach = move.path, move.approach
@@ -118,12 +118,12 @@ class Limits:
         carrier = Carrier(base, self.tip_radius, self.stem_radius, self.stem_length)
         allowed = FREE_SINKING * self.tip_radius
         clearance = float(carrier.clearance(path, approach).min())
-        return f"{what} sinks {-1e3 * clearance:.3f} mm into the body" if clearance < -allowed else None
+        return f"{what} sinks {length_text(-clearance)} into the body" if clearance < -allowed else None
 
     def _way(self, before: Move, move: Move, base: Base) -> str | None:
         """Ball and stem on their way from the end of one move to the beginning of the next."""
         deepest = sunk(gap(before, move, self.tip_radius), base, self.tip_radius)
         if deepest > MOST_SINKING * self.tip_radius:
-            return f"the way from the move before sinks {1e3 * deepest:.3f} mm into the body"
+            return f"the way from the move before sinks {length_text(deepest)} into the body"
         way = way_between(before, move, self.tip_radius)
         return self._stem_sinks("on the way from the move before the stem", *way, base)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from hw import Move
-from mapping import FloatArray, IntArray, Surface
+from mapping import FloatArray, IntArray, Surface, length_text
 from mapping.base import Base
 from mapping.detection import Coverage, coverage
 from mapping.geometry.mesh import clipped
@@ -80,7 +80,7 @@ class Survey:
             answer = yield move
             touched.extend(self.touched(part) for part in executed(move, answer))
         done = self.covered(touched)
-        detail = f"{100 * done.fraction:.1f} % of the surface lies within {1e3 * done.reach:.2f} mm of a sweep"
+        detail = f"{100 * done.fraction:.1f} % of the surface lies within {length_text(done.reach)} of a sweep"
         return Outcome("done" if done.fraction > 0.99 else "not all reached", detail, done)
 
     def touched(self, move: Move) -> FloatArray:

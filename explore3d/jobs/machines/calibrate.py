@@ -21,7 +21,7 @@ from explore3d.log import OUTCOME, LogWriter, read_log
 from explore3d.scene import Scene, scene_text
 from hw import Finger, Move
 from hw.probing import GrblFinger
-from mapping import Trace
+from mapping import Trace, length_text
 from mapping.geometry.mesh import write_whole
 from mapping.instrument import TipCalibration, calibrate_tip
 
@@ -58,7 +58,7 @@ class TipProfile:
             f"tip radius {1e3 * tip.radius:.4f} mm, 90 % between {1e3 * low:.4f} and {1e3 * high:.4f} mm",
             f"centre {np.round(1e3 * tip.center, 4).tolist()} mm, sd {np.round(1e3 * tip.center_sd, 4).tolist()} mm",
             f"noise {1e3 * tip.noise.white:.4f} mm white, {1e3 * tip.noise.correlated:.4f} mm correlated over "
-            f"{1e3 * tip.noise.length:.2f} mm",
+            f"{length_text(tip.noise.length)}",
             f"largest mean deviation by direction {1e3 * float(np.abs(tip.deviations).max()):.4f} mm",
         ]
         if self.delay is not None:

@@ -171,7 +171,7 @@ def _nearest(log: Log, at: FloatArray) -> int:
     if not away[nearest] <= 2.0 * log.trace.tip_radius:
         raise UserError(
             f"nothing was recorded near {np.round(1e3 * at, 3).tolist()} mm: the nearest of {len(away)} samples, at "
-            f"{np.round(1e3 * log.trace.centers[nearest], 3).tolist()} mm, is {1e3 * away[nearest]:.3g} mm away"
+            f"{np.round(1e3 * log.trace.centers[nearest], 3).tolist()} mm, is {length_text(away[nearest])} away"
         )
     near = np.flatnonzero(away <= 2.0 * log.trace.tip_radius)
     return int(near[_beside(log.trace.centers[near] - at, _approach(log, nearest)).argmin()])

@@ -75,10 +75,8 @@ def _instead(folder: Path) -> str:
         job, command = str(record["job"]), str(record.get("command", ""))
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return "expected a log, a table, or the folder of a session with one"
-    made = (
-        f"what is in it was made by: {command}" if command else f"it is what explore3d {job} made of a file elsewhere"
-    )
-    return f"{made}; give the recording that it was made from"
+    made = f"was made by: {command}" if command else f"is what explore3d {job} made of a file elsewhere"
+    return f"what it holds {made}; give the recording that it was made from"
 
 
 def read_recording(path: Path, settings: Mapping[str, Any]) -> Log:

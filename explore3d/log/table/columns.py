@@ -194,8 +194,18 @@ def _cannot_tell(table: TableText, why: str) -> UserError:
     heights = '; if it is a map of heights, say how far its pixels are apart: --pixel "1 um"' if is_map else ""
     return UserError(
         f"{table.path}: field columns: cannot tell x, y, z or x, z among {_labels(table)}{': ' * bool(why)}{why}; "
-        f'say which with --columns "x=1, z=2" (names or numbers){heights}'
+        f'say which with --columns "{_example(table)}" (names or numbers){heights}'
     )
+
+
+def _example(table: TableText) -> str:
+    """How to say which column is which: of a table with three columns of numbers or more, y too."""
+    numbers = [index + 1 for index in range(len(table.names)) if index not in table.texts]
+    marks = [each for each in numbers if len(table.rows) and is_mark(table.rows[:, each - 1])]
+    plausible = [each for each in numbers if each not in marks]
+    roles = POSITION if len(plausible) >= len(POSITION) else ("x", "z")
+    numbered = plausible if len(plausible) >= len(roles) else [1, 2]
+    return ", ".join(f"{role}={number}" for role, number in zip(roles, numbered, strict=False))
 
 
 def _named(table: TableText, role: str) -> int | None:
@@ -210,7 +220,8 @@ def _named(table: TableText, role: str) -> int | None:
     if len(found) > 1 and role in (*POSITION, "t", "sweep"):
         which = " and ".join(f"{table.names[index]!r} (column {index + 1})" for index in found)
         raise UserError(
-            f'{table.path}: field columns: {which} may both be {role}; say which with --columns "x=1, z=2" (numbers)'
+            f"{table.path}: field columns: {which} may both be {role}; say which with "
+            f'--columns "{_example(table)}" (numbers)'
         )
     return found[0] if found else None
 

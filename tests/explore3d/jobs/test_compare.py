@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -99,10 +100,22 @@ def test_of_thirty_changes_among_a_hundred_features_nine_tenths_are_found_and_ha
     assert not compare_models(first, first).likely(0.5)
 
 
+def test_scans_that_share_no_place_have_nothing_in_common(tmp_path: Path) -> None:
+    nothing = np.zeros(0)
+    log = scan(nothing, nothing, np.random.default_rng(0), count=3)
+    away = replace(log, trace=replace(log.trace, centers=log.trace.centers + 3.0 * np.ptp(log.trace.centers[:, 0])))
+    here, there = table(tmp_path / "here.csv", log), table(tmp_path / "there.csv", away)
+    told = Told(TIP, quick=True)
+    with pytest.raises(UserError, match="nothing in common to compare: no feature is in both"):
+        compare(here, there, told=told)
+    same = compare(here, here, told=told)  # bare, too
+    assert same.comparison.pairs == 0 and not same.comparison.changes
+
+
 def test_two_tips_are_not_compared(tmp_path: Path) -> None:
     nothing = np.zeros(0)  # what both tips felt does not matter
     log = table(tmp_path / "bare.csv", scan(nothing, nothing, np.random.default_rng(0), count=3))
     for name, radius in (("x", TIP), ("y", 2 * TIP)):
         analyze(log, tmp_path / name, tip_radius=radius, quick=True)
-    with pytest.raises(UserError, match="not comparable"):
+    with pytest.raises(UserError, match=r"with a tip of 10 µm, .* with one of 20 µm: not comparable"):
         compare(tmp_path / "x", tmp_path / "y", told=Told(quick=True))

@@ -108,6 +108,16 @@ def test_units_come_from_the_header_even_if_they_differ(tmp_path: Path) -> None:
     assert trace.centers == pytest.approx(np.array([[1e-3, 0, 2e-6], [4e-3, 0, 5e-6]]))
 
 
+def test_the_hint_of_columns_names_as_many_as_there_are(tmp_path: Path) -> None:
+    header = "Länge a [mm];Breite b [mm];Höhe c [mm]"
+    rows = [f"{i % 9};{i // 9};{0.1 * (i % 4):.1f}" for i in range(81)]
+    refused(tmp_path, "\n".join([header, *rows]), '--columns "x=1, y=2, z=3"')
+    two = [f"{i};{0.1 * (i % 4):.1f}" for i in range(81)]
+    refused(tmp_path, "\n".join(["Länge a [mm];Höhe c [mm]", *two]), '--columns "x=1, z=2"')
+    marked = [f"{i % 2};{row}" for i, row in enumerate(rows)]
+    refused(tmp_path, "\n".join([f"gültig;{header}", *marked]), '--columns "x=2, y=3, z=4"')
+
+
 def test_units_that_nobody_or_two_state_are_refused(tmp_path: Path) -> None:
     refused(tmp_path, "1;2\n3;4\n", "field units", "--units mm", units=None)
     refused(tmp_path, "x [um];z [um]\n1;2\n3;4\n", "field units", "'mm'", "'um'")
