@@ -77,8 +77,9 @@ def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Poste
     if chart.closed:
         axis[-1], normals[-1] = axis[0], normals[0]
     section = kind_of(problem.feature).section(problem.feature, shape, draws)
-    seen = explored(problem, draws) if has_ends else None
-    length, notes = _length(problem, shape, draws, seen)
+    best = draws[int(np.argmax(problem.target.log_density(draws)))] if has_ends else None
+    seen = None if best is None else explored(problem, best)
+    length, notes = _length(problem, shape, draws, best, seen)
     # Along the axis: how well it is known across itself, and its two ends along itself (first, last).
     known: dict[str, Any] = {"axis_sd": courses.std(axis=0)}
     if has_ends:
@@ -104,9 +105,13 @@ def _ends(problem: PosteriorProblem) -> list[int]:
 
 
 def _length(
-    problem: PosteriorProblem, shape: LineShape, draws: FloatArray, seen: tuple[bool, bool] | None
+    problem: PosteriorProblem,
+    shape: LineShape,
+    draws: FloatArray,
+    best: FloatArray | None,
+    seen: tuple[bool, bool] | None,
 ) -> tuple[Interval, list[str]]:
-    """The length, and what is to be said of it; `seen` as of `explored`, None of a line without ends."""
+    """The length, and what is to be said of it; the likeliest draw and `explored`, None of a line without ends."""
     chart, modes = shape.chart, shape.modes
     some = draws[:: max(1, len(draws) // FEW_DRAWS)]
 
@@ -120,13 +125,13 @@ def _length(
     interval = Interval.from_draws(np.array([of(*each) for each in zip(some, *ends.T, strict=True)]))
     if chart.closed:
         return interval, []
-    if seen is None:
+    if best is None or seen is None:
         return replace(interval, censored=True), [
             f"the length of a {problem.feature.kind} is what was explored of it: at least this"
         ]
     if all(seen):
         return interval, []
-    first, last = demanded(problem, draws, seen)
+    first, last = demanded(problem, best, seen)
     sure = np.sort(np.column_stack([np.maximum(ends[:, 0], first), np.minimum(ends[:, 1], last)]), axis=1)
     low = float(np.quantile([of(*each) for each in zip(some, *sure.T, strict=True)], 0.05))
     return replace(interval, low=min(low, interval.low), censored=True), [*with_open_ends((), seen)]
@@ -134,19 +139,19 @@ def _length(
 
 # An end that may as well lie at the limit of what was looked at was not seen: no more log density against it.
 UNSEEN = 3.0
-# Places between which an end that was not seen is looked for, from the limit to the other end
+# Places between which an end that was not seen is looked for, from the limit to the other end: half a per cent of that,
+# and the one that is denied is told
 PLACES_OF_END = 200
 GOES_ON = "the axis goes on beyond what was explored"
 
 
-def explored(problem: PosteriorProblem, draws: FloatArray) -> tuple[bool, bool]:
+def explored(problem: PosteriorProblem, best: FloatArray) -> tuple[bool, bool]:
     """For the first and the last end: True if the data say that the axis does not go on.
 
     The best of the draws is moved out to the limit of the end's prior; if the density hardly drops, nothing was
     measured that could have shown the end, and the length is only bounded from below (a censored value).
     """
     target = problem.target
-    best = draws[int(np.argmax(target.log_density(draws)))]
     at_limit = np.tile(best, (3, 1))
     columns = _ends(problem)
     at_limit[1, columns[0]] = target.low[columns[0]]
@@ -155,14 +160,13 @@ def explored(problem: PosteriorProblem, draws: FloatArray) -> tuple[bool, bool]:
     return bool(value[0] - value[1] > UNSEEN), bool(value[0] - value[2] > UNSEEN)
 
 
-def demanded(problem: PosteriorProblem, draws: FloatArray, seen: tuple[bool, bool]) -> tuple[float, float]:
+def demanded(problem: PosteriorProblem, best: FloatArray, seen: tuple[bool, bool]) -> tuple[float, float]:
     """How far the data demand that the axis goes, along it, m; infinitely far out of an end that was seen.
 
     Beyond what was looked at all places of an end are alike, and draws are of the prior there: their 5 % quantile lies
     where nothing was felt. The best of the draws is moved in from the limit until the density speaks against it.
     """
     target, columns = problem.target, _ends(problem)
-    best = draws[int(np.argmax(target.log_density(draws)))]
     limits, places = (target.low[columns[0]], target.high[columns[1]]), [-np.inf, np.inf]
     for i, column in enumerate(columns):
         if not seen[i]:
