@@ -17,9 +17,9 @@ from mapping.instrument import neighbour_scatter, robust_sd
 # The mesh of a fitted base goes on so many tip radii beyond the samples: a foot lies at most one aside of its centre,
 # on however steep a flank, and with the other no ball that touches there reaches over the border
 FIT_MARGIN = 2.0
-# Places of a surface closer together than this hang together, in tip radii. They lie 0.06 apart, and are rounded to cells
-# of half of this: links of up to 0.4 + 0.2 sqrt(3), less than half of the strip of 1.8 about the sweep that parts a gap from
-# the border
+# Places of a surface closer together than this hang together, in tip radii. They lie 0.06 apart, and are rounded to
+# cells of half of this: links of up to 0.4 + 0.2 sqrt(3), less than half of the strip of 1.8 about the sweep that parts
+# a gap from the border
 HANGING = 0.4
 
 

@@ -25,8 +25,8 @@ REFUTED_BY_CHANCE = 1e-4
 # Standard deviations by which a bend may be gentler than it is measured, and the fewest places that refute a radius:
 # of 10^5 places of Gaussian noise three exceed that with a chance of (10^5 * 2.9e-7)^3 / 6, 4e-6.
 BEND_SDS, FEWEST_BENDS = 5.0, 3
-# Standard deviations of its radius by which the ball may be smaller than told: of Gaussian ones 1.3e-3 are. Such a ball is
-# refuted only where it is sharp, too: of 150 told too large by a half-normal draw none was.
+# Standard deviations of its radius by which the ball may be smaller than told: of Gaussian ones 1.3e-3 are. Such a ball
+# is refuted only where it is sharp, too: of 150 told too large by a half-normal draw none was.
 RADIUS_SDS = 3.0
 # Share by which means over blocks bend more than the path: of random pins and plateaus up to 2 r high, 5e-4 to 0.5 r
 # between samples, blocks of up to r without noise bend on circles of 0.913 r and more where nothing is steeper than
@@ -42,11 +42,12 @@ SHORTEST_JUMP_SHARE, SURE_JUMP_SDS = 0.25, 3.0
 # Half blocks to either side in which a bend has come down to the path beside it: an arc of the height h under a circle
 # of the radius c is 2 sqrt(2 c h) wide, and told best over blocks of a third of that.
 BESIDE_BLOCKS = 8
-# Samples over which the level of the noise is taken: it may change within a sweep, and is known by the median of so many
-# to 1.17 / sqrt(256) = 7 %; the fewest bends that tell their scatter, to 18 % by the same, and how many do, to 2 %.
+# Samples over which the level of the noise is taken: it may change within a sweep, and is known by the median of so
+# many to 1.17 / sqrt(256) = 7 %; the fewest bends that tell their scatter, to 18 % by the same, and how many do, to 2
+# %.
 LEVEL_WINDOW, FEWEST_SCATTERED, SCATTERED = 256, 40, 4000
-# Points of the base under a sweep that tell which way is up: on a whole round of a body to 7.5 degrees; and bends that are
-# held against each other, each with all.
+# Points of the base under a sweep that tell which way is up: on a whole round of a body to 7.5 degrees; and bends that
+# are held against each other, each with all.
 UP_PLACES, MOST_BENDS = 24, 2000
 # Factor between the radii that are tried: the largest is told with two digits.
 RADIUS_STEP = 1.02
