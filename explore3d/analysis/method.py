@@ -33,7 +33,7 @@ from mapping.geometry.curvature import principal_curvatures
 from mapping.geometry.mesh import distances
 from mapping.inference import refine_all
 from mapping.inference.kinds import kind_of
-from mapping.model import Judgement, ObjectModel, dropped_crossings, dropped_features, judged
+from mapping.model import Judgement, ObjectModel, Tolerance, dropped_crossings, dropped_features, judged
 
 if TYPE_CHECKING:
     from mapping.estimate.envelope import Estimate
@@ -99,7 +99,7 @@ class Work:
         sound: the trace under sound sweep numbers; None for a log that was searched while it was read.
         path: what became of the recorded path.
         deviation: what the given model gets wrong; None if nothing is known to be.
-        judgements: what became of the scene's tolerances.
+        judgements: what became of the tolerances.
         apart: samples left out for that.
         refuted_tip: what the trace says against the radius of the tip; None if nothing.
         roughness: what the surface is like beside the features.
@@ -141,6 +141,13 @@ class Work:
             self.settings = replace(self.settings, tip_sd=self.log.tip_sd)
         if self.given is not None:
             self.base = self.given
+
+    @property
+    def tolerances(self) -> tuple[Tolerance, ...]:
+        """What the drawing allows: as the analysis was told, else as the scene says."""
+        if self.log.tolerances is not None:
+            return self.log.tolerances
+        return () if self.scene is None else self.scene.tolerances
 
     @property
     def truth(self) -> tuple[TrueFeature, ...]:
@@ -559,10 +566,10 @@ def modelled(work: Work, share: Share) -> None:
         dropped=work.dropped,
         deviation=work.deviation.heights if work.deviation and work.deviation.of_the_model else None,
     )
-    if work.scene is not None and work.scene.tolerance:
+    if work.tolerances:
         swept = swept_share(work.inspected, work.account, work.base)
         limit = work.detections.detection_limit
-        work.judgements = judged(work.model.features, work.scene.tolerances, limit, swept)
+        work.judgements = judged(work.model.features, work.tolerances, limit, swept)
         record = [each.record() for each in work.judgements]
         work.model = replace(work.model, provenance=work.model.provenance | {"tolerances": record})
 

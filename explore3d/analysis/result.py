@@ -96,7 +96,7 @@ class Analysis:
         path: what became of the path that was recorded; None for a log that was searched while it was read.
         deviation: what the given model gets wrong at long wavelengths, None if nothing.
         refuted_tip: what the trace says against the radius of the tip, None if nothing.
-        judgements: what became of each tolerance of the scene.
+        judgements: what became of each tolerance.
         roughness: what the surface is like beside the features; None where a trace cannot tell.
         standard_heights: what its ridges, grooves and steps measure by the standards.
         computing: what a run's planning and modelling took; None where nothing was planned.

@@ -21,6 +21,7 @@ from explore3d.cli.options import (
     Pixel,
     SameObject,
     TipRadius,
+    Tolerances,
     Units,
     length,
 )
@@ -51,6 +52,7 @@ def analyze(
             metavar="FROM..TO", help="Stretch in x that the base is not fitted to (1.2mm..1.4mm); may be repeated."
         ),
     ] = None,
+    tolerances: Tolerances = None,
     units: Units = None,
     columns: Columns = None,
     pixel: Pixel = None,
@@ -90,6 +92,7 @@ def analyze(
             tip_sd=tip_sd,
             form=form,
             mask=mask,
+            tolerances=tolerances,
             model=model,
             model_units=model_units,
             progress=progress,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from explore3d import UnitError, UserError, count_text, parse_time, seconds_text
-from explore3d.cli.options import Columns, Force, Frame, Json, Part, Pixel, TipRadius, Units
+from explore3d.cli.options import Columns, Force, Frame, Json, Part, Pixel, TipRadius, Tolerances, Units
 
 if TYPE_CHECKING:
     from explore3d.jobs.batch import Standing
@@ -38,6 +38,7 @@ def batch(
     tip_radius: TipRadius = None,
     tip_sd: Annotated[str | None, typer.Option(help="Standard deviation of that radius.")] = None,
     form: Annotated[str | None, typer.Option(help="Shape of a fitted base, as for analyze.")] = None,
+    tolerances: Tolerances = None,
     units: Units = None,
     columns: Columns = None,
     pixel: Pixel = None,
@@ -67,6 +68,7 @@ def batch(
     from explore3d.jobs import Told
     from explore3d.jobs.batch import Limits, batch as carry_out, tasks_of
     from explore3d.log.table import load_settings
+    from explore3d.scene import read_tolerances
 
     if not out:
         raise UserError("--out is missing: the folder or address of the store")
@@ -75,6 +77,9 @@ def batch(
     table |= {"pixel": pixel, "part": part, "frame": origin}
     said = {name: value for name, value in table.items() if value is not None}
     load_settings(Path("the command's options"), tip_radius=tip_radius, **said)
+    if tolerances is not None:
+        read_tolerances(tolerances)
+        said["tolerances"] = str(tolerances.resolve())
     told = Told(tip_radius, model, model_units, tuple(force or ()), quick, said)
     if model is not None and not model.is_file():
         raise UserError(f"--model {model}: no such mesh file")

@@ -68,6 +68,10 @@ FilesFrom = Annotated[
     ),
 ]
 NoReport = Annotated[bool, typer.Option("--no-report", help="Write no report and no pictures: tables and model alone.")]
+Tolerances = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="TOML file of [[tolerance]] tables: what the drawing allows (docs/scene.md)."),
+]
 Pixel = Annotated[
     str | None,
     typer.Option(help='The file is a map of heights whose pixels are so far apart: "1 um", or "1 um, 2 um".'),

@@ -14,7 +14,7 @@ from explore3d.jobs.conclude import conclude
 from explore3d.jobs.objects import not_one_object
 from explore3d.jobs.session import Job, Session
 from explore3d.log import LOG, digest, large_log, load_logs, must_fit_analysis, read_base, sidecar_of
-from explore3d.scene import load_mesh, recorded_scene
+from explore3d.scene import load_mesh, read_tolerances, recorded_scene
 from mapping.base import Base
 from mapping.geometry.mesh import algebra_in_one_thread
 
@@ -49,9 +49,9 @@ def analyze(
         report: False to write no report and no pictures.
         cutoffs: nesting indices of the L-filter and of the S-filter for roughness, m; None: by the standard.
         quick: only existence, places and sizes: no report, no chains, no estimated surface.
-        table: tip_sd, form, mask (explore3d.log.load_logs); units, columns, frame, jump, reference, pixel of a table
-            (explore3d.log.table.read_table); average: samples of a run that becomes one, their mean; part: which of
-            several that a file holds.
+        table: tip_sd, form, mask, tolerances (explore3d.log.load_logs); units, columns, frame, jump, reference, pixel
+            of a table (explore3d.log.table.read_table); average: samples of a run that becomes one, their mean; part:
+            which of several that a file holds.
 
     Raises:
         UserError: input that cannot be used, named by file and field.
@@ -80,6 +80,12 @@ class Told:
     table: Mapping[str, Any] = field(default_factory=dict)
     cutoffs: tuple[float | None, float | None] = (None, None)
 
+    @property
+    def tolerances(self) -> Path | None:
+        """The file that says what the drawing allows, None if none was given."""
+        given = self.table.get("tolerances")
+        return None if given is None else Path(given)
+
     def words(self) -> list[str]:
         """The options of a command that say the same."""
         words = [] if self.model is None else ["--model", str(self.model), "--model-units", self.model_units]
@@ -91,7 +97,7 @@ class Told:
         """All that decides, beside the recordings' bytes, what comes of them: files by their digests.
 
         Raises:
-            UserError: a sidecar that cannot be read.
+            UserError: a sidecar, or the file of tolerances, that cannot be read.
         """
         sidecars = [sidecar_of(log_path(path)) for path in paths]
         return {
@@ -103,6 +109,7 @@ class Told:
             "cutoffs": [] if self.cutoffs == (None, None) else list(self.cutoffs),
             "sidecars": [digest(path) for path in sidecars if path is not None],
             **self.table,
+            **({"tolerances": digest(allowed)} if (allowed := self.tolerances) is not None else {}),
         }
 
 
@@ -170,7 +177,7 @@ def log_path(path: Path | str) -> Path:
 def table_words(tip_radius: str | float | None, table: dict[str, Any]) -> list[str]:
     """The options of a command that say again how to read what does not say it."""
     words = [] if tip_radius is None else ["--tip-radius", str(tip_radius)]
-    for name in ("units", "columns", "pixel", "part", "tip_sd", "form", "average"):
+    for name in ("units", "columns", "pixel", "part", "tip_sd", "form", "tolerances", "average"):
         words += [f"--{name.replace('_', '-')}", str(table[name])] if table.get(name) else []
     words += [part for mask in table.get("mask") or () for part in ("--mask", mask)]
     origin = (table.get("frame") or {}).get("origin")
@@ -190,7 +197,10 @@ def _analyze(
         given = None if told.model is None else Base(load_mesh(told.model, told.model_units))
         radius = None if told.tip_radius is None else parse_length(told.tip_radius)
         run = run_key(digest(large), told.record(paths))
-        return analyze_stream(large, session, stages, base=given, tip_radius=radius, report=report, run=run)
+        allowed = None if told.tolerances is None else read_tolerances(told.tolerances)
+        return analyze_stream(
+            large, session, stages, base=given, tip_radius=radius, tolerances=allowed, report=report, run=run
+        )
     with stages.stage("reading"):
         log = load_logs(paths, tip_radius=told.tip_radius, **told.table)
         must_fit_analysis(", ".join(log.sources), len(log.trace))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 from explore3d.analysis import Analysis, Stages, build_model
@@ -13,6 +14,7 @@ from explore3d.log import Log, LogStream, count_samples, digest, head, read_base
 from explore3d.scene import AnalysisSettings, recorded_scene
 from mapping import LeftOut, Trace
 from mapping.base import Base, fit_base
+from mapping.model import Tolerance
 
 
 def analyze_stream(
@@ -22,6 +24,7 @@ def analyze_stream(
     *,
     base: Base | None = None,
     tip_radius: float | None = None,
+    tolerances: tuple[Tolerance, ...] | None = None,
     chunk: int = CHUNK,
     report: bool = True,
     run: str = "",
@@ -33,6 +36,7 @@ def analyze_stream(
     Args:
         session: entered, for model and report; None writes nothing.
         stages: the account of what runs and what is left out.
+        tolerances: what the drawing allows; None: what the scene says.
         report, run: as for conclude.
     """
     scene_text, events = head(path)
@@ -44,7 +48,7 @@ def analyze_stream(
     stream = LogStream(path, tip_radius)
     with stages.stage("detection") as share:
         condensed = condense(stream, base, folder, share, chunk, **settings.detection)
-    log = _log(path, scene_text, condensed)
+    log = replace(_log(path, scene_text, condensed), tolerances=tolerances)
     far = condensed.samples - len(condensed.trace)
     searched = f"all {condensed.samples:,} samples were searched; {far:,} of them, away from crossings, were not kept"
     stages.left_out.append(LeftOut("part of the trace", searched))

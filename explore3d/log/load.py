@@ -10,6 +10,7 @@ from typing import Any
 from explore3d import UnitError, UserError, parse_length
 from explore3d.log.own import Log, merge
 from explore3d.log.readers import read_recording
+from explore3d.scene import read_tolerances
 from mapping.base import Form
 
 
@@ -20,6 +21,7 @@ def load_logs(
     tip_sd: str | float | None = None,
     form: str | None = None,
     mask: Sequence[str] | None = None,
+    tolerances: Path | str | None = None,
     **table: Any,
 ) -> Log:
     """Read and merge recordings of one object with one fingertip.
@@ -32,14 +34,19 @@ def load_logs(
         tip_sd: standard deviation of that radius; None: what scene or table say.
         form: what the base is, where it is fitted (mapping.base.Form); None: what a table's sidecar says.
         mask: stretches in x that the base is not fitted to, "1.2mm..1.4mm"; None: what a table's sidecar says.
+        tolerances: file that says what the drawing allows (explore3d.scene.read_tolerances); None: what scenes and
+            sidecars say.
         table: the other settings of read_table; `average` is one for every kind of file.
 
     Raises:
         UserError: one line naming the file and the field.
     """
+    allowed = None if tolerances is None else read_tolerances(tolerances)
     log = merge([read_recording(Path(path), {"tip_radius": tip_radius} | table) for path in paths])
     if tip_sd is not None:
         log = replace(log, tip_sd=_tip_sd(tip_sd), tip_sd_assumed=False)
+    if allowed is not None:
+        log = replace(log, tolerances=allowed)
     if form is None and mask is None:
         return log
     masks = log.form.masks if mask is None else Form.read("auto", mask).masks

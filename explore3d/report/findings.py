@@ -248,7 +248,7 @@ def swept_part(analysis: Analysis) -> str:
 
 
 def tolerance_lines(analysis: Analysis) -> list[str]:
-    """A line for each tolerance of the scene: the verdict, and what it rests on."""
+    """A line for each tolerance: the verdict, and what it rests on."""
     return [f"{each.verdict}: {each.tolerance.text()} ({each.reason()})" for each in analysis.judgements]
 
 

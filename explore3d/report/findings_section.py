@@ -123,7 +123,7 @@ def what_was_found(analysis: Analysis, pictures: Pictures, view: Html) -> Html:
 
 
 def against_tolerances(analysis: Analysis) -> Html:
-    """What the drawing allows, and whether that is proved; nothing where the scene names no tolerance."""
+    """What the drawing allows, and whether that is proved; nothing where no tolerance was named."""
     if not analysis.judgements:
         return Html("")
     rows = [

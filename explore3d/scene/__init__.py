@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from explore3d.scene.settings import AnalysisSettings as AnalysisSettings
     from explore3d.scene.simulated import SimulatedFingerTable as SimulatedFingerTable
     from explore3d.scene.to_toml import scene_text as scene_text
+    from explore3d.scene.tolerance import ToleranceTable as ToleranceTable, read_tolerances as read_tolerances
     from explore3d.scene.values import (
         Angle as Angle,
         Delay as Delay,
@@ -73,6 +74,7 @@ _PUBLIC = {
     "settings": ("AnalysisSettings",),
     "simulated": ("SimulatedFingerTable",),
     "to_toml": ("scene_text",),
+    "tolerance": ("ToleranceTable", "read_tolerances"),
     "values": ("Angle", "Delay", "Extent", "Force", "Length", "LengthUnit", "Point", "Rate", "Speed", "Table", "Turn"),
 }
 doorway(__name__, _PUBLIC)

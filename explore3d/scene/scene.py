@@ -17,6 +17,7 @@ from explore3d.scene.finger import FingerTable, Setting, finger_table
 from explore3d.scene.mesh_files import checked_mesh, load_mesh
 from explore3d.scene.named_files import NamedFiles, with_files
 from explore3d.scene.to_toml import scene_text
+from explore3d.scene.tolerance import ToleranceTable
 from explore3d.scene.values import (
     INFORMATIVE,
     Angle,
@@ -32,7 +33,6 @@ from explore3d.scene.values import (
 )
 from hw import Finger
 from mapping import KINDS, FloatArray, Surface, length_text
-from mapping.inference.kinds import kind_named
 from mapping.instrument import Noise, StatedNoise
 from mapping.model import Tolerance
 from planners.survey import fastest_speed
@@ -154,26 +154,6 @@ class About(Table):
     part: Annotated[str, INFORMATIVE] = ""
 
 
-class ToleranceTable(Table):
-    """What a drawing allows of a size of every feature of a kind, hollows measured downwards: at most `limit` (m)."""
-
-    kind: Literal["any", *KINDS]  # type: ignore[valid-type]
-    size: Literal["height", "width", "length"]
-    limit: Length | None = None
-    least: Extent = 0.0
-
-    @model_validator(mode="after")
-    def _says_something(self) -> ToleranceTable:
-        if self.limit is None and self.least == 0.0:
-            raise ValueError("give limit (at most), least (at least), or both")
-        if self.limit is not None and self.least >= self.limit:
-            raise ValueError(f"least must lie below limit; found least {self.least:g} m and limit {self.limit:g} m")
-        if self.size == "length" and self.kind != "any" and not kind_named(self.kind).line:
-            lines = ", ".join(name for name in KINDS if kind_named(name).line)
-            raise ValueError(f"a {self.kind} has no length; possible with length: any, {lines}")
-        return self
-
-
 class Scene(Table):
     """The whole file. Paths are absolute after loading; `path` is the file, `text` what stood in it."""
 
@@ -256,10 +236,7 @@ class Scene(Table):
     @property
     def tolerances(self) -> tuple[Tolerance, ...]:
         """What the drawing allows."""
-        return tuple(
-            Tolerance(each.kind, each.size, inf if each.limit is None else each.limit, each.least)
-            for each in self.tolerance
-        )
+        return tuple(each.tolerance() for each in self.tolerance)
 
     @property
     def sweep_speed(self) -> float:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         Judgement as Judgement,
         Tolerance as Tolerance,
         judged as judged,
+        overall as overall,
     )
     from mapping.model.dropped import dropped_crossings as dropped_crossings, dropped_features as dropped_features
     from mapping.model.feature_mesh import drawn_at_least as drawn_at_least, feature_mesh as feature_mesh
@@ -44,6 +45,7 @@ _PUBLIC = {
         "Judgement",
         "Tolerance",
         "judged",
+        "overall",
     ),
     "dropped": ("dropped_crossings", "dropped_features"),
     "feature_mesh": ("drawn_at_least", "feature_mesh"),

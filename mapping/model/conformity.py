@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, isnan, nan
 from typing import Any
@@ -137,6 +137,14 @@ def judged(
         probabilities = tuple((name, each.probability(size)) for name, size in sizes)
         found.append(Judgement(each, probabilities, "; ".join(unseen)))
     return tuple(found)
+
+
+def overall(verdicts: Collection[str]) -> str:
+    """FAIL if one tolerance is broken, PASS if all are kept, else UNDECIDED; "" without any."""
+    verdicts = set(verdicts)
+    if not verdicts:
+        return ""
+    return FAIL if FAIL in verdicts else PASS if verdicts == {PASS} else UNDECIDED
 
 
 def _told(probability: float) -> str:

@@ -18,6 +18,7 @@ from explore3d.jobs.batch.store import RUN_COLUMNS
 from explore3d.jobs.batch.tasks import Task
 from hw import FingerError, MoveError
 from mapping import MappingError
+from mapping.model import overall
 from planners import PlannerError
 
 # What a user can mend, in one line
@@ -130,5 +131,6 @@ def _known(analysis: Analysis) -> dict[str, Any]:
         "noise_length": float(noise.length),
         "detection_limit": limit if limit < float("inf") else None,
         "base": analysis.base.kind,
+        "tolerances": overall([each.verdict for each in analysis.judgements]) or None,
         "warnings": "; ".join((*refuted, *detections.remarks)) or None,
     }

@@ -41,6 +41,7 @@ RUN_COLUMNS: dict[str, str] = {
     "noise_length": "float64",
     "detection_limit": "float64",
     "base": "string",
+    "tolerances": "string",
     "warnings": "string",
     "finished": "string",
 }
@@ -94,7 +95,8 @@ class Store:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        table = pa.concat_tables([pq.read_table(io.BytesIO(self._place.get(name))) for name in names])
+        rows = [pq.read_table(io.BytesIO(self._place.get(name))) for name in names]
+        table = pa.concat_tables(rows, promote_options="default")  # those of an older version lack newer columns
         stream = io.BytesIO()
         pq.write_table(table, stream, compression="zstd")
         return stream.getvalue()

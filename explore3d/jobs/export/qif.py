@@ -14,7 +14,7 @@ from typing import Any
 
 from explore3d import __version__
 from mapping import Feature, Interval
-from mapping.model import DISPROOF, FAIL, PASS, PROOF, ObjectModel, probability
+from mapping.model import DISPROOF, FAIL, PASS, PROOF, UNDECIDED, ObjectModel, overall, probability
 
 QIF_NAMESPACE = "http://qifstandards.org/xsd/qif3"
 QIF_VERSION = "3.0.0"
@@ -22,6 +22,8 @@ QIF_VERSION = "3.0.0"
 _MILLIMETRE = 1e-3
 # Standard deviations in a central interval of 90 % of a Gaussian
 _NINETY = 3.29
+# QIF's word for each verdict on the whole
+STATUS_WORDS = {FAIL: "FAIL", PASS: "PASS", UNDECIDED: "UNKNOWN", "": "NOT_CALCULATED"}
 # A document's identity follows from its content: the same model gives the same file
 _IDENTITIES = uuid.uuid5(uuid.NAMESPACE_URL, QIF_NAMESPACE)
 
@@ -32,7 +34,7 @@ def qif_results(model: ObjectModel) -> bytes:
     A bump or pit is a point, all others are curves through the vertices of their axes. Each known size is a
     characteristic: its median, with half the 90 % interval over 1.645 as its combined standard uncertainty and the
     interval's ends as attributes. A size that the data only bound has no value, only those ends. Depths of pits and
-    grooves are positive. Where the scene allows a size limits, the characteristic has them, and passes or fails if
+    grooves are positive. Where tolerances give a size limits, the characteristic has them, and passes or fails if
     that is proved (mapping.model.Tolerance); one of each tolerance, where several speak of a size.
     """
     written = _Document(model)
@@ -208,9 +210,8 @@ class _Document:
             _list(one, "MeasuredFeatures", self.features)
         if self.measurements:
             _list(_add(one, "MeasuredCharacteristics"), "CharacteristicMeasurements", self.measurements)
-        verdicts = {each["verdict"] for each in self.model.provenance.get("tolerances", ())}
-        whole = "FAIL" if FAIL in verdicts else "PASS" if verdicts == {PASS} else "UNKNOWN"
-        _add(_add(one, "InspectionStatus"), "InspectionStatusEnum", whole if verdicts else "NOT_CALCULATED")
+        whole = overall([each["verdict"] for each in self.model.provenance.get("tolerances", ())])
+        _add(_add(one, "InspectionStatus"), "InspectionStatusEnum", STATUS_WORDS[whole])
         return results
 
 

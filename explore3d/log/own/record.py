@@ -14,6 +14,7 @@ from explore3d import UserError, count_text
 from hw import Move
 from mapping import Surface, SurfaceError, Trace
 from mapping.base import Base, Form
+from mapping.model import Tolerance
 
 if TYPE_CHECKING:
     from mapping.detection import Detections
@@ -70,6 +71,7 @@ class Log:
         tip_sd: standard deviation of the tip's radius, m; None: the scene says it.
         tip_sd_assumed: True if nobody stated it.
         form: what the base is, where it is fitted.
+        tolerances: what the drawing allows; None: what the scene says.
         timed: False if nobody recorded times: `trace.t` counts the samples then, for no clock went with them.
     """
 
@@ -85,6 +87,7 @@ class Log:
     tip_sd: float | None = None
     tip_sd_assumed: bool = False
     form: Form = Form()  # noqa: RUF009
+    tolerances: tuple[Tolerance, ...] | None = None
     timed: bool = True
 
 
@@ -124,6 +127,7 @@ def merge(logs: Sequence[Log]) -> Log:
         tip_sd=max((log.tip_sd for log in logs if log.tip_sd is not None), default=None),
         tip_sd_assumed=any(log.tip_sd_assumed for log in logs),
         form=next((log.form for log in logs if log.form != Form()), Form()),
+        tolerances=tuple(dict.fromkeys(each for log in logs for each in log.tolerances or ())) or None,
         timed=all(log.timed for log in logs),
     )
 

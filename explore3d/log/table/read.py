@@ -201,6 +201,7 @@ def _log(found: Samples, settings: TableSettings, sidecar: Path | None) -> Log:
         tip_sd=TIP_DOUBT * settings.tip_radius if settings.tip_sd is None else settings.tip_sd,
         tip_sd_assumed=settings.tip_sd is None,
         form=Form.read(settings.form, settings.mask),
+        tolerances=tuple(each.tolerance() for each in settings.tolerance) or None,
         timed="t" in roles,
     )
 

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, mo
 
 from explore3d import UserError
 from explore3d.log.table.columns import Role
-from explore3d.scene import Extent, Length, LengthUnit, Point, Table, complaint
+from explore3d.scene import Extent, Length, LengthUnit, Point, Table, ToleranceTable, complaint
 
 Row = tuple[float, float, float]
 
@@ -67,6 +67,7 @@ class TableSettings(Table):
         pixel: distance of the columns and of the rows of a map of heights, m; one for both or two.
         average: runs of so many consecutive samples become one each, their mean; None: every sample is taken.
         part: which one of several the file holds: topic of a bag, sheet of a workbook, channel of an instrument.
+        tolerance: what the drawing allows, as in a scene.
     """
 
     units: LengthUnit | dict[Role, LengthUnit] | None = None
@@ -82,6 +83,7 @@ class TableSettings(Table):
     pixel: Annotated[tuple[Length, Length] | None, BeforeValidator(_both_ways)] = None
     average: Annotated[int, Field(ge=1)] | None = None
     part: str | None = None
+    tolerance: tuple[ToleranceTable, ...] = ()
 
     @model_validator(mode="before")
     @classmethod
