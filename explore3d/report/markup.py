@@ -22,6 +22,10 @@ READER_UNITS = {
 }
 
 
+# Columns that a telephone shows beside each other
+MOST_NARROW_COLUMNS = 3
+
+
 class Html(str):
     """Text that is markup already and is not escaped again."""
 
@@ -43,24 +47,23 @@ def paragraph(*content: str) -> Html:
 
 
 def table(head: Row, rows: Iterable[Row], *, numeric: Sequence[int] = ()) -> Html:
-    """A table that scrolls sideways on narrow screens; columns in `numeric` are aligned to the right.
+    """A table, on narrow screens a card for each row if it has many columns; those in `numeric` are right-aligned.
 
     It can be scrolled by keyboard, so it can be reached by keyboard, and says what it is by its first column.
     """
 
-    def cells(kind: str, row: Row) -> Html:
-        return element(
-            "tr",
-            # a header without a word is none
-            *(
-                element(kind if each else "td", each, **({"class_": "number"} if i in numeric else {}))
-                for i, each in enumerate(row)
-            ),
-        )
+    def cells(kind: str, row: Row, **labels: Sequence[str]) -> Html:
+        made = []
+        for i, each in enumerate(row):
+            attributes = {"class_": "number"} if i in numeric else {}
+            attributes |= {name: texts[i] for name, texts in labels.items() if each}
+            made.append(element(kind if each else "td", each, **attributes))  # a header without a word is none
+        return element("tr", *made)
 
-    body = element("tbody", *(cells("td", row) for row in rows))
+    body = element("tbody", *(cells("td", row, data_label=head) for row in rows))
     whole = element("table", element("thead", cells("th", head)), body)
-    return element("div", whole, class_="table", role="group", tabindex="0", aria_label=f"Table: {head[0]}")
+    wide = "table wide" if len(head) > MOST_NARROW_COLUMNS else "table"
+    return element("div", whole, class_=wide, role="group", tabindex="0", aria_label=f"Table: {head[0]}")
 
 
 def section(title: str, name: str, *content: str) -> Html:

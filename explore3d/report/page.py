@@ -135,7 +135,17 @@ details { margin-top: .6rem; } summary { cursor: pointer; color: var(--soft); }
 pre { background: var(--wash); padding: .8rem; border-radius: 8px; overflow: auto; font-size: .82rem; }
 code { font-size: .9em; }
 @media (max-width: 640px) { h1 { font-size: 1.5rem; } main { padding: 1.4rem .9rem 3rem; }
-  .view .stage { height: 380px; } }
+  .view .stage { height: 380px; }
+  .table { max-height: none; } table { font-size: .86rem; } th, td { padding: .45rem .4rem; }
+  th, th.number, td b, td span { white-space: normal; } .bar { max-width: 30vw; }
+  /* a wide table as cards: each row one, each cell a line with the name of its column before it */
+  .wide { border: 0; border-radius: 0; } .wide table, .wide tbody { display: block; }
+  .wide thead { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); }
+  .wide tbody tr { display: table; width: 100%; border-collapse: separate; border-spacing: .7rem .35rem;
+    margin: 0 0 .7rem; border: 1px solid var(--faint); border-radius: 8px; }
+  .wide td, .wide td.number { display: table-row; text-align: left; } .wide td:not([data-label]) { display: none; }
+  .wide td::before { content: attr(data-label); display: table-cell; width: 7.5rem; color: var(--soft);
+    vertical-align: top; } td small.note { min-width: 0; } }
 @media (prefers-color-scheme: dark) {
   :root { --ink: #e4e7eb; --soft: #a8b4c2; --faint: #323f4b; --paper: #141b22; --wash: #1e2831; --link: #8fbcf0;
     --edge: #52606d; --chosen: #4a3f12; --warn: #33280f; --good: #163a29; --good-ink: #a5e0bf; --bad: #4a1d1d;
