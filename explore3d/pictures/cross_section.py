@@ -77,8 +77,9 @@ def cross_section(
     if len(window) == 0:
         return None
     feet = LaidTrace.of(trace, base).feet(window)
-    x, beside = _place(feature, feet.points, feet.normals)
     half = max(half_width(feature, trace.tip_radius), 0.0 if crossing is None else crossing.half_width)
+    heading = _heading(feature, feet.points, half)
+    x, beside = _place(feature, feet.points, feet.normals, heading)
     near = (np.abs(x) < SECTION_REACH * half) & (beside < half)
     index = np.flatnonzero(near)[np.argsort(x[near], kind="stable")]
     if len(index) < 3:
@@ -107,7 +108,7 @@ def cross_section(
         curves[0],
         np.minimum(curves[1], curves[2]),
         np.maximum(curves[1], curves[2]),
-        *_body(feature, sweep, half, estimate, base, trace.tip_radius, level),
+        *_body(feature, sweep, half, heading, estimate, base, trace.tip_radius, level),
         len(feature.axis) > 1,
     )
 
@@ -176,13 +177,30 @@ def _angle(crossing: Crossing, feature: Feature) -> float:
     return float(np.linalg.norm(np.cross(directions(feature.axis)[near], crossing.tangent)))
 
 
-def _place(feature: Feature, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _heading(feature: Feature, points: FloatArray, half: float) -> FloatArray | None:
+    """(3,) unit vector of the sweep over a point, from its samples (N, 3) within the disturbance; None for lines.
+
+    Fewer samples would not do: noise moves single ones further than they lie apart.
+    """
+    if len(feature.axis) > 1:
+        return None
+    offset = points - feature.axis[0]
+    away = np.linalg.norm(offset, axis=1)
+    near = offset[away < max(half, float(np.partition(away, min(2, len(away) - 1))[min(2, len(away) - 1)]))]
+    heading: FloatArray = np.linalg.svd(near - near.mean(axis=0), full_matrices=False)[2][0]
+    forward: FloatArray = heading * np.sign(heading[int(np.abs(heading).argmax())])
+    return forward
+
+
+def _place(
+    feature: Feature, points: FloatArray, normals: FloatArray, heading: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
     """Signed distance of base points (N, 3) across the crest, and how far they lie beside the section, m.
 
     Across a line the sign is that of normal x tangent, and beside means beyond its ends. Over a point the
-    distance is along the direction in which the samples spread most, and beside is across it.
+    distance is along the heading of the sweep, and beside is across it.
     """
-    if len(feature.axis) > 1:
+    if heading is None:
         closest, s = nearest_on(points, feature.axis)
         offset = points - closest
         leg = np.clip(np.searchsorted(_knots(feature), s, side="right") - 1, 0, len(feature.axis) - 2)
@@ -191,12 +209,8 @@ def _place(feature: Feature, points: FloatArray, normals: FloatArray) -> tuple[F
         left = np.cross(normals, along)
         return np.einsum("ij,ij->i", offset, left), np.abs(np.einsum("ij,ij->i", offset, along))
     offset = points - feature.axis[0]
-    near = np.linalg.norm(offset, axis=1)
-    nearest = offset[np.argsort(near, kind="stable")[: max(3, len(near) // 50)]]
-    heading = np.linalg.svd(nearest - nearest.mean(axis=0), full_matrices=False)[2][0]
-    heading = heading * np.sign(heading[int(np.abs(heading).argmax())])
     x = offset @ heading
-    return x, np.sqrt(np.maximum(near**2 - x**2, 0.0))
+    return x, np.sqrt(np.maximum((offset**2).sum(axis=1) - x**2, 0.0))
 
 
 def _knots(feature: Feature) -> FloatArray:
@@ -241,7 +255,14 @@ def _binned(x: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def _body(
-    feature: Feature, sweep: int, half: float, estimate: Estimate | None, base: Base, tip_radius: float, level: float
+    feature: Feature,
+    sweep: int,
+    half: float,
+    heading: FloatArray | None,
+    estimate: Estimate | None,
+    base: Base,
+    tip_radius: float,
+    level: float,
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """The estimated surface along the sweep: places, heights over the base's level, and where it was bridged.
 
@@ -255,7 +276,7 @@ def _body(
     near = np.linalg.norm(estimate.points[own] - nearest_on(estimate.points[own], feature.axis)[0], axis=1)
     own = own[near < 2.0 * SECTION_REACH * half]
     foot = base.foot(estimate.points[own], tip_radius)
-    x, beside = _place(feature, foot.points, foot.normals)
+    x, beside = _place(feature, foot.points, foot.normals, heading)
     keep = np.flatnonzero((np.abs(x) < SECTION_REACH * half) & (beside < half))
     order = keep[np.argsort(x[keep], kind="stable")]
     return x[order], foot.height[order] + tip_radius - level, estimate.labels[own][order] == BRIDGED

@@ -55,6 +55,20 @@ def test_the_body_lies_nowhere_above_the_trace_of_the_sweep_that_felt_it() -> No
     assert above.max() < 4.0 * noise
 
 
+def test_over_a_bump_places_are_measured_along_the_sweep_though_noise_exceeds_its_step() -> None:
+    """Samples 50 um apart whose places beside the sweep scatter by 300 um: the nearest ones lie in any direction."""
+    rng = np.random.default_rng(8)
+    x, high = np.arange(-0.8 * TIP, 0.8 * TIP, 5e-3 * TIP), 0.05 * TIP
+    beside = 3e-2 * TIP * rng.standard_normal(len(x))
+    z = TIP + cap_height(x, high, 1e-9, TIP)
+    trace = Trace(np.arange(float(len(x))), np.column_stack([x, beside, z]), np.zeros(len(x), dtype=int), TIP)
+    size = Interval.normal(high, 1e-6)
+    bump = Feature("bump", np.zeros((1, 3)), UP[None], size, Interval(0, 0, 0), size, Support(9.0, 1), True, 1e-5)
+    section = cross_section(bump, trace, BASE, [])
+    assert section is not None and len(section.x) > 250
+    np.testing.assert_allclose(section.height, cap_height(section.x, high, 1e-9, TIP), atol=1e-3 * TIP)
+
+
 def test_the_prediction_lies_on_the_level_of_the_samples_about_it() -> None:
     lifted = Trace(sweeps().t, sweeps().centers + 2e-5 * UP, sweeps().sweep, TIP)
     section = cross_section(ridge(), lifted, BASE, [crossing(4, -0.006)])
