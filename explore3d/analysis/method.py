@@ -517,8 +517,10 @@ def why_no_curvature(work: Work) -> str:
 
 def curvature_taken(work: Work, share: Share) -> None:
     """Principal curvatures at the vertices of the estimated surface."""
-    if work.estimate is not None and work.estimate.surface is not None:
-        work.curvature = principal_curvatures(work.estimate.surface, noise=work.estimate.sd)
+    found = work.estimate
+    if found is not None and found.surface is not None:
+        # outward is where the balls touched from: the mesh alone turns inward where it ends, over a mug's mouth
+        work.curvature = principal_curvatures(found.surface, normals=found.normals, noise=found.sd)
         for remark in work.curvature.remarks:
             work.stages.left_out.append(LeftOut("curvature by libigl", remark))
 

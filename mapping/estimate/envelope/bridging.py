@@ -57,6 +57,20 @@ def resting_points(centers: FloatArray, normals: FloatArray, faces: IntArray, ti
     return np.where(proper[:, None], met, (a + b + c) / 3 - tip_radius * up)
 
 
+def rest_between(points: FloatArray, centers: FloatArray, normals: FloatArray, faces: IntArray) -> BoolArray:
+    """(F,) which resting points (F, 3) lie under their balls in directions between those in which the balls touched.
+
+    A ball that comes to rest in a kink touches it in directions between those of its flanks. Where corners lie nearer
+    to one another than their noise their plane may have any direction, and the ball at rest on it, too: it would stand
+    on a body that nobody felt.
+    """
+    corner = normals[faces]
+    up = unit(corner.sum(axis=1))
+    widest = np.einsum("ij,ikj->ik", up, corner).min(axis=1)
+    arm = unit(centers[faces].mean(axis=1) - points)
+    return np.asarray(np.einsum("ij,ij->i", arm, up) >= widest)
+
+
 def split(faces: IntArray, chosen: IntArray, first: int) -> IntArray:
     """Faces with those of indices `chosen` split in three about new vertices first, first + 1, ..."""
     rest = np.delete(faces, chosen, axis=0)

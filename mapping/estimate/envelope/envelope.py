@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from mapping import BoolArray, EnvelopeError, FloatArray, IntArray, Surface, Trace
 from mapping.base import Base, LaidTrace
 from mapping.estimate.envelope.alpha_shape import alpha_estimate
-from mapping.estimate.envelope.bridging import bridged_faces, resting_points, split
+from mapping.estimate.envelope.bridging import bridged_faces, rest_between, resting_points, split
 from mapping.estimate.envelope.estimate import Estimate
 from mapping.estimate.envelope.profile_envelope import penetration_below
 from mapping.estimate.envelope.proof import Balls, owners_along
@@ -219,7 +219,7 @@ def _contacts(trace: Trace, method: str, outward: FloatArray, slack: float) -> E
         sweeps.append(np.full(len(row.centers), number))
         start += len(part)
     row = ContactRow.joined(rows)
-    normals, across, doubt = surface_normals(trace, row, outward)
+    normals, across, doubt = surface_normals(trace, row, outward, slack)
     if method == "contact" and trace.normals is not None:
         normals, doubt = _recorded(trace, row), np.zeros(len(doubt))
     # A ball turned by an angle about its contact leaves the body by half of r angle^2.
@@ -273,6 +273,7 @@ def _meshed(
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
     # Samples between the three corners lower the balls' common boundary by up to this sagitta.
     possible = depth(resting, slack) <= slack + longest**2 / (2 * r)
+    possible &= rest_between(resting, points.centers, points.normals, faces[chosen])
     chosen, resting = chosen[possible], resting[possible]
     joined = points.with_resting(resting, faces[chosen])
     surface = Surface(joined.points, split(faces, chosen, len(points.points)))

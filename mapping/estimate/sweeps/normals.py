@@ -20,11 +20,17 @@ from mapping.estimate.sweeps.tangents import lagrange, unit
 SAMPLES_AT_ONCE = 4096
 
 
-def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def surface_normals(
+    trace: Trace, row: ContactRow, outward: FloatArray, slack: float = 0.0
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Outward unit normals (M, 3) at the points of `row`, curvature across (M,), 1/m, and doubt of the slope (M,), rad.
 
     A single sweep knows its slope along itself only: its normals stay in the plane of tangent and outward
     direction, as of a profile. Parallel sweeps add the slope across; other arrangements take it from local fits.
+
+    Args:
+        slack: what noise moves a centre by at most, m. Sweeps whose balls would stand out between them by less than
+            an eighth of it are passes over one line: they tell no slope across.
     """
     if len(np.unique(trace.sweep)) < 2:
         return row.normals, np.full(len(row.normals), np.nan), np.zeros(len(row.normals))
@@ -36,7 +42,9 @@ def surface_normals(trace: Trace, row: ContactRow, outward: FloatArray) -> tuple
     slope = (
         CrossSlope(along.copy(), unknown, unknown.copy())
         if rows is None
-        else cross_slope(trace.centers, along, outward, rows, _curves(trace, row, rows))
+        else cross_slope(
+            trace.centers, along, outward, rows, _curves(trace, row, rows), float(np.sqrt(trace.tip_radius * slack))
+        )
     )
     lost = np.flatnonzero(np.isnan(slope.doubt))
     if len(lost):
@@ -157,12 +165,20 @@ class CrossSlope:
 
 
 def cross_slope(
-    points: FloatArray, along: FloatArray, outward: FloatArray, rows: list[IntArray], curves: list[SweepCurve]
+    points: FloatArray,
+    along: FloatArray,
+    outward: FloatArray,
+    rows: list[IntArray],
+    curves: list[SweepCurve],
+    least: float = 0.0,
 ) -> CrossSlope:
     """Slope across the parallel sweeps `rows` at their samples (N, 3) with unit tangents `along` (N, 3).
 
     The surface is cut at each sample by the plane perpendicular to the sweep, which the neighbouring rows cross
     in a few points; their interpolant gives the slope, its last term the doubt.
+
+    Args:
+        least: rows usually nearer than that, m, to the row itself or to one that was taken already are passed over.
     """
     across = unit(np.cross(outward, along))
     up = np.cross(along, across)
@@ -171,16 +187,29 @@ def cross_slope(
     for j, row in enumerate(rows):
         v, w = np.full((2, len(row), 2 * ROWS_EITHER_SIDE + 1), np.nan)
         v[:, ROWS_EITHER_SIDE] = w[:, ROWS_EITHER_SIDE] = 0.0
-        for shift in range(-ROWS_EITHER_SIDE, ROWS_EITHER_SIDE + 1):
-            if shift and 0 <= j + shift < len(rows):
-                arm = curves[j + shift].crossings(points[row], along[row]) - points[row]
-                v[:, ROWS_EITHER_SIDE + shift] = np.einsum("ij,ij->i", arm, across[row])
-                w[:, ROWS_EITHER_SIDE + shift] = np.einsum("ij,ij->i", arm, up[row])
+        for side in (-1, 1):
+            taken, beside = 0, np.zeros(len(row))
+            for other in range(j + side, -1 if side < 0 else len(rows), side):
+                arm = curves[other].crossings(points[row], along[row]) - points[row]
+                away = np.einsum("ij,ij->i", arm, across[row])
+                if _usual(np.abs(away - beside)) < least:
+                    continue
+                taken, beside = taken + 1, away
+                v[:, ROWS_EITHER_SIDE + side * taken] = away
+                w[:, ROWS_EITHER_SIDE + side * taken] = np.einsum("ij,ij->i", arm, up[row])
+                if taken == ROWS_EITHER_SIDE:
+                    break
         slope[row], bend[row], doubt[row] = smooth_slope(v, w)
         # Beside an outermost sweep nothing shows whether the surface goes on as it came.
         alone = np.isnan(v[:, ROWS_EITHER_SIDE - 1]) | np.isnan(v[:, ROWS_EITHER_SIDE + 1])
         doubt[row] = shared(np.where(alone & ~np.isnan(doubt[row]), np.pi / 2, doubt[row]))
     return CrossSlope(unit(across + slope[:, None] * up), -bend / (1 + slope**2) ** 1.5, doubt)
+
+
+def _usual(distances: FloatArray) -> float:
+    """Their median, infinite where none is known."""
+    known = distances[np.isfinite(distances)]
+    return float(np.median(known)) if len(known) else np.inf
 
 
 def shared(doubt: FloatArray, reach: int = 2) -> FloatArray:

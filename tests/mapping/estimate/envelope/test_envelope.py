@@ -308,6 +308,20 @@ def test_recorded_normals_give_the_contacts_themselves():
     assert (estimate.labels == TOUCHED).all()
 
 
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_a_line_swept_twice_leaves_nothing_standing_on_the_plate(seed):
+    """Two passes over one line lie nearer to one another than their noise: no slope follows from them."""
+    rng, noise, tip = np.random.default_rng(seed), 50e-6, 4e-3
+    x = np.arange(-20e-3, 20e-3, 0.03e-3)
+    rows = [0.0, 0.0, 2e-3, 4e-3, 6e-3]
+    centers = np.concatenate([np.column_stack([x, np.full_like(x, y), np.full_like(x, tip)]) for y in rows])
+    centers += noise * rng.standard_normal(centers.shape)
+    trace = Trace(1e-3 * np.arange(len(centers)), centers, np.repeat(np.arange(len(rows)), len(x)), tip)
+    estimate = estimate_surface(trace, noise=Noise(noise, 0.0, 0.0))
+    assert np.abs(estimate.points[:, 2]).max() < 2 * noise
+    assert estimate.normals[:, 2].min() > 0.9
+
+
 def test_crossing_sweeps_become_one_mesh():
     first = rows(sphere, pitch=0.2, spacing=0.02)
     turned = Trace(first.t, first.centers[:, [1, 0, 2]], first.sweep + 1000, 1.0)
