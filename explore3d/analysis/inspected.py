@@ -21,6 +21,8 @@ STATED = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
 # Where no height is asked for, those are told that hold on so much of what sweeps came near: the limit itself holds
 # only where a sweep passes, on no area
 TOLD_SHARES = (("half", 0.5), ("nine tenths", 0.9))
+# Where less of the surface than this is inspected for the height asked for, the height is told for which so much is
+WELL_INSPECTED = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +117,10 @@ class Inspected:
                 f"{100 * self.share(self.asked):.1f} % of the surface is inspected for sharp features above "
                 f"{length_text(self.asked, 2)}"
             )
+            near = 1.0 - self.untouched
+            if self.share(self.asked) < WELL_INSPECTED <= near:
+                height = length_text(self.above(WELL_INSPECTED / near), 2)
+                sentence += f", {100 * WELL_INSPECTED:.0f} % above {height}"
         sentence += f", with a probability of at least {100 * self.probability:.0f} % each."
         if self.untouched > 5e-4:
             sentence += f" No sweep came near {100 * self.untouched:.1f} % of it."

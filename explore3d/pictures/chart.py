@@ -416,11 +416,16 @@ def _scale(limits: tuple[float, float], first: float, last: float, log: bool) ->
 
 
 def _ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
-    """Round places between the limits, at most about `most`, with their numbers."""
+    """Round places between the limits, at most about `most` but two at least, with their numbers."""
     rough = (high - low) / max(most, 1)
     power = 10.0 ** np.floor(np.log10(rough))
-    step = power * next(factor for factor in (1.0, 2.0, 2.5, 5.0, 10.0) if factor * power >= rough * (1.0 - 1e-9))
-    places = step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
+    factors = (0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 2.5, 5.0, 10.0)
+    number = next(i for i, factor in enumerate(factors) if factor * power >= rough * (1.0 - 1e-9))
+    for factor in factors[number::-1]:  # one number alone tells no scale
+        step = factor * power
+        places = step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
+        if len(places) > 1:
+            break
     digits = next(count for count in range(20) if np.isclose(step, round(step, count), rtol=1e-6, atol=0.0))
     return [(float(place), f"{round(place, digits) + 0.0:.{digits}f}".replace("-", "−")) for place in places]
 

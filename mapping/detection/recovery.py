@@ -52,7 +52,8 @@ def recovered(
         if len(places) < FEWEST_INJECTED and injected:
             break
         if len(places) < FEWEST_INJECTED:
-            short = f"the limit is computed, not measured: the quiet path has room for {len(places)} crests only"
+            room = f"has room for {len(places)} of the {FEWEST_INJECTED} crests that this takes"
+            short = f"the limit is computed, not measured: the quiet path {room}"
             return replace(detections, left_out=(*detections.left_out, short))
         found = _count_found(
             detect(_with_crests(laid, places, height), laid.base, **settings), laid, places, half_width

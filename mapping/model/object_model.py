@@ -27,7 +27,7 @@ from mapping.model.json_record import (
     read_dropped,
     read_feature,
 )
-from mapping.model.plot import plot_model
+from mapping.model.plot import plot_model, plot_profile
 from mapping.model.table import dataframe, html_table
 
 __all__ = ["LeftOut", "ObjectModel"]
@@ -117,14 +117,16 @@ class ObjectModel:
         return dataframe(self.features)
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw the base and its features, with matplotlib.
+        """Draw the base and its features with matplotlib; of a profile the features' heights along it.
 
         Args:
-            axes: of matplotlib, with projection "3d", to draw into; None: new ones.
+            axes: of matplotlib, with projection "3d" unless it is a profile, to draw into; None: new ones.
 
         Returns:
             The axes.
         """
+        if self.base.kind == "profile":
+            return plot_profile(self.features, axes)
         return plot_model(self.base.surface, self.features, axes)
 
     def save(self, folder: Path | str) -> Path:

@@ -18,6 +18,30 @@ PLOTTED_SHARE = 0.006
 MOST_PLOTTED_FACES = 4000
 
 
+def plot_profile(features: Sequence[Feature], axes: Any = None) -> Any:
+    """Draw the features of a profile, as ObjectModel.plot: height over place, with 90 % intervals and widths."""
+    if axes is None:
+        import matplotlib.pyplot as plt
+
+        _, axes = plt.subplots(figsize=(7.0, 3.5), layout="constrained")
+    place = np.array([feature.axis[0, 0] for feature in features])
+    factor, unit = length_unit(float(np.ptp(place)) or float(np.abs(place).max(initial=0.0)) or 1.0)
+    tallest = max((abs(feature.height.median) for feature in features), default=1.0)
+    scale, name = length_unit(tallest or 1.0)
+    axes.axhline(0.0, color="#9aa5b1", linewidth=1.0)
+    for feature, at in zip(features, place / factor, strict=True):
+        colour, height = kind_of(feature).colour, feature.height
+        half = 0.5 * max(feature.width.median, 0.0) / factor if np.isfinite(feature.width.median) else 0.0
+        axes.plot([at - half, at + half], [height.median / scale] * 2, color=colour, linewidth=3.0)
+        axes.plot([at, at], [0.0, height.median / scale], color=colour, linewidth=1.0)
+        axes.plot([at, at], [height.low / scale, height.high / scale], color=colour, linewidth=5.0, alpha=0.35)
+        axes.annotate(feature.id, (at, height.median / scale), (0, 6), textcoords="offset points", ha="center", size=7)
+    axes.set_xlabel(f"x ({unit})")
+    axes.set_ylabel(f"height over the base ({name})")
+    axes.margins(x=0.05, y=0.15)
+    return axes
+
+
 def plot_model(base: Surface, features: Sequence[Feature], axes: Any = None) -> Any:
     """Draw a base and features; arguments and result as for ObjectModel.plot."""
     if axes is None:

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from reported_wire import BASE, ridge
 
-from mapping.feature import Interval
+from mapping.base import fit_base
+from mapping.feature import Feature, Interval, Support
 from mapping.model.object_model import ObjectModel
 from mapping.posterior import Posterior
+from mapping.trace import Trace
 
 
 @pytest.fixture(autouse=True)
@@ -26,6 +28,19 @@ def test_a_model_names_each_feature_where_it_is() -> None:
     np.testing.assert_allclose(label.get_position_3d(), 1e3 * 0.5 * (first + last), atol=1e-9)
     assert axes.get_xlabel() == "x (mm)"
     assert len(axes.collections) == 2  # the base and the ridge
+
+
+def test_a_profile_shows_the_height_of_each_feature_where_it_is() -> None:
+    x = np.linspace(0.0, 4e-3, 400)
+    trace = Trace(x, np.column_stack([x, 0.0 * x, 2e-6 + 0.0 * x]), np.zeros(400, dtype=np.int64), 2e-6)
+    size = Interval(3e-7, 2e-7, 4e-7)
+    at = np.array([[1.5e-3, 0.0, 0.0]])
+    bump = Feature("bump", at, np.array([[0.0, 0.0, 1.0]]), size, Interval(2e-6, 1e-6, 3e-6), Interval(0, 0, 0),
+                  Support(9.0, 1), True, 1e-9)  # fmt: skip
+    axes = ObjectModel.attach(fit_base(trace), (bump,)).plot()
+    (label,) = axes.texts
+    assert label.get_text() == "bump-1" and label.xy == pytest.approx((1.5, 0.3))
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x (mm)", "height over the base (µm)")
 
 
 def test_a_feature_shows_each_size_with_its_interval() -> None:
