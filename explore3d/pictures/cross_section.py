@@ -108,7 +108,7 @@ def cross_section(
         curves[0],
         np.minimum(curves[1], curves[2]),
         np.maximum(curves[1], curves[2]),
-        *_body(feature, sweep, half, heading, estimate, base, trace.tip_radius, level),
+        *_body(feature, window[index], half, heading, estimate, base, trace.tip_radius, level),
         len(feature.axis) > 1,
     )
 
@@ -256,7 +256,7 @@ def _binned(x: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 def _body(
     feature: Feature,
-    sweep: int,
+    samples: IntArray,
     half: float,
     heading: FloatArray | None,
     estimate: Estimate | None,
@@ -266,13 +266,14 @@ def _body(
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """The estimated surface along the sweep: places, heights over the base's level, and where it was bridged.
 
-    What balls between this sweep and its neighbours would leave lies beside it, and is left out: it comes after all
-    that stems from samples.
+    Only that which stems from the section's own samples (N,), or lies between them: the same sweep may pass the feature
+    again, beyond its end. What balls between this sweep and its neighbours would leave lies beside it: it comes after
+    all that stems from samples.
     """
     if estimate is None:
         return np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool)
-    own = np.flatnonzero(estimate.sweep == sweep)
-    own = own[own <= np.flatnonzero(estimate.sample >= 0)[-1]]
+    felt = np.flatnonzero((estimate.sample >= samples.min()) & (estimate.sample <= samples.max()))
+    own = np.arange(felt[0], felt[-1] + 1) if len(felt) else felt
     near = np.linalg.norm(estimate.points[own] - nearest_on(estimate.points[own], feature.axis)[0], axis=1)
     own = own[near < 2.0 * SECTION_REACH * half]
     foot = base.foot(estimate.points[own], tip_radius)
