@@ -49,7 +49,8 @@ def section_heights(
     modes, nodes, corners = basis.shape[0], s.shape[1], across.shape[1]
     nearest, widest, sway = np.empty(bins), np.empty(bins), np.zeros((bins, modes))
     # balls over a plane that are felt as the tip is over the base, across the line and along it
-    beside, beyond_end = np.empty((bins, nodes)), np.empty((bins, nodes))
+    beside, beyond_end, longest = np.empty((bins, nodes)), np.empty((bins, nodes)), np.zeros(bins)
+    first, last = np.full(bins, np.inf), np.full(bins, -np.inf)
     runs, falls, flanks = np.empty(corners), np.empty(corners), np.empty(corners)
     for i in range(bins):
         nearest[i], lowest = np.inf, np.inf
@@ -57,6 +58,8 @@ def section_heights(
             nearest[i], lowest = min(nearest[i], abs(lateral[i, q])), min(lowest, bend[i, q])
             beside[i, q] = tip / max(1.0 + tip * bend[i, q], 1e-3)
             beyond_end[i, q] = tip / max(1.0 + tip * bend_along[i, q], 1e-3)
+            longest[i] = max(longest[i], beyond_end[i, q])
+            first[i], last[i] = min(first[i], s[i, q]), max(last[i], s[i, q])
             for m in range(modes):
                 sway[i, m] = max(sway[i, m], abs(basis[m, i, q]))
         widest[i] = tip / max(1.0 + tip * lowest, 1e-3)
@@ -67,6 +70,10 @@ def section_heights(
             runs[k], falls[k] = across[w, k + 1] - across[w, k], up[w, k] - up[w, k + 1]
             flanks[k] = np.sqrt(runs[k] * runs[k] + falls[k] * falls[k])
         for i in range(bins):
+            beyond = max(ends[w, 0] - last[i], first[i] - ends[w, 1])
+            if beyond > 0.0 and (beyond >= min(longest[i], tip) or beyond * beyond > least * longest[i]):
+                out[w, i] = 0.0
+                continue
             # a ball of radius R at x beside all corners stands x^2 / 2 R lower than on the crest, at least
             gap = nearest[i] - across[w, corners - 1]
             for m in range(modes):
