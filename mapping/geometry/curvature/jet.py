@@ -31,8 +31,8 @@ LOST_WEIGHT_SHARE = 0.1
 LARGE_MESH_POINTS = 20_000
 # Points to a leaf of the tree: searches for 547 neighbours take a fifth less time than with the default of 10
 LEAF_POINTS = 32
-# Neighbour indices held at once by one thread: keeps a million points under a gigabyte.
-CHUNK_VALUES = 4_000_000
+# Neighbours held at once by one thread, of 24 bytes each while they are sought: 12 MB
+CHUNK_VALUES = 500_000
 SMOOTHING = 24
 # Rings of faces whose area vectors tell where outside is: as many as those nearest points. With one ring 2.4 %, with
 # two 0.03 % and with three none of 10,000 vertices of a torus with noise of half an edge had normals that led astray.
