@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from explore3d.pictures.camera import Camera
 from explore3d.pictures.chart import FONT_SIZE, drawing, image, pixels_png, text_at
 from explore3d.pictures.object import SUPERSAMPLING, cameras_for, pictured, shifted, view_directions
 from explore3d.pictures.render import Body, Picture, render
@@ -16,6 +17,8 @@ from mapping.geometry.mesh import arclengths, directions, resample
 from mapping.model import feature_mesh
 
 if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
     from mapping.estimate.envelope import Estimate
     from mapping.geometry.curvature import Curvature
 
@@ -35,6 +38,8 @@ MAP_PIXELS = 2
 # Points that a value is read from: those of a ring about the nearest in a mesh of triangles, and of the ring about it
 # (6 and 12), less those that weigh nothing
 READ_FROM = 12
+# Places that are read at once: all 125,000 of a large picture took 120 MB, the most of a whole run
+READ_AT_ONCE = 16_384
 # What is felt around the corner, turned by more than 60 degrees, says nothing of a place
 LEAST_ALIKE = 0.5
 # A line's own values hold up to its reach, and fade to nothing at so many times it: the fits of curvature take in
@@ -80,20 +85,13 @@ def curvature_picture(
     sides = np.concatenate([base.face_normals, *(_sides(*each) for each in zip(bodies[1:], features, strict=True))])
     content, down, right = "", CURVATURE_TITLE, 0.0
     for camera in cameras_for(base.vertices[np.unique(base.faces)], directions):
-        picture = replace(render(bodies, camera), flat=sides)
         width, height = camera.width / SUPERSAMPLING, camera.height / SUPERSAMPLING
-        lit = picture.reduced(SUPERSAMPLING) / 255.0
-        for left, colours, name in zip(
-            (0.0, width),
-            _map_colours(picture, felt, lines, tip_radius, top),
-            ("larger, k₁", "smaller, k₂"),
-            strict=True,
-        ):
+        maps = _maps_seen(bodies, sides, camera, felt, lines, tip_radius, top)
+        for left, png, name in zip((0.0, width), maps, ("larger, k₁", "smaller, k₂"), strict=True):
             if not right:
                 title, size = f"Principal curvature, {name}", 1.1 * FONT_SIZE * SIDE_BY_SIDE
                 content += text_at(left + 4.0, 18.0 * SIDE_BY_SIDE, title, size=size, bold=True)
-            pixels = np.rint(255.0 * lit * colours[: lit.shape[0], : lit.shape[1]]).astype(np.uint8)
-            content += shifted(image(pixels_png(pixels), 0.0, 0.0, width, height), left, down)
+            content += shifted(image(png, 0.0, 0.0, width, height), left, down)
         down, right = down + height, max(right, 2.0 * width)
     bar = min(BAR[1], (down - CURVATURE_TITLE) / SIDE_BY_SIDE)
     marks = [f"{share * top:.2g}" for share in MARKS]
@@ -200,10 +198,30 @@ def _contradicted(faces: IntArray, sweep: IntArray, values: FloatArray) -> Float
     return np.sqrt(np.column_stack([np.bincount(ends, twice[:, i], len(values)) / count for i in (0, 1)]))
 
 
+def _maps_seen(
+    bodies: Sequence[Body],
+    sides: FloatArray,
+    camera: Camera,
+    felt: Felt,
+    lines: Sequence[Line],
+    tip_radius: float,
+    top: float,
+) -> list[bytes]:
+    """PNG of k1 and of k2 as a camera sees them: what is rendered, 28 bytes a sample, is let go of at once."""
+    picture = replace(render(bodies, camera), flat=sides)
+    lit = 255.0 * (picture.reduced(SUPERSAMPLING) / 255.0)
+    maps = []
+    for blocks in _map_colours(picture, felt, lines, tip_radius, top):
+        colours = blocks.repeat(MAP_PIXELS, axis=0).repeat(MAP_PIXELS, axis=1)[: lit.shape[0], : lit.shape[1]]
+        colours *= lit
+        maps.append(pixels_png(np.rint(colours, out=colours).astype(np.uint8)))
+    return maps
+
+
 def _map_colours(
     picture: Picture, felt: Felt, lines: Sequence[Line], tip_radius: float, top: float
-) -> tuple[FloatArray, FloatArray]:
-    """(H, W, 3) colours of k1 and of k2 for the pixels of the drawing, a block of MAP_PIXELS alike."""
+) -> Iterator[FloatArray]:
+    """(H, W, 3) colours of k1, then of k2, for the blocks of MAP_PIXELS pixels of the drawing each way."""
     places, normals, blocks = _seen(picture, SUPERSAMPLING * MAP_PIXELS)
     front = np.einsum("ij,ij->i", felt.normals, picture.camera.eye - felt.places) > 0.0  # walls are thin
     read, apart = _read(places, felt.places[front], felt.values[front], (normals, felt.normals[front]))
@@ -213,14 +231,12 @@ def _map_colours(
             own, _ = _read(beside / line.scale, line.beside, line.values)
             share = line.share(beside)[:, None]
             read[near] = share * own + (1.0 - share) * read[near]
-    maps = []
     for number in (0, 1):
         colours = coloured(0.5 + 0.5 * faded(read[:, number] / top, read[:, 2 + number] / top))
         colours[~(apart < tip_radius)] = NOT_VALID
         whole = np.ones((*blocks.shape, 3))
         whole[blocks] = colours
-        maps.append(whole.repeat(MAP_PIXELS, axis=0).repeat(MAP_PIXELS, axis=1))
-    return maps[0], maps[1]
+        yield whole
 
 
 def _seen(picture: Picture, block: int) -> tuple[FloatArray, FloatArray, BoolArray]:
@@ -256,7 +272,19 @@ def _read(
     count = min(READ_FROM, len(points))
     if count == 0:
         return np.zeros((len(places), 4)), np.full(len(places), np.inf)
-    apart, which = cKDTree(points).query(places, k=count)
+    tree, read, apart = cKDTree(points), np.empty((len(places), 4)), np.empty(len(places))
+    for first in range(0, len(places), READ_AT_ONCE):
+        part = slice(first, first + READ_AT_ONCE)
+        own = None if sides is None else (sides[0][part], sides[1])
+        read[part], apart[part] = _read_some(tree, count, places[part], values, own)
+    return read, apart
+
+
+def _read_some(
+    tree: cKDTree, count: int, places: FloatArray, values: FloatArray, sides: tuple[FloatArray, FloatArray] | None
+) -> tuple[FloatArray, FloatArray]:
+    """`_read` from so many points of a tree at once."""
+    apart, which = tree.query(places, k=count)
     apart, which = np.reshape(apart, (len(places), count)), np.reshape(which, (len(places), count))
     weights = (1.0 - (apart / np.maximum(apart[:, -1:], np.finfo(float).tiny)) ** 2) ** 2 + 1e-9
     nearest = apart[:, 0]
@@ -265,8 +293,9 @@ def _read(
         weights = weights * np.clip(facing, 0.0, 1.0)
         nearest = np.where(facing > LEAST_ALIKE, apart, np.inf).min(axis=1)
     weights = weights / np.maximum(weights.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-    mean = np.einsum("mk,mkj->mj", weights, values[which])
-    spread = np.einsum("mk,mkj->mj", weights, values[which][..., :2] ** 2) - mean[:, :2] ** 2
+    near = values[which]
+    mean = np.einsum("mk,mkj->mj", weights, near)
+    spread = np.einsum("mk,mkj->mj", weights, near[..., :2] ** 2) - mean[:, :2] ** 2
     sd = np.sqrt(np.maximum(spread, 0.0) + mean[:, 2:] ** 2)
     return np.column_stack([mean[:, :2], sd]), nearest
 

@@ -199,8 +199,9 @@ class _Path:
         rise, product, usable = block_bends(self.sums, self.up, size, stride, self.step, LEVEL_ENOUGH)
         if size == 1:
             self.levels = _levels(rise, np.finfo(float).eps * float(np.abs(self.sums).max()))
-        cells = np.arange(len(rise)) * stride * len(self.levels) // len(self)
-        self.scales.append(_Scale(size, stride, rise, product, usable, self.levels[cells]))
+        if self.scales:  # of smaller blocks no more is asked than whether a jump is among them
+            self.scales[-1].product, self.scales[-1].usable = np.zeros(0), np.zeros(0, dtype=bool)
+        self.scales.append(_Scale(size, stride, rise, product, usable, self.levels, len(self)))
 
     def told(self, radius: float, resolution: float) -> _Bends:
         """Bends of the largest blocks that noise cannot have made, nor a jump, and a ball of the radius hardly."""
@@ -240,21 +241,36 @@ class _Path:
             share = part.size / scale.size
             within = np.arange(3 * (scale.size - part.size) // part.stride + 1)
             inside = np.minimum((peaks * scale.stride // part.stride)[:, None] + within, len(part.rise) - 1)
-            rise = part.rise if share >= SHORTEST_JUMP_SHARE else part.rise - SURE_JUMP_SDS * part.sd
-            jumps |= rise[inside].max(axis=1) >= share * scale.rise[peaks]
+            rise = part.rise[inside]
+            if share < SHORTEST_JUMP_SHARE:
+                rise = rise - SURE_JUMP_SDS * part.sd_of(inside)
+            jumps |= rise.max(axis=1) >= share * scale.rise[peaks]
         return jumps
 
 
 @dataclass(eq=False)
 class _Scale:
-    """Bends of a sweep over blocks of so many samples; arrays as in `block_bends`, and the sd (K,) of the first, m."""
+    """Bends of a sweep of `count` samples over blocks of so many; arrays as in `block_bends`.
+
+    The standard deviation of the first is one of `levels` (L,), m: the sweep in so many equal parts.
+    """
 
     size: int
     stride: int
     rise: FloatArray
     product: FloatArray
     usable: BoolArray
-    sd: FloatArray
+    levels: FloatArray
+    count: int
+
+    def sd_of(self, k: IntArray) -> FloatArray:
+        """Standard deviations of the heights of bends, m."""
+        return np.asarray(self.levels[k * self.stride * len(self.levels) // self.count])
+
+    @property
+    def sd(self) -> FloatArray:
+        """Of all of them."""
+        return self.sd_of(np.arange(len(self.rise)))
 
     def middle(self, k: IntArray) -> IntArray:
         """Samples in the middle of bends."""
@@ -279,7 +295,7 @@ def _over_all_sizes(paths: list[_Path], radius: float, resolution: float) -> Ite
             return
         scatter = robust_scale(np.concatenate(scattered)[:: 1 + count // SCATTERED])
         for path in paths:
-            path.scales[-1].sd *= scatter
+            path.scales[-1].levels = scatter * path.scales[-1].levels
             if SHORTEST_JUMP_SHARE * size >= 1.0:
                 yield path.told(radius, resolution)
         size *= 2

@@ -19,23 +19,28 @@ LEAST_SQUARED_ERROR = 1e-28  # squared error of a curvature that is never underc
 @njit(cache=True)
 def _design(u, v, z, first, last, scale, degree, out):  # type: ignore[no-untyped-def]
     """Columns ordered by degree (so that one QR serves every degree) and the heights, in units of the scale."""
-    for i in range(first, last):
-        x, y, row = u[i] / scale, v[i] / scale, i - first
-        out[0, row] = 1.0
-        column = 1
-        for d in range(1, degree + 1):
-            for p in range(d):
-                out[column + p, row] = x * out[column - d + p, row]
-            out[column + d, row] = y * out[column - 1, row]
-            column += d + 1
-        out[MONOMIALS, row] = z[i] / scale
+    count = last - first
+    for i in range(count):
+        out[0, i] = 1.0
+        out[1, i] = u[first + i] / scale
+        out[2, i] = v[first + i] / scale
+        out[MONOMIALS, i] = z[first + i] / scale
+    column = 3
+    for d in range(2, degree + 1):
+        for p in range(d):
+            for i in range(count):
+                out[column + p, i] = out[1, i] * out[column - d + p, i]
+        for i in range(count):
+            out[column + d, i] = out[2, i] * out[column - 1, i]
+        column += d + 1
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
 def _absorb(triangle, rows, count, columns):  # type: ignore[no-untyped-def]
     """Fold new rows into R and the rotated heights by reflections that leave R's zeros alone.
 
-    Row j of either array holds column j of the least-squares problem, so that the inner loops run along memory.
+    Row j of either array holds column j of the least-squares problem, so that the inner loops run along memory. Four
+    columns at a time take part in a reflection: its own is then read once for all of them.
 
     Returns:
         sum of squares of the part of the new heights that no column explains.
@@ -49,20 +54,47 @@ def _absorb(triangle, rows, count, columns):  # type: ignore[no-untyped-def]
         norm = np.sqrt(norm + triangle[j, j] * triangle[j, j])
         alpha = -norm if triangle[j, j] > 0 else norm
         head = triangle[j, j] - alpha
-        for i in range(count):
-            rows[j, i] /= head
-        tau = -head / alpha
+        tau = -1.0 / (alpha * head)
         triangle[j, j] = alpha
-        for c in range(j + 1, MONOMIALS + 1):
-            if columns <= c < MONOMIALS:
-                continue
-            dot = triangle[c, j]
+        others = columns - j  # those behind j, and the heights, which stand for the one after the last
+        done = 0
+        while done + 4 <= others:
+            c = j + 1 + done
+            last = c + 3 if done + 4 < others else MONOMIALS
+            dot0, dot1, dot2, dot3 = 0.0, 0.0, 0.0, 0.0
             for i in range(count):
-                dot += rows[j, i] * rows[c, i]
-            dot *= tau
-            triangle[c, j] -= dot
+                own = rows[j, i]
+                dot0 += own * rows[c, i]
+                dot1 += own * rows[c + 1, i]
+                dot2 += own * rows[c + 2, i]
+                dot3 += own * rows[last, i]
+            dot0 = (dot0 + head * triangle[c, j]) * tau
+            dot1 = (dot1 + head * triangle[c + 1, j]) * tau
+            dot2 = (dot2 + head * triangle[c + 2, j]) * tau
+            dot3 = (dot3 + head * triangle[last, j]) * tau
+            triangle[c, j] -= dot0 * head
+            triangle[c + 1, j] -= dot1 * head
+            triangle[c + 2, j] -= dot2 * head
+            triangle[last, j] -= dot3 * head
             for i in range(count):
-                rows[c, i] -= dot * rows[j, i]
+                rows[c, i] -= dot0 * rows[j, i]
+            for i in range(count):
+                rows[c + 1, i] -= dot1 * rows[j, i]
+            for i in range(count):
+                rows[c + 2, i] -= dot2 * rows[j, i]
+            for i in range(count):
+                rows[last, i] -= dot3 * rows[j, i]
+            done += 4
+        while done < others:
+            c = j + 1 + done if done + 1 < others else MONOMIALS
+            dot0 = 0.0
+            for i in range(count):
+                dot0 += rows[j, i] * rows[c, i]
+            dot0 = (dot0 + head * triangle[c, j]) * tau
+            triangle[c, j] -= dot0 * head
+            for i in range(count):
+                rows[c, i] -= dot0 * rows[j, i]
+            done += 1
     rest = 0.0
     for i in range(count):
         rest += rows[MONOMIALS, i] * rows[MONOMIALS, i]
@@ -84,24 +116,36 @@ def _determined(triangle, columns, ratio):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _solve(triangle, columns, coefficients, row):  # type: ignore[no-untyped-def]
-    """Coefficients of the nested fit; returns the variance factor of its curvatures (squared Frobenius norm)."""
-    for j in range(columns - 1, -1, -1):
-        total = triangle[MONOMIALS, j]
-        for c in range(j + 1, columns):
-            total -= triangle[c, j] * coefficients[c]
-        coefficients[j] = total / triangle[j, j]
-    factor = 0.0
-    for target in range(3, 6):
-        square = 0.0
-        for j in range(target, columns):
-            total = 1.0 if j == target else 0.0
-            for c in range(target, j):
-                total -= triangle[j, c] * row[c]
-            row[j] = total / triangle[j, j]
-            square += row[j] * row[j]
-        factor += (2.0 if target == 4 else 4.0) * square
-    return factor
+def _solve(triangle, columns, coefficients):  # type: ignore[no-untyped-def]
+    """Coefficients of the nested fit."""
+    for j in range(columns):
+        coefficients[j] = triangle[MONOMIALS, j]
+    for c in range(columns - 1, -1, -1):
+        coefficients[c] /= triangle[c, c]
+        for j in range(c):
+            coefficients[j] -= triangle[c, j] * coefficients[c]
+
+
+@njit(cache=True)
+def _variances(triangle, columns, rows, factors):  # type: ignore[no-untyped-def]
+    """Variance factors of the curvatures (squared Frobenius norms) of all nested fits of at most so many columns.
+
+    Those of fewer columns are the first terms of those of more.
+    """
+    a, b, c, option = 0.0, 0.0, 0.0, 0
+    for j in range(3, columns):
+        r0, r1, r2 = 1.0 if j == 3 else 0.0, 1.0 if j == 4 else 0.0, 1.0 if j == 5 else 0.0
+        for k in range(3, j):
+            r0 -= triangle[j, k] * rows[0, k]
+            r1 -= triangle[j, k] * rows[1, k]
+            r2 -= triangle[j, k] * rows[2, k]
+        rows[0, j], rows[1, j], rows[2, j] = r0 / triangle[j, j], r1 / triangle[j, j], r2 / triangle[j, j]
+        a += rows[0, j] * rows[0, j]
+        b += rows[1, j] * rows[1, j]
+        c += rows[2, j] * rows[2, j]
+        if j + 1 == TERMS_OF_DEGREE[option]:
+            factors[option] = 4.0 * a + 2.0 * b + 4.0 * c
+            option += 1
 
 
 @njit(cache=True)
@@ -206,7 +250,7 @@ def fit_jets(points, normals, neighbours, chosen, bends, sizes, degree):  # type
     place = np.empty((3, widest))
     rows = np.empty((MONOMIALS + 1, widest))
     triangle = np.empty((MONOMIALS + 1, MONOMIALS))
-    coefficients, row = np.zeros(MONOMIALS), np.zeros(MONOMIALS)
+    coefficients, inverse, variances = np.zeros(MONOMIALS), np.zeros((3, MONOMIALS)), np.zeros(options)
     ends = np.zeros(len(sizes), dtype=np.int64)
     for m in range(count):
         e1, e2 = _frame(normals[chosen[m]])
@@ -223,7 +267,7 @@ def fit_jets(points, normals, neighbours, chosen, bends, sizes, degree):  # type
             reach = _reach(place, first, last, reach)
             _design(place[0], place[1], place[2], first, last, scale, degree, rows)
             rest += _absorb(triangle, rows, last - first, columns)
-            first, over, before = last, rest, columns
+            first, over, before, known = last, rest, columns, False
             for d in range(options - 1, -1, -1):
                 terms = TERMS_OF_DEGREE[d]
                 for j in range(terms, before):
@@ -233,7 +277,11 @@ def fit_jets(points, normals, neighbours, chosen, bends, sizes, degree):  # type
                     continue
                 if not _determined(triangle, terms, scale / np.sqrt(reach)):
                     continue
-                factors[m, s, d] = np.sqrt(_solve(triangle, terms, coefficients, row)) / (scale * scale)
+                if not known:
+                    _variances(triangle, terms, inverse, variances)
+                    known = True
+                factors[m, s, d] = np.sqrt(variances[d]) / (scale * scale)
+                _solve(triangle, terms, coefficients)
                 _weingarten(coefficients, scale, bends[m] * scale, operators[m, s, d])
                 slopes[m, s, d] = coefficients[1:3]
                 rests[m, s, d] = np.sqrt(over / (last - terms)) * scale

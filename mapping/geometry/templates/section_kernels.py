@@ -48,11 +48,18 @@ def section_heights(
     walkers, bins = out.shape
     modes, nodes, corners = basis.shape[0], s.shape[1], across.shape[1]
     nearest, widest, sway = np.empty(bins), np.empty(bins), np.zeros((bins, modes))
+    # balls over a plane that are felt as the tip is over the base, across the line and along it
+    beside, beyond_end, longest = np.empty((bins, nodes)), np.empty((bins, nodes)), np.zeros(bins)
+    first, last = np.full(bins, np.inf), np.full(bins, -np.inf)
     runs, falls, flanks = np.empty(corners), np.empty(corners), np.empty(corners)
     for i in range(bins):
         nearest[i], lowest = np.inf, np.inf
         for q in range(nodes):
             nearest[i], lowest = min(nearest[i], abs(lateral[i, q])), min(lowest, bend[i, q])
+            beside[i, q] = tip / max(1.0 + tip * bend[i, q], 1e-3)
+            beyond_end[i, q] = tip / max(1.0 + tip * bend_along[i, q], 1e-3)
+            longest[i] = max(longest[i], beyond_end[i, q])
+            first[i], last[i] = min(first[i], s[i, q]), max(last[i], s[i, q])
             for m in range(modes):
                 sway[i, m] = max(sway[i, m], abs(basis[m, i, q]))
         widest[i] = tip / max(1.0 + tip * lowest, 1e-3)
@@ -63,6 +70,10 @@ def section_heights(
             runs[k], falls[k] = across[w, k + 1] - across[w, k], up[w, k] - up[w, k + 1]
             flanks[k] = np.sqrt(runs[k] * runs[k] + falls[k] * falls[k])
         for i in range(bins):
+            beyond = max(ends[w, 0] - last[i], first[i] - ends[w, 1])
+            if beyond > 0.0 and (beyond >= min(longest[i], tip) or beyond * beyond > least * longest[i]):
+                out[w, i] = 0.0
+                continue
             # a ball of radius R at x beside all corners stands x^2 / 2 R lower than on the crest, at least
             gap = nearest[i] - across[w, corners - 1]
             for m in range(modes):
@@ -73,28 +84,32 @@ def section_heights(
             total = 0.0
             for q in range(nodes):
                 beyond = max(ends[w, 0] - s[i, q], s[i, q] - ends[w, 1])
-                circle, drop = tip, 0.0
+                ball, drop = beside[i, q], 0.0
                 if beyond > 0.0:
-                    ball = tip / max(1.0 + tip * bend_along[i, q], 1e-3)
-                    if beyond >= min(ball, tip) or beyond * beyond > least * ball:
+                    along = beyond_end[i, q]
+                    if beyond >= min(along, tip) or beyond * beyond > least * along:
                         continue
-                    drop = beyond * beyond / (ball + np.sqrt((ball - beyond) * (ball + beyond)))
+                    drop = beyond * beyond / (along + np.sqrt((along - beyond) * (along + beyond)))
                     circle = np.sqrt((tip - beyond) * (tip + beyond))
+                    ball = circle / max(1.0 + circle * bend[i, q], 1e-3)
                 aside = lateral[i, q]
                 for m in range(modes):
                     aside -= courses[w, m] * basis[m, i, q]
                 aside = abs(aside)
-                ball = circle / max(1.0 + circle * bend[i, q], 1e-3)
                 best = drop
                 if aside <= top:
                     best = max(best, crest)
                 for k in range(corners):
+                    if up[w, k] <= best:  # neither this corner nor what is below it holds the ball higher
+                        break
                     gap = abs(aside - across[w, k])
                     if gap < ball and gap * gap <= least * ball:
                         best = max(best, up[w, k] - gap * gap / (ball + np.sqrt((ball - gap) * (ball + gap))))
                     if k + 1 < corners:
                         run, fall, flank = runs[k], falls[k], flanks[k]
-                        if run > 0.0 and fall > 0.0:
+                        # most flanks are too steep to be touched: that is told without a division
+                        touched = (aside - across[w, k]) * flank >= (1.0 - BOUND_MARGIN) * ball * fall
+                        if run > 0.0 and fall > 0.0 and touched:
                             at = aside - ball * fall / flank - across[w, k]
                             if at >= 0.0 and at <= run:
                                 # R (run / flank - 1) without the difference of near numbers
