@@ -170,7 +170,7 @@ def _shares(
 ) -> dict[str, float]:
     """Area, reach, and the four shares."""
     tip = scene.tip.radius
-    survey = Survey(base=base, tip_radius=tip, smallest=scene.survey.smallest_feature, region=scene.model.part)
+    survey = Survey(base=base, tip_radius=tip, smallest=scene.survey.smallest_feature, **scene.model.asked)
     surface, reach = survey.surface, 0.55 * survey.pitch
     if surface is None:  # the body stands elsewhere than its mesh said
         nothing = {"swept": 0.0, "refused": 0.0, "unreachable": 0.0, "not_inspected": 1.0}

@@ -19,7 +19,7 @@ from explore3d.log import KIND, SURVEY, Stop, base_event
 from hw import FingerError, Move, Workspace
 from mapping import FloatArray, Trace
 from mapping.base import Base
-from mapping.geometry.mesh import clipped
+from mapping.geometry.mesh import asked_part
 from planners import Outcome, Plan, Spent, drive, within
 from planners.explore import Discover, Explore, Locate, SurveyCount
 from planners.paths import Limits, Ways, routed
@@ -27,6 +27,8 @@ from planners.paths import Limits, Ways, routed
 if TYPE_CHECKING:
     from explore3d.scene import Scene
 
+# An unknown body stands on something: where no side is named it is approached from above
+ABOVE = ("+z",)
 Execute = Callable[[Move], Trace]
 # Told the kind of an event, and its data
 Event = Callable[[str, dict[str, Any]], None]
@@ -155,7 +157,7 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
             high=np.array(model.region.high),
             tip_radius=tip,
             smallest=smallest,
-            sides=model.sides,
+            sides=model.sides or ABOVE,
             speed=speed,
             force=force,
         )
@@ -164,6 +166,7 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
             base=base,
             tip_radius=tip,
             smallest=smallest,
+            sides=model.facing,
             shift=model.shift,
             turn=model.turn,
             speed=speed,
@@ -174,7 +177,7 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
         tip_radius=tip,
         smallest=smallest,
         precision=scene.explore.precision,
-        region=model.part,
+        **model.asked,
         speed=speed,
         force=force,
         shortest_ridge=scene.survey.shortest_ridge,
@@ -189,15 +192,20 @@ def known_base(scene: Scene) -> Base | None:
     """The global model that the scene gives, None if it gives a region alone.
 
     Raises:
-        SceneError: a mesh that cannot be used, or none of its surface lies in the region.
+        SceneError: a mesh that cannot be used, or none of its surface lies in the region and faces one of the sides.
     """
     surface, part = scene.base_surface(), scene.model.part
     if surface is None:
         return None
-    if part is not None and clipped(surface, *part) is None:
+    if part is not None and asked_part(surface, part) is None:
         raise SceneError(
             f"{scene.path}: model.region: the mesh has no surface in it; found {_box_text(*part)}, possible is what "
             f"meets the mesh, {_box_text(*surface.bounds)}"
+        )
+    if asked_part(surface, **scene.model.asked) is None:
+        raise SceneError(
+            f"{scene.path}: model.sides: no face of the mesh that is to be explored lies within 60 degrees of one of "
+            f"them; found {', '.join(scene.model.sides or ())}; turn the mesh, or name other sides"
         )
     return Base(surface)
 
