@@ -17,7 +17,7 @@ from explore3d import SceneError
 from explore3d.analysis import Computing
 from explore3d.log import KIND, SURVEY, Stop, base_event
 from hw import FingerError, Move, Workspace
-from mapping import FloatArray, Trace
+from mapping import FloatArray, Trace, length_text
 from mapping.base import Base
 from mapping.geometry.mesh import asked_part
 from planners import Outcome, Plan, Spent, drive, within
@@ -145,7 +145,8 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
     """All that a scene says of exploring with a finger of that workspace.
 
     Raises:
-        SceneError: a mesh that cannot be read, a region without surface, or a speed that cannot be known.
+        SceneError: a mesh that cannot be read, a region without surface or too small for a sweep, or a speed that
+            cannot be known.
     """
     model, tip, smallest = scene.model, scene.tip.radius, scene.survey.smallest_feature
     speed, force = scene.sweep_speed, scene.survey.force
@@ -185,6 +186,11 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
         false_alarms_per_metre=scene.detection.false_alarms_per_metre,
         stated=scene.noise,
     )
+    if base is not None and model.part is not None and next(explore(base=base).survey.lines(), None) is None:
+        raise SceneError(
+            f"{scene.path}: model.region: no sweep fits into it: of its surface no line is as long as a tenth of the "
+            f"{length_text(explore(base=base).survey.pitch, 2)} between sweeps; found {_box_text(*model.part)}"
+        )
     return Explorer(base, discover, locate, explore, workspace, tip, scene.explore.time_budget)
 
 
