@@ -12,7 +12,7 @@ from mapping.base import Base, LaidTrace
 from mapping.detection import Detections, found_heights
 from mapping.estimate.envelope import Estimate
 from mapping.estimate.sweeps import EXTRAPOLATED, pitch
-from mapping.geometry.mesh import clipped
+from mapping.geometry.mesh import asked_part
 
 # Places that tell which of the surface was touched
 MOST_SURFACE_CELLS = 20_000
@@ -53,12 +53,14 @@ class Inspected:
         base: Base,
         detections: Detections,
         asked: float | None,
-        box: tuple[FloatArray, FloatArray] | None = None,
+        region: tuple[FloatArray, FloatArray] | None = None,
+        sides: FloatArray | None = None,
     ) -> Inspected:
         """What a trace inspected of a base, by the noise and the threshold of its detection.
 
         Args:
-            box: (low, high) corners (3,), m: what was to be inspected lies in it; all if None or empty.
+            region, sides: what was to be inspected lies in it, and faces one of them (see `asked_part`); all, if that
+                is nothing.
         """
         limit = detections.detection_limit
         if base.kind == "profile":  # a strip as wide as one likes: all of it lies under the one sweep
@@ -68,7 +70,7 @@ class Inspected:
         if not np.isfinite(limit):
             places = places[:0]
         found = found_heights(base.surface, places, trace.tip_radius, limit)
-        part = None if box is None else clipped(base.surface, *box)
+        part = asked_part(base.surface, region, sides)
         if part is not None and part is not base.surface:
             found = replace(found_heights(part, places, trace.tip_radius, limit), face=found.face)
         # what a fit added beyond the samples is no part of a body that was asked to be inspected

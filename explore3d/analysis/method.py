@@ -537,8 +537,8 @@ def roughness_taken(work: Work, share: Share) -> None:
 
 def inspected(work: Work, share: Share) -> None:
     """Which places are free of features, and above which height."""
-    box = None if work.scene is None else work.scene.model.part
-    work.inspected = Inspected.of(work.laid, work.base, work.detections, work.smallest_feature, box)
+    asked = {} if work.scene is None else work.scene.model.asked
+    work.inspected = Inspected.of(work.laid, work.base, work.detections, work.smallest_feature, **asked)
     work.account = SurfaceAccount.of_log(work.log, work.laid, work.base, work.scene)
 
 

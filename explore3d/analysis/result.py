@@ -130,3 +130,8 @@ class Analysis:
     roughness: Roughness | None = None
     standard_heights: tuple[StandardHeight, ...] = ()
     computing: Computing | None = None
+
+    @property
+    def refused(self) -> bool:
+        """True if nothing was looked for, since the model is wrong beyond repair."""
+        return self.deviation is not None and self.deviation.beyond_repair

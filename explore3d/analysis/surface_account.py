@@ -17,6 +17,7 @@ from explore3d.scene import Scene
 from mapping import BoolArray, FloatArray, Trace, length_text
 from mapping.base import Base, LaidTrace
 from mapping.detection import face_samples
+from mapping.geometry.mesh import faces_side
 from planners import Survey
 from planners.paths import Carrier, reachable, resampled
 
@@ -28,6 +29,11 @@ NEARLY_ALL = 0.995
 MOST_ACCOUNT_PLACES = 60_000
 # A sweep on the other side of a thin plate has not touched this one: opposite normals count as this many reaches apart
 OPPOSITE_APART = 1.0
+# Why a finger leaves the region
+OUT_OF_REGION = "what is found is followed to its ends, and ways lead round the body"
+# What lies no further outside of a region than so many tip radii was touched from inside: sweeps are pressed on its
+# border, and a ball that rolls over an edge there touches beside it
+REGION_BORDER = 0.1
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,9 @@ class SurfaceAccount:
         causes: (why, how many moves were refused for it), the most frequent first.
         shortest_ridge: m, where only lines of that length were asked for: then most of a surface need not be swept.
         is_plan: True if nothing was moved yet.
+        touched_beyond, ways_beyond: how far outside of the scene's region the ball touched, and went on its ways, m;
+            None without a region.
+        below: share of the area that faces down; 0 where the scene names the sides that are explored.
     """
 
     area: float
@@ -62,6 +71,9 @@ class SurfaceAccount:
     causes: tuple[tuple[str, int], ...]
     shortest_ridge: float | None = None
     is_plan: bool = False
+    touched_beyond: float | None = None
+    ways_beyond: float | None = None
+    below: float = 0.0
 
     @classmethod
     def of_log(cls, log: Log, trace: Trace, base: Base, scene: Scene | None) -> SurfaceAccount | None:
@@ -77,9 +89,11 @@ class SurfaceAccount:
             name: sum(_length(d) for d in made if (d["purpose"] == "sweep") is (name == "sweep")) for name in _KINDS
         }
         paths = [np.asarray(d["path"]) for d in refused if d.get("purpose") == "sweep"]
-        account = _shares(base, scene, LaidTrace.of(trace, base).touched(MOST_SURFACE_CELLS), paths)
+        touched = LaidTrace.of(trace, base).touched(MOST_SURFACE_CELLS)
+        ways = [np.asarray(d["path"]) for d in made if d["purpose"] != "sweep"]
         return cls(
-            **account,
+            **_shares(base, scene, touched, paths),
+            **_beyond(scene, touched[0], ways),
             swept_path=lengths["sweep"],
             other_path=lengths["other"],
             refused_path=sum(_length(d) for d in refused if d.get("purpose") == "sweep"),
@@ -108,6 +122,7 @@ class SurfaceAccount:
         feet = base.foot(np.concatenate(dense) if dense else np.zeros((0, 3)), scene.tip.radius)
         return cls(
             **_shares(base, scene, (feet.points, feet.normals), [move.path for move in refusals]),
+            **_beyond(scene, feet.points, [move.path for move in moves if move.purpose != "sweep"]),
             swept_path=sum(move.length for move in sweeps),
             other_path=sum(move.length for move in moves if move.purpose != "sweep"),
             refused_path=sum(move.length for move in refusals),
@@ -133,6 +148,7 @@ class SurfaceAccount:
         names = ["area", "swept", "refused", "unreachable", "not_inspected", "reach"]
         names += ["swept_path", "other_path", "refused_path", "moves"]
         causes = [{"why": why, "moves": count} for why, count in self.causes]
+        names += [] if self.touched_beyond is None else ["touched_beyond", "ways_beyond"]
         return {name: getattr(self, name) for name in names} | {"unswept": self.unswept, "causes": causes}
 
     def warning(self) -> str:
@@ -159,7 +175,26 @@ class SurfaceAccount:
         if refused:
             told = "; ".join(f"{why} ({count})" for why, count in self.causes[:3])
             sentence += f" {count_text(refused, 'move')} refused of {refused + self.moves}: {told}."
-        return sentence
+        if self.is_plan and self.below > 0.0:
+            sentence += f" It includes the underside, {100 * self.below:.0f} % of it; sides in [model] leaves that out."
+        return sentence + self._outside()
+
+    def _outside(self) -> str:
+        """How far the finger leaves the region, and why; "" without one."""
+        if self.touched_beyond is None or self.ways_beyond is None:
+            return ""
+        touched, ways = (length_text(far, 2) for far in (self.touched_beyond, self.ways_beyond))
+        if self.is_plan:
+            sweeps = (
+                f"Sweeps leave the region by up to {touched}" if self.touched_beyond else "Sweeps stay in the region"
+            )
+            between = f", ways between them leave it by up to {ways}" if self.ways_beyond else ""
+            return f" {sweeps}{between}; what is found is followed to its ends, out of it, too."
+        if not self.touched_beyond and not self.ways_beyond:
+            return " The finger stayed in the region."
+        felt = f"touched up to {touched}" if self.touched_beyond else "touched nothing"
+        between = f", and went up to {ways}" if self.ways_beyond else ""
+        return f" Outside of the region the finger {felt}{between}: {OUT_OF_REGION}."
 
 
 _KINDS = ("sweep", "other")
@@ -170,7 +205,7 @@ def _shares(
 ) -> dict[str, float]:
     """Area, reach, and the four shares."""
     tip = scene.tip.radius
-    survey = Survey(base=base, tip_radius=tip, smallest=scene.survey.smallest_feature, region=scene.model.part)
+    survey = Survey(base=base, tip_radius=tip, smallest=scene.survey.smallest_feature, **scene.model.asked)
     surface, reach = survey.surface, 0.55 * survey.pitch
     if surface is None:  # the body stands elsewhere than its mesh said
         nothing = {"swept": 0.0, "refused": 0.0, "unreachable": 0.0, "not_inspected": 1.0}
@@ -182,16 +217,42 @@ def _shares(
     swept = _near(points, normals, *touched, reach)
     feet = base.foot(np.concatenate([*refused, np.zeros((0, 3))]), tip)
     tried = _near(points, normals, feet.points, feet.normals, reach)
+    down = (
+        faces_side(normals, np.array([[0.0, 0.0, -1.0]]))
+        if scene.model.sides is None
+        else np.zeros(len(points), dtype=bool)
+    )
     can = np.ones(len(points), dtype=bool)
     rest = np.flatnonzero(~swept)
     can[rest] = reachable(points[rest], normals[rest], Carrier.of(base, tip))
-    parts = {"swept": swept, "refused": ~swept & can & tried, "unreachable": ~swept & ~can}
+    parts = {"below": down, "swept": swept, "refused": ~swept & can & tried, "unreachable": ~swept & ~can}
     total = max(float(weights.sum()), float(np.finfo(float).tiny))
     shares = {name: float(weights[mask].sum()) / total for name, mask in parts.items()}
+    whole = shares["swept"] + shares["refused"] + shares["unreachable"]
     return shares | {
         "area": float(weights.sum()),
         "reach": reach,
-        "not_inspected": max(0.0, 1.0 - sum(shares.values())),
+        "not_inspected": max(0.0, 1.0 - whole),
+    }
+
+
+def _beyond(scene: Scene, touched: FloatArray, ways: Sequence[FloatArray]) -> dict[str, Any]:
+    """How far outside of the region places (M, 3) were touched, and centres on ways (each (K, 3)) lay, m.
+
+    A ball that touches the region's border lies no further outside of it than its own radius.
+    """
+    part, tip = scene.model.part, scene.tip.radius
+    if part is None:
+        return {"touched_beyond": None, "ways_beyond": None}
+
+    def furthest(points: FloatArray, allowed: float) -> float:
+        outside = np.maximum(np.maximum(part[0] - points, points - part[1]), 0.0)
+        beyond = float(np.linalg.norm(outside, axis=1).max(initial=0.0)) - allowed
+        return beyond if beyond > REGION_BORDER * tip else 0.0
+
+    return {
+        "touched_beyond": furthest(touched, 0.0),
+        "ways_beyond": furthest(np.concatenate([*ways, np.zeros((0, 3))]), tip) if len(ways) else 0.0,
     }
 
 

@@ -9,6 +9,7 @@ import typer
 
 from explore3d import UserError
 from explore3d.cli.options import (
+    INCOMPLETE,
     Average,
     Columns,
     Force,
@@ -111,6 +112,8 @@ def analyze(
         print(told[0])
     for analysis in analyses:
         show(analysis, out, json)
+    if any(analysis.refused for analysis in analyses):
+        raise typer.Exit(INCOMPLETE)
 
 
 def roughness(

@@ -23,8 +23,9 @@ def emulate(
     units: Annotated[str, typer.Option(help="Unit of the mesh's coordinates.")] = "m",
     tip_radius: Annotated[str, typer.Option(help="Radius of the tip.")] = "10 mm",
     origin: Annotated[
-        str, typer.Option(metavar="X,Y,Z", help="Machine coordinates of the object's origin.")
-    ] = "-150 mm, -150 mm, -50 mm",
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="Machine coordinates of the object's origin; else those that init writes."),
+    ] = None,
     sensor: Annotated[str | None, typer.Option(help="Force sensor at the tip: optoforce or line.")] = None,
     stiffness: Annotated[float, typer.Option(help="Of the tip, N/m.")] = 1e4,
     pace: Annotated[float, typer.Option(help="Emulated seconds per second.")] = 1.0,
@@ -44,6 +45,7 @@ def emulate(
     from json import dumps
 
     from explore3d.jobs.machines import Emulation, serve
+    from explore3d.scene import MIDDLE_OF_TRAVEL
 
     if device != "grbl" or sensor not in (None, "optoforce", "line"):
         raise UserError(f"cannot emulate {device!r} with sensor {sensor!r}; possible: grbl, optoforce or line sensor")
@@ -53,7 +55,7 @@ def emulate(
         mesh=mesh,
         units=units,
         tip_radius=length("--tip-radius", tip_radius, positive=True),
-        origin=point("--origin", origin),
+        origin=point("--origin", ", ".join(MIDDLE_OF_TRAVEL) if origin is None else origin),
         sensor=sensor,
         stiffness=stiffness,
         pace=pace,

@@ -68,7 +68,7 @@ def run(
     if view is not None and not json:
         print("the view stays as long as a browser looks at it" if view.is_there else "the view has ended")
     short = analysis.account is not None and analysis.account.short
-    if short or (analysis.stopped is not None and analysis.stopped.incomplete):
+    if short or analysis.refused or (analysis.stopped is not None and analysis.stopped.incomplete):
         raise typer.Exit(INCOMPLETE)
 
 

@@ -17,9 +17,9 @@ from explore3d import SceneError
 from explore3d.analysis import Computing
 from explore3d.log import KIND, SURVEY, Stop, base_event
 from hw import FingerError, Move, Workspace
-from mapping import FloatArray, Trace
+from mapping import FloatArray, Trace, length_text
 from mapping.base import Base
-from mapping.geometry.mesh import clipped
+from mapping.geometry.mesh import asked_part
 from planners import Outcome, Plan, Spent, drive, within
 from planners.explore import Discover, Explore, Locate, SurveyCount
 from planners.paths import Limits, Ways, routed
@@ -27,6 +27,8 @@ from planners.paths import Limits, Ways, routed
 if TYPE_CHECKING:
     from explore3d.scene import Scene
 
+# An unknown body stands on something: where no side is named it is approached from above
+ABOVE = ("+z",)
 Execute = Callable[[Move], Trace]
 # Told the kind of an event, and its data
 Event = Callable[[str, dict[str, Any]], None]
@@ -143,7 +145,8 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
     """All that a scene says of exploring with a finger of that workspace.
 
     Raises:
-        SceneError: a mesh that cannot be read, a region without surface, or a speed that cannot be known.
+        SceneError: a mesh that cannot be read, a region without surface or too small for a sweep, or a speed that
+            cannot be known.
     """
     model, tip, smallest = scene.model, scene.tip.radius, scene.survey.smallest_feature
     speed, force = scene.sweep_speed, scene.survey.force
@@ -155,7 +158,7 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
             high=np.array(model.region.high),
             tip_radius=tip,
             smallest=smallest,
-            sides=model.sides,
+            sides=model.sides or ABOVE,
             speed=speed,
             force=force,
         )
@@ -164,6 +167,7 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
             base=base,
             tip_radius=tip,
             smallest=smallest,
+            sides=model.facing,
             shift=model.shift,
             turn=model.turn,
             speed=speed,
@@ -174,7 +178,7 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
         tip_radius=tip,
         smallest=smallest,
         precision=scene.explore.precision,
-        region=model.part,
+        **model.asked,
         speed=speed,
         force=force,
         shortest_ridge=scene.survey.shortest_ridge,
@@ -182,6 +186,11 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
         false_alarms_per_metre=scene.detection.false_alarms_per_metre,
         stated=scene.noise,
     )
+    if base is not None and model.part is not None and next(explore(base=base).survey.lines(), None) is None:
+        raise SceneError(
+            f"{scene.path}: model.region: no sweep fits into it: of its surface no line is as long as a tenth of the "
+            f"{length_text(explore(base=base).survey.pitch, 2)} between sweeps; found {_box_text(*model.part)}"
+        )
     return Explorer(base, discover, locate, explore, workspace, tip, scene.explore.time_budget)
 
 
@@ -189,15 +198,20 @@ def known_base(scene: Scene) -> Base | None:
     """The global model that the scene gives, None if it gives a region alone.
 
     Raises:
-        SceneError: a mesh that cannot be used, or none of its surface lies in the region.
+        SceneError: a mesh that cannot be used, or none of its surface lies in the region and faces one of the sides.
     """
     surface, part = scene.base_surface(), scene.model.part
     if surface is None:
         return None
-    if part is not None and clipped(surface, *part) is None:
+    if part is not None and asked_part(surface, part) is None:
         raise SceneError(
             f"{scene.path}: model.region: the mesh has no surface in it; found {_box_text(*part)}, possible is what "
             f"meets the mesh, {_box_text(*surface.bounds)}"
+        )
+    if asked_part(surface, **scene.model.asked) is None:
+        raise SceneError(
+            f"{scene.path}: model.sides: no face of the mesh that is to be explored lies within 60 degrees of one of "
+            f"them; found {', '.join(scene.model.sides or ())}; turn the mesh, or name other sides"
         )
     return Base(surface)
 

@@ -50,7 +50,7 @@ def summary(analysis: Analysis) -> list[str]:
     """One line on the whole, one a feature, and one on what would have been seen."""
     features = analysis.model.features
     finer = sum(feature.curvature_feature for feature in features)
-    refused = analysis.deviation is not None and analysis.deviation.beyond_repair
+    refused = analysis.refused
     looked = f"{count_text(len(features), 'feature')} found{swept_part(analysis)}"
     lines = ["no features were looked for" if refused else looked]
     account = analysis.account
@@ -217,7 +217,7 @@ def path_sentence(path: PathLedger) -> str:
 def limit_sentence(analysis: Analysis) -> str:
     """What would have been seen."""
     detections = analysis.detections
-    if analysis.deviation is not None and analysis.deviation.beyond_repair:
+    if analysis.refused:
         return "Nothing was looked for over this model, so nothing would have been seen."
     if not isfinite(detections.detection_limit):
         return "The trace is too short, or its samples too far apart, to say what would have been seen."

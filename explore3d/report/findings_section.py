@@ -59,7 +59,7 @@ def _when_and_who(analysis: Analysis) -> str:
 def found_sentence(analysis: Analysis) -> str:
     """What was found, and what a lone feature measures."""
     features = analysis.model.features
-    if analysis.deviation is not None and analysis.deviation.beyond_repair:
+    if analysis.refused:
         return limit_sentence(analysis)
     if not features:
         return f"Nothing was found that the base does not explain{swept_part(analysis)}. {limit_sentence(analysis)}"

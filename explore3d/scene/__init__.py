@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     )
     from explore3d.scene.machine import (
         EMULATOR as EMULATOR,
+        MIDDLE_OF_TRAVEL as MIDDLE_OF_TRAVEL,
         LineSensorTable as LineSensorTable,
         MachineTable as MachineTable,
         OptoForceTable as OptoForceTable,
@@ -68,7 +69,7 @@ _PUBLIC = {
         "SensorTable",
         "Setting",
     ),
-    "machine": ("EMULATOR", "LineSensorTable", "MachineTable", "OptoForceTable"),
+    "machine": ("EMULATOR", "MIDDLE_OF_TRAVEL", "LineSensorTable", "MachineTable", "OptoForceTable"),
     "mesh_files": ("load_mesh", "mesh_text"),
     "scene": ("Scene", "load_scene", "parse_scene", "recorded_scene"),
     "settings": ("AnalysisSettings",),

@@ -12,6 +12,8 @@ from hw.sensors import ForceSensor, LineSensor, OptoForce
 
 # The port that means: start the emulator beside the run
 EMULATOR = "emulator"
+# Machine coordinates of the object's origin, where none are known yet: in the middle of an emulated machine's travel
+MIDDLE_OF_TRAVEL = ("-150 mm", "-150 mm", "-60 mm")
 
 
 class MachineTable(Table):

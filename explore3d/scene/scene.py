@@ -79,11 +79,14 @@ class Region(Table):
         return self
 
 
+Side = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+
+
 class GlobalModel(Table):
     """What is known of the object beforehand: a mesh, whose file is in `units`, or merely a region.
 
-    With pose = "estimate" the object may stand off the mesh by up to `shift` (m) and `turn` (rad). An unknown object
-    is approached from the `sides` of the region.
+    With pose = "estimate" the object may stand off the mesh by up to `shift` (m) and `turn` (rad). Of a mesh all sides
+    are explored, or those that are named in `sides`; an unknown object is approached from them, or from above.
     """
 
     mesh: Path | None = None
@@ -92,13 +95,25 @@ class GlobalModel(Table):
     pose: Literal["given", "estimate"] = "given"
     shift: Length = 3e-3
     turn: Annotated[Angle, Field(gt=0)] = 0.035
-    sides: Annotated[tuple[Literal["+x", "-x", "+y", "-y", "+z", "-z"], ...], Field(min_length=1)] = ("+z",)
+    sides: Annotated[tuple[Side, ...], Field(min_length=1)] | None = None
 
     @model_validator(mode="after")
     def _mesh_or_region(self) -> GlobalModel:
         if self.mesh is None and self.region is None:
             raise ValueError("give mesh, region, or both; without a mesh the base is fitted to the survey")
         return self
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Which part of a mesh is to be explored: arguments of `asked_part`."""
+        return {"region": self.part, "sides": self.facing}
+
+    @property
+    def facing(self) -> FloatArray | None:
+        """(S, 3) outward directions of the sides of the mesh that are to be explored; None: all, or no mesh."""
+        if self.mesh is None or self.sides is None:
+            return None
+        return np.array([(1.0 if side[0] == "+" else -1.0) * np.eye(3)["xyz".index(side[1])] for side in self.sides])
 
     @property
     def part(self) -> tuple[FloatArray, FloatArray] | None:

@@ -11,6 +11,7 @@ from mapping.base.base import Base, Feet
 from mapping.base.cells import Cells
 from mapping.base.fit import fit_base
 from mapping.base.laid_trace import LaidTrace
+from mapping.geometry.mesh import FELT_SIDE_COSINE, faces_side
 from mapping.instrument import robust_scale
 
 MOST_EXTENT_CELLS = 4000
@@ -21,8 +22,6 @@ MOST_BORDER_SAMPLES = 2000
 MOST_FIT_PLACES = 1000
 # So far from a place where the finger felt nothing, or rolled off, the body is taken to go on, in tip radii
 EDGE_REACH = 0.5
-# Cosine of the angle to the side from which a face is felt, at most
-FELT_SIDE_COSINE = 0.5
 # A sweep that ends this deep (tip radii) below the base rolled off the body's edge
 ROLLED_OFF = 0.05
 # A ball that overlaps the base by so much (tip radii) would have felt it: half of what sweeps are pressed by
@@ -67,7 +66,7 @@ def touched_part(base: Base, trace: Trace, empty: FloatArray, box: FloatArray, s
     keep = touched[nearest]
     if not touched.all():
         keep &= cKDTree(places[~touched]).query(middle)[0] > EDGE_REACH * trace.tip_radius
-    keep &= (base.surface.face_normals @ sides.T > FELT_SIDE_COSINE).any(axis=1)
+    keep &= faces_side(base.surface.face_normals, sides)
     keep = keep & (middle >= box[0]).all(axis=1) & (middle <= box[1]).all(axis=1)
     if not keep.any():
         raise SurfaceError(

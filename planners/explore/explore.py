@@ -67,6 +67,7 @@ class Explore:
         speed, force: of the sweeps, m/s and N.
         shortest_ridge: distance between the ends of the shortest ridge to be found, m; None: bumps as well.
         region: (low, high) corners (3,) of the part to be inspected, m; None: all of the base.
+        sides: (S, 3) outward directions: what faces none of them is not inspected; None: all is.
         time_budget: finger time, s.
         path_budget: finger path, m.
         travel_speed: between sweeps, m/s; None: 25 tip radii per second.
@@ -83,6 +84,7 @@ class Explore:
     force: float = 1.0
     shortest_ridge: float | None = None
     region: tuple[FloatArray, FloatArray] | None = None
+    sides: FloatArray | None = None
     time_budget: float = np.inf
     path_budget: float = np.inf
     travel_speed: float | None = None
@@ -111,6 +113,7 @@ class Explore:
             force=self.force,
             shortest_ridge=self.shortest_ridge,
             region=self.region,
+            sides=self.sides,
         )
 
     @property

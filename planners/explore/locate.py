@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import Trace, TraceError, length_text
+from mapping import FloatArray, Trace, TraceError, length_text
 from mapping.base import Base, estimate_pose
 from planners import Outcome, Plan
 from planners.explore.warm_up import get_ready
@@ -26,6 +26,7 @@ class Locate:
         base: the model as given.
         tip_radius: m.
         smallest: height of the smallest feature to be found, m: of the survey.
+        sides: (S, 3) outward directions of the sides to be swept; None: all.
         shift, turn: how far the object may stand off its model, m and rad.
         speed, force: of the sweeps, m/s and N.
     """
@@ -33,6 +34,7 @@ class Locate:
     base: Base
     tip_radius: float
     smallest: float
+    sides: FloatArray | None = None
     shift: float = 3e-3
     turn: float = float(np.radians(2.0))
     speed: float = 0.03
@@ -42,7 +44,12 @@ class Locate:
         """The outcome's value is the Pose, or None if the object was not met or stands further off than allowed."""
         get_ready(self.tip_radius)
         survey = Survey(
-            base=self.base, tip_radius=self.tip_radius, smallest=self.smallest, speed=self.speed, force=self.force
+            base=self.base,
+            tip_radius=self.tip_radius,
+            smallest=self.smallest,
+            speed=self.speed,
+            force=self.force,
+            sides=self.sides,
         )
         moves = list(survey.sweeps())
         felt = []

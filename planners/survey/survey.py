@@ -12,7 +12,7 @@ from hw import Move
 from mapping import FloatArray, IntArray, Surface, length_text
 from mapping.base import Base
 from mapping.detection import Coverage, coverage
-from mapping.geometry.mesh import clipped
+from mapping.geometry.mesh import asked_part
 from planners import Outcome, Plan, PlannerError, executed
 from planners.paths import Carrier, Isoline, isolines, pressed_sweep, sound_parts, thinned, touched_points
 from planners.survey.charts import crease_charts
@@ -37,6 +37,7 @@ class Survey:
         speed, force: of the sweeps, m/s and N.
         shortest_ridge: distance between the ends of the shortest ridge to be found, m; None: bumps as well.
         region: (low, high) corners in m of the box whose part of the surface is inspected; everything if None.
+        sides: (S, 3) outward directions: what faces none of them is not inspected; None: all is.
         visible: share of the smallest feature's height that every sweep pair must leave visible.
         crossings: how often a straight ridge of the shortest span must be crossed.
     """
@@ -48,6 +49,7 @@ class Survey:
     force: float = 1.0
     shortest_ridge: float | None = None
     region: tuple[FloatArray, FloatArray] | None = None
+    sides: FloatArray | None = None
     visible: float = 0.35
     crossings: int = 1
 
@@ -70,8 +72,8 @@ class Survey:
 
     @cached_property
     def surface(self) -> Surface | None:
-        """What is to be inspected: the base's surface, or its part inside the region; None if there is none."""
-        return self.base.surface if self.region is None else clipped(self.base.surface, *self.region)
+        """What is to be inspected: the base's surface, or its part in the region and on the sides; None if none."""
+        return asked_part(self.base.surface, self.region, self.sides)
 
     def plan(self) -> Plan:
         """Yield every sweep; the outcome's value is the planned Coverage."""

@@ -35,6 +35,8 @@ USUAL_TIMES, USUAL_SHARE = 2.0, 0.75
 # By how much more than that share of them two sweeps that drift may be apart: of Gaussian levels one pair in 200,000 is
 DRIFTING_TIMES = 4.0
 TINY = float(np.finfo(float).tiny)
+# Files of meshes hold single precision: of a coordinate so large a share is rounding
+SINGLE = 2.0**-24
 # A sweep of fewer bins tells nothing of long wavelengths
 FEWEST_BINS = 3
 # Blocks whose middles are nearer than half of one have more than half of their path in common, and lie in one place;
@@ -60,7 +62,7 @@ class Blocks:
         edge: (B,) whether the height jumps there, however little.
         weight: (B,) what each counts, so that no place counts more than the usual one, however often it was passed: a
             finger that explores goes where the details are, and of the model it learns there no more than elsewhere.
-        noise: standard deviation of one block by the differences of neighbouring bins, m.
+        noise: standard deviation of one block by the differences of neighbouring bins, or a mesh's rounding, m.
     """
 
     points: FloatArray
@@ -85,9 +87,13 @@ class Blocks:
         apart = [length / (len(sweep.trace) - 1) for length, sweep in zip(lengths, sweeps, strict=True)]
         profiles = [p for sweep, step in zip(sweeps, apart, strict=True) for p in sweep.heights(max(spacing, step))]
         profiles = [p for p in profiles if len(p.height) >= FEWEST_BINS]
+        # of samples far apart a block takes as many as its length does: a longer one would be wider than a feature
+        each = [max(1, round(BINS_PER_BLOCK * spacing / p.spacing)) for p in profiles]
         curved = np.concatenate([np.zeros(0), *(np.diff(p.height, 2) for p in profiles)])
         sd = MAD_TO_SD * float(np.median(np.abs(curved))) / np.sqrt(6.0) if len(curved) else 0.0
-        parts = [_grouped(profile, number, sd, laid) for number, profile in enumerate(profiles)]
+        parts = [
+            _grouped(p, number, bins, sd, laid) for number, (p, bins) in enumerate(zip(profiles, each, strict=True))
+        ]
         if not parts:
             nothing = np.zeros(0)
             none = nothing.astype(np.int64)
@@ -98,12 +104,21 @@ class Blocks:
         own = {s.number: s for s in laid.laid_sweeps}
         felt = [(own[profile.sweep], part[4]) for profile, part in zip(profiles, parts, strict=True)]
         t = np.concatenate([np.interp(where, of.arclength, of.trace.t) for of, where in felt])
-        noise = sd / np.sqrt(BINS_PER_BLOCK)
+        noise = max(
+            sd / np.sqrt(float(np.median(np.array(each)[piece]))),
+            SINGLE * float(np.abs(laid.base.surface.vertices).max()),
+        )
         weight = _weights(points, normals, tip)
         return cls(points, normals, height, sweep, piece, place, t, steepness, edge, weight, noise)
 
     def __len__(self) -> int:
         return len(self.height)
+
+    @property
+    def step(self) -> float:
+        """Length of the usual block, m; 0 of a single one."""
+        along = np.diff(self.place)[np.diff(self.piece) == 0]
+        return float(np.median(along)) if len(along) else 0.0
 
     def apart(self, distance: float) -> BoolArray:
         """(B,) True for blocks further (m) from all that is steep: nearer, a height may be the skirt of a feature."""
@@ -156,15 +171,16 @@ class Blocks:
 
 
 def _grouped(
-    profile: SweepHeights, number: int, sd: float, laid: LaidTrace
+    profile: SweepHeights, number: int, bins: int, sd: float, laid: LaidTrace
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray, BoolArray]:
     """The blocks of one profile: points, normals, heights, its number, places, steepness, edges (see Blocks).
 
     Args:
+        bins: in a block.
         sd: noise of one bin, m.
     """
-    starts = np.arange(0, len(profile.height), BINS_PER_BLOCK)
-    if len(starts) > 1 and len(profile.height) - starts[-1] < FEWEST_BINS:
+    starts = np.arange(0, len(profile.height), bins)
+    if len(starts) > 1 and len(profile.height) - starts[-1] < min(FEWEST_BINS, bins):
         starts = starts[:-1]
     counts = np.diff(np.append(starts, len(profile.height)))
     middle = starts + counts // 2

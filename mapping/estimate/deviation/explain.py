@@ -21,7 +21,8 @@ from mapping.estimate.deviation.blocks import (
 from mapping.estimate.deviation.drift import Drift, SteadyDrift, drift
 from mapping.estimate.deviation.evidence import Fit, Whitened, best_fit, every_law, whitened
 from mapping.estimate.deviation.fields import RigidFrame, SmoothField, spread
-from mapping.estimate.deviation.parts import DEEP, parts_of, stands_off
+from mapping.estimate.deviation.on_details import unexplained
+from mapping.estimate.deviation.parts import DEEP, departure, parts_of
 from mapping.estimate.deviation.reshaped import fine_enough, reshaped
 from mapping.estimate.deviation.result import Deviation, Part
 from mapping.instrument import MAD_TO_SD
@@ -57,8 +58,8 @@ MOST_ROUNDS = 3
 ROBUST_ROUNDS, LEAST_ROBUST = 12, 0.3
 # Blocks that stand further off the best explanation, in robust standard deviations, do not speak for another
 FAR_OFF = 5.0
-# More of the felt surface than this that nothing explains: the model is another body's. A step across the body, which
-# is a fine feature, leaves less than a half of it off the rest.
+# More of the felt surface than this that nothing explains, details on it included: the model is another body's. A step
+# across the body, which is a fine feature, leaves less than a half of it off the rest.
 BEYOND_REPAIR = 0.5
 # A ball further off than its own diameter does not touch the place where it would stand: on which side of the body it
 # was and over which place, heights alone do not tell. A level so far off is named, and nothing is looked for; tip radii
@@ -156,9 +157,9 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
             break
         seen = Blocks.of(LaidTrace.of(trace, now))
         parts = parts_of(seen, seen.height, seen.smooth(seen.height), tip, missed)
-    if not found and not lines and not parts and not level:
-        return None
     deviation = _deviation(before, now, blocks, seen, found, lines, parts, tip)
+    if not found and not lines and not parts and not level and not deviation.beyond_repair:
+        return None
     if not level:
         return deviation
     return replace(
@@ -182,9 +183,12 @@ def _common_level(blocks: Blocks, base: Base, tip: float) -> tuple[float, float]
     bends enough, and one below the model as a part that is missing everywhere.
     """
     level = weighted_median(blocks.height, blocks.weight)
-    near = np.abs(blocks.height - level) <= min(0.5 * abs(level), FAR_OFF * EXPECTED_SHARE * tip)
+    within = min(0.5 * abs(level), FAR_OFF * EXPECTED_SHARE * tip)
+    near = np.abs(blocks.height - level) <= within
     together = blocks.weight[near].sum() > BEYOND_REPAIR * blocks.weight.sum()
     if abs(level) <= DEEP * tip or not together or near.sum() < FEWEST_BLOCKS:
+        return 0.0, 0.0
+    if unexplained(blocks, blocks.height, within, tip) <= BEYOND_REPAIR:  # details on the model have that level
         return 0.0, 0.0
     kept = _Kept.of(blocks, near, _rigid_columns(blocks, RigidFrame.of(base.surface)), tip)
     seen, none = kept.whitened(np.zeros((len(kept.height), 0))), np.zeros(0, dtype=np.int64)
@@ -506,7 +510,7 @@ def _deviation(
         if np.isfinite(part.height):
             heights[part.covers(now.surface.vertices)] += part.height
     keep = seen.smooth(seen.height)
-    unexplained = float(np.average(stands_off(seen.height, seen.noise, tip), weights=seen.weight))
+    left_over = unexplained(seen, seen.height, departure(seen.noise, tip), tip)
     middle = RigidFrame.of(before.surface).middle
     old, new = Pose.of(before), Pose.of(now)
     shift, turn = np.zeros(3), 0.0
@@ -533,8 +537,8 @@ def _deviation(
         left=MAD_TO_SD * float(np.median(np.abs(seen.height[keep]))),
         gain=(*(step.gain for step in found), *(own.gain for own in lines if isinstance(own, Drift)), 0.0)[0],
         heights=heights,
-        unexplained=unexplained,
-        beyond_repair=unexplained > BEYOND_REPAIR,
+        unexplained=left_over,
+        beyond_repair=left_over > BEYOND_REPAIR,
     )
 
 

@@ -6,13 +6,11 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray
 from mapping.base import Feet
-from mapping.estimate.deviation.blocks import BIN, BINS_PER_BLOCK, Blocks
+from mapping.estimate.deviation.blocks import Blocks
+from mapping.estimate.deviation.on_details import WIDE_PART, beside
 from mapping.estimate.deviation.result import Part
 from mapping.instrument import MAD_TO_SD
 
-# A stretch of a sweep that stands off over so many tip radii is wide: the ball goes into it, or onto it, as a whole,
-# which it does with no fine feature
-WIDE_PART = 2.0
 # It stands off by more than so many standard deviations of the rest, and by so much of a tip radius
 STANDS_OFF, LEAST_PART = 6.0, 0.02
 # Places where nothing was felt are a tip radius from all that was: when they are so many apart, the hole is wide
@@ -46,7 +44,7 @@ def parts_of(blocks: Blocks, height: FloatArray, rest: BoolArray, tip: float, mi
 
     quiet = height[rest] if rest.any() else height
     sd = max(MAD_TO_SD * float(np.median(np.abs(quiet - np.median(quiet)))), blocks.noise)
-    off = stands_off(height, sd, tip)
+    off = np.abs(height) > departure(sd, tip)
     deep = height < -DEEP * tip
     counts = deep | _in_wide_runs(blocks, height, off, tip)
     index = np.flatnonzero(counts)
@@ -69,17 +67,21 @@ def parts_of(blocks: Blocks, height: FloatArray, rest: BoolArray, tip: float, mi
         if np.mean(joined[size > 0.5 * size.max()]) > JOINED or (level and np.mean(sure[own]) < MOSTLY):
             continue
         empty = missed.points[own[len(index) :]]
-        if _spans(empty, MISSED_SPAN * tip) or _is_wide(points[own], normals[own], blocks, off, tip):
+        # what the ball stands off beside what stands out is no width of it, along sweeps or across them
+        top = max(float(heights[own].max()), 0.0)
+        upper = own & (heights >= 0.5 * top) if top else own
+        narrower = 2.0 * float(beside(np.array(0.5 * top), tip))
+        if _spans(empty, MISSED_SPAN * tip) or _is_wide(points[upper], normals[upper], narrower, blocks, off, tip):
             here = height[index[own[: len(index)]]]
             largest = here[np.abs(here).argmax()] if len(here) else np.nan
-            path = int((own[: len(index)]).sum()) * BINS_PER_BLOCK * BIN * tip
+            path = int((own[: len(index)]).sum()) * blocks.step
             found.append(Part(points[own], AROUND_PART * tip, float(largest), path))
     return tuple(found)
 
 
-def stands_off(height: FloatArray, sd: float, tip: float) -> BoolArray:
-    """(N,) True for heights that neither noise of a standard deviation (m) nor a smooth remainder explains."""
-    return np.asarray(np.abs(height) > max(STANDS_OFF * sd, LEAST_PART * tip))
+def departure(sd: float, tip: float) -> float:
+    """The least height, m, that neither noise of a standard deviation (m) nor a smooth remainder explains."""
+    return max(STANDS_OFF * sd, LEAST_PART * tip)
 
 
 def _spans(points: FloatArray, length: float) -> bool:
@@ -89,11 +91,7 @@ def _spans(points: FloatArray, length: float) -> bool:
 
 def _in_wide_runs(blocks: Blocks, height: FloatArray, off: BoolArray, tip: float) -> BoolArray:
     """(B,) True for blocks of stretches that stand off to one side all along, and are wide: hollows as a whole, what
-    stands out at half its height.
-
-    A ball of radius r stands off beside what is t high, by sqrt(2 r t - t^2) to either side: that is no width of it.
-    """
-    step = float(np.median(np.diff(blocks.place)[np.diff(blocks.piece) == 0], axis=0)) if len(blocks) > 1 else 0.0
+    stands out at half its height."""
     state = np.where(off, np.sign(height), 0.0)
     new = np.flatnonzero((np.diff(state, prepend=np.nan) != 0) | (np.diff(blocks.piece, prepend=-1) != 0))
     lengths = np.diff(np.append(new, len(blocks)))
@@ -101,19 +99,25 @@ def _in_wide_runs(blocks: Blocks, height: FloatArray, off: BoolArray, tip: float
         return off
     top = np.maximum.reduceat(height, new)
     upper = np.add.reduceat((height >= 0.5 * np.repeat(top, lengths)).astype(np.int64), new)
-    half = np.clip(0.5 * top, 0.0, tip)
-    beside = 2.0 * np.sqrt(2.0 * tip * half - half**2)
-    wide = np.where(top > 0, upper * step - beside, lengths * step) >= WIDE_PART * tip
+    wide = (
+        np.where(top > 0, upper * blocks.step - 2.0 * beside(0.5 * top, tip), lengths * blocks.step) >= WIDE_PART * tip
+    )
     return np.asarray(np.repeat(wide, lengths) & off)
 
 
-def _is_wide(points: FloatArray, normals: FloatArray, blocks: Blocks, off: BoolArray, tip: float) -> bool:
-    """True for places (N, 3) that are wide in both directions, and filled."""
+def _is_wide(
+    points: FloatArray, normals: FloatArray, narrower: float, blocks: Blocks, off: BoolArray, tip: float
+) -> bool:
+    """True for places (N, 3) that are wide in both directions and filled.
+
+    Args:
+        narrower: what the ball stands off beside them, and is no width of theirs, m.
+    """
     middle = points.mean(axis=0)
     if len(points) < 3:
         return False
     across = np.linalg.svd(points - middle, full_matrices=False)[2][1]
-    width = float(np.ptp((points - middle) @ across)) + BINS_PER_BLOCK * BIN * tip
+    width = float(np.ptp((points - middle) @ across)) - narrower  # or wider, by less than a block
     if width < WIDE_PART * tip:
         return False
     near = np.linalg.norm(blocks.points - middle, axis=1) < 0.5 * width

@@ -72,7 +72,7 @@ class Deviation:
         left: of what remains of them, m.
         gain: logarithm of how much more probable the heights are than without a deviation.
         heights: (V,) departure at each vertex of `base`, m, positive where the body stands out of its model.
-        unexplained: share of the felt surface that stands off the corrected model, parts included.
+        unexplained: share of the felt surface that stands off the corrected model, and not on details that stand on it.
         beyond_repair: whether nothing can be looked for; `offset` is then by how much it lies off, not corrected.
         facing: (3,) unit direction that the felt side of the model faces, where an offset of a quarter of a tip radius
             or more was named; zeros else, and where it faces many.

@@ -8,7 +8,12 @@ if TYPE_CHECKING:
     from mapping.geometry.mesh.atomic_write import write_whole as write_whole
     from mapping.geometry.mesh.borrowing_kernels import borrowing as borrowing, inlined as inlined
     from mapping.geometry.mesh.bvh_kernels import STACK as STACK, WIDTH as WIDTH, push_lanes as push_lanes
-    from mapping.geometry.mesh.clip import clipped as clipped
+    from mapping.geometry.mesh.clip import (
+        FELT_SIDE_COSINE as FELT_SIDE_COSINE,
+        asked_part as asked_part,
+        clipped as clipped,
+        faces_side as faces_side,
+    )
     from mapping.geometry.mesh.nearest import MovedNearestPoint as MovedNearestPoint, NearestPoint as NearestPoint
     from mapping.geometry.mesh.open3d_import import open3d as open3d
     from mapping.geometry.mesh.polyline import (
@@ -52,7 +57,7 @@ _PUBLIC = {
     "atomic_write": ("write_whole",),
     "borrowing_kernels": ("borrowing", "inlined"),
     "bvh_kernels": ("STACK", "WIDTH", "push_lanes"),
-    "clip": ("clipped",),
+    "clip": ("FELT_SIDE_COSINE", "asked_part", "clipped", "faces_side"),
     "nearest": ("MovedNearestPoint", "NearestPoint"),
     "open3d_import": ("open3d",),
     "polyline": ("arclengths", "directions", "distances", "middle", "nearest_on", "resample"),

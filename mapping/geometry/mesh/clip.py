@@ -1,14 +1,37 @@
-"""Clip: the part of a mesh inside a box, its triangles cut by the box's planes."""
+"""Clip: the part of a mesh inside a box, its triangles cut by the box's planes, and what of it faces some sides."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from mapping import FloatArray, IntArray, Surface
+from mapping import BoolArray, FloatArray, IntArray, Surface
 
 # A mesh file may hold 32-bit numbers: so near to a plane of the box (share of the greatest coordinate) a corner lies on
 # it, and a face that was drawn in that plane belongs to the part
 ON_PLANE = float(np.finfo(np.float32).eps)
+# Cosine of the angle to the side from which a face is felt, at least: 60 degrees
+FELT_SIDE_COSINE = 0.5
+
+
+def asked_part(
+    surface: Surface, region: tuple[FloatArray, FloatArray] | None = None, sides: FloatArray | None = None
+) -> Surface | None:
+    """The part of a mesh that is to be explored; None if there is none.
+
+    Args:
+        surface: the whole mesh.
+        region: (low, high) corners (3,) of the box that it lies in, m; None: everywhere.
+        sides: (S, 3) outward directions, one of which every face of it faces; None: all.
+    """
+    part = surface if region is None else clipped(surface, *region)
+    if part is None or sides is None or (keep := faces_side(part.face_normals, sides)).all():
+        return part
+    return _of_faces(part, keep) if keep.any() else None
+
+
+def faces_side(normals: FloatArray, sides: FloatArray) -> BoolArray:
+    """(F,) True for unit normals (F, 3) within 60 degrees of one of the directions (S, 3)."""
+    return np.asarray((normals @ sides.T > FELT_SIDE_COSINE).any(axis=1))
 
 
 def clipped(surface: Surface, low: FloatArray, high: FloatArray) -> Surface | None:
@@ -34,10 +57,19 @@ def clipped(surface: Surface, low: FloatArray, high: FloatArray) -> Surface | No
         return None
     if len(vertices) == len(surface.vertices) and len(faces) == len(surface.faces):
         return surface  # each cut adds vertices
+    # a sliver's own corners tell its normal badly
+    return _made(vertices, faces, surface.face_normals[parent])
+
+
+def _of_faces(surface: Surface, keep: BoolArray) -> Surface:
+    return _made(surface.vertices, surface.faces[keep], surface.face_normals[keep])
+
+
+def _made(vertices: FloatArray, faces: IntArray, normals: FloatArray) -> Surface:
+    """The mesh of these faces, whose normals are known, without the vertices that none uses."""
     used, corners = np.unique(faces, return_inverse=True)
     part = Surface(vertices[used], corners.reshape(-1, 3))
-    # a sliver's own corners tell its normal badly
-    part.__dict__["face_normals"] = surface.face_normals[parent]
+    part.__dict__["face_normals"] = normals
     return part
 
 

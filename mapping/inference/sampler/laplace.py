@@ -99,6 +99,10 @@ def _descend(target: LogPosterior, start: FloatArray, iterations: int) -> FloatA
     cost = float(residual @ residual)
     for _ in range(iterations):
         scaled = jacobian * scale
+        outwards = scaled.T @ residual
+        # What lies at its bound and would go beyond stays there: a step with it, clipped, is none that the others would
+        # take, and leaves them to crawl (projected Newton: Bertsekas, SIAM J. Control Optim. 20, 1982)
+        scaled = scaled * ~(((theta <= low) & (outwards > 0.0)) | ((theta >= high) & (outwards < 0.0)))
         gradient, hessian = scaled.T @ residual, scaled.T @ scaled
         # Several dampings are tried at once: a batch of templates costs little more than one.
         dampings = damping * np.array([1e-2, 1.0, 1e2, 1e4])

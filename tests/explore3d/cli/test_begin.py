@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 import trimesh
 from in_process import explore3d_main
@@ -65,9 +64,26 @@ def test_a_machine_is_given_what_it_touches_from_above(tmp_path: Path) -> None:
     path = begin_scene(tmp_path / "mine", tmp_path / "part.stl", "mm", "3 mm", "grbl")
     model = load_scene(path).base_surface()
     assert model is not None
-    np.testing.assert_allclose(model.bounds, [[-0.03, -0.02, 0.004], [0.03, 0.02, 0.004]], atol=1e-9)
-    assert load_scene(path).object_surface().bounds[0, 2] == pytest.approx(-0.004)  # the emulated one is whole
-    assert {tuple(each.approach[0]) for each in plan_scene(path).moves if each.purpose == "sweep"} == {(0.0, 0.0, -1.0)}
+    assert model.bounds[0, 2] == pytest.approx(-0.004)  # ways lead round the whole of it
+    plan = plan_scene(path)
+    assert {tuple(each.approach[0]) for each in plan.moves if each.purpose == "sweep"} == {(0.0, 0.0, -1.0)}
+    assert plan.account is not None
+    assert plan.account.area == pytest.approx(0.06 * 0.04)
+
+
+@pytest.mark.parametrize("radius", [1, 3])
+def test_a_peck_s_way_leads_over_an_inner_corner(radius: int, tmp_path: Path) -> None:
+    outline = [(0, 0), (60, 0), (60, 6), (6, 6), (6, 50), (0, 50)]
+    corners = [(x, y, z) for y in (0, 40) for x, z in outline]
+    ends = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)]
+    faces = [*ends, *((c + 6, b + 6, a + 6) for a, b, c in ends)]
+    faces += [each for i in range(6) for j in [(i + 1) % 6] for each in ((j, i, i + 6), (j, i + 6, j + 6))]
+    trimesh.Trimesh(corners, faces, process=False).export(tmp_path / "bracket.stl")
+    path = begin_scene(tmp_path / "mine", tmp_path / "bracket.stl", "mm", f"{radius} mm", "grbl")
+    plan = plan_scene(path)
+    assert not plan.violations
+    assert plan.account is not None
+    assert plan.account.not_inspected < 0.01
 
 
 def test_a_body_that_no_machine_can_touch_from_above_is_refused(tmp_path: Path) -> None:

@@ -94,7 +94,7 @@ def others(value: Any, info: FieldInfo) -> list[Any]:
         wanted = str(info.annotation)
         if "Path" in wanted:
             return [str(MESHES / "flat.ply")]
-        return [[-0.3, -0.3, -0.3]] if "tuple" in wanted else [0.003]
+        return ([[choice] for choice in allowed] or [[-0.3, -0.3, -0.3]]) if "tuple" in wanted else [0.003]
     if isinstance(value, bool):
         return [not value]
     if isinstance(value, int | float):

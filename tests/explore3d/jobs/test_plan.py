@@ -109,6 +109,57 @@ def test_a_region_without_surface_is_refused_before_anything_moves(tmp_path: Pat
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("pose", ["given", "estimate"])
+def test_a_region_too_small_for_a_sweep_is_refused_before_anything_moves(pose: str, tmp_path: Path) -> None:
+    scene = block_scene(tmp_path, 2.0, 4.0)
+    small = (
+        scene.read_text().replace("14 mm", "3 mm").replace('high = ["17 mm", "4 mm",', 'high = ["3.01 mm", "-3.99 mm",')
+    )
+    scene.write_text(small.replace('units = "mm"\nregion', f'units = "mm"\npose = "{pose}"\nregion'))
+    with pytest.raises(SceneError, match=r"model.region: no sweep fits into it.*0\.72 mm between sweeps"):
+        run(scene, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_how_far_the_finger_leaves_its_region_is_told(tmp_path: Path) -> None:
+    scene = block_scene(tmp_path, 2.0, 4.0)
+    told = plan_scene(scene).account
+    assert told is not None
+    assert told.touched_beyond == 0.0
+    assert "Sweeps stay in the region; what is found is followed to its ends, out of it, too." in told.sentence()
+    scene.write_text(scene.read_text().replace('units = "mm"\nregion', 'units = "mm"\npose = "estimate"\nregion'))
+    away = plan_scene(scene).account
+    assert away is not None
+    assert away.touched_beyond is not None
+    assert 30e-3 < away.touched_beyond < 60e-3  # to the block's far end, and to its underside
+    assert "Sweeps leave the region by up to" in away.sentence()
+
+
+def test_the_underside_is_told_and_left_out_where_the_scene_names_sides(tmp_path: Path) -> None:
+    text = block_scene(tmp_path, 2.0, 4.0).read_text()
+    whole, above = tmp_path / "whole.toml", tmp_path / "above.toml"
+    without = "\n".join(line for line in text.splitlines() if not line.startswith("region")).replace(
+        '"0.1 mm"', '"0.4 mm"'
+    )
+    whole.write_text(without)
+    above.write_text(without.replace("[model]", '[model]\nsides = ["+z"]'))
+    area = 2 * (60 * 40 + 60 * 6 + 40 * 6) * 1e-6
+    both = [plan_scene(path).account for path in (whole, above)]
+    assert both[0] is not None and both[1] is not None
+    assert both[0].area == pytest.approx(area)
+    assert both[0].below == pytest.approx(60 * 40e-6 / area, abs=0.01)
+    assert "It includes the underside, 40 % of it" in both[0].sentence()
+    assert both[1].area == pytest.approx(60 * 40e-6)
+    assert "underside" not in both[1].sentence()
+
+
+def test_sides_that_no_face_looks_to_are_refused(tmp_path: Path) -> None:
+    scene = block_scene(tmp_path, 2.0, 4.0)
+    scene.write_text(scene.read_text().replace("[model]", '[model]\nsides = ["-x"]'))
+    with pytest.raises(SceneError, match="sides: no face of the mesh that is to be explored lies within 60 degrees"):
+        plan_scene(scene)
+
+
 @pytest.mark.parametrize(
     ("changes", "speed"),
     [

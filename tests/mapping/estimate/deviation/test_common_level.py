@@ -41,8 +41,8 @@ def probed(rib: float = RIB_HEIGHT, seed: int = 41) -> Trace:
 
 def test_samples_wider_apart_than_bins_have_their_noise() -> None:
     blocks = Blocks.of(LaidTrace.of(probed(rib=0.0), plate()))
-    # five samples in a block, two thousandths of a tip radius each
-    assert blocks.noise == pytest.approx(NOISE / np.sqrt(5.0), rel=0.15)
+    # two samples in a block of half a tip radius, two thousandths of one each
+    assert blocks.noise == pytest.approx(NOISE / np.sqrt(2.0), rel=0.15)
     assert blocks.smooth(blocks.height).mean() > 0.9
 
 
