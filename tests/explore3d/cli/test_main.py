@@ -185,7 +185,7 @@ def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatc
     options = ["--tip-radius", "2 um", "--units", "mm", "--columns", "x=1, z=2", "--frame", "0 mm, 1 mm,5 mm"]
     options += ["--pixel", "1 um", "--part", "/tip", "--average", "20", "--same-object"]
     options += ["--tip-sd", "20 nm", "--form", "line", "--mask", "1mm..2mm"]
-    options += ["--model", "body.ply", "--model-units", "mm", "--force", "curvature"]
+    options += ["--model", "body.ply", "--model-units", "mm", "--force", "curvature", "--tolerances", "drawing.toml"]
     assert explore3d_main(monkeypatch, "analyze", "a.csv", "b.mcap", "--out", tmp_path, *options) == 0
     ((given, named),) = calls
     assert given == ([Path("a.csv"), Path("b.mcap")], tmp_path)
@@ -197,6 +197,7 @@ def test_the_options_of_analyze_reach_the_library(monkeypatch: pytest.MonkeyPatc
         "columns": "x=1, z=2",
         "pixel": "1 um",
         "part": "/tip",
+        "tolerances": Path("drawing.toml"),
         "average": 20,
         "tip_sd": "20 nm",
         "form": "line",
