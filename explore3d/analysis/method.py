@@ -229,7 +229,9 @@ def _was_found(base: Base) -> bool:
 def why_no_pose(work: Work) -> str:
     """Without a scene nothing says how far off the object may stand; a base that was felt stands where it was felt."""
     estimated = work.scene is not None and work.scene.model.pose == "estimate"
-    return "" if estimated else "the model's pose was given"
+    if estimated:
+        return ""
+    return "the model's pose was given" if work.given is not None else "the base stands where it was felt"
 
 
 def placed(work: Work, share: Share) -> None:

@@ -95,6 +95,8 @@ def batch(
     told_of = [f"{number} {status}" for status, number in result.statuses.most_common()]
     known = f"{result.known} were in the store" if result.known else ""
     print(f"{count_text(result.logs, 'log')}: {', '.join([*told_of, *([known] if known else [])])}")
+    if result.verdicts:
+        print(f"tolerances: {', '.join(f'{number} {verdict}' for verdict, number in result.verdicts.most_common())}")
     for log, status, reason in result.failures[:MOST_LISTED_FAILURES]:
         print(f"  {log}: {status}: {reason}")
     if len(result.failures) > MOST_LISTED_FAILURES:

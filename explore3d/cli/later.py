@@ -147,6 +147,8 @@ def _lines(found: Compared, least: float) -> list[str]:
         if change.kind == "shrunk":
             amount = Interval(-amount.median, -amount.high, -amount.low)
         name = change.first or change.second
+        if change.first and change.second:
+            name += f" ({change.second} of the second scan)"
         lines.append(f"  {change.kind}: {name}, {MEASURES[change.kind]} {amount}, probability {change.probability:.3f}")
     if len(likely) > MOST_LISTED_CHANGES:
         lines.append(f"  and {len(likely) - MOST_LISTED_CHANGES} more, see --json")

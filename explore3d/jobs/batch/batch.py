@@ -51,23 +51,32 @@ class Batch:
         known: of them, in the store already.
         statuses: how many of the others ended how.
         failures: (log, status, reason) of those without a result.
+        verdicts: of how many logs, those in the store already included, the tolerances are kept, broken, undecided.
     """
 
     logs: int
     known: int = 0
     statuses: Counter[str] = field(default_factory=Counter)
     failures: list[tuple[str, str, str]] = field(default_factory=list)
+    verdicts: Counter[str] = field(default_factory=Counter)
 
     def record(self) -> dict[str, Any]:
         """The same in JSON's types."""
         failures = [dict(zip(("log", "status", "reason"), each, strict=True)) for each in self.failures]
-        return {"logs": self.logs, "known": self.known, "statuses": dict(self.statuses), "failures": failures}
+        counts = {"statuses": dict(self.statuses), "verdicts": dict(self.verdicts)}
+        return {"logs": self.logs, "known": self.known, **counts, "failures": failures}
 
     def note(self, row: dict[str, Any]) -> None:
         """Count a run's row."""
         self.statuses[row["status"]] += 1
+        self.judge(row["tolerances"])
         if row["status"] != "done":
             self.failures.append((row["log"], row["status"], row["reason"] or ""))
+
+    def judge(self, verdict: str | None) -> None:
+        """Count a verdict, if there is one."""
+        if verdict:
+            self.verdicts[verdict] += 1
 
 
 def batch(
@@ -157,6 +166,7 @@ def _to_do(tasks: Sequence[Task], store: Store, result: Batch, models: str | Non
         first[job.run] = task.log
         if job.run in store and not (retry and store.status(job.run) != "done"):
             result.known += 1
+            result.judge(store.verdict(job.run))
         else:
             yield job
 

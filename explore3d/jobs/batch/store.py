@@ -49,6 +49,8 @@ RUN_COLUMNS: dict[str, str] = {
 # Loose runs from which on they are put together: a thousand files of 8 kB are slow to ask, one of 100 kB is not
 PACKED_FROM = 64
 _PACK = "pack-"
+# Columns of a run that a store knows without being asked again; one that an older version wrote may lack the last
+KNOWN_COLUMNS = ("run", "status", "tolerances")
 
 Row = Mapping[str, Any]
 
@@ -72,12 +74,17 @@ class Store:
         """How a run that stands there ended."""
         return str(self._standing[run]["status"])
 
+    def verdict(self, run: str) -> str | None:
+        """What became of its tolerances; None where nobody named any."""
+        verdict = self._standing[run].get("tolerances")
+        return None if verdict is None else str(verdict)
+
     def add(self, run: Row, features: Sequence[Row]) -> None:
         """Write a run and its features; one of the same key that was not done is replaced."""
         key = run["run"]
         self._place.put(f"features/{key}.parquet", parquet_bytes(FEATURE_COLUMNS, [dict(row) for row in features]))
         self._place.put(f"runs/{key}.parquet", parquet_bytes(RUN_COLUMNS, [dict(run)]))
-        self._standing[key] = {"run": key, "status": run["status"]}
+        self._standing[key] = {name: run.get(name) for name in KNOWN_COLUMNS}
 
     def pack(self) -> int:
         """Put loose runs that were done together where there are many; how many were."""
@@ -123,7 +130,8 @@ class Store:
 
         rows: list[dict[str, Any]] = []
         for name in names:
-            rows += pq.read_table(io.BytesIO(self._place.get(name)), columns=["run", "status"]).to_pylist()
+            table = pq.ParquetFile(io.BytesIO(self._place.get(name)))
+            rows += table.read(columns=[each for each in KNOWN_COLUMNS if each in table.schema_arrow.names]).to_pylist()
         return rows
 
 

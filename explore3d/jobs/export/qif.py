@@ -179,7 +179,7 @@ class _Document:
             limits = _add(definition, "Tolerance")
             for bound, limit in (("MaxValue", tolerance["limit"]), ("MinValue", tolerance["least"] or None)):
                 if limit is not None:
-                    _add(limits, bound, _decimal(limit / _MILLIMETRE))
+                    _add(limits, bound, _decimal(float(f"{limit / _MILLIMETRE:.12g}")))  # as the drawing has it
             _add(limits, "DefinedAsLimit", "true")
         nominal = ET.Element(f"{kind}Nominal", id=self._new())
         _add(nominal, "CharacteristicDefinitionId", definition.attrib["id"])

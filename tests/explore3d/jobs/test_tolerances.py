@@ -65,14 +65,18 @@ def test_a_sidecar_says_them_and_the_option_wins(scan: Path, tmp_path: Path) -> 
     assert [each.verdict for each in judged] == [PASS]
 
 
-def test_a_batch_keeps_the_verdict_of_each_log(scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_batch_keeps_the_verdict_of_each_log(
+    scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     drawing = tmp_path / "drawing.toml"
     store = tmp_path / "store"
     words = ["batch", scan, "--tip-radius", f"{TIP} m", "--tip-sd", "0 m", "--out", store, "--quick", "--workers", "1"]
     for limit in ("20 um", "60 um"):  # the same file's name, another drawing: another run
         drawing.write_text(DRAWING.format(limit=limit).replace("ridge", "any"))
-        assert explore3d_main(monkeypatch, *words, "--tolerances", drawing) == 0
+        for _ in range(2):  # what stands in the store is told as what is new
+            assert explore3d_main(monkeypatch, *words, "--tolerances", drawing) == 0
+            assert f"tolerances: 1 {FAIL if limit == '20 um' else PASS}" in capsys.readouterr().out
     assert explore3d_main(monkeypatch, *words) == 0
     assert sorted(map(str, pq.read_table(store / "runs")["tolerances"].to_pylist())) == ["None", FAIL, PASS]
 
