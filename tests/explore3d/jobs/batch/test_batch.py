@@ -348,10 +348,12 @@ def test_a_result_that_a_lost_worker_held_is_waited_for(tmp_path: Path) -> None:
 
 def test_a_result_counts_what_failed() -> None:
     result = Batch(2)
-    result.note({"status": "refused", "log": "a", "reason": "why"})
+    result.note({"status": "refused", "log": "a", "reason": "why", "tolerances": None})
+    result.note({"status": "done", "log": "b", "reason": None, "tolerances": "fail"})
     assert result.record() == {
         "logs": 2,
         "known": 0,
-        "statuses": {"refused": 1},
+        "statuses": {"refused": 1, "done": 1},
+        "verdicts": {"fail": 1},
         "failures": [{"log": "a", "status": "refused", "reason": "why"}],
     }
