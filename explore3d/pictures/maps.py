@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -207,20 +207,22 @@ def _maps_seen(
     tip_radius: float,
     top: float,
 ) -> list[bytes]:
-    """PNG of k1 and of k2 as a camera sees them: what is rendered, 28 bytes a sample, is let go of at once."""
+    """PNG of k1 and of k2 as a camera sees them; what is rendered, 20 bytes a sample, is let go of before they are."""
     picture = replace(render(bodies, camera), flat=sides)
-    lit = 255.0 * (picture.reduced(SUPERSAMPLING) / 255.0)
+    lit = picture.reduced(SUPERSAMPLING)
+    coarse = _map_colours(picture, felt, lines, tip_radius, top)
+    del picture
     maps = []
-    for blocks in _map_colours(picture, felt, lines, tip_radius, top):
+    for blocks in coarse:
         colours = blocks.repeat(MAP_PIXELS, axis=0).repeat(MAP_PIXELS, axis=1)[: lit.shape[0], : lit.shape[1]]
-        colours *= lit
+        colours *= 255.0 * (lit / 255.0)
         maps.append(pixels_png(np.rint(colours, out=colours).astype(np.uint8)))
     return maps
 
 
 def _map_colours(
     picture: Picture, felt: Felt, lines: Sequence[Line], tip_radius: float, top: float
-) -> Iterator[FloatArray]:
+) -> list[FloatArray]:
     """(H, W, 3) colours of k1, then of k2, for the blocks of MAP_PIXELS pixels of the drawing each way."""
     places, normals, blocks = _seen(picture, SUPERSAMPLING * MAP_PIXELS)
     front = np.einsum("ij,ij->i", felt.normals, picture.camera.eye - felt.places) > 0.0  # walls are thin
@@ -231,12 +233,14 @@ def _map_colours(
             own, _ = _read(beside / line.scale, line.beside, line.values)
             share = line.share(beside)[:, None]
             read[near] = share * own + (1.0 - share) * read[near]
+    maps = []
     for number in (0, 1):
         colours = coloured(0.5 + 0.5 * faded(read[:, number] / top, read[:, 2 + number] / top))
         colours[~(apart < tip_radius)] = NOT_VALID
         whole = np.ones((*blocks.shape, 3))
         whole[blocks] = colours
-        yield whole
+        maps.append(whole)
+    return maps
 
 
 def _seen(picture: Picture, block: int) -> tuple[FloatArray, FloatArray, BoolArray]:

@@ -192,19 +192,28 @@ def _likeliest(problems: Sequence[PosteriorProblem], rng: np.random.Generator, c
     The first of them begins at its optima, under the noise that it was left with.
     """
     best = solve_problem(problems[0], rng, confirm=confirm, adapt=False)
-    solved = [best]
+    solved, weights = [best], [_log_weight(best)]
     for problem in problems[1:]:
         target = problem.target.with_likelihood(best.problem.target.likelihood)
         modes = [laplace(target, optimum) for optimum in find_optima(target, problem.beginnings)]
-        fast, rival = importance_sample(target, modes, rng), replace(problem, target=target)
+        # what is surely unlikely beside the likeliest so far need not be known better; a plain member tells by draws
+        plain = kind_of(problem.feature).has_plain_member(with_nominal_tip(problem).target.shape)
+        least = -np.inf if plain else max(weights) + float(np.log(UNLIKELY_FAMILY))
+        fast, rival = importance_sample(target, modes, rng, least), replace(problem, target=target)
         solved.append(Solution(rival, _from_importance(rival, fast, rng), fast, None))
-    shares = probabilities([each.importance.log_evidence + np.log1p(_plain_odds(each)) for each in solved])
+        weights.append(_log_weight(solved[-1]))
+    shares = probabilities(weights)
     order = [int(k) for k in np.argsort(-shares, kind="stable")]
     first = solved[order[0]]
     if first is not best and confirm is not None and (confirm or first.importance.k_hat >= TRUSTED_K_HAT):
         first = solve_problem(first.problem, rng, confirm=confirm, adapt=False)
     likely = [(float(shares[k] / shares[order[0]]), solved[k]) for k in order[1:]]
     return replace(first, likely=tuple(each for each in likely if each[0] > UNLIKELY_FAMILY))
+
+
+def _log_weight(solution: Solution) -> float:
+    """Log evidence of a solved family and of its plainest member, which are equally probable beforehand."""
+    return solution.importance.log_evidence + float(np.log1p(_plain_odds(solution)))
 
 
 def _plain_odds(solution: Solution) -> float:

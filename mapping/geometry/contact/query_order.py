@@ -21,7 +21,8 @@ def morton_order(points: FloatArray) -> IntArray | None:
         return None
     low = points.min(axis=0)
     extent = float((points.max(axis=0) - low).max())
-    step = float(np.linalg.norm(np.diff(points, axis=0), axis=1).mean())
+    steps = np.diff(points, axis=0)
+    step = float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).mean())
     if not np.isfinite(extent) or step * np.sqrt(len(points)) <= IN_ROWS * extent:
         return None
     cells = np.minimum((points - low) * (2**BITS / extent), 2**BITS - 1).astype(np.uint32)

@@ -19,6 +19,7 @@ from mapping.geometry.curvature.cloud_mesh import meshed
 from mapping.geometry.curvature.curvature import Curvature
 from mapping.geometry.curvature.jet import LARGE_MESH_POINTS, jets_and_noise, oriented
 from mapping.geometry.curvature.libigl_fits import SMALLEST_COMPONENT, libigl_curvatures
+from mapping.geometry.curvature.neighbours import Neighbours
 
 # Rings of libigl's fits; each is judged by the next, the last only judges.
 RADII = (2, 3, 4, 6)
@@ -74,10 +75,7 @@ def auto_curvature(body: Surface | FloatArray, normals: FloatArray | None, noise
 
 def _nearest(points: FloatArray) -> IntArray:
     """(N, 19) indices of the nearest points, or of all if there are fewer; each point itself comes first."""
-    from scipy.spatial import cKDTree
-
-    count = min(TWO_RINGS, len(points))
-    return np.asarray(cKDTree(points).query(points, k=count)[1], dtype=np.int64).reshape(len(points), count)
+    return Neighbours(points).query(points, min(TWO_RINGS, len(points)))
 
 
 def _reach(points: FloatArray, near: IntArray) -> FloatArray:

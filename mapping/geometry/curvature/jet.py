@@ -11,6 +11,7 @@ import numpy as np
 
 from mapping import BoolArray, CurvatureError, FloatArray, IntArray, Surface
 from mapping.geometry.curvature.curvature import Curvature, from_operators
+from mapping.geometry.curvature.neighbours import Neighbours
 from mapping.geometry.mesh import NEAREST_COST, by_shares, cores
 
 # Neighbourhoods from which points choose. Regular grids are symmetric in 25, 37, 49, 69 and 97 neighbours, which
@@ -29,10 +30,8 @@ SAMPLE = 3000
 LOST_WEIGHT_SHARE = 0.1
 # Meshes above this size try only the neighbourhoods that a sample of their points chooses.
 LARGE_MESH_POINTS = 20_000
-# Points to a leaf of the tree: searches for 547 neighbours take a fifth less time than with the default of 10
-LEAF_POINTS = 32
-# Neighbours held at once by one thread, of 24 bytes each while they are sought: 12 MB
-CHUNK_VALUES = 500_000
+# Neighbours held at once by one thread: 8 MB
+CHUNK_VALUES = 1_000_000
 SMOOTHING = 24
 # Rings of faces whose area vectors tell where outside is: as many as those nearest points. With one ring 2.4 %, with
 # two 0.03 % and with three none of 10,000 vertices of a torus with noise of half an edge had normals that led astray.
@@ -159,15 +158,10 @@ class _Jets:
     """Points (N, 3) of about unit size with their neighbourhoods and mean normals."""
 
     def __init__(self, place: FloatArray, rough: FloatArray, degree: int):
-        from scipy.spatial import cKDTree
-
         self.place, self.degree = place, degree
-        self.tree = cKDTree(place, leafsize=LEAF_POINTS)
+        self.tree = Neighbours(place)
         self.normals = _smoothed_normals(place, rough, self.tree)
         self.bends = np.zeros(len(place))
-        # the widest search for neighbours takes as long as half of the fits: the sample's are fitted more than once
-        self.sample = np.linspace(0, len(place) - 1, min(SAMPLE, len(place))).astype(np.int64)
-        self.near_sample = np.zeros((0, 0), dtype=np.int64)
 
     def fit(self, chosen: IntArray, sizes: IntArray, near: IntArray | None = None) -> _Candidates:
         """Every candidate at the chosen points; `near` as of the method, if it is known."""
@@ -178,19 +172,11 @@ class _Jets:
 
     def near(self, chosen: IntArray, count: int) -> IntArray:
         """(M, count) nearest points, nearest first; N where there are no more."""
-        near = np.empty((len(chosen), count), dtype=np.int64)
-        known = np.zeros(len(chosen), dtype=bool)
-        if self.near_sample.shape[1] == count:
-            row = np.minimum(np.searchsorted(self.sample, chosen), len(self.sample) - 1)
-            known = self.sample[row] == chosen
-            near[known] = self.near_sample[row[known]]
-        near[~known] = self.tree.query(self.place[chosen[~known]], k=count)[1].reshape(-1, count)
-        return near
+        return self.tree.query(self.place[chosen], count)
 
-    def fit_sample(self, sizes: IntArray) -> _Candidates:
-        """Every candidate at points that speak for all; their neighbours are kept."""
-        self.near_sample = self.near(self.sample, max(int(sizes[-1]), POOL))
-        return self.fit(self.sample, sizes, self.near_sample)
+    def sample(self) -> IntArray:
+        """Indices of points that speak for all."""
+        return np.linspace(0, len(self.place) - 1, min(SAMPLE, len(self.place))).astype(np.int64)
 
     def noise(self) -> float:
         """Noise level from residuals of the highest fits over two small neighbourhoods.
@@ -198,7 +184,7 @@ class _Jets:
         Noise leaves the same residual in both; what the polynomial cannot follow grows with the power of the radius
         that is one above its degree. The median ignores the few points where the surface is not smooth.
         """
-        rests = self.fit(self.sample, np.array(SMALL)).rests[..., -1]
+        rests = self.fit(self.sample(), np.array(SMALL)).rests[..., -1]
         rests = rests[np.isfinite(rests).all(axis=1)]
         if len(rests) == 0:
             return 0.0
@@ -212,8 +198,8 @@ class _Jets:
         """Bend all ordinates by the larger curvature at the nearest point of a sample, found without bending."""
         from scipy.spatial import cKDTree
 
-        sample = self.sample
-        found, tree = self.fit_sample(sizes), cKDTree(self.place[sample])
+        sample = self.sample()
+        found, tree = self.fit(sample, sizes), cKDTree(self.place[sample])
         pools = tree.query(self.place[sample], k=min(POOL // POOL_STEP, len(sample)))[1].reshape(len(sample), -1)
         weights = self._weights(found, found.deviations(noise), np.arange(len(sample)), pools, sizes, noise)[0]
         a, b, c = np.einsum("msd,msdk->km", weights, np.nan_to_num(found.operators))
@@ -223,8 +209,9 @@ class _Jets:
 
     def worthwhile(self, sizes: IntArray, noise: float) -> IntArray:
         """The sizes that points of a sample give most weight to, with those that judge them."""
-        found = self.fit_sample(sizes)
-        own, all_of_it = found.deviations(noise), np.arange(len(self.sample))
+        sample = self.sample()
+        found = self.fit(sample, sizes)
+        own, all_of_it = found.deviations(noise), np.arange(len(sample))
         weights = self._weights(found, own, all_of_it, all_of_it[:, None], sizes, noise)[0].sum(axis=2)
         reach = np.cumsum(weights[np.isfinite(weights).all(axis=1)].mean(axis=0))
         last = min(int(np.searchsorted(reach, 1 - LOST_WEIGHT_SHARE)), len(sizes) - 1)
@@ -337,11 +324,11 @@ def _patch_normals(surface: Surface) -> FloatArray:
     return total
 
 
-def _smoothed_normals(place: FloatArray, rough: FloatArray, tree: Any) -> FloatArray:
+def _smoothed_normals(place: FloatArray, rough: FloatArray, tree: Neighbours) -> FloatArray:
     """Mean normals over the nearest points: noise tilts single triangles."""
     smooth = np.empty_like(rough)
     for part in np.array_split(np.arange(len(place)), max(1, len(place) * SMOOTHING // CHUNK_VALUES)):
-        near = by_shares(lambda at: tree.query(at, k=min(SMOOTHING, len(place)))[1], place[part], SMOOTHING)
+        near = by_shares(lambda at: tree.query(at, min(SMOOTHING, len(place))), place[part], SMOOTHING)
         same = np.einsum("ijk,ik->ij", rough[near], rough[part]) > 0
         smooth[part] = np.einsum("ijk,ij->ik", rough[near], same.astype(np.float64))
     length = np.linalg.norm(smooth, axis=1, keepdims=True)

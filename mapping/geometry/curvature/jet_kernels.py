@@ -304,8 +304,17 @@ def pooled_bias(operators, deviations, pools, sizes, certainty, out):  # type: i
         certainty: standard deviations.
         out: (M, S, D) squared Frobenius norms, written.
     """
-    options = operators.shape[2]
+    options, pool = operators.shape[2], pools.shape[1]
+    # of the pool's points side by side: variances, NaN where undetermined, and operators
+    variances, parts = np.empty((len(sizes), options, pool)), np.empty((len(sizes), options, 3, pool))
     for m in range(len(pools)):
+        for s in range(len(sizes)):
+            for d in range(options):
+                for i in range(pool):
+                    y = pools[m, i]
+                    variances[s, d, i] = deviations[y, s, d] ** 2 if np.isfinite(deviations[y, s, d]) else np.nan
+                    for k in range(3):
+                        parts[s, d, k, i] = operators[y, s, d, k]
         for s in range(len(sizes)):
             for d in range(options):
                 worst = 0.0
@@ -314,29 +323,47 @@ def pooled_bias(operators, deviations, pools, sizes, certainty, out):  # type: i
                         # one size wider serves as a judge only if its degree is higher
                         if higher == d and other >= s:
                             continue
-                        excess, weight, members, here = 0.0, 0.0, 0, True
-                        for y in pools[m]:
-                            first, here = here, False
-                            own, its = deviations[y, s, d], deviations[y, other, higher]
-                            if not (np.isfinite(own) and np.isfinite(its)) or (other <= s and its <= own):
-                                continue
-                            expected = max(its * its + (own * own if other > s else -own * own), LEAST_SQUARED_ERROR)
-                            gap = 0.0
-                            for k in range(3):
-                                part = operators[y, s, d, k] - operators[y, other, higher, k]
-                                gap += part * part * (2.0 if k == 1 else 1.0)
-                            # the variance of the gap: one uncertain judge must not drown the others
-                            excess += (gap - expected) / (expected * expected)
-                            weight += 1.0 / (expected * expected)
-                            members += 1
-                            if first:  # beyond what noise does at one point, its own gap needs no company
-                                worst = max(worst, gap - CERTAIN_GAP * expected)
-                        if members:
+                        excess, weight, members = _disagreement(variances, parts, s, d, other, higher)
+                        own, its = variances[s, d, 0], variances[other, higher, 0]
+                        if own >= 0.0 and its >= 0.0 and (other > s or its > own):
+                            # beyond what noise does at one point, its own gap needs no company
+                            expected = max(its + (own if other > s else -own), LEAST_SQUARED_ERROR)
+                            worst = max(worst, _gap(parts, s, d, other, higher, 0) - CERTAIN_GAP * expected)
+                        if members > 0.0:
                             # neighbourhoods overlap: the pool holds fewer independent values than points
                             independent = 1.0 + 3.0 * members / sizes[other]
                             allowance = certainty * np.sqrt(2.0 * members / (3.0 * independent * weight))
                             worst = max(worst, excess / weight - allowance)
                 out[m, s, d] = worst
+
+
+@njit(cache=True, inline="always")
+def _gap(parts, s, d, other, higher, i):  # type: ignore[no-untyped-def]
+    """Squared Frobenius norm of the difference of two of point i's symmetric operators."""
+    a = parts[s, d, 0, i] - parts[other, higher, 0, i]
+    b = parts[s, d, 1, i] - parts[other, higher, 1, i]
+    c = parts[s, d, 2, i] - parts[other, higher, 2, i]
+    return a * a + 2.0 * b * b + c * c
+
+
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+def _disagreement(variances, parts, s, d, other, higher):  # type: ignore[no-untyped-def]
+    """Sums over a pool of a fit's weighed gaps from another beyond the expected ones, of the weights, and of members.
+
+    The weight is one over the variance of the gap: one uncertain judge must not drown the others. The other fit is a
+    judge where it varies more, or is wider.
+    """
+    excess, weight, members, sign = 0.0, 0.0, 0.0, 1.0 if other > s else -1.0
+    for i in range(variances.shape[2]):
+        own, its = variances[s, d, i], variances[other, higher, i]
+        known = own + its >= 0.0 and (sign > 0.0 or its > own)
+        expected = max(its + sign * own, LEAST_SQUARED_ERROR)
+        share = 1.0 / (expected * expected)
+        beyond = (_gap(parts, s, d, other, higher, i) - expected) * share
+        excess += beyond if known else 0.0
+        weight += share if known else 0.0
+        members += 1.0 if known else 0.0
+    return excess, weight, members
 
 
 @njit(cache=True, nogil=True)

@@ -125,6 +125,10 @@ class Kind:
         """
         return ()
 
+    def has_plain_member(self, shape: Shape) -> bool:
+        """True of a family with a plainest member, which counts on its own."""
+        return False
+
     def plain_odds(self, shape: Shape, draws: FloatArray) -> float:
         """Bayes factor of the plainest member of a family, which people make and lay there, against all of it; 0: none.
 

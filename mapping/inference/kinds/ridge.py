@@ -69,13 +69,16 @@ class Ridge(Crest, LineKind):
         parts = {"top": float(np.median(top)), "run": float(np.median(run)), "radius": None}
         return Section(Interval.from_draws(height), Interval.from_draws(top + 2.0 * run), parts)
 
+    def has_plain_member(self, shape: Any) -> bool:
+        return isinstance(shape, RidgeShape)
+
     def plain_odds(self, shape: Any, draws: FloatArray) -> float:
         """Of a wire that lies on the base: its radius is half its height.
 
         By the ratio of the densities of the radius there, after the data and before (Savage's ratio; Dickey, Annals of
         Mathematical Statistics 42, 1971), the former from the draws by Gaussian kernels of Silverman's width.
         """
-        if not isinstance(shape, RidgeShape):
+        if not self.has_plain_member(shape):
             return 0.0
         lying = np.log(0.5 * draws[:, -2])
         off = draws[:, -1] - lying

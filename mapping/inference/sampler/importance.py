@@ -22,6 +22,8 @@ FINALS = 3
 TRUSTED_K_HAT = 0.5
 # The proposal is good enough when this share of the draws is effective.
 EFFICIENT = 0.5
+# Standard deviations by which a log evidence must lie below what is asked for to be given up before it is known well
+GIVEN_UP_SDS = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,20 +47,37 @@ class Importance:
     log_evidence: float
 
 
-def importance_sample(target: LogPosterior, modes: Sequence[Laplace], rng: np.random.Generator) -> Importance:
+def importance_sample(
+    target: LogPosterior, modes: Sequence[Laplace], rng: np.random.Generator, least: float = -np.inf
+) -> Importance:
     """Draws of the target, the proposal adapted from Laplace approximations by its own weighted draws.
 
     While few draws carry the weight it is tempered, so that the proposal grows towards the target instead of
     collapsing on the best draw.
 
+    Args:
+        target: the density.
+        modes: its Laplace approximations.
+        rng: all randomness comes from here.
+        least: log evidence below which nothing more is asked than that it is below: draws that can be trusted and are
+            sure of it are returned, if the proposal that they taught gives such draws, too (one that misses a part of
+            the target may seem sure). The variance of the mean of S weights is that mean's square times
+            1 / ESS - 1 / S.
+
     Reference: theory section 8.2; Cappé et al. 2008 for the adaptation (proposal.py has it in full), Vehtari et al.
     2024 for the test (psis.py).
     """
-    proposal = _first_proposal(modes)
+    proposal, was_sure = _first_proposal(modes), False
     for _ in range(PROPOSAL_ROUNDS):
         draws, ratios = _weigh(target, proposal, rng, DRAWS_PER_ROUND)
         weights, k_hat = smooth_weights(ratios)
-        if effective_size(weights) > EFFICIENT * DRAWS_PER_ROUND and k_hat < TRUSTED_K_HAT:
+        ess = effective_size(weights)
+        spread = np.sqrt(max(1.0 / ess - 1.0 / len(draws), 0.0))
+        sure = k_hat < TRUSTED_K_HAT and _log_mean(ratios) + GIVEN_UP_SDS * spread < least
+        if sure and was_sure:
+            return Importance(proposal, draws, weights, k_hat, ess, _log_mean(ratios))
+        was_sure = sure
+        if ess > EFFICIENT * DRAWS_PER_ROUND and k_hat < TRUSTED_K_HAT and not sure:
             break
         proposal = _learned(proposal, draws, ratios)
     for final in range(FINALS):
@@ -68,9 +87,13 @@ def importance_sample(target: LogPosterior, modes: Sequence[Laplace], rng: np.ra
         weights, k_hat = smooth_weights(ratios)
         if k_hat < TRUSTED_K_HAT:
             break
+    return Importance(proposal, draws, weights, k_hat, effective_size(weights), _log_mean(ratios))
+
+
+def _log_mean(ratios: FloatArray) -> float:
+    """Log of the mean of what they are the logs of; -inf if all of them are."""
     top = float(ratios.max())
-    log_evidence = top + float(np.log(np.mean(np.exp(ratios - top)))) if np.isfinite(top) else -np.inf
-    return Importance(proposal, draws, weights, k_hat, effective_size(weights), log_evidence)
+    return top + float(np.log(np.mean(np.exp(ratios - top)))) if np.isfinite(top) else -np.inf
 
 
 def _first_proposal(modes: Sequence[Laplace]) -> Proposal:
