@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import Feature, FloatArray, IntArray
+from mapping import BoolArray, Feature, FloatArray, IntArray
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference.families import Surroundings
@@ -144,7 +144,7 @@ def _finer(window: Window) -> Window:
     )
 
 
-def window_of(places: Places, keep: FloatArray) -> Window:
+def window_of(places: Places, keep: BoolArray) -> Window:
     """The chosen places as bins: a run ends where a sweep does, or where it leaves them.
 
     Places that lie closer together than a sweep's samples have none at every second of them: that ends no run, else
