@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,6 +55,8 @@ class SurfaceAccount:
         is_plan: True if nothing was moved yet.
         touched_beyond, ways_beyond: how far outside of the scene's region the ball touched, and went on its ways, m;
             None without a region.
+        unseen_path: length of sweeps too short, or of too few samples, for anything to be seen on them, m: what only
+            they touched was not swept.
         below: share of the area that faces down; 0 where the scene names the sides that are explored.
     """
 
@@ -73,13 +75,19 @@ class SurfaceAccount:
     is_plan: bool = False
     touched_beyond: float | None = None
     ways_beyond: float | None = None
+    unseen_path: float = 0.0
     below: float = 0.0
 
     @classmethod
-    def of_log(cls, log: Log, trace: Trace, base: Base, scene: Scene | None) -> SurfaceAccount | None:
+    def of_log(
+        cls, log: Log, trace: Trace, base: Base, scene: Scene | None, inspected: Collection[int] | None = None
+    ) -> SurfaceAccount | None:
         """The account of a run by its log, and by its trace over the base.
 
         None without a scene that says what to inspect, or without a surface.
+
+        Args:
+            inspected: numbers of the sweeps on which something would have been seen; None: all.
         """
         if scene is None or base.kind == "profile":
             return None
@@ -89,10 +97,17 @@ class SurfaceAccount:
             name: sum(_length(d) for d in made if (d["purpose"] == "sweep") is (name == "sweep")) for name in _KINDS
         }
         paths = [np.asarray(d["path"]) for d in refused if d.get("purpose") == "sweep"]
-        touched = LaidTrace.of(trace, base).touched(MOST_SURFACE_CELLS)
+        laid = LaidTrace.of(trace, base)
+        touched = laid.touched(MOST_SURFACE_CELLS)
+        seen, unseen = touched, 0.0
+        if inspected is not None and not (kept := np.isin(laid.sweep, list(inspected))).all():
+            none = (np.zeros((0, 3)), np.zeros((0, 3)))
+            seen = laid.within(kept).touched(MOST_SURFACE_CELLS) if kept.any() else none
+            unseen = sum(float(own.arclength[-1]) for own in laid.laid_sweeps if own.number not in inspected)
         ways = [np.asarray(d["path"]) for d in made if d["purpose"] != "sweep"]
         return cls(
-            **_shares(base, scene, touched, paths),
+            **_shares(base, scene, seen, paths),
+            unseen_path=unseen,
             **_beyond(scene, touched[0], ways),
             swept_path=lengths["sweep"],
             other_path=lengths["other"],
@@ -156,6 +171,9 @@ class SurfaceAccount:
         if not self.short:
             return ""
         why = f", most often because {self.causes[0][0]}" if self.causes else ""
+        if self.unseen_path > self.refused_path:
+            sweeps = f"{length_text(self.unseen_path, 2)} of sweeps"
+            why = f": {sweeps} are too short, or have too few samples, to show anything"
         is_missed = "would not be swept" if self.is_plan else "was not swept"
         return f"NOT INSPECTED: {100 * self.unswept:.0f} % of the surface that the finger can reach {is_missed}{why}."
 

@@ -164,7 +164,7 @@ def background(
             banks = _banks(profiles, level, tip_radius, largest, drift)
             if several and not level.further:
                 break
-    return Background(level, banks, {spacing: _uncertainty(fit, bank) for spacing, bank in banks.items()})
+    return Background(level, banks, {spacing: _uncertainty(fit, bank, tip_radius) for spacing, bank in banks.items()})
 
 
 def _likely(profile: SweepHeights, noise: Noise, drift: int) -> BoolArray:
@@ -251,13 +251,14 @@ def _profile_blocks(profile: SweepHeights, keep: BoolArray) -> Blocks:
     return Blocks(np.where(keep, profile.height, np.nan), steps, profile.samples)
 
 
-def _uncertainty(fit: NoiseFit, bank: Bank) -> float:
-    """Relative standard deviation of the narrowest filter's noise; every threshold rests on it."""
+def _uncertainty(fit: NoiseFit, bank: Bank, tip_radius: float) -> float:
+    """Relative standard deviation of the narrowest filter's noise; every threshold rests on it.
+
+    Rounding is known: what few samples say of a noise below it is very uncertain, and of no consequence.
+    """
     width, spacing, samples = bank.filters[0].half_width, bank.spacing, bank.samples
-    own = filter_sd(width, fit.noise, spacing, samples, bank.drift)
-    others = [
-        filter_sd(width, perturbed(fit.noise, k, 0.1), spacing, samples, bank.drift) for k in range(len(fit.covariance))
-    ]
+    laws = [fit.noise, *(perturbed(fit.noise, k, 0.1) for k in range(len(fit.covariance)))]
+    own, *others = (filter_sd(width, floored(law, tip_radius), spacing, samples, bank.drift) for law in laws)
     return relative_sd(fit, np.log(np.array(others) / own) / 0.1)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import Feature, FloatArray, IntArray
+from mapping import BoolArray, Feature, FloatArray, IntArray
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference.families import Surroundings
@@ -144,11 +144,17 @@ def _finer(window: Window) -> Window:
     )
 
 
-def window_of(places: Places, keep: FloatArray) -> Window:
-    """The chosen places as bins: a run ends where a sweep does, or where it leaves them."""
-    index = np.flatnonzero(keep)
-    jump = (np.diff(index) > 1) | (np.diff(places.sweep[index]) != 0)
-    gaps = np.linalg.norm(np.diff(places.points[index], axis=0), axis=1) > 3.0 * places.spacing
+def window_of(places: Places, keep: BoolArray) -> Window:
+    """The chosen places as bins: a run ends where a sweep does, or where it leaves them.
+
+    Places that lie closer together than a sweep's samples have none at every second of them: that ends no run, else
+    nothing would be left of pecks.
+    """
+    index = np.flatnonzero(keep & (places.samples > 0))
+    felt = np.cumsum(places.samples > 0)
+    jump = (np.diff(felt[index]) > 1) | (np.diff(places.sweep[index]) != 0)
+    apart = np.linalg.norm(np.diff(places.points[index], axis=0), axis=1)
+    gaps = apart > 3.0 * places.spacing * np.diff(index)
     starts = np.concatenate([[0], np.flatnonzero(jump | gaps) + 1, [len(index)]]).astype(np.int64)
     # a run of a place or two tells the base alone
     long = np.repeat(np.diff(starts) > 3, np.diff(starts))
@@ -159,7 +165,7 @@ def window_of(places: Places, keep: FloatArray) -> Window:
     for start, stop in itertools.pairwise(starts):
         along = np.gradient(points[start:stop], axis=0)
         tangents[start:stop] = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(float).tiny)
-        place[start:stop] = places.spacing * np.arange(stop - start)
+        place[start:stop] = places.spacing * (index[start:stop] - index[start])
     flat = len(index) > 0 and float(np.ptp(normals, axis=0).max()) < SAME_PLANE
     half = np.full(len(index), 0.5 * places.spacing)
     count = places.samples[index].astype(np.int64)

@@ -10,6 +10,7 @@ import pytest
 import trimesh
 from scene_files import write_scene_file
 
+from explore3d.analysis.surface_account import SurfaceAccount
 from explore3d.errors import SceneError
 from explore3d.jobs.expedition import explorer
 from explore3d.jobs.plan import DryRun, plan_scene
@@ -119,6 +120,26 @@ def test_a_region_too_small_for_a_sweep_is_refused_before_anything_moves(pose: s
     with pytest.raises(SceneError, match=r"model.region: no sweep fits into it.*0\.72 mm between sweeps"):
         run(scene, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_what_sweeps_touched_that_show_nothing_was_not_swept(tmp_path: Path) -> None:
+    scene = block_scene(tmp_path, 2.0, 4.0)
+    text = scene.read_text().replace('high = ["17 mm", "4 mm",', 'high = ["4 mm", "-3 mm",')  # a millimetre square
+    few = run_text(tmp_path, text.replace("[survey]", 'rate = "80 Hz"\n[survey]'), "few")
+    assert few.swept == 0.0
+    assert few.short
+    assert "3 mm of sweeps are too short, or have too few samples, to show anything" in few.warning()
+    many = run_text(tmp_path, text, "many")
+    assert many.swept == 1.0
+    assert not many.short
+
+
+def run_text(folder: Path, text: str, name: str) -> SurfaceAccount:
+    scene = folder / f"{name}.toml"
+    scene.write_text(text)
+    account = run(scene, folder / name, report=False).account
+    assert account is not None
+    return account
 
 
 def test_how_far_the_finger_leaves_its_region_is_told(tmp_path: Path) -> None:

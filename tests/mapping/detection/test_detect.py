@@ -15,8 +15,10 @@ from mapping.detection.candidates import search
 from mapping.detection.detect import Detections, detect
 from mapping.detection.filters.false_alarms import _intensity, false_alarm_rate, threshold_for
 from mapping.detection.filters.matched_filter import build_bank, filter_sd
+from mapping.detection.quiet_noise import _uncertainty, floored
 from mapping.errors import DetectionError
 from mapping.geometry.templates.shapes import cap_height, groove_height, step_height
+from mapping.instrument.block_likelihood import NoiseFit
 from mapping.instrument.noise import Noise
 from mapping.surface import Surface
 from mapping.trace import Trace
@@ -51,6 +53,14 @@ def test_without_noise_a_wire_is_measured_to_its_binning():
     assert abs(crossing.point[0]) < 1e-6
     np.testing.assert_allclose(crossing.height, 0.65e-3, rtol=0.02)
     np.testing.assert_allclose(crossing.trace_curvature, 1 / (TIP + 0.325e-3), rtol=0.1)
+
+
+def test_what_is_not_known_of_a_noise_below_rounding_makes_no_threshold_uncertain():
+    few = np.eye(3)  # of samples so few that the level of each part is known to half of itself
+    for white, doubt in ((1e-6, 0.5), (1e-16, 0.0)):
+        noise = Noise(white, 1e-3 * white, 1e-3)
+        bank = build_bank(floored(noise, TIP), 0.1e-3, 10.0, 0.5e-3, 2e-3)
+        assert _uncertainty(NoiseFit(noise, few), bank, TIP) == pytest.approx(doubt, abs=0.02)
 
 
 def test_a_wire_under_the_noise_of_the_apparatus_is_found_where_it_is():

@@ -20,7 +20,7 @@ from mapping.detection import detect
 from mapping.inference.configuration import Places, count_in, in_words
 from mapping.inference.configuration.configuration import fitted, part_of
 from mapping.inference.configuration.joined_shape import JoinedShape
-from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood
+from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
 from mapping.inference.configuration.proposals import smoother, straight_lines
 from mapping.inference.families import Surroundings
 from mapping.instrument import Noise
@@ -169,3 +169,20 @@ def test_a_bump_that_runs_out_gently_is_one_with_a_skirt_and_not_several() -> No
     base = plate()
     laid = LaidTrace.of(trace, base)
     assert [feature.kind for feature in assemble(detect(laid, base), laid, base)] == ["bump"]
+
+
+def test_places_without_a_sample_between_others_end_no_run() -> None:
+    """Pecks that lie further apart than places: every second or third place has none."""
+    count, spacing = 30, 0.2e-3
+    points = np.column_stack([spacing * np.arange(count), np.zeros((count, 2))])
+    samples = np.where(np.isin(np.arange(count) % 5, (0, 2)), 1, 0)
+    sweep = np.where(np.arange(count) < 20, 1, 2)
+    up = np.tile([0.0, 0.0, 1.0], (count, 1))
+    window = window_of(Places(points, up, np.zeros(count), samples, sweep, spacing), np.ones(count, dtype=bool))
+    # one run of each sweep, at the places' own distances
+    np.testing.assert_array_equal(window.starts, [0, 8, 12])
+    np.testing.assert_allclose(window.place[:4], spacing * np.array([0.0, 2.0, 5.0, 7.0]))
+    # a place that was felt, and lies outside of the neighbourhood, ends one; what is left of three places is none
+    inside = np.arange(count) != 10
+    parted = window_of(Places(points, up, np.zeros(count), samples, sweep, spacing), inside)
+    np.testing.assert_array_equal(parted.starts, [0, 4, 8])
