@@ -26,9 +26,16 @@ from mapping import Dropped, EnvelopeError, Feature, LeftOut, Trace, length_text
 from mapping.assembly import Inspections, assemble, inspected_for, why_none_sought
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
-from mapping.detection.path import PathLedger, SoundSweeps, path_ledger, sound_sweeps
-from mapping.estimate.deviation import Deviation, UnclimbedLevel, explain, left_standing, unclimbed_levels
-from mapping.estimate.envelope import RefutedTip, estimate_surface, refuted_tip
+from mapping.detection.path import (
+    PathLedger,
+    SoundSweeps,
+    SparseSamples,
+    path_ledger,
+    sound_sweeps,
+    sparse_samples,
+)
+from mapping.estimate.deviation import Deviation, UnclimbedLevel, explain, felt_enough, left_standing, unclimbed_levels
+from mapping.estimate.envelope import RefutedTip, estimate_surface, refuted_by_lines, refuted_tip
 from mapping.geometry.curvature import principal_curvatures
 from mapping.geometry.mesh import distances
 from mapping.inference import refine_all
@@ -48,6 +55,8 @@ NOISE_FREE = 2e-8
 
 # What is left out where what may be a feature is none: taken for form, or too wide
 ABSORBED = "part of the form"
+# What is said of a model that nothing speaks against because nothing could
+TOO_LITTLE_FELT = "too little was felt to hold the model against it: a wrong one would not be named"
 # What a stage could not do although it was needed
 FAILED = "could not be done"
 _TOO_WIDE = "stands off the base and is wider than fine features are: only its edges are sought"
@@ -102,6 +111,7 @@ class Work:
         judgements: what became of the tolerances.
         apart: samples left out for that.
         refuted_tip: what the trace says against the radius of the tip; None if nothing.
+        sparse: what lies unfelt between samples that are further apart than the ball is wide; None if they are not.
         roughness: what the surface is like beside the features.
         standard_heights: what its ridges, grooves and steps measure by the standards.
         asked: whether a stage was asked for, by its name.
@@ -129,6 +139,7 @@ class Work:
     deviation: Deviation | None = None
     apart: int = 0
     refuted_tip: RefutedTip | None = None
+    sparse: SparseSamples | None = None
     roughness: Roughness | None = None
     standard_heights: tuple[StandardHeight, ...] = ()
     time_curve: tuple[tuple[float, float], ...] = ()
@@ -262,8 +273,8 @@ def deviated(work: Work, share: Share) -> None:
     swept = [event.data for event in work.log.events if event.kind == "move" and event.data["purpose"] == "sweep"]
     work.deviation = explain(laid, work.base, [np.asarray(data["path"], dtype=np.float64) for data in swept])
     if work.deviation is None:
-        agrees = "what was felt agrees with the model at long wavelengths"
-        work.stages.left_out.append(LeftOut("deviation map", agrees))
+        agrees = LeftOut("deviation map", "what was felt agrees with the model at long wavelengths")
+        work.stages.left_out.append(agrees if felt_enough(laid, work.base) else LeftOut(FAILED, TOO_LITTLE_FELT))
         work.trace = laid
         return
     work.base = work.deviation.base
@@ -309,10 +320,12 @@ def made_sound(work: Work, share: Share) -> None:
 
 
 def tip_asked(work: Work, share: Share) -> None:
-    """The radius of the tip, held against the trace while all of it is there: a tip told too large takes what it feels
-    for outliers."""
+    """The radius of the tip, held against the trace while all of it is there (a tip told too large takes what it feels
+    for outliers), and against the distance of the samples."""
     if not work.log.detections:
         work.refuted_tip = refuted_tip(work.laid, work.settings.tip_sd)
+        # of means the path between was felt, by the samples that they are the means of
+        work.sparse = None if work.log.metadata.get("average") else sparse_samples(work.laid)
 
 
 def why_no_contact_algorithms(work: Work) -> str | None:
@@ -334,15 +347,15 @@ def detected(work: Work, share: Share) -> None:
     """Crossings of single sweeps; samples that cannot have been felt count no more for anything that follows."""
     beyond = len(work.log.trace) - len(work.laid) - work.apart
     work.detections = detect(work.laid, work.base, **work.settings.detection)
+    keep = np.ones(len(work.trace), dtype=bool)
     if work.detections.unfelt:
-        keep = np.ones(len(work.trace), dtype=bool)
         keep[list(work.detections.unfelt)] = False
         work.trace, work.laid = work.trace.select(keep), work.laid.within(keep)
         found = detect(work.laid, work.base, **work.settings.detection)
         work.detections = replace(found, left_out=(*work.detections.left_out, *found.left_out))
     refused = work.deviation is not None and work.deviation.beyond_repair
     if work.sound is not None:
-        work.path = path_ledger(work.sound, work.detections, beyond, work.apart, refused)
+        work.path = path_ledger(work.sound, work.detections, beyond, work.apart, refused, keep)
     if work.deviation is not None and refused:
         crossings = len(work.detections.crossings)
         said = f"the model is wrong: of {crossings} places that stand off it, none is called a feature"
@@ -393,6 +406,13 @@ def assembled(work: Work, share: Share) -> None:
     work.features = assemble(
         work.detections, work.laid, work.base, false_alarms_per_metre=rate, inspections=work.inspections
     )
+
+
+def tip_asked_of_lines(work: Work, share: Share) -> None:
+    """The radius of the tip, held against all crossings of a ridge together: noise hides little of so many."""
+    if work.sound is not None and work.refuted_tip is None:
+        ridges = [feature for feature in work.features if feature.kind == "ridge"]
+        work.refuted_tip = refuted_by_lines(work.sound.trace, ridges, work.detections.noise, work.settings.tip_sd)
 
 
 def why_no_posterior(work: Work) -> str:
@@ -549,6 +569,7 @@ def modelled(work: Work, share: Share) -> None:
     rough = {} if work.roughness is None else {"roughness": work.roughness.record()}
     deviation = {} if work.deviation is None else {"deviation": work.deviation.record()}
     refuted = {} if work.refuted_tip is None else {"refuted_tip": work.refuted_tip.record()}
+    sparse = {} if work.sparse is None else {"sparse_samples": work.sparse.record()}
     curved = {} if work.curvature is None else {"curvature": work.curvature.record()}
     proven = {} if work.estimate is None else {"estimated_surface": work.estimate.certainty()}
     work.model = ObjectModel.attach(
@@ -560,6 +581,7 @@ def modelled(work: Work, share: Share) -> None:
         | path
         | deviation
         | refuted
+        | sparse
         | curved
         | proven
         | rough,
