@@ -25,23 +25,18 @@ from explore3d.scene import AnalysisSettings, Scene
 from mapping import Dropped, EnvelopeError, Feature, LeftOut, Trace, length_text, place_text
 from mapping.assembly import Inspections, assemble, inspected_for, why_none_sought
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
-from mapping.detection import (
-    RAW_SAMPLES,
-    Backlash,
-    Detections,
-    backlash,
-    detect,
-    recovered,
-    with_doubt,
-    without_backlash,
-)
+from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
 from mapping.detection.path import (
+    Backlash,
     PathLedger,
     SoundSweeps,
     SparseSamples,
+    backlash,
     path_ledger,
     sound_sweeps,
     sparse_samples,
+    with_doubt,
+    without_backlash,
 )
 from mapping.estimate.deviation import Deviation, UnclimbedLevel, explain, felt_enough, left_standing, unclimbed_levels
 from mapping.estimate.envelope import RefutedTip, estimate_surface, refuted_by_lines, refuted_tip

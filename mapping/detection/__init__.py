@@ -5,12 +5,6 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.detection.backlash import (
-        Backlash as Backlash,
-        backlash as backlash,
-        with_doubt as with_doubt,
-        without_backlash as without_backlash,
-    )
     from mapping.detection.candidates import CLEAR as CLEAR
     from mapping.detection.coverage import (
         Coverage as Coverage,
@@ -36,7 +30,6 @@ if TYPE_CHECKING:
     from mapping.detection.terraces import terraced as terraced
 
 _PUBLIC = {
-    "backlash": ("Backlash", "backlash", "with_doubt", "without_backlash"),
     "candidates": ("CLEAR",),
     "coverage": ("Coverage", "FoundHeights", "coverage", "face_samples", "found_heights"),
     "crossing": ("Crossing",),

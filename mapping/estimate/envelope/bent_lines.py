@@ -116,7 +116,7 @@ def _chance(crossed: list[_Crossed], noise: Noise, radius: float) -> tuple[float
         asked += 1
         if (chance := float(ndtr(-beyond))) < best:
             best, places = chance, len(told)
-    return min(1.0, asked * best), places
+    return min(1.0, max(asked, 1) * best), places
 
 
 def _crossings(laid: LaidTrace, line: Feature) -> Iterator[_Crossed]:

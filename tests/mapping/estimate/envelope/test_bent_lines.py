@@ -17,12 +17,19 @@ STEP, SWEEPS, PITCH = 0.01, 8, 0.5  # in true radii of the ball
 
 
 def asked(
-    told: float, height: float, section: float, noise: float, seed: int, tip_sd: float = 0.0, shared: bool = False
+    told: float,
+    height: float,
+    section: float,
+    noise: float,
+    seed: int,
+    tip_sd: float = 0.0,
+    shared: bool = False,
+    step: float = STEP,
 ) -> tuple[RefutedTip | None, RefutedTip | None]:
     """What the crossings of a ridge of this height and radius of section say of a told radius, and what bends alone
     say; all in true radii. `shared`: the noise is correlated over a fifth of a radius."""
     rng = np.random.default_rng((41, seed))
-    x, lean, large = np.arange(-12.0, 12.0, STEP), rng.uniform(-0.3, 0.3), 1.0 + section
+    x, lean, large = np.arange(-12.0, 12.0, step), rng.uniform(-0.3, 0.3), 1.0 + section
     rows = []
     for k in range(SWEEPS):
         y = PITCH * (k - 0.5 * SWEEPS)
@@ -73,6 +80,10 @@ def test_a_blade_under_the_right_ball_refutes_nothing(seed: int) -> None:
 def test_a_doubt_that_covers_the_true_radius_leaves_it() -> None:
     assert asked(1.3, 0.1, 0.05, 5e-3, seed=2)[0] is not None
     assert asked(1.3, 0.1, 0.05, 5e-3, seed=2, tip_sd=0.1)[0] is None
+
+
+def test_crests_of_a_few_samples_tell_nothing() -> None:
+    assert asked(1.0, 0.3, 0.05, 1e-3, seed=3, step=0.25)[0] is None
 
 
 def test_a_trace_without_a_line_is_not_asked() -> None:

@@ -3,9 +3,9 @@
 The centre that is recorded hangs behind the true one by up to half the play of each axis: on the way up a crest it is
 too low, on the way down too high, and along a sweep every place lies too far back. The heights over all crossings tell
 the play: beside the crest that fits best, with its place and its width free, they go up later and come down later, and
-stay where the axis was left. Its size is one number, and what is known of it is the likelihood of all crossings. A
-crest that is steeper on one side is not told from it by sweeps that go one way alone, but it is so in proportion to its
-height; which of the two explains the crossings better is asked.
+stay where the axis was left. Its size is one number, and what is known of it is the likelihood of all crossings. Crests
+that are steeper on one side, or of another section, are so in proportion to their heights and end where they end: a
+section that all crossings have in common is marginalised.
 
 What the play does along the sweeps is not felt on level ground: there the axes are taken to be alike, and places carry
 a doubt as large.
@@ -23,22 +23,25 @@ import numpy as np
 
 from mapping import FloatArray, Trace, length_text
 from mapping.base import LaidSweep, LaidTrace, SweepHeights
-from mapping.detection.crossing import Crossing
-from mapping.detection.detect import Detections
+from mapping.detection import Crossing, Detections
 from mapping.instrument import Noise
 
 # Half plays that are tried, in standard deviations of a sample: below a fiftieth a hundred crossings of a hundred
 # samples tell nothing (1 / sqrt(10^4)); a play of 60 is wider than the crests that such noise lets see
 HALF_PLAYS = np.geomspace(0.02, 30.0, 40)
 # Beforehand a machine has a play that matters with this probability (as each cause of a wrong model has), and it is
-# named if it makes the heights a thousand times more probable than none, than crests that are steeper on one side, and
-# than a play of each crossing's own: what is no play of the machine moves them by different amounts
+# named if it makes the heights a thousand times more probable than none, and than a play of each crossing's own: what
+# is no play of the machine moves them by different amounts
 LIKELY_PLAY, LEAST_PLAY_GAIN = 0.1, float(np.log(1e3))
-# Share of a crest's height by which one side of it may be steeper, tried in the same way
-STEEPER = np.concatenate([-np.geomspace(0.01, 1.0, 12)[::-1], np.geomspace(0.01, 1.0, 12)])
+# Sections are no parabolas: what all crossings have in common, in shares of their heights, is a line through knots so
+# many half-widths apart and as far out, of one of these standard deviations (those of theory equation 5.1, and one for
+# sections that are quite another)
+KNOT_STEP, KNOT_REACH, SECTION_SDS = 0.125, 1.5, (0.0, 0.01, 0.03, 0.1, 0.3)
 # A crossing is looked at with this many half-widths to either side of its crest, or to the middle between it and the
 # next, in so many bins at most: the axis stays where it was left, which the level beside the crest tells
 WINDOW_HALF_WIDTHS, WINDOW_BINS = 8.0, 160
+# Crossings that are asked: a play that two hundred do not tell is of no consequence
+MOST_WINDOWS = 200
 
 
 @dataclass(frozen=True)
@@ -100,16 +103,15 @@ def backlash(laid: LaidTrace, found: Detections, taken: float = 0.0) -> Backlash
     sd = found.noise.sd
     profiles = _profiles(laid, found.crossings)
     windows = [window for profile in profiles for window in _windows(profile, found.noise)]
+    windows = windows[:: 1 + len(windows) // MOST_WINDOWS]
     if not windows or not sd > 0.0:
         return None
     halves = sd * HALF_PLAYS
-    each = np.array([window.gains(halves, 0.5 * taken) for window in windows])
-    log = each.sum(axis=0)
+    section = _Section(windows, halves, 0.5 * taken)
+    log = section.gains()
     # the path is reckoned with crests as they were recorded: higher than the play, or the axis would not have moved
     log[halves > 0.5 * float(np.median([abs(window.height) for window in windows]))] = -np.inf
-    steeper = sum((window.gain_if_steeper(0.5 * taken) for window in windows), np.zeros(len(STEEPER)))
-    evidence = _evidence(log)
-    gain = evidence - max(0.0, _evidence(steeper), _evidence_of_each(each))
+    gain = _evidence(log) - max(0.0, _evidence_of_each(section.gains_of_each()))
     if gain < LEAST_PLAY_GAIN:
         return None
     weight = np.exp(log - log.max())
@@ -131,7 +133,7 @@ def without_backlash(trace: Trace, laid: LaidTrace, found: Detections, play: flo
         laid, found: as given to `backlash`.
         play: of each axis, m.
     """
-    from mapping.detection.backlash_kernels import hang_behind
+    from mapping.detection.path.backlash_kernels import hang_behind
 
     when, behind = [np.zeros(0)], [np.zeros((0, 3))]
     for profile in _profiles(laid, found.crossings):
@@ -169,7 +171,7 @@ def _evidence(log: FloatArray) -> float:
 
 
 def _evidence_of_each(log: FloatArray) -> float:
-    """The same if every crossing (K) hangs behind by an amount of its own (K, H), or by none: what a machine does not."""
+    """The same if every crossing (K) hangs behind by an amount of its own (K, H), or by none: no machine does that."""
     top = np.maximum(log.max(axis=1), 0.0)
     own = LIKELY_PLAY * np.exp(log - top[:, None]).mean(axis=1) + (1.0 - LIKELY_PLAY) * np.exp(-top)
     return float((top + np.log(own)).sum())
@@ -242,21 +244,59 @@ class _Window:
         self.root, self.values, self.height, self.u = root, values, crossing.height, u
         self.lifted, self.inside, self.merge = lifted, inside, merge
 
-    def gains(self, halves: FloatArray, taken: float) -> FloatArray:
-        """(H,) gain in the log-likelihood for half plays, m, of which one was taken off already."""
-        heights = self.values + self._seen(taken)
-        seen = [self._seen(half) for half in halves]
-        return np.array([float(each @ heights - 0.5 * each @ each) for each in seen])
+    def section(self) -> FloatArray:
+        """(n, K) the height at its knots, whitened."""
+        knots = np.arange(-KNOT_REACH, KNOT_REACH + 0.5 * KNOT_STEP, KNOT_STEP)
+        hats = np.maximum(1.0 - np.abs(self.u[:, None] - knots) / KNOT_STEP, 0.0)
+        return np.asarray(self.root @ (self.height * hats))
 
-    def gain_if_steeper(self, taken: float) -> FloatArray:
-        """(K,) gain for the shares STEEPER of the height."""
-        odd = self.height * np.where(np.abs(self.u) < 1.0, self.u * (1.0 - self.u**2), 0.0)
-        seen, heights = self.root @ odd, self.values + self._seen(taken)
-        return np.asarray(STEEPER * float(seen @ heights) - 0.5 * STEEPER**2 * float(seen @ seen))
-
-    def _seen(self, half: float) -> FloatArray:
+    def seen(self, half: float) -> FloatArray:
         """(n,) what a half play makes of the heights, whitened."""
         return np.asarray(self.root @ _merged(self.lifted.by(half)[self.inside], self.merge))
+
+
+class _Section:
+    """What all crossings have in common beside their caps, marginalised.
+
+    Args:
+        windows: the crossings (W).
+        halves: (H,) half plays that are tried, m.
+        taken: half of a play that was taken off their heights already, m.
+    """
+
+    def __init__(self, windows: Sequence[_Window], halves: FloatArray, taken: float) -> None:
+        self.seen = [np.array([window.seen(half) for half in halves]) for window in windows]
+        self.heights = [window.values + window.seen(taken) for window in windows]
+        self.columns = [window.section() for window in windows]
+        gram = np.sum([each.T @ each for each in self.columns], axis=0)
+        unit = np.eye(len(gram))
+        # of each standard deviation: covariance of the knots after the heights, and what that costs
+        self.after = [sd**2 * np.linalg.inv(unit + sd**2 * gram) for sd in SECTION_SDS]
+        self.cost = [-0.5 * float(np.linalg.slogdet(unit + sd**2 * gram)[1]) for sd in SECTION_SDS]
+
+    def gains(self) -> FloatArray:
+        """(H,) gain in the log-likelihood for the half plays."""
+        tried = range(len(self.seen[0]))
+        left = ([y - seen[k] for y, seen in zip(self.heights, self.seen, strict=True)] for k in tried)
+        return np.array([self._log(each) for each in left]) - self._log(self.heights)
+
+    def gains_of_each(self) -> FloatArray:
+        """(W, H) the same of every crossing alone, beside the section that all have without a play."""
+        logs = [self._log_of(self.heights, k) for k in range(len(SECTION_SDS))]
+        common = self.after[int(np.argmax(logs))] @ self._moment(self.heights)
+        each = zip(self.seen, self.heights, self.columns, strict=True)
+        return np.array([seen @ (y - columns @ common) - 0.5 * (seen**2).sum(axis=1) for seen, y, columns in each])
+
+    def _moment(self, left: Sequence[FloatArray]) -> FloatArray:
+        return np.asarray(np.sum([each.T @ y for each, y in zip(self.columns, left, strict=True)], axis=0))
+
+    def _log(self, left: Sequence[FloatArray]) -> float:
+        logs = np.array([self._log_of(left, k) for k in range(len(SECTION_SDS))])
+        return float(logs.max() + np.log(np.exp(logs - logs.max()).mean()))
+
+    def _log_of(self, left: Sequence[FloatArray], k: int) -> float:
+        moment = self._moment(left)
+        return float(0.5 * moment @ self.after[k] @ moment) + self.cost[k] - 0.5 * sum(float(y @ y) for y in left)
 
 
 class _Lifted:
@@ -268,7 +308,7 @@ class _Lifted:
 
     def by(self, half: float) -> FloatArray:
         """(N,) for a half play, m."""
-        from mapping.detection.backlash_kernels import hang_behind
+        from mapping.detection.path.backlash_kernels import hang_behind
 
         if half not in self._known:
             self._known[half] = np.einsum("ij,ij->i", hang_behind(self._path, half), self._normals)
