@@ -16,8 +16,8 @@ from mapping.posterior import Posterior
 # Log Bayes factor below which evidence is "barely worth mentioning" (Jeffreys, Theory of Probability, 1961, appendix
 # B): what was sought in many places has odds against it before.
 SUBSTANTIAL = 0.5 * math.log(10.0)
-
-
+# Standard deviations of a Gaussian to its 95 % quantile
+NORMAL_QUANTILE_95 = 1.6448536
 LENGTH_UNITS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 # A lower bound below this share of the upper one reads as none
 NEXT_TO_NOTHING = 0.02
@@ -92,8 +92,14 @@ class Interval:
 
     @classmethod
     def normal(cls, mean: float, sd: float) -> Interval:
-        """The interval of a Gaussian; 1.6449 is its 95 % quantile."""
-        return cls(float(mean), float(mean - 1.6448536 * sd), float(mean + 1.6448536 * sd))
+        """The interval of a Gaussian."""
+        return cls(float(mean), float(mean - NORMAL_QUANTILE_95 * sd), float(mean + NORMAL_QUANTILE_95 * sd))
+
+    def with_doubt(self, sd: float) -> Interval:
+        """The same value with a further, independent, Gaussian doubt of so much; a bound moves by as much."""
+        low, high = (abs(end - self.median) for end in (self.low, self.high))
+        more = NORMAL_QUANTILE_95 * sd
+        return replace(self, low=self.median - math.hypot(low, more), high=self.median + math.hypot(high, more))
 
     def text(self, unit: str = "") -> tuple[str, str]:
         """The median with its unit, and the 90 % range ("0.64 to 0.66", or ""); a bound has none: "at least 0.64 mm",

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from explore3d.log import Stop
     from explore3d.scene import Scene
     from mapping.detection import Detections
-    from mapping.detection.path import PathLedger
+    from mapping.detection.path import PathLedger, SparseSamples
     from mapping.estimate.deviation import Deviation
     from mapping.estimate.envelope import Estimate, RefutedTip
     from mapping.geometry.curvature import Curvature
@@ -96,6 +96,7 @@ class Analysis:
         path: what became of the path that was recorded; None for a log that was searched while it was read.
         deviation: what the given model gets wrong at long wavelengths, None if nothing.
         refuted_tip: what the trace says against the radius of the tip, None if nothing.
+        sparse: what lies unfelt between samples that are further apart than the ball is wide, None if they are not.
         judgements: what became of each tolerance.
         roughness: what the surface is like beside the features; None where a trace cannot tell.
         standard_heights: what its ridges, grooves and steps measure by the standards.
@@ -126,6 +127,7 @@ class Analysis:
     path: PathLedger | None = None
     deviation: Deviation | None = None
     refuted_tip: RefutedTip | None = None
+    sparse: SparseSamples | None = None
     judgements: tuple[Judgement, ...] = ()
     roughness: Roughness | None = None
     standard_heights: tuple[StandardHeight, ...] = ()

@@ -116,15 +116,21 @@ def warnings(analysis: Analysis) -> list[str]:
 
 
 def tip_warning(analysis: Analysis) -> list[str]:
-    """What must be read before anything else that was found: that the tip was none of the radius that was told."""
-    refuted = analysis.refuted_tip
-    if refuted is None:
-        return []
+    """What must be read before anything else that was found: that the tip was none of the radius that was told, or
+    that a ball of that radius did not feel what lies between the samples."""
+    refuted, sparse, told = analysis.refuted_tip, analysis.sparse, []
     where = "--tip-radius" if analysis.scene is None else "tip.radius in the scene"
-    return [
-        f"Warning: {refuted.sentence()}. All that follows rests on that radius and is not to be believed: is its unit "
-        f"right? Give the right one with {where}, or with --tip-sd how far it may be off."
-    ]
+    if refuted is not None:
+        told.append(
+            f"Warning: {refuted.sentence()}. All that follows rests on that radius and is not to be believed: is its "
+            f"unit right? Give the right one with {where}, or with --tip-sd how far it may be off."
+        )
+    if sparse is not None:
+        told.append(
+            f"Warning: {sparse.sentence()}. Nothing that follows holds between the samples: is the unit of the radius "
+            f"right ({where})?"
+        )
+    return told
 
 
 def deviation_warning(analysis: Analysis) -> list[str]:

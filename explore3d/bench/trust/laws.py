@@ -191,7 +191,9 @@ def _stuck(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
 
 
 def _linear_drift(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
-    return _white(path, level, rng) + 20.0 * level.sd * np.linspace(0.0, rng.choice([-1.0, 1.0]), len(path.sweep))
+    # also while the finger is on its way from sweep to sweep: by the samples' count it would be a tilt of a plate
+    far = 20.0 * level.sd * rng.choice([-1.0, 1.0])
+    return np.asarray(_white(path, level, rng) + far * path.t / path.t[-1])
 
 
 def _random_walk(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:

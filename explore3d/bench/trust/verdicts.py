@@ -249,6 +249,7 @@ def _usual_warnings(records: Sequence[dict[str, Any]], law: str) -> str:
         "too few samples": "too few to inspect",
         "may be rounding": "may be rounding",
         "tip refuted": "the tip was no ball",
+        "readings hang behind": "hang behind",
     }
     shares = {
         kind: np.mean([any(words in said for said in each["warnings"]) for each in bare])

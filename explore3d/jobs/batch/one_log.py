@@ -121,7 +121,7 @@ def _analysed(job: Job) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 def _known(analysis: Analysis) -> dict[str, Any]:
     detections = analysis.detections
     noise, limit = detections.noise, float(detections.detection_limit)
-    refuted = () if analysis.refuted_tip is None else (analysis.refuted_tip.sentence(),)
+    of_tip = [each.sentence() for each in (analysis.refuted_tip, analysis.sparse) if each is not None]
     return {
         "samples": int(analysis.model.provenance["samples"]),
         "features": len(analysis.model.features),
@@ -132,5 +132,5 @@ def _known(analysis: Analysis) -> dict[str, Any]:
         "detection_limit": limit if limit < float("inf") else None,
         "base": analysis.base.kind,
         "tolerances": overall([each.verdict for each in analysis.judgements]) or None,
-        "warnings": "; ".join((*refuted, *detections.remarks)) or None,
+        "warnings": "; ".join((*of_tip, *detections.remarks)) or None,
     }

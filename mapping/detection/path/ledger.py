@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mapping import BoolArray
 from mapping.detection import SHORTEST_SWEEP_SAMPLES, Detections
 from mapping.detection.path.sound_sweeps import JUMP_STEPS, SoundSweeps
 
@@ -53,7 +54,12 @@ class PathLedger:
 
 
 def path_ledger(
-    sound: SoundSweeps, detections: Detections, beyond: int = 0, apart: int = 0, refused: bool = False
+    sound: SoundSweeps,
+    detections: Detections,
+    beyond: int = 0,
+    apart: int = 0,
+    refused: bool = False,
+    felt: BoolArray | None = None,
 ) -> PathLedger:
     """The account of a trace that was inspected.
 
@@ -63,18 +69,26 @@ def path_ledger(
         beyond: samples that were recorded beyond the base's border, and not looked at.
         apart: samples on parts that the body has and its model has not, or the other way round, and not looked at.
         refused: whether the model is wrong beyond repair, and nothing was looked for over it.
+        felt: (N,) False for samples of that trace that no ball on any surface can give; None: all were felt.
     """
     inspected_of = dict(detections.inspected_sweeps)
-    path = few = inspected = 0.0
+    felt = np.ones(len(sound.trace), dtype=bool) if felt is None else felt
+    path = few = inspected = unfelt = 0.0
+    begin = 0
     for sweep in sound.trace.laid_sweeps:
+        own = felt[begin : begin + len(sweep.trace)]
+        begin += len(sweep.trace)
         steps = np.diff(sweep.arclength)
         usual = float(np.median(steps)) if len(steps) else 0.0
         # over a gap that the times tell of nothing was touched
-        length = float(steps[steps <= JUMP_STEPS * usual].sum())
+        touched = steps <= JUMP_STEPS * usual
+        length = float(steps[touched].sum())
         path += length
         if sweep.number in inspected_of:
-            # bins may reach past a sweep's ends
-            inspected += min(inspected_of[sweep.number], length)
+            # bins may reach past a sweep's ends, and over lone samples that were not felt
+            seen = min(inspected_of[sweep.number], length)
+            inspected += seen
+            unfelt += min(float(steps[touched & ~(own[1:] & own[:-1])].sum()), length - seen)
         else:
             few += length
     outside = {
@@ -83,7 +97,8 @@ def path_ledger(
     }
     lost = outside | {
         f"sweeps of fewer than {SHORTEST_SWEEP_SAMPLES} samples": few,
-        "ends of sweeps, and pieces too short for the smallest crest": path - few - inspected,
+        "readings that no ball of this radius gives, or that do not change": unfelt,
+        "ends of sweeps, and pieces too short for the smallest crest": path - few - inspected - unfelt,
     }
     recorded = path + sum(outside.values())
     if refused:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.estimate.deviation.explain import explain as explain
+    from mapping.estimate.deviation.explain import explain as explain, felt_enough as felt_enough
     from mapping.estimate.deviation.left_standing import LeftStanding as LeftStanding, left_standing as left_standing
     from mapping.estimate.deviation.result import CAUSES as CAUSES, Deviation as Deviation, Part as Part
     from mapping.estimate.deviation.unclimbed import (
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
-    "explain": ("explain",),
+    "explain": ("explain", "felt_enough"),
     "left_standing": ("LeftStanding", "left_standing"),
     "result": ("CAUSES", "Deviation", "Part"),
     "unclimbed": ("UnclimbedLevel", "unclimbed_levels"),

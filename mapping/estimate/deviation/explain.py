@@ -133,12 +133,10 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
     for _ in range(MOST_ROUNDS):
         whole = ~_covered(parts, seen.points)
         keep = seen.smooth(seen.height) & whole
-        # near what is steep a height may be the skirt of a feature: of the model it says something if enough lies apart
-        told = (keep & seen.apart(SHORTEST_FIELD * tip)).sum() >= FEWEST_BLOCKS
         # where more of the surface agrees with the model than hangs together beside it, that is a plateau
         flat = whole & (np.abs(seen.height) <= FAR_OFF * seen.noise)
         plateau = seen.weight[flat].sum() > seen.weight[keep].sum()
-        if not told or _agrees(seen, seen.height, keep, tip) or plateau:
+        if not _told(seen, keep, tip) or _agrees(seen, seen.height, keep, tip) or plateau:
             break
         step, own = _explanation(seen, whole, base, tip), _drift(seen, whole, tip)
         if own is not None and (step is None or own.gain > step.gain):
@@ -171,6 +169,26 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
         gain=level_gain,
         facing=_facing(blocks),
     )
+
+
+def felt_enough(trace: Trace, base: Base) -> bool:
+    """True if so much was felt that `explain` could tell that the model is wrong: where it finds nothing, that speaks
+    for the model.
+
+    Args:
+        trace, base: as given to `explain`.
+    """
+    blocks, tip = Blocks.of(LaidTrace.of(trace, base)), trace.tip_radius
+    if len(blocks) < FEWEST_BLOCKS:
+        return False
+    keep = blocks.smooth(blocks.height)
+    return _told(blocks, keep, tip) or _agrees(blocks, blocks.height, keep, tip)
+
+
+def _told(blocks: Blocks, keep: BoolArray, tip: float) -> bool:
+    """True if enough of the blocks to keep (B,) lie apart from what is steep: nearer, a height may be the skirt of a
+    feature, and says nothing of the model."""
+    return bool((keep & blocks.apart(SHORTEST_FIELD * tip)).sum() >= FEWEST_BLOCKS)
 
 
 def _common_level(blocks: Blocks, base: Base, tip: float) -> tuple[float, float]:

@@ -5,12 +5,14 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from mapping.estimate.envelope.bent_lines import refuted_by_lines as refuted_by_lines
     from mapping.estimate.envelope.envelope import estimate_surface as estimate_surface
     from mapping.estimate.envelope.estimate import Estimate as Estimate
     from mapping.estimate.envelope.profile_envelope import envelope_heights as envelope_heights
     from mapping.estimate.envelope.refuted_tip import RefutedTip as RefutedTip, refuted_tip as refuted_tip
 
 _PUBLIC = {
+    "bent_lines": ("refuted_by_lines",),
     "envelope": ("estimate_surface",),
     "estimate": ("Estimate",),
     "profile_envelope": ("envelope_heights",),

@@ -43,6 +43,7 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
         account=None,
         deviation=None,
         refuted_tip=None,
+        sparse=None,
         scene=None,
         path=None,
         left_out=(),

@@ -234,3 +234,25 @@ def test_ten_samples_a_sweep_are_used_for_what_they_are_worth(seed: int) -> None
     ledger, found = inspected(traced(np.concatenate(lines), of))
     assert ledger.shortfall < 0.02
     assert [feature.kind for feature in found] == ["ridge"]
+
+
+def test_readings_that_were_not_felt_have_their_own_reason() -> None:
+    places, number = serpentine(BUILT_ON)
+    trace = traced(places, BUILT_ON, number)
+    centers = trace.centers.copy()
+    off = np.zeros(len(trace), dtype=bool)
+    for begin in range(1000, len(trace) - 1000, 4000):
+        off[begin : begin + 200] = True
+    centers[off, 2] += 2e-3  # a wall that no ball draws
+    sound = sound_sweeps(replace(trace, centers=centers), plate())
+    found = detect(sound.trace, plate())
+    felt = np.ones(len(trace), dtype=bool)
+    felt[list(found.unfelt)] = False
+    assert (~felt)[off].mean() > 0.9
+    kept = sound.trace.within(felt)
+    left_out = dict(path_ledger(sound, detect(kept, plate()), felt=felt).left_out)
+    (own,) = (length for reason, length in left_out.items() if "no ball of this radius" in reason)
+    assert own == pytest.approx(BUILT_ON.spacing * (~felt).sum(), rel=0.2)
+    before = dict(path_ledger(sound, detect(kept, plate())).left_out)
+    (ends,) = (length for reason, length in before.items() if "ends of sweeps" in reason)
+    assert left_out.get("ends of sweeps, and pieces too short for the smallest crest", 0.0) < 0.2 * ends

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from mapping import FloatArray, Surface, Trace
 from mapping.base import Base, LaidTrace
-from mapping.estimate.deviation import explain
+from mapping.estimate.deviation import explain, felt_enough
 from mapping.estimate.deviation.drift import SteadyDrift
 from mapping.estimate.deviation.explain import FEW_SAMPLES, _robust, _unfelt
 
@@ -357,3 +357,13 @@ def test_the_skirt_of_a_tall_feature_on_a_small_plate_is_no_deviation() -> None:
 def test_heights_without_noise_do_not_tell_two_like_causes_apart_and_need_not() -> None:
     found = _robust(np.ones((40, 2)), np.zeros(40), np.ones(40), np.ones(40, dtype=bool), 3e-4)
     np.testing.assert_array_equal(found, np.zeros(40))
+
+
+def test_what_speaks_for_a_model_is_told_from_what_says_nothing() -> None:
+    whole = felt()
+    assert felt_enough(whole, model())
+    # ten tip radii of one sweep are twenty blocks: no cause could be told, and none is
+    few = whole.select(np.flatnonzero(whole.sweep == whole.sweep[0])[:400])
+    lifted = Trace(few.t, few.centers + np.array([0.0, 0.0, 0.4e-3]), few.sweep, TIP)
+    assert explain(lifted, model()) is None
+    assert not felt_enough(lifted, model())

@@ -1,0 +1,87 @@
+"""The play of a machine's axes is told from the flanks of all crossings; where there is none, none is."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from mapping import FloatArray, Surface, Trace
+from mapping.base import Base, LaidTrace
+from mapping.detection import Detections, detect
+from mapping.detection.path import Backlash, backlash, with_doubt, without_backlash
+
+TIP, STEP, NOISE, SWEEPS = 5e-3, 50e-6, 20e-6, 8
+HEIGHTS = np.array([0.12e-3, 0.2e-3, 0.16e-3])
+
+
+def plate() -> Base:
+    corners = 0.2 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    return Base(Surface(corners, np.array([[0, 1, 2], [0, 2, 3]])))
+
+
+def played(path: FloatArray, play: float) -> FloatArray:
+    """Where a stage stands that follows a path (N, 3) by the axes only as they are pulled: their ends of play."""
+    out = path.copy()
+    for before, now in itertools.pairwise(out):
+        now[:] = np.minimum(np.maximum(before, now - 0.5 * play), now + 0.5 * play)
+    return out
+
+
+def swept(play: float, seed: int, steeper: float = 0.0, back: bool = False) -> Trace:
+    """Sweeps across three wires; `steeper`: share of the height by which one side of each is steeper."""
+    rng = np.random.default_rng((61, seed))
+    x = np.arange(-45e-3, 45e-3, STEP)
+    rows = []
+    for k in range(SWEEPS):
+        z = np.full(len(x), TIP)
+        for height, place in zip(HEIGHTS, (-25e-3, 2e-3, 28e-3), strict=True):
+            u = (x - place - rng.uniform(-1.0, 1.0) * STEP) / np.sqrt(2.0 * TIP * height)
+            z += height * np.maximum(1.0 - u**2, 0.0) * (1.0 + steeper * np.clip(u, -1.0, 1.0))
+        path = np.column_stack([x, np.full(len(x), 2e-3 * k), z])
+        path = path[::-1] if back and k % 2 else path
+        rows.append(played(path, play) + NOISE * rng.standard_normal((len(x), 1)) * [0.0, 0.0, 1.0])
+    centers = np.concatenate(rows)
+    return Trace(1e-3 * np.arange(len(centers)), centers, np.repeat(np.arange(SWEEPS), len(x)), TIP)
+
+
+def asked(trace: Trace) -> tuple[LaidTrace, Detections, Backlash | None]:
+    laid = LaidTrace.of(trace, plate())
+    found = detect(laid, laid.base)
+    return laid, found, backlash(laid, found)
+
+
+@pytest.mark.parametrize("back", [False, True])
+@pytest.mark.parametrize("play", [20e-6, 40e-6])
+def test_a_play_is_told_and_heights_without_it_are_right(play: float, back: bool) -> None:
+    trace = swept(play, seed=1, back=back)
+    laid, found, told = asked(trace)
+    off, before = [_height_error(found)], 0.0
+    for _ in range(4):
+        assert told is not None and told.one_way is not back
+        laid, found, _ = asked(without_backlash(trace, laid, found, told.play))
+        off.append(_height_error(found))
+        before, told = told.play, backlash(laid, found, told.play)
+    assert told is not None and abs(told.play - play) < 3.0 * told.sd
+    assert abs(told.play - before) < told.sd
+    assert off[-1] < 0.5 * off[0] and off[-1] < 0.3 * play
+    said = with_doubt(found, told)
+    assert said.remarks[-1] == told.sentence()
+    assert min(c.position_sd for c in said.crossings) > 0.5 * told.play
+
+
+def _height_error(found: Detections) -> float:
+    """How far the heights of crossings are off that of the next wire, m."""
+    heights = np.array([c.height for c in found.crossings])
+    return float(np.abs(np.subtract.outer(heights, HEIGHTS)).min(axis=1).mean())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_where_the_axes_have_no_play_none_is_told(seed: int) -> None:
+    assert asked(swept(0.0, seed=10 + seed, back=bool(seed % 2)))[2] is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_crests_that_are_steeper_on_one_side_are_no_play(seed: int) -> None:
+    assert asked(swept(0.0, seed=20 + seed, steeper=0.3))[2] is None
