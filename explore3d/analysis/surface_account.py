@@ -133,7 +133,10 @@ class SurfaceAccount:
         sweeps = [move for move in moves if move.purpose == "sweep"]
         refusals = [move for move, _ in refused if move.purpose == "sweep"]
         spacing = 0.2 * scene.tip.radius
-        dense = [resampled(m.path, m.approach, spacing)[0] if len(m.path) > 1 else m.path for m in sweeps]
+        dense = []
+        for move in sweeps:
+            touched = scene.finger.touches(move, scene.tip.radius) if len(move.path) > 1 else move.path
+            dense.append(resampled(move.path, move.approach, spacing)[0] if touched is None else touched)
         feet = base.foot(np.concatenate(dense) if dense else np.zeros((0, 3)), scene.tip.radius)
         return cls(
             **_shares(base, scene, (feet.points, feet.normals), [move.path for move in refusals]),

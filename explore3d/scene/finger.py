@@ -19,9 +19,9 @@ from pydantic import Field, ValidationError
 from explore3d import SceneError
 from explore3d.scene.complaint import complaint
 from explore3d.scene.values import Delay, Extent, Length, Speed, Table, Turn
-from hw import Finger
+from hw import Finger, Move
 from hw.sensors import ForceSensor
-from mapping import Surface
+from mapping import FloatArray, Surface
 
 FINGER_GROUP, SENSOR_GROUP = "explore3d.fingers", "explore3d.sensors"
 FINGERS = {
@@ -97,6 +97,10 @@ class FingerTable(Table):
     @property
     def touched(self) -> tuple[Path, str] | None:
         """Mesh and unit of what it touches, where that is a file; the truth of a simulation."""
+        return None
+
+    def touches(self, move: Move, tip_radius: float) -> FloatArray | None:
+        """(N, 3) the ball's commanded centres where it touches along a sweep, m; None: all along it."""
         return None
 
     def follows(self, tip_radius: float, smallest: float) -> tuple[float, float] | None:

@@ -60,20 +60,22 @@ class Peck:
     speed: float
     stroke: float
 
-    def count(self, move: Move) -> int:
-        """How often a sweep is pecked at."""
-        return len(spaced(move, min(self.step, move.length / FEWEST_PECKS))[0])
+    def places(self, move: Move) -> tuple[FloatArray, FloatArray]:
+        """Commanded centres (N, 3) of the pecks at a sweep, m, and unit approach directions (N, 3)."""
+        return spaced(move, min(self.step, move.length / FEWEST_PECKS))
 
     def seconds(self, stage: GuardedStage, move: Move) -> float:
         """About how long a sweep takes, s: up, on and down at their speeds, and what asking takes."""
         guarded = stage.guarded_speed
         on, down = np.hypot(self.step, self.clearance) / guarded, self.clearance / min(self.speed, guarded)
         up = self.clearance / stage.speed
-        return self.count(move) * float(on + down + up + ASKINGS * max(stage.controller.round_trip, LEAST_ASKING))
+        return len(self.places(move)[0]) * float(
+            on + down + up + ASKINGS * max(stage.controller.round_trip, LEAST_ASKING)
+        )
 
     def trace(self, stage: GuardedStage, move: Move) -> Iterator[Touched]:
         """The latched tip centre of each contact along the sweep, as it is made."""
-        path, approach = spaced(move, min(self.step, move.length / FEWEST_PECKS))
+        path, approach = self.places(move)
         depth = -self.stroke  # of the last contact behind the commanded path, along the approach
         known: list[FloatArray] = []  # contacts before this one
         left_out = 0

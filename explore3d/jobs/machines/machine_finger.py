@@ -13,9 +13,10 @@ from pydantic import SerializeAsAny, model_validator
 from explore3d import SceneError
 from explore3d.jobs.machines.emulate import Emulation, EmulatorProcess
 from explore3d.scene import EMULATOR, FingerTable, LengthUnit, MachineTable, SensorTable, Setting
-from hw import Finger
+from hw import Finger, Move
 from hw.grbl import StageFrame
 from hw.probing import GrblFinger, Peck, Slide
+from mapping import FloatArray
 
 
 class GrblFingerTable(FingerTable):
@@ -55,6 +56,10 @@ class GrblFingerTable(FingerTable):
     def touched(self) -> tuple[Path, str] | None:
         """Mesh and unit of what the emulated machine touches."""
         return None if self.object is None else (self.object, self.units)
+
+    def touches(self, move: Move, tip_radius: float) -> FloatArray | None:
+        """Where it pecks."""
+        return _peck(self.machine, tip_radius).places(move)[0] if self.machine.touch == "peck" else None
 
     def finger(self, setting: Setting) -> Finger:
         """It pecks, or slides; an emulated one brings its emulator along."""

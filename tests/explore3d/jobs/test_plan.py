@@ -142,6 +142,17 @@ def run_text(folder: Path, text: str, name: str) -> SurfaceAccount:
     return account
 
 
+def test_pecks_far_apart_leave_surface_between_them(tmp_path: Path) -> None:
+    """A probe touches where it pecks alone: a plan that counts the whole way between promises what no run keeps."""
+    text = WIRE.with_name("grbl_peck.toml").read_text()
+    swept = []
+    for step in ("0.5 mm", "4 mm"):
+        account = planned(tmp_path, text.replace('step = "0.5 mm"', f'step = "{step}"')).account
+        assert account is not None
+        swept.append(account.swept)
+    assert swept[0] > 0.99 and swept[1] < 0.96
+
+
 def test_how_far_the_finger_leaves_its_region_is_told(tmp_path: Path) -> None:
     scene = block_scene(tmp_path, 2.0, 4.0)
     told = plan_scene(scene).account
