@@ -44,6 +44,7 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
         deviation=None,
         refuted_tip=None,
         sparse=None,
+        refused=False,
         scene=None,
         path=None,
         left_out=(),
