@@ -167,10 +167,12 @@ def compile_kernels(quiet: bool) -> None:
     from explore3d.jobs import run
     from explore3d.jobs.batch import rehearse
     from hw.sensors import load_sample_kernels
+    from mapping.assembly import load_faint_kernel
 
     with tempfile.TemporaryDirectory(prefix="explore3d-") as folder, shown(quiet) as progress:
         run(example(COMPILES).scene, Path(folder) / "out", progress=progress)
     load_sample_kernels()
+    load_faint_kernel()
     rehearse(quick=False)
     next(bench_stepping([1000.0], 0.01))  # over a body that has details of every kind
     for package in (explore3d, planners, hw, mapping):

@@ -211,6 +211,15 @@ def _clearest_in(
     return FaintLine(origin + ends, normal, crest, crest_sd, half_width, snr, sweeps), support
 
 
+def load_faint_kernel() -> None:
+    """Compile or load the kernel now: whether a run looks for faint lines depends on what it feels."""
+    from mapping.assembly.faint_kernels import best_segment
+
+    place, one = np.zeros((1, 2)), np.ones(1)
+    size = 2.0 * float(LINE_LENGTHS[-1])
+    best_segment(place, one, one, one, size, 1.0, 1.0, np.ones(3), np.array(LINE_LENGTHS), LEAST_POWER)
+
+
 def _frame(normal: FloatArray, way: FloatArray) -> FloatArray:
     """(2, 3) orthonormal tangents: the first square to the normal and to `way`."""
     first = np.cross(normal, way)
