@@ -477,7 +477,8 @@ def assembled(work: Work, share: Share) -> None:
 def tip_asked_of_lines(work: Work, share: Share) -> None:
     """The radius of the tip, held against all crossings of a ridge together: noise hides little of so many."""
     if work.sound is not None and work.refuted_tip is None:
-        ridges = [feature for feature in work.features if feature.kind == "ridge"]
+        kinds = [(kind_of(feature), feature) for feature in work.features]
+        ridges = [feature for kind, feature in kinds if kind.line and kind.sign > 0 and kind.sampled]
         work.refuted_tip = refuted_by_lines(work.sound.trace, ridges, work.detections.noise, work.settings.tip_sd)
 
 
