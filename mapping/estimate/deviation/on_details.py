@@ -40,11 +40,13 @@ def unexplained(blocks: Blocks, height: FloatArray, within: float, tip: float) -
         return 0.0
     side = np.where(np.abs(height) <= within, 0.0, np.sign(height))
     starts, counts = _stretches(blocks, side)
-    lengths, top = counts * blocks.step, np.maximum.reduceat(height, starts)
-    off, piece = side[starts] != 0.0, blocks.piece[starts]
+    # a sweep beside the top of a detail stands off as far as the top makes it, however low it runs itself; what the
+    # sweep's end cuts off is as wide as it was felt
+    near = cKDTree(blocks.points).query_ball_point(blocks.points, WIDE_PART * tip)
+    tallest = np.array([height[each].max() for each in near])
+    lengths, top = counts * blocks.step, np.maximum.reduceat(tallest, starts)
+    off = side[starts] != 0.0
     wide = lengths >= np.where(off, WIDE_PART * tip + 2.0 * beside(top, tip), AGREEING_STRETCH * tip)
-    # one that the sweep's end cuts off may be of any width
-    wide |= off & ((np.diff(piece, prepend=-1) != 0) | (np.diff(piece, append=-1) != 0))
     wide = np.repeat(wide, counts)
     agreeing, apart = wide & (side == 0.0), wide & (side != 0.0)
     if agreeing.any() and apart.any():
