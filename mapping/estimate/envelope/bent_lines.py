@@ -20,9 +20,12 @@ from mapping.geometry.mesh import arclengths, nearest_on
 from mapping.instrument import Noise
 
 # Stretches that are looked at reach to both sides of the crest as far as a ball of these shares of the told radius
-# would touch it: over more than the true ball does the path is no circle any more, and bends less
+# would touch it: over more than the true ball does the path is no circle any more, and bends less. The first asks for a
+# fifth, beyond RADIUS_SDS of a usual doubt; a stretch grows with the root of the radius, so that halves leave at least
+# 0.7 of the longest that is sound; the last is of a radius told 160 times too large
 SMALLER_BALLS = 0.8 * 0.5 ** np.arange(8.0)
-# Bins of a stretch (24 means tell the bend of a parabola as well as all samples do, to 1 %), and its fewest samples
+# Bins of a stretch (24 means tell the bend of a parabola as well as all samples do, to 1 %), and its fewest samples:
+# five more than the fit has numbers
 BENT_BINS, FEWEST_STRETCHED = 24, 8
 # Sine of the least angle between a sweep and the line that it crosses; along a line nothing bends
 ACROSS = 0.5

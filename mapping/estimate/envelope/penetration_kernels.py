@@ -6,32 +6,7 @@ import numpy as np
 from numba import njit
 
 from mapping import FloatArray
-from mapping.geometry.mesh import borrowing, inlined
-
-# Centres to a box. Neighbours along a sweep lie in small boxes without any sorting; of 8, 16 and 32 on a raster of 1e5
-# samples, 16 took least time
-CENTERS_PER_BOX = 16
-MOST_WAITING = 64  # one box a level at most, and fewer levels than bits of a number
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def boxes_of(centers: FloatArray) -> FloatArray:
-    """(2 M, 6) lower and upper corners: leaf m of M, a power of two, is box M + m; box k holds 2 k and 2 k + 1."""
-    leaves = 1
-    while leaves * CENTERS_PER_BOX < len(centers):
-        leaves *= 2
-    boxes = np.empty((2 * leaves, 6))
-    boxes[:, :3], boxes[:, 3:] = np.inf, -np.inf
-    for i in range(len(centers)):
-        box = leaves + i // CENTERS_PER_BOX
-        for c in range(3):
-            boxes[box, c] = min(boxes[box, c], centers[i, c])
-            boxes[box, 3 + c] = max(boxes[box, 3 + c], centers[i, c])
-    for box in range(leaves - 1, 0, -1):
-        for c in range(3):
-            boxes[box, c] = min(boxes[2 * box, c], boxes[2 * box + 1, c])
-            boxes[box, 3 + c] = max(boxes[2 * box, 3 + c], boxes[2 * box + 1, 3 + c])
-    return boxes
+from mapping.geometry.mesh import MOST_WAITING, POINTS_PER_BOX, borrowing, inlined
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -67,8 +42,8 @@ def nearest_center(centers, boxes, x, y, z, best, waiting):  # type: ignore[no-u
             waiting[top], waiting[top + 1] = second, first  # the nearer next
             top += 2
             continue
-        start = (box - leaves) * CENTERS_PER_BOX
-        for i in range(start, min(start + CENTERS_PER_BOX, len(centers))):
+        start = (box - leaves) * POINTS_PER_BOX
+        for i in range(start, min(start + POINTS_PER_BOX, len(centers))):
             square = (centers[i, 0] - x) ** 2 + (centers[i, 1] - y) ** 2 + (centers[i, 2] - z) ** 2
             if square < best:
                 best, found = square, i

@@ -95,15 +95,15 @@ def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[Float
 
 def boxed_centers(centers: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The centres (M, 3) in an order in which neighbours lie together, and (K, 6) boxes about pieces of it."""
-    from mapping.estimate.envelope.penetration_kernels import CENTERS_PER_BOX, boxes_of
+    from mapping.geometry.mesh import POINTS_PER_BOX, boxes_about
 
     laid = read_only(centers)
     steps = np.linalg.norm(np.diff(laid, axis=0), axis=1)
-    if len(steps) and CENTERS_PER_BOX * np.median(steps) > 0.5 * float(np.ptp(laid, axis=0).max()):
+    if len(steps) and POINTS_PER_BOX * np.median(steps) > 0.5 * float(np.ptp(laid, axis=0).max()):
         from scipy.spatial import cKDTree
 
-        laid = read_only(laid[cKDTree(laid, leafsize=CENTERS_PER_BOX).indices])
-    return laid, boxes_of(laid)
+        laid = read_only(laid[cKDTree(laid, leafsize=POINTS_PER_BOX).indices])
+    return laid, boxes_about(laid)
 
 
 def _below_profile(points: FloatArray, centers: FloatArray, tip_radius: float) -> FloatArray:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mapping.estimate.envelope.penetration_kernels import MOST_WAITING, nearest_center
-from mapping.geometry.mesh import borrowing, vector
+from mapping.estimate.envelope.penetration_kernels import nearest_center
+from mapping.geometry.mesh import MOST_WAITING, borrowing, vector
 
 # Constraints to a ball: the more, the sharper the bound and the slower (pairs of them are met). A raster gives six to
 # eight, and some more where it is oblique to the body; leaving some out is allowed, for it only widens the bound. Of an

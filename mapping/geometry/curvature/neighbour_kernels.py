@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-# Points to a box
-POINTS_PER_BOX = 16
-MOST_WAITING = 64  # one box a level at most, and fewer levels than bits of a number
+from mapping.geometry.mesh import MOST_WAITING, POINTS_PER_BOX
+
 # Room within which the neighbours are looked for, over the room that held those of the place before: places in a row
 # lie beside each other, and what is found too much costs less than to look again
 ROOMIER = 1.2
@@ -16,29 +15,6 @@ MOST_FOUND = 8
 # Squared radii that differ by less of themselves are one: as many points as lie between are equally near
 ONE_RADIUS = 1e-9
 LEAST_SQUARE = 1e-300  # of points that all lie on one place
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def boxes_about(points):  # type: ignore[no-untyped-def]
-    """(2 M, 6) lower and upper corners about points (N, 3) of which neighbours follow one another.
-
-    Leaf m of M, a power of two, is box M + m; box k holds 2 k and 2 k + 1.
-    """
-    leaves = 1
-    while leaves * POINTS_PER_BOX < len(points):
-        leaves *= 2
-    boxes = np.empty((2 * leaves, 6))
-    boxes[:, :3], boxes[:, 3:] = np.inf, -np.inf
-    for i in range(len(points)):
-        box = leaves + i // POINTS_PER_BOX
-        for c in range(3):
-            boxes[box, c] = min(boxes[box, c], points[i, c])
-            boxes[box, 3 + c] = max(boxes[box, 3 + c], points[i, c])
-    for box in range(leaves - 1, 0, -1):
-        for c in range(3):
-            boxes[box, c] = min(boxes[2 * box, c], boxes[2 * box + 1, c])
-            boxes[box, 3 + c] = max(boxes[2 * box, 3 + c], boxes[2 * box + 1, 3 + c])
-    return boxes
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -20,7 +20,7 @@ class Neighbours:
     def __init__(self, points: FloatArray) -> None:
         from scipy.spatial import cKDTree
 
-        from mapping.geometry.curvature.neighbour_kernels import POINTS_PER_BOX, boxes_about
+        from mapping.geometry.mesh import POINTS_PER_BOX, boxes_about
 
         self.order = cKDTree(points, leafsize=POINTS_PER_BOX).indices.astype(np.int64)  # neighbours in a row
         self.points = np.ascontiguousarray(points[self.order])

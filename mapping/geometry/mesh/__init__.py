@@ -7,6 +7,11 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from mapping.geometry.mesh.atomic_write import write_whole as write_whole
     from mapping.geometry.mesh.borrowing_kernels import borrowing as borrowing, inlined as inlined
+    from mapping.geometry.mesh.box_kernels import (
+        MOST_WAITING as MOST_WAITING,
+        POINTS_PER_BOX as POINTS_PER_BOX,
+        boxes_about as boxes_about,
+    )
     from mapping.geometry.mesh.bvh_kernels import STACK as STACK, WIDTH as WIDTH, push_lanes as push_lanes
     from mapping.geometry.mesh.clip import (
         FELT_SIDE_COSINE as FELT_SIDE_COSINE,
@@ -56,6 +61,7 @@ _PUBLIC = {
     "spline": ("Spline", "spline_design"),
     "atomic_write": ("write_whole",),
     "borrowing_kernels": ("borrowing", "inlined"),
+    "box_kernels": ("MOST_WAITING", "POINTS_PER_BOX", "boxes_about"),
     "bvh_kernels": ("STACK", "WIDTH", "push_lanes"),
     "clip": ("FELT_SIDE_COSINE", "asked_part", "clipped", "faces_side"),
     "nearest": ("MovedNearestPoint", "NearestPoint"),
