@@ -84,9 +84,8 @@ def render(bodies: Sequence[Body], camera: Camera) -> Picture:
     faces = np.concatenate([body.surface.faces + first for body, first in zip(bodies, counts[:-1], strict=True)])
     corners = np.concatenate([(body.surface.vertices - camera.eye) @ np.stack(camera.frame, axis=1) for body in bodies])
     flat = np.concatenate([body.surface.face_normals for body in bodies])
-    bent = np.concatenate([_vertex_normals(body.surface) for body in bodies])
+    bent, bends = _corner_normals(flat, np.concatenate([body.surface.face_areas for body in bodies]), faces)
     colours = np.concatenate([np.broadcast_to(body.colours, body.surface.vertices.shape) for body in bodies])
-    rounded = (np.einsum("fj,fkj->fk", flat, bent[faces]) > CREASE_COSINE).all(axis=1)
     shape = camera.height, camera.width
     depth, seen = np.full(shape, np.inf, dtype=np.float32), np.full(shape, -1, dtype=np.int32)
     weights, pixels = np.empty((*shape, 2), dtype=np.float32), np.ones((*shape, 3), dtype=np.float32)
@@ -95,19 +94,39 @@ def render(bodies: Sequence[Body], camera: Camera) -> Picture:
     light = light / np.linalg.norm(light)
     first = forward + camera.pixel * (0.5 * (camera.height - 1) * up - 0.5 * (camera.width - 1) * right)
     rays = np.stack([camera.pixel * right, -camera.pixel * up, first])
-    shade(seen, weights, faces, flat, bent, rounded, colours, light, rays, AMBIENT, BRIGHTEST, pixels)
+    shade(seen, weights, faces, flat, bent, bends, colours, light, rays, AMBIENT, BRIGHTEST, pixels)
     outline(depth, OUTLINE_PIXELS * camera.pixel, OUTLINE, pixels)
     return Picture(camera, pixels, depth, seen, flat)
 
 
-def _vertex_normals(surface: Surface) -> FloatArray:
-    """(V, 3) normals weighted by area, of unit length."""
-    weighted = surface.face_normals * surface.face_areas[:, None]
-    sums = np.stack(
-        [
-            np.bincount(surface.faces.ravel(), np.repeat(weighted[:, axis], 3), minlength=len(surface.vertices))
-            for axis in range(3)
-        ],
-        axis=1,
-    )
-    return np.asarray(sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), np.finfo(float).tiny))
+def _corner_normals(flat: FloatArray, areas: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Unit normals (N, 3) that a surface is shaded by, and (F, 3) which of them serves each corner of a face.
+
+    The mean of the faces at a vertex, weighted by area, if all of them bend by less than a crease from it; else each
+    face has its own, of those that bend by less from itself: a narrow side is not tilted by the wide face beside it.
+
+    Args:
+        flat: (F, 3) unit normals of the faces.
+        areas: (F,) theirs, m^2.
+        faces: (F, 3) vertices.
+    """
+    from explore3d.pictures.render_kernels import sums_of_alike
+
+    weighted, corners = flat * areas[:, None], faces.ravel()
+    count = int(faces.max(initial=-1)) + 1
+    sums = [np.bincount(corners, np.repeat(weighted[:, axis], 3), minlength=count) for axis in range(3)]
+    at_vertices = _unit(np.stack(sums, axis=1))
+    beyond = np.einsum("fj,fkj->fk", flat, at_vertices[faces]).ravel() <= CREASE_COSINE
+    creased = np.zeros(len(at_vertices), dtype=bool)
+    creased[corners[beyond]] = True
+    own = np.flatnonzero(creased[corners])
+    own = own[np.argsort(corners[own], kind="stable")]  # those of a vertex in a row
+    at_corners = _unit(sums_of_alike(flat, weighted, own // 3, corners[own], CREASE_COSINE))
+    bends = corners.copy()
+    bends[own] = len(at_vertices) + np.arange(len(own))
+    return np.concatenate([at_vertices, at_corners]), bends.reshape(-1, 3)
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    """Vectors (N, 3) at unit length."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny))

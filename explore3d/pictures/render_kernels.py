@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mapping import BoolArray, FloatArray, IntArray
+from mapping import FloatArray, IntArray
 
 # Barycentric coordinates may miss zero by rounding: without this, pixels on an edge between two faces could see neither
 EDGE_SLACK = 1e-9
@@ -74,13 +74,36 @@ def see(
 
 
 @njit(cache=True)
+def sums_of_alike(flat: FloatArray, weighted: FloatArray, face: IntArray, vertex: IntArray, alike: float) -> FloatArray:
+    """(N, 3) sums, at each corner of a face, over the faces of its vertex whose normals' cosine with its own is larger.
+
+    Args:
+        flat, weighted: (F, 3) unit normals of the faces, and what is summed.
+        face, vertex: (N,) whose each corner is; those of a vertex in a row.
+    """
+    sums = np.zeros((len(face), 3))
+    first = 0
+    for stop in range(1, len(face) + 1):
+        if stop < len(face) and vertex[stop] == vertex[first]:
+            continue
+        for one in range(first, stop):
+            own = flat[face[one]]
+            for other in range(first, stop):
+                its = flat[face[other]]
+                if own[0] * its[0] + own[1] * its[1] + own[2] * its[2] > alike:
+                    sums[one] += weighted[face[other]]
+        first = stop
+    return sums
+
+
+@njit(cache=True)
 def shade(
     seen: NDArray[np.int32],
     weights: NDArray[np.float32],
     faces: IntArray,
     flat: FloatArray,
     bent: FloatArray,
-    rounded: BoolArray,
+    bends: IntArray,
     colours: FloatArray,
     light: FloatArray,
     rays: FloatArray,
@@ -94,8 +117,7 @@ def shade(
         seen, weights: of `see`.
         faces: (F, 3).
         flat: (F, 3) unit normals of the faces.
-        bent: (V, 3) normals at the vertices.
-        rounded: (F,) True where those at the vertices serve.
+        bent, bends: (N, 3) normals at corners, and (F, 3) which of them each corner of a face has.
         colours: (V, 3).
         light: (3,) unit vector towards the light.
         rays: (3, 3) what a ray's direction changes by a pixel to the right, and by one down; and the first ray.
@@ -109,6 +131,7 @@ def shade(
             if face < 0:
                 continue
             i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+            a, b, c = bends[face, 0], bends[face, 1], bends[face, 2]
             second, third = weights[row, column, 0], weights[row, column, 1]
             first = 1.0 - second - third
             size = 0.0
@@ -116,10 +139,7 @@ def shade(
             for axis in range(3):
                 ray[axis] = rays[2, axis] + column * rays[0, axis] + row * rays[1, axis]
                 facing += ray[axis] * flat[face, axis]
-                if rounded[face]:
-                    normal[axis] = first * bent[i, axis] + second * bent[j, axis] + third * bent[k, axis]
-                else:
-                    normal[axis] = flat[face, axis]
+                normal[axis] = first * bent[a, axis] + second * bent[b, axis] + third * bent[c, axis]
                 size += normal[axis] ** 2
             shine = 0.0
             if size > 0.0:

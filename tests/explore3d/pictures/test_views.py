@@ -93,3 +93,22 @@ def test_a_sweep_is_drawn_over_the_bump_that_it_climbed_not_under_it() -> None:
     np.testing.assert_allclose(lifted.points[:, 2], ellipse, atol=0.05)
     np.testing.assert_array_equal(lifted.points[:, :2], path.points[:, :2])
     np.testing.assert_array_equal(over_features([path], [])[0].points, path.points)
+
+
+def test_a_flat_side_is_shaded_evenly_beside_a_narrow_one_round_a_sharp_edge() -> None:
+    """The front of a thin bar has one brightness: the faces above and below it do not tilt its shading."""
+    x = np.array([0.0, 0.02, 0.025, 0.06, 0.1])
+    rails = np.concatenate(
+        [np.column_stack([x, np.full(5, y), np.full(5, z)]) for y in (0.0, 4e-3) for z in (0.0, 0.02)]
+    )
+    faces = []
+    for low, high in ((0, 5), (5, 15), (15, 10), (10, 0)):  # front, top, back, bottom
+        for i in range(4):
+            faces += [[low + i, low + i + 1, high + i + 1], [low + i, high + i + 1, high + i]]
+    surface = Surface(rails, np.array(faces))
+    camera = Camera.facing(surface.vertices, np.array([0.0, -1.0, 0.3]), 400, 200)
+    picture = render([Body(surface, np.ones(3))], camera)
+    front = (picture.seen >= 0) & (picture.seen < 8)
+    assert front.sum() > 1000
+    shades = picture.pixels[front].mean(axis=1)
+    assert np.quantile(shades, 0.9) - np.quantile(shades, 0.1) < 0.01  # outlines are darker
