@@ -18,6 +18,9 @@ from mapping.estimate.sweeps.tangents import lagrange, unit
 
 # Samples whose neighbourhoods are fitted together: a bound on the memory that they take
 SAMPLES_AT_ONCE = 4096
+# What was touched from a direction turned by more than a radian is another side of the body: over an arc of that
+# length a quadratic is off by an eighth of the arc's rise
+ANOTHER_SIDE = float(np.cos(1.0))
 
 
 def surface_normals(
@@ -48,7 +51,7 @@ def surface_normals(
     )
     lost = np.flatnonzero(np.isnan(slope.doubt))
     if len(lost):
-        slope.tangents[lost], slope.doubt[lost] = _fitted(trace, lost, along[lost], outward[lost])
+        slope.tangents[lost], slope.doubt[lost] = _fitted(trace, lost, along, outward)
     across = slope.tangents[row.nearest]
     ends, continued = at_kinks(trace, row, slope.tangents)
     across[ends] = continued
@@ -95,10 +98,12 @@ def _fitted(
     """Tangents across the sweeps, and their doubt, from quadratic fits to the nearest samples of the thinned trace.
 
     The doubt is three times the residual over the width; it is a right angle where the neighbours lie on one line.
+    Around a sharp edge, or behind a thin wall, the nearest samples are those of another side: they do not count.
     """
     from scipy.spatial import cKDTree
 
-    cloud = trace.centers[thinned(trace.centers, trace.sweep, pitch(trace.centers, trace.sweep))]
+    kept = thinned(trace.centers, trace.sweep, pitch(trace.centers, trace.sweep))
+    cloud, sides = trace.centers[kept], outward[kept]
     tree, count = cKDTree(cloud), min(neighbours, len(cloud))
     tangents, doubt = np.empty((len(samples), 3)), np.empty(len(samples))
     for start in range(0, len(samples), SAMPLES_AT_ONCE):
@@ -106,15 +111,18 @@ def _fitted(
         distance, index = (
             np.asarray(found) for found in tree.query(trace.centers[samples[part]], [*range(1, count + 1)])
         )
-        arm = cloud[index] - trace.centers[samples[part], None]
-        tangents[part], doubt[part] = _across(arm, distance, along[part], outward[part])
+        own = samples[part]
+        arm = cloud[index] - trace.centers[own, None]
+        counts = np.einsum("nc,nkc->nk", outward[own], sides[index]) > ANOTHER_SIDE
+        tangents[part], doubt[part] = _across(arm, distance, counts, along[own], outward[own])
     return tangents, doubt
 
 
 def _across(
-    arm: FloatArray, distance: FloatArray, along: FloatArray, outward: FloatArray
+    arm: FloatArray, distance: FloatArray, counts: BoolArray, along: FloatArray, outward: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Tangents across and their doubt from the ways (N, K, 3) to the neighbours of each sample, and their lengths."""
+    """Tangents across and their doubt from the ways (N, K, 3) to the neighbours of each sample, their lengths (N, K),
+    and which of them count (N, K)."""
     from mapping.estimate.sweeps.tangent_kernels import slopes_across
 
     across = unit(np.cross(outward, along))
@@ -123,7 +131,7 @@ def _across(
     scale = np.maximum(distance[:, -1:], 1e-300)
     arm = arm / scale[..., None]
     u, v, w = (np.einsum("nkc,nc->nk", arm, axis) for axis in (along, across, up))
-    weight = np.exp(-2.0 * (distance / scale) ** 2)
+    weight = np.exp(-2.0 * (distance / scale) ** 2) * counts
     slope, residual, determined = slopes_across(u, v, w, weight)
     rest = np.flatnonzero(~determined)
     if len(rest):

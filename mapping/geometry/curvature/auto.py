@@ -17,7 +17,7 @@ import numpy as np
 from mapping import BoolArray, FloatArray, IntArray, Surface
 from mapping.geometry.curvature.cloud_mesh import meshed
 from mapping.geometry.curvature.curvature import Curvature
-from mapping.geometry.curvature.jet import LARGE_MESH_POINTS, jets_and_noise, oriented
+from mapping.geometry.curvature.jet import LARGE_MESH_POINTS, jets_and_noise, least_alike, oriented
 from mapping.geometry.curvature.libigl_fits import SMALLEST_COMPONENT, libigl_curvatures
 from mapping.geometry.curvature.neighbours import Neighbours
 
@@ -69,13 +69,22 @@ def auto_curvature(body: Surface | FloatArray, normals: FloatArray | None, noise
         found = _ask(mesh, _asked(jets, reach, points))
         remarks = tuple(dict.fromkeys(remark for one in found for remark in one.remarks))
         jets = _the_better(jets, found, mesh.faces, level, reach)
-    hidden = _hidden(points, oriented(body, normals)[1], near, 0.5 * (jets.k1 + jets.k2), level)
+    outward = oriented(body, normals)[1]
+    hidden = _hidden(
+        points, outward, _of_one_side(near, outward, least_alike(normals)), 0.5 * (jets.k1 + jets.k2), level
+    )
     return _where_carried(jets, hidden, reach, remarks)
 
 
 def _nearest(points: FloatArray) -> IntArray:
     """(N, 19) indices of the nearest points, or of all if there are fewer; each point itself comes first."""
     return Neighbours(points).query(points, min(TWO_RINGS, len(points)))
+
+
+def _of_one_side(near: IntArray, normals: FloatArray, alike: float) -> IntArray:
+    """The neighbours (N, K), with the point itself in place of each that lies on another side of the body."""
+    facing = np.einsum("nc,nkc->nk", normals, normals[near])
+    return np.where(facing < alike, near[:, :1], near)
 
 
 def _reach(points: FloatArray, near: IntArray) -> FloatArray:

@@ -36,6 +36,9 @@ SMOOTHING = 24
 # Rings of faces whose area vectors tell where outside is: as many as those nearest points. With one ring 2.4 %, with
 # two 0.03 % and with three none of 10,000 vertices of a torus with noise of half an edge had normals that led astray.
 PATCH_RINGS = 3
+# Cosine of the angle by which the normals of a side of the body turn at most. Those that are told, by the ball that
+# touched, show a sharp edge: within the radius of curvature a side turns by a radian. Those of noisy triangles may not.
+TOLD_SIDE, GUESSED_SIDE = float(np.cos(1.0)), 0.0
 # Share of the residual that counts as noise even where all of it seems to be the polynomial's misfit.
 NOISE_FLOOR = 1e-3
 # Variance of a mean over what nested fits of white noise have: the weights follow the noise, too. And the share of the
@@ -62,7 +65,8 @@ def jets_and_noise(
 
     Args:
         body: mesh or points (N, 3), m.
-        normals: (N, 3) outward normals, or None.
+        normals: (N, 3) outward normals, or None. Neighbours whose normals turn by more than a radian, a right angle
+            if none are given, lie on another side of the body, round a sharp edge or behind a thin wall.
         noise: standard deviation of the points along the normal, m, or None: estimated.
         neighbours: use this neighbourhood and `degree` alone instead of choosing.
         degree: 2, 4 or 6; the highest to choose from.
@@ -77,7 +81,7 @@ def jets_and_noise(
         return _nothing(len(points)), noise or 0.0
     place = points[index] - points[index].mean(axis=0)
     size = float(np.abs(place).max()) or 1.0
-    jets = _Jets(place / size, rough[index], degree)
+    jets = _Jets(place / size, rough[index], degree, least_alike(normals))
     sizes = np.array(
         [s for s in NEIGHBOURHOOD_SIZES if s <= max(len(index), NEIGHBOURHOOD_SIZES[0])]
         if neighbours is None
@@ -155,12 +159,12 @@ class _Candidates:
 
 
 class _Jets:
-    """Points (N, 3) of about unit size with their neighbourhoods and mean normals."""
+    """Points (N, 3) of about unit size with their neighbourhoods and mean normals; those of a side are `alike`."""
 
-    def __init__(self, place: FloatArray, rough: FloatArray, degree: int):
-        self.place, self.degree = place, degree
+    def __init__(self, place: FloatArray, rough: FloatArray, degree: int, alike: float):
+        self.place, self.degree, self.alike = place, degree, alike
         self.tree = Neighbours(place)
-        self.normals = _smoothed_normals(place, rough, self.tree)
+        self.normals = _smoothed_normals(place, rough, self.tree, alike)
         self.bends = np.zeros(len(place))
 
     def fit(self, chosen: IntArray, sizes: IntArray, near: IntArray | None = None) -> _Candidates:
@@ -168,7 +172,8 @@ class _Jets:
         from mapping.geometry.curvature.jet_kernels import fit_jets
 
         near = self.near(chosen, int(sizes[-1])) if near is None else near
-        return _Candidates(*fit_jets(self.place, self.normals, near, chosen, self.bends[chosen], sizes, self.degree))
+        bends = self.bends[chosen]
+        return _Candidates(*fit_jets(self.place, self.normals, near, chosen, bends, self.alike, sizes, self.degree))
 
     def near(self, chosen: IntArray, count: int) -> IntArray:
         """(M, count) nearest points, nearest first; N where there are no more."""
@@ -324,12 +329,17 @@ def _patch_normals(surface: Surface) -> FloatArray:
     return total
 
 
-def _smoothed_normals(place: FloatArray, rough: FloatArray, tree: Neighbours) -> FloatArray:
-    """Mean normals over the nearest points: noise tilts single triangles."""
+def least_alike(normals: FloatArray | None) -> float:
+    """Cosine of the angle by which the normals (N, 3) of one side of the body turn at most."""
+    return GUESSED_SIDE if normals is None else TOLD_SIDE
+
+
+def _smoothed_normals(place: FloatArray, rough: FloatArray, tree: Neighbours, alike: float) -> FloatArray:
+    """Mean normals over the nearest points of the same side: noise tilts single triangles."""
     smooth = np.empty_like(rough)
     for part in np.array_split(np.arange(len(place)), max(1, len(place) * SMOOTHING // CHUNK_VALUES)):
         near = by_shares(lambda at: tree.query(at, min(SMOOTHING, len(place))), place[part], SMOOTHING)
-        same = np.einsum("ijk,ik->ij", rough[near], rough[part]) > 0
+        same = np.einsum("ijk,ik->ij", rough[near], rough[part]) > alike
         smooth[part] = np.einsum("ijk,ij->ik", rough[near], same.astype(np.float64))
     length = np.linalg.norm(smooth, axis=1, keepdims=True)
     return np.where(length > 0, smooth / np.where(length > 0, length, 1.0), rough)

@@ -185,7 +185,7 @@ def _frame(n):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather(points, normals, near, centre, e1, e2, bend, sizes, place, ends):  # type: ignore[no-untyped-def]
+def _gather(points, normals, near, centre, e1, e2, bend, alike, sizes, place, ends):  # type: ignore[no-untyped-def]
     """Coordinates of the neighbours on this side of the body, z bent; `ends` counts them for each size."""
     n, used, s = normals[centre], 0, 0
     for i in range(len(near)):
@@ -195,7 +195,7 @@ def _gather(points, normals, near, centre, e1, e2, bend, sizes, place, ends):  #
         j = near[i]
         if j < 0 or j >= len(points):
             continue
-        if normals[j, 0] * n[0] + normals[j, 1] * n[1] + normals[j, 2] * n[2] < 0.0:
+        if normals[j, 0] * n[0] + normals[j, 1] * n[1] + normals[j, 2] * n[2] < alike:
             continue
         dx, dy, dz = (
             points[j, 0] - points[centre, 0],
@@ -220,7 +220,7 @@ def _reach(place, first, last, reach):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def fit_jets(points, normals, neighbours, chosen, bends, sizes, degree):  # type: ignore[no-untyped-def]
+def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree):  # type: ignore[no-untyped-def]
     """Shape operators of chosen points by every neighbourhood size and every even degree up to the given one.
 
     The sizes are nested: each adds its new points to the triangle of the one before, and one triangle serves all
@@ -234,6 +234,7 @@ def fit_jets(points, normals, neighbours, chosen, bends, sizes, degree):  # type
         neighbours: (M, K) indices of the nearest points of each chosen point, nearest first; others are skipped.
         chosen: (M,) indices.
         bends: (M,) about the curvature of larger absolute value there, outward positive; 0 if not known.
+        alike: cosine of the angle by which the normals of one side turn at most.
         sizes: (S,) neighbourhood sizes, ascending, at most K.
         degree: 2, 4 or 6.
 
@@ -254,7 +255,7 @@ def fit_jets(points, normals, neighbours, chosen, bends, sizes, degree):  # type
     ends = np.zeros(len(sizes), dtype=np.int64)
     for m in range(count):
         e1, e2 = _frame(normals[chosen[m]])
-        used = _gather(points, normals, neighbours[m], chosen[m], e1, e2, bends[m], sizes, place, ends)
+        used = _gather(points, normals, neighbours[m], chosen[m], e1, e2, bends[m], alike, sizes, place, ends)
         scale = np.sqrt(_reach(place, 0, used, 0.0))
         if scale == 0.0:
             continue

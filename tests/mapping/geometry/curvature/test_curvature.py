@@ -363,3 +363,20 @@ def test_a_cloud_is_meshed_first_and_one_that_cannot_be_says_so():
     alone = principal_curvatures(ring.vertices, normals=outward)
     assert "meshed" in alone.remarks[0]
     assert set(alone.answered_by[alone.valid]) == {"jet"}
+
+
+def test_what_lies_round_a_sharp_edge_or_behind_a_thin_wall_says_nothing_of_a_flat_side():
+    """Points with noise of a plate of three pitches, felt above, below and at its narrow side."""
+    rng, pitch, noise = np.random.default_rng(3), 0.5e-3, 5e-6
+    across, along = np.meshgrid(pitch * np.arange(24), pitch * np.arange(-24, 25), indexing="ij")
+    flat = np.column_stack([across.ravel(), along.ravel(), np.zeros(across.size)])
+    narrow = np.column_stack([np.zeros(98), np.tile(along[0], 2), np.repeat([-pitch, -2 * pitch], 49)])
+    sides = [(flat, [0, 0, 1]), (flat - [0, 0, 3 * pitch], [0, 0, -1]), (narrow, [-1, 0, 0])]
+    normals = np.concatenate([np.tile(np.array(out, dtype=float), (len(at), 1)) for at, out in sides])
+    points = np.concatenate([at for at, _ in sides]) + noise * rng.normal(size=(len(normals), 1)) * normals
+    found = principal_curvatures(points, "jet", normals=normals, noise=noise)
+    above = (np.abs(points[:, 1]) < 8 * pitch) & (normals[:, 2] > 0.5)
+    assert found.valid[above].all()
+    beyond = np.abs(np.concatenate([found.k1[above], found.k2[above]])) > 1.645 * np.tile(found.sd[above], 2)
+    assert beyond.mean() < 0.13  # 10 % of what stated intervals of 90 % leave out, and three of its deviations
+    assert np.abs(found.largest[above]).max() < 0.05 / pitch
