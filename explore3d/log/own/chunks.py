@@ -22,7 +22,8 @@ from explore3d.log.own.format import LARGEST_RECORD
 # opcode, record length, first time, last time, uncompressed size, checksum; then the name of the compression
 _HEADER = struct.Struct("<BQQQQI")
 _COMPRESSION = re.compile(rb"\x04\0\0\0zstd|\x03\0\0\0lz4")
-_BLOCK = 1 << 16
+# Bytes that are searched at once: at first few, for the next chunk mostly follows a short index of the one before
+_FIRST_BLOCK, _BLOCK = 1 << 10, 1 << 16
 
 
 @dataclass
@@ -47,15 +48,16 @@ def intact_chunks(file: BinaryIO, damage: Damage, at: int = 0) -> Iterator[list[
 
 def _next_header(file: BinaryIO, at: int) -> int | None:
     """Position of the next thing that looks like a chunk at or after `at`."""
+    size = _FIRST_BLOCK
     while True:
         file.seek(at)
-        block = file.read(_BLOCK)
+        block = file.read(size)
         for hit in _COMPRESSION.finditer(block, _HEADER.size):
             if block[hit.start() - _HEADER.size] == Opcode.CHUNK:
                 return at + hit.start() - _HEADER.size
-        if len(block) < _BLOCK:
+        if len(block) < size:
             return None
-        at += len(block) - _HEADER.size - 8
+        at, size = at + len(block) - _HEADER.size - 8, min(8 * size, _BLOCK)
 
 
 def _read_chunk(file: BinaryIO, start: int, damage: Damage) -> tuple[list[McapRecord] | None, int]:
