@@ -9,7 +9,7 @@ may touch both flanks and not what is between: its depth is then only bounded.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,15 +26,20 @@ from mapping.instrument import Noise, neighbour_scatter, robust_scale
 # radii, a thirtieth of what the ball itself takes of a width there
 FINEST = 0.1
 # Widths of a crest of no width of its own, felt at the same share of the height, from which on the trace is the
-# section: two thirds of what is felt are then the detail's own. Below, families know what the ball hides. 1.5 and 2
-# are alike, 5 leaves narrow scratches to families that do not fit them: heights 83
-WIDER_THAN_CREST = 3.0
+# section: what is felt is then mostly the detail's own. Below, families know what the ball hides. Over 80 scratches
+# and humps 5 to 30 um wide and 0.3 to 3 um high, in white noise or roughness of a fifth to a sixtieth of that (seeds
+# 100 to 119), 1.0 to 1.5 are alike: 68 heights and 58 widths inside; at 3, narrow scratches are left to families that
+# do not fit them: 57 and 46
+WIDER_THAN_CREST = 1.5
+# Bins from where a section leaves the base to where it returns, at least, if its noise asks for wider bins than the
+# finest. 6 to 8 are alike, of 12 one scratch of 20 is lost
+LEAST_BINS = 8
 # Where flanks are read. On a parabola the tangent at a share q meets the base q^2 / 8 of the half-width outside, at a
 # quarter 1 %; lower, noise and the foot count for more. At 0.15 widths 51, at 0.4 53
 FLANK = 0.25
-# That height stands clear of what else the profile scatters by so many of that, which noise reaches once in 16,000
-# places: details are 16 times as high. 2.5 to 6 are alike
-FLANK_SDS = 4.0
+# That height stands clear of what else the profile scatters by so many of that: details are 10 times as high. At 4 some
+# faint sections more are lost, and of the 80 above heights 68 and widths 58 inside instead of 74 and 70; 2 is like 2.5
+FLANK_SDS = 2.5
 # A tangent is the line through all between these shares of that height: its slope from as much above as below, within
 # which a parabola's own changes by an eighth. 0.8 to 1.2: widths 55; 0.4 to 1.6: 53
 ABOUT = 0.6, 1.4
@@ -82,8 +87,7 @@ def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[Featur
     for sweep in trace.laid_sweeps:
         between = float(np.median(np.diff(sweep.arclength)))
         for over in sweep.heights(max(between, FINEST * trace.tip_radius)):
-            piece = terraced(over, trace.base, trace.tip_radius).profile
-            for section in _sections(piece, trace.tip_radius):
+            for section in _of_all_scales(terraced(over, trace.base, trace.tip_radius).profile, trace.tip_radius):
                 inside = [c for c in rest if _overlaps(section, c, sweep.trace.t)]
                 if not inside:
                     continue
@@ -91,9 +95,26 @@ def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[Featur
                 if feature is not None:
                     features.append(feature)
                     fine = [c for c in inside if _stands_off(section, c)]
-                    upon += [c for c in fine if section.begin < _bin(piece, c) < section.end]
+                    upon += [c for c in fine if section.begin < _bin(section.piece, c) < section.end]
                     rest = [c for c in rest if c not in inside or (c in fine and c not in upon)]
     return features, upon, rest
+
+
+def _of_all_scales(piece: SweepHeights, tip_radius: float) -> list[_Section]:
+    """The sections of a piece, each in the finest bins in which it stands clear of their scatter."""
+    found = _sections(piece, tip_radius)
+    piece = piece.coarser()
+    while LEAST_BINS * piece.spacing < SHORTEST_LEVEL * piece.length:
+        clear = [section for section in _sections(piece, tip_radius) if section.end - section.begin >= LEAST_BINS]
+        found += [section for section in clear if not any(_overlap(section, other) for other in found)]
+        piece = piece.coarser()
+    return found
+
+
+def _overlap(one: _Section, other: _Section) -> bool:
+    """True of two sections that share a part of the path."""
+    (begin, end), (start, stop) = (each.piece.s[[each.begin, each.end]] for each in (one, other))
+    return bool(begin < stop and start < end)
 
 
 def _sections(piece: SweepHeights, tip_radius: float) -> list[_Section]:
@@ -129,6 +150,8 @@ def _outlined(piece: SweepHeights, sign: float, begin: int, end: int, usual: flo
         return None
     inside = z[first : last + 1]
     top = int(np.argmax(np.convolve(inside, np.ones(3) / 3.0, mode="same")))
+    if not 0 < top < len(inside) - 1:
+        return None  # all within a bin
     rise = isotonic_regression(inside[: top + 1], increasing=True).x
     fall = isotonic_regression(inside[top:], increasing=False).x
     monotone = np.concatenate([rise[:-1], [max(rise[-1], fall[0])], fall[1:]])
@@ -208,6 +231,7 @@ def _measured(section: _Section, sweep: LaidSweep, noise: Noise, algorithm: int,
     foot = sweep.base.foot(center[None], tip)
     left, right = _flanks(section, NEARLY_FLAT)
     below = _unfelt_depth(section, tip, height, sd) if section.sign < 0.0 else 0.0
+    wide = Interval.normal(width, width_sd)
     if not np.isfinite([height, width, width_sd, log_odds]).all() or width <= 0.0:
         return None
     low = Interval.normal(section.sign * height, sd)
@@ -218,7 +242,7 @@ def _measured(section: _Section, sweep: LaidSweep, noise: Noise, algorithm: int,
         axis=foot.points,
         normals=foot.normals,
         height=Interval(section.sign * (height + 0.5 * below), *bounds),
-        width=Interval.normal(width, width_sd),
+        width=replace(wide, low=max(wide.low, 0.0)),
         length=Interval(0.0, 0.0, 0.0),
         evidence=Support(snr, crossings, (algorithm,), float(log_odds)),
         curvature_feature=False,
@@ -248,8 +272,11 @@ def _extreme(section: _Section, sd: float) -> float:
 
 
 def _width(section: _Section, tip: float, noise: Noise) -> tuple[float, float, float]:
-    """(width on the body, its standard deviation, middle): the flanks drawn on to the base, without the ball's part."""
-    widths = []
+    """(width on the body, its standard deviation, middle): the flanks drawn on to the base, without the ball's part.
+
+    Where both shares of the height tell another width by more than their noise does, the rest is doubt, too.
+    """
+    widths, near = [], 0.0
     for share in (NEAR_FOOT, FLANK):
         left, right = _flanks(section, share, noise)
         begin, end = (
@@ -257,7 +284,9 @@ def _width(section: _Section, tip: float, noise: Noise) -> tuple[float, float, f
             for side, flank in ((1.0, left), (-1.0, right))
         )
         widths.append(end - begin)
-    sd = np.hypot(np.hypot(left.foot_sd, right.foot_sd), widths[1] - widths[0])
+        near = near or float(np.hypot(left.foot_sd, right.foot_sd))
+    doubt = np.sqrt(max((widths[1] - widths[0]) ** 2 - near**2, 0.0))
+    sd = np.hypot(np.hypot(left.foot_sd, right.foot_sd), doubt)
     return widths[1], float(sd), 0.5 * float(begin + end)
 
 

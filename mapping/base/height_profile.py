@@ -67,6 +67,15 @@ class SweepHeights:
         """Length of path that the profile covers, m."""
         return self.spacing * len(self.height)
 
+    def coarser(self) -> SweepHeights:
+        """The same in bins twice as wide, without what stood under them; an odd last bin is left out."""
+        count = len(self.height) // 2
+        height, t, centers = (
+            0.5 * (each[0 : 2 * count : 2] + each[1 : 2 * count : 2]) for each in (self.height, self.t, self.centers)
+        )
+        start, first = self.start + 0.5 * self.spacing, self.first[: 2 * count + 1 : 2]
+        return SweepHeights(self.sweep, start, 2.0 * self.spacing, height, 2.0 * self.samples, first, t, centers)
+
 
 def arclength(trace: Trace, base: Base, means: Means | None = None) -> FloatArray:
     """(N,) arclength along the base's trace under one sweep, m, free of the zigzag that noise adds.

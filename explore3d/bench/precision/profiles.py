@@ -36,6 +36,16 @@ def _scratch(rng: np.random.Generator) -> Form:
     return lambda u: -np.maximum(0.0, depth * (1.0 - 2.0 * np.abs(u) / width)), (("pit", -depth, width),)
 
 
+def _faint_scratch(rng: np.random.Generator) -> Form:
+    width, depth = rng.uniform(8e-6, 30e-6), rng.uniform(0.5e-6, 2e-6)
+    return lambda u: -np.maximum(0.0, depth * (1.0 - 2.0 * np.abs(u) / width)), (("pit", -depth, width),)
+
+
+def _faint_hump(rng: np.random.Generator) -> Form:
+    width, height = rng.uniform(8e-6, 30e-6), rng.uniform(0.5e-6, 2e-6)
+    return lambda u: np.maximum(0.0, height * (1.0 - (2.0 * u / width) ** 2)), (("bump", height, width),)
+
+
 def _burred(rng: np.random.Generator) -> Form:
     scratch, ((_, depth, width),) = _scratch(rng)
     height, sd = rng.uniform(2e-6, 6e-6), rng.uniform(5e-6, 10e-6)
@@ -71,6 +81,8 @@ PROFILE_FORMS: dict[str, Callable[[np.random.Generator], Form]] = {
     "scratch": _scratch,
     "scratch with burrs": _burred,
     "hump": _hump,
+    "faint scratch": _faint_scratch,
+    "faint hump": _faint_hump,
     "step": _step,
     "slot on an arc": _on_an_arc,
     "bare": _bare,

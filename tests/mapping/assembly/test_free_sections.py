@@ -74,6 +74,23 @@ def test_a_wide_detail_of_any_form_is_one_with_its_sizes(
     assert found.evidence.likely
 
 
+@pytest.mark.parametrize(("depth", "width"), [(1.2e-6, 16e-6), (0.5e-6, 9e-6), (2e-6, 30e-6)])
+@pytest.mark.parametrize("share", [0.04, 0.08])
+def test_a_faint_scratch_is_read_in_bins_as_wide_as_its_noise_asks_for(
+    depth: float, width: float, share: float
+) -> None:
+    def faint(u: FloatArray) -> FloatArray:
+        return -np.maximum(0.0, depth * (1.0 - 2.0 * np.abs(u) / width))
+
+    (found,) = felt(faint, 7, share * depth)
+    assert found.kind == "pit" and found.details.free_section
+    for size, true in ((found.height, -depth), (found.width, width)):
+        spread = size.high - size.low
+        assert size.median - spread < true < size.median + spread
+    assert abs(found.height.median + depth) < 0.25 * depth
+    assert found.width.low > 0.0 and abs(found.width.median - width) < 0.35 * width
+
+
 def test_a_scratch_with_burrs_is_three_details() -> None:
     def burred(u: FloatArray) -> FloatArray:
         return scratch(u) + 5e-6 * sum(np.exp(-0.5 * ((u - side * 50e-6) / 8e-6) ** 2) for side in (-1, 1))
