@@ -48,6 +48,7 @@ class Roughness:
         squares: as wide as the cut-off, that these rest on.
         why_no_areal: one sentence, "" if there are areal ones.
         noise: of a sample as the detection took it, m: instrument and surface are one there.
+        form: what was taken off before the filters, in words.
     """
 
     cutoff: float
@@ -58,6 +59,7 @@ class Roughness:
     squares: int
     why_no_areal: str
     noise: float
+    form: str
 
     @property
     def parameters(self) -> dict[str, Interval]:
@@ -69,7 +71,7 @@ class Roughness:
         values = {
             name: {"median": each.median, "low": each.low, "high": each.high} for name, each in self.parameters.items()
         }
-        about = ("cutoff", "short_cutoff", "sections", "squares", "why_no_areal", "noise")
+        about = ("cutoff", "short_cutoff", "sections", "squares", "why_no_areal", "noise", "form")
         return {name: getattr(self, name) for name in about} | {"parameters": values}
 
     def rows(self) -> list[tuple[str, str, str]]:
@@ -81,9 +83,9 @@ class Roughness:
         short = "no S-filter" if self.short_cutoff is None else f"an S-filter of {length_text(self.short_cutoff)}"
         kind = f"{self.sections} sections" + (f" and {self.squares} squares" if self.squares else "")
         return (
-            f"Gaussian L-filter of {length_text(self.cutoff)}, {short}; {kind} beside the features. Ranges are 90 % "
-            f"intervals, from section to section. The noise of a sample is {length_text(self.noise, 2)}: the detection "
-            "counts instrument and roughness as one."
+            f"Taken off before the filters: {self.form}. Gaussian L-filter of {length_text(self.cutoff)}, {short}; "
+            f"{kind} beside the features. Ranges are 90 % intervals, from section to section. The noise of a sample is "
+            f"{length_text(self.noise, 2)}: the detection counts instrument and roughness as one."
         )
 
 
@@ -152,7 +154,25 @@ def roughness_of(
     if not profile:
         return None
     areal, squares, why_not = _areal(pieces, index, usable)
-    return Roughness(index, usable, profile, sections, areal, squares, why_not, noise)
+    return Roughness(index, usable, profile, sections, areal, squares, why_not, noise, form_text(trace.base))
+
+
+def form_text(base: Base) -> str:
+    """What a base takes off as form, in words."""
+    if base.kind == "mesh":
+        return "the global model"
+    if base.kind != "profile":
+        return f"a fitted {base.kind}"
+    fitted: Any = base.parameters
+    if "form" in fitted:
+        asked = fitted["form"]
+        size = {"poly": f":{asked['degree']}", "gaussian": f":{length_text(asked['cutoff'])}"}.get(asked["kind"], "")
+        return f"the form that was asked for, {asked['kind']}{size}"
+    degree, pieces = int(fitted["degree"]), int(fitted["pieces"])
+    if degree == 1 and pieces == 1:
+        return "a straight line"
+    curve = f"a curve of {count_text(pieces, 'piece')} of degree {degree}"
+    return f"{curve}, {length_text(fitted['piece_length'], 2)} long each (--form line takes off less)"
 
 
 def _pieces(

@@ -20,9 +20,14 @@ def cross_sections(analysis: Analysis, pictures: Pictures) -> Html:
     more = (
         f" The {shown} features with the strongest evidence of {all_of_them} are shown." if shown < all_of_them else ""
     )
+    fitted = any(not feature.details.free_section for feature in shown_features(analysis))
+    red = (
+        "Red: the trace that the feature found would leave, on the level of the samples about it, with its 90 % band. "
+        if fitted
+        else ""
+    )
     caption = (
-        "Height over the base where a sweep crosses each feature. Dots: what the finger traced. Red: the trace that "
-        "the feature found would leave, on the level of the samples about it, with its 90 % band. Black: the body "
+        f"Height over the base where a sweep crosses each feature. Dots: what the finger traced. {red}Black: the body "
         "itself, as the balls allow it; dotted where the tip bridged it and nothing was touched." + more
     )
     picture = figure(pictures.files["sections"], "Profiles across the features", caption)

@@ -94,12 +94,14 @@ function show(root, data) {
     pen.stroke();
     for (const each of data.features) {
       const [column, row] = [right(each.x), down(each.y) - 4];
-      pen.fillStyle = each.id === chosen ? "#ffc107" : "#c62828";
+      pen.fillStyle = pen.strokeStyle = each.id === chosen ? "#ffc107" : "#c62828";
       pen.beginPath();
       pen.moveTo(column, row);
       pen.lineTo(column - 5, row - 9);
       pen.lineTo(column + 5, row - 9);
-      pen.fill();
+      pen.closePath();
+      if (each.finer) pen.fill();
+      pen.stroke();
     }
     pen.restore();
     const part = data.features.find((each) => each.id === chosen);

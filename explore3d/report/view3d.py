@@ -100,6 +100,7 @@ def profile_view(trace: Trace, base: Base, features: Sequence[Feature]) -> Html:
                 "id": each.id,
                 "x": float((each.axis[0] - origin) @ heading) / x_factor,
                 "y": float(each.height.median) / factor,
+                "finer": each.curvature_feature,
                 "text": hover_text(each),
             }
             for each in features

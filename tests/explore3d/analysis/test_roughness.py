@@ -78,8 +78,8 @@ def test_the_command_prints_a_table_and_refuses_what_it_cannot(
     words = ["roughness", path, "--tip-radius", f"{TIP} m", "--cutoff"]
     assert explore3d_main(monkeypatch, *words, "0.08 mm") == 0
     told = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in told[:-1]] == ["Ra", "Rq", "Rz", "Rsk", "Rku", "Rsm", "Wa"]
-    assert "L-filter of 80 µm" in told[-1]
+    assert [line.split()[0] for line in told[:7]] == ["Ra", "Rq", "Rz", "Rsk", "Rku", "Rsm", "Wa"]
+    assert " ".join(told[7:]).startswith("Taken off before the filters: a straight line. Gaussian L-filter of 80 µm")
     assert explore3d_main(monkeypatch, *words, "0.08 mm", "--json") == 0
     assert json.loads(capsys.readouterr().out)["cutoff"] == pytest.approx(0.08e-3)
     for more, complaint in (

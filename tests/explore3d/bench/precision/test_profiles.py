@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from explore3d.bench.precision import FIRST_REPORTED, PROFILE_FORMS, bench_profiles, profile_trial
+from explore3d.bench.precision import FIRST_REPORTED, bench_profiles, profile_trial
 
 
 @pytest.mark.parametrize("name", ["slot", "scratch with burrs", "step", "bare"])
@@ -23,4 +23,4 @@ def test_a_line_counts_sizes_within_their_intervals() -> None:
 
 
 def test_reported_seeds_are_others_than_those_built_with() -> None:
-    assert FIRST_REPORTED > 100 and len(PROFILE_FORMS) == 7
+    assert FIRST_REPORTED > 100
