@@ -11,7 +11,8 @@ from mapping import Feature, FloatArray, Trace
 from mapping.assembly.edges import edge_features, step_features
 from mapping.assembly.faint_features import faint_spacing, why_none_sought, with_faint_lines
 from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
-from mapping.assembly.free_sections import free_sections
+from mapping.assembly.free_lines import free_lines, lies_on
+from mapping.assembly.free_sections import free_sections, free_spot
 from mapping.assembly.inspection import Inspection, Inspections
 from mapping.assembly.lines import Around, line_features
 from mapping.assembly.linking import groups
@@ -51,7 +52,8 @@ def assemble(
     explains, because a sweep ran along it, are dropped, and crests that the sweep began or ended on are accepted only
     if no step explains them. What the rules say of details that are felt together, and of lines wider than a wire, is
     then improved as one configuration (`accounted`). Ridges and grooves too low for any one sweep are found where many
-    sweeps agree. In a single profile every crossing is a bump, a pit or a step, or belongs to a free section.
+    sweeps agree. What is wide, on a base that was fitted, is measured as free sections. In a single profile every
+    crossing is a bump, a pit or a step, or belongs to one of these.
 
     Args:
         detections: of the trace.
@@ -71,6 +73,12 @@ def assemble(
         return _of_profile(detections, laid)
     inspections = inspections or inspected_for(detections, laid, base, spacing=spacing, faint=faint)
     spacing = place_spacing(crossings, trace.tip_radius) if spacing is None and crossings else spacing
+    wide = list[Feature]()
+    if base.kind != "mesh":  # a given base that is off is no detail, however wide
+        sections, upon, rest = free_sections(detections, laid)
+        wide = free_lines(sections, detections, laid)
+        crossings = tuple(c for c in (*rest, *upon) if not any(lies_on(c, feature) for feature in wide))
+        detections = replace(detections, crossings=crossings)
     features = [] if spacing is None or not crossings else _linked(detections, laid, inspections.at(spacing))
     if features and spacing is not None and proposals:
         places = _places(inspections.at(spacing))
@@ -78,7 +86,7 @@ def assemble(
         features = accounted(features, crossings, places, around, false_alarms_per_metre, proposals)
     if faint:
         features = with_faint_lines(features, detections, laid, base, false_alarms_per_metre, inspections)
-    return _strongest_first(features)
+    return _strongest_first([*wide, *features])
 
 
 def inspected_for(
@@ -200,8 +208,9 @@ def _nearest(point: FloatArray, others: list[FloatArray]) -> float:
 def _of_profile(detections: Detections, laid: LaidTrace) -> tuple[Feature, ...]:
     """Features of a single sweep: each crossing one, but for those that are parts of a free section."""
     wide, upon, rest = list[Feature](), list[Crossing](), list(detections.crossings)
-    if laid.base.kind == "profile":  # a given base that is off is no detail, however wide
-        wide, upon, rest = free_sections(detections, laid)
+    if laid.base.kind != "mesh":  # a given base that is off is no detail, however wide
+        sections, upon, rest = free_sections(detections, laid)
+        wide = [free_spot(section, detections.algorithm) for section in sections]
     fine, standing = (
         [point_feature([c], _name(c), detections, laid.tip_radius) for c in crossings] for crossings in (rest, upon)
     )

@@ -1,4 +1,4 @@
-"""Free sections: details of a single profile so much wider than a crest under the ball that the trace is their surface.
+"""Free sections: details of a sweep so much wider than a crest under the ball that the trace is their surface.
 
 No family is fitted to them: the trace over the base, monotone on both sides of its extreme, is the section. What the
 ball changes is known in closed form. On a flank of slope tan(a) the trace stands off the body by r (1/cos a - 1), and
@@ -9,6 +9,7 @@ may touch both flanks and not what is between: its depth is then only bounded.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,6 +57,15 @@ EXTREME_SD, EXTREME_WINDOW = 0.005, 4
 # What lies above this share of the height is called the top (or floor); of a parabola that is 0.22 of the width, less
 # than the third from which a top counts as flat by the standard. 0.9 and 0.98 are alike
 NEARLY_FLAT = 0.95
+# A floor, which was touched: that of a parabola is 0.22 of the width, and by the standard it is a third
+FLOOR = 1.0 / 3.0
+# Middles are told by noisy flanks: sections are moved until they lie on their mean, which is theirs after two rounds
+ALIGNMENTS = 3
+# Sides that rise by this share of the height between two samples are blurred in a mean of sweeps that sample elsewhere:
+# its width is by up to a sample's distance too large
+BLURRED = 0.25
+# What lies farther than this share of the width from the middle is beside a mean section
+SIDES = 0.6
 # A section has as many degrees of freedom as splines that would follow it (as in `pooled_residual`)
 FREEDOM = 14
 
@@ -72,32 +82,189 @@ class _Section:
     monotone: FloatArray
 
 
-def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[Feature], list[Crossing], list[Crossing]]:
-    """The wide details of a profile on a base that was fitted to it; crossings on one of them, and all that are not.
+@dataclass(frozen=True, eq=False)
+class SectionSizes:
+    """What a section measures, m.
+
+    Args:
+        height, height_sd: of its extreme over the base (positive), and its standard deviation.
+        below: by how much it may go on beyond what was felt.
+        width, width_sd: on the body, and its standard deviation by noise.
+        foot_doubt: by how much the width may be another where the foot is round, or a side steep between two samples.
+        top: width of what is nearly as high as the extreme.
+        middle: of the width, from the profile's start.
+        steep: the largest rise from one bin to the next, as a share of the height.
+    """
+
+    height: float
+    height_sd: float
+    below: float
+    width: float
+    width_sd: float
+    foot_doubt: float
+    top: float
+    middle: float
+    steep: float
+
+    def height_interval(self, sign: float, sd: float = 0.0) -> Interval:
+        """The signed height: what was felt, down to what may be below, by its own standard deviation or a larger."""
+        sd = max(sd, self.height_sd)
+        low, deep = (Interval.normal(sign * height, sd) for height in (self.height, self.height + self.below))
+        return Interval(0.5 * (low.median + deep.median), min(low.low, deep.low), max(low.high, deep.high))
+
+    def width_interval(self, sd: float = 0.0) -> Interval:
+        """The width by noise (its own, or more), and by its foot."""
+        wide = Interval.normal(self.width, float(np.hypot(max(sd, self.width_sd), self.foot_doubt)))
+        return replace(wide, low=max(wide.low, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class FreeSection:
+    """What one sweep shows of a wide detail, measured.
+
+    Args:
+        crossing: where its middle is and which way the sweep went there; the signed height as felt.
+        sizes: along the sweep.
+        piece: heights of the sweep about it, in the finest bins.
+        log_odds: for it, on this sweep.
+        parts: crossings that are parts of it.
+    """
+
+    crossing: Crossing
+    sizes: SectionSizes
+    piece: SweepHeights
+    log_odds: float
+    parts: int
+
+    @property
+    def sign(self) -> float:
+        """+1 of what stands up, -1 of what is hollow."""
+        return float(np.sign(self.crossing.height))
+
+
+def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[FreeSection], list[Crossing], list[Crossing]]:
+    """The wide details on the sweeps over a base that was fitted to them; crossings on one of them; all that are not.
 
     What is fine on a flank or a floor is too far from the base for a family that stands on it.
 
     Args:
-        detections: of the trace; what they did not notice is no detail.
-        trace: a single sweep, laid on its base.
+        detections: of the trace; what they did not notice is no detail, unless the base has levels: a short one may be
+            a floor or a plateau.
+        trace: laid on its base.
 
     Reference: theory section 5.4.
     """
-    features, rest, upon = list[Feature](), list(detections.crossings), list[Crossing]()
+    found, rest, upon = list[FreeSection](), list[Crossing](), list[Crossing]()
+    by_sweep: dict[int, list[Crossing]] = {}
+    for crossing in detections.crossings:
+        by_sweep.setdefault(crossing.sweep, []).append(crossing)
+    levelled = len(trace.base.levels) > 1  # nothing was noticed of what one of them is the floor or the plateau of
     for sweep in trace.laid_sweeps:
-        between = float(np.median(np.diff(sweep.arclength)))
-        for over in sweep.heights(max(between, FINEST * trace.tip_radius)):
-            for section in _of_all_scales(terraced(over, trace.base, trace.tip_radius).profile, trace.tip_radius):
-                inside = [c for c in rest if _overlaps(section, c, sweep.trace.t)]
-                if not inside:
-                    continue
-                feature = _measured(section, sweep, detections.noise, detections.algorithm, len(inside))
-                if feature is not None:
-                    features.append(feature)
-                    fine = [c for c in inside if _stands_off(section, c)]
-                    upon += [c for c in fine if section.begin < _bin(section.piece, c) < section.end]
-                    rest = [c for c in rest if c not in inside or (c in fine and c not in upon)]
-    return features, upon, rest
+        left = by_sweep.pop(sweep.number, [])
+        if left or levelled:
+            between = float(np.median(np.diff(sweep.arclength)))
+            for over in sweep.heights(max(between, FINEST * trace.tip_radius)):
+                own, above = _of_all_scales(over, trace.tip_radius), _on_levels(over, trace)
+                above = [each for each in above if not any(_overlap(each, other) for other in own)]
+                for number, section in enumerate([*own, *above]):
+                    inside = [c for c in left if _overlaps(section, c, sweep.trace.t)]
+                    told = inside or (levelled and number < len(own))
+                    measured = _measured(section, over, sweep, detections.noise, inside) if told else None
+                    if measured is not None:
+                        found.append(measured)
+                        fine = [c for c in inside if _stands_off(section, c)]
+                        upon += [c for c in fine if section.begin < _bin(section.piece, c) < section.end]
+                        left = [c for c in left if c not in inside or (c in fine and c not in upon)]
+        rest += left
+    return found, upon, [*rest, *(c for own in by_sweep.values() for c in own)]
+
+
+def free_spot(section: FreeSection, algorithm: int) -> Feature:
+    """The bump or pit of which one sweep shows a section."""
+    crossing, sizes = section.crossing, section.sizes
+    return Feature(
+        kind=kind_made_of(crossing.kind, line=False).name,
+        axis=crossing.point[None],
+        normals=crossing.normal[None],
+        height=sizes.height_interval(section.sign),
+        width=sizes.width_interval(),
+        length=Interval(0.0, 0.0, 0.0),
+        evidence=Support(crossing.snr, section.parts, (algorithm,), section.log_odds),
+        curvature_feature=False,
+        position_sd=crossing.position_sd,
+        details=Details(top=sizes.top, free_section=True),
+    )
+
+
+def mean_sizes(group: Sequence[FreeSection], square: FloatArray, tip: float, noise: Noise) -> SectionSizes | None:
+    """The sizes of the mean section of several sweeps, laid square to the line and on each other; None if it is none.
+
+    The extreme of a single section is the noise's too: of n sweeps together it is so by a root of n less.
+
+    Args:
+        square: (N,) sines of the angles between the line and the sweeps.
+        tip: radius of the fingertip, m.
+        noise: of single samples.
+    """
+    spacing = float(np.median(square * [section.piece.spacing for section in group]))
+    reach = float(np.max(square * [section.sizes.width for section in group]))
+    u = spacing * np.arange(-np.ceil(reach / spacing), np.ceil(reach / spacing) + 1)
+    shifts = np.zeros(len(group))
+    for _ in range(ALIGNMENTS):
+        heights = [_laid_square(u + by, *each) for by, *each in zip(shifts, group, square, strict=True)]
+        known = np.isfinite(heights).all(axis=0)
+        if known.sum() < LEAST_BINS:
+            return None
+        mean = np.mean(heights, axis=0)[known]
+        # least squares: a section that is the mean moved by d differs from it by d times its slope
+        slope = np.gradient(mean, spacing)
+        gaps = (np.array(heights)[:, known] - mean) @ slope / max(float(slope @ slope), np.finfo(float).tiny)
+        shifts = shifts - np.clip(gaps, -0.1 * reach, 0.1 * reach)
+    first = group[0].piece
+    samples = float(np.median([section.piece.samples for section in group]))
+    index, nowhere = np.arange(len(mean) + 1), np.zeros((len(mean), 3))
+    start = float(u[known][0])
+    piece = SweepHeights(first.sweep, start, spacing, mean, samples, index, np.zeros(len(mean)), nowhere)
+    noise = noise.of_passes(len(group)).scaled(white=(max(samples, 1.0) * len(group)) ** -0.5)
+    while len(piece.height) >= LEAST_BINS:
+        section = _middle_section(piece, group[0].sign, reach, noise.sd)
+        if section is not None:
+            sizes = _sizes(section, tip, noise)
+            if sizes is None or float(np.median([each.sizes.steep for each in group])) < BLURRED:
+                return sizes
+            width = float(np.mean(square * [each.sizes.width for each in group]))
+            doubt = float(np.median([each.sizes.foot_doubt for each in group]))
+            return replace(sizes, width=width, foot_doubt=doubt)
+        piece, noise = piece.coarser(), noise.scaled(white=2.0**-0.5)
+    return None
+
+
+def _middle_section(piece: SweepHeights, sign: float, reach: float, sd: float) -> _Section | None:
+    """The section about the middle of a mean profile, 2 `reach` long; None if it is not clear of the noise (sd, m)."""
+    z = sign * piece.height
+    beside = piece.height[np.abs(piece.s) > SIDES * reach]
+    usual = max(sd, robust_scale(beside) if len(beside) > 1 else 0.0, np.finfo(float).tiny)
+    out, inner = z > FLANK_SDS * usual, np.flatnonzero(np.abs(piece.s) < 0.25 * reach)
+    if not len(inner) or not out[inner].any():
+        return None
+    top = int(inner[np.argmax(z[inner])])
+    below = np.flatnonzero(~out)
+    before, after = below[below < top], below[below > top]
+    if not len(before) or not len(after):
+        return None
+    return _outlined(piece, sign, int(before[-1]) + 1, int(after[0]), usual, np.inf)
+
+
+def _laid_square(u: FloatArray, section: FreeSection, square: float) -> FloatArray:
+    """Heights at places u (N,) across a line, m from the section's middle; NaN beyond its piece."""
+    piece = section.piece
+    return np.interp(u, square * (piece.s - section.sizes.middle), piece.height, left=np.nan, right=np.nan)
+
+
+def _on_levels(piece: SweepHeights, trace: LaidTrace) -> list[_Section]:
+    """The sections of a piece over the levels that it runs on; none over a base of one level."""
+    over = terraced(piece, trace.base, trace.tip_radius).profile
+    return [] if over is piece else _of_all_scales(over, trace.tip_radius)
 
 
 def _of_all_scales(piece: SweepHeights, tip_radius: float) -> list[_Section]:
@@ -127,14 +294,15 @@ def _sections(piece: SweepHeights, tip_radius: float) -> list[_Section]:
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
             if begin == 0 or end >= len(z):
                 continue  # what goes on beyond the profile's end is no detail
-            section = _outlined(piece, sign, int(begin), int(end), usual)
+            section = _outlined(piece, sign, int(begin), int(end), usual, SHORTEST_LEVEL * piece.length)
             if section is not None and _is_wide(section, tip_radius):
                 found.append(section)
     return found
 
 
-def _outlined(piece: SweepHeights, sign: float, begin: int, end: int, usual: float) -> _Section | None:
-    """The section from where it leaves the scatter of the base to where it comes back, monotone on either side."""
+def _outlined(piece: SweepHeights, sign: float, begin: int, end: int, usual: float, longest: float) -> _Section | None:
+    """The section from where it leaves the scatter of the base to where it comes back, monotone on either side; None of
+    one that is not clear of it, or longer than `longest`, m."""
     from scipy.optimize import isotonic_regression
 
     z = sign * piece.height
@@ -146,7 +314,7 @@ def _outlined(piece: SweepHeights, sign: float, begin: int, end: int, usual: flo
     if not len(before) or not len(after):
         return None
     first, last = int(before[-1]), end + int(after[0])
-    if (last - first) * piece.spacing > SHORTEST_LEVEL * piece.length:
+    if (last - first) * piece.spacing > longest:
         return None
     inside = z[first : last + 1]
     top = int(np.argmax(np.convolve(inside, np.ones(3) / 3.0, mode="same")))
@@ -176,12 +344,24 @@ class _Flank:
         foot: where its tangent there meets the base, m.
         foot_sd: its standard deviation, m.
         angle: of the tangent over the base, rad.
+        wall: mean height of the two samples that a wall lies between, m; NaN of no wall.
     """
 
     place: float
     foot: float
     foot_sd: float
     angle: float
+    wall: float = np.nan
+
+    def hidden(self, tip: float, fall: float) -> float:
+        """How far beside the body's own edge the foot lies, m: r tan(a/2) of a tangent.
+
+        Round the edge of a wall the ball rolls on a circle: where it has fallen by so much (m), at most by its radius,
+        it is a chord of that circle beside it.
+        """
+        if np.isnan(self.wall):
+            return float(tip * np.tan(0.5 * self.angle))
+        return float(np.sqrt(max(fall, 0.0) * (2.0 * tip - fall))) if fall < tip else tip
 
 
 def _flanks(section: _Section, share: float, noise: Noise | None = None) -> tuple[_Flank, _Flank]:
@@ -190,7 +370,7 @@ def _flanks(section: _Section, share: float, noise: Noise | None = None) -> tupl
     top = section.top - section.begin
     left = _flank(s[: top + 1], section.monotone[: top + 1], share, noise)
     right = _flank(-s[top:][::-1], section.monotone[top:][::-1], share, noise)
-    return left, _Flank(-right.place, -right.foot, right.foot_sd, right.angle)
+    return left, replace(right, place=-right.place, foot=-right.foot)
 
 
 def _flank(x: FloatArray, z: FloatArray, share: float, noise: Noise | None) -> _Flank:
@@ -199,7 +379,8 @@ def _flank(x: FloatArray, z: FloatArray, share: float, noise: Noise | None) -> _
     steepest = int(np.diff(z).argmax())
     if z[steepest + 1] - z[steepest] > WALL * z[-1]:
         place = 0.5 * float(x[steepest] + x[steepest + 1])
-        return _Flank(place, place, spacing / np.sqrt(12.0), 0.5 * np.pi)
+        middle = 0.5 * float(z[steepest] + z[steepest + 1])
+        return _Flank(place, place, spacing / np.sqrt(12.0), 0.5 * np.pi, middle)
     after = max(int(np.argmax(z > level)), 1)
     low, high = ABOUT
     first = min(int(np.argmax(z > low * level)), after - 1)
@@ -216,39 +397,53 @@ def _flank(x: FloatArray, z: FloatArray, share: float, noise: Noise | None) -> _
     return _Flank(at + (level - float(offset)) / slope, at - float(offset) / slope, sd, float(np.arctan(slope)))
 
 
-def _measured(section: _Section, sweep: LaidSweep, noise: Noise, algorithm: int, crossings: int) -> Feature | None:
-    """The section as a feature; None if its flanks tell no size."""
-    piece, tip = section.piece, sweep.trace.tip_radius
-    bins = slice(section.begin, section.end + 1)
-    place = piece.s[bins]
+def _measured(
+    section: _Section, over: SweepHeights, sweep: LaidSweep, noise: Noise, inside: list[Crossing]
+) -> FreeSection | None:
+    """A section of the heights `over` the base, with its sizes; None if its flanks tell none."""
+    piece = section.piece
     noise = noise.scaled(white=max(piece.samples, 1.0) ** -0.5)  # of a bin's mean
-    sd = noise.sd
+    place = piece.s[section.begin : section.end + 1]
     snr = float(np.linalg.norm(noise.whiten(section.monotone, place)[0]))
     log_odds = 0.5 * (snr**2 - FREEDOM * np.log1p(snr**2 / FREEDOM)) - np.log(piece.length / np.ptp(place))
-    height = _extreme(section, sd)
-    width, width_sd, middle = _width(section, tip, noise)
-    center = np.array([np.interp(middle, piece.s, piece.centers[:, k]) for k in range(3)])
-    foot = sweep.base.foot(center[None], tip)
-    left, right = _flanks(section, NEARLY_FLAT)
-    below = _unfelt_depth(section, tip, height, sd) if section.sign < 0.0 else 0.0
-    wide = Interval.normal(width, width_sd)
-    if not np.isfinite([height, width, width_sd, log_odds]).all() or width <= 0.0:
+    sizes = _sizes(section, sweep.trace.tip_radius, noise)
+    if sizes is None or not np.isfinite(log_odds):
         return None
-    low = Interval.normal(section.sign * height, sd)
-    deep = Interval.normal(section.sign * (height + below), sd)
-    bounds = min(low.low, deep.low), max(low.high, deep.high)
-    return Feature(
-        kind=kind_made_of("convex" if section.sign > 0.0 else "concave", line=False).name,
-        axis=foot.points,
-        normals=foot.normals,
-        height=Interval(section.sign * (height + 0.5 * below), *bounds),
-        width=replace(wide, low=max(wide.low, 0.0)),
-        length=Interval(0.0, 0.0, 0.0),
-        evidence=Support(snr, crossings, (algorithm,), float(log_odds)),
+    around = sizes.middle + np.array([-0.5, 0.0, 0.5]) * sizes.width
+    before, center, after = (np.array([np.interp(s, piece.s, one) for one in piece.centers.T]) for s in around)
+    foot, way = sweep.base.foot(center[None], sweep.trace.tip_radius), after - before
+    crossing = Crossing(
+        sweep=sweep.number,
+        t=float(np.interp(sizes.middle, piece.s, piece.t)),
+        point=foot.points[0],
+        normal=foot.normals[0],
+        tangent=way / max(float(np.linalg.norm(way)), np.finfo(float).tiny),
+        kind="convex" if section.sign > 0.0 else "concave",
+        height=section.sign * sizes.height,
+        height_sd=sizes.height_sd,
+        position_sd=0.5 * float(np.hypot(sizes.width_sd, sizes.foot_doubt)),
+        half_width=0.5 * sizes.width,
+        trace_curvature=0.0,
+        snr=snr,
         curvature_feature=False,
-        position_sd=0.5 * width_sd,
-        details=Details(top=right.place - left.place, free_section=True),
+        start=int(piece.first[section.begin]),
+        stop=int(piece.first[section.end + 1]),
     )
+    return FreeSection(crossing, sizes, over, float(log_odds), len(inside))
+
+
+def _sizes(section: _Section, tip: float, noise: Noise) -> SectionSizes | None:
+    """What a section measures, by the noise of its bins; None if its flanks tell no size."""
+    height = _extreme(section, noise.sd)
+    width, width_sd, foot_doubt, middle = _width(section, tip, noise)
+    steep = float(np.abs(np.diff(section.monotone)).max() / section.monotone.max())
+    if not np.isfinite([height, width, width_sd, foot_doubt]).all() or width <= 0.0:
+        return None
+    left, right = _flanks(section, NEARLY_FLAT)
+    top = right.place - left.place
+    hollow = section.sign < 0.0 and top < FLOOR * width
+    below = _unfelt_depth(section, tip, height, noise.sd) if hollow else 0.0
+    return SectionSizes(height, noise.sd, below, width, width_sd, foot_doubt, top, middle, steep)
 
 
 def _extreme(section: _Section, sd: float) -> float:
@@ -271,23 +466,27 @@ def _extreme(section: _Section, sd: float) -> float:
     return float(np.polyval(bent, crest))
 
 
-def _width(section: _Section, tip: float, noise: Noise) -> tuple[float, float, float]:
-    """(width on the body, its standard deviation, middle): the flanks drawn on to the base, without the ball's part.
+def _width(section: _Section, tip: float, noise: Noise) -> tuple[float, float, float, float]:
+    """(width on the body, its standard deviation by noise, by how much it may be another, middle), m.
 
-    Where both shares of the height tell another width by more than their noise does, the rest is doubt, too.
+    The flanks are drawn on to the base, without the ball's part. Where both shares of the height tell another width by
+    more than their noise does, the foot is round. Where a side is nearly a wall, the chord between two samples is no
+    tangent of the circle that the ball rolls on, and its foot is as doubtful as the place of a wall is.
     """
-    widths, near = [], 0.0
+    widths, sds, high = [], [], float(section.monotone.max())
     for share in (NEAR_FOOT, FLANK):
         left, right = _flanks(section, share, noise)
         begin, end = (
-            flank.foot + side * section.sign * tip * np.tan(0.5 * flank.angle)
+            flank.foot
+            + side * section.sign * flank.hidden(tip, flank.wall if section.sign < 0.0 else high - flank.wall)
             for side, flank in ((1.0, left), (-1.0, right))
         )
         widths.append(end - begin)
-        near = near or float(np.hypot(left.foot_sd, right.foot_sd))
-    doubt = np.sqrt(max((widths[1] - widths[0]) ** 2 - near**2, 0.0))
-    sd = np.hypot(np.hypot(left.foot_sd, right.foot_sd), doubt)
-    return widths[1], float(sd), 0.5 * float(begin + end)
+        sds.append(float(np.hypot(left.foot_sd, right.foot_sd)))
+    foot_doubt = float(np.sqrt(max((widths[1] - widths[0]) ** 2 - sds[0] ** 2, 0.0)))
+    steepest = float(np.abs(np.diff(section.monotone)).max()) / (WALL * high)
+    foot_doubt = float(np.hypot(foot_doubt, min(steepest, 1.0) ** 2 * section.piece.spacing / np.sqrt(6.0)))
+    return widths[1], sds[1], foot_doubt, 0.5 * float(begin + end)
 
 
 def _unfelt_depth(section: _Section, tip: float, height: float, sd: float) -> float:

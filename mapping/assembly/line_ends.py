@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import FloatArray
+from mapping import FloatArray, Interval
 from mapping.assembly.inspection import Inspection
 from mapping.geometry.mesh import arclengths
 from mapping.geometry.templates import crest_trace, robust_cost
@@ -69,6 +69,14 @@ def line_end(axis: FloatArray, height: float, half_width: float, inspection: Ins
     rim = half_width if height < 0 else 0.0
     beyond_end = int(((axis - anchor) @ way > best + rim)[_index_of(axis, anchor) :].sum())
     return LineEnd(anchor + (best + rim) * way, best - float(likely[0]), float(likely[-1]) - best, seen, beyond_end)
+
+
+def ended_length(axis: FloatArray, ends: list[LineEnd]) -> Interval:
+    """Length of an axis (K, 3) with its ends: at least so much where one was not seen, m."""
+    length = float(arclengths(axis)[-1])
+    shorter = float(np.hypot.reduce([end.low for end in ends])) if ends else 0.0
+    longer = float(np.hypot.reduce([end.high for end in ends])) if ends else 0.0
+    return Interval(length, max(length - shorter, 0.0), length + longer, not all(end.seen for end in ends))
 
 
 def _last_leg(axis: FloatArray, back: float) -> tuple[FloatArray, FloatArray, float]:

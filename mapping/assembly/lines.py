@@ -10,7 +10,7 @@ import numpy as np
 from mapping import Feature, FloatArray, Interval
 from mapping.assembly.branches import Branch, branches, rejoined
 from mapping.assembly.inspection import Inspection
-from mapping.assembly.line_ends import LineEnd, closes, line_end
+from mapping.assembly.line_ends import closes, ended_length, line_end
 from mapping.assembly.linking import FELT_REACH, LONGEST_LINK, between
 from mapping.assembly.points import body_width, evidence
 from mapping.assembly.runs import RunPoint
@@ -199,7 +199,7 @@ def _ended(
             axis = np.vstack([axis[: len(axis) - end.dropped], end.point])
             ends.append(end)
         axis = axis[::-1]
-    return axis, _length(axis, ends)
+    return axis, ended_length(axis, ends)
 
 
 def _exactly(axis: FloatArray) -> Interval:
@@ -218,10 +218,3 @@ def _without_low_end(axis: FloatArray, members: list[Crossing], half_width: floa
     last, before = (members[int(np.linalg.norm(places - point, axis=1).argmin())] for point in axis[[-1, -2]])
     low = abs(last.height) + 2 * last.height_sd < END_HEIGHT * abs(before.height)
     return axis[:-1] if low and len(axis) > 2 else axis
-
-
-def _length(axis: FloatArray, ends: list[LineEnd]) -> Interval:
-    length = float(arclengths(axis)[-1])
-    shorter = float(np.hypot.reduce([end.low for end in ends])) if ends else 0.0
-    longer = float(np.hypot.reduce([end.high for end in ends])) if ends else 0.0
-    return Interval(length, max(length - shorter, 0.0), length + longer, not all(end.seen for end in ends))

@@ -1,0 +1,192 @@
+"""Free lines: what several sweeps cross that is so wide that each of them shows its section.
+
+The sections of the sweeps (`free_sections`) are linked as crossings of fine details are. Together they are a line, or a
+spot if they lie no further apart than it is wide. Its sizes are means over its sections, laid square to the line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mapping import Details, Feature, FloatArray, Support
+from mapping.assembly.branches import Branch, branches
+from mapping.assembly.free_sections import FreeSection, free_spot, mean_sizes
+from mapping.assembly.inspection import Inspection, Inspections
+from mapping.assembly.line_ends import LineEnd, ended_length
+from mapping.assembly.lines import FULL_HEIGHT
+from mapping.assembly.linking import groups
+from mapping.base import LaidTrace
+from mapping.detection import Crossing, Detections
+from mapping.geometry.mesh import distances
+from mapping.inference.kinds import kind_made_of
+
+# So much of the width to either side of the middle is half as high, of a V as of a slot; and places to that
+CORE, PLACES_PER_CORE = 0.25, 3.0
+# How far beyond its last section a line is looked for, in pitches of the sweeps: the next sweep lies nearer unless the
+# line runs at a slant of more than 70 degrees to them
+END_PITCHES = 3.0
+# Legs of an axis that tell its direction at an end
+LAST_LEGS = 4
+# Half of a 90 % interval of what is equally probable over a stretch of one
+UNIFORM_HALF_90 = 0.45
+
+
+def free_lines(sections: Sequence[FreeSection], detections: Detections, trace: LaidTrace) -> list[Feature]:
+    """The ridges, grooves, bumps and pits that the sections of several sweeps are of.
+
+    Reference: theory section 5.4.
+    """
+    found = list[Feature]()
+    for sign in (1.0, -1.0):
+        alike = [section for section in sections if section.sign == sign]
+        if alike:
+            core = CORE * float(np.median([section.sizes.width for section in alike]))
+            spacing = core / PLACES_PER_CORE
+            inspection = Inspections.of(trace, trace.base, detections.noise, [spacing]).at(spacing)
+            linked = groups([section.crossing for section in alike], inspection, core)
+            own = list[Feature]()
+            for members in sorted(linked, key=len, reverse=True):  # what ends a line is found with it
+                group = [alike[k] for k in members]
+                if not any(lies_on(section.crossing, line) for line in own for section in group):
+                    own += _of_group(group, inspection, detections, trace)
+            found += own
+    return found
+
+
+def lies_on(crossing: Crossing, feature: Feature) -> bool:
+    """True of a crossing of the feature's sign within its width, or where its end may be: a part of it."""
+    alike = crossing.is_step or crossing.height * feature.height.median > 0.0
+    reach = 0.5 * feature.width.high + crossing.half_width + feature.length.high - feature.length.median
+    return bool(alike and distances(crossing.point[None], feature.axis)[0] < reach)
+
+
+def _of_group(
+    group: list[FreeSection], inspection: Inspection, detections: Detections, trace: LaidTrace
+) -> list[Feature]:
+    """The spot, or the lines, that linked sections are of."""
+    points = np.array([section.crossing.point for section in group])
+    highest = max(group, key=lambda section: abs(section.crossing.height))
+    if np.linalg.norm(points[:, None] - points[None], axis=2).max() <= highest.sizes.width:
+        spot = free_spot(_between_sweeps(highest, group), detections.algorithm)
+        return [replace(spot, evidence=_evidence(group, detections.algorithm))]
+    half_width = 0.5 * float(np.median([section.sizes.width for section in group]))
+    lines = [line for line in branches(points, half_width) if len(line.axis) > 1]
+    apart = np.array([distances(points, line.axis) for line in lines])
+    found = []
+    for number, line in enumerate(lines):
+        own = [group[k] for k in np.flatnonzero(apart.argmin(axis=0) == number)]
+        found.append(_line(line, own, inspection, detections, trace) if own else None)
+    return [feature for feature in found if feature is not None]
+
+
+def _between_sweeps(highest: FreeSection, group: list[FreeSection]) -> FreeSection:
+    """The highest section of a spot, which may be higher still between two sweeps: a cone's tip, half a pitch aside, is
+    by half of what the sweep beside it is lower."""
+    others = [section.sizes.height for section in group if section is not highest]
+    more = 0.5 * max(highest.sizes.height - max(others), 0.0) if others else 0.0
+    return replace(highest, sizes=replace(highest.sizes, below=highest.sizes.below + more))
+
+
+def _line(
+    line: Branch, group: list[FreeSection], inspection: Inspection, detections: Detections, trace: LaidTrace
+) -> Feature | None:
+    """A line of the mean section of its sweeps; None where they have none in common."""
+    whole = _whole(group, line)
+    square = np.array([_squareness(line.axis, section) for section in whole])
+    sizes = mean_sizes(whole, square, trace.tip_radius, detections.noise)
+    if sizes is None:
+        return None
+    sign, crossings = group[0].sign, [section.crossing for section in whole]
+    axis, ends = _ended(line, sign * sizes.height, sizes.width, inspection)
+    feet = trace.base.foot(axis, trace.tip_radius)
+    length = ended_length(axis, ends)
+    return Feature(
+        kind=kind_made_of(crossings[0].kind, line=True).name,
+        axis=np.vstack([feet.points[:-1], feet.points[:1]]) if line.closed else feet.points,
+        normals=feet.normals,
+        height=sizes.height_interval(sign, _sd_of_mean([c.height for c in crossings])),
+        width=sizes.width_interval(_sd_of_mean(square * [section.sizes.width for section in whole])),
+        length=length,
+        evidence=_evidence(group, detections.algorithm),
+        curvature_feature=False,
+        position_sd=float(np.median([c.position_sd for c in crossings])),
+        notes=("runs on where nothing was inspected: its length is at least this",) if length.censored else (),
+        junction=line.junction,
+        details=Details(top=sizes.top, free_section=True),
+    )
+
+
+def _whole(group: list[FreeSection], line: Branch) -> list[FreeSection]:
+    """The sections less those at the ends of a line that are lower: these sweeps passed where it is no longer whole."""
+    along = [int(np.linalg.norm(line.axis - section.crossing.point, axis=1).argmin()) for section in group]
+    order = [group[k] for k in np.argsort(along, kind="stable")]
+    usual = float(np.median([section.sizes.height for section in order]))
+    while len(order) > 2 and not line.closed:
+        ends = [
+            each
+            for each in (order[0], order[-1])
+            if each.sizes.height + 2.0 * each.sizes.height_sd < FULL_HEIGHT * usual
+        ]
+        if not ends:
+            break
+        order.remove(min(ends, key=lambda section: section.sizes.height))
+    return order
+
+
+def _evidence(group: Sequence[FreeSection], algorithm: int) -> Support:
+    """All sweeps together: each tells of it by itself."""
+    snr = float(np.sqrt(sum(section.crossing.snr**2 for section in group)))
+    return Support(snr, len(group), (algorithm,), sum(section.log_odds for section in group))
+
+
+def _sd_of_mean(values: Sequence[float] | FloatArray) -> float:
+    """Standard deviation of a mean by how far the values (N,) scatter, of sections that may vary along a line."""
+    return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 2 else 0.0
+
+
+def _squareness(axis: FloatArray, section: FreeSection) -> float:
+    """Sine of the angle between a line's axis (K, 3) and the sweep that shows a section of it."""
+    nearest = int(np.linalg.norm(axis - section.crossing.point, axis=1).argmin())
+    leg = axis[min(nearest + 1, len(axis) - 1)] - axis[max(nearest - 1, 0)]
+    return float(np.linalg.norm(np.cross(leg, section.crossing.tangent)) / np.linalg.norm(leg))
+
+
+def _ended(line: Branch, height: float, width: float, inspection: Inspection) -> tuple[FloatArray, list[LineEnd]]:
+    """The axis up to its ends: half-way to the next sweep that felt nothing of it."""
+    if line.closed:
+        return np.vstack([line.axis, line.axis[:1]]), []
+    axis, ends = line.axis, []
+    for free in line.free[::-1]:
+        if free:
+            ends.append(_end(axis, height, width, inspection))
+            axis = np.vstack([axis, ends[-1].point])
+        axis = axis[::-1]
+    return axis, ends
+
+
+def _end(axis: FloatArray, height: float, width: float, inspection: Inspection) -> LineEnd:
+    """The last end of an axis (K, 3): between the last sweep that is half as high there, and the next that is not."""
+    back = axis[max(len(axis) - LAST_LEGS - 1, 0)]
+    way = (axis[-1] - back) / max(float(np.linalg.norm(axis[-1] - back)), np.finfo(float).tiny)
+    reach = END_PITCHES * inspection.pitch if np.isfinite(inspection.pitch) else width
+    places = inspection.near(np.stack([axis[-1], axis[-1] + reach * way]), CORE * width)
+    offset = inspection.points[places] - axis[-1]
+    along = offset @ way
+    aside = np.linalg.norm(offset - np.outer(along, way), axis=1)
+    felt, beside = inspection.height[places] * np.sign(height), (aside < CORE * width) & (along < reach)
+    passed = []
+    for number in np.unique(inspection.sweep[places[beside]]):
+        own = np.flatnonzero(beside & (inspection.sweep[places] == number))
+        passed.append((float(along[own[aside[own].argmin()]]), bool(felt[own].max() > 0.5 * abs(height))))
+    last = 0.0
+    for at, shows in sorted(passed):
+        if shows:
+            last = max(last, at)
+        elif at > last:
+            gap = at - last
+            point = axis[-1] + (last + 0.5 * gap) * way
+            return LineEnd(point, UNIFORM_HALF_90 * gap, UNIFORM_HALF_90 * gap, seen=True, dropped=0)
+    return LineEnd(axis[-1] + last * way, 0.0, 0.0, seen=False, dropped=0)

@@ -1,0 +1,86 @@
+"""Wide details of rasters: every sweep shows their section, and together they are one line or spot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.ndimage import grey_dilation
+
+from mapping import Feature, FloatArray, Trace
+from mapping.assembly import assemble
+from mapping.base import fit_base
+from mapping.detection import detect
+from mapping.inference import refine_all
+
+TIP, FINE, SAMPLING, PITCH = 2e-6, 0.125e-6, 8, 15e-6
+Form = Callable[[FloatArray, FloatArray], FloatArray]
+
+
+def felt(form: Form, seed: int, noise: float, rows: int = 14) -> tuple[Feature, ...]:
+    """What is found on a raster of 0.5 mm, each row by brute-force dilation of heights over x and y from its middle."""
+    x, rng, sweeps = FINE * np.arange(-2000, 2000), np.random.default_rng(seed), []
+    reach = int(TIP / FINE)
+    ball = np.sqrt(TIP**2 - (FINE * np.arange(-reach, reach + 1)) ** 2) - TIP
+    for k in range(rows):
+        y = PITCH * (k - 0.5 * (rows - 1))
+        trace = grey_dilation(form(x, np.full_like(x, y)), structure=ball, mode="nearest")[::SAMPLING]
+        height = trace + noise * rng.standard_normal(len(trace)) + TIP
+        sweeps.append(np.column_stack([x[::SAMPLING], np.full(len(trace), y), height]))
+    count = len(sweeps[0])
+    centers = np.concatenate(sweeps)
+    raster = Trace(1e-3 * np.arange(len(centers)), centers, np.repeat(np.arange(rows), count), TIP)
+    base = fit_base(raster)
+    features = refine_all(assemble(detect(raster, base), raster, base), raster, seed, base=base)
+    return tuple(feature for feature in features if feature.evidence.likely)
+
+
+def scratch(x: FloatArray, y: FloatArray) -> FloatArray:
+    return -np.maximum(0.0, 1.2e-6 * (1.0 - np.abs(x - 0.1 * y) / 8e-6)) * (np.abs(y) < 60e-6)
+
+
+def slot(x: FloatArray, y: FloatArray) -> FloatArray:
+    return np.where((np.abs(x - 0.2 * y) < 10e-6) & (np.abs(y) < 60e-6), -1.5e-6, 0.0)
+
+
+def bead(x: FloatArray, y: FloatArray) -> FloatArray:
+    return np.maximum(0.0, 1e-6 * (1.0 - ((x + 0.3 * y) / 12e-6) ** 2)) * (np.abs(y) < 60e-6)
+
+
+@pytest.mark.parametrize(
+    ("form", "kind", "height", "width"),
+    [(scratch, "groove", -1.2e-6, 16e-6), (slot, "groove", -1.5e-6, 19.6e-6), (bead, "ridge", 1e-6, 23e-6)],
+)
+def test_a_wide_line_is_one_with_the_sizes_of_its_mean_section(
+    form: Form, kind: str, height: float, width: float
+) -> None:
+    (found,) = felt(form, 11, 60e-9)
+    assert found.kind == kind and found.details.free_section
+    for size, true in ((found.height, height), (found.width, width), (found.length, 121e-6)):
+        spread = size.high - size.low
+        assert size.median - spread < true < size.median + spread
+    assert abs(found.height.median - height) < 0.08e-6
+    assert abs(found.width.median - width) < 1.0e-6
+    assert abs(found.length.median - 121e-6) < PITCH
+    assert not found.length.censored and found.evidence.crossings >= 7
+
+
+def test_a_line_to_the_rasters_border_is_at_least_so_long() -> None:
+    (found,) = felt(lambda x, _: -np.maximum(0.0, 1e-6 * (1.0 - np.abs(x) / 8e-6)), 12, 50e-9)
+    assert found.kind == "groove" and found.length.censored
+    assert found.length.median == pytest.approx(13 * PITCH, rel=0.02)
+
+
+def test_a_wide_hollow_no_longer_than_wide_is_a_pit_that_may_be_deeper_between_the_sweeps() -> None:
+    def cone(x: FloatArray, y: FloatArray) -> FloatArray:
+        return -2e-6 * np.maximum(0.0, 1.0 - np.hypot(x, y - 4e-6) / 25e-6)
+
+    (found,) = felt(cone, 13, 50e-9)
+    assert found.kind == "pit" and found.length.median == 0.0
+    assert found.height.low < -2e-6 < found.height.high
+    assert np.linalg.norm(found.axis[0, :2] - [0.0, 4e-6]) < 0.6 * PITCH
+
+
+def test_a_bare_raster_holds_nothing_wide() -> None:
+    assert not felt(lambda x, _: 0.0 * x, 14, 60e-9)
