@@ -11,11 +11,10 @@ from mapping import Feature, FloatArray, Trace
 from mapping.assembly.edges import edge_features, step_features
 from mapping.assembly.faint_features import faint_spacing, why_none_sought, with_faint_lines
 from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
+from mapping.assembly.free import free_sections, free_spot
 from mapping.assembly.free_lines import free_lines, lies_on
-from mapping.assembly.free_sections import free_sections, free_spot
-from mapping.assembly.inspection import Inspection, Inspections
 from mapping.assembly.lines import Around, line_features
-from mapping.assembly.linking import groups
+from mapping.assembly.linking import Inspection, Inspections, groups
 from mapping.assembly.points import outline, point_feature
 from mapping.assembly.runs import along, split_runs, told_crests
 from mapping.base import Base, LaidTrace

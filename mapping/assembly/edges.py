@@ -13,10 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval, Support
-from mapping.assembly.branches import main_line
-from mapping.assembly.inspection import Inspection
 from mapping.assembly.lines import ONE_POINT, Around, mean_point, merged
-from mapping.assembly.linking import groups
+from mapping.assembly.linking import Inspection, groups, main_line
 from mapping.detection import Crossing
 from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.inference.kinds import kind_made_of

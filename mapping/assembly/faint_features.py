@@ -8,8 +8,7 @@ import numpy as np
 
 from mapping import Feature, Interval, Support, Trace
 from mapping.assembly.faint_lines import FEWEST_AGREEING_SWEEPS, SECTIONS, FaintLine, faint_lines
-from mapping.assembly.inspection import Inspection, Inspections
-from mapping.assembly.line_ends import line_end
+from mapping.assembly.linking import Inspection, Inspections, line_end
 from mapping.assembly.points import body_width
 from mapping.base import Base
 from mapping.detection import Detections

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray
-from mapping.assembly.inspection import Inspection
+from mapping.assembly.linking import Inspection
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import crest_trace
 

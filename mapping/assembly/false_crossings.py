@@ -12,8 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapping import Feature
-from mapping.assembly.inspection import Inspection
-from mapping.assembly.linking import uphill
+from mapping.assembly.linking import Inspection, uphill
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import crest_trace

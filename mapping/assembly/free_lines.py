@@ -12,12 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from mapping import Details, Feature, FloatArray, Support
-from mapping.assembly.branches import Branch, branches
-from mapping.assembly.free_sections import FreeSection, free_spot, mean_sizes
-from mapping.assembly.inspection import Inspection, Inspections
-from mapping.assembly.line_ends import LineEnd, ended_length
+from mapping.assembly.free import FreeSection, free_spot, mean_sizes
 from mapping.assembly.lines import FULL_HEIGHT
-from mapping.assembly.linking import groups
+from mapping.assembly.linking import Branch, Inspection, Inspections, LineEnd, branches, ended_length, groups
 from mapping.base import LaidTrace
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances

@@ -8,10 +8,18 @@ from functools import partial
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
-from mapping.assembly.branches import Branch, branches, rejoined
-from mapping.assembly.inspection import Inspection
-from mapping.assembly.line_ends import closes, ended_length, line_end
-from mapping.assembly.linking import FELT_REACH, LONGEST_LINK, between
+from mapping.assembly.linking import (
+    FELT_REACH,
+    LONGEST_LINK,
+    Branch,
+    Inspection,
+    between,
+    branches,
+    closes,
+    ended_length,
+    line_end,
+    rejoined,
+)
 from mapping.assembly.points import body_width, evidence
 from mapping.assembly.runs import RunPoint
 from mapping.base import Base

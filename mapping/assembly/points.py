@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import Details, Feature, FloatArray, Interval, Support
-from mapping.assembly.inspection import Inspection
+from mapping.assembly.linking import Inspection
 from mapping.assembly.runs import RunPoint
 from mapping.detection import Crossing, Detections
 from mapping.geometry.templates import CREST_OUTLIER_SDS, SHAPE_ERROR, crest_trace

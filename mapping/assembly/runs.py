@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import BoolArray, FloatArray
-from mapping.assembly.inspection import Inspection
+from mapping.assembly.linking import Inspection
 from mapping.base import Base
 from mapping.detection import Crossing
 from mapping.geometry.templates import crest_trace, robust_cost

@@ -8,7 +8,7 @@ from mapping import FloatArray, IntArray
 from mapping.instrument import robust_scale
 
 # Of the length: what keeps to another level for less is a detail of the level beside it, and what is a detail is no
-# longer (`assembly.free_sections`). A 16th and a fifth find the same 18 steps and 20 slots of 20 each
+# longer (`assembly.free`). A 16th and a fifth find the same 18 steps and 20 slots of 20 each
 SHORTEST_LEVEL = 1 / 8
 # A difference between neighbours that leaves the usual ones by so many of their scatter may be an edge: noise does
 # once in a million profiles of 480 places. Of 20 steps 4 finds 17, 6 and 8 18 (`explore3d bench profiles`, seeds 200

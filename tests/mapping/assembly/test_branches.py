@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mapping.assembly.branches import branches
+from mapping.assembly.linking.branches import branches
 
 WIDTH = 3.6e-3
 

@@ -10,7 +10,7 @@ import pytest
 from mapping import Feature, Interval, Support
 from mapping.assembly.faint_features import _is_weak
 from mapping.assembly.faint_lines import faint_lines, threshold
-from mapping.assembly.inspection import Inspection, inspect
+from mapping.assembly.linking.inspection import Inspection, inspect
 from mapping.base.base import Base
 from mapping.geometry.mesh.polyline import distances
 from mapping.geometry.templates.small_heights import crest_trace

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mapping.assembly.inspection import Inspection
-from mapping.assembly.line_ends import line_end
+from mapping.assembly.linking.inspection import Inspection
+from mapping.assembly.linking.line_ends import line_end
 from mapping.geometry.mesh.polyline import distances
 from mapping.geometry.templates.small_heights import crest_trace
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapping.assembly.inspection import Inspection
 from mapping.assembly.lines import Around, line_features
+from mapping.assembly.linking.inspection import Inspection
 from mapping.base.base import Base
 from mapping.detection.crossing import Crossing
 from mapping.detection.detect import Detections

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mapping.assembly.inspection import Inspection
+from mapping.assembly.linking.inspection import Inspection
 from mapping.assembly.points import outline
 from mapping.detection.crossing import Crossing
 from mapping.geometry.mesh.polyline import distances

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mapping.assembly.branches import Branch, rejoined
+from mapping.assembly.linking.branches import Branch, rejoined
 
 WIDE = 3.6e-3
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapping.assembly.branches import branches, spanning_tree
-from mapping.assembly.spanning_tree import untied
+from mapping.assembly.linking.branches import branches, spanning_tree
+from mapping.assembly.linking.spanning_tree import untied
 
 WIDE = 3.6e-3
 

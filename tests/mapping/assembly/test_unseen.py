@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapping.assembly.false_crossings import is_plateau_end, is_unseen
-from mapping.assembly.inspection import Inspection
+from mapping.assembly.linking.inspection import Inspection
 from mapping.detection.crossing import Crossing
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapping import FloatArray
-from mapping.assembly.inspection import Inspection
+from mapping.assembly.linking.inspection import Inspection
 from mapping.detection import Crossing
 
 # Crossings further apart than this many sweep distances are not linked, whatever lies between.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import FloatArray
-from mapping.assembly.spanning_tree import Tree, untied, way_from
+from mapping.assembly.linking.spanning_tree import Tree, untied, way_from
 
 ArmEnd = tuple[int, int]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import FloatArray, Interval
-from mapping.assembly.inspection import Inspection
+from mapping.assembly.linking.inspection import Inspection
 from mapping.geometry.mesh import arclengths
 from mapping.geometry.templates import crest_trace, robust_cost
 

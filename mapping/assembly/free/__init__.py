@@ -1,0 +1,19 @@
+"""Free sections: details so wide that the trace over them is their surface; measured, not fitted."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.assembly.free.free_sections import (
+        FreeSection as FreeSection,
+        free_sections as free_sections,
+        free_spot as free_spot,
+    )
+    from mapping.assembly.free.mean_section import mean_sizes as mean_sizes
+
+_PUBLIC = {
+    "free_sections": ("FreeSection", "free_sections", "free_spot"),
+    "mean_section": ("mean_sizes",),
+}
+doorway(__name__, _PUBLIC)

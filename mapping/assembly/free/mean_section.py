@@ -1,0 +1,89 @@
+"""Mean section: that of several sweeps across one line, which a root of their number less noise is in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mapping import FloatArray
+from mapping.assembly.free.free_sections import FreeSection
+from mapping.assembly.free.outline import FLANK_SDS, LEAST_BINS, outlined
+from mapping.assembly.free.section import Section
+from mapping.assembly.free.sizes import SectionSizes, sizes_of_section
+from mapping.base import SweepHeights
+from mapping.instrument import Noise, robust_scale
+
+# Middles are told by noisy flanks: sections are moved until they lie on their mean, which is theirs after two rounds
+ALIGNMENTS = 3
+# Sides that rise by this share of the height between two samples are blurred in a mean of sweeps that sample elsewhere:
+# its width is by up to a sample's distance too large
+BLURRED = 0.25
+# What lies farther than this share of the width from the middle is beside a mean section
+SIDES = 0.6
+
+
+def mean_sizes(group: Sequence[FreeSection], square: FloatArray, tip: float, noise: Noise) -> SectionSizes | None:
+    """The sizes of the mean section of several sweeps, laid square to the line and on each other; None if it is none.
+
+    The extreme of a single section is the noise's too: of n sweeps together it is so by a root of n less.
+
+    Args:
+        square: (N,) sines of the angles between the line and the sweeps.
+        tip: radius of the fingertip, m.
+        noise: of single samples.
+    """
+    spacing = float(np.median(square * [section.piece.spacing for section in group]))
+    reach = float(np.max(square * [section.sizes.width for section in group]))
+    u = spacing * np.arange(-np.ceil(reach / spacing), np.ceil(reach / spacing) + 1)
+    shifts = np.zeros(len(group))
+    for _ in range(ALIGNMENTS):
+        heights = [_laid_square(u + by, *each) for by, *each in zip(shifts, group, square, strict=True)]
+        known = np.isfinite(heights).all(axis=0)
+        if known.sum() < LEAST_BINS:
+            return None
+        mean = np.mean(heights, axis=0)[known]
+        # least squares: a section that is the mean moved by d differs from it by d times its slope
+        slope = np.gradient(mean, spacing)
+        gaps = (np.array(heights)[:, known] - mean) @ slope / max(float(slope @ slope), np.finfo(float).tiny)
+        shifts = shifts - np.clip(gaps, -0.1 * reach, 0.1 * reach)
+    first = group[0].piece
+    samples = float(np.median([section.piece.samples for section in group]))
+    index, nowhere = np.arange(len(mean) + 1), np.zeros((len(mean), 3))
+    start = float(u[known][0])
+    piece = SweepHeights(first.sweep, start, spacing, mean, samples, index, np.zeros(len(mean)), nowhere)
+    noise = noise.of_passes(len(group)).scaled(white=(max(samples, 1.0) * len(group)) ** -0.5)
+    while len(piece.height) >= LEAST_BINS:
+        section = _middle_section(piece, group[0].sign, reach, noise.sd)
+        if section is not None:
+            sizes = sizes_of_section(section, tip, noise)
+            if sizes is None or float(np.median([each.sizes.steep for each in group])) < BLURRED:
+                return sizes
+            width = float(np.mean(square * [each.sizes.width for each in group]))
+            doubt = float(np.median([each.sizes.foot_doubt for each in group]))
+            return replace(sizes, width=width, foot_doubt=doubt)
+        piece, noise = piece.coarser(), noise.scaled(white=2.0**-0.5)
+    return None
+
+
+def _laid_square(u: FloatArray, section: FreeSection, square: float) -> FloatArray:
+    """Heights at places u (N,) across a line, m from the section's middle; NaN beyond its piece."""
+    piece = section.piece
+    return np.interp(u, square * (piece.s - section.sizes.middle), piece.height, left=np.nan, right=np.nan)
+
+
+def _middle_section(piece: SweepHeights, sign: float, reach: float, sd: float) -> Section | None:
+    """The section about the middle of a mean profile, 2 `reach` long; None if it is not clear of the noise (sd, m)."""
+    z = sign * piece.height
+    beside = piece.height[np.abs(piece.s) > SIDES * reach]
+    usual = max(sd, robust_scale(beside) if len(beside) > 1 else 0.0, np.finfo(float).tiny)
+    out, inner = z > FLANK_SDS * usual, np.flatnonzero(np.abs(piece.s) < 0.25 * reach)
+    if not len(inner) or not out[inner].any():
+        return None
+    top = int(inner[np.argmax(z[inner])])
+    below = np.flatnonzero(~out)
+    before, after = below[below < top], below[below > top]
+    if not len(before) or not len(after):
+        return None
+    return outlined(piece, sign, int(before[-1]) + 1, int(after[0]), usual, np.inf)

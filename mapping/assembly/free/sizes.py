@@ -1,0 +1,143 @@
+"""Sizes: height and width of a section on the body, what the ball changes being known (theory section 5.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapping import Interval
+from mapping.assembly.free.section import FLANK, WALL, Section, flanks
+from mapping.instrument import Noise
+
+# The flank once more, half as high: where both tell another width the foot is round, and the width as doubtful as
+# that. Nearer to the first (three quarters of it) it does not tell: widths 44
+NEAR_FOOT = 0.5 * FLANK
+# So many places about the extreme as make its standard deviation this share of the height would be enough (0.002:
+# heights 84, 0.01: 85); where it is flat over more, up to so many times as many (1: heights 85, 10: 86). Of a V's tip
+# a parabola takes 0.2 of what these places fall short of it
+EXTREME_SD, EXTREME_WINDOW = 0.005, 4
+# What lies above this share of the height is called the top (or floor); of a parabola that is 0.22 of the width, less
+# than the third from which a top counts as flat by the standard. 0.9 and 0.98 are alike
+NEARLY_FLAT = 0.95
+# A floor, which was touched: that of a parabola is 0.22 of the width, and by the standard it is a third
+FLOOR = 1.0 / 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class SectionSizes:
+    """What a section measures, m.
+
+    Args:
+        height, height_sd: of its extreme over the base (positive), and its standard deviation.
+        below: by how much it may go on beyond what was felt.
+        width, width_sd: on the body, and its standard deviation by noise.
+        foot_doubt: by how much the width may be another where the foot is round, or a side steep between two samples.
+        top: width of what is nearly as high as the extreme.
+        middle: of the width, from the profile's start.
+        steep: the largest rise from one bin to the next, as a share of the height.
+    """
+
+    height: float
+    height_sd: float
+    below: float
+    width: float
+    width_sd: float
+    foot_doubt: float
+    top: float
+    middle: float
+    steep: float
+
+    def height_interval(self, sign: float, sd: float = 0.0) -> Interval:
+        """The signed height: what was felt, down to what may be below, by its own standard deviation or a larger."""
+        sd = max(sd, self.height_sd)
+        low, deep = (Interval.normal(sign * height, sd) for height in (self.height, self.height + self.below))
+        return Interval(0.5 * (low.median + deep.median), min(low.low, deep.low), max(low.high, deep.high))
+
+    def width_interval(self, sd: float = 0.0) -> Interval:
+        """The width by noise (its own, or more), and by its foot."""
+        wide = Interval.normal(self.width, float(np.hypot(max(sd, self.width_sd), self.foot_doubt)))
+        return replace(wide, low=max(wide.low, 0.0))
+
+
+def sizes_of_section(section: Section, tip: float, noise: Noise) -> SectionSizes | None:
+    """What a section measures, by the noise of its bins; None if its flanks tell no size."""
+    height = _extreme(section, noise.sd)
+    width, width_sd, foot_doubt, middle = _width(section, tip, noise)
+    steep = float(np.abs(np.diff(section.monotone)).max() / section.monotone.max())
+    if not np.isfinite([height, width, width_sd, foot_doubt]).all() or width <= 0.0:
+        return None
+    left, right = flanks(section, NEARLY_FLAT)
+    top = right.place - left.place
+    hollow = section.sign < 0.0 and top < FLOOR * width
+    below = _unfelt_depth(section, tip, height, noise.sd) if hollow else 0.0
+    return SectionSizes(height, noise.sd, below, width, width_sd, foot_doubt, top, middle, steep)
+
+
+def _extreme(section: Section, sd: float) -> float:
+    """The height (positive): the crest of a parabola about the extreme, over the places that noise (sd, m) asks for."""
+    z = section.sign * section.piece.height[section.begin : section.end + 1]
+    high = float(section.monotone.max())
+    # the middle of what is nearly as high, not its highest place, which is high by its noise
+    top = np.flatnonzero(section.monotone > min(NEARLY_FLAT, 1.0 - 2.0 * sd / high) * high)
+    needed = max(1, int((sd / (EXTREME_SD * high)) ** 2))
+    half = max(1, min(len(top) // 2, EXTREME_WINDOW * needed))
+    middle = int(top[0] + top[-1]) // 2
+    first = max(middle - half, 0)
+    around = z[first : middle + half + 1]
+    u = np.arange(len(around)) - (middle - first)
+    if len(around) < 3:
+        return float(around.max())
+    bent = np.polyfit(u, around, 2)
+    crest = -0.5 * bent[1] / bent[0] if bent[0] < 0.0 else 0.0
+    crest = float(np.clip(crest, u[0], u[-1]))
+    return float(np.polyval(bent, crest))
+
+
+def _width(section: Section, tip: float, noise: Noise) -> tuple[float, float, float, float]:
+    """(width on the body, its standard deviation by noise, by how much it may be another, middle), m.
+
+    The flanks are drawn on to the base, without the ball's part. Where both shares of the height tell another width by
+    more than their noise does, the foot is round. Where a side is nearly a wall, the chord between two samples is no
+    tangent of the circle that the ball rolls on, and its foot is as doubtful as the place of a wall is.
+    """
+    widths, sds, high = [], [], float(section.monotone.max())
+    for share in (NEAR_FOOT, FLANK):
+        left, right = flanks(section, share, noise)
+        begin, end = (
+            flank.foot
+            + side * section.sign * flank.hidden(tip, flank.wall if section.sign < 0.0 else high - flank.wall)
+            for side, flank in ((1.0, left), (-1.0, right))
+        )
+        widths.append(end - begin)
+        sds.append(float(np.hypot(left.foot_sd, right.foot_sd)))
+    foot_doubt = float(np.sqrt(max((widths[1] - widths[0]) ** 2 - sds[0] ** 2, 0.0)))
+    steepest = float(np.abs(np.diff(section.monotone)).max()) / (WALL * high)
+    foot_doubt = float(np.hypot(foot_doubt, min(steepest, 1.0) ** 2 * section.piece.spacing / np.sqrt(6.0)))
+    return widths[1], sds[1], foot_doubt, 0.5 * float(begin + end)
+
+
+def _unfelt_depth(section: Section, tip: float, height: float, sd: float) -> float:
+    """By how much a hollow may go on below what was felt of it: as far as its flanks meet, without the ball, m.
+
+    Between two samples lies the trace's own bottom, and below that the ball touches two flanks and nothing between.
+    """
+    piece, top = section.piece, section.top
+    z = section.sign * piece.height
+    count = max(3, int(np.ceil((sd / (EXTREME_SD * height)) ** 2)))
+    lines = []
+    for side in (slice(max(section.begin, top - count), top), slice(top + 1, min(section.end, top + count) + 1)):
+        u, rise = np.arange(side.start, side.stop) - float(top), z[side]
+        if len(u) < 3:
+            return 0.0
+        slope, level = np.polyfit(u, rise, 1)
+        error = sd / np.sqrt(len(u) * (len(u) ** 2 - 1) / 12.0)
+        if abs(slope) < 2.0 * error:  # a floor
+            return 0.0
+        lines.append((float(slope), float(level)))
+    (up, left), (down, right) = lines
+    if not up > 0.0 > down:
+        return 0.0
+    meeting = left + up * (right - left) / (up - down)
+    slope = np.sqrt(-up * down) / piece.spacing
+    return float(max(meeting - height, 0.0) + tip * (np.hypot(1.0, slope) - 1.0))

@@ -1,0 +1,35 @@
+"""Linking: which crossings are one line and where it ends, by what was inspected beside and between them."""
+
+from typing import TYPE_CHECKING
+
+from mapping.doorway import doorway
+
+if TYPE_CHECKING:
+    from mapping.assembly.linking.branches import (
+        Branch as Branch,
+        branches as branches,
+        main_line as main_line,
+        rejoined as rejoined,
+    )
+    from mapping.assembly.linking.inspection import Inspection as Inspection, Inspections as Inspections
+    from mapping.assembly.linking.line_ends import (
+        LineEnd as LineEnd,
+        closes as closes,
+        ended_length as ended_length,
+        line_end as line_end,
+    )
+    from mapping.assembly.linking.linking import (
+        FELT_REACH as FELT_REACH,
+        LONGEST_LINK as LONGEST_LINK,
+        between as between,
+        groups as groups,
+        uphill as uphill,
+    )
+
+_PUBLIC = {
+    "branches": ("Branch", "branches", "main_line", "rejoined"),
+    "inspection": ("Inspection", "Inspections"),
+    "line_ends": ("LineEnd", "closes", "ended_length", "line_end"),
+    "linking": ("FELT_REACH", "LONGEST_LINK", "between", "groups", "uphill"),
+}
+doorway(__name__, _PUBLIC)
