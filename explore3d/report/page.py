@@ -122,6 +122,7 @@ figcaption { color: var(--soft); font-size: .9rem; margin-top: .45rem; max-width
 .hint { color: var(--soft); font-size: .85rem; }
 button { font: inherit; color: var(--link); background: none; border: 1px solid var(--edge); border-radius: 6px;
   padding: .05rem .5rem; cursor: pointer; }
+.wide th, .wide td { padding: .5rem .45rem; } .wide td .badge { white-space: normal; border-radius: 10px; }
 td button.feature { border: 0; padding: 0; font-weight: 600; text-align: left; white-space: nowrap; }
 td button.feature:hover { text-decoration: underline; }
 tr.chosen td { background: var(--chosen); }
