@@ -438,16 +438,17 @@ def sections(
 def profiles(
     forms: Annotated[str | None, typer.Option(help="Forms, separated by commas; all if left out.")] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Profiles of each form.")] = 10,
+    rows: Annotated[int, typer.Option(min=1, help="Rows of a raster that the detail crosses; 1: a profile.")] = 1,
     building: Annotated[bool, typer.Option("--building", help="The seeds that may be looked into.")] = False,
 ) -> None:
-    """Are scratches, slots, steps and humps of a rough profile found, with true sizes? As CSV.
+    """Are scratches, slots, steps and humps of a rough profile, or of a raster, found with true sizes? As CSV.
 
     Example: explore3d bench profiles --forms slot,step --seeds 2
     """
     from explore3d.bench.precision import FIRST_REPORTED, PROFILE_FORMS, bench_profiles
 
     first = 0 if building else FIRST_REPORTED
-    for line in bench_profiles(_names(forms, "--forms", list(PROFILE_FORMS)), range(first, first + seeds)):
+    for line in bench_profiles(_names(forms, "--forms", list(PROFILE_FORMS)), range(first, first + seeds), rows):
         print(line, flush=True)
 
 

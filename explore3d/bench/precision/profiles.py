@@ -4,6 +4,9 @@ The trace is a dilation by brute force on a grid of 40 nm, none of the closed fo
 analysed is a table, as `explore3d analyze` reads it.
 
     explore3d bench profiles --seeds 10
+    explore3d bench profiles --seeds 10 --rows 16
+
+Of a raster each row is such a profile of a millimetre; the detail crosses the rows between its ends at a slant.
 """
 
 from __future__ import annotations
@@ -20,6 +23,11 @@ from mapping import Feature, FloatArray, Interval
 STYLUS, GRID_PITCH, GRID_PER_SAMPLE, PROFILE_LENGTH = 2e-6, 40e-9, 25, 10e-3
 # Roughness correlated over 20 um, white noise, and a random walk from sample to sample, m; slope of the whole
 ROUGH_SD, CORRELATED_OVER, WHITE_SD, WALK_SD, PROFILE_TILT = 50e-9, 20e-6, 10e-9, 2e-9, 3e-3
+# A raster: its rows' length and distance, how far the detail moves aside for a way across them, and the rows beyond its
+# ends, m
+RASTER_LENGTH, ROW_PITCH, MOST_ASIDE, ROWS_BESIDE = 1e-3, 20e-6, 0.5, 4
+# What is a spot on a profile is a line across a raster
+ACROSS = {"pit": "groove", "bump": "ridge"}
 # Seeds that the analysis was built with lie below
 FIRST_REPORTED = 3000
 # A form: heights over places (m) from its middle, and what is to be found: kind, height and width (NaN: has none), m
@@ -89,21 +97,28 @@ PROFILE_FORMS: dict[str, Callable[[np.random.Generator], Form]] = {
 }
 
 
-def bench_profiles(forms: Sequence[str], seeds: range) -> Iterator[str]:
-    """CSV lines: of each form the profiles, those right in kind and count, and sizes within their 90 % intervals."""
-    yield "form,profiles,right,heights,heights_inside,widths,widths_inside"
+def bench_profiles(forms: Sequence[str], seeds: range, rows: int = 1) -> Iterator[str]:
+    """CSV lines: of each form the profiles, those right in kind and count, and sizes within their 90 % intervals.
+
+    Args:
+        rows: of a raster; 1: profiles.
+    """
+    yield "form,profiles,right,heights,heights_inside,widths,widths_inside,lengths,lengths_inside"
     for name in forms:
-        right, heights, widths = 0, list[bool](), list[bool]()
+        right, heights, widths, lengths = 0, list[bool](), list[bool](), list[bool]()
         for seed in seeds:
-            found, wanted = profile_trial(name, seed)
+            found, wanted, length = raster_trial(name, seed, rows) if rows > 1 else (*profile_trial(name, seed), np.nan)
             if [feature.kind for feature in found] != [kind for kind, _, _ in wanted]:
                 continue
             right += 1
             for feature, (_, height, width) in zip(found, wanted, strict=True):
+                if np.isfinite(length):
+                    lengths.append(_holds(feature.length, length))
                 heights.append(_holds(feature.height, height))
                 if np.isfinite(width):
                     widths.append(_holds(feature.width, width))
-        yield f"{name},{len(seeds)},{right},{len(heights)},{sum(heights)},{len(widths)},{sum(widths)}"
+        counts = [count for sizes in (heights, widths, lengths) for count in (len(sizes), sum(sizes))]
+        yield ",".join([name, *map(str, [len(seeds), right, *counts])])
 
 
 def profile_trial(name: str, seed: int) -> tuple[list[Feature], tuple[tuple[str, float, float], ...]]:
@@ -111,19 +126,42 @@ def profile_trial(name: str, seed: int) -> tuple[list[Feature], tuple[tuple[str,
     rng = np.random.default_rng([seed, *name.encode()])
     form, wanted = PROFILE_FORMS[name](rng)
     x, z = _felt(form, rng.uniform(0.3, 0.7) * PROFILE_LENGTH, rng)
+    return _analysed(1e3 * np.column_stack([x, z]), "x [mm],z [mm]"), wanted
+
+
+def raster_trial(name: str, seed: int, rows: int) -> tuple[list[Feature], tuple[tuple[str, float, float], ...], float]:
+    """As `profile_trial`, of a raster of so many rows, and the detail's length between its ends, m (NaN: none)."""
+    rng = np.random.default_rng([seed, rows, *name.encode()])
+    form, wanted = PROFILE_FORMS[name](rng)
+    aside, y = rng.uniform(-MOST_ASIDE, MOST_ASIDE), ROW_PITCH * (np.arange(rows) - 0.5 * (rows - 1))
+    square, table = 1.0 / np.hypot(1.0, aside), list[FloatArray]()
+    ends = ROW_PITCH * (0.5 * rows - ROWS_BESIDE + rng.uniform(-0.5, 0.5, 2)) * [-1.0, 1.0]
+    for number, at in enumerate(y):
+        inside = ends[0] < at < ends[1]
+        # across the detail the path is longer by the slant
+        slanted = (lambda u: form(square * u)) if inside else (lambda u: 0.0 * u)
+        x, z = _felt(slanted, 0.5 * RASTER_LENGTH + aside * at, rng, RASTER_LENGTH)
+        table.append(np.column_stack([np.full(len(x), number), 1e3 * x, np.full(len(x), 1e3 * at), 1e3 * z]))
+    found = _analysed(np.concatenate(table), "sweep,x [mm],y [mm],z [mm]")
+    wanted = tuple((ACROSS.get(kind, kind), height, width) for kind, height, width in wanted)
+    return found, wanted, float((ends[1] - ends[0]) / square) if wanted else np.nan
+
+
+def _analysed(table: FloatArray, head: str) -> list[Feature]:
+    """The features of a table, mm, along x, as `explore3d analyze --quick` finds them."""
     with TemporaryDirectory() as folder:
-        table = Path(folder, "profile.csv")
-        np.savetxt(table, 1e3 * np.column_stack([x, z]), fmt="%.7f", delimiter=",", header="x [mm],z [mm]", comments="")
-        analysis = explore3d.analyze(table, tip_radius=STYLUS, quick=True)
-    return sorted(analysis.model.features, key=lambda feature: float(feature.axis[0, 0])), wanted
+        path = Path(folder, "table.csv")
+        np.savetxt(path, table, fmt="%.7f", delimiter=",", header=head, comments="")
+        analysis = explore3d.analyze(path, tip_radius=STYLUS, quick=True)
+    return sorted(analysis.model.features, key=lambda feature: float(feature.axis[:, 0].mean()))
 
 
 def _felt(
-    form: Callable[[FloatArray], FloatArray], middle: float, rng: np.random.Generator
+    form: Callable[[FloatArray], FloatArray], middle: float, rng: np.random.Generator, length: float = PROFILE_LENGTH
 ) -> tuple[FloatArray, FloatArray]:
     from scipy.ndimage import gaussian_filter1d
 
-    x: FloatArray = GRID_PITCH * np.arange(int(PROFILE_LENGTH / GRID_PITCH), dtype=np.float64)
+    x: FloatArray = GRID_PITCH * np.arange(int(length / GRID_PITCH), dtype=np.float64)
     reach = int(STYLUS / GRID_PITCH)
     around = np.pad(form(x - middle), reach, mode="edge")
     trace = np.full(len(x), -np.inf)
