@@ -291,13 +291,14 @@ def _smoothing(
 def _shoulders(height: FloatArray, begin: int, end: int, bank: Bank) -> tuple[float, float]:
     """Levels to join when a stretch is removed: what stands beside it, as far as that tells what lay below.
 
-    Over an unknown base that is all of it; over a known one, under a law of several terms, what the noise beside says
-    of the noise within: the share of its mean that its neighbour has in common. Under one process the base will do.
+    Over an unknown base that is all of it; over a known one what the noise beside says of the noise within: the share
+    of its mean that its neighbour has in common, none of white noise. The base itself would be a pit in a sweep that
+    noise keeps off it for longer than the stretch, and that the next one.
     """
     size = max(2, (end - begin) // 3)
     share = 1.0
     if bank.drift == 0:
-        if not bank.noise.further:
+        if not bank.noise.terms:  # to spare the medians
             return 0.0, 0.0
         own, next_ = bank.noise.block_covariances(2, size * bank.spacing, size * bank.samples)
         share = float(next_ / own)

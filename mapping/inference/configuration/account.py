@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,9 +15,16 @@ from mapping.geometry.mesh import distances
 from mapping.inference import describe
 from mapping.inference.configuration.configuration import Configuration, fitted, part_of
 from mapping.inference.configuration.joined_shape import JoinedShape, OneOfMany
-from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Places, neighbourhood, thin_half_width
+from mapping.inference.configuration.neighbourhood import (
+    NEIGHBOURHOOD_REACH,
+    PARTS_OF_BIN,
+    Neighbourhood,
+    Places,
+    neighbourhood,
+    thin_half_width,
+)
 from mapping.inference.configuration.proposals import PEAK_SDS, PROPOSALS, Proposal, apart_of, as_far_as_felt, dense
-from mapping.inference.configuration.search import Account, searched
+from mapping.inference.configuration.search import CROWDED, Account, searched
 from mapping.inference.families import MEETING_REACH, PosteriorProblem, RidgeShape, Surroundings, TwinShape
 from mapping.inference.kinds import kind_named, kind_of, sizes_of
 from mapping.inference.likelihood import Nuisance
@@ -32,6 +39,8 @@ CHOSEN_LATER = {"section", "smoother"}
 # Draws of the Gaussian that preliminary intervals are taken from
 PRELIMINARY_DRAWS = 400
 ENDED_EARLY = "the search for what is felt here, and what beside it, ended before all was tried"
+# What is said of more details than are weighed at once
+IN_BLOCKS = f"more details are felt together here than the {CROWDED} that are weighed at once: those beside were held"
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
@@ -64,24 +73,42 @@ def accounted(
         for group, own in _groups([feature for known in settled for feature in known], open_to, tip):
             if again and len({origin[id(feature)] for feature in group}) < 2:
                 found.append(group)
-            else:
-                found.append(_improved(group, own, places, around, false_alarms_per_metre, proposals))
+                continue
+            for block in _blocks(group, own, [origin[id(feature)] for feature in group] if again else [], tip):
+                improved = _improved(block, places, around, false_alarms_per_metre, proposals)
+                divided = again and bool(block.beside)
+                found.append([_noted(feature, (IN_BLOCKS,)) for feature in improved] if divided else improved)
         settled = found
     return [*rest, *(feature for group in settled for feature in group)]
 
 
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """What is weighed together.
+
+    Args:
+        features, crossings: which.
+        beside: features that reach into it, of the same neighbourhood.
+    """
+
+    features: list[Feature]
+    crossings: list[Crossing]
+    beside: list[Feature]
+
+
 def _improved(
-    group: list[Feature],
-    crossings: Sequence[Crossing],
+    block: _Block,
     places: Places,
     around: Surroundings,
     false_alarms_per_metre: float,
     proposals: Sequence[Proposal],
 ) -> list[Feature]:
-    """The features of one neighbourhood, as they are or better."""
+    """The features of one block, as they are or better."""
+    group, crossings = block.features, block.crossings
     place = neighbourhood(group, crossings, places, around, false_alarms_per_metre)
     if place is None:
         return group
+    place = _holding(block.beside, place)
     try:
         parts = [part_of(feature, place) for feature in group]
         start = fitted(parts, place)
@@ -106,6 +133,18 @@ def _improved(
     algorithms = group[0].evidence.algorithms if group else ()
     features = [_with_odds(feature, odds, noted) for feature in _described(found.best, around, algorithms)]
     return _meeting(features, around.trace.tip_radius)
+
+
+def _holding(beside: Sequence[Feature], place: Neighbourhood) -> Neighbourhood:
+    """The place with features that reach into it as they are; what has no family there is not held."""
+    held = []
+    for feature in beside:
+        try:
+            held.append(part_of(feature, place))
+        except MappingError:
+            continue
+    theirs = np.concatenate([np.zeros(0), *(part.start for part in held)])
+    return replace(place, held=tuple(part.shape for part in held), theirs=theirs)
 
 
 def _is_plain(start: Configuration) -> bool:
@@ -157,6 +196,48 @@ def _groups(
     return list(groups.values())
 
 
+def _blocks(features: list[Feature], crossings: list[Crossing], origins: Sequence[int], tip: float) -> list[_Block]:
+    """A neighbourhood as one block, or cut into blocks of CROWDED details that lie nearest together.
+
+    Args:
+        features, crossings: of the neighbourhood.
+        origins: the blocks that the features were weighed in before; none: they were not. Blocks grow from where those
+            met, so that what was cut is weighed together.
+        tip: radius, m.
+    """
+    if len(features) <= CROWDED:
+        return [_Block(features, crossings, [])]
+    reach = np.array([sizes_of(feature, tip).half_width for feature in features])
+    gap = np.array([[float(distances(one.axis, other.axis).min()) for other in features] for one in features])
+    apart = np.minimum(gap, gap.T)
+    gap = apart - reach - reach[:, None]  # less than 0 where disturbances touch
+    strength = np.array([feature.evidence.snr for feature in features])
+    met = [any(gap[k, m] < 0.0 and origins[m] != own for m in range(len(gap))) for k, own in enumerate(origins)]
+    order = list(np.lexsort((-strength, ~np.array(met, dtype=bool)))) if met else list(np.argsort(-strength))
+    blocks = list[list[int]]()
+    while order:
+        block = [order.pop(0)]
+        while order and len(block) < CROWDED:
+            nearest = order[int(np.argmin(gap[np.ix_(block, order)].min(axis=0)))]
+            order.remove(nearest)
+            block.append(nearest)
+        blocks.append(block)
+    of_block = {k: number for number, block in enumerate(blocks) for k in block}
+    own: list[list[Crossing]] = [[] for _ in blocks]
+    for crossing in crossings:
+        away = [float(distances(crossing.point[None], feature.axis)[0]) for feature in features] - reach
+        own[of_block[int(np.argmin(away))]].append(crossing)
+    windows = apart < NEIGHBOURHOOD_REACH * (reach + reach[:, None])
+    return [
+        _Block(
+            [features[k] for k in block],
+            felt,
+            [features[m] for m in range(len(features)) if m not in block and windows[m, block].any()],
+        )
+        for block, felt in zip(blocks, own, strict=True)
+    ]
+
+
 def _felt_by(crossing: Crossing, feature: Feature, tip: float) -> bool:
     """True if what a sweep detected may be a part of what a feature disturbs."""
     reach, axis = sizes_of(feature, tip).half_width + crossing.half_width, feature.axis
@@ -187,8 +268,8 @@ def _described(best: Configuration, around: Surroundings, algorithms: tuple[int,
     draws = theta + rng.standard_normal((PRELIMINARY_DRAWS, len(theta))) @ root_of(best.found.covariance).T
     features = []
     for k, (part, own) in enumerate(zip(best.parts, best.shape.columns, strict=True)):
-        others = [other.shape for other in best.parts if other is not part]
-        theirs = np.delete(theta, np.arange(own.start, own.stop))
+        others = [*(other.shape for other in best.parts if other is not part), *best.place.held]
+        theirs = np.append(np.delete(theta, np.arange(own.start, own.stop)), best.place.theirs)
         target = OneOfMany(part.shape, likelihood, None, others, theirs, PARTS_OF_BIN)
         sizes = sizes_of(part.feature, around.trace.tip_radius)
         problem = PosteriorProblem(part.feature, sizes, target, around.noise, Nuisance(0.0, 0.0), part.start[None])
@@ -249,4 +330,9 @@ def count_in(words: str) -> int:
 
 
 def _with_odds(feature: Feature, odds: tuple[tuple[str, float], ...], noted: tuple[str, ...]) -> Feature:
-    return replace(feature, details=replace(feature.details, account=odds or None), notes=(*feature.notes, *noted))
+    return _noted(replace(feature, details=replace(feature.details, account=odds or None)), noted)
+
+
+def _noted(feature: Feature, notes: tuple[str, ...]) -> Feature:
+    """The feature with some notes more; each is told once."""
+    return replace(feature, notes=tuple(dict.fromkeys((*feature.notes, *notes))))

@@ -86,7 +86,7 @@ class Configuration:
     @cached_property
     def shape(self) -> JoinedShape:
         """All parts joined."""
-        return JoinedShape([part.shape for part in self.parts], len(self.place.window), PARTS_OF_BIN)
+        return self.place.joined([part.shape for part in self.parts])
 
     @cached_property
     def template(self) -> FloatArray:
@@ -195,7 +195,7 @@ def laid(parts: Sequence[Part], place: Neighbourhood) -> Configuration:
 
 def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | None = None) -> Configuration | None:
     """The configuration of these parts at the optimum of all of them together; None if a rival is far better."""
-    shape = JoinedShape([part.shape for part in parts], len(place.window), PARTS_OF_BIN)
+    shape = place.joined([part.shape for part in parts])
     theta = np.concatenate([np.zeros(0), *(part.start for part in parts)])
     constants = np.array([constant for _, constant in place.levels])
     level = len(constants) - 1 if rival is None else rival.level

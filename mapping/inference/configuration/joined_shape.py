@@ -31,11 +31,15 @@ class JoinedShape:
         shapes: over a window that has `fine` bins for each one of the likelihood's.
         bins: of the likelihood.
         fine: parts of a bin.
+        held: others that are felt with them and stay as they are.
+        theirs: the parameters of these in a row.
     """
 
     shapes: Sequence[Shape]
     bins: int
     fine: int
+    held: Sequence[Shape] = ()
+    theirs: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -60,31 +64,66 @@ class JoinedShape:
     @cached_property
     def columns(self) -> list[slice]:
         """The parameters of each shape."""
-        ends = np.cumsum([0, *(len(shape.names) for shape in self.shapes)])
-        return [slice(int(low), int(high)) for low, high in itertools.pairwise(ends)]
+        return _in_a_row(self.shapes)
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights over the base's trace, m."""
-        own = [theta[:, columns] for columns in self.columns]
-        hollows = [_Distinct.of(shape, own[k]) for k, shape in enumerate(self.shapes) if not stands_out(shape)]
-        felt = np.tile(sum((each.heights[0] for each in hollows), np.zeros(self.fine * self.bins)), (len(theta), 1))
+        theta = np.hstack([theta, np.tile(self.theirs, (len(theta), 1))]) if self.held else theta
+        own = [theta[:, columns] for columns in _in_a_row(self._all)]
+        hollows = [_Distinct.of(self._all[k], own[k]) for k in self._varied if not stands_out(self._all[k])]
+        ground = sum((each.heights[0] for each in hollows), self._held_ground)
+        felt = np.tile(ground, (len(theta), 1))
         for hollow in hollows:
             felt[hollow.other] += hollow.heights[hollow.which[hollow.other]] - hollow.heights[0]
         # a crest beside a hollow holds the ball that sinks into it: crests are known as far down as it does
         sunk = max(-float(felt.min(initial=0.0)), 0.0)
-        crests = [
-            _Distinct.of(shape, _raised(shape, piece, lift + sunk))
-            for k, shape in enumerate(self.shapes)
-            if stands_out(shape)
-            for piece, lift in [(own[k], np.zeros(len(theta))), *self._on_steps(k, own)]
-        ]
+        crests = [_Distinct.of(self._all[k], piece) for k in self._varied for piece in self._crests(k, own, sunk)]
+        crests += [_Distinct.same(heights, len(theta)) for heights in self._held_crests(own, sunk)]
         _rest_on(felt, crests, sunk)
         return np.asarray(felt.reshape(len(theta), self.bins, self.fine).mean(axis=2))
 
+    @cached_property
+    def _varied(self) -> range:
+        """Numbers of the shapes that leave something else when parameters change: a step lifts what stands on it."""
+        every = not self.held or any(isinstance(shape, StepShape) for shape in self.shapes)
+        return range(len(self._all) if every else len(self.shapes))
+
+    @cached_property
+    def _held_ground(self) -> FloatArray:
+        """(fine * bins,) what steps and hollows leave that do not vary, m."""
+        ground = np.zeros(self.fine * self.bins)
+        columns = _in_a_row(self.held)
+        for k in range(len(self._varied), len(self._all)):
+            if not stands_out(self._all[k]):
+                ground += self._all[k].templates(self.theirs[None, columns[k - len(self.shapes)]])[0]
+        return ground
+
+    def _held_crests(self, own: Sequence[FloatArray], sunk: float) -> list[FloatArray]:
+        """Highest of the crests (fine * bins,) that do not vary, raised by `sunk`, m; none if there are none."""
+        if sunk not in self._raised_by:
+            one, numbers = [each[:1] for each in own], range(len(self._varied), len(self._all))
+            crests = [self._all[k].templates(piece)[0] for k in numbers for piece in self._crests(k, one, sunk)]
+            self._raised_by.clear()
+            self._raised_by[sunk] = [np.max(crests, axis=0)] if crests else []
+        return self._raised_by[sunk]
+
+    @cached_property
+    def _raised_by(self) -> dict[float, list[FloatArray]]:
+        return {}
+
+    def _crests(self, k: int, own: Sequence[FloatArray], sunk: float) -> Iterator[FloatArray]:
+        """Parameters (W, P) of the k-th shape if it stands out, and of what of it stands on steps, raised by `sunk`."""
+        shape = self._all[k]
+        if not stands_out(shape):
+            return
+        yield _raised(shape, own[k], np.full(len(own[k]), sunk))
+        for piece, lift in self._on_steps(k, own):
+            yield _raised(shape, piece, lift + sunk)
+
     def _on_steps(self, k: int, own: Sequence[FloatArray]) -> Iterator[tuple[FloatArray, FloatArray]]:
         """What of the k-th shape stands on the high side of each step: its parameters (W, P), and the (W,) lift, m."""
-        shape: Any = self.shapes[k]
-        for number, step in enumerate(self.shapes):
+        shape: Any = self._all[k]
+        for number, step in enumerate(self._all):
             if not isinstance(step, StepShape):
                 continue
             s, along, aside = self._places_at(k, number)
@@ -113,12 +152,22 @@ class JoinedShape:
 
     def _line(self, k: int) -> Any:
         """The k-th shape, or the course of a twin."""
-        shape: Any = self.shapes[k]
+        shape: Any = self._all[k]
         return shape.midway if isinstance(shape, TwinShape) else shape
+
+    @cached_property
+    def _all(self) -> list[Shape]:
+        return [*self.shapes, *self.held]
 
     @cached_property
     def _known(self) -> dict[tuple[int, int], tuple[FloatArray, FloatArray, FloatArray]]:
         return {}
+
+
+def _in_a_row(shapes: Sequence[Shape]) -> list[slice]:
+    """The columns of each shape's parameters."""
+    ends = np.cumsum([0, *(len(shape.names) for shape in shapes)])
+    return [slice(int(low), int(high)) for low, high in itertools.pairwise(ends)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +193,11 @@ class _Distinct:
         which = place[which.reshape(-1)]
         return cls(shape.templates(np.ascontiguousarray(rows[order])), which, np.flatnonzero(which))
 
+    @classmethod
+    def same(cls, heights: FloatArray, count: int) -> _Distinct:
+        """Heights (n,) that so many rows have."""
+        return cls(heights[None], np.zeros(count, dtype=np.int64), np.zeros(0, dtype=np.int64))
+
 
 def _rest_on(felt: FloatArray, crests: Sequence[_Distinct], sunk: float) -> None:
     """Raise ground (W, n) to the highest of crests that are `sunk` (m) too high."""
@@ -156,13 +210,16 @@ def _rest_on(felt: FloatArray, crests: Sequence[_Distinct], sunk: float) -> None
     for k, crest in enumerate(crests):
         for row in crest.other:
             changed[row].append(k)
+    np.put_along_axis(commonest, top[None], -np.inf, axis=0)
+    second = commonest.max(axis=0)
+    np.put_along_axis(commonest, top[None], highest[None], axis=0)
     without: dict[tuple[int, ...], FloatArray] = {(): highest}
     for row, own in enumerate(changed):
         if (key := tuple(own)) not in without:
-            rest = np.delete(commonest, own, axis=0)
             where = np.isin(top, own)
-            without[key] = highest.copy()
-            without[key][where] = rest[:, where].max(axis=0, initial=-np.inf)
+            without[key] = np.where(where, second, highest)
+            if len(own) > 1:
+                without[key][where] = np.delete(commonest, own, axis=0)[:, where].max(axis=0, initial=-np.inf)
         np.maximum(felt[row], without[key] - sunk, out=felt[row])
         for k in own:
             np.maximum(felt[row], crests[k].heights[crests[k].which[row]] - sunk, out=felt[row])
@@ -206,5 +263,5 @@ class OneOfMany(LogPosterior):
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights of all of them together, m."""
-        joined = JoinedShape([self.shape, *self.others], len(self.likelihood.window), self.fine)
-        return joined.templates(np.hstack([theta, np.tile(self.theirs, (len(theta), 1))]))
+        joined = JoinedShape([self.shape], len(self.likelihood.window), self.fine, self.others, self.theirs)
+        return joined.templates(theta)

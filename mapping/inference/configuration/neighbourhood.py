@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from mapping import BoolArray, Feature, FloatArray, IntArray
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
+from mapping.inference.configuration.joined_shape import JoinedShape
 from mapping.inference.families import Surroundings
 from mapping.inference.kinds import sizes_of
-from mapping.inference.likelihood import Likelihood, Nuisance, Window, build_likelihood
+from mapping.inference.likelihood import Likelihood, Nuisance, Shape, Window, build_likelihood
 from mapping.instrument import Noise
 
 # How wrong the shapes of a configuration may be about a real detail, in shares of its height: which of these it is the
@@ -64,6 +65,8 @@ class Neighbourhood:
         half_width: of the narrowest disturbance, m.
         told: (M, 3) places where single sweeps detected something, m.
         false_alarms_per_metre: false features that are accepted, 1/m of path.
+        held: details of other neighbourhoods that reach into this one, and stay as they are.
+        theirs: the parameters of these in a row.
     """
 
     window: Window
@@ -73,6 +76,12 @@ class Neighbourhood:
     half_width: float
     told: FloatArray
     false_alarms_per_metre: float
+    held: tuple[Shape, ...] = ()
+    theirs: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+    def joined(self, shapes: Sequence[Shape]) -> JoinedShape:
+        """Some shapes over `fine` and what reaches into the neighbourhood, as they are felt together."""
+        return JoinedShape(shapes, len(self.window), PARTS_OF_BIN, self.held, self.theirs)
 
 
 def neighbourhood(

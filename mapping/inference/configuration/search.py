@@ -9,13 +9,21 @@ import numpy as np
 
 from mapping import FloatArray, MappingError
 from mapping.inference.configuration.configuration import Configuration, Part, fitted, laid
+from mapping.inference.configuration.neighbourhood import Neighbourhood
 from mapping.inference.configuration.proposals import JOIN, PROPOSALS, Parts, Proposal
 
-# Configurations that are fitted in one neighbourhood, of so many details each: a bound on the time, which crowded ones
-# reach. A fit's time grows with the square of the details (rows of a difference quotient times shapes), 17 to 47 s for
-# the 26 that a random walk left on a sphere: 6 of those. The benches' plates and the shipped scenes have 5 details at
-# most: twice as many, for what is proposed beside them, are not bounded any earlier.
-MOST_FITTED, CROWDED = 40, 10
+# Details that are weighed at once (see `account`), and places that they are usually weighed on: one fit of them takes
+# about one CPU second. Its time grows with the square of the details (rows of a difference quotient times shapes) and
+# with the places.
+CROWDED, CROWDED_PLACES = 10, 1000
+# Configurations that are fitted in one neighbourhood, of so many details each; of more, fewer: a bound on the time. The
+# benches' plates and the shipped scenes have 5 details at most: twice as many, for what is proposed beside them, are
+# not bounded any earlier.
+MOST_FITTED = 40
+# Of such fits so many a detail are spent on joining pieces of a line, beyond them: 40 of 10 details, and 80 of 5, which
+# is every pair of them and every pair that is left after that. With both, less than 10 CPU s a detail: 2.9 where 39
+# details and 112 crossings felt each other, 6 in a row of twelve touching wires
+MOST_JOINED = 4.0
 # A proposal must be better by this log odds: less is rounding, or the same configuration found again
 WORTH = 0.5
 # What is less likely than the best by this log odds is not gone on from, nor told
@@ -31,7 +39,7 @@ class Account:
         best: the configuration of the highest odds.
         visited: the best of each set of kinds, the best of all first.
         accepted: names of the proposals that led from the beginning to the best.
-        bounded: True if the search ended for want of time, with proposals left.
+        bounded: True if the search ended at MOST_FITTED or MOST_JOINED, with proposals left.
     """
 
     start: Configuration
@@ -60,16 +68,19 @@ def searched(
         proposals: the generators that are asked, in order.
     """
     place, best, accepted, idle = start.place, start, list[str](), 0
-    left = MOST_FITTED - _cost(start.parts)
+    left = MOST_FITTED - max(1.0, _cost(parts, place))
     visited = {start.kinds: start}
-    whole, joining = laid(parts, place), True
+    whole, joining, joins = laid(parts, place), True, MOST_JOINED * len(parts)
     # pieces of one line hide each other once they are fitted: they are joined as the rules left them, those first that
     # gain most by it: both flanks of a wide line may be one step to some extent, and no longer a line after that
     while joining and left > 0.0:
         joining = False
         for other_parts in _yielded(JOIN, whole, points) if JOIN in proposals else ():
+            if joins <= 0.0:
+                break
             other = fitted(other_parts, place)
-            left -= _cost(other_parts)
+            cost = _cost(other_parts, place)
+            left, joins = left - max(1.0, cost), joins - cost
             if other is not None and other.log_odds > best.log_odds + WORTH:
                 best, joined, joining = other, laid(other_parts, place), True
         if joining:
@@ -82,7 +93,7 @@ def searched(
             for proposed in _yielded(proposal, best, points):
                 if left <= 0.0:
                     break
-                left -= _cost(proposed)
+                left -= max(1.0, _cost(proposed, best.place))
                 other = fitted(proposed, best.place, best)
                 if other is None:
                     continue
@@ -99,12 +110,13 @@ def searched(
                 break
     order = sorted(visited.values(), key=lambda each: -each.log_odds)
     likely = [each for each in order if each.log_odds > best.log_odds - NEGLIGIBLE_ODDS]
-    return Account(start, best, tuple(likely), tuple(accepted), left <= 0.0)
+    return Account(start, best, tuple(likely), tuple(accepted), min(left, joins) <= 0.0)
 
 
-def _cost(parts: Sequence[Part]) -> float:
-    """Of fitting a configuration, in those of few details."""
-    return max(1.0, (len(parts) / CROWDED) ** 2)
+def _cost(parts: Sequence[Part], place: Neighbourhood) -> float:
+    """Of fitting a configuration, in those of CROWDED details on CROWDED_PLACES."""
+    rows, shapes = len(parts) / CROWDED, (len(parts) + len(place.held)) / CROWDED
+    return rows * shapes * len(place.window) / CROWDED_PLACES
 
 
 def _yielded(proposal: Proposal, now: Configuration, points: FloatArray) -> Iterator[Parts]:

@@ -42,6 +42,12 @@ def one_over_f(rng: np.random.Generator) -> FloatArray:
     return np.asarray(WHITE * heights / heights.std())
 
 
+def wandering(rng: np.random.Generator) -> FloatArray:
+    """White, and a walk that goes on from sweep to sweep: each stands at a level of its own, and hardly leaves it."""
+    steps = rng.standard_normal(SWEEPS * len(S))
+    return white(rng) + WHITE * np.cumsum(steps).reshape(SWEEPS, -1) / np.sqrt(4 * len(S))
+
+
 def found(law: Callable[[np.random.Generator], FloatArray], seed: int, height: float = 0.0) -> Detections:
     """What is detected at one false alarm a metre on a metre of plate, a wire of that height across every sweep."""
     z = law(np.random.default_rng([11, seed]))
@@ -126,6 +132,15 @@ def test_noise_of_another_law_gives_no_more_than_thrice_the_false_alarms_asked_f
     # where the law has the terms that the noise has, there is nothing to tell
     assert all(said or run.noise.further for said, run in zip(told, runs, strict=True))
     assert all(told) if law is level_by_sweep else all(run.noise.further for run in runs)
+
+
+def test_beside_a_crest_in_noise_that_wanders_there_is_no_pit() -> None:
+    """A sweep that stands off the base does so under a crest, too: the base there would be a pit as wide as the crest,
+    with a step down and a step up at its ends, and the next one beside it."""
+    runs = [found(wandering, seed, 8 * WHITE) for seed in range(4)]
+    beside = [c for run in runs for c in run.crossings if abs(c.point[0] - 0.1 * LENGTH) > np.sqrt(2 * TIP * 8 * WHITE)]
+    assert not any(c.is_step for c in beside)
+    assert len(beside) <= 3 * sum(run.inspected_length for run in runs)
 
 
 def test_a_wire_that_stands_out_is_still_found_where_the_level_differs_by_sweep() -> None:

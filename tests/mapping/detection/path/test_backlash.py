@@ -12,7 +12,7 @@ from mapping.base import Base, LaidTrace
 from mapping.detection import Detections, detect
 from mapping.detection.path import Backlash, backlash, with_doubt, without_backlash
 
-TIP, STEP, NOISE, SWEEPS = 5e-3, 50e-6, 20e-6, 8
+TIP, STEP, NOISE, SWEEPS = 5e-3, 50e-6, 20e-6, 12
 HEIGHTS = np.array([0.12e-3, 0.2e-3, 0.16e-3])
 
 

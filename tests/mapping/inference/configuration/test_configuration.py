@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,15 +16,17 @@ from explore3d.bench.detection.classify import noisy, touched, trial
 from explore3d.bench.posterior.calibration import plate, record, straight_path
 from explore3d.bench.posterior.counts import run_counts
 from explore3d.bench.scenes import FIRST_BUILT_WITH, classified_body
-from mapping import Details, Feature, Interval, Support
+from mapping import Details, Feature, Interval, Support, Surface, Trace
 from mapping.assembly import assemble
 from mapping.base import Base, LaidTrace
 from mapping.detection import detect
 from mapping.inference.configuration import Places, count_in, in_words
-from mapping.inference.configuration.configuration import fitted, part_of
+from mapping.inference.configuration.account import ENDED_EARLY, IN_BLOCKS, accounted
+from mapping.inference.configuration.configuration import Configuration, Part, fitted, part_of
 from mapping.inference.configuration.joined_shape import JoinedShape
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
 from mapping.inference.configuration.proposals import smoother, straight_lines
+from mapping.inference.configuration.search import searched
 from mapping.inference.families import Surroundings
 from mapping.instrument import Noise
 
@@ -64,6 +69,45 @@ def test_details_together_leave_what_the_ball_feels_of_them(body: str, off: floa
     ends = np.concatenate([feature.axis[[0, -1]] for feature in features])
     away = np.min(np.linalg.norm(place.window.feet[:, None] - ends[None], axis=2), axis=1) > 4e-3
     assert np.quantile(inner[away], 0.999) < off
+    # those that another block holds are felt with them all the same, whichever they are
+    for k, part in enumerate(parts):
+        others = [other for other in parts if other is not part]
+        theirs = np.concatenate([own for m, own in enumerate(start) if m != k])
+        beside = JoinedShape([part.shape], len(place.window), PARTS_OF_BIN, [o.shape for o in others], theirs)
+        assert np.abs(beside.templates(np.tile(start[k], (2, 1))) - felt).max() < 1e-15
+
+
+def test_more_details_than_are_weighed_at_once_are_weighed_beside_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five wires in a row, each within the disturbance of the next, in blocks of three."""
+    tip, pitch, height, count, together = 5e-3, 2.2e-3, 0.15e-3, 5, 3
+    x = np.arange(-10e-3, 10e-3, 20e-6)
+    wires = (np.arange(count) - 0.5 * (count - 1)) * pitch
+    ball = tip + 0.5 * height
+    near = np.clip(np.abs(x[:, None] - wires).min(axis=1), 0.0, np.sqrt(2.0 * tip * height))
+    z = np.maximum(np.sqrt(ball**2 - near**2) + 0.5 * height - tip, 0.0)
+    rng, sweeps = np.random.default_rng(5), 4
+    sweep = np.repeat(np.arange(sweeps), len(x))
+    centers = np.column_stack([np.tile(x, sweeps), 1.5e-3 * (sweep - 3.0), tip + np.tile(z, sweeps)])
+    centers[:, 2] += 5e-6 * rng.standard_normal(len(centers))
+    trace = Trace(1e-3 * np.arange(len(centers)), centers, sweep, tip)
+    corners = 0.1 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    base, sizes = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]])), list[int]()
+
+    def counted(parts: Sequence[Part], *rest: Any) -> Configuration | None:
+        sizes.append(len(parts))
+        return fitted(parts, *rest)
+
+    monkeypatch.setattr(sys.modules[searched.__module__], "fitted", counted)
+    monkeypatch.setattr(sys.modules[accounted.__module__], "CROWDED", together)
+    features = assemble(detect(trace, base), trace, base, faint=False)
+    assert [feature.kind for feature in features] == ["ridge"] * count
+    assert np.abs(np.sort([feature.axis[:, 0].mean() for feature in features]) - wires).max() < 0.1e-3
+    assert all(IN_BLOCKS in feature.notes for feature in features)
+    # two details may be proposed beside those of a block
+    assert max(sizes) <= together + 2
+    # what is not tried is said
+    monkeypatch.setattr(sys.modules[searched.__module__], "MOST_FITTED", 2)
+    assert all(ENDED_EARLY in each.notes for each in assemble(detect(trace, base), trace, base, faint=False))
 
 
 def test_a_line_laid_as_it_was_felt_is_asked_for_fewer_bends() -> None:
