@@ -75,7 +75,7 @@ def _dropped_row(dropped: Dropped) -> Row:
     row: Row = dict.fromkeys(FEATURE_COLUMNS) | {"kind": dropped.kind, "height": dropped.height, "snr": dropped.snr}
     row |= {name: float(value) for name, value in zip("xyz", dropped.point, strict=True)}
     row |= {"crossings": dropped.crossings, "log_odds": dropped.log_odds, "kept": False, "why_dropped": dropped.reason}
-    row["probability"] = None if dropped.log_odds is None else probability(dropped.log_odds)
+    row["probability"] = probability(dropped)
     return {name: value for name, value in row.items() if name != "run"}
 
 

@@ -21,12 +21,15 @@ from mapping.estimate.roughness import (
     suited_cutoff,
 )
 from mapping.geometry.mesh import distances
-from mapping.inference.kinds import sizes_of
+from mapping.inference.kinds import feature_trace, kind_of, sizes_of
 
 # Nesting index of the S-filter that belongs to each of the L-filter's (ISO 21920-3), m
 SHORT_INDICES = dict(zip(NESTING_INDICES, (2.5e-6, 2.5e-6, 2.5e-6, 8e-6, 25e-6), strict=True))
 # What belongs to a feature: its trace, and so many standard deviations of its place
 _PLACE_SDS = 3.0
+# Half-widths up to which what runs out of a feature is looked for (wider ones are no fine features), and at how many
+# places
+_FARTHEST, _PLACES = 4.0, 61
 # Rounding of the mean distance of samples
 SPACING_ROUNDING = 1e-3
 # Directions of a raster's sweeps agree to this cosine, their distances to this share
@@ -141,7 +144,8 @@ def roughness_of(
     index = cutoff or suited_cutoff(longest, EVALUATED_SECTIONS)
     if index is None:
         return None
-    pieces = [piece for sweep in trace.laid_sweeps for piece in _pieces(sweep, trace, features, over_terraces=True)]
+    reaches = [(each, reach_above(each, noise, trace.tip_radius)) for each in features]
+    pieces = [piece for sweep in trace.laid_sweeps for piece in _pieces(sweep, trace, reaches, over_terraces=True)]
     spacing = float(np.median([piece.spacing for piece, _ in pieces])) if pieces else np.inf
     short = short_cutoff or SHORT_INDICES.get(index, index / 300.0)
     usable = None if spacing * FEWEST_IN_SHORT > short * (1.0 + SPACING_ROUNDING) else short
@@ -175,10 +179,34 @@ def form_text(base: Base) -> str:
     return f"{curve}, {length_text(fitted['piece_length'], 2)} long each (--form line takes off less)"
 
 
+def reach_above(feature: Feature, level: float, tip_radius: float) -> float:
+    """How far to the side of a feature's axis its trace stands off by more than a level, m, over a base that is flat
+    there: at least its half-width, and further where its flank runs out.
+
+    Args:
+        feature: any.
+        level: m.
+        tip_radius: m.
+    """
+    half_width, kind = sizes_of(feature, tip_radius).half_width, kind_of(feature)
+    if kind.sided:  # what a step leaves goes on to wherever its level does
+        return half_width
+    middle = (len(feature.axis) - 1) // 2
+    normal = feature.normals[middle]
+    along = feature.axis[middle + 1] - feature.axis[middle] if kind.line else np.roll(normal, 1)
+    aside = np.cross(normal, along)
+    aside /= max(float(np.linalg.norm(aside)), np.finfo(float).tiny)
+    away = half_width * np.linspace(1.0, _FARTHEST, _PLACES)
+    feet = feature.axis[middle] + away[:, None] * aside
+    left = feature_trace(feature, feet, np.tile(normal, (len(feet), 1)), tip_radius)
+    return float(away[np.flatnonzero(np.abs(left) > level)].max(initial=half_width))
+
+
 def _pieces(
-    sweep: LaidSweep, trace: LaidTrace, features: Sequence[Feature], over_terraces: bool = False
+    sweep: LaidSweep, trace: LaidTrace, reaches: Sequence[tuple[Feature, float]], over_terraces: bool = False
 ) -> list[tuple[Stretch, FloatArray]]:
-    """A sweep's evenly sampled pieces, and the places (N, 3) of their samples."""
+    """A sweep's evenly sampled pieces, without what lies within the reach (m) of features, and the places (N, 3) of
+    their samples."""
     if len(sweep.trace) < 3:
         return []
     # a bin holds one sample: where they all stand is known, and between neighbours it is a line
@@ -186,8 +214,8 @@ def _pieces(
     for piece in sweep.heights(float(sweep.arclength[-1]) / (len(sweep.trace) - 1)):
         under = np.column_stack([np.interp(piece.s, sweep.arclength, known) for known in feet])
         keep = np.ones(len(piece.height), dtype=bool)
-        for feature in features:
-            reach = sizes_of(feature, trace.tip_radius).half_width + _PLACE_SDS * feature.position_sd
+        for feature, half_width in reaches:
+            reach = half_width + _PLACE_SDS * feature.position_sd
             low, high = feature.axis.min(axis=0) - reach, feature.axis.max(axis=0) + reach
             near = np.flatnonzero(((under >= low) & (under <= high)).all(axis=1))
             keep[near] &= distances(under[near], feature.axis) > reach
@@ -204,7 +232,8 @@ def residual(trace: Trace, base: Base, features: Sequence[Feature]) -> tuple[Flo
         UserError: several sweeps that are no raster.
     """
     laid = LaidTrace.of(trace, base)
-    pieces = [piece for sweep in laid.laid_sweeps for piece in _pieces(sweep, laid, features)]
+    reaches = [(each, sizes_of(each, trace.tip_radius).half_width) for each in features]
+    pieces = [piece for sweep in laid.laid_sweeps for piece in _pieces(sweep, laid, reaches)]
     if len(pieces) == 1:
         stretch = pieces[0][0]
         return np.where(stretch.keep, stretch.heights, np.nan), (0.0, stretch.spacing)

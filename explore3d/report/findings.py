@@ -13,6 +13,7 @@ from explore3d.analysis import ABSORBED, FAILED, Analysis, swept_share
 from mapping import Feature, length_text, place_text
 from mapping.detection import CLEAR
 from mapping.detection.path import PathLedger
+from mapping.inference.configuration import numbers_in
 
 # One and several of each reason for which a sweep is cut
 CUT_NAMES = {
@@ -51,7 +52,8 @@ def summary(analysis: Analysis) -> list[str]:
     features = analysis.model.features
     finer = sum(feature.curvature_feature for feature in features)
     refused = analysis.refused
-    looked = f"{count_text(len(features), 'feature')} found{swept_part(analysis)}"
+    odds = undecided_text(features)
+    looked = f"{number_text(numbers_found(features), 'feature')} found{odds and f' ({odds})'}{swept_part(analysis)}"
     lines = ["no features were looked for" if refused else looked]
     account = analysis.account
     if features:
@@ -89,17 +91,56 @@ def read_lines(analysis: Analysis) -> list[str]:
     return [*read_as, f"extent of the samples: {reach}"]
 
 
+def numbers_found(features: Sequence[Feature], kind: str = "") -> list[int]:
+    """How many features of a kind, or of any, there may be, in ascending order: several where the sweeps do not
+    decide."""
+    possible = {sum(not kind or each.kind == kind for each in features if not each.details.account)}
+    for account in _undecided(features):
+        own = [numbers_in(words) for words, _ in account]
+        possible = {before + (each[kind] if kind else each.total()) for before in possible for each in own}
+    return sorted(possible)
+
+
+def kinds_found(features: Sequence[Feature]) -> list[str]:
+    """The kinds of features, and those that they may be instead."""
+    instead = [numbers_in(words) for account in _undecided(features) for words, _ in account]
+    return [*dict.fromkeys([*(each.kind for each in features), *(kind for each in instead for kind in each)])]
+
+
+def number_text(numbers: Sequence[int], singular: str, plural: str = "") -> str:
+    """ "no features", "1 feature", "1 or 2 features", "1 to 4 features"."""
+    if len(numbers) == 1:
+        return count_text(numbers[0], singular, plural)
+    between = "or" if len(numbers) == 2 else "to"
+    return f"{numbers[0]} {between} {count_text(numbers[-1], singular, plural)}"
+
+
+def undecided_text(features: Sequence[Feature]) -> str:
+    """ "one ridge 66 %, two ridges 34 %" where one neighbourhood is undecided; of several their own sentences tell."""
+    accounts = list(_undecided(features))
+    return _shares_text(accounts[0]) if len(accounts) == 1 else ""
+
+
 def account_lines(analysis: Analysis) -> list[str]:
     """What details that are felt together may be where the trace does not decide, a sentence a neighbourhood."""
-    felt: dict[tuple[tuple[str, float], ...], list[str]] = {}
-    for feature in analysis.model.features:
-        if feature.details.account:
-            felt.setdefault(feature.details.account, []).append(feature.id)
     return [
         f"The sweeps do not decide what {' and '.join(names)} {'are' if len(names) > 1 else 'is'}: "
-        f"{', '.join(f'{words} {100 * share:.0f} %' for words, share in account)}."
-        for account, names in felt.items()
+        f"{_shares_text(account)}."
+        for account, names in _undecided(analysis.model.features).items()
     ]
+
+
+def _undecided(features: Sequence[Feature]) -> dict[tuple[tuple[str, float], ...], list[str]]:
+    """The accounts of the neighbourhoods that the trace does not decide, with the names of their features."""
+    felt: dict[tuple[tuple[str, float], ...], list[str]] = {}
+    for feature in features:
+        if feature.details.account:
+            felt.setdefault(feature.details.account, []).append(feature.id)
+    return felt
+
+
+def _shares_text(account: tuple[tuple[str, float], ...]) -> str:
+    return ", ".join(f"{words} {100 * share:.0f} %" for words, share in account)
 
 
 def warnings(analysis: Analysis) -> list[str]:

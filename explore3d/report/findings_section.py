@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -13,13 +12,17 @@ from explore3d.report.findings import (
     deviation_warning,
     dropped_warning,
     form_warnings,
+    kinds_found,
     limit_sentence,
     misfit_warnings,
+    number_text,
+    numbers_found,
     path_sentence,
     path_warning,
     stop_lines,
     swept_part,
     tip_warning,
+    undecided_text,
     warning_lines,
 )
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
@@ -63,12 +66,13 @@ def found_sentence(analysis: Analysis) -> str:
         return limit_sentence(analysis)
     if not features:
         return f"Nothing was found that the base does not explain{swept_part(analysis)}. {limit_sentence(analysis)}"
-    kinds = Counter(feature.kind for feature in features)
-    counts = [count_text(number, kind, kind_named(kind).plural) for kind, number in kinds.items()]
-    sentence = f"{_listed(counts)} {'was' if len(features) == 1 else 'were'} found."
+    numbers = {kind: numbers_found(features, kind) for kind in kinds_found(features)}
+    counts = [number_text(each, kind, kind_named(kind).plural) for kind, each in numbers.items()]
+    odds, is_one = undecided_text(features), numbers_found(features) == [1]
+    sentence = f"{_listed(counts)} {'was' if is_one else 'were'} found{odds and f': {odds}'}."
     if len(features) == 1:
         sizes = [f"{_described(getattr(features[0], name))} {word}" for name, word in _sizes(features[0])]
-        sentence += f" It is {_listed(sizes)}."
+        sentence += f" {f'As one {features[0].kind} it' if odds else 'It'} is {_listed(sizes)}."
     return sentence[0].upper() + sentence[1:]
 
 

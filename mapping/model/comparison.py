@@ -187,8 +187,8 @@ def _alone(own: ObjectModel, other: ObjectModel, motion: Registration, paired: s
         share = (went.sum() + 0.5) / (len(own.features) + 1.0)
     changes = []
     for each, chance in zip(alone, seen, strict=True):
-        odds = each.evidence.log_odds
-        there = 1.0 if odds is None else probability(odds)
+        known = probability(each)
+        there = 1.0 if known is None else known
         left = 0.0 if chance == 0.0 else there * share / (share + (1.0 - share) * (1.0 - chance))
         names = ("", each.id) if kind == "new" else (each.id, "")
         place = motion.applied(each) if kind == "new" else each

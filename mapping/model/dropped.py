@@ -9,7 +9,10 @@ import numpy as np
 from mapping import Dropped, Feature, length_text
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
-from mapping.inference.kinds import sizes_of
+from mapping.inference.kinds import feature_trace, kind_of, sizes_of
+
+# Share of a height that is most of it
+MOST = 0.5
 
 
 def dropped_features(features: Sequence[Feature]) -> tuple[Dropped, ...]:
@@ -32,7 +35,8 @@ def dropped_features(features: Sequence[Feature]) -> tuple[Dropped, ...]:
 def dropped_crossings(
     crossings: Sequence[Crossing], features: Sequence[Feature], tip_radius: float
 ) -> tuple[Dropped, ...]:
-    """Crossings that no feature accounts for: none lies within their disturbance, or within its own.
+    """Crossings that no feature accounts for: none lies within their disturbance, or within its own, or leaves most of
+    what was felt there, as the flank of a bump that runs out does to the rows that pass beside it.
 
     Args:
         crossings: all that was detected.
@@ -41,7 +45,8 @@ def dropped_crossings(
     """
     if not crossings:
         return ()
-    points = np.array([crossing.point for crossing in crossings])
+    points, normals = (np.array([getattr(crossing, name) for crossing in crossings]) for name in ("point", "normal"))
+    height = np.array([crossing.height for crossing in crossings])
     nearest, away = np.full(len(points), -1), np.full(len(points), np.inf)
     accounted = np.zeros(len(points), dtype=bool)
     own = np.array([crossing.half_width for crossing in crossings])
@@ -57,6 +62,10 @@ def dropped_crossings(
             accounted |= parts
         else:
             accounted |= apart <= np.maximum(own, sizes_of(feature, tip_radius).half_width)
+            if not kind_of(feature).sided:  # what a step leaves goes on to wherever its level does
+                beside = np.flatnonzero(~accounted)
+                left = feature_trace(feature, points[beside], normals[beside], tip_radius)
+                accounted[beside] = left * np.sign(height[beside]) > MOST * np.abs(height[beside])
         nearest, away = np.where(apart < away, number, nearest), np.minimum(apart, away)
     return tuple(
         Dropped(

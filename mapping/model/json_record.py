@@ -21,6 +21,7 @@ from mapping import (
     Posterior,
     Support,
 )
+from mapping.model.table import probability
 
 # Names of the values under "extra" that have a type of their own
 DETAILS = frozenset(each.name for each in fields(Details))
@@ -64,7 +65,7 @@ def feature_record(feature: Feature) -> Record:
         "length": _interval_record(feature.length),
         "position_sd": plain(float(feature.position_sd)),
         "anchor": None if feature.anchor is None else _anchor_record(feature.anchor),
-        "evidence": _evidence_record(feature.evidence),
+        "evidence": _evidence_record(feature),
         "curvature_feature": bool(feature.curvature_feature),
         "posterior": None if feature.posterior is None else _posterior_record(feature.posterior),
         "notes": list(feature.notes),
@@ -148,12 +149,14 @@ def _read_anchor(record: Record | None) -> Anchor | None:
     return Anchor(face=int(record["face"]), **parts)
 
 
-def _evidence_record(evidence: Support) -> Record:
+def _evidence_record(feature: Feature) -> Record:
+    evidence = feature.evidence
     return {
         "snr": plain(float(evidence.snr)),
         "crossings": int(evidence.crossings),
         "algorithms": [int(number) for number in evidence.algorithms],
         "log_odds": None if evidence.log_odds is None else plain(float(evidence.log_odds)),
+        "probability": plain(probability(feature)),
     }
 
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from mapping import Feature, ModelError
+from mapping import Dropped, Feature, ModelError
 from mapping.geometry.mesh import middle
+from mapping.inference.configuration import share_as_told
 
 SIZES = ("height", "width", "length")
 
@@ -36,15 +37,22 @@ def _row(feature: Feature) -> dict[str, Any]:
         "snr": float(support.snr),
         "crossings": support.crossings,
         "log_odds": support.log_odds,
-        "probability": None if support.log_odds is None else probability(support.log_odds),
+        "probability": probability(feature),
         "finer_than_the_tip": feature.curvature_feature,
         "face": None if feature.anchor is None else feature.anchor.face,
     }
 
 
-def probability(log_odds: float) -> float:
-    """Of the feature against nothing, with even odds beforehand."""
-    return 0.5 * (1.0 + math.tanh(0.5 * log_odds))
+def probability(of: Feature | Dropped) -> float | None:
+    """That it is there, against nothing and with even odds beforehand; None where nobody asked.
+
+    Of a feature, that it is there as it is told: where the trace does not decide how many are felt together, what is
+    there in one number only is as probable as that number.
+    """
+    odds = of.evidence.log_odds if isinstance(of, Feature) else of.log_odds
+    if odds is None:
+        return None
+    return 0.5 * (1.0 + math.tanh(0.5 * odds)) * (share_as_told(of) if isinstance(of, Feature) else 1.0)
 
 
 def dataframe(features: Sequence[Feature]) -> Any:

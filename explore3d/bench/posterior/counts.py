@@ -23,7 +23,7 @@ from mapping import Feature, FloatArray, Interval, Support
 from mapping.assembly import assemble
 from mapping.base import LaidTrace
 from mapping.detection import detect
-from mapping.inference.configuration import PROPOSALS, count_in
+from mapping.inference.configuration import PROPOSALS, numbers_in
 from mapping.inference.kinds import feature_trace, kind_made_of
 
 # Sweeps over a square of twice this, m, one pitch apart; details stay inside by the margin
@@ -105,11 +105,11 @@ def stated_counts(features: Sequence[Feature]) -> dict[int, float]:
         if account is None:
             total = np.convolve(total, np.eye(number + 1)[number])
             continue
-        own = np.zeros(1 + max(count_in(words) for words, _ in account))
+        own = np.zeros(1 + max(numbers_in(words).total() for words, _ in account))
         for words, share in account:
-            own[count_in(words)] += share
+            own[numbers_in(words).total()] += share
         own /= own.sum()
-        for _ in range(max(1, round(number / count_in(account[0][0])))):
+        for _ in range(max(1, round(number / numbers_in(account[0][0]).total()))):
             total = np.convolve(total, own)
     return {number: float(p) for number, p in enumerate(total) if p > 0.0}
 

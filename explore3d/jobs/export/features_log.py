@@ -135,8 +135,8 @@ def _entity(name: str, time_ns: int, facts: dict[str, str]) -> dict[str, Any]:
 def _facts(feature: Feature) -> dict[str, str]:
     """What a click on the feature shows."""
     facts = {"kind": feature.kind} | {size: str(getattr(feature, size)) for size in SIZES}
-    if feature.evidence.log_odds is not None:
-        facts["probability"] = f"{probability(feature.evidence.log_odds):.6g}"
+    if (known := probability(feature)) is not None:
+        facts["probability"] = f"{known:.6g}"
     return facts | ({"notes": "; ".join(feature.notes)} if feature.notes else {})
 
 

@@ -147,8 +147,8 @@ class _Document:
 
     def _about(self, measured: ET.Element, feature: Feature) -> None:
         known = {"position_sd": _decimal(float(feature.position_sd) / _MILLIMETRE)}
-        if feature.evidence.log_odds is not None:
-            known["probability"] = _decimal(probability(feature.evidence.log_odds))
+        if (there := probability(feature)) is not None:
+            known["probability"] = _decimal(there)
         _attributes(measured, {"kind": feature.kind} | known)
         _add(measured, "FeatureName", feature.id)
 

@@ -5,17 +5,19 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from mapping.inference.configuration.account import (
-        accounted as accounted,
-        count_in as count_in,
-        in_words as in_words,
-    )
+    from mapping.inference.configuration.account import accounted as accounted
     from mapping.inference.configuration.neighbourhood import Places as Places
     from mapping.inference.configuration.proposals import PROPOSALS as PROPOSALS, Proposal as Proposal
+    from mapping.inference.configuration.told import (
+        in_words as in_words,
+        numbers_in as numbers_in,
+        share_as_told as share_as_told,
+    )
 
 _PUBLIC = {
-    "account": ("accounted", "count_in", "in_words"),
+    "account": ("accounted",),
     "neighbourhood": ("Places",),
     "proposals": ("PROPOSALS", "Proposal"),
+    "told": ("in_words", "numbers_in", "share_as_told"),
 }
 doorway(__name__, _PUBLIC)

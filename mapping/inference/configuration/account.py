@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -25,8 +24,9 @@ from mapping.inference.configuration.neighbourhood import (
 )
 from mapping.inference.configuration.proposals import PEAK_SDS, PROPOSALS, Proposal, apart_of, as_far_as_felt, dense
 from mapping.inference.configuration.search import CROWDED, Account, searched
+from mapping.inference.configuration.told import in_words
 from mapping.inference.families import MEETING_REACH, PosteriorProblem, RidgeShape, Surroundings, TwinShape
-from mapping.inference.kinds import kind_named, kind_of, sizes_of
+from mapping.inference.kinds import kind_of, sizes_of
 from mapping.inference.likelihood import Nuisance
 from mapping.inference.sampler import root_of
 
@@ -41,7 +41,6 @@ PRELIMINARY_DRAWS = 400
 ENDED_EARLY = "the search for what is felt here, and what beside it, ended before all was tried"
 # What is said of more details than are weighed at once
 IN_BLOCKS = f"more details are felt together here than the {CROWDED} that are weighed at once: those beside were held"
-NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
 def accounted(
@@ -312,21 +311,6 @@ def _told(found: Account) -> tuple[tuple[str, float], ...]:
     """What the neighbourhood may consist of, in words, with the probability of each; the most probable first."""
     told = [(in_words(kinds), share) for kinds, share in found.shares if share > TOLD_SHARE]
     return tuple(told) if len(told) > 1 else ()
-
-
-def in_words(kinds: Sequence[str]) -> str:
-    """Kinds of features as people count them: "one step and two ridges"."""
-    parts = []
-    for name, count in Counter(kinds).items():
-        number = NUMBERS[count] if count < len(NUMBERS) else str(count)
-        parts.append(f"{number} {name if count == 1 else kind_named(name).plural}")
-    return " and ".join(parts) if parts else "nothing"
-
-
-def count_in(words: str) -> int:
-    """How many details `in_words` speaks of."""
-    first = [part.split()[0] for part in words.split(" and ") if words != "nothing"]
-    return sum(NUMBERS.index(word) if word in NUMBERS else int(word) for word in first)
 
 
 def _with_odds(feature: Feature, odds: tuple[tuple[str, float], ...], noted: tuple[str, ...]) -> Feature:

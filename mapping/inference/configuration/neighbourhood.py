@@ -133,12 +133,13 @@ def with_waves(noise: Noise, sd: float, length: float) -> Noise:
 
 
 def _finer(window: Window) -> Window:
-    """The window with each bin cut into PARTS_OF_BIN."""
+    """The window with each bin cut into PARTS_OF_BIN; a single sample was felt at a point, not all over its bin."""
     share = np.tile((np.arange(PARTS_OF_BIN) - 0.5 * (PARTS_OF_BIN - 1)) * 2.0 / PARTS_OF_BIN, len(window))
     feet, normals, tangents = (
         np.repeat(each, PARTS_OF_BIN, axis=0) for each in (window.feet, window.normals, window.tangents)
     )
-    half, place = np.repeat(window.half, PARTS_OF_BIN), np.repeat(window.place, PARTS_OF_BIN)
+    extent = np.where(window.count > 1, window.half, 0.0)
+    half, place = np.repeat(extent, PARTS_OF_BIN), np.repeat(window.place, PARTS_OF_BIN)
     return replace(
         window,
         feet=feet + (share * half)[:, None] * tangents,

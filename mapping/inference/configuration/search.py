@@ -109,8 +109,8 @@ def searched(
             if idle == len(proposals):
                 break
     order = sorted(visited.values(), key=lambda each: -each.log_odds)
-    likely = [each for each in order if each.log_odds > best.log_odds - NEGLIGIBLE_ODDS]
-    return Account(start, best, tuple(likely), tuple(accepted), min(left, joins) <= 0.0)
+    likely = [each for each in order if each.log_odds > order[0].log_odds - NEGLIGIBLE_ODDS]
+    return Account(start, order[0], tuple(likely), tuple(accepted), min(left, joins) <= 0.0)
 
 
 def _cost(parts: Sequence[Part], place: Neighbourhood) -> float:

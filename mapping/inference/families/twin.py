@@ -10,15 +10,16 @@ from mapping import FloatArray
 from mapping.inference.families.problem import Sizes
 from mapping.inference.families.ridge import RidgeShape
 from mapping.inference.families.trapezoid import NARROWEST_PART, WIDEST_PART
-from mapping.inference.likelihood import Prior, Uniform
+from mapping.inference.likelihood import LogOfUniform, Prior
 
 
 @dataclass(frozen=True, eq=False)
 class TwinShape:
     """A ridge twice, to either side of its course: log gap between both, and the parameters of the ridge midway.
 
-    One parameter more than a ridge has, as a flat top is: whether a wide line is a bar or two wires is then asked of
-    families that cost the same. The gap is clear: what overlaps is one line.
+    One parameter more than a ridge has, as a flat top is. The gap is clear: what overlaps is one line. The second ridge
+    lies anywhere beside the first, as any detail does: gaps are equally probable, not their logarithms, of which half
+    would be of ridges that all but touch.
 
     Args:
         midway: the ridge on the course between both.
@@ -38,7 +39,7 @@ class TwinShape:
 
     @property
     def priors(self) -> tuple[Prior, ...]:
-        gap = Uniform(*np.log(self.half_width * np.array([NARROWEST_PART, WIDEST_PART])))
+        gap = LogOfUniform(*np.log(self.half_width * np.array([NARROWEST_PART, WIDEST_PART])))
         return (gap, *self.midway.priors)
 
     @property

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         build_likelihood as build_likelihood,
     )
     from mapping.inference.likelihood.priors import (
+        LogOfUniform as LogOfUniform,
         Normal as Normal,
         Prior as Prior,
         StudentT as StudentT,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "bin_filter": ("bin_filter",),
     "gaussian": ("Likelihood", "Nuisance", "build_likelihood"),
-    "priors": ("Normal", "Prior", "StudentT", "Uniform"),
+    "priors": ("LogOfUniform", "Normal", "Prior", "StudentT", "Uniform"),
     "target": ("LogPosterior", "Shape"),
     "window": ("Window", "bin_samples", "distance_along", "gather", "samples_near"),
 }

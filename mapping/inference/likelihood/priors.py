@@ -50,6 +50,23 @@ class Uniform:
 
 
 @dataclass(frozen=True)
+class LogOfUniform:
+    """The logarithm of what is equally probable between exp(low) and exp(high)."""
+
+    low: float
+    high: float
+
+    def log_density(self, x: FloatArray) -> FloatArray:
+        return np.asarray(np.asarray(x) - self.high - np.log1p(-np.exp(self.low - self.high)))
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        return np.asarray(np.sqrt(2.0 * np.maximum(self.high - np.asarray(x), 0.0)))
+
+    def draw(self, rng: np.random.Generator, size: int) -> FloatArray:
+        return np.asarray(np.log(rng.uniform(np.exp(self.low), np.exp(self.high), size)))
+
+
+@dataclass(frozen=True)
 class StudentT:
     """Student's t with few degrees of freedom: sure of little, overruled by data far out."""
 

@@ -17,7 +17,7 @@ from explore3d.bench.scenes.plate_sweeps import DIAMETER, plate, scaled, sweeps,
 from explore3d.log.own.record import Log
 from explore3d.report import write_report
 from mapping import Trace
-from mapping.assembly import inspection
+from mapping.assembly.linking import inspection
 from mapping.base import laid_trace
 from mapping.base.base import Base
 from mapping.base.laid_trace import LaidTrace

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,10 @@ from changed_scans import NOISE, PITCH, TIP, scan
 from in_process import explore3d_main
 
 from explore3d.analysis import Stages, build_model
+from explore3d.analysis.roughness import reach_above
 from explore3d.log.own.record import Log
+from mapping import Details, Feature, Interval, Support
+from mapping.inference.kinds import sizes_of
 from mapping.trace import Trace
 
 RMS = 30e-9
@@ -89,3 +93,16 @@ def test_the_command_prints_a_table_and_refuses_what_it_cannot(
     ):
         assert explore3d_main(monkeypatch, *words, *more) == 2
         assert complaint in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_what_runs_out_of_a_bump_is_none_of_the_roughness() -> None:
+    height, none = Interval(1e-4, 0.9e-4, 1.1e-4), Interval(0.0, 0.0, 0.0)
+    cap = Feature(
+        "bump", np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), height, height, none, Support(9.0, 3), True, 0.0
+    )
+    bell = replace(cap, details=Details(scale=3e-4, exponent=1.0))
+    half_width = sizes_of(cap, 1e-3).half_width
+    assert reach_above(cap, 1e-6, 1e-3) == half_width
+    # z = H / (1 + (u / w)^2) is 4 um high at 5 w, and a ball feels no less
+    assert 1.5e-3 < reach_above(bell, 3.5e-6, 1e-3) < 2e-3
+    assert reach_above(bell, 1.0, 1e-3) == half_width

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from explore3d.report.findings import summary, warnings
+from explore3d.report.findings import kinds_found, number_text, numbers_found, summary, warnings
 from mapping import Dropped, Posterior, place_text
 from mapping.detection.path import PathLedger
 from mapping.estimate.envelope import RefutedTip
@@ -56,6 +56,22 @@ def analysis(*features: SimpleNamespace, recovered: str = "", limit: float = 0.1
 
 def test_nothing_found_is_said_so() -> None:
     assert summary(analysis())[0] == "no features found"
+
+
+def test_what_the_sweeps_do_not_decide_is_said_first() -> None:
+    one = feature("ridge-1", True, Interval(20e-3, 19e-3, 21e-3))
+    one.kind, one.details.account = "ridge", (("one ridge", 0.66), ("two ridges", 0.34))
+    line = summary(analysis(one))[0]
+    assert line.startswith("1 or 2 features found (one ridge 66 %, two ridges 34 %), 1 of them finer")
+    assert kinds_found([one]) == ["ridge"] and numbers_found([one], "ridge") == [1, 2]
+    other, sure = (feature(name, True, Interval(0.0, 0.0, 0.0)) for name in ("ridge-2", "bump-1"))
+    other.kind, other.details.account = "ridge", (("one ridge", 0.5), ("two ridges and one step", 0.5))
+    sure.kind = "bump"
+    assert summary(analysis(one, other, sure))[0].startswith("3 to 6 features found, 3 of them")
+    assert kinds_found([one, other, sure]) == ["ridge", "bump", "step"]
+    numbers = [numbers_found([one, other, sure], kind) for kind in ("ridge", "bump", "step")]
+    assert numbers == [[2, 3, 4], [1], [0, 1]]
+    assert [number_text(each, "ridge") for each in numbers] == ["2 to 4 ridges", "1 ridge", "0 or 1 ridge"]
 
 
 def test_a_refuted_tip_is_told_once_and_before_anything_else() -> None:

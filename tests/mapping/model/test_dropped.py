@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapping import Dropped, Feature, Interval, Support
+from mapping import Details, Dropped, Feature, Interval, Support
 from mapping.detection import Crossing
 from mapping.model import dropped_crossings, dropped_features
 
@@ -31,6 +31,18 @@ def test_a_crossing_that_no_feature_accounts_for_is_kept_with_its_place_and_the_
     assert lone.reason.endswith("the nearest, a bump, is 7.9 mm away")
     assert dropped_crossings([], [], 10e-3) == ()
     assert len(dropped_crossings([crossing(0.0)], [], 10e-3)) == 1
+
+
+def test_a_row_beside_a_bump_that_runs_out_felt_its_flank() -> None:
+    # the paper's bump falls to a tenth of its height at three half widths, where no cap of its width is felt any more
+    wide = replace(bump(0.0, 50.0), details=Details(scale=3e-3, exponent=1.0), width=Interval(6e-3, 6e-3, 6e-3))
+    flank, tall = crossing(7e-3), crossing(7e-3)
+    flank = replace(flank, height=2e-5)
+    assert dropped_crossings([flank], [wide], 10e-3) == ()
+    assert [each.height for each in dropped_crossings([flank, tall], [wide], 10e-3)] == [tall.height]
+    # a cap of that width leaves nothing there, and a hollow is no flank
+    assert len(dropped_crossings([flank], [bump(0.0, 50.0)], 10e-3)) == 1
+    assert len(dropped_crossings([replace(flank, height=-2e-5)], [wide], 10e-3)) == 1
 
 
 def test_a_feature_that_hardly_anything_speaks_for_is_kept_with_its_odds() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mapping import Base, Feature, Interval, ModelError, ObjectModel, Support, Surface
+from mapping import Base, Details, Feature, Interval, ModelError, ObjectModel, Support, Surface
 from mapping.model.table import dataframe, rows
 
 SQUARE = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
@@ -83,3 +83,10 @@ def test_a_data_frame_has_a_row_for_each_feature_or_says_what_is_missing(model: 
             model.to_dataframe()
     else:
         assert list(dataframe(model.features).id) == ["ridge-1", "ridge-2"]
+
+
+def test_one_of_two_that_may_be_one_is_as_probable_as_the_two() -> None:
+    doubtful = replace(RIDGE, details=Details(account=(("two ridges", 0.66), ("one ridge", 0.34))))
+    assert [row["probability"] for row in rows([RIDGE, doubtful])] == pytest.approx([1.0, 0.66])
+    weak = replace(doubtful, evidence=replace(RIDGE.evidence, log_odds=0.0))
+    assert rows([weak])[0]["probability"] == pytest.approx(0.33)
