@@ -6,7 +6,7 @@ analysed is a table, as `explore3d analyze` reads it.
     explore3d bench profiles --seeds 10
     explore3d bench profiles --seeds 10 --rows 16
 
-Of a raster each row is such a profile of a millimetre; the detail crosses the rows between its ends at a slant.
+Of a raster each row is such a profile of three millimetres; the detail crosses the rows between its ends at a slant.
 """
 
 from __future__ import annotations
@@ -19,15 +19,14 @@ import numpy as np
 
 import explore3d
 from mapping import Feature, FloatArray, Interval
+from mapping.inference.kinds import kind_made_of, kind_named
 
 STYLUS, GRID_PITCH, GRID_PER_SAMPLE, PROFILE_LENGTH = 2e-6, 40e-9, 25, 10e-3
 # Roughness correlated over 20 um, white noise, and a random walk from sample to sample, m; slope of the whole
 ROUGH_SD, CORRELATED_OVER, WHITE_SD, WALK_SD, PROFILE_TILT = 50e-9, 20e-6, 10e-9, 2e-9, 3e-3
 # A raster: its rows' length and distance, how far the detail moves aside for a way across them, and the rows beyond its
 # ends, m
-RASTER_LENGTH, ROW_PITCH, MOST_ASIDE, ROWS_BESIDE = 1e-3, 20e-6, 0.5, 4
-# What is a spot on a profile is a line across a raster
-ACROSS = {"pit": "groove", "bump": "ridge"}
+RASTER_LENGTH, ROW_PITCH, MOST_ASIDE, ROWS_BESIDE = 3e-3, 40e-6, 0.5, 4
 # Seeds that the analysis was built with lie below
 FIRST_REPORTED = 3000
 # A form: heights over places (m) from its middle, and what is to be found: kind, height and width (NaN: has none), m
@@ -143,7 +142,9 @@ def raster_trial(name: str, seed: int, rows: int) -> tuple[list[Feature], tuple[
         x, z = _felt(slanted, 0.5 * RASTER_LENGTH + aside * at, rng, RASTER_LENGTH)
         table.append(np.column_stack([np.full(len(x), number), 1e3 * x, np.full(len(x), 1e3 * at), 1e3 * z]))
     found = _analysed(np.concatenate(table), "sweep,x [mm],y [mm],z [mm]")
-    wanted = tuple((ACROSS.get(kind, kind), height, width) for kind, height, width in wanted)
+    # what is a spot on a profile is a line across a raster
+    lines = (kind_made_of(kind_named(kind).made_of, line=True).name for kind, _, _ in wanted)
+    wanted = tuple((name, height, width) for name, (_, height, width) in zip(lines, wanted, strict=True))
     return found, wanted, float((ends[1] - ends[0]) / square) if wanted else np.nan
 
 

@@ -58,7 +58,7 @@ def test_of_noise_alone_nothing_is_told(reach: int) -> None:
     assert told == [0, 0]
 
 
-def test_the_command_says_it_of_a_raster_as_of_a_profile(
+def test_the_command_finds_it_on_a_raster_as_on_a_profile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     trace = raster(hollow, np.random.default_rng(2))
@@ -68,7 +68,8 @@ def test_the_command_says_it_of_a_raster_as_of_a_profile(
     words = ("analyze", table, "--tip-radius", "2 um", "--quick", "--out", tmp_path / "out", "--no-report")
     assert explore3d_main(monkeypatch, *words) == 0
     text = capsys.readouterr().out
-    assert "A hollow 1.5 µm deep and 7" in text and "in 11 sweeps stands off the base" in text
+    assert "1 feature found" in text and "groove-1: height -1.5" in text
+    assert "stands off the base" not in text  # what is a feature is not said once more
 
 
 def test_a_hollow_is_not_as_deep_as_its_noisiest_place() -> None:
