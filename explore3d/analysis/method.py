@@ -23,7 +23,7 @@ from explore3d.analysis.truth import TrueFeature
 from explore3d.log import Log, stop_of
 from explore3d.scene import AnalysisSettings, Scene
 from mapping import Dropped, EnvelopeError, Feature, LeftOut, Trace, length_text, place_text
-from mapping.assembly import Inspections, assemble, inspected_for, why_none_sought
+from mapping.assembly import Inspections, assemble, inspected_for, why_none_sought, without_wide
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
 from mapping.detection.path import (
@@ -373,7 +373,7 @@ def detected(work: Work, share: Share) -> None:
         if work.before is None or not _may_hang_behind(work):
             break
         taken = 0.0 if work.backlash is None else work.backlash.play
-        play = backlash(work.laid, work.detections, taken)
+        play = backlash(work.laid, without_wide(work.detections, work.laid), taken)
         if play is None or (work.backlash is not None and abs(play.play - taken) < 0.5 * play.sd):
             break
         work.backlash = play

@@ -72,11 +72,11 @@ def _of_group(
     half_width = 0.5 * float(np.median([section.sizes.width for section in group]))
     lines = [line for line in branches(points, half_width) if len(line.axis) > 1]
     apart = np.array([distances(points, line.axis) for line in lines])
-    found = []
+    found = list[Feature]()
     for number, line in enumerate(lines):
         own = [group[k] for k in np.flatnonzero(apart.argmin(axis=0) == number)]
-        found.append(_line(line, own, inspection, detections, trace) if own else None)
-    return [feature for feature in found if feature is not None]
+        found += [_line(line, own, inspection, detections, trace)] if own else []
+    return found
 
 
 def _between_sweeps(highest: FreeSection, group: list[FreeSection]) -> FreeSection:
@@ -89,13 +89,11 @@ def _between_sweeps(highest: FreeSection, group: list[FreeSection]) -> FreeSecti
 
 def _line(
     line: Branch, group: list[FreeSection], inspection: Inspection, detections: Detections, trace: LaidTrace
-) -> Feature | None:
-    """A line of the mean section of its sweeps; None where they have none in common."""
+) -> Feature:
+    """A line of the mean section of its sweeps."""
     whole = _whole(group, line)
     square = np.array([_squareness(line.axis, section) for section in whole])
     sizes = mean_sizes(whole, square, trace.tip_radius, detections.noise)
-    if sizes is None:
-        return None
     sign, crossings = group[0].sign, [section.crossing for section in whole]
     axis, ends = _ended(line, sign * sizes.height, sizes.width, inspection)
     feet = trace.base.foot(axis, trace.tip_radius)

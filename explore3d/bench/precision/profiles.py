@@ -136,10 +136,8 @@ def raster_trial(name: str, seed: int, rows: int) -> tuple[list[Feature], tuple[
     square, table = 1.0 / np.hypot(1.0, aside), list[FloatArray]()
     ends = ROW_PITCH * (0.5 * rows - ROWS_BESIDE + rng.uniform(-0.5, 0.5, 2)) * [-1.0, 1.0]
     for number, at in enumerate(y):
-        inside = ends[0] < at < ends[1]
-        # across the detail the path is longer by the slant
-        slanted = (lambda u: form(square * u)) if inside else (lambda u: 0.0 * u)
-        x, z = _felt(slanted, 0.5 * RASTER_LENGTH + aside * at, rng, RASTER_LENGTH)
+        crossed = form if ends[0] < at < ends[1] else _bare(rng)[0]
+        x, z = _felt(crossed, 0.5 * RASTER_LENGTH + aside * at, rng, RASTER_LENGTH, square)
         table.append(np.column_stack([np.full(len(x), number), 1e3 * x, np.full(len(x), 1e3 * at), 1e3 * z]))
     found = _analysed(np.concatenate(table), "sweep,x [mm],y [mm],z [mm]")
     # what is a spot on a profile is a line across a raster
@@ -158,16 +156,22 @@ def _analysed(table: FloatArray, head: str) -> list[Feature]:
 
 
 def _felt(
-    form: Callable[[FloatArray], FloatArray], middle: float, rng: np.random.Generator, length: float = PROFILE_LENGTH
+    form: Callable[[FloatArray], FloatArray],
+    middle: float,
+    rng: np.random.Generator,
+    length: float = PROFILE_LENGTH,
+    square: float = 1.0,
 ) -> tuple[FloatArray, FloatArray]:
+    """Places and heights of a stylus that crosses a form at an angle of the sine `square`: a ball feels it across."""
     from scipy.ndimage import gaussian_filter1d
 
     x: FloatArray = GRID_PITCH * np.arange(int(length / GRID_PITCH), dtype=np.float64)
-    reach = int(STYLUS / GRID_PITCH)
-    around = np.pad(form(x - middle), reach, mode="edge")
+    pitch = square * GRID_PITCH
+    reach = int(STYLUS / pitch)
+    around = np.pad(form(square * (x - middle)), reach, mode="edge")
     trace = np.full(len(x), -np.inf)
     for k in range(-reach, reach + 1):
-        ball = float(np.sqrt(max(STYLUS**2 - (GRID_PITCH * k) ** 2, 0.0))) - STYLUS
+        ball = float(np.sqrt(max(STYLUS**2 - (pitch * k) ** 2, 0.0))) - STYLUS
         np.maximum(trace, around[reach + k : reach + k + len(x)] + ball, out=trace)
     x, trace = x[::GRID_PER_SAMPLE], trace[::GRID_PER_SAMPLE]
     rough = gaussian_filter1d(rng.standard_normal(len(x)), CORRELATED_OVER / (GRID_PITCH * GRID_PER_SAMPLE))

@@ -9,7 +9,7 @@ may touch both flanks and not what is between: its depth is then only bounded.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -88,6 +88,13 @@ def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[FreeSe
                         left = [c for c in left if c not in inside or (c in fine and c not in upon)]
         rest += left
     return found, upon, [*rest, *(c for own in by_sweep.values() for c in own)]
+
+
+def without_wide(detections: Detections, trace: LaidTrace) -> Detections:
+    """The detections less those that are parts of wide sections: whose sides say nothing of how a crest was felt."""
+    if trace.base.kind == "mesh" or not detections.crossings:
+        return detections
+    return replace(detections, crossings=tuple(free_sections(detections, trace)[2]))
 
 
 def free_spot(section: FreeSection, algorithm: int) -> Feature:

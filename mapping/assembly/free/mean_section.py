@@ -13,27 +13,40 @@ from mapping.assembly.free.outline import FLANK_SDS, LEAST_BINS, outlined
 from mapping.assembly.free.section import Section
 from mapping.assembly.free.sizes import SectionSizes, sizes_of_section
 from mapping.base import SweepHeights
-from mapping.instrument import Noise, robust_scale
+from mapping.instrument import Noise
 
 # Middles are told by noisy flanks: sections are moved until they lie on their mean, which is theirs after two rounds
 ALIGNMENTS = 3
 # Sides that rise by this share of the height between two samples are blurred in a mean of sweeps that sample elsewhere:
 # its width is by up to a sample's distance too large
 BLURRED = 0.25
+# Standard deviation of a Gaussian over the median of its absolute values
+MEDIAN_TO_SD = 1.4826
 # What lies farther than this share of the width from the middle is beside a mean section
 SIDES = 0.6
 
 
-def mean_sizes(group: Sequence[FreeSection], square: FloatArray, tip: float, noise: Noise) -> SectionSizes | None:
-    """The sizes of the mean section of several sweeps, laid square to the line and on each other; None if it is none.
+def mean_sizes(group: Sequence[FreeSection], square: FloatArray, tip: float, noise: Noise) -> SectionSizes:
+    """The sizes of the mean section of several sweeps, laid square to the line and on each other.
 
-    The extreme of a single section is the noise's too: of n sweeps together it is so by a root of n less.
+    The extreme of a single section is the noise's too: of n sweeps together it is so by a root of n less. Where their
+    mean is no section, those of the one of the median height stand for all.
 
     Args:
         square: (N,) sines of the angles between the line and the sweeps.
         tip: radius of the fingertip, m.
         noise: of single samples.
     """
+    sizes = _of_mean(group, square, tip, noise)
+    if sizes is not None:
+        return sizes
+    usual = sorted(range(len(group)), key=lambda k: group[k].sizes.height)[len(group) // 2]
+    own = group[usual].sizes
+    return replace(own, width=square[usual] * own.width, top=square[usual] * own.top)
+
+
+def _of_mean(group: Sequence[FreeSection], square: FloatArray, tip: float, noise: Noise) -> SectionSizes | None:
+    """The sizes of the mean section; None if it has none."""
     spacing = float(np.median(square * [section.piece.spacing for section in group]))
     reach = float(np.max(square * [section.sizes.width for section in group]))
     u = spacing * np.arange(-np.ceil(reach / spacing), np.ceil(reach / spacing) + 1)
@@ -76,8 +89,9 @@ def _laid_square(u: FloatArray, section: FreeSection, square: float) -> FloatArr
 def _middle_section(piece: SweepHeights, sign: float, reach: float, sd: float) -> Section | None:
     """The section about the middle of a mean profile, 2 `reach` long; None if it is not clear of the noise (sd, m)."""
     z = sign * piece.height
-    beside = piece.height[np.abs(piece.s) > SIDES * reach]
-    usual = max(sd, robust_scale(beside) if len(beside) > 1 else 0.0, np.finfo(float).tiny)
+    beside = np.abs(piece.height[np.abs(piece.s) > SIDES * reach])
+    # off zero, too: what is left of a drift is alike on all that lies beside
+    usual = max(sd, MEDIAN_TO_SD * float(np.median(beside)) if len(beside) else 0.0, np.finfo(float).tiny)
     out, inner = z > FLANK_SDS * usual, np.flatnonzero(np.abs(piece.s) < 0.25 * reach)
     if not len(inner) or not out[inner].any():
         return None
