@@ -29,6 +29,9 @@ KINDS: dict[str, str] = {
 }
 # Corners of half a cross-section: smooth to the eye, light on disk
 SECTION_CORNERS = 17
+# A height that may be no more than nothing is looked for as if it were this share of the most that it may be: its
+# disturbance would have no width, and places along its line no distance
+LEAST_OF_MOST = 0.1
 # A ribbon stands this part of its width above the base, lest viewers show it in stripes
 RIBBON_LIFT = 0.02
 
@@ -245,7 +248,8 @@ def feature_trace(feature: Feature, feet: FloatArray, normals: FloatArray, tip_r
 
 def preliminary(feature: Feature, tip_radius: float) -> tuple[float, float, float]:
     """Height, its standard deviation and width from a feature's intervals, m, none of them zero."""
-    height = max(abs(feature.height.median), 1e-9 * tip_radius)
+    farther = max(abs(feature.height.low), abs(feature.height.high))
+    height = max(abs(feature.height.median), LEAST_OF_MOST * farther, 1e-9 * tip_radius)
     sd = max(abs(feature.height.high - feature.height.low) / 3.29, 1e-3 * height)
     return height, sd, feature.width.median if feature.width.median > 0.0 else height
 

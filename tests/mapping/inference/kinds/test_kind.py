@@ -15,7 +15,7 @@ import pytest
 from explore3d.report.findings import feature_line
 from mapping.errors import MappingError
 from mapping.feature import Feature, Interval, Support
-from mapping.inference.kinds.kind import KINDS, Kind, kind_made_of, kind_named, kind_of
+from mapping.inference.kinds.kind import KINDS, Kind, kind_made_of, kind_named, kind_of, sizes_of
 from mapping.model.glb import glb_bytes
 from mapping.model.json_record import feature_record, read_feature
 from mapping.surface import Surface
@@ -110,3 +110,12 @@ def test_a_kind_in_the_table_is_one_for_model_pictures_and_report(scratch: Kind)
     plate = Surface([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     assert b'"scratch-1"' in glb_bytes(plate, [feature])
     assert "scratch-1: height" in feature_line(feature)
+
+
+def test_a_height_that_may_be_nothing_is_looked_for_over_a_width() -> None:
+    """Places along a line lie as near to each other as its disturbance is narrow: there were hundreds of millions."""
+    known = Interval(0.0, 0.0, 35e-9)
+    axis, up = np.array([[0.0, 0.0, 0.0], [3e-4, 0.0, 0.0]]), np.tile([0.0, 0.0, 1.0], (2, 1))
+    nothing = Interval(0.0, 0.0, 0.0)
+    step = Feature("step", axis, up, known, nothing, Interval(3e-4, 3e-4, 3e-4), Support(3.0, 2, (3,)), False, 1e-6)
+    assert sizes_of(step, 2e-6).half_width > 0.05e-6
