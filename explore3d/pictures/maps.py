@@ -13,6 +13,7 @@ from explore3d.pictures.chart import FONT_SIZE, drawing, image, pixels_png, text
 from explore3d.pictures.object import SUPERSAMPLING, cameras_for, pictured, shifted, view_directions
 from explore3d.pictures.render import Body, Picture, render
 from mapping import BoolArray, Feature, FloatArray, IntArray, Surface, length_unit
+from mapping.geometry.curvature import TOLD_SIDE
 from mapping.geometry.mesh import arclengths, directions, resample
 from mapping.model import feature_mesh
 
@@ -40,8 +41,6 @@ MAP_PIXELS = 2
 READ_FROM = 12
 # Places that are read at once: all 125,000 of a large picture took 120 MB, the most of a whole run
 READ_AT_ONCE = 16_384
-# What is felt around the corner, turned by more than 60 degrees, says nothing of a place
-LEAST_ALIKE = 0.5
 # A line's own values hold up to its reach, and fade to nothing at so many times it: the fits of curvature take in
 # neighbours from as far again
 ZONE = 2.0
@@ -295,7 +294,7 @@ def _read_some(
     if sides is not None:
         facing = np.einsum("mj,mkj->mk", sides[0], sides[1][which])
         weights = weights * np.clip(facing, 0.0, 1.0)
-        nearest = np.where(facing > LEAST_ALIKE, apart, np.inf).min(axis=1)
+        nearest = np.where(facing > TOLD_SIDE, apart, np.inf).min(axis=1)
     weights = weights / np.maximum(weights.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     near = values[which]
     mean = np.einsum("mk,mkj->mj", weights, near)

@@ -12,20 +12,20 @@ from dataclasses import replace
 import numpy as np
 
 from mapping import Details, Feature, FloatArray, Support
-from mapping.assembly.free import FreeSection, free_spot, mean_sizes
-from mapping.assembly.lines import FULL_HEIGHT
+from mapping.assembly.free import CORE, FreeSection, free_spot, mean_sizes
+from mapping.assembly.lines import FULL_HEIGHT, ONE_POINT, mean_point, merged
 from mapping.assembly.linking import Branch, Inspection, Inspections, LineEnd, branches, ended_length, groups
 from mapping.base import LaidTrace
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances
 from mapping.inference.kinds import kind_made_of
 
-# So much of the width to either side of the middle is half as high, of a V as of a slot; and places to that
-CORE, PLACES_PER_CORE = 0.25, 3.0
+# Places to the core of a section, which has to be felt for a sweep to deny it; 6 are alike
+PLACES_PER_CORE = 3.0
 # How far beyond its last section a line is looked for, in pitches of the sweeps: the next sweep lies nearer unless the
 # line runs at a slant of more than 70 degrees to them
 END_PITCHES = 3.0
-# Legs of an axis that tell its direction at an end
+# Legs of an axis that tell its direction at an end: over 24 rasters (seeds 100 to 105) 2 and 8 are alike
 LAST_LEGS = 4
 # Half of a 90 % interval of what is equally probable over a stretch of one
 UNIFORM_HALF_90 = 0.45
@@ -64,13 +64,15 @@ def _of_group(
     group: list[FreeSection], inspection: Inspection, detections: Detections, trace: LaidTrace
 ) -> list[Feature]:
     """The spot, or the lines, that linked sections are of."""
-    points = np.array([section.crossing.point for section in group])
     highest = max(group, key=lambda section: abs(section.crossing.height))
-    if np.linalg.norm(points[:, None] - points[None], axis=2).max() <= highest.sizes.width:
+    points = np.array([section.crossing.point for section in group])
+    if np.linalg.norm(np.ptp(points, axis=0)) <= highest.sizes.width:
         spot = free_spot(_between_sweeps(highest, group), detections.algorithm)
         return [replace(spot, evidence=_evidence(group, detections.algorithm))]
     half_width = 0.5 * float(np.median([section.sizes.width for section in group]))
-    lines = [line for line in branches(points, half_width) if len(line.axis) > 1]
+    # a row that was swept to and fro crosses twice in one place
+    places = np.array([mean_point(each) for each in merged([s.crossing for s in group], ONE_POINT * half_width)])
+    lines = [line for line in branches(places, half_width) if len(line.axis) > 1]
     apart = np.array([distances(points, line.axis) for line in lines])
     found = list[Feature]()
     for number, line in enumerate(lines):

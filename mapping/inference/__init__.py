@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     )
     from mapping.inference.joint import refine_all as refine_all
     from mapping.inference.kind_odds import as_broken as as_broken, as_bump as as_bump
+    from mapping.inference.pooled_residual import POOLED_SPLINES as POOLED_SPLINES
     from mapping.inference.summary import describe as describe
 
 _PUBLIC = {
@@ -26,6 +27,7 @@ _PUBLIC = {
     "feature_posterior": ("Solution", "pose_problem", "refine", "sample_posterior", "solve", "solve_problem"),
     "joint": ("refine_all",),
     "kind_odds": ("as_broken", "as_bump"),
+    "pooled_residual": ("POOLED_SPLINES",),
     "summary": ("describe",),
 }
 doorway(__name__, _PUBLIC)

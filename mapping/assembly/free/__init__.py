@@ -11,9 +11,11 @@ if TYPE_CHECKING:
         free_spot as free_spot,
     )
     from mapping.assembly.free.mean_section import mean_sizes as mean_sizes
+    from mapping.assembly.free.section import CORE as CORE
 
 _PUBLIC = {
     "free_sections": ("FreeSection", "free_sections", "free_spot"),
     "mean_section": ("mean_sizes",),
+    "section": ("CORE",),
 }
 doorway(__name__, _PUBLIC)

@@ -19,14 +19,13 @@ from mapping.assembly.free.section import Section
 from mapping.assembly.free.sizes import SectionSizes, sizes_of_section
 from mapping.base import LaidSweep, LaidTrace, SweepHeights
 from mapping.detection import Crossing, Detections, terraced
+from mapping.inference import POOLED_SPLINES
 from mapping.inference.kinds import kind_made_of
 from mapping.instrument import Noise
 
 # Bins are no finer than this share of the tip's radius: a wall between two of them is told to 0.1 / sqrt(12) = 0.03
 # radii, a thirtieth of what the ball itself takes of a width there
 FINEST = 0.1
-# A section has as many degrees of freedom as splines that would follow it (as in `pooled_residual`)
-FREEDOM = 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +127,9 @@ def _measured(
     noise = noise.scaled(white=max(piece.samples, 1.0) ** -0.5)  # of a bin's mean
     place = piece.s[section.begin : section.end + 1]
     snr = float(np.linalg.norm(noise.whiten(section.monotone, place)[0]))
-    log_odds = 0.5 * (snr**2 - FREEDOM * np.log1p(snr**2 / FREEDOM)) - np.log(piece.length / np.ptp(place))
+    # as many degrees of freedom as splines that follow any form
+    paid = POOLED_SPLINES * np.log1p(snr**2 / POOLED_SPLINES)
+    log_odds = 0.5 * (snr**2 - paid) - np.log(piece.length / np.ptp(place))
     sizes = sizes_of_section(section, sweep.trace.tip_radius, noise)
     if sizes is None or not np.isfinite(log_odds):
         return None

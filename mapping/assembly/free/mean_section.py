@@ -10,20 +10,26 @@ import numpy as np
 from mapping import FloatArray
 from mapping.assembly.free.free_sections import FreeSection
 from mapping.assembly.free.outline import FLANK_SDS, LEAST_BINS, outlined
-from mapping.assembly.free.section import Section
+from mapping.assembly.free.section import CORE, Section
 from mapping.assembly.free.sizes import SectionSizes, sizes_of_section
 from mapping.base import SweepHeights
-from mapping.instrument import Noise
+from mapping.instrument import MAD_TO_SD, Noise
 
-# Middles are told by noisy flanks: sections are moved until they lie on their mean, which is theirs after two rounds
+# What follows was varied over 24 rasters with a V, a ridge, a slot or a bell 8 to 40 um wide (seeds 100 to 105).
+#
+# Middles are told by noisy flanks: sections are moved onto their mean, which is taken so many times. Heights within
+# their intervals are 17 with 1, 20 with 2, 21 with 3 and with 5
 ALIGNMENTS = 3
 # Sides that rise by this share of the height between two samples are blurred in a mean of sweeps that sample elsewhere:
-# its width is by up to a sample's distance too large
+# its width is by up to a sample's distance too large. Gentler sides rise by half of this in bins of an eighth of the
+# width (LEAST_BINS), walls by all of the height: 0.15 and 0.4 are alike
 BLURRED = 0.25
-# Standard deviation of a Gaussian over the median of its absolute values
-MEDIAN_TO_SD = 1.4826
-# What lies farther than this share of the width from the middle is beside a mean section
+# What lies farther than this share of the width from the middle is beside a mean section: half of it is the section's
+# own. 0.55 and 0.7 are alike
 SIDES = 0.6
+# A round moves a section by this share of its width at most: middles are told far better, and one that matches nowhere
+# does not run away
+FARTHEST_MOVE = 0.1
 
 
 def mean_sizes(group: Sequence[FreeSection], square: FloatArray, tip: float, noise: Noise) -> SectionSizes:
@@ -60,7 +66,7 @@ def _of_mean(group: Sequence[FreeSection], square: FloatArray, tip: float, noise
         # least squares: a section that is the mean moved by d differs from it by d times its slope
         slope = np.gradient(mean, spacing)
         gaps = (np.array(heights)[:, known] - mean) @ slope / max(float(slope @ slope), np.finfo(float).tiny)
-        shifts = shifts - np.clip(gaps, -0.1 * reach, 0.1 * reach)
+        shifts = shifts - np.clip(gaps, -FARTHEST_MOVE * reach, FARTHEST_MOVE * reach)
     first = group[0].piece
     samples = float(np.median([section.piece.samples for section in group]))
     index, nowhere = np.arange(len(mean) + 1), np.zeros((len(mean), 3))
@@ -91,8 +97,8 @@ def _middle_section(piece: SweepHeights, sign: float, reach: float, sd: float) -
     z = sign * piece.height
     beside = np.abs(piece.height[np.abs(piece.s) > SIDES * reach])
     # off zero, too: what is left of a drift is alike on all that lies beside
-    usual = max(sd, MEDIAN_TO_SD * float(np.median(beside)) if len(beside) else 0.0, np.finfo(float).tiny)
-    out, inner = z > FLANK_SDS * usual, np.flatnonzero(np.abs(piece.s) < 0.25 * reach)
+    usual = max(sd, MAD_TO_SD * float(np.median(beside)) if len(beside) else 0.0, np.finfo(float).tiny)
+    out, inner = z > FLANK_SDS * usual, np.flatnonzero(np.abs(piece.s) < CORE * reach)
     if not len(inner) or not out[inner].any():
         return None
     top = int(inner[np.argmax(z[inner])])

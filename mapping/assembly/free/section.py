@@ -16,6 +16,8 @@ from mapping.instrument import Noise
 # Where flanks are read. On a parabola the tangent at a share q meets the base q^2 / 8 of the half-width outside, at a
 # quarter 1 %; lower, noise and the foot count for more. At 0.15 widths 51, at 0.4 53
 FLANK = 0.25
+# So much of the width to either side of the middle is half as high, of a V as of a slot
+CORE = 0.25
 # A tangent is the line through all between these shares of that height: its slope from as much above as below, within
 # which a parabola's own changes by an eighth. 0.8 to 1.2: widths 55; 0.4 to 1.6: 53
 ABOUT = 0.6, 1.4

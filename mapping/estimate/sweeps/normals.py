@@ -15,12 +15,10 @@ from mapping.estimate.sweeps.curve import SweepCurve
 from mapping.estimate.sweeps.labels import TOUCHED
 from mapping.estimate.sweeps.rows import parallel_rows, pitch, thinned
 from mapping.estimate.sweeps.tangents import lagrange, unit
+from mapping.geometry.curvature import TOLD_SIDE
 
 # Samples whose neighbourhoods are fitted together: a bound on the memory that they take
 SAMPLES_AT_ONCE = 4096
-# What was touched from a direction turned by more than a radian is another side of the body: over an arc of that
-# length a quadratic is off by an eighth of the arc's rise
-ANOTHER_SIDE = float(np.cos(1.0))
 
 
 def surface_normals(
@@ -113,7 +111,7 @@ def _fitted(
         )
         own = samples[part]
         arm = cloud[index] - trace.centers[own, None]
-        counts = np.einsum("nc,nkc->nk", outward[own], sides[index]) > ANOTHER_SIDE
+        counts = np.einsum("nc,nkc->nk", outward[own], sides[index]) > TOLD_SIDE
         tangents[part], doubt[part] = _across(arm, distance, counts, along[own], outward[own])
     return tangents, doubt
 
