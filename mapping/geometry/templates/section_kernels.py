@@ -35,8 +35,8 @@ def section_heights(
     and `up` (W, K), which falls from the crest. The ball rests on the top, on a corner (an arc of its own radius) or on
     a flank (a line parallel to it), whichever holds it highest: dilation distributes over unions. The section goes on
     round the ends, about a top whose corners are rounded in plan: the ball touches it square to its outline, so that
-    only the distance from that counts. On a curved base heights over it are felt as a ball of curvature 1/r + k feels
-    them over a plane, k being the base's in that direction.
+    only the distance from that counts (theory equation 7.3). On a curved base heights over it are felt as a ball of
+    curvature 1/r + k feels them over a plane, k being the base's in that direction.
 
     Args:
         s, lateral, basis: of the nodes, as for `about_course`.
