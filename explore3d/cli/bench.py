@@ -453,6 +453,26 @@ def profiles(
 
 
 @bench.command()
+def lengths(
+    forms: Annotated[str | None, typer.Option(help="Lines and their ends, separated by commas.")] = None,
+    noises: Annotated[str | None, typer.Option(help="white, OU or both, separated by a comma.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Lines of each form and noise.")] = 20,
+    building: Annotated[bool, typer.Option("--building", help="The seeds that may be looked into.")] = False,
+) -> None:
+    """Do 90 % intervals of lines' lengths hold the truth, however their ends are made? As CSV.
+
+    Example: explore3d bench lengths --forms "round wire,stadium bar" --noises white --seeds 3
+    """
+    from explore3d.bench.precision import LENGTHS_FORMS, LENGTHS_NOISES, bench_lengths
+    from explore3d.bench.scenes import FIRST_BUILT_WITH
+
+    chosen = _names(forms, "--forms", list(LENGTHS_FORMS)), _names(noises, "--noises", list(LENGTHS_NOISES))
+    first = FIRST_BUILT_WITH if building else 0
+    for line in bench_lengths(*chosen, range(first, first + seeds)):
+        print(line, flush=True)
+
+
+@bench.command()
 def labels(
     bodies: Annotated[str | None, typer.Option(help="Bodies, separated by commas; all if left out.")] = None,
     files: Annotated[Path | None, typer.Option(help="Folder of published bodies: bunny.off, ...")] = None,

@@ -34,7 +34,7 @@ from mapping.inference.sampler import (
     sample_ensemble,
     walkers_for,
 )
-from mapping.inference.summary import describe
+from mapping.inference.summary import describe, with_ends_of_all
 from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise
 
@@ -124,7 +124,7 @@ def refine(
         nothing = replace(feature.evidence, log_odds=0.0)
         return replace(feature, evidence=nothing, notes=(*feature.notes, f"no posterior: {error}"))
     families = [(share, each.problem, each.posterior) for share, each in [(1.0, solution), *solution.likely]]
-    found = averaged(describe(solution.problem, solution.posterior, base), families)
+    found = with_ends_of_all(averaged(describe(solution.problem, solution.posterior, base), families), families)
     pooled = solution.pooled or _pooled(solution, noise.rounded(trace.resolution))
     found = with_remark(found, pooled, raised=solution.problem.misfit > 0.0)
     odds = odds_against_nothing(solution)

@@ -112,17 +112,10 @@ def _length(
     seen: tuple[bool, bool] | None,
 ) -> tuple[Interval, list[str]]:
     """The length, and what is to be said of it; the likeliest draw and `explored`, None of a line without ends."""
-    chart, modes = shape.chart, shape.modes
+    chart = shape.chart
     some = draws[:: max(1, len(draws) // FEW_DRAWS)]
-
-    def of(theta: FloatArray, first: float, last: float) -> float:
-        s = np.linspace(first, last, AXIS_POINTS if len(chart.s) > 8 or modes.degree > 1 else 2)
-        points, laterals, _, _ = chart.at(s)
-        course = points + modes.lateral(theta[None, : modes.count], s)[0][:, None] * laterals
-        return float(np.linalg.norm(np.diff(course, axis=0), axis=1).sum())
-
     ends = np.tile(chart.s[[0, -1]], (len(some), 1)) if seen is None else some[:, _ends(problem)]
-    interval = Interval.from_draws(np.array([of(*each) for each in zip(some, *ends.T, strict=True)]))
+    interval = Interval.from_draws(_lengths(shape, some, ends))
     if chart.closed:
         return interval, []
     if best is None or seen is None:
@@ -133,8 +126,46 @@ def _length(
         return interval, []
     first, last = demanded(problem, best, seen)
     sure = np.sort(np.column_stack([np.maximum(ends[:, 0], first), np.minimum(ends[:, 1], last)]), axis=1)
-    low = float(np.quantile([of(*each) for each in zip(some, *sure.T, strict=True)], 0.05))
+    low = float(np.quantile(_lengths(shape, some, sure), 0.05))
     return replace(interval, low=min(low, interval.low), censored=True), [*with_open_ends((), seen)]
+
+
+def _lengths(shape: LineShape, draws: FloatArray, ends: FloatArray) -> FloatArray:
+    """(S,) lengths of the courses of draws (S, P) between two places along the chart (S, 2), m."""
+    chart, modes = shape.chart, shape.modes
+    share = np.linspace(0.0, 1.0, AXIS_POINTS if len(chart.s) > 8 or modes.degree > 1 else 2)
+    lengths = np.empty(len(draws))
+    for k, (theta, (first, last)) in enumerate(zip(draws, ends, strict=True)):
+        s = first + share * (last - first)
+        points, laterals, _, _ = chart.at(s)
+        course = points + modes.lateral(theta[None, : modes.count], s)[0][:, None] * laterals
+        lengths[k] = np.linalg.norm(np.diff(course, axis=0), axis=1).sum()
+    return lengths
+
+
+def with_ends_of_all(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, Posterior]]) -> Feature:
+    """A line with the length and the doubt of its ends that all likely families agree on: each ends in its own way.
+
+    Args:
+        feature: as its most probable family describes it.
+        likely: weight, problem and posterior of each family, the most probable one first.
+    """
+    if len(likely) == 1 or feature.length.censored or feature.details.end_intervals is None:
+        return feature
+    total = sum(share for share, _, _ in likely)
+    lengths, places, middle = list[FloatArray](), list[FloatArray](), np.zeros(2)
+    for share, problem, posterior in likely:
+        problem = with_nominal_tip(problem)
+        shape: Any = problem.target.shape
+        columns, draws = _ends(problem), posterior.samples[:, : len(shape.names)]
+        if not places:
+            middle = np.median(draws[:, columns], axis=0)
+        some = draws[np.linspace(0, len(draws) - 1, round(FEW_DRAWS * share / total)).astype(np.int64)]
+        places.append(some[:, columns] - middle)
+        lengths.append(_lengths(shape, some, some[:, columns]))
+    spans = np.quantile(np.concatenate(places), [0.05, 0.95], axis=0)
+    details = replace(feature.details, end_intervals=spans.T)
+    return replace(feature, length=Interval.from_draws(np.concatenate(lengths)), details=details)
 
 
 # An end that may as well lie at the limit of what was looked at was not seen: no more log density against it.

@@ -16,6 +16,12 @@ if TYPE_CHECKING:
         bench_labels as bench_labels,
         label_lines as label_lines,
     )
+    from explore3d.bench.precision.lengths import (
+        LENGTHS_FORMS as LENGTHS_FORMS,
+        LENGTHS_NOISES as LENGTHS_NOISES,
+        bench_lengths as bench_lengths,
+        lengths_trace as lengths_trace,
+    )
     from explore3d.bench.precision.profiles import (
         FIRST_REPORTED as FIRST_REPORTED,
         PROFILE_FORMS as PROFILE_FORMS,
@@ -27,6 +33,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "bench": ("as_record", "bench", "summary", "write"),
     "labels": ("LABEL_BODIES", "bench_labels", "label_lines"),
+    "lengths": ("LENGTHS_FORMS", "LENGTHS_NOISES", "bench_lengths", "lengths_trace"),
     "profiles": ("FIRST_REPORTED", "PROFILE_FORMS", "bench_profiles", "profile_trial"),
     "work_precision": ("Measured",),
 }

@@ -66,8 +66,7 @@ class Bell:
 class Trench:
     """A groove or a pit: all of the base that is nearer to the axis than half the width, lowered, with upright walls.
 
-    A groove ends square at the ends of its axis, as the family that is fitted to it does. Where several overlap, the
-    deepest counts.
+    A groove ends square at the ends of its axis. Where several overlap, the deepest counts.
 
     Args:
         axis: (K, 3) points of the base, m; one of a pit; first equals last of a closed groove.

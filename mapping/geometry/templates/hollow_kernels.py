@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from mapping import FloatArray
+from mapping.geometry.templates.course_kernels import about_course
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -31,31 +32,39 @@ def groove_heights(
     bend_along: FloatArray,
     courses: FloatArray,
     ends: FloatArray,
+    rounded: FloatArray,
     widths: FloatArray,
     depths: FloatArray,
     tip: float,
     out: FloatArray,
 ) -> None:
-    """Heights (W, n) of W grooves over bins with q nodes; `basis` (m, n, q) of the lateral modes, `ends` (W, 2).
+    """Heights (W, n) of W grooves over bins with q nodes; `s` to `courses` as for `about_course`, `ends` (W, 2).
 
+    The corners of the mouth are arcs of the radius `rounded` (W,), up to half of the width, m; as everywhere only the
+    distance to the rim counts.
     `bend` and `bend_along` (n, q), curvatures of the base across and along the line, 1/m: the ball dips under a long
     rim by the first, under the rim at an end by the second, and rests on whichever holds it highest.
     """
     walkers, bins = out.shape
-    modes, nodes = basis.shape[0], s.shape[1]
+    nodes = s.shape[1]
     for w in range(walkers):
         half, first, last = 0.5 * widths[w], ends[w, 0], ends[w, 1]
         for i in range(bins):
             total = 0.0
             for q in range(nodes):
-                along = min(s[i, q] - first, last - s[i, q])
+                place, aside, stretch = about_course(s, lateral, basis, courses[w], i, q)
+                along = stretch * min(place - first, last - place)
                 if along <= 0.0:
                     continue
-                aside = lateral[i, q]
-                for m in range(modes):
-                    aside -= courses[w, m] * basis[m, i, q]
-                across = _rim(half - abs(aside), tip, depths[w], bend[i, q])
-                total += max(across, _rim(along, tip, depths[w], bend_along[i, q]))
+                across = half - abs(aside)
+                out_along, out_across = rounded[w] - along, rounded[w] - across
+                if out_along > 0.0 and out_across > 0.0:
+                    square = out_along * out_along + out_across * out_across
+                    bent = bend[i, q] + out_along * out_along / square * (bend_along[i, q] - bend[i, q])
+                    total += _rim(rounded[w] - np.sqrt(square), tip, depths[w], bent)
+                else:
+                    beside = _rim(across, tip, depths[w], bend[i, q])
+                    total += max(beside, _rim(along, tip, depths[w], bend_along[i, q]))
             out[w, i] = total / nodes
 
 
@@ -101,17 +110,15 @@ def step_heights(
 ) -> None:
     """Heights (W, n) of W steps over bins with nodes at lateral distances (n, q) from the chart.
 
-    `bend` (n, q) is the curvature of the base across the edge, 1/m.
+    `basis` and `courses` are as for `about_course`; `bend` (n, q) is the curvature of the base across the edge, 1/m.
     """
     walkers, bins = out.shape
-    modes, nodes = basis.shape[0], lateral.shape[1]
+    nodes = lateral.shape[1]
     for w in range(walkers):
         for i in range(bins):
             total = 0.0
             for q in range(nodes):
-                aside = lateral[i, q]
-                for m in range(modes):
-                    aside -= courses[w, m] * basis[m, i, q]
+                _, aside, _ = about_course(lateral, lateral, basis, courses[w], i, q)
                 inside = max(-high_side * aside, 0.0)
                 if inside < tip:  # farther off the ball does not touch the edge, however high it is
                     square = inside * inside

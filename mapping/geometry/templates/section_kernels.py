@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from mapping import FloatArray
+from mapping.geometry.templates.course_kernels import about_course
 
 # Share by which a bound is widened that leaves places out: what it leaves out is zero to the last digit
 BOUND_MARGIN = 1e-9
@@ -22,6 +23,7 @@ def section_heights(
     bend_along: FloatArray,
     courses: FloatArray,
     ends: FloatArray,
+    rounded: FloatArray,
     across: FloatArray,
     up: FloatArray,
     tip: float,
@@ -31,37 +33,37 @@ def section_heights(
 
     Half of the section, which is the same on both sides, has the corners `across` (W, K), from the middle outwards,
     and `up` (W, K), which falls from the crest. The ball rests on the top, on a corner (an arc of its own radius) or on
-    a flank (a line parallel to it), whichever holds it highest: dilation distributes over unions. Beyond an end, cut
-    square, what touches is the circle in which the ball crosses the end's plane. On a curved base heights over it are
-    felt as a ball of curvature 1/r + k feels them over a plane, k being the base's in that direction.
+    a flank (a line parallel to it), whichever holds it highest: dilation distributes over unions. The section goes on
+    round the ends, about a top whose corners are rounded in plan: the ball touches it square to its outline, so that
+    only the distance from that counts (theory equation 7.3). On a curved base heights over it are felt as a ball of
+    curvature 1/r + k feels them over a plane, k being the base's in that direction.
 
     Args:
-        s, lateral: (n, q) places of the nodes along and across the chart, m.
-        basis: (m, n, q) lateral modes there.
+        s, lateral, basis: of the nodes, as for `about_course`.
         bend, bend_along: (n, q) curvatures of the base across and along the line, 1/m.
         courses: (W, m) coefficients of the modes.
-        ends: (W, 2) where the line begins and ends along the chart, m.
+        ends: (W, 2) where the top begins and ends along the chart, m.
+        rounded: (W,) radius of the corners of the top in plan, up to half of its width, m.
         across, up: (W, K) corners, m.
         tip: radius of the fingertip, m.
         out: (W, n) heights, m.
     """
     walkers, bins = out.shape
-    modes, nodes, corners = basis.shape[0], s.shape[1], across.shape[1]
-    nearest, widest, sway = np.empty(bins), np.empty(bins), np.zeros((bins, modes))
-    # balls over a plane that are felt as the tip is over the base, across the line and along it
-    beside, beyond_end, longest = np.empty((bins, nodes)), np.empty((bins, nodes)), np.zeros(bins)
+    modes, nodes, corners = basis.shape[1], s.shape[1], across.shape[1]
+    nearest, farthest, widest = np.empty(bins), np.zeros(bins), np.empty(bins)
+    sway, turn = np.zeros((bins, modes)), np.zeros((bins, modes))
     first, last = np.full(bins, np.inf), np.full(bins, -np.inf)
     runs, falls, flanks = np.empty(corners), np.empty(corners), np.empty(corners)
     for i in range(bins):
         nearest[i], lowest = np.inf, np.inf
         for q in range(nodes):
-            nearest[i], lowest = min(nearest[i], abs(lateral[i, q])), min(lowest, bend[i, q])
-            beside[i, q] = tip / max(1.0 + tip * bend[i, q], 1e-3)
-            beyond_end[i, q] = tip / max(1.0 + tip * bend_along[i, q], 1e-3)
-            longest[i] = max(longest[i], beyond_end[i, q])
+            nearest[i], farthest[i] = min(nearest[i], abs(lateral[i, q])), max(farthest[i], abs(lateral[i, q]))
+            lowest = min(lowest, bend[i, q], bend_along[i, q])
             first[i], last[i] = min(first[i], s[i, q]), max(last[i], s[i, q])
             for m in range(modes):
-                sway[i, m] = max(sway[i, m], abs(basis[m, i, q]))
+                sway[i, m] = max(sway[i, m], abs(basis[0, m, i, q]))
+                turn[i, m] = max(turn[i, m], abs(basis[1, m, i, q]))
+        # the ball over a plane, at most, that is felt as the tip is over the base
         widest[i] = tip / max(1.0 + tip * lowest, 1e-3)
     for w in range(walkers):
         top, crest = across[w, 0], up[w, 0]
@@ -70,35 +72,33 @@ def section_heights(
             runs[k], falls[k] = across[w, k + 1] - across[w, k], up[w, k] - up[w, k + 1]
             flanks[k] = np.sqrt(runs[k] * runs[k] + falls[k] * falls[k])
         for i in range(bins):
-            beyond = max(ends[w, 0] - last[i], first[i] - ends[w, 1])
-            if beyond > 0.0 and (beyond >= min(longest[i], tip) or beyond * beyond > least * longest[i]):
-                out[w, i] = 0.0
-                continue
-            # a ball of radius R at x beside all corners stands x^2 / 2 R lower than on the crest, at least
-            gap = nearest[i] - across[w, corners - 1]
+            swayed, turned = 0.0, 0.0
             for m in range(modes):
-                gap -= abs(courses[w, m]) * sway[i, m]
+                swayed += abs(courses[w, m]) * sway[i, m]
+                turned += abs(courses[w, m]) * turn[i, m]
+            # a ball of radius R at x beside all corners stands x^2 / 2 R lower than on the crest, at least
+            foot = across[w, corners - 1]
+            beyond = max(ends[w, 0] - last[i], first[i] - ends[w, 1]) - turned * (farthest[i] + swayed) - (foot - top)
+            gap = max((nearest[i] - swayed) / np.sqrt(1.0 + turned * turned) - foot, beyond)
             if gap > 0.0 and gap * gap > least * widest[i]:
                 out[w, i] = 0.0
                 continue
             total = 0.0
             for q in range(nodes):
-                beyond = max(ends[w, 0] - s[i, q], s[i, q] - ends[w, 1])
-                ball, drop = beside[i, q], 0.0
-                if beyond > 0.0:
-                    along = beyond_end[i, q]
-                    if beyond >= min(along, tip) or beyond * beyond > least * along:
-                        continue
-                    drop = beyond * beyond / (along + np.sqrt((along - beyond) * (along + beyond)))
-                    circle = np.sqrt((tip - beyond) * (tip + beyond))
-                    ball = circle / max(1.0 + circle * bend[i, q], 1e-3)
-                aside = lateral[i, q]
-                for m in range(modes):
-                    aside -= courses[w, m] * basis[m, i, q]
-                aside = abs(aside)
-                best = drop
+                place, aside, stretch = about_course(s, lateral, basis, courses[w], i, q)
+                beyond = stretch * max(ends[w, 0] - place, place - ends[w, 1])
+                aside, around = abs(aside), beyond + rounded[w]
+                bent = bend[i, q]
+                if around > 0.0:
+                    # the distance of a rectangle that is smaller by the corners' radius all round
+                    core = top - rounded[w]
+                    side = max(aside - core, 0.0)
+                    away = np.sqrt(around * around + side * side)
+                    bent += (around / away) ** 2 * (bend_along[i, q] - bent)
+                    aside = core + away
+                ball, best = tip / max(1.0 + tip * bent, 1e-3), 0.0
                 if aside <= top:
-                    best = max(best, crest)
+                    best = crest
                 for k in range(corners):
                     if up[w, k] <= best:  # neither this corner nor what is below it holds the ball higher
                         break
@@ -115,5 +115,5 @@ def section_heights(
                                 # R (run / flank - 1) without the difference of near numbers
                                 lift = -ball * fall * fall / (flank * (flank + run))
                                 best = max(best, up[w, k] - at * fall / run + lift)
-                total += best - drop
+                total += best
             out[w, i] = total / nodes

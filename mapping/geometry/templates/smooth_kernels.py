@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from mapping import FloatArray
+from mapping.geometry.templates.course_kernels import about_course
 
 # Places of the table of the trace: between them it errs by 1e-5 of the height or less where the trace is smooth.
 TABLE_PLACES = 500
@@ -161,15 +162,13 @@ def smooth_groove_heights(
         heights (negative), halves, tapers: (W,) m, m, and 1: see `smooth_trace`.
     """
     walkers, bins = out.shape
-    modes, nodes = basis.shape[0], s.shape[1]
+    nodes = s.shape[1]
     away, toward = np.empty((bins, nodes)), np.empty((bins, nodes))
     for w in range(walkers):
         for i in range(bins):
             for q in range(nodes):
-                aside = lateral[i, q]
-                for m in range(modes):
-                    aside -= courses[w, m] * basis[m, i, q]
-                beyond = max(ends[w, 0] - s[i, q], s[i, q] - ends[w, 1], 0.0)
+                place, aside, stretch = about_course(s, lateral, basis, courses[w], i, q)
+                beyond = stretch * max(ends[w, 0] - place, place - ends[w, 1], 0.0)
                 square = aside * aside + beyond * beyond
                 turned = beyond * beyond / square if square > 0.0 else 0.0
                 away[i, q] = np.sqrt(square)

@@ -164,9 +164,7 @@ def as_bar(part: Part, place: Neighbourhood, top: float) -> Part:
     """A ridge with a flat top of a width (m) and upright flanks."""
     ridge: Any = part.shape
     bar = trapezoid_beside(ridge, sizes_of(part.feature, ridge.tip_radius), roof=False)
-    course, last = ridge.modes.count, len(part.start) - 1
-    kept = np.delete(part.start, [last] if ridge.chart.closed else [course, last])
-    return Part(part.feature, bar, np.concatenate([kept, np.log([top, 0.02 * place.half_width])]))
+    return Part(part.feature, bar, np.concatenate([part.start[:-1], np.log([top, 0.02 * place.half_width])]))
 
 
 def as_bell(part: Part, half: float) -> Part:

@@ -51,9 +51,7 @@ class CurveModes:
 
     def slope(self, coefficients: FloatArray, s: float) -> FloatArray:
         """(W,) change of the lateral distance per metre along the chart."""
-        step = 1e-3 * self.reach
-        ends = self.basis(np.array([s - step, s + step]))
-        return np.asarray(coefficients @ (ends[:, 1] - ends[:, 0]) / (2.0 * step))
+        return np.asarray(coefficients @ self.slopes(np.array([s]))[:, 0])
 
     def basis(self, s: FloatArray) -> FloatArray:
         """(count, ...) lateral distance of each mode's unit coefficient at places s."""
@@ -68,6 +66,18 @@ class CurveModes:
         # Straight on beyond the stretch that the data cover: a polynomial would fly off.
         bends = value[2:] + (x - inside) * slope[2:]
         return np.concatenate([np.stack([np.ones_like(x), x * self.reach])[: self.count], bends])
+
+    def slopes(self, s: FloatArray) -> FloatArray:
+        """(count, ...) change of each mode's lateral distance per metre along the chart at places s."""
+        x = (s - self.middle) / self.reach
+        if self.closed:
+            rows = [np.zeros_like(x)]
+            for k in range(1, self.degree + 1):
+                turn = np.pi * k
+                rows += [-turn / self.reach * np.sin(turn * x), turn / self.reach * np.cos(turn * x)]
+            return np.stack(rows)
+        _, slope = _legendre(self.degree, np.clip(x, -1.0, 1.0))
+        return np.concatenate([np.stack([np.zeros_like(x), np.ones_like(x)])[: self.count], slope[2:] / self.reach])
 
 
 def _legendre(degree: int, x: FloatArray) -> tuple[FloatArray, FloatArray]:

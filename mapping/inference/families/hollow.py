@@ -10,6 +10,7 @@ import numpy as np
 from mapping import FloatArray
 from mapping.inference.curves import Chart, CurveModes
 from mapping.inference.families.bump import Spot
+from mapping.inference.families.ridge import rounding_of
 from mapping.inference.likelihood import Prior, Window
 
 # Two Gauss points average a template over its bin: exact for cubics between kinks.
@@ -57,7 +58,10 @@ class PitShape:
 
 @dataclass(frozen=True, eq=False)
 class GrooveShape:
-    """Grooves with upright walls and a flat bottom: lateral modes, ends, log width, log depth."""
+    """Grooves with upright walls and a flat bottom: lateral modes, rounding and places of ends, log width, log depth.
+
+    In plan an end is square (rounding 0), or a half circle as a cutter leaves it (1). It is where the mouth ends.
+    """
 
     window: Window
     chart: Chart
@@ -69,27 +73,25 @@ class GrooveShape:
 
     @property
     def names(self) -> tuple[str, ...]:
-        ends = () if self.chart.closed else ("start", "end")
+        ends = () if self.chart.closed else ("end rounding", "start", "end")
         return (*self.modes.names, *ends, "log width", "log depth")
 
     @property
     def units(self) -> tuple[str, ...]:
-        ends = () if self.chart.closed else ("m", "m")
+        ends = () if self.chart.closed else ("", "m", "m")
         return (*self.modes.units, *ends, "ln m", "ln m")
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights (negative) over the base's trace, m."""
         from mapping.geometry.templates import groove_heights
 
-        ends = (
-            np.ascontiguousarray(theta[:, -4:-2])
-            if not self.chart.closed
-            else np.tile([-1e300, 1e300], (len(theta), 1))
-        )
         courses = np.ascontiguousarray(theta[:, : self.modes.count])
-        out = np.empty((len(theta), len(self.window)))
         width, depth = np.exp(theta[:, -2]), np.exp(theta[:, -1])
-        groove_heights(*self._places, courses, ends, width, depth, self.tip_radius, out)
+        ends, rounded = np.tile([-1e300, 1e300], (len(theta), 1)), np.zeros(len(theta))
+        if not self.chart.closed:
+            ends, rounded = np.ascontiguousarray(theta[:, -4:-2]), 0.5 * width * rounding_of(theta[:, -5])
+        out = np.empty((len(theta), len(self.window)))
+        groove_heights(*self._places, courses, ends, rounded, width, depth, self.tip_radius, out)
         return out
 
     @cached_property
@@ -100,11 +102,11 @@ class GrooveShape:
 def line_nodes(
     window: Window, chart: Chart, modes: CurveModes
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """(n, nodes) distances along the chart, lateral distances, (m, n, nodes) modes, and the base's two bends."""
+    """(n, nodes) places along and across the chart, (2, m, n, nodes) modes and slopes, and the base's two bends."""
     nodes = bin_nodes(window)
     s, lateral, leg = chart.coordinates(nodes.reshape(-1, 3))
     shape = nodes.shape[:2]
-    basis = modes.basis(s).reshape(-1, *shape)
+    basis = np.stack([modes.basis(s), modes.slopes(s)]).reshape(2, -1, *shape)
     bend, bend_along = (each[leg].reshape(shape) for each in (chart.bend, chart.bend_along))
     return s.reshape(shape), lateral.reshape(shape), basis, bend, bend_along
 

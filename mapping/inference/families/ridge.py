@@ -124,5 +124,9 @@ class RidgeShape:
 
 
 def rounding_of(turn: FloatArray) -> FloatArray:
-    """Rounding 0 to 1 of an end from a parameter that is uniform on 0 to 1: mostly either square or round."""
-    return np.asarray(0.5 - 0.5 * np.cos(np.pi * turn))
+    """Rounding 0 to 1 of an end from a parameter that is uniform on 0 to 1.
+
+    A third each are square, round, and something between: what is made is mostly one of the first two, and stands at
+    the rim of what the data leave likely where all roundings are thought to be.
+    """
+    return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.clip(3.0 * turn - 1.0, 0.0, 1.0)))

@@ -26,11 +26,13 @@ class SmoothGrooveShape(GrooveShape):
 
     @property
     def names(self) -> tuple[str, ...]:
-        return (*super().names[:-2], "log half width", "log depth", "taper")
+        ends = () if self.chart.closed else ("start", "end")
+        return (*self.modes.names, *ends, "log half width", "log depth", "taper")
 
     @property
     def units(self) -> tuple[str, ...]:
-        return (*super().units, "")
+        ends = () if self.chart.closed else ("m", "m")
+        return (*self.modes.units, *ends, "ln m", "ln m", "")
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights (negative) over the base's trace, m."""
@@ -83,14 +85,15 @@ def smooth_pit_beside(pit: PitShape, sizes: Sizes) -> SmoothPitShape:
     return SmoothPitShape(pit.window, pit.spot, pit.tip_radius, pit.free, *_about(pit, sizes))
 
 
-def smooth_beginnings(beginnings: FloatArray, sizes: Sizes) -> FloatArray:
+def smooth_beginnings(upright: GrooveShape | PitShape, beginnings: FloatArray, sizes: Sizes) -> FloatArray:
     """Starts from narrow to wide, from what was felt to twice as deep, with an edge and with a skirt.
 
     Args:
-        beginnings: (B, P) of the upright family: the places of the first are kept.
+        upright: the upright family.
+        beginnings: (B, P) of it: the places of the first are kept.
         sizes: preliminary ones.
     """
-    places = beginnings[0, :-2]
+    places = beginnings[0, _places_of(upright)]
     starts = [
         [*places, np.log(part * sizes.radius), np.log(more * sizes.height), taper]
         for part in (0.25, 0.5, 1.0)
@@ -104,7 +107,13 @@ def _about(upright: GrooveShape | PitShape, sizes: Sizes) -> tuple[tuple[Prior, 
     """Priors, start and step: the places as in the upright family; half of its mouth is as wide as any half width."""
     half = float(np.log(0.5 * sizes.radius))
     depth = upright.priors[-1]
-    priors = (*upright.priors[:-2], Uniform(half - 2.0, half + 2.0), depth, Uniform(*TAPERS))
-    start = np.array([*upright.start[:-2], half, np.log(sizes.height), -0.2])
-    step = np.array([*upright.step[:-2], 0.02, 0.05, 0.05])
+    places = _places_of(upright)
+    priors = (*(upright.priors[k] for k in places), Uniform(half - 2.0, half + 2.0), depth, Uniform(*TAPERS))
+    start = np.array([*upright.start[places], half, np.log(sizes.height), -0.2])
+    step = np.array([*upright.step[places], 0.02, 0.05, 0.05])
     return priors, start, step
+
+
+def _places_of(upright: GrooveShape | PitShape) -> list[int]:
+    """The parameters of an upright family that a smooth one shares: its places, not its mouth and its depth."""
+    return [k for k, name in enumerate(upright.names[:-2]) if name != "end rounding"]

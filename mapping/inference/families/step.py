@@ -49,6 +49,6 @@ class StepShape:
 
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(n, nodes) lateral distances from the chart, the (m, n, nodes) modes there, and bends of the base."""
+        """(n, nodes) lateral distances from the chart, (2, m, n, nodes) modes and slopes, and bends of the base."""
         _, lateral, basis, bend, _ = line_nodes(self.window, self.chart, self.modes)
         return lateral, basis, bend

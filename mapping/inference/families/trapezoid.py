@@ -11,7 +11,7 @@ from mapping import FloatArray
 from mapping.inference.curves import Chart, CurveModes
 from mapping.inference.families.hollow import line_nodes
 from mapping.inference.families.problem import Sizes
-from mapping.inference.families.ridge import RidgeShape
+from mapping.inference.families.ridge import RidgeShape, rounding_of
 from mapping.inference.likelihood import Prior, Uniform, Window
 
 # Tops and flanks from this share of the disturbance's half-width to that one, all equally probable in their logarithm:
@@ -22,10 +22,14 @@ NARROWEST_PART, WIDEST_PART = 0.01, 4.0
 
 @dataclass(frozen=True, eq=False)
 class TrapezoidShape:
-    """Lines with a flat top: lateral modes, ends (cut square), height, log width of the top, log run of each flank.
+    """Lines with a flat top: lateral modes, rounding and places of the ends, height, log width of the top, log run of
+    each flank.
 
-    A run of nothing is a bar with upright walls; a roof has no top, and no parameter for it. A flank that is steeper
-    than the ball's own flank at the kink is never touched: all such runs leave one trace.
+    An end is where the top ends: in plan its corners are square (rounding 0), or both are one half circle (1), and the
+    flanks go round it. Which of them it is moves the end by a share of the width, so what is not known of it is
+    marginalised. A run of nothing is a bar with upright walls; a roof has no top, and no parameters for it and its
+    corners. A flank that is steeper than the ball's own flank at the kink is never touched: all such runs leave one
+    trace.
     """
 
     window: Window
@@ -39,26 +43,31 @@ class TrapezoidShape:
 
     @property
     def names(self) -> tuple[str, ...]:
-        ends = () if self.chart.closed else ("start", "end")
+        ends = () if self.chart.closed else ("start", "end") if self.roof else ("end rounding", "start", "end")
         return (*self.modes.names, *ends, "height", *(() if self.roof else ("log top",)), "log run")
 
     @property
     def units(self) -> tuple[str, ...]:
-        ends = () if self.chart.closed else ("m", "m")
+        ends = () if self.chart.closed else ("m", "m") if self.roof else ("", "m", "m")
         return (*self.modes.units, *ends, "m", *(() if self.roof else ("ln m",)), "ln m")
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights over the base's trace, m."""
         from mapping.geometry.templates import section_heights
 
-        closed = np.tile([-1e300, 1e300], (len(theta), 1))
-        first = self.modes.count
-        ends = closed if self.chart.closed else np.ascontiguousarray(theta[:, first : first + 2])
+        ends, rounded = np.tile([-1e300, 1e300], (len(theta), 1)), np.zeros(len(theta))
+        if "start" in self.names:
+            first = self.names.index("start")
+            ends = np.ascontiguousarray(theta[:, first : first + 2])
         courses = np.ascontiguousarray(theta[:, : self.modes.count])
         height, top, run = self.parts(theta)
         up, half = np.column_stack([height, np.zeros(len(theta))]), 0.5 * top
+        if "end rounding" in self.names:
+            rounded = half * rounding_of(theta[:, self.modes.count])
         out = np.empty((len(theta), len(self.window)))
-        section_heights(*self._places, courses, ends, np.column_stack([half, half + run]), up, self.tip_radius, out)
+        section_heights(
+            *self._places, courses, ends, rounded, np.column_stack([half, half + run]), up, self.tip_radius, out
+        )
         return out
 
     def parts(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -75,8 +84,9 @@ class TrapezoidShape:
 def trapezoid_beside(ridge: RidgeShape, sizes: Sizes, *, roof: bool) -> TrapezoidShape:
     """The family on a ridge's window, with its course, its ends and its height, and their priors."""
     course = ridge.modes.count
-    # of the ridge's parameters all but the rounding of its ends and the radius
-    shared = [*range(course), *range(course if ridge.chart.closed else course + 1, len(ridge.names) - 1)]
+    # of the ridge's parameters all but the radius, and the rounding of its ends where no top has corners
+    skipped = int(roof and not ridge.chart.closed)
+    shared = [*range(course), *range(course + skipped, len(ridge.names) - 1)]
     wide = Uniform(*np.log(sizes.half_width * np.array([NARROWEST_PART, WIDEST_PART])))
     parts = 1 if roof else 2
     priors = (*(ridge.priors[k] for k in shared), *(wide,) * parts)

@@ -72,8 +72,8 @@ def _flat_topped(feature: Feature, feet: FloatArray, tip_radius: float) -> Float
     across, up = np.array([[0.5 * top, 0.5 * top + run]]), np.array([[feature.height.median, 0.0]])
     nowhere, endless = np.zeros_like(away), np.array([[-1e300, 1e300]])
     out = np.empty((1, len(feet)))
-    section_heights(nowhere, away, np.zeros((0, *away.shape)), nowhere, nowhere, np.zeros((1, 0)), endless, across, up,
-                    tip_radius, out)  # fmt: skip
+    section_heights(nowhere, away, np.zeros((2, 0, *away.shape)), nowhere, nowhere, np.zeros((1, 0)), endless,
+                    np.zeros(1), across, up, tip_radius, out)  # fmt: skip
     return np.asarray(out[0])
 
 

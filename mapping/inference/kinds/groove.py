@@ -9,27 +9,29 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray
-from mapping.geometry.templates import groove_height, rim_height
+from mapping.geometry.templates import rim_height
 from mapping.inference.families import (
     GrooveShape,
     PosteriorProblem,
     Sizes,
     Surroundings,
+    rounding_of,
     smooth_beginnings,
     smooth_groove_beside,
 )
 from mapping.inference.kinds.hollows import Hollow
-from mapping.inference.kinds.lines import LineKind, Parameters, Traced
+from mapping.inference.kinds.lines import ROUNDING_OF_ENDS, LineKind, Parameters, Traced
 from mapping.inference.kinds.posterior_density import hollow_priors
 
 
 class Groove(Hollow, LineKind):
-    """Grooves with a flat bottom: course, places of the ends, log width, log depth; smooth ones where none fits."""
+    """Grooves with a flat bottom: course, rounding and places of the ends, log width, log depth; or smooth ones."""
 
     def shape(self, traced: Traced) -> GrooveShape:
         sizes, tip = traced.sizes, traced.tip_radius
         guess = float(np.log(2.0 * sizes.radius)), float(np.log(2.0 * sizes.height))
-        whole = traced.laterals + traced.ends + Parameters(hollow_priors(sizes, tip), guess, (0.02, 0.05))
+        rounding = Parameters() if traced.chart.closed else ROUNDING_OF_ENDS
+        whole = traced.laterals + rounding + traced.ends + Parameters(hollow_priors(sizes, tip), guess, (0.02, 0.05))
         return GrooveShape(traced.window, traced.chart, traced.modes, tip, *whole.arrays)
 
     def other_starts(self, sizes: Sizes) -> tuple[float, ...]:
@@ -39,14 +41,17 @@ class Groove(Hollow, LineKind):
         """A groove without an edge, on the same course."""
         upright: Any = problem.target.shape
         target = replace(problem.target, shape=smooth_groove_beside(upright, problem.sizes))
-        return (replace(problem, target=target, beginnings=smooth_beginnings(problem.beginnings, problem.sizes)),)
+        beginnings = smooth_beginnings(upright, problem.beginnings, problem.sizes)
+        return (replace(problem, target=target, beginnings=beginnings),)
 
     def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
         s, lateral, _ = shape.chart.coordinates(feet)
         x = lateral - shape.modes.lateral(truth[None, : shape.modes.count], s)[0]
-        inside = np.minimum(s - truth[-4], truth[-3] - s)
-        across = groove_height(x, np.exp(truth[-2]), shape.tip_radius, np.exp(truth[-1]))
-        return np.maximum(across, rim_height(inside, shape.tip_radius, np.exp(truth[-1])))
+        along, across = np.minimum(s - truth[-4], truth[-3] - s), 0.5 * np.exp(truth[-2]) - np.abs(x)
+        radius = 0.5 * np.exp(truth[-2]) * rounding_of(truth[-5])
+        corner = radius - np.hypot(np.maximum(radius - along, 0.0), np.maximum(radius - across, 0.0))
+        inside = np.where((along < radius) & (across < radius), corner, np.minimum(along, across))
+        return rim_height(inside, shape.tip_radius, np.exp(truth[-1]))
 
 
 GROOVE = Groove(

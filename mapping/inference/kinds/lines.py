@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -59,6 +60,12 @@ class Parameters:
     def arrays(self) -> tuple[tuple[Prior, ...], FloatArray, FloatArray]:
         """Priors, start (P,) and step (P,), as a shape takes them."""
         return self.priors, np.array(self.start), np.array(self.step)
+
+
+# Of both ends alike, from square to round: a line is mostly made by one tool
+ROUNDING_OF_ENDS = Parameters((Uniform(0.0, 1.0),), (0.5,), (0.2,))
+# Its values in the middle of those that are square and of those that are round: no descent leads from one to the other
+SQUARE_OR_ROUND = (1.0 / 6.0, 5.0 / 6.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +219,16 @@ class LineKind(Kind):
                 moved = shape.start.copy()
                 moved[first : first + 2] += out * sizes.half_width * np.array([-1.0, 1.0])
                 starts.append(moved)
-        return np.array(starts)
+        return np.concatenate([starts, *(ended(np.array(starts[:1]), shape.names, turn) for turn in SQUARE_OR_ROUND)])
+
+
+def ended(starts: FloatArray, names: Sequence[str], turn: float) -> FloatArray:
+    """(M, P) starts with another rounding of the ends; none where the shape's ends have no rounding."""
+    if "end rounding" not in names:
+        return starts[:0]
+    starts = starts.copy()
+    starts[:, names.index("end rounding")] = turn
+    return starts
 
 
 def _cost(problem: PosteriorProblem) -> float:

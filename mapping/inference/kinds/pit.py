@@ -41,7 +41,9 @@ class Pit(Hollow, PointKind):
         """A pit without an edge."""
         upright: Any = problem.target.shape
         target = replace(problem.target, shape=smooth_pit_beside(upright, problem.sizes))
-        return (replace(problem, target=target, beginnings=smooth_beginnings(problem.beginnings, problem.sizes)),)
+        return (
+            replace(problem, target=target, beginnings=smooth_beginnings(upright, problem.beginnings, problem.sizes)),
+        )
 
     def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
         place = np.zeros(2)

@@ -21,9 +21,9 @@ from mapping.inference.families import (
 )
 from mapping.inference.kinds.crests import Crest
 from mapping.inference.kinds.kind import Section
-from mapping.inference.kinds.lines import LineKind, Parameters, Traced
+from mapping.inference.kinds.lines import ROUNDING_OF_ENDS, SQUARE_OR_ROUND, LineKind, Parameters, Traced, ended
 from mapping.inference.kinds.posterior_density import height_prior, radius_prior
-from mapping.inference.likelihood import Shape, Uniform
+from mapping.inference.likelihood import Shape
 
 # Widths of a flat top and runs of a flank, in half-widths of the disturbance, from which their optimum is searched:
 # upright and gentle flanks, tops that are hardly felt and such as fill the disturbance
@@ -36,7 +36,7 @@ class Ridge(Crest, LineKind):
 
     def shape(self, traced: Traced) -> RidgeShape:
         sizes, tip = traced.sizes, traced.tip_radius
-        rounding = Parameters() if traced.chart.closed else Parameters((Uniform(0.0, 1.0),), (0.5,), (0.2,))
+        rounding = Parameters() if traced.chart.closed else ROUNDING_OF_ENDS
         section = Parameters(
             (height_prior(sizes), radius_prior(sizes, tip)),
             (sizes.height, float(np.log(sizes.radius))),
@@ -52,12 +52,14 @@ class Ridge(Crest, LineKind):
         """Lines with straight flanks, and with a flat top or none, on the same course."""
         ridge: Any = problem.target.shape
         course, last = ridge.modes.count, len(optimum) - 1
-        kept = np.delete(optimum, [last] if ridge.chart.closed else [course, last])
         posed = []
         for roof, parts in ((False, FLAT_STARTS), (True, ROOF_STARTS)):
+            kept = np.delete(optimum, [course, last] if roof and not ridge.chart.closed else [last])
             shape = trapezoid_beside(ridge, problem.sizes, roof=roof)
             begun = np.log(problem.sizes.half_width * np.array(parts))
             beginnings = np.column_stack([np.tile(kept, (len(parts), 1)), begun])
+            alike = [ended(beginnings, shape.names, turn) for turn in SQUARE_OR_ROUND]
+            beginnings = np.concatenate(alike) if len(alike[0]) else beginnings
             posed.append(replace(problem, target=replace(problem.target, shape=shape), beginnings=beginnings))
         return posed
 

@@ -55,11 +55,29 @@ def test_a_groove_ends_as_its_own_direction_is_bent(lengthwise: bool) -> None:
     s, aside = (s, WALL * np.sin(aside / WALL)) if lengthwise else (WALL * np.sin(s / WALL), aside)
     bends = [np.full((len(s), 1), each) for each in ((1 / WALL, 0.0) if lengthwise else (0.0, 1 / WALL))]
     out = np.empty((1, len(s)))
-    nothing, places = np.zeros((0, len(s), 1)), (s[:, None], aside[:, None])
+    nothing, places = np.zeros((2, 0, len(s), 1)), (s[:, None], aside[:, None])
     ends, size = np.array([[-end, end]]), (np.array([2 * half]), np.array([depth]))
-    groove_heights(*places, nothing, *bends, np.zeros((1, 0)), ends, *size, TIP, out)
+    groove_heights(*places, nothing, *bends, np.zeros((1, 0)), ends, np.zeros(1), *size, TIP, out)
     # a chord at the rim is longer by what is felt over the radius of the cylinder, 0.6 %, than one at the bottom
     np.testing.assert_allclose(out[0], true, atol=2.5e-6)
+
+
+def test_a_groove_that_a_cutter_left_ends_as_half_a_pit() -> None:
+    rng = np.random.default_rng(3)
+    width, depth, end = 3e-3, 0.09e-3, 10e-3
+    x, y = rng.uniform(-3e-3, 3e-3, (2, 500, 1))
+    bends, flat = np.array([20.0, -15.0]), np.zeros((2, 0, 500, 1))
+    size = np.array([width]), np.array([depth])
+    groove, pit = np.empty((1, 500)), np.empty((1, 500))
+    places = end - 0.5 * width + x, y, flat, np.full((500, 1), bends[1]), np.full((500, 1), bends[0]), np.zeros((1, 0))
+    groove_heights(*places, np.array([[0.0, end]]), np.array([0.5 * width]), *size, TIP, groove)
+    pit_heights(x, y, bends, np.zeros((1, 2)), *size, TIP, pit)
+    beyond = x[:, 0] > 0.0
+    np.testing.assert_allclose(groove[0, beyond], pit[0, beyond], atol=1e-18)
+    assert (pit[0, beyond] < 0.0).sum() > 50
+    # before its end it is as wide as it is
+    inside = ~beyond & (np.abs(y[:, 0]) < 0.5 * width)
+    assert groove[0, inside].max() < 0.0 and not groove[0, ~beyond & ~inside].any()
 
 
 def test_a_pit_is_shallower_where_its_wall_is_straight() -> None:
@@ -85,8 +103,8 @@ def test_an_edge_along_the_axis_falls_with_the_wall() -> None:
     true = felt(u, z, np.repeat(np.where(u > 0.0, height, 0.0)[:, None], 13, axis=1), (true_at, np.zeros(51)))
     out = np.empty((1, 51))
     lateral = WALL * np.sin(true_at / WALL)[:, None]
-    step_heights(lateral, np.zeros((0, 51, 1)), np.full((51, 1), 1 / WALL), np.zeros((1, 0)), np.array([height]), 1.0,
-                 TIP, out)  # fmt: skip
+    straight = np.zeros((2, 0, 51, 1)), np.full((51, 1), 1 / WALL), np.zeros((1, 0))
+    step_heights(lateral, *straight, np.array([height]), 1.0, TIP, out)
     np.testing.assert_allclose(out[0], true, atol=5e-6)
 
 
@@ -101,6 +119,8 @@ def test_a_bar_ends_as_its_own_direction_is_bent(lengthwise: bool) -> None:
     bends = [np.full((len(s), 1), each) for each in ((1 / WALL, 0.0) if lengthwise else (0.0, 1 / WALL))]
     out = np.empty((1, len(s)))
     across, up = np.array([[half, half + 1e-9]]), np.array([[height, 0.0]])
-    places, nothing = (s[:, None], aside[:, None]), np.zeros((0, len(s), 1))
-    section_heights(*places, nothing, *bends, np.zeros((1, 0)), np.array([[-end, end]]), across, up, TIP, out)
+    places, nothing = (s[:, None], aside[:, None]), np.zeros((2, 0, len(s), 1))
+    section_heights(
+        *places, nothing, *bends, np.zeros((1, 0)), np.array([[-end, end]]), np.zeros(1), across, up, TIP, out
+    )
     np.testing.assert_allclose(out[0], true, atol=6e-6)

@@ -71,14 +71,14 @@ def test_a_groove_is_felt_as_its_section_as_the_base_bends_and_ends_round() -> N
     bend = np.linspace(-40.0, 120.0, 33)[:, None]
     s, aside = np.full_like(bend, 5e-3), np.full_like(bend, 0.5e-3)
     shape = np.array([-depth]), np.array([half]), np.array([taper])
-    line = np.zeros((0, *bend.shape)), bend, 0.0 * bend, np.zeros((1, 0)), np.array([[0.0, 10e-3]])
+    line = np.zeros((2, 0, *bend.shape)), bend, 0.0 * bend, np.zeros((1, 0)), np.array([[0.0, 10e-3]])
     out = np.empty((1, len(bend)))
     smooth_groove_heights(s, aside, *line, *shape, TIP, out)
     expected = [on_a_circle(0.5e-3, k, -depth, half, taper) for k in bend[:, 0]]
     np.testing.assert_allclose(out[0], expected, atol=1e-3 * depth)
     assert np.ptp(expected) > 0.05 * depth
     beyond = np.linspace(0.0, 2e-3, 33)[:, None]
-    flat = np.zeros((0, *bend.shape)), 0.0 * bend, 0.0 * bend, np.zeros((1, 0)), np.array([[0.0, 10e-3]])
+    flat = np.zeros((2, 0, *bend.shape)), 0.0 * bend, 0.0 * bend, np.zeros((1, 0)), np.array([[0.0, 10e-3]])
     smooth_groove_heights(10e-3 + beyond, 0.0 * beyond, *flat, *shape, TIP, out)
     np.testing.assert_allclose(out[0], rolled(beyond[:, 0], TIP, depth, half, taper), atol=2e-5 * depth)
 

@@ -68,8 +68,8 @@ def bar_form(top: float, run: float) -> Form:
         nothing, out = np.zeros((len(x), 1)), np.empty((1, len(x)))
         corners = np.array([[0.5 * top, 0.5 * top + run]]), np.array([[0.2e-3, 0.0]])
         section_heights(
-            nothing, np.c_[x], np.zeros((0, len(x), 1)), nothing, nothing, np.zeros((1, 0)),
-            np.array([[-1e300, 1e300]]), *corners, r, out,
+            nothing, np.c_[x], np.zeros((2, 0, len(x), 1)), nothing, nothing, np.zeros((1, 0)),
+            np.array([[-1e300, 1e300]]), np.zeros(1), *corners, r, out,
         )  # fmt: skip
         return np.asarray(out[0])
 

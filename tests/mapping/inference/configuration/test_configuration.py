@@ -134,6 +134,7 @@ def test_samples_as_far_apart_as_places_were_felt_at_points() -> None:
     place = _weighed_on(body, [bar], 100)
     part = as_bar(part_of(bar, place, 1), place, bar.width.median)
     part.start[-1] = np.log(0.02 * place.half_width)
+    part.start[part.shape.names.index("end rounding")] = 0.0  # it is a box
     shape = JoinedShape([part.shape], len(place.window), PARTS_OF_BIN)
     off = np.abs(place.window.height - shape.templates(part.start[None])[0])
     # means over 0.6 mm were 25 um off where the ball leaves the base
