@@ -186,9 +186,7 @@ def background(
     return Background(level, banks, {spacing: _uncertainty(fit, bank, tip_radius) for spacing, bank in banks.items()})
 
 
-def _cuts(
-    profiles: Sequence[SweepHeights], found: Sequence[Suspects], banks: dict[float, Bank]
-) -> dict[float, float]:
+def _cuts(profiles: Sequence[SweepHeights], found: Sequence[Suspects], banks: dict[float, Bank]) -> dict[float, float]:
     """For the profiles of each width of bins the signal-to-noise ratio from which on what is found is no noise.
 
     It is the least above which noise explains FALSE_DISCOVERIES of what is found (Benjamini and Hochberg 1995);
