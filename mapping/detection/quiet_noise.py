@@ -173,8 +173,8 @@ def background(
             banks = _banks(profiles, level, tip_radius, largest, drift)
             if several and not level.further:
                 break
-    # what a sum of processes leaves of its law is measured later (`null_scales`), the cut with it; of white noise, which
-    # has as many independent parts as samples, the cut takes a fifth of a per cent
+    # what a sum of processes leaves of its law is measured later (`null_scales`), the cut with it; of white noise, as
+    # many independent parts as samples, the cut takes a fifth of a per cent
     if base.known and level.terms and not level.further:
         for _ in range(QUIET_NOISE_ROUNDS):
             found, before = suspected(), quiet

@@ -111,9 +111,9 @@ class Backlash:
         if not self.told:
             return (
                 f"the readings may hang behind the finger, as of axes with a play of {length_text(self.play, 2)} ± "
-                f"{length_text(self.sd, 2)} (probability {100.0 * self.probability:.0f} %): the crossings do not decide "
-                f"it. Nothing was taken off; heights carry a doubt of {length_text(self.height_sd, 2)} for it, and "
-                f"places of what it moves them.{way}"
+                f"{length_text(self.sd, 2)} (probability {100.0 * self.probability:.0f} %): the crossings do not "
+                f"decide it. Nothing was taken off; heights carry a doubt of {length_text(self.height_sd, 2)} for it, "
+                f"and places of what it moves them.{way}"
             ).removesuffix(".")
         return (
             f"the readings hang behind the finger, as of axes with a play of {length_text(self.play, 2)} ± "
