@@ -34,8 +34,8 @@ HALF_PLAYS = np.geomspace(0.02, 30.0, 40)
 # named if it makes the heights a thousand times more probable than none, and than a play of each crossing's own: what
 # is no play of the machine moves them by different amounts
 LIKELY_PLAY, LEAST_PLAY_GAIN = 0.1, float(np.log(1e3))
-# One less probable than this leaves every 90 % interval as it is, to within half of its tail
-UNLIKELY_PLAY = 0.05
+# One that the heights make less than so many times as probable, the root of ten, is barely worth mentioning (Jeffreys)
+WORTH_MENTIONING = float(0.5 * np.log(10.0))
 # Sections are no parabolas: what all crossings have in common, in shares of their heights, is a line through knots so
 # many half-widths apart and as far out, of one of these standard deviations (those of theory equation 5.1, and one for
 # sections that are quite another)
@@ -123,7 +123,7 @@ class Backlash:
 
 
 def backlash(laid: LaidTrace, found: Detections, taken: float = 0.0) -> Backlash | None:
-    """The play of the axes, by all crossings together; None if they speak against one.
+    """The play of the axes, by all crossings together; None if they hardly speak for one.
 
     Args:
         laid: the trace that was searched.
@@ -142,7 +142,7 @@ def backlash(laid: LaidTrace, found: Detections, taken: float = 0.0) -> Backlash
     # the path is reckoned with crests as they were recorded: higher than the play, or the axis would not have moved
     log[halves > 0.5 * float(np.median([abs(window.height) for window in windows]))] = -np.inf
     gain = _evidence(log) - max(0.0, _evidence_of_each(section.gains_of_each()))
-    if gain < np.log(UNLIKELY_PLAY / (1.0 - UNLIKELY_PLAY)):
+    if gain < np.log(LIKELY_PLAY) + WORTH_MENTIONING:
         return None
     weight = np.exp(log - log.max())
     weight /= weight.sum()
