@@ -367,17 +367,30 @@ def _keep_aside(work: Work, base: Base | None) -> None:
 
 
 def detected(work: Work, share: Share) -> None:
-    """Crossings of single sweeps, of readings that hang behind no more."""
+    """Crossings of single sweeps, of readings that hang behind no more.
+
+    Crests that the play has moved tell less of it than those that it is taken off from, so it is, on trial; one that
+    remains in doubt is put back.
+    """
     _searched(work)
+    if work.before is None or not _may_hang_behind(work):
+        return
+    untouched, said = vars(work).copy(), work.stages.left_out.copy()
     for _ in range(PLAY_ROUNDS):
-        if work.before is None or not _may_hang_behind(work):
-            break
         taken = 0.0 if work.backlash is None else work.backlash.play
         play = backlash(work.laid, without_wide(work.detections, work.laid), taken)
-        if play is None or (work.backlash is not None and abs(play.play - taken) < 0.5 * play.sd):
+        if play is None:
+            if work.backlash is not None and not work.backlash.told:
+                work.backlash = None
+            break
+        if work.backlash is not None and abs(play.play - taken) < 0.5 * play.sd:
+            work.backlash = replace(play, play=taken)
             break
         work.backlash = play
         _begun_again(work, without_backlash(work.before[0], work.laid, work.detections, play.play), share)
+    if work.backlash is None or not work.backlash.told:
+        vars(work).update(untouched | {"backlash": work.backlash})
+        work.stages.left_out[:] = said
     if work.backlash is not None:
         work.detections = with_doubt(work.detections, work.backlash)
 

@@ -55,7 +55,7 @@ def with_faint_lines(
             masked[near] |= distances(inspection.points[near], feature.axis) < reach
     alarms = false_alarms_per_metre * detections.inspected_length
     inflation = _inflation(inspection, detections, len(trace), half_width)
-    lines = faint_lines(inspection, inspection.normals, masked, half_width, inflation, alarms)
+    lines = faint_lines(inspection, inspection.normals, masked, half_width, inflation, alarms, detections.doubt)
     for line in lines:
         ridge = _feature(line, inspection, base, detections, trace.tip_radius)
         features = [f for f in features if f not in weak or distances(f.axis, ridge.axis).max() > 2 * line.half_width]

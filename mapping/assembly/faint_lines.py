@@ -71,7 +71,13 @@ class FaintLine:
 
 
 def faint_lines(
-    inspection: Inspection, normals: FloatArray, masked: BoolArray, half_width: float, inflation: float, alarms: float
+    inspection: Inspection,
+    normals: FloatArray,
+    masked: BoolArray,
+    half_width: float,
+    inflation: float,
+    alarms: float,
+    doubt: float = 1.0,
 ) -> tuple[FaintLine, ...]:
     """The lines that all sweeps together show, the clearest first.
 
@@ -82,10 +88,11 @@ def faint_lines(
         half_width: of the smallest crest that a single sweep detects, m.
         inflation: standard deviation of a mean over a crossing, against that of independent places.
         alarms: accepted number of false lines.
+        doubt: factor of a threshold for what is not known of the noise.
     """
     found: list[FaintLine] = []
     free = ~masked
-    needed = threshold(len(inspection.points) * inspection.spacing, inspection.pitch, half_width, alarms)
+    needed = doubt * threshold(len(inspection.points) * inspection.spacing, inspection.pitch, half_width, alarms)
     tiles = _tiles(inspection, normals, free, half_width)
     search = partial(_clearest_of_each, inspection, normals, half_width, inflation, needed)
     lines = dict(enumerate(search(tiles)))

@@ -147,13 +147,34 @@ def without(height: FloatArray, quiet: BoolArray, bank: Bank) -> FloatArray:
     return height
 
 
-def quiet_bins(profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float) -> BoolArray:
-    """(n,) True where a profile shows nothing above the threshold; nowhere if it is too short for any filter."""
+@dataclass(frozen=True, eq=False)
+class Suspects:
+    """What of a profile may be no noise.
+
+    Args:
+        whole: (n,) True, but of a profile that is too short for any filter False: what it holds is not known.
+        stretches: (first bin, past-last bin, signal-to-noise) of each.
+    """
+
+    whole: BoolArray
+    stretches: tuple[tuple[int, int, float], ...]
+
+    def quiet(self, threshold: float) -> BoolArray:
+        """(n,) False where something exceeds the threshold, or nothing is known."""
+        quiet = self.whole.copy()
+        for begin, end, snr in self.stretches:
+            if snr >= threshold:
+                quiet[begin:end] = False
+        return quiet
+
+
+def suspects(profile: SweepHeights, bank: Bank, noise: Noise, threshold: float, tip_radius: float) -> Suspects:
+    """What of a profile exceeds a threshold; the other arguments as for `search`."""
     short = bank.filters[0].half_width > LARGEST_SHARE * profile.length
-    quiet = np.full(len(profile.height), not short)
-    for _, begin, end, _, _ in _stretches(profile, bank, noise, threshold, tip_radius):
-        quiet[begin:end] = False
-    return quiet
+    found = _stretches(profile, bank, noise, threshold, tip_radius)
+    return Suspects(
+        np.full(len(profile.height), not short), tuple((begin, end, snr) for _, begin, end, _, snr in found)
+    )
 
 
 def _stretches(

@@ -27,7 +27,7 @@ from mapping.detection.quiet_noise import (
     raw_stretches,
 )
 from mapping.detection.terraces import Terraced, terraced
-from mapping.instrument import Noise, StatedNoise
+from mapping.instrument import Levels, Noise, StatedNoise
 
 # Half-width of the widest disturbance that counts as fine, in tip radii.
 LARGEST = 4.0
@@ -67,6 +67,7 @@ class Detections:
         unfelt: indices of the trace's samples that no ball on any surface can give; they were left out.
         injected, recovered: crests of the limit's height that were put into the quiet path, and found (see recovery);
             0 where the limit is computed.
+        doubt: factor of the threshold, and of any other, for what is not known of the noise.
     """
 
     crossings: tuple[Crossing, ...]
@@ -82,6 +83,7 @@ class Detections:
     unfelt: tuple[int, ...] = ()
     injected: int = 0
     recovered: int = 0
+    doubt: float = 1.0
 
     @classmethod
     def together(cls, parts: Sequence[Detections]) -> Detections:
@@ -175,6 +177,7 @@ def detect(
     threshold, bank = thresholds[usual], behind.banks[usual]
     found_from = bank.detection_limit(threshold, tip)
     rounding, remarks = UNRESOLVED * trace.resolution, tuple[str, ...]()
+    doubt = threshold / threshold_for(bank, false_alarms_per_metre)
     # a noise that is given is the caller's word; one that was fitted is held against the quiet path
     if noise is None and level.white > CONTACT_ROUNDING * tip:
         weighed, nulls = _weighed(profiles, list(found), behind.banks, level, thresholds, tip)
@@ -187,7 +190,11 @@ def detect(
             # over a base that was fitted to one profile, small features and roughness are the same thing: what
             # speaks against the law is said, and decides nothing (see _stands_out)
             if base.kind != "profile":
-                found, level = weighed, floored(effective_noise(bank, told), tip) if told else level
+                found = weighed
+                if told:
+                    doubt *= told[0].doubt_at(float(np.sqrt(2 * tip * measured)))
+                    level = floored(effective_noise(bank, told), tip)
+                    level = replace(level, levels=_levels(profiles, nulls, told, measured, tip))
                 found_from = measured
     crossings = []
     for one, each in zip(over, found, strict=True):
@@ -217,6 +224,7 @@ def detect(
         left_out,
         of_each,
         remarks,
+        doubt=doubt,
     )
 
 
@@ -275,6 +283,20 @@ def _weighed(
             if all(np.array_equal(one, other) for one, other in zip(before, masks, strict=True)):
                 break
     return found, nulls
+
+
+def _levels(
+    profiles: list[SweepHeights], nulls: list[NullScale | None], usual: list[NullScale], limit: float, tip: float
+) -> Levels | None:
+    """How loud the noise is along the sweeps, as the filter of the smallest crest that is found sees it.
+
+    Over the effective noise, whose variance is the mean of all that the usual scales tell.
+    """
+    half_width = min(float(np.sqrt(2 * tip * limit)), float(usual[0].widths[-1]))
+    k = usual[0].nearest(half_width)
+    mean = float(np.sqrt(np.mean([np.mean(scale.level(k) ** 2) for scale in usual])))
+    known = [(p, null) for p, null in zip(profiles, nulls, strict=True) if null is not None]
+    return Levels.of([(p.sweep, p.t, null.level(null.nearest(half_width)) / mean) for p, null in known])
 
 
 def _raised(measured: float, fitted: float, base: Base) -> str:

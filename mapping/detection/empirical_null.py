@@ -98,8 +98,15 @@ class NullScale:
 
     def at(self, half_width: float, place: float) -> float:
         """Of the filter nearest to a half-width, m, at a bin."""
-        k = int(np.abs(np.log(self.widths / half_width)).argmin())
-        return float(np.interp(place, np.arange(len(self.local)), self.along(k)))
+        return float(np.interp(place, np.arange(len(self.local)), self.along(self.nearest(half_width))))
+
+    def nearest(self, half_width: float) -> int:
+        """Number of the filter nearest to a half-width, m."""
+        return int(np.abs(np.log(self.widths / half_width)).argmin())
+
+    def doubt_at(self, half_width: float) -> float:
+        """Factor of a threshold for the filter nearest to a half-width, m; beyond all filters that of the last."""
+        return float(self.doubt[self.nearest(min(half_width, float(self.widths[-1])))])
 
 
 def null_scales(

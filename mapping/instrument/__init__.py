@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         perturbed as perturbed,
         relative_sd as relative_sd,
     )
+    from mapping.instrument.levels import Levels as Levels
     from mapping.instrument.noise import Noise as Noise, estimate_noise as estimate_noise
     from mapping.instrument.noise_fit import fit_noise as fit_noise
     from mapping.instrument.robust import (
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "averaging": ("Means", "RunMeans", "running_mean"),
     "block_likelihood": ("Blocks", "NoiseFit", "perturbed", "relative_sd"),
+    "levels": ("Levels",),
     "noise_fit": ("fit_noise",),
     "noise": ("Noise", "estimate_noise"),
     "robust": (

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping import FloatArray, NoiseError
+from mapping.instrument.levels import Levels
 from mapping.instrument.robust import robust_sd
 from mapping.instrument.states import point_steps
 from mapping.instrument.term import Term
@@ -36,6 +37,8 @@ class Noise:
         correlated: standard deviation of the correlated part, m.
         length: correlation length, m; matters only where `correlated` is positive.
         further: correlated terms beyond that one, where one does not explain what is measured.
+        levels: by how much the noise of a recording is louder and quieter than this law along its sweeps; None: it
+            is of one level. Two noises are equal if their laws are.
 
     Raises:
         NoiseError: a negative or non-finite value, or correlated noise without a positive length.
@@ -47,6 +50,7 @@ class Noise:
     correlated: float = 0.0
     length: float = 1e-3
     further: tuple[Term, ...] = ()
+    levels: Levels | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         values = (self.white, self.correlated, self.length)
@@ -101,7 +105,7 @@ class Noise:
     def scaled(self, height: float = 1.0, path: float = 1.0, white: float = 1.0) -> Noise:
         """The noise with its levels and lengths so many times as large, and the white level `white` times that."""
         further = tuple(Term(t.sd * height, t.length * path, t.wavelength * path) for t in self.further)
-        return Noise(self.white * height * white, self.correlated * height, self.length * path, further)
+        return Noise(self.white * height * white, self.correlated * height, self.length * path, further, self.levels)
 
     def of_passes(self, count: int) -> Noise:
         """Of the samples of so many passes over one place: the correlated parts average out, not along a pass."""
@@ -119,7 +123,8 @@ class Noise:
             return self
         own, rounding = self.correlated**2, step**2 / 12.0
         length = (own * self.length + rounding * step) / (own + rounding)
-        return Noise(self.white, float(np.sqrt(own + rounding)), length, self.further)
+        levels = None if self.levels is None else self.levels.beside(rounding / (self.sd**2 + rounding))
+        return Noise(self.white, float(np.sqrt(own + rounding)), length, self.further, levels)
 
     def covariance(self, s: ArrayLike) -> FloatArray:
         """(N, N) covariance of samples at arclengths s (N,), m^2."""

@@ -212,6 +212,8 @@ def _joined(
     samples = np.concatenate([np.diff(profile.first) for profile in profiles])
     sd = _sd_of_means(noise, spacing, samples)
     sweep = np.repeat([profile.sweep for profile in profiles], [len(profile.height) for profile in profiles])
+    if noise.levels is not None:
+        sd *= noise.levels.at(sweep, np.concatenate([profile.t for profile in profiles]))
     over = np.concatenate(lowered) if lowered else np.zeros(0)
     return Inspection(np.concatenate(points), height, sd, sweep, spacing, np.concatenate(normals), over, samples)
 

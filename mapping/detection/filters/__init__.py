@@ -6,7 +6,10 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from mapping.detection.filters.cap_kernels import caps as caps
-    from mapping.detection.filters.false_alarms import threshold_for as threshold_for
+    from mapping.detection.filters.false_alarms import (
+        false_alarms_over as false_alarms_over,
+        threshold_for as threshold_for,
+    )
     from mapping.detection.filters.matched_filter import (
         FILTER_BINS_PER_HALF_WIDTH as FILTER_BINS_PER_HALF_WIDTH,
         LADDER as LADDER,
@@ -18,7 +21,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "cap_kernels": ("caps",),
-    "false_alarms": ("threshold_for",),
+    "false_alarms": ("false_alarms_over", "threshold_for"),
     "matched_filter": (
         "Bank",
         "FILTER_BINS_PER_HALF_WIDTH",

@@ -52,13 +52,10 @@ def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float 
         false_alarms_per_metre: 1/m.
         uncertainty: relative standard deviation of the filters' noise.
     """
-    colour, _ = colour_in_bins(bank.noise, bank.spacing, bank.samples)
-    noise = on_rungs(colour, STEPS_PER_OCTAVE)
-    smallest = rung(bank.filters[0].half_width / bank.spacing, STEPS_PER_OCTAVE)
+    rung_of_bank = _rung_of(bank)
 
     def solved(near: float) -> float:
-        intensity = _intensity(noise, smallest, len(bank.filters), bank.drift, near)
-        return _solve(intensity, false_alarms_per_metre * bank.spacing)
+        return _solve(_intensity(*rung_of_bank, near), false_alarms_per_metre * bank.spacing)
 
     normal = solved(round(solved(TYPICAL_THRESHOLD) / THRESHOLD_STEP) * THRESHOLD_STEP)
     if uncertainty < NEGLIGIBLE_UNCERTAINTY:
@@ -67,6 +64,24 @@ def threshold_for(bank: Bank, false_alarms_per_metre: float, uncertainty: float 
 
     # the square of an estimated level with n degrees of freedom has the relative variance 2 / n
     return float(-stdtrit(0.5 / uncertainty**2, float(ndtr(-normal))))
+
+
+def false_alarms_over(bank: Bank, thresholds: FloatArray) -> FloatArray:
+    """(T,) how often per metre noise alone exceeds thresholds (T,), in either sign, 1/m.
+
+    Of the bank of the ladder whose threshold for a rate `threshold_for` remembers, its clumps as large as at
+    TYPICAL_THRESHOLD.
+    """
+    from scipy.special import ndtr
+
+    return np.asarray(2.0 * ndtr(-thresholds) * _intensity(*_rung_of(bank), TYPICAL_THRESHOLD) / bank.spacing)
+
+
+def _rung_of(bank: Bank) -> tuple[Noise, float, int, int]:
+    """The nearest bank of the ladder: its noise and narrowest half-width in bins, filters and drift."""
+    colour, _ = colour_in_bins(bank.noise, bank.spacing, bank.samples)
+    smallest = rung(bank.filters[0].half_width / bank.spacing, STEPS_PER_OCTAVE)
+    return on_rungs(colour, STEPS_PER_OCTAVE), smallest, len(bank.filters), bank.drift
 
 
 @lru_cache(maxsize=256)

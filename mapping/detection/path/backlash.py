@@ -8,7 +8,8 @@ that are steeper on one side, or of another section, are so in proportion to the
 section that all crossings have in common is marginalised.
 
 What the play does along the sweeps is not felt on level ground: there the axes are taken to be alike, and places carry
-a doubt as large.
+a doubt as large. Where the crossings do not decide whether there is a play, heights and places carry what it would do
+to them, as far as it is probable.
 
 Reference: theory section 6.10.
 """
@@ -33,6 +34,8 @@ HALF_PLAYS = np.geomspace(0.02, 30.0, 40)
 # named if it makes the heights a thousand times more probable than none, and than a play of each crossing's own: what
 # is no play of the machine moves them by different amounts
 LIKELY_PLAY, LEAST_PLAY_GAIN = 0.1, float(np.log(1e3))
+# One that the heights make less than so many times as probable, the root of ten, is barely worth mentioning (Jeffreys)
+WORTH_MENTIONING = float(0.5 * np.log(10.0))
 # Sections are no parabolas: what all crossings have in common, in shares of their heights, is a line through knots so
 # many half-widths apart and as far out, of one of these standard deviations (those of theory equation 5.1, and one for
 # sections that are quite another)
@@ -49,12 +52,12 @@ MOST_WINDOWS = 200
 
 @dataclass(frozen=True)
 class Backlash:
-    """The play of a machine's axes.
+    """The play of a machine's axes: told, or in doubt.
 
     Args:
-        play: from end to end, of each axis, m.
+        play: from end to end, of each axis, if there is one, m.
         sd: standard deviation of it, m.
-        gain: logarithm of how much more probable the heights are with it.
+        gain: logarithm of how much more probable it is than none.
         one_way: whether all sweeps go one way: then no sweep tells what it does along them.
     """
 
@@ -63,31 +66,55 @@ class Backlash:
     gain: float
     one_way: bool
 
+    @property
+    def told(self) -> bool:
+        """True if it is certain enough to be taken off; if not, all of it may be in the heights, or nothing."""
+        return self.gain >= LEAST_PLAY_GAIN
+
+    @property
+    def probability(self) -> float:
+        """That there is one."""
+        return float(1.0 / (1.0 + np.exp(-self.gain)))
+
+    @property
+    def _left(self) -> float:
+        """Standard deviation of what of it is left in the heights, m."""
+        return self.sd if self.told else float(np.sqrt(self.probability) * np.hypot(self.play, self.sd))
+
     def aside(self, height: float, half_width: float) -> float:
         """Standard deviation of the place of a crest that the play leaves, m.
 
-        Along the sweeps it is not felt: half of it. And half of its own doubt moves the flanks: the least squares
+        Along the sweeps it is not felt: half of it. And half of what is left of it moves the flanks: the least squares
         of a step by h at the crest against a shift of its cap, whose slope is 2 H u / w, are 3 h w / (4 H).
 
         Args:
             height: of the crest, m.
             half_width: of its disturbance, m.
         """
-        return float(np.hypot(0.5 * self.play, 0.5 * self.sd * 0.75 * half_width / max(abs(height), 0.5 * self.play)))
+        along = self.play if self.told else self._left
+        return float(np.hypot(0.5 * along, 0.5 * self._left * 0.75 * half_width / max(abs(height), 0.5 * self.play)))
 
     @property
     def height_sd(self) -> float:
         """Standard deviation that it leaves to heights, m: a crest lowers the axis that it meets midway by half of the
         play, and one that it meets where the last crest left it by all of it."""
-        return 0.75 * self.sd
+        return 0.75 * self._left
 
     def record(self) -> dict[str, Any]:
         """JSON values, SI units."""
-        return asdict(self) | {"sentence": self.sentence()}
+        certain = {"taken_off": self.told, "probability": self.probability}
+        return asdict(self) | certain | {"sentence": self.sentence()}
 
     def sentence(self) -> str:
         """What was found and done, for people."""
         way = " All sweeps go one way: sweeps back would tell" if self.one_way else ""
+        if not self.told:
+            return (
+                f"the readings may hang behind the finger, as of axes with a play of {length_text(self.play, 2)} ± "
+                f"{length_text(self.sd, 2)} (probability {100.0 * self.probability:.0f} %): the crossings do not "
+                f"decide it. Nothing was taken off; heights carry a doubt of {length_text(self.height_sd, 2)} for it, "
+                f"and places of what it moves them.{way}"
+            ).removesuffix(".")
         return (
             f"the readings hang behind the finger, as of axes with a play of {length_text(self.play, 2)} ± "
             f"{length_text(self.sd, 2)}: rising flanks are too low, falling ones too high. That was taken off; what it "
@@ -96,7 +123,7 @@ class Backlash:
 
 
 def backlash(laid: LaidTrace, found: Detections, taken: float = 0.0) -> Backlash | None:
-    """The play of the axes, by all crossings together; None if they do not speak for one.
+    """The play of the axes, by all crossings together; None if they hardly speak for one.
 
     Args:
         laid: the trace that was searched.
@@ -115,7 +142,7 @@ def backlash(laid: LaidTrace, found: Detections, taken: float = 0.0) -> Backlash
     # the path is reckoned with crests as they were recorded: higher than the play, or the axis would not have moved
     log[halves > 0.5 * float(np.median([abs(window.height) for window in windows]))] = -np.inf
     gain = _evidence(log) - max(0.0, _evidence_of_each(section.gains_of_each()))
-    if gain < LEAST_PLAY_GAIN:
+    if gain < np.log(LIKELY_PLAY) + WORTH_MENTIONING:
         return None
     weight = np.exp(log - log.max())
     weight /= weight.sum()
@@ -159,7 +186,7 @@ def without_backlash(trace: Trace, laid: LaidTrace, found: Detections, play: flo
 
 
 def with_doubt(found: Detections, play: Backlash) -> Detections:
-    """What was detected without the play, its places as doubtful as that leaves them, and a word on it."""
+    """What was detected, its places as doubtful as the play leaves them, and a word on it."""
     crossings = tuple(
         replace(c, position_sd=float(np.hypot(c.position_sd, play.aside(c.height, c.half_width))))
         for c in found.crossings

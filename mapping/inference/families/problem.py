@@ -130,10 +130,10 @@ def window_for(crest: FloatArray, sizes: Sizes, around: Surroundings) -> Window:
     samples = gather(around.trace, around.base, crest, reach)
     precise = around.noise.sd <= PRECISE * sizes.height
     most, smooth_over = (2 * MOST_BINS, 0.0) if precise else (MOST_BINS, sizes.half_width)
-    window = bin_samples(samples, width, around.noise.sd, smooth_over)
+    window = bin_samples(samples, width, around.noise.sd, smooth_over, around.noise.levels)
     if len(window) > most:
         coarser = min(width * len(window) / most, sizes.half_width / 8.0)
-        window = bin_samples(samples, coarser, around.noise.sd, smooth_over)
+        window = bin_samples(samples, coarser, around.noise.sd, smooth_over, around.noise.levels)
     return window
 
 

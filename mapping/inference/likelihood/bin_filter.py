@@ -34,7 +34,8 @@ def bin_filter(window: Window, noise: Noise, floor: float, inflation: FloatArray
     begins[window.starts[:-1]] = True
     steps = mean_steps(noise.terms, _distance_from_previous(window), own, np.maximum(count, 1.0))
     one = steps.filter(np.arange(len(count)), begins, np.ones(len(count), dtype=bool))
-    return replace(one, scale=one.scale * np.sqrt(window.passes))
+    # levels change slowly against a bin's memory of those before it
+    return replace(one, scale=one.scale * np.sqrt(window.passes) / window.level)
 
 
 def _distance_from_previous(window: Window) -> FloatArray:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mapping import EmptyWindowError, FloatArray, IntArray, Trace
 from mapping.base import Base, Feet, LaidTrace, over_levels
+from mapping.instrument import Levels
 
 # Samples are looked at in blocks of this many: the cost of the rest of a long log is that of its boxes.
 SAMPLES_PER_BLOCK = 64
@@ -40,6 +41,7 @@ class Window:
         samples: number of raw samples behind the bins.
         flat: True if all of them stand on one plane of the base: it neither bends nor folds between them.
         passes: (n,) passes over one line, of which the bin is the mean.
+        level: (n,) standard deviation of the noise over that of its law.
     """
 
     feet: FloatArray
@@ -54,6 +56,7 @@ class Window:
     samples: int
     flat: bool = False
     passes: IntArray | int = 1
+    level: FloatArray | float = 1.0
 
     def __len__(self) -> int:
         return len(self.height)
@@ -85,12 +88,14 @@ def samples_near(trace: Trace, points: FloatArray, reach: float) -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """The raw samples near a feature: feet on the base, the first sample of each run after the first, and whether all
-    of them stand on one plane."""
+    """The raw samples near a feature: feet on the base, the first sample of each run after the first, whether all
+    of them stand on one plane, and their sweeps and times."""
 
     feet: Feet
     breaks: IntArray
     flat: bool
+    sweep: IntArray
+    t: FloatArray
 
 
 def gather(trace: Trace, base: Base, points: FloatArray, reach: float) -> Samples:
@@ -115,7 +120,7 @@ def gather(trace: Trace, base: Base, points: FloatArray, reach: float) -> Sample
     feet = LaidTrace.of(trace, base).feet(index)
     if len(base.levels) > 1:
         feet = replace(feet, height=over_levels(feet.height, breaks, base.levels))
-    return Samples(feet, breaks, _on_one_plane(feet, base))
+    return Samples(feet, breaks, _on_one_plane(feet, base), trace.sweep[index], trace.t[index])
 
 
 def _on_one_plane(feet: Feet, base: Base) -> bool:
@@ -125,7 +130,9 @@ def _on_one_plane(feet: Feet, base: Base) -> bool:
     return bool(turned <= PLANE_ROUNDING and off <= PLANE_ROUNDING * reach)
 
 
-def bin_samples(samples: Samples, width: float, noise_level: float, scale: float) -> Window:
+def bin_samples(
+    samples: Samples, width: float, noise_level: float, scale: float, levels: Levels | None = None
+) -> Window:
     """Bin samples along their runs; passes over one line, one after the other, are one run, their mean.
 
     Noise is independent between passes, and they felt the same: nothing that tells of the feature is in them beside
@@ -137,30 +144,34 @@ def bin_samples(samples: Samples, width: float, noise_level: float, scale: float
         noise_level: standard deviation of a sample, m: how far the path can be trusted.
         scale: half width of the feature's disturbance, m: the path is smooth over a small part of it; 0: it is not,
             and each bin lies where it was felt (a stage moves by steps, now along and now up).
+        levels: of the noise along the sweeps; None: it is of one level.
     """
     feet, count = samples.feet, len(samples.feet.height)
+    level = np.ones(count) if levels is None else levels.at(samples.sweep, samples.t)
     runs = []
     for start, stop in zip([0, *samples.breaks], [*samples.breaks, count], strict=True):
         own = slice(int(start), int(stop))
         path = distance_along(feet.points[own], noise_level)
-        runs.append(_Run(feet.points[own], feet.normals[own], feet.height[own], path))
+        runs.append(_Run(feet.points[own], feet.normals[own], feet.height[own], path, level[own]))
     binned = [_mean_of_passes(passes, width, noise_level, scale) for passes in _over_one_line(runs, width, noise_level)]
     return replace(_join(binned), flat=samples.flat)
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """Feet on the base and their normals (N, 3), heights (N,) and distances (N,) along a line, m."""
+    """Feet on the base and their normals (N, 3), heights (N,) and distances (N,) along a line, m, and levels (N,) of
+    the noise."""
 
     points: FloatArray
     normals: FloatArray
     height: FloatArray
     path: FloatArray
+    level: FloatArray
 
     @property
     def backwards(self) -> _Run:
         path = self.path[0] + self.path[-1] - self.path
-        return _Run(self.points[::-1], self.normals[::-1], self.height[::-1], path[::-1])
+        return _Run(self.points[::-1], self.normals[::-1], self.height[::-1], path[::-1], self.level[::-1])
 
     @property
     def course(self) -> tuple[FloatArray, FloatArray]:
@@ -242,6 +253,7 @@ def _mean_of_passes(passes: list[_Run], width: float, noise_level: float, scale:
         np.array([0, len(cell)], dtype=np.int64),
         sum(one.samples for one in each),
         passes=np.sum(went, axis=0),
+        level=mean("level"),
     )
 
 
@@ -272,6 +284,7 @@ def _join(runs: list[Window]) -> Window:
         starts.astype(np.int64),
         sum(run.samples for run in runs),
         passes=np.concatenate([np.broadcast_to(run.passes, len(run)) for run in runs]),
+        level=every("level"),
     )
 
 
@@ -318,11 +331,22 @@ def _bin(run: _Run, width: float, noise_level: float, scale: float) -> Window:
     if noise_level > 0.0:
         share, count = _without_spikes(height, edges, count, share, noise_level)
     mean_height = np.add.reduceat(share * height, edges)
+    mean_level = np.add.reduceat(share * run.level, edges)
     # as many samples of equal share as would be known as well: where the finger stood, they are worth fewer
     worth = np.maximum(np.rint(1.0 / np.add.reduceat(share**2, edges)), 1.0).astype(np.int64)
     whole = np.array([0, len(count)], dtype=np.int64)
     return Window(
-        feet, mean_normals, _tangents(feet), mean_height, worth, place, last, 0.5 * extent, whole, int(count.sum())
+        feet,
+        mean_normals,
+        _tangents(feet),
+        mean_height,
+        worth,
+        place,
+        last,
+        0.5 * extent,
+        whole,
+        int(count.sum()),
+        level=mean_level,
     )
 
 

@@ -142,3 +142,13 @@ def test_what_few_sweeps_show_one_by_one_is_weak_however_many_passed_over_it(sho
     crossings = [SimpleNamespace(point=point) for point in (*points, np.array([0.05, 0.0, 0.0]))]
     detections = SimpleNamespace(crossings=crossings, threshold=4.7, detection_limit=0.2e-3)
     assert _is_weak(piece, detections, 0.01) == (shown == 3)
+
+
+def test_what_is_not_known_of_the_noise_raises_what_a_line_needs():
+    inspection = places(1.7 * SD, 0)
+    normals, nothing = np.tile([0.0, 0.0, 1.0], (len(inspection.points), 1)), np.zeros(len(inspection.points), bool)
+    (line,) = found(inspection)
+    needed = threshold(len(inspection.points) * inspection.spacing, inspection.pitch, WIDTH, 0.01)
+    assert line.snr > 1.1 * needed
+    assert len(faint_lines(inspection, normals, nothing, WIDTH, 1.0, 0.01, 1.1)) == 1
+    assert faint_lines(inspection, normals, nothing, WIDTH, 1.0, 0.01, 1.01 * line.snr / needed) == ()

@@ -84,4 +84,35 @@ def test_where_the_axes_have_no_play_none_is_told(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_crests_that_are_steeper_on_one_side_are_no_play(seed: int) -> None:
-    assert asked(swept(0.0, seed=20 + seed, steeper=0.3))[2] is None
+    """One way they leave it in doubt; none is more probable, on trial too."""
+    trace = swept(0.0, seed=20 + seed, steeper=0.3)
+    laid, found, play = asked(trace)
+    for _ in range(4):
+        if play is None:
+            break
+        assert not play.told and play.probability < 0.5
+        laid, found, _ = asked(without_backlash(trace, laid, found, play.play))
+        play = backlash(laid, found, play.play)
+
+
+def test_a_play_in_doubt_is_left_in_the_heights_as_far_as_it_is_probable() -> None:
+    told, even = Backlash(20e-6, 4e-6, 20.0, False), Backlash(20e-6, 4e-6, 0.0, False)
+    assert told.told and not even.told and even.probability == pytest.approx(0.5)
+    # the doubt of one that was taken off, and all of one that may be there: on each half of the draws, or not at all
+    assert told.height_sd == pytest.approx(0.75 * 4e-6)
+    assert even.height_sd == pytest.approx(0.75 * np.sqrt(0.5 * (20e-6**2 + 4e-6**2)))
+    assert even.aside(0.1e-3, 1e-3) > told.aside(0.1e-3, 1e-3)
+    assert "may hang behind" in even.sentence() and "50 %" in even.sentence()
+    assert even.record()["taken_off"] is False and told.record()["taken_off"] is True
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_few_crossings_leave_a_play_in_doubt_that_is_told_once_it_is_taken_off(seed: int) -> None:
+    """Wires of three sweeps: on trial the play is more probable than before."""
+    whole = swept(20e-6, seed=30 + seed, back=True)
+    trace = whole.select(whole.sweep < 3)
+    laid, found, first = asked(trace)
+    assert first is not None
+    on_trial, seen, _ = asked(without_backlash(trace, laid, found, first.play))
+    again = backlash(on_trial, seen, first.play)
+    assert again is not None and again.gain > first.gain
