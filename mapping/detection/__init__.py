@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         coverage as coverage,
         face_samples as face_samples,
         found_heights as found_heights,
+        lost_heights as lost_heights,
     )
     from mapping.detection.crossing import Crossing as Crossing
     from mapping.detection.detect import (
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
         Detections as Detections,
         detect as detect,
     )
+    from mapping.detection.expected_limit import expected_limit as expected_limit
     from mapping.detection.filters.matched_filter import LADDER as LADDER
     from mapping.detection.paper_algorithms import (
         along_chord as along_chord,
@@ -31,9 +33,10 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "candidates": ("CLEAR",),
-    "coverage": ("Coverage", "FoundHeights", "coverage", "face_samples", "found_heights"),
+    "coverage": ("Coverage", "FoundHeights", "coverage", "face_samples", "found_heights", "lost_heights"),
     "crossing": ("Crossing",),
     "detect": ("SHORTEST_SWEEP_SAMPLES", "Detections", "detect"),
+    "expected_limit": ("expected_limit",),
     "filters.matched_filter": ("LADDER",),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
     "quiet_noise": ("RAW_SAMPLES", "smallest_crest"),
