@@ -33,6 +33,7 @@ from explore3d.scene.values import (
 )
 from hw import Finger
 from mapping import KINDS, FloatArray, Surface, length_text
+from mapping.detection import expected_limit
 from mapping.instrument import Noise, StatedNoise
 from mapping.model import Tolerance
 from planners.survey import fastest_speed
@@ -252,8 +253,6 @@ class Scene(Table):
     def expected_limit(self) -> float | None:
         """Height of a sharp crest that a sweep will show with 95 % probability, m, as far as the noise that the scene
         states foretells it; None where it states none, or nobody knows how often the finger samples."""
-        from mapping.detection import expected_limit
-
         follows = self.finger.follows(self.tip.radius, self.survey.smallest_feature)
         if self.noise is None or follows is None:
             return None

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
         SHORTEST_SWEEP_SAMPLES as SHORTEST_SWEEP_SAMPLES,
         Detections as Detections,
         detect as detect,
+        expected_limit as expected_limit,
     )
-    from mapping.detection.expected_limit import expected_limit as expected_limit
     from mapping.detection.filters.matched_filter import LADDER as LADDER
     from mapping.detection.paper_algorithms import (
         along_chord as along_chord,
@@ -35,8 +35,7 @@ _PUBLIC = {
     "candidates": ("CLEAR",),
     "coverage": ("Coverage", "FoundHeights", "coverage", "face_samples", "found_heights", "lost_heights"),
     "crossing": ("Crossing",),
-    "detect": ("SHORTEST_SWEEP_SAMPLES", "Detections", "detect"),
-    "expected_limit": ("expected_limit",),
+    "detect": ("SHORTEST_SWEEP_SAMPLES", "Detections", "detect", "expected_limit"),
     "filters.matched_filter": ("LADDER",),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
     "quiet_noise": ("RAW_SAMPLES", "smallest_crest"),

@@ -13,8 +13,7 @@ from mapping import length_text
 from mapping.base.base import Base
 from mapping.base.fit import fit_base
 from mapping.detection.coverage import found_heights, found_probability, lost_heights
-from mapping.detection.detect import detect
-from mapping.detection.expected_limit import expected_limit
+from mapping.detection.detect import detect, expected_limit
 from mapping.geometry.templates.shapes import cap_height
 from mapping.instrument.noise import Noise
 from mapping.surface import Surface
