@@ -25,6 +25,8 @@ from planners.paths import Carrier, reachable, resampled
 MOST_UNSWEPT = 0.05
 # Share of the surface from which on it counts as all of it: it is printed in whole per cent
 NEARLY_ALL = 0.995
+# Where no noise is known, or it hides what was asked for, half a strip counts as swept, and a tenth of that more
+STRIP_SHARE = 0.55
 # Places of what was not swept that are asked why, at most about so many
 MOST_ACCOUNT_PLACES = 60_000
 # Why a finger leaves the region
@@ -44,8 +46,8 @@ class SurfaceAccount:
         refused: share that is reachable, was not swept, and would have been by a sweep that was refused.
         unreachable: share that the ball with its stem cannot touch by any pose, and that was not swept.
         not_inspected: share of the rest.
-        reach: distance from a sweep up to which the smallest feature asked for is seen on a plane, m; where its noise
-            hides that from all sweeps, up to which a third of it is felt.
+        reach: distance from a sweep up to which the smallest feature asked for is seen on a plane, m; where no
+            noise is known, or hides that from all sweeps, half a strip.
         hidden: height from which on features show on a sweep, m, if that is more than was asked for; else None.
         swept_path, other_path: lengths of executed sweeps, and of other executed moves, m.
         refused_path: length of refused sweeps, m.
@@ -242,15 +244,14 @@ def _shares(
     """
     tip, smallest = scene.tip.radius, scene.survey.smallest_feature
     survey = Survey(base=base, tip_radius=tip, smallest=smallest, **scene.model.asked)
+    hidden = limit if limit is not None and smallest <= limit < np.inf else None
     if limit is None or limit >= smallest:
-        most_lost, hidden = (
-            (1.0 - survey.visible) * smallest,
-            limit if limit is not None and np.isfinite(limit) else None,
-        )
+        reach = STRIP_SHARE * survey.pitch
     else:
-        most_lost, hidden = smallest - limit, None
-    most_lost = min(most_lost, tip)
-    told = {"reach": float(np.sqrt(most_lost * (2.0 * tip - most_lost))), "hidden": hidden}
+        lost = min(smallest - limit, tip)
+        reach = float(np.sqrt(lost * (2.0 * tip - lost)))
+    most_lost = tip - np.sqrt((tip - reach) * (tip + reach))
+    told = {"reach": reach, "hidden": hidden}
     if survey.surface is None:  # the body stands elsewhere than its mesh said
         nothing = {"swept": 0.0, "refused": 0.0, "unreachable": 0.0, "not_inspected": 1.0}
         return nothing | {"area": 0.0} | told
