@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Collection
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mapping import FloatArray, Surface, Trace, length_text
 from mapping.base import Base, LaidTrace
-from mapping.detection import Detections, found_heights
+from mapping.detection import Detections, FoundHeights, found_heights
 from mapping.estimate.envelope import Estimate
 from mapping.estimate.sweeps import EXTRAPOLATED, pitch
 from mapping.geometry.mesh import asked_part
 
-# Places that tell which of the surface was touched
-MOST_SURFACE_CELLS = 20_000
+# Distance along a sweep of the places that tell what it touched, in tip radii: halfway between two of them the ball
+# lies 1/3200 of its radius higher over what it touches than it was
+TOUCHED_SPACING = 0.05
 # Heights that the record states the inspected share for, in detection limits
 STATED = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
 # Where no height is asked for, those are told that hold on so much of what sweeps came near: the limit itself holds
@@ -32,16 +34,15 @@ class Inspected:
     Args:
         height: (F,) m: a sharp crest at least so high anywhere on the face would have been found; infinity where
             no sweep passed within a tip radius.
-        place, area: (N,) the same at places all over what was to be inspected, m, and what each stands for, m^2;
-            without those where a fitted base goes on beyond what was felt.
+        found: places all over what was to be inspected, and what is lost at each: by how much a crest there is felt
+            lower than one that a sweep crosses; without those where a fitted base goes on beyond what was felt.
         limit: height found where a sweep crosses it, m.
         probability: with which all this holds.
         asked: height of the smallest feature that the scene asks for, m, or None.
     """
 
     height: FloatArray
-    place: FloatArray
-    area: FloatArray
+    found: FoundHeights
     limit: float
     probability: float
     asked: float | None = None
@@ -55,30 +56,47 @@ class Inspected:
         asked: float | None,
         region: tuple[FloatArray, FloatArray] | None = None,
         sides: FloatArray | None = None,
+        seen: Collection[int] | None = None,
     ) -> Inspected:
         """What a trace inspected of a base, by the noise and the threshold of its detection.
 
         Args:
             region, sides: what was to be inspected lies in it, and faces one of them (see `asked_part`); all, if that
                 is nothing.
+            seen: numbers of the sweeps on which something would have been seen; None: all.
         """
         limit = detections.detection_limit
         if base.kind == "profile":  # a strip as wide as one likes: all of it lies under the one sweep
             height = np.full(len(base.surface.faces), limit)
-            return cls(height, height, base.surface.face_areas, limit, detections.probability, asked)
-        places, _ = LaidTrace.of(trace, base).touched(MOST_SURFACE_CELLS)
-        if not np.isfinite(limit):
-            places = places[:0]
-        found = found_heights(base.surface, places, trace.tip_radius, limit)
-        part = asked_part(base.surface, region, sides)
+            middle = base.surface.vertices[base.surface.faces].mean(axis=1)
+            found = FoundHeights(
+                height - limit, height - limit, base.surface.face_areas, middle, base.surface.face_normals
+            )
+            return cls(height, found, limit, detections.probability, asked)
+        laid = LaidTrace.of(trace, base)
+        if seen is not None and not (kept := np.isin(laid.sweep, list(seen))).all():
+            laid = laid.within(kept)
+        touched = touched_places(laid)
+        found = found_heights(base.surface, *touched, trace.tip_radius)
+        part, face = asked_part(base.surface, region, sides), found.face
         if part is not None and part is not base.surface:
-            found = replace(found_heights(part, places, trace.tip_radius, limit), face=found.face)
+            found = found_heights(part, *touched, trace.tip_radius)
         # what a fit added beyond the samples is no part of a body that was asked to be inspected
         told = np.isfinite(found.place)
         if told.any():
             told[~told] = ~base.beyond(found.points[~told], trace.tip_radius)
-            return cls(found.face, found.place[told], found.area[told], limit, detections.probability, asked)
-        return cls(found.face, found.place, found.area, limit, detections.probability, asked)
+            found = found.at(told)
+        return cls(limit + face, found, limit, detections.probability, asked)
+
+    @property
+    def place(self) -> FloatArray:
+        """(N,) m: a sharp crest at least so high at each place would have been found."""
+        return self.limit + self.found.place
+
+    @property
+    def area(self) -> FloatArray:
+        """(N,) that each place stands for, m^2."""
+        return self.found.area
 
     def share(self, height: float) -> float:
         """Share of the area on which every crest at least `height` m high would have been found."""
@@ -127,6 +145,14 @@ class Inspected:
         if self.untouched > 5e-4:
             sentence += f" No sweep came near {100 * self.untouched:.1f} % of it."
         return sentence
+
+
+def touched_places(laid: LaidTrace) -> tuple[FloatArray, FloatArray]:
+    """Places of the base that a trace touched, and unit directions from there to the ball's centre, both (M, 3)."""
+    if not len(laid):
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    path = sum(float(sweep.arclength[-1]) for sweep in laid.laid_sweeps)
+    return laid.touched(1 + int(path / (TOUCHED_SPACING * laid.tip_radius)))
 
 
 # A vertex takes the label of the nearest estimated point within this many distances between points or sweeps.

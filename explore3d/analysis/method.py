@@ -650,12 +650,12 @@ def roughness_taken(work: Work, share: Share) -> None:
 def inspected(work: Work, share: Share) -> None:
     """Which places are free of features, and above which height."""
     asked = {} if work.scene is None else work.scene.model.asked
-    work.inspected = Inspected.of(work.laid, work.base, work.detections, work.smallest_feature, **asked)
     # over a model that is refused nothing was looked for on any sweep, which is said otherwise
     refused = work.deviation is not None and work.deviation.beyond_repair
     told = not refused and not work.log.detections
     seen = {number for number, length in work.detections.inspected_sweeps if length > 0.0} if told else None
-    work.account = SurfaceAccount.of_log(work.log, work.laid, work.base, work.scene, seen)
+    work.inspected = Inspected.of(work.laid, work.base, work.detections, work.smallest_feature, **asked, seen=seen)
+    work.account = SurfaceAccount.of_log(work.log, work.laid, work.base, work.scene, work.inspected, seen)
 
 
 def modelled(work: Work, share: Share) -> None:

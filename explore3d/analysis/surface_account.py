@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from explore3d import count_text
-from explore3d.analysis.inspected import MOST_SURFACE_CELLS, Inspected
+from explore3d.analysis.inspected import TOUCHED_SPACING, Inspected, touched_places
 from explore3d.log import Log
 from explore3d.scene import Scene
-from mapping import BoolArray, FloatArray, Trace, length_text
+from mapping import FloatArray, Trace, length_text
 from mapping.base import Base, LaidTrace
-from mapping.detection import face_samples
-from mapping.geometry.mesh import faces_side
+from mapping.detection import FoundHeights, found_heights, lost_heights
+from mapping.geometry.mesh import asked_part, faces_side
 from planners import Survey
 from planners.paths import Carrier, reachable, resampled
 
@@ -25,10 +25,10 @@ from planners.paths import Carrier, reachable, resampled
 MOST_UNSWEPT = 0.05
 # Share of the surface from which on it counts as all of it: it is printed in whole per cent
 NEARLY_ALL = 0.995
-# Places of the surface that are asked, at most about so many
+# Where no noise is known, or it hides what was asked for, half a strip counts as swept, and a tenth of that more
+STRIP_SHARE = 0.55
+# Places of what was not swept that are asked why, at most about so many
 MOST_ACCOUNT_PLACES = 60_000
-# A sweep on the other side of a thin plate has not touched this one: opposite normals count as this many reaches apart
-OPPOSITE_APART = 1.0
 # Why a finger leaves the region
 OUT_OF_REGION = "what is found is followed to its ends, and ways lead round the body"
 # What lies no further outside of a region than so many tip radii was touched from inside: sweeps are pressed on its
@@ -42,11 +42,13 @@ class SurfaceAccount:
 
     Args:
         area: m^2.
-        swept: share within `reach` of a place that a sweep touched.
-        refused: share that is reachable, was not swept, and lies within `reach` of a sweep that was refused.
+        swept: share so near to a sweep that it shows the smallest feature asked for with 95 % probability.
+        refused: share that is reachable, was not swept, and would have been by a sweep that was refused.
         unreachable: share that the ball with its stem cannot touch by any pose, and that was not swept.
         not_inspected: share of the rest.
-        reach: distance from a sweep up to which the smallest feature asked for is seen, m.
+        reach: distance from a sweep up to which the smallest feature asked for is seen on a plane, m; where no
+            noise is known, or hides that from all sweeps, half a strip.
+        hidden: height from which on features show on a sweep, m, if that is more than was asked for; else None.
         swept_path, other_path: lengths of executed sweeps, and of other executed moves, m.
         refused_path: length of refused sweeps, m.
         moves: executed.
@@ -77,17 +79,25 @@ class SurfaceAccount:
     ways_beyond: float | None = None
     unseen_path: float = 0.0
     below: float = 0.0
+    hidden: float | None = None
 
     @classmethod
     def of_log(
-        cls, log: Log, trace: Trace, base: Base, scene: Scene | None, inspected: Collection[int] | None = None
+        cls,
+        log: Log,
+        trace: Trace,
+        base: Base,
+        scene: Scene | None,
+        inspected: Inspected,
+        seen: Collection[int] | None = None,
     ) -> SurfaceAccount | None:
         """The account of a run by its log, and by its trace over the base.
 
         None without a scene that says what to inspect, or without a surface.
 
         Args:
-            inspected: numbers of the sweeps on which something would have been seen; None: all.
+            inspected: what those sweeps say about the places where nothing was found.
+            seen: numbers of the sweeps on which something would have been seen; None: all.
         """
         if scene is None or base.kind == "profile":
             return None
@@ -98,17 +108,12 @@ class SurfaceAccount:
         }
         paths = [np.asarray(d["path"]) for d in refused if d.get("purpose") == "sweep"]
         laid = LaidTrace.of(trace, base)
-        touched = laid.touched(MOST_SURFACE_CELLS)
-        seen, unseen = touched, 0.0
-        if inspected is not None and not (kept := np.isin(laid.sweep, list(inspected))).all():
-            none = (np.zeros((0, 3)), np.zeros((0, 3)))
-            seen = laid.within(kept).touched(MOST_SURFACE_CELLS) if kept.any() else none
-            unseen = sum(float(own.arclength[-1]) for own in laid.laid_sweeps if own.number not in inspected)
+        unseen = [own for own in laid.laid_sweeps if seen is not None and own.number not in seen]
         ways = [np.asarray(d["path"]) for d in made if d["purpose"] != "sweep"]
         return cls(
-            **_shares(base, scene, seen, paths),
-            unseen_path=unseen,
-            **_beyond(scene, touched[0], ways),
+            **_shares(base, scene, inspected.found, inspected.limit, paths),
+            unseen_path=sum(float(own.arclength[-1]) for own in unseen),
+            **_beyond(scene, touched_places(laid)[0], ways),
             swept_path=lengths["sweep"],
             other_path=lengths["other"],
             refused_path=sum(_length(d) for d in refused if d.get("purpose") == "sweep"),
@@ -132,14 +137,16 @@ class SurfaceAccount:
             return None
         sweeps = [move for move in moves if move.purpose == "sweep"]
         refusals = [move for move, _ in refused if move.purpose == "sweep"]
-        spacing = 0.2 * scene.tip.radius
+        spacing = TOUCHED_SPACING * scene.tip.radius
         dense = []
         for move in sweeps:
             touched = scene.finger.touches(move, scene.tip.radius) if len(move.path) > 1 else move.path
             dense.append(resampled(move.path, move.approach, spacing)[0] if touched is None else touched)
         feet = base.foot(np.concatenate(dense) if dense else np.zeros((0, 3)), scene.tip.radius)
+        part = asked_part(base.surface, **scene.model.asked)
+        found = found_heights(part or base.surface, feet.points, feet.normals, scene.tip.radius)
         return cls(
-            **_shares(base, scene, (feet.points, feet.normals), [move.path for move in refusals]),
+            **_shares(base, scene, found, scene.expected_limit, [move.path for move in refusals]),
             **_beyond(scene, feet.points, [move.path for move in moves if move.purpose != "sweep"]),
             swept_path=sum(move.length for move in sweeps),
             other_path=sum(move.length for move in moves if move.purpose != "sweep"),
@@ -170,9 +177,13 @@ class SurfaceAccount:
         return {name: getattr(self, name) for name in names} | {"unswept": self.unswept, "causes": causes}
 
     def warning(self) -> str:
-        """The first thing to say where too much is missing, else ""."""
+        """The first thing to say where too much is missing, or where noise hides what was asked for, else ""."""
         if not self.short:
-            return ""
+            if self.hidden is None or self.shortest_ridge is not None:
+                return ""
+            return (
+                f"NOT INSPECTED: no sweep shows sharp features lower than {length_text(self.hidden, 2)} in its noise."
+            )
         why = f", most often because {self.causes[0][0]}" if self.causes else ""
         if self.unseen_path > self.refused_path:
             sweeps = f"{length_text(self.unseen_path, 2)} of sweeps"
@@ -184,11 +195,12 @@ class SurfaceAccount:
         """The account in one or two sentences."""
         refused = sum(count for _, count in self.causes)
         is_swept, is_missed = "was swept", "was not inspected"
+        shown = "show what was asked for up to" if self.hidden is None else "see"
         if self.is_plan:
             is_swept, is_missed = "would be swept", "would not be inspected"
         sentence = (
-            f"Of the surface {100 * self.swept:.1f} % {is_swept} ({length_text(self.swept_path)} of sweeps, which see "
-            f"{length_text(self.reach, 2)} to either side), {100 * self.refused:.1f} % refused, "
+            f"Of the surface {100 * self.swept:.1f} % {is_swept} ({length_text(self.swept_path)} of sweeps, which "
+            f"{shown} {length_text(self.reach, 2)} to either side), {100 * self.refused:.1f} % refused, "
             f"{100 * self.unreachable:.1f} % the finger cannot reach, {100 * self.not_inspected:.1f} % {is_missed}."
         )
         if self.shortest_ridge is not None:
@@ -222,38 +234,50 @@ _KINDS = ("sweep", "other")
 
 
 def _shares(
-    base: Base, scene: Scene, touched: tuple[FloatArray, FloatArray], refused: Sequence[FloatArray]
-) -> dict[str, float]:
-    """Area, reach, and the four shares."""
-    tip = scene.tip.radius
-    survey = Survey(base=base, tip_radius=tip, smallest=scene.survey.smallest_feature, **scene.model.asked)
-    surface, reach = survey.surface, 0.55 * survey.pitch
-    if surface is None:  # the body stands elsewhere than its mesh said
+    base: Base, scene: Scene, found: FoundHeights, limit: float | None, refused: Sequence[FloatArray]
+) -> dict[str, Any]:
+    """Area, reach, the four shares, and what noise hides.
+
+    Args:
+        found: places of what was to be inspected, and what is lost at each.
+        limit: height found where a sweep crosses it, m; None: not known.
+    """
+    tip, smallest = scene.tip.radius, scene.survey.smallest_feature
+    survey = Survey(base=base, tip_radius=tip, smallest=smallest, **scene.model.asked)
+    hidden = limit if limit is not None and smallest <= limit < np.inf else None
+    if limit is None or limit >= smallest:
+        reach = STRIP_SHARE * survey.pitch
+    else:
+        lost = min(smallest - limit, tip)
+        reach = float(np.sqrt(lost * (2.0 * tip - lost)))
+    most_lost = tip - np.sqrt((tip - reach) * (tip + reach))
+    told = {"reach": reach, "hidden": hidden}
+    if survey.surface is None:  # the body stands elsewhere than its mesh said
         nothing = {"swept": 0.0, "refused": 0.0, "unreachable": 0.0, "not_inspected": 1.0}
-        return nothing | {"area": 0.0, "reach": reach}
-    spacing = max(reach / 3.0, float(np.sqrt(surface.face_areas.sum() / MOST_ACCOUNT_PLACES)))
-    points, owner = face_samples(surface, spacing)
-    weights = surface.face_areas[owner] / np.bincount(owner, minlength=len(surface.faces))[owner]
-    normals = surface.face_normals[owner]
-    swept = _near(points, normals, *touched, reach)
+        return nothing | {"area": 0.0} | told
+    swept = found.place <= most_lost
+    rest = found.at(~swept)
+    # of what was not swept every so many-th place tells why
+    rest = rest.at(np.arange(len(rest.area)) % (1 + len(rest.area) // MOST_ACCOUNT_PLACES) == 0)
+    can = reachable(rest.points, rest.normals, Carrier.of(base, tip))
     feet = base.foot(np.concatenate([*refused, np.zeros((0, 3))]), tip)
-    tried = _near(points, normals, feet.points, feet.normals, reach)
-    down = (
-        faces_side(normals, np.array([[0.0, 0.0, -1.0]]))
-        if scene.model.sides is None
-        else np.zeros(len(points), dtype=bool)
+    tried = lost_heights(rest.points, rest.normals, feet.points, feet.normals, tip) <= most_lost
+    area, least = float(found.area.sum()), float(np.finfo(float).tiny)
+    missed = float(found.area[~swept].sum()) / max(area, least)
+    refused_share, unreachable = (
+        missed * float(rest.area[which].sum()) / max(float(rest.area.sum()), least) for which in (can & tried, ~can)
     )
-    can = np.ones(len(points), dtype=bool)
-    rest = np.flatnonzero(~swept)
-    can[rest] = reachable(points[rest], normals[rest], Carrier.of(base, tip))
-    parts = {"below": down, "swept": swept, "refused": ~swept & can & tried, "unreachable": ~swept & ~can}
-    total = max(float(weights.sum()), float(np.finfo(float).tiny))
-    shares = {name: float(weights[mask].sum()) / total for name, mask in parts.items()}
-    whole = shares["swept"] + shares["refused"] + shares["unreachable"]
-    return shares | {
-        "area": float(weights.sum()),
-        "reach": reach,
-        "not_inspected": max(0.0, 1.0 - whole),
+    below = 0.0
+    if scene.model.sides is None:
+        down = faces_side(found.normals, np.array([[0.0, 0.0, -1.0]]))
+        below = float(found.area[down].sum()) / max(area, least)
+    return told | {
+        "area": area,
+        "swept": 1.0 - missed,
+        "refused": refused_share,
+        "unreachable": unreachable,
+        "not_inspected": max(0.0, missed - refused_share - unreachable),
+        "below": below,
     }
 
 
@@ -275,18 +299,6 @@ def _beyond(scene: Scene, touched: FloatArray, ways: Sequence[FloatArray]) -> di
         "touched_beyond": furthest(touched, 0.0),
         "ways_beyond": furthest(np.concatenate([*ways, np.zeros((0, 3))]), tip) if len(ways) else 0.0,
     }
-
-
-def _near(points: FloatArray, normals: FloatArray, touched: FloatArray, up: FloatArray, reach: float) -> BoolArray:
-    """(N,) True where a touched place (M, 3) lies within reach, on the same side of the body."""
-    from scipy.spatial import cKDTree
-
-    if not len(touched):
-        return np.zeros(len(points), dtype=bool)
-    apart = 0.5 * OPPOSITE_APART * reach
-    tree = cKDTree(np.column_stack([touched, apart * up]))
-    distance, _ = tree.query(np.column_stack([points, apart * normals]), distance_upper_bound=reach)
-    return np.isfinite(distance)
 
 
 def _length(data: dict[str, Any]) -> float:

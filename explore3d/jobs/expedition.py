@@ -185,6 +185,7 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
         travel_speed=workspace.max_speed,
         false_alarms_per_metre=scene.detection.false_alarms_per_metre,
         stated=scene.noise,
+        expected=scene.expected_limit,
     )
     if base is not None and model.part is not None and next(explore(base=base).survey.lines(), None) is None:
         raise SceneError(

@@ -71,8 +71,6 @@ class DryRun:
         moves: in their order.
         metres, seconds: finger path and time, the ways between the sweeps included.
         speed: of the sweeps, m/s.
-        covered: share of the surface that the sweeps inspect; None if the time budget ends before the survey.
-        reach: distance from a sweep up to which the smallest feature is seen, m; None likewise.
         violations: (number of the move, what limit it breaks).
         account: what of the surface the sweeps would sweep; None if the time budget ends before the survey.
         assumed: what had to be assumed of the object, and what the plan falls short of; a sentence or "".
@@ -87,8 +85,6 @@ class DryRun:
     metres: float
     seconds: float
     speed: float
-    covered: float | None
-    reach: float | None
     violations: tuple[tuple[int, str], ...]
     account: SurfaceAccount | None = None
     assumed: str = ""
@@ -107,8 +103,8 @@ class DryRun:
             "pecking_time": self.pecking,
             "detail_time": None if self.detail is None else asdict(self.detail),
             "speed": self.speed,
-            "covered": self.covered,
-            "reach": self.reach,
+            "covered": None if self.account is None else self.account.swept,
+            "reach": None if self.account is None else self.account.reach,
             "violations": [{"move": number, "what": what} for number, what in self.violations],
             "surface": None if self.account is None else self.account.record(),
         }
@@ -120,18 +116,15 @@ class DryRun:
             f"{sweeps} at {1e3 * self.speed:.3g} mm/s, {length_text(self.metres)} of finger path, "
             f"{seconds_text(self.seconds)}"
         )
-        within = []
-        if self.covered is not None and self.reach is not None:
-            within = [f"{100 * self.covered:.1f} % of the surface lies within {length_text(self.reach)} of a sweep"]
         broken = [f"move {number}: {what}" for number, what in self.violations]
         assumed = [self.assumed] if self.assumed else []
         account = [] if self.account is None else [self.account.sentence()]
-        warning = [self.account.warning()] if self.account is not None and self.account.short else []
+        warning = [self.account.warning()] if self.account is not None and self.account.warning() else []
         told = [] if self.pecking is None else [f"pecking takes it about {seconds_text(self.pecking)}, ways included"]
         more = [] if self.detail is None else [self.detail.sentence()]
         mesh = [f"the mesh: {self.mesh}"] if self.mesh else []
         before = [*warning, *mesh, *assumed]
-        return [*before, first, *more, *told, *within, *account, *(broken or ["no move breaks a limit"])]
+        return [*before, first, *more, *told, *account, *(broken or ["no move breaks a limit"])]
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""
@@ -178,7 +171,7 @@ def _planned(scene: Scene, finger: Finger, stages: Stages) -> DryRun:
         spent.count(move)
         return planned.nothing
 
-    survey, ended = None, ""
+    surveyed, ended = False, ""
     if spent.seconds < budget:
         count = SurveyCount()
         exploring = planned.explore(base=base, time_budget=budget - spent.seconds).plan(count=count)
@@ -191,18 +184,17 @@ def _planned(scene: Scene, finger: Finger, stages: Stages) -> DryRun:
                 return made(move)
 
             _, outcome = drive(exploring, carried, check=check, empty=planned.nothing)
-        survey = None if outcome.value is None else outcome.value.survey
+        surveyed = outcome.value is not None and outcome.value.surveyed
         ended = outcome.detail if outcome.reason != "budget" else ""
-    if survey is None:
+    if not surveyed:
         short = "the time budget ends before the survey does: raise explore.time_budget or survey.smallest_feature"
         short = f"the survey does not come to its end: {ended}" if ended else short
         assumed = f"{assumed}; {short}" if assumed else short
-    covered, reach = (None, None) if survey is None else (survey.fraction, survey.reach)
     broken = {number - 1: what for number, what in violations}
     sound = [move for number, move in enumerate(moves) if number not in broken]
     refused = [(moves[number], what) for number, what in broken.items()]
     with stages.stage("surface swept"):
-        account = None if survey is None else SurfaceAccount.of_plan(sound, refused, base, scene)
+        account = SurfaceAccount.of_plan(sound, refused, base, scene) if surveyed else None
     with stages.stage("rehearsal"):
         detail = _rehearsed(scene, planned, base, finger) if isinstance(finger, SimulatedFinger) else None
     return DryRun(
@@ -212,8 +204,6 @@ def _planned(scene: Scene, finger: Finger, stages: Stages) -> DryRun:
         spent.metres,
         spent.seconds,
         scene.sweep_speed,
-        covered,
-        reach,
         tuple(violations),
         account,
         assumed,

@@ -70,7 +70,7 @@ def summary(analysis: Analysis) -> list[str]:
     return [
         *tip_warning(analysis),
         *told,
-        *([account.warning()] if account is not None and account.short else []),
+        *([account.warning()] if account is not None and account.warning() else []),
         *lines,
         *(feature_line(feature) for feature in features[:MOST_LISTED_FEATURES]),
         *more,

@@ -33,6 +33,7 @@ from explore3d.scene.values import (
 )
 from hw import Finger
 from mapping import KINDS, FloatArray, Surface, length_text
+from mapping.detection import expected_limit
 from mapping.instrument import Noise, StatedNoise
 from mapping.model import Tolerance
 from planners.survey import fastest_speed
@@ -247,6 +248,16 @@ class Scene(Table):
         told = self.finger.noise
         noise = Noise(told.white, told.correlated, told.correlation_length)
         return StatedNoise(noise, told.doubt) if noise.sd > 0 else None
+
+    @property
+    def expected_limit(self) -> float | None:
+        """Height of a sharp crest that a sweep will show with 95 % probability, m, as far as the noise that the scene
+        states foretells it; None where it states none, or nobody knows how often the finger samples."""
+        follows = self.finger.follows(self.tip.radius, self.survey.smallest_feature)
+        if self.noise is None or follows is None:
+            return None
+        spacing = self.sweep_speed / follows[1]
+        return expected_limit(self.noise.noise, spacing, self.tip.radius, self.detection.false_alarms_per_metre)
 
     @property
     def tolerances(self) -> tuple[Tolerance, ...]:

@@ -12,12 +12,14 @@ if TYPE_CHECKING:
         coverage as coverage,
         face_samples as face_samples,
         found_heights as found_heights,
+        lost_heights as lost_heights,
     )
     from mapping.detection.crossing import Crossing as Crossing
     from mapping.detection.detect import (
         SHORTEST_SWEEP_SAMPLES as SHORTEST_SWEEP_SAMPLES,
         Detections as Detections,
         detect as detect,
+        expected_limit as expected_limit,
     )
     from mapping.detection.filters.matched_filter import LADDER as LADDER
     from mapping.detection.paper_algorithms import (
@@ -31,9 +33,9 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "candidates": ("CLEAR",),
-    "coverage": ("Coverage", "FoundHeights", "coverage", "face_samples", "found_heights"),
+    "coverage": ("Coverage", "FoundHeights", "coverage", "face_samples", "found_heights", "lost_heights"),
     "crossing": ("Crossing",),
-    "detect": ("SHORTEST_SWEEP_SAMPLES", "Detections", "detect"),
+    "detect": ("SHORTEST_SWEEP_SAMPLES", "Detections", "detect", "expected_limit"),
     "filters.matched_filter": ("LADDER",),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
     "quiet_noise": ("RAW_SAMPLES", "smallest_crest"),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapping import FloatArray, IntArray, Surface
+from mapping import BoolArray, FloatArray, IntArray, Surface
 from mapping.geometry.mesh import NEAREST_COST, by_shares
 
 # Samples of faces looked at, at most
@@ -57,48 +57,104 @@ class FoundHeights:
         place: (N,) at each of many places all over the surface, m.
         area: (N,) that each place stands for, m^2.
         points: (N, 3) the places, m.
+        normals: (N, 3) outward unit normals there.
     """
 
     face: FloatArray
     place: FloatArray
     area: FloatArray
     points: FloatArray
+    normals: FloatArray
+
+    def at(self, places: BoolArray) -> FoundHeights:
+        """Those of some places (N,) alone, and all faces."""
+        return FoundHeights(self.face, self.place[places], self.area[places], self.points[places], self.normals[places])
 
 
-def found_heights(surface: Surface, touched: FloatArray, tip_radius: float, limit: float) -> FoundHeights:
-    """The height from which on a crest would have been found, by face and by place.
+def found_heights(
+    surface: Surface, touched: FloatArray, up: FloatArray, tip_radius: float, limit: float = 0.0
+) -> FoundHeights:
+    """The height from which on a crest would have been found, by face and by place; without a limit, what is lost.
 
-    A ball that passes a sharp crest of height D at the distance y still rises to D - (r - sqrt(r^2 - y^2)); it is
-    found, with the probability that `limit` is stated for, if that is at least the detection limit. Taken is the
-    nearest sweep alone, so the true probability is higher where two sweeps pass near.
+    A crest of height D lifts the ball by D less what is lost (`lost_heights`); it is found, with the probability that
+    `limit` is stated for, if that is at least the detection limit. Taken is the nearest sweep alone, so the true
+    probability is higher where two sweeps pass near.
 
     Args:
         touched: (N, 3) places of the base that sweeps touched, closer together than the answer is wanted, m.
+        up: (N, 3) unit directions from there to the ball's centre.
         tip_radius: r, m.
         limit: height of the smallest crest found where a sweep crosses it, m.
 
     Reference: theory sections 4 and 6.
     """
-    from scipy.spatial import cKDTree
-
     if not len(touched):
-        nowhere = np.full(len(surface.faces), np.inf)
-        return FoundHeights(nowhere, nowhere, surface.face_areas, surface.vertices[surface.faces].mean(axis=1))
+        nowhere, middle = np.full(len(surface.faces), np.inf), surface.vertices[surface.faces].mean(axis=1)
+        return FoundHeights(nowhere, nowhere, surface.face_areas, middle, surface.face_normals)
     step = 0.06 * tip_radius
     while _sample_count(surface, step) > MOST_FACE_SAMPLES:
-        step *= 1.5  # a coarser answer is a more cautious one
+        step *= 1.5
     points, owner = face_samples(surface, step)
-    tree, most = cKDTree(touched), 0.9 * tip_radius
-    distance = by_shares(lambda at: np.asarray(tree.query(at, distance_upper_bound=most)[0]), points, NEAREST_COST)
+    normals = surface.face_normals[owner]
+    lost = lost_heights(points, normals, touched, up, tip_radius)
     # as far as a place of the face may lie from the nearest sample
     parts = _parts(surface, step)
-    distance = distance + 0.55 * (_longest_sides(surface) / parts)[owner]
-    passed = distance < tip_radius
-    lost = np.full(len(points), np.inf)
-    lost[passed] = distance[passed] ** 2 / (tip_radius + np.sqrt(tip_radius**2 - distance[passed] ** 2))
+    low = np.minimum(lost, tip_radius)
+    further = np.sqrt(low * (2.0 * tip_radius - low)) + 0.55 * (_longest_sides(surface) / parts)[owner]
     worst = np.zeros(len(surface.faces))
-    np.maximum.at(worst, owner, lost)
-    return FoundHeights(limit + worst, limit + lost, (surface.face_areas / parts**2)[owner], points)
+    np.maximum.at(worst, owner, _lost_on_a_plane(further, tip_radius))
+    return FoundHeights(limit + worst, limit + lost, (surface.face_areas / parts**2)[owner], points, normals)
+
+
+def lost_heights(
+    points: FloatArray, normals: FloatArray, touched: FloatArray, up: FloatArray, tip_radius: float
+) -> FloatArray:
+    """(N,) m: height at which a crest on each place just touches the nearest ball; infinity from a tip radius on.
+
+    A crest that stands on a place along its normal n touches the ball whose centre is c, for d = c - place, from
+    h = (d^2 - r^2) / (d n + sqrt((d n)^2 - d^2 + r^2)) on: r - sqrt(r^2 - y^2) at the distance y over a plane, more on
+    an outward bend, less on an inward one.
+
+    Args:
+        points, normals: (N, 3) places, m, and the outward unit normals there.
+        touched, up: (M, 3) places of the base that sweeps touched, m, and unit directions from there to the ball.
+        tip_radius: r, m.
+
+    Reference: theory section 4.
+    """
+    from scipy.spatial import cKDTree
+
+    lost = np.full(len(points), np.inf)
+    if not len(touched):
+        return lost
+    centres = touched + tip_radius * up
+    tree = cKDTree(centres)
+
+    def nearest(at: FloatArray) -> FloatArray:
+        return np.asarray(tree.query(at, distance_upper_bound=tip_radius)[1])
+
+    # the ball that would rest on a place tells on which side of a thin wall it is
+    index = by_shares(nearest, points + tip_radius * normals, NEAREST_COST)
+    passed = np.flatnonzero(index < len(centres))
+    lost[passed] = _lost(centres[index[passed]] - points[passed], normals[passed], tip_radius)
+    return lost
+
+
+def _lost(away: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
+    """(N,) m: height along the normals (N, 3) at which the ball is touched whose centre lies so far away (N, 3), m."""
+    distance = np.linalg.norm(away, axis=1)
+    along = np.einsum("ni,ni->n", away, normals)
+    outside = (distance - tip_radius) * (distance + tip_radius)
+    root = along**2 - outside
+    touches = (root >= 0.0) & (along > 0.0)
+    lost = outside / np.where(touches, along + np.sqrt(np.maximum(root, 0.0)), 1.0)
+    return np.where(touches, np.maximum(lost, 0.0), np.inf)
+
+
+def _lost_on_a_plane(distance: FloatArray, tip_radius: float) -> FloatArray:
+    """(N,) m: the same at distances (N,) m from a sweep over a plane; infinity from a tip radius on."""
+    inside = np.sqrt(np.maximum(tip_radius**2 - distance**2, 0.0))
+    return np.where(distance < tip_radius, np.minimum(distance, tip_radius) ** 2 / (tip_radius + inside), np.inf)
 
 
 def found_probability(

@@ -74,6 +74,7 @@ class Explore:
         false_alarms_per_metre: accepted rate of false crossings, 1/m.
         noise: of the samples; None: learnt from the first sweeps.
         stated: what is known of the noise before, say from a data sheet; learning begins from it.
+        expected: limit of detection that is foretold from that, m; None: nothing is known.
     """
 
     base: Base
@@ -91,6 +92,7 @@ class Explore:
     false_alarms_per_metre: float = 0.01
     noise: Noise | None = None
     stated: StatedNoise | None = None
+    expected: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("tip_radius", "smallest", "precision", "speed", "time_budget"):
@@ -131,7 +133,7 @@ class Explore:
         found = Found(self.tip_radius, noise=self.noise)
         spent = Spent(25.0 * self.tip_radius if self.travel_speed is None else self.travel_speed)
         count = SurveyCount() if count is None else count
-        surveyor = Surveyor(self.survey, found, self.false_alarms_per_metre, self.stated, count)
+        surveyor = Surveyor(self.survey, found, self.false_alarms_per_metre, self.stated, count, self.expected)
         everything = self._everything(surveyor, found)
         outcome = yield from within(everything, spent, self.time_budget, self.path_budget)
         if found.surveyed:
@@ -156,12 +158,11 @@ class Explore:
         return "every detection was looked into and nothing was left to sharpen"
 
     def _account(self, surveyor: Surveyor, found: Found) -> None:
-        """What the survey covered, told when the finger has nothing to wait for any more."""
-        found.survey = surveyor.covered()
+        """What the survey does not cover, told when the finger has nothing to wait for any more."""
         if surveyor.survey.crossed(surveyor.visible) is not None:
             found.unseen.append(
                 f"features smaller than a ridge that spans {1e3 * (self.shortest_ridge or 0.0):g} mm: "
-                f"{100 * found.survey.fraction:.0f} % of the surface lies near enough to a sweep to see them"
+                f"{100 * surveyor.covered().fraction:.0f} % of the surface lies near enough to a sweep to see them"
             )
 
     def _everything(self, surveyor: Surveyor, found: Found) -> Plan:

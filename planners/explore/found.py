@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mapping import FloatArray
-from mapping.detection import Coverage, Crossing
+from mapping.detection import Crossing
 from mapping.instrument import Noise
 from planners.follow import AxisTrack, BumpSize, FaintLead, is_step, slender
 from planners.paths import tangential
@@ -30,7 +30,6 @@ class Found:
     surveyed: bool = False
     asked: float = 0.0
     reported: float = 0.0
-    survey: Coverage | None = None
     noise: Noise | None = None
     tracks: list[AxisTrack] = field(default_factory=list)
     bumps: list[BumpSize] = field(default_factory=list)

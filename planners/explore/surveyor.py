@@ -11,7 +11,7 @@ import numpy as np
 from hw import Move
 from mapping import FloatArray, Trace, length_text
 from mapping.base import LaidTrace
-from mapping.detection import Coverage, detect
+from mapping.detection import Coverage, detect, expected_limit
 from mapping.estimate.deviation import Deviation, explain
 from mapping.instrument import Noise, StatedNoise
 from planners import Outcome, Plan, executed
@@ -27,8 +27,16 @@ CANDIDATES = 4.0
 # of the noise may be above it by its own (which scattered by 1.6 % in 12 explored logs); by theory equation 6.12 that
 # is exp(0.03 * 4.7^2) = 1.9 times as much
 REPORTABLE = 2.0
-# Height that must stay visible between two sweeps, in detection limits; and its least share of the smallest feature's
-VISIBLE_HEIGHT_MARGIN, LEAST_VISIBLE_SHARE = 1.25, 0.1
+# Height that must stay visible between two sweeps, in detection limits: the noise of a first sweep alone foretells the
+# limit of all to 5 % (one standard deviation, in 12 explored logs)
+VISIBLE_HEIGHT_MARGIN = 1.05
+# Its least and its greatest share of the smallest feature's. Where white noise decides, the limit goes with the speed
+# to the power 2/5, and area is swept fastest, at the speed times the root of what may be lost, where the limit is 5/6
+# of the height asked for: closer sweeps cost more than slower ones
+LEAST_VISIBLE_SHARE, MOST_VISIBLE_SHARE = 0.1, 5.0 / 6.0
+# Sweeps that were laid out before the first told the noise stand if what it told leaves so much of the surface
+# inspected, and would make strips no wider than by one over that
+STANDS = 0.95
 # Lines that are worked out before each sweep: one takes some 13 ms on the bench's bodies, and the finger is to wait no
 # longer than 50 ms; all are after a third of the sweeps
 LAID_OUT = 3
@@ -59,6 +67,8 @@ class Surveyor:
         found: where crossings and noise are noted.
         false_alarms_per_metre: accepted rate of false crossings in the end, 1/m.
         stated: what is known of the noise before; None: nothing.
+        expected: limit of a single sweep in the analysis of all, m, as what is known of the noise foretells it; None
+            where nothing does.
         given_noise: that was known before the survey; None: none.
         visible: share of the smallest feature's height that stays visible between two sweeps.
         paths: touched by the sweeps so far, each (K, 3), m.
@@ -73,6 +83,7 @@ class Surveyor:
     false_alarms_per_metre: float
     stated: StatedNoise | None = None
     count: SurveyCount = field(default_factory=SurveyCount)
+    expected: float | None = None
     visible: float = field(init=False)
     given_noise: Noise | None = field(init=False)
     paths: list[FloatArray] = field(init=False, default_factory=list)
@@ -81,24 +92,24 @@ class Surveyor:
     limit: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
-        self.visible = self.survey.visible
+        self.visible = self.survey.visible if self.expected is None else self._visible_for(self.expected)
         self.given_noise = self.found.noise
 
     def plan(self) -> Plan:
         """Every sweep of the survey; the first ones are detected together, for they tell the noise."""
         strips = self.survey.crossed(self.survey.visible) is None
-        if strips and (first := next(self.survey.sweeps(), None)) is not None:
-            trace = yield first
-            self.count.made += 1
-            self._keep(executed(first, trace), trace)
-            self._widen(trace)
-        waiting, felt = list[Trace](), 0.0
-        for move in self._laid_out():
+        if not strips:
+            self.visible = self.survey.visible
+        sweeps, waiting, felt = self._laid_out(), list[Trace](), 0.0
+        while (move := next(sweeps, None)) is not None:
             trace = yield move
             self.count.made += 1
             done = executed(move, trace)
-            self.paths.extend(self.survey.touched(part) for part in done)
             self._keep(done, trace)
+            if strips and self.count.made == 1 and not self._stands(done, trace):
+                sweeps = self._laid_out()
+                continue
+            self.paths.extend(self.survey.touched(part) for part in done)
             if not done:
                 self.found.left_out.append("a survey sweep was not carried out")
                 continue
@@ -150,20 +161,38 @@ class Surveyor:
         """How much of the surface lies near enough to a sweep to see the smallest feature."""
         return self.survey.covered(self.paths, self.survey.strip(self.visible))
 
-    def _widen(self, first: Trace) -> None:
-        """Strips as wide as the noise of a first sweep allows the smallest feature to be seen."""
+    def _stands(self, done: Sequence[Move], first: Trace) -> bool:
+        """True if the sweeps as laid out keep their promise in the noise of the first; else `visible` changes."""
         if len(first) < FEWEST_SWEEP_SAMPLES:
-            return
+            return True
         smallest = self.survey.smallest
-        limit = detect(first, self.survey.base, noise=self.found.noise, stated=self.stated).detection_limit
+        felt = detect(first, self.survey.base, noise=self.found.noise, stated=self.stated)
+        limit = felt.detection_limit
+        if np.isfinite(limit):  # by a single sweep; of all together the noise is known better
+            step = sum(part.length for part in done) / (len(first) - 1)
+            limit = expected_limit(felt.noise, step, self.survey.tip_radius, self.false_alarms_per_metre)
         if limit > smallest:
             shown = f"features lower than {length_text(limit, 2)}: a single sweep does not show them through the noise"
             if not np.isfinite(limit):
                 shown = "some features of any height: samples lie too far apart for a single sweep to show them all"
             self.found.unseen.append(f"{shown}, though {length_text(smallest, 2)} was asked for")
-        self.visible = float(
-            np.clip(VISIBLE_HEIGHT_MARGIN * limit / smallest, LEAST_VISIBLE_SHARE, self.survey.visible)
-        )
+        laid_out, visible = self.visible, self._visible_for(limit)
+        inspected = float(np.sqrt(max(1.0 - limit / smallest, 0.0) / (1.0 - laid_out)))
+        wider = self.survey.strip(visible) / self.survey.strip(laid_out)
+        if (inspected >= STANDS or visible == laid_out) and wider <= 1.0 / STANDS:
+            return True
+        self.visible = visible
+        return False
+
+    def _visible_for(self, limit: float) -> float:
+        """Share of the smallest feature's height to leave visible between two sweeps that show what is so high, m.
+
+        The survey's own share where no sweep shows the smallest feature: none would be gained by closer ones.
+        """
+        smallest = self.survey.smallest
+        if limit >= smallest:
+            return self.survey.visible
+        return float(np.clip(VISIBLE_HEIGHT_MARGIN * limit / smallest, LEAST_VISIBLE_SHARE, MOST_VISIBLE_SHARE))
 
     def _detect(self, waiting: list[Trace]) -> None:
         felt = detect(

@@ -10,44 +10,66 @@ from mapping import FloatArray, IntArray, Surface
 
 # A linear field serves where its slope along the surface stays above this (1 is perfect)
 ENOUGH_SLOPE = 0.8
+# What a face is bent counts no more than this: where the ball runs over a sharp edge its centre turns on the spot
+MOST_BENT = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class LevelField:
     """Values (V,) in metres at the mesh's vertices, valid on the triangles `faces` (M, 3) of a chart.
 
-    `slope` is the least gradient there: levels that differ by c lie at most c / slope apart on the surface.
+    `slope` is the least gradient there: levels that differ by c lie at most c / slope apart on the surface. `bend` is
+    how many times further apart than on the surface the ball's centres are, across the level sets: on an outward bend
+    of radius R by 1 + r / R, and so many times more is lost between two sweeps than on a plane.
     """
 
     faces: IntArray
     values: FloatArray
     kind: str
     slope: float
+    bend: float = 1.0
 
     def levels(self, pitch: float) -> FloatArray:
-        """Levels that leave no point of the chart further than pitch / 2 from a level set, m."""
+        """Levels between which no more is lost than a pitch apart on a plane: none is further than pitch / 2, m."""
         used = self.values[self.faces]
         low, high = float(used.min()), float(used.max())
-        count = max(1, int(np.ceil((high - low) / (pitch * self.slope) - 1e-9)))
+        count = max(1, int(np.ceil((high - low) * np.sqrt(self.bend) / (pitch * self.slope) - 1e-9)))
         return np.asarray(low + (np.arange(count) + 0.5) * (high - low) / count)
 
 
-def level_field(surface: Surface, vertices: FloatArray, chart: IntArray) -> LevelField:
+def level_field(surface: Surface, vertices: FloatArray, chart: IntArray, tip_radius: float = 0.0) -> LevelField:
     """The field for a chart: a coordinate where the chart is flat or a cylinder, else geodesic distance.
 
     Args:
         surface: the body.
         vertices: (V, 3) its vertices.
         chart: faces of one connected chart.
+        tip_radius: r, m.
     """
     axis, slope = _best_axis(surface, chart)
-    faces = surface.faces[chart]
-    if slope >= ENOUGH_SLOPE:
-        return LevelField(faces, vertices @ axis, "linear", slope)
-    values = _geodesic(vertices, faces)
-    if values is not None:
-        return LevelField(faces, values, "geodesic", min(1.0, _slope(vertices, faces, values)))
-    return LevelField(faces, vertices @ axis, "linear", max(slope, 0.25))
+    faces, values, kind = surface.faces[chart], vertices @ axis, "linear"
+    if slope < ENOUGH_SLOPE:
+        distance = _geodesic(vertices, faces)
+        slope = max(slope, 0.25)
+        if distance is not None:
+            values, kind, slope = distance, "geodesic", min(1.0, _slope(vertices, faces, distance))
+    return LevelField(faces, values, kind, slope, _bend(surface, vertices, chart, values, tip_radius))
+
+
+def _bend(surface: Surface, vertices: FloatArray, chart: IntArray, values: FloatArray, tip_radius: float) -> float:
+    """How many times the ball's centres are further apart across the level sets than what it touches: the mean by area.
+
+    Never under 1: an inward bend beside an outward one does not make up for it.
+    """
+    faces, areas = surface.faces[chart], surface.face_areas[chart]
+    normals = np.zeros_like(vertices)
+    for k in range(3):
+        np.add.at(normals, faces[:, k], surface.face_normals[chart] * areas[:, None])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    touched, centres = (_gradients(at, faces, values) for at in (vertices, vertices + tip_radius * normals))
+    known = (touched > 0) & (centres > 0)
+    bent = np.minimum(touched[known] / centres[known], MOST_BENT)
+    return max(1.0, float(np.average(bent, weights=areas[known]))) if known.any() else 1.0
 
 
 def _best_axis(surface: Surface, chart: IntArray) -> tuple[FloatArray, float]:
@@ -110,10 +132,18 @@ def _geodesic(vertices: FloatArray, faces: IntArray) -> FloatArray | None:
 
 def _slope(vertices: FloatArray, faces: IntArray, values: FloatArray) -> float:
     """Fifth percentile of the field's gradient over the faces."""
+    gradients = _gradients(vertices, faces, values)
+    return float(np.quantile(gradients[np.isfinite(gradients)], 0.05))
+
+
+def _gradients(vertices: FloatArray, faces: IntArray, values: FloatArray) -> FloatArray:
+    """(M,) the field's gradient on each face; NaN where it is degenerate."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     double = np.linalg.norm(normal, axis=1)
     good = double > 0
+    out = np.full(len(faces), np.nan)
     va, vb, vc = (values[faces[:, k], None] for k in range(3))
     gradient = va * (c - b) + vb * (a - c) + vc * (b - a)
-    return float(np.quantile(np.linalg.norm(gradient[good], axis=1) / double[good], 0.05))
+    out[good] = np.linalg.norm(gradient[good], axis=1) / double[good]
+    return out

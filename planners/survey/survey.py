@@ -162,7 +162,7 @@ class Survey:
                 continue
             touched = []
             if number not in self._fields:
-                self._fields[number] = level_field(surface, surface.vertices, chart)
+                self._fields[number] = level_field(surface, surface.vertices, chart, self.tip_radius)
             levels = self._fields[number]
             for level in levels.levels(pitch):
                 lines = isolines(surface.vertices, surface.faces, chart, levels.values, float(level))

@@ -90,7 +90,7 @@ speed = "20 mm/s"
 def test_a_region_inside_the_triangles_of_a_side_is_planned_and_accounted_for(tmp_path: Path) -> None:
     plan = plan_scene(block_scene(tmp_path, 2.0, 4.0))
     assert plan.account is not None and plan.account.area == pytest.approx(14e-3 * 8e-3)
-    assert plan.covered == plan.account.swept == 1.0 and not plan.account.short
+    assert plan.account.swept == plan.record()["covered"] == 1.0 and not plan.account.short
     ways = np.concatenate([move.path for move in plan.moves if move.purpose == "sweep"])
     assert (ways[:, :2] >= np.array([3e-3, -4e-3]) - 1e-9).all() and (
         ways[:, :2] <= np.array([17e-3, 4e-3]) + 1e-9
@@ -128,7 +128,7 @@ def test_what_sweeps_touched_that_show_nothing_was_not_swept(tmp_path: Path) -> 
     few = run_text(tmp_path, text.replace("[survey]", 'rate = "80 Hz"\n[survey]'), "few")
     assert few.swept == 0.0
     assert few.short
-    assert "3 mm of sweeps are too short, or have too few samples, to show anything" in few.warning()
+    assert "2 mm of sweeps are too short, or have too few samples, to show anything" in few.warning()
     many = run_text(tmp_path, text, "many")
     assert many.swept == 1.0
     assert not many.short
@@ -235,3 +235,30 @@ def test_a_fastest_speed_that_cannot_be_known_is_refused() -> None:
         parse_scene(pecked.read_text().replace('speed = "20 mm/s"', 'speed = "fastest"'), pecked)
     with pytest.raises(SceneError, match=r'survey\.speed: expected a speed .*or write "fastest"'):
         parse_scene(FASTEST.replace('"fastest"', '"fast"'), WIRE)
+
+
+def test_plan_and_run_promise_the_same_and_keep_it(tmp_path: Path) -> None:
+    """Sweeps lie so close that the noise lets the height asked for be found halfway between two of them."""
+    text = TEXT.replace("wire_on_plate.ply", "tile.ply").replace("meshes/plate.ply", "meshes/tile.ply")
+    text = text.partition("[[truth]]")[0].replace('radius = "10 mm"', 'radius = "5 mm"').replace("5 kHz", "2 kHz")
+    counts = []
+    for smallest in ("0.5 mm", "0.22 mm"):  # a third of the one is hidden, and two thirds of the other
+        asked = text.replace('"0.3 mm"', f'"{smallest}"')
+        plan, found = planned(tmp_path, asked), run(parse_scene(asked, WIRE), tmp_path / smallest, report=False)
+        assert plan.account is not None and found.account is not None and found.inspected is not None
+        assert found.inspected.asked is not None
+        share = found.inspected.share(found.inspected.asked)
+        assert share == pytest.approx(found.account.swept, abs=1e-9) and share > 0.95
+        assert plan.account.swept == pytest.approx(share, abs=0.02)
+        assert float(found.trace.t[-1]) == pytest.approx(plan.seconds, rel=0.1)
+        counts.append(sum(move.purpose == "sweep" for move in plan.moves))
+    assert counts[1] > 2 * counts[0]
+
+
+def test_noise_that_hides_what_was_asked_for_is_said_first(tmp_path: Path) -> None:
+    text = TEXT.replace("wire_on_plate.ply", "tile.ply").replace("meshes/plate.ply", "meshes/tile.ply")
+    text = text.partition("[[truth]]")[0].replace('"0.3 mm"', '"0.1 mm"').replace('radius = "10 mm"', 'radius = "5 mm"')
+    plan = planned(tmp_path, text)
+    assert plan.account is not None and plan.account.hidden is not None and plan.account.hidden > 1e-4
+    assert plan.lines()[0] == plan.account.warning()
+    assert "noise" in plan.account.warning()

@@ -12,8 +12,8 @@ from hw.simulated.finger import SimulatedFinger
 from mapping import length_text
 from mapping.base.base import Base
 from mapping.base.fit import fit_base
-from mapping.detection.coverage import found_heights, found_probability
-from mapping.detection.detect import detect
+from mapping.detection.coverage import found_heights, found_probability, lost_heights
+from mapping.detection.detect import detect, expected_limit
 from mapping.geometry.templates.shapes import cap_height
 from mapping.instrument.noise import Noise
 from mapping.surface import Surface
@@ -34,14 +34,53 @@ def plate(cells: int = 24) -> Surface:
 def test_a_face_beside_a_sweep_hides_what_the_ball_passes_over() -> None:
     surface = plate()
     touched = np.column_stack([np.linspace(0, 0.06, 601), np.full(601, 0.03), np.zeros(601)])
-    height = found_heights(surface, touched, R, 1e-4).face
+    height = found_heights(surface, touched, upwards(touched), R, 1e-4).face
     middle = surface.vertices[surface.faces].mean(axis=1)
     away = np.abs(surface.vertices[surface.faces][:, :, 1] - 0.03).max(axis=1)
     near = away < 0.8 * R
     exact, beyond = (1e-4 + R - np.sqrt(R**2 - (away[near] + more) ** 2) for more in (0.0, 0.1 * R))
     assert (height[near] >= exact).all() and (height[near] <= beyond).all()
     assert np.isinf(height[np.abs(middle[:, 1] - 0.03) > 1.1 * R]).all()
-    assert np.isinf(found_heights(surface, touched[:0], R, 1e-4).face).all()
+    assert np.isinf(found_heights(surface, touched[:0], touched[:0], R, 1e-4).face).all()
+
+
+def upwards(places: np.ndarray) -> np.ndarray:
+    return np.tile([0.0, 0.0, 1.0], (len(places), 1))
+
+
+@pytest.mark.parametrize("bend", [1 / 0.03, 0.0, -1 / 0.03])
+def test_what_is_lost_beside_a_sweep_is_the_height_of_the_crest_that_the_ball_just_touches(bend: float) -> None:
+    """Sweeps along a cylinder: outside of it more is lost than on a plane, inside less."""
+    aside = 1.5e-3
+    if bend:
+        radius, angle = 1 / bend, aside * bend
+        normal = np.array([[np.sin(angle), 0.0, np.cos(angle)]])
+        place = radius * (normal - [[0.0, 0.0, 1.0]])
+    else:
+        place, normal = np.array([[aside, 0.0, 0.0]]), upwards(np.zeros((1, 3)))
+    touched = np.column_stack([np.zeros(401), np.linspace(-5e-3, 5e-3, 401), np.zeros(401)])
+    lost = lost_heights(place, normal, touched, upwards(touched), R)[0]
+    crest, centre = place[0] + lost * normal[0], np.array([0.0, 0.0, R])
+    assert np.linalg.norm(crest - centre) == pytest.approx(R, rel=1e-12)
+    assert lost == pytest.approx(0.5 * aside**2 * (1 / R + bend), rel=0.02)
+
+
+def test_a_ball_on_the_other_side_of_a_thin_wall_shows_nothing() -> None:
+    touched = np.column_stack([np.linspace(0, 0.06, 601), np.full(601, 0.03), np.full(601, -1e-4)])
+    place = np.array([[0.03, 0.03, 0.0]])
+    assert np.isinf(lost_heights(place, upwards(place), touched, -upwards(touched), R)).all()
+
+
+@pytest.mark.parametrize("noise", [Noise(1e-4), Noise(1e-4, 1e-5, 1e-3), Noise(2e-5, 2e-5, 2e-3)])
+def test_the_limit_is_foretold_from_the_noise_alone(noise: Noise) -> None:
+    spacing, flat = 2e-5, Surface([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    x, rng = np.arange(0.0, 0.4, spacing), np.random.default_rng(3)
+    slow, kept = noise.correlated * rng.normal(size=len(x)), np.exp(-spacing / noise.length)
+    for k in range(1, len(x)):
+        slow[k] = kept * slow[k - 1] + np.sqrt(1 - kept**2) * slow[k]
+    trace = Trace.from_profile(x, R + slow + noise.white * rng.normal(size=len(x)), R)
+    # the spread of the limit over ten such traces is 2 to 4 %
+    assert expected_limit(noise, spacing, R) == pytest.approx(detect(trace, Base(flat)).detection_limit, rel=0.12)
 
 
 def test_the_probability_of_finding_is_what_detection_does() -> None:
@@ -81,6 +120,10 @@ def test_a_survey_inspects_what_it_was_asked_for() -> None:
     boxed = Inspected.of(half, base, detect(half, base), 4e-4, box)
     assert boxed.untouched == 0.0 and boxed.share(4e-4) > 0.9 and np.array_equal(boxed.height, part.height)
     assert boxed.area.sum() == pytest.approx(0.02 / 0.06 * part.area.sum())
+    # sweeps on which nothing would have been seen inspect nothing
+    third = [*np.unique(trace.sweep)[: len(np.unique(trace.sweep)) // 3]]
+    few = Inspected.of(trace, base, detect(trace, base), 4e-4, seen=third)
+    assert few.share(4e-4) == pytest.approx(1 / 3, abs=0.05)
     # where no height is asked for, heights are told that hold on some area: the limit holds on none
     unasked = replace(part, asked=None)
     half_of_it, most_of_it = unasked.above(0.5), unasked.above(0.9)
@@ -98,7 +141,9 @@ def test_what_a_fit_added_beyond_the_samples_is_not_called_unswept_but_a_gap_ami
     # what lies behind the gap is another sweep, as the ledger of the path would have it
     quarter = (trace.centers[:, :2] > 0.03) @ [1000, 2000]
     behind = replace(trace, sweep=trace.sweep + quarter).select(~gap)
-    for felt, least, most in ((trace, 0.0, 0.001), (behind, 0.02, (3 * R) ** 2 / 0.06**2)):
+    # what lies a tip radius inside the gap, of the plate and a margin of a tip radius; and all of the gap
+    least_gap = (3 * R - 2 * R) ** 2 / (0.06 + 2 * R) ** 2
+    for felt, least, most in ((trace, 0.0, 0.001), (behind, least_gap, (3 * R) ** 2 / 0.06**2)):
         base = fit_base(felt)
         assert base.kind == "plane"
         untouched = Inspected.of(felt, base, detect(felt, base), 4e-4).untouched
@@ -112,9 +157,9 @@ def test_the_share_that_was_passed_does_not_depend_on_how_large_the_faces_are():
     corners = 0.2 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
     plate = Surface(corners, [[0, 1, 2], [0, 2, 3]])
     line = np.column_stack([np.linspace(-0.05, 0.05, 201), np.zeros(201), np.zeros(201)])
-    found = found_heights(plate, line, 0.01, 1e-4)
+    found = found_heights(plate, line, upwards(line), 0.01, 1e-4)
     assert np.isinf(found.face).all()
     assert found.area.sum() == pytest.approx(0.16)
-    # at least the strip of half a tip radius to either side, at most that of a whole one and the round ends
+    # the strip of a tip radius to either side, and the round ends
     passed = found.area[np.isfinite(found.place)].sum()
-    assert 0.1 * 0.01 < passed < 0.1 * 0.02 + np.pi * 0.01**2
+    assert passed == pytest.approx(0.1 * 0.02 + np.pi * 0.01**2, rel=0.02)

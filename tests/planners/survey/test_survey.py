@@ -103,6 +103,11 @@ def test_a_sphere_is_covered_by_level_sets_of_the_geodesic_distance() -> None:
     field = level_field(surface, surface.vertices, np.arange(len(surface.faces)))
     assert field.kind == "geodesic"
     assert field.values.max() - field.values.min() == pytest.approx(np.pi * 0.04, rel=0.03)
+    # the ball's centres are (R + r) / R times further apart than what it touches, and so much more is lost between
+    # two sweeps: they lie closer by the root of that
+    bent = level_field(surface, surface.vertices, np.arange(len(surface.faces)), R)
+    assert field.bend == 1.0 and bent.bend == pytest.approx((0.04 + R) / 0.04, rel=0.01)
+    assert len(bent.levels(2e-3)) == pytest.approx(len(field.levels(2e-3)) * np.sqrt(bent.bend), rel=0.02)
     _, outcome = dry_run(survey(surface).plan(), EMPTY)
     assert outcome.value.fraction > 0.995
 
