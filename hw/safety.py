@@ -14,16 +14,16 @@ from typing import Any
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 # Packages that call back into Python from compiled code, where an exception is lost, takes another name or ends the
-# process
-_NOT_TO_BE_BROKEN_OFF = ("numba", "llvmlite", "pydantic")
+# process; and one that takes whatever ends the import of a library for its absence: a Ctrl-C in ten was lost there
+_NOT_TO_BE_BROKEN_OFF = ("numba", "llvmlite", "pydantic", "trimesh")
 _AGAIN = 0.002  # s until a signal that met them is sent again: kernels may follow each other that closely
 
 
 def end_program(number: int, frame: FrameType | None) -> None:
     """The handler of a signal that ends the program in order: every `with` block is left by an exception.
 
-    A compiler or serialiser at work is not broken off, for it would lose or rename the exception, or crash; the same
-    signal comes again until it is done (a kernel takes some seconds, once).
+    A compiler, a serialiser or a library that is loading others is not broken off, for it would lose or rename the
+    exception, or crash; the same signal comes again until it is done (a kernel takes some seconds, once).
 
     Raises:
         KeyboardInterrupt: Ctrl-C.

@@ -74,3 +74,29 @@ def test_a_signal_that_meets_a_serialiser_keeps_its_name(name: str) -> None:
     command = [sys.executable, "-c", SERIALISES, name]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert (ended.returncode, ended.stdout) == (0, "20 came\n"), ended.stderr
+
+
+# The signal comes while trimesh asks whether a library is there; without care it counts as a library that is not
+LOADS = """
+import os, signal, sys, time
+from hw import end_program
+number = getattr(signal, sys.argv[1])
+signal.signal(number, end_program)
+class Asked:
+    def find_spec(self, name, path=None, target=None):
+        if name == "scipy.spatial":
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), number)
+sys.meta_path.insert(0, Asked())
+try:
+    import trimesh
+    time.sleep(10)
+except (KeyboardInterrupt, SystemExit):
+    print("came")
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_is_not_taken_for_a_library_that_is_missing(name: str) -> None:
+    ended = subprocess.run([sys.executable, "-c", LOADS, name], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout) == (0, "came\n"), ended.stderr
