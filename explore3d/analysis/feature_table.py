@@ -8,14 +8,11 @@ import io
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from explore3d import __version__
 from mapping import Dropped
-from mapping.model import SIZES, probability, rows
-
-if TYPE_CHECKING:
-    from explore3d.analysis.result import Analysis
+from mapping.model import SIZES, ObjectModel, probability, rows
 
 # Characters of a run's key: 64 bits, so that among a million runs the chance that any two share one is 3e-8
 RUN_KEY_DIGITS = 16
@@ -59,14 +56,14 @@ def run_key(sha256: str, settings: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:RUN_KEY_DIGITS]
 
 
-def feature_rows(analysis: Analysis, run: str) -> list[Row]:
+def feature_rows(model: ObjectModel, run: str) -> list[Row]:
     """A row for each feature, what was detected and dropped last; columns as FEATURE_COLUMNS.
 
     Args:
         run: key of the analysis.
     """
-    kept = [row | {"kept": True, "why_dropped": None} for row in rows(analysis.model.features)]
-    table = (*kept, *map(_dropped_row, analysis.model.dropped))
+    kept = [row | {"kept": True, "why_dropped": None} for row in rows(model.features)]
+    table = (*kept, *map(_dropped_row, model.dropped))
     return [{"run": run} | {name: _known(value) for name, value in row.items()} for row in table]
 
 

@@ -759,6 +759,7 @@ def _provenance(work: Work) -> dict[str, Any]:
         "about": {name: value for name, value in vars(work.scene.about).items() if value} if work.scene else {},
         "seed": work.settings.seed,
         "log_sha256": log.sha256,
+        "felt_sha256": log.felt_sha256,
         "samples": len(log.trace),
         "recovered": log.recovered,
         "stopped": None if stop is None else stop.text,

@@ -64,7 +64,8 @@ def merge(
     if json:
         print(dumps(merged.document(), ensure_ascii=False, allow_nan=False))
         return
-    print("\n".join([*map(feature_line, merged.features), f"model: {out / 'model.json'}"]))
+    results = [f"{name}: {out / file}" for name, file in (("model", "model.json"), ("features", "features.csv"))]
+    print("\n".join([*map(feature_line, merged.features), *results]))
 
 
 def compare(

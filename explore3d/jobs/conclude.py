@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from time import process_time
 
 from explore3d.analysis import (
@@ -24,6 +25,7 @@ from explore3d.report import write_report
 from explore3d.scene import Scene
 from mapping.base import Base
 from mapping.geometry.mesh import write_whole
+from mapping.model import ObjectModel
 
 # The table of features beside the model, for every program and for those that ask many at once
 FEATURES_CSV, FEATURES_PARQUET = "features.csv", "features.parquet"
@@ -57,12 +59,21 @@ def conclude(
         if report:
             with stages.stage("report"):
                 write_report(analysis, folder, stages.is_forced("rendered pictures"))
-        table = feature_rows(analysis, run)
-        write_whole(folder / FEATURES_CSV, csv_text(FEATURE_COLUMNS, table))
-        write_whole(folder / FEATURES_PARQUET, parquet_bytes(FEATURE_COLUMNS, table))
+        write_table(analysis.model, folder, run)
         about = {"forecast": forecast(analysis), "errors": worst_errors(analysis.errors)}
         known = {name: each.record() if isinstance(each, Forecast) else each for name, each in about.items() if each}
         provenance = analysis.model.provenance | known
         model = replace(analysis.model, provenance=provenance, timings=dict(stages.timings))
         model.save(folder)
     return replace(analysis, model=model, timings=dict(stages.timings))
+
+
+def write_table(model: ObjectModel, folder: Path, run: str = "") -> None:
+    """Write the table of a model's features beside it.
+
+    Args:
+        run: key of the analysis; "": the model is not of one alone.
+    """
+    table = feature_rows(model, run)
+    write_whole(folder / FEATURES_CSV, csv_text(FEATURE_COLUMNS, table))
+    write_whole(folder / FEATURES_PARQUET, parquet_bytes(FEATURE_COLUMNS, table))

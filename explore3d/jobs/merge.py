@@ -11,6 +11,7 @@ from typing import Any
 from explore3d import UserError
 from explore3d.analysis import Progress, Stages, build_model, silent
 from explore3d.jobs.analyze import digest_of, table_words
+from explore3d.jobs.conclude import write_table
 from explore3d.jobs.objects import unlike
 from explore3d.jobs.session import Job, Session
 from explore3d.log import load_logs
@@ -63,6 +64,7 @@ def merge(
         known = _merged(model, logs, pose_sd, {"tip_radius": tip_radius} | table, progress)
         with session.staging() as folder:
             known.save(folder)
+            write_table(known, folder)
     return known
 
 
@@ -72,13 +74,20 @@ def _merged(
     known = ObjectModel.load(model)
     for path in logs:
         log = load_logs([path], **settings)
-        seen = [known.provenance.get("log_sha256"), *known.provenance.get("merged_sha256", [])]
-        if log.sha256 in seen:
+        said = known.provenance
+        if log.sha256 in (said.get("log_sha256"), *said.get("merged_sha256", [])):
             raise UserError(f"{path}: this log is in the model {model} already; merged twice it would count twice")
+        if log.felt_sha256 in (said.get("felt_sha256"), *said.get("merged_felt_sha256", [])):
+            raise UserError(
+                f"{path}: another file, but its samples are in the model {model} already and would count twice; a "
+                "simulation that is run again with its seed feels the same: give it another seed"
+            )
         if complaint := unlike(log, known.base, pose_sd):
             raise UserError(f"{path}: not a log of the object of {model}, or not in its frame: {complaint}")
         analysis = build_model(log, None, known.base, Stages(progress))
         known = merge_model(known, analysis.model.features, "/".join(Path(path).resolve().parts[-2:]), pose_sd)
-        hashes = [*known.provenance.get("merged_sha256", []), log.sha256]
-        known = replace(known, provenance={**known.provenance, "merged_sha256": hashes})
+        about = dict(known.provenance)
+        about["merged_sha256"] = [*about.get("merged_sha256", []), log.sha256]
+        about["merged_felt_sha256"] = [*about.get("merged_felt_sha256", []), log.felt_sha256]
+        known = replace(known, provenance=about)
     return known

@@ -115,7 +115,7 @@ def _analysed(job: Job) -> tuple[dict[str, Any], list[dict[str, Any]]]:
             quick=told.quick,
             **told.table,
         )
-    return job.row("done", **_known(analysis)), feature_rows(analysis, job.run)
+    return job.row("done", **_known(analysis)), feature_rows(analysis.model, job.run)
 
 
 def _known(analysis: Analysis) -> dict[str, Any]:

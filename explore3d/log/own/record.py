@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from explore3d import UserError, count_text
@@ -89,6 +90,11 @@ class Log:
     form: Form = Form()  # noqa: RUF009
     tolerances: tuple[Tolerance, ...] | None = None
     timed: bool = True
+
+    @cached_property
+    def felt_sha256(self) -> str:
+        """Of where the centre was, whatever file says it: a simulation that is run again with its seed has the same."""
+        return hashlib.sha256(self.trace.centers.tobytes()).hexdigest()
 
 
 def merge(logs: Sequence[Log]) -> Log:

@@ -6,7 +6,6 @@ import csv
 import io
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -15,9 +14,11 @@ from in_process import explore3d_main
 from small_profiles import TIP, write_profile
 
 from explore3d import load
-from explore3d.analysis import FEATURE_COLUMNS, Analysis, feature_rows, parquet_bytes, run_key
+from explore3d.analysis import FEATURE_COLUMNS, feature_rows, parquet_bytes, run_key
 from explore3d.jobs.analyze import analyze
-from mapping import Dropped, Feature, Interval, Support
+from mapping import Dropped, Feature, Interval, Support, Surface
+from mapping.base import Base
+from mapping.model import ObjectModel
 
 
 @pytest.fixture(scope="module")
@@ -55,28 +56,26 @@ def test_quick_results_are_those_of_the_long_way_without_surface_report_and_chai
 
 
 def test_what_was_dropped_has_a_row_with_its_reason() -> None:
-    analysis = _analysis_of_one()
-    feature = analysis.model.features[0]
     lost = Dropped("pit", np.zeros(3), -1e-6, 5.0, 2, 0.0, "hardly spoken for")
-    rows = feature_rows(replace(analysis, model=SimpleNamespace(features=(feature,), dropped=(lost,))), "key")
+    rows = feature_rows(replace(_model_of_one(), dropped=(lost,)), "key")
     assert rows[-1]["why_dropped"] == "hardly spoken for" and not rows[-1]["kept"] and rows[-1]["id"] is None
     assert rows[0]["kept"] and rows[-1]["height"] == -1e-6 and rows[-1]["probability"] == 0.5
     assert list(rows[-1]) == list(rows[0]) == list(FEATURE_COLUMNS)
     assert parquet_bytes(FEATURE_COLUMNS, [])  # a log without features has a table, too
 
 
-def _analysis_of_one() -> Analysis:
-
+def _model_of_one() -> ObjectModel:
     size = Interval(1e-6, 0.9e-6, float("inf"), censored=True)
     feature = Feature(
         "bump", [[0.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]], size, size, size, Support(5.0, 1), True, 0.0, id="bump-1"
     )
-    model = SimpleNamespace(features=(feature,), dropped=())
-    return Analysis("", None, None, None, model)  # type: ignore[arg-type]
+    return ObjectModel(
+        Base(Surface([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])), features=(feature,)
+    )
 
 
 def test_a_number_that_is_not_known_is_empty() -> None:
-    (row,) = feature_rows(_analysis_of_one(), "key")
+    (row,) = feature_rows(_model_of_one(), "key")
     assert row["height_high"] is None and row["log_odds"] is None and row["probability"] is None
 
 

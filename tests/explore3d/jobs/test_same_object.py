@@ -95,6 +95,16 @@ def test_merge_takes_a_table_as_analyze_does(tmp_path: Path) -> None:
     analyze(table(tmp_path / "a.csv", raster_over(0)), tmp_path / "model", tip_radius=R)
     merged = merge(tmp_path / "model", [table(tmp_path / "b.csv", raster_over(1))], tmp_path / "both", tip_radius=R)
     assert len(merged.provenance["merged_sha256"]) == 1
+    assert (tmp_path / "both" / "features.csv").is_file() and (tmp_path / "both" / "features.parquet").is_file()
     with pytest.raises(UserError, match="--tip-radius"):
         merge(tmp_path / "model", [tmp_path / "b.csv"], tmp_path / "again")
     assert not (tmp_path / "again").exists()
+
+
+def test_the_same_samples_in_another_file_are_not_merged_twice(tmp_path: Path) -> None:
+    analyze(table(tmp_path / "a.csv", raster_over(0)), tmp_path / "model", tip_radius=R)
+    again = tmp_path / "again.csv"
+    again.write_text((tmp_path / "a.csv").read_text() + "\n")
+    with pytest.raises(UserError, match=r"another file, but its samples are in the model .* already"):
+        merge(tmp_path / "model", [again], tmp_path / "both", tip_radius=R)
+    assert not (tmp_path / "both").exists()
