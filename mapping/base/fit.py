@@ -13,7 +13,18 @@ from mapping.base.base import Base
 from mapping.base.cells import Cells
 from mapping.base.polyhedron import polyhedron
 from mapping.base.profiles import AUTO, Form, fit_profile, profile_frame
-from mapping.base.quadrics import FAMILIES, Cloud, Family, Fitted, cylinder, plane, quadric, sheet, sphere
+from mapping.base.quadrics import (
+    FAMILIES,
+    Cloud,
+    Family,
+    Fitted,
+    cylinder,
+    independent_share,
+    plane,
+    quadric,
+    sheet,
+    sphere,
+)
 from mapping.base.star import star
 from mapping.base.terraces import terraced_plane, terraced_quadric
 from mapping.base.tube import tube
@@ -163,5 +174,4 @@ def _noise_of(residual: FloatArray, floor: float) -> tuple[float, float]:
     # the scatter from cell to cell is too large where sweeps are short and bend over features
     scale = max(0.5 * floor, robust_scale(residual))
     kept = np.clip(residual / scale, -FEATURE_RESIDUAL_SDS, FEATURE_RESIDUAL_SDS)
-    correlation = float(np.clip((kept[1:] * kept[:-1]).mean() / max((kept**2).mean(), 1e-12), 0.0, 0.98))
-    return scale, (1.0 - correlation) / (1.0 + correlation)
+    return scale, independent_share(float((kept[1:] * kept[:-1]).mean() / max((kept**2).mean(), 1e-12)))

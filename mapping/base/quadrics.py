@@ -35,6 +35,7 @@ class Cloud:
         scale: standard deviation of the points about a smooth surface, m.
         tip_radius: m.
         outward: (C, 3) measured contact normals in the frame, or None.
+        sweep: (C,) of each point.
     """
 
     points: FloatArray
@@ -43,6 +44,7 @@ class Cloud:
     scale: float
     tip_radius: float
     outward: FloatArray | None
+    sweep: IntArray
 
     @classmethod
     def of(cls, trace: Trace, most: int) -> Cloud:
@@ -57,9 +59,8 @@ class Cloud:
         if np.linalg.det(axes) < 0:
             axes = np.stack([axes[0], -axes[1], axes[2]])
         points = (means - origin) @ axes.T
-        return cls(
-            points, origin, axes, _roughness(points), trace.tip_radius, None if normals is None else normals @ axes.T
-        )
+        outward = None if normals is None else normals @ axes.T
+        return cls(points, origin, axes, _roughness(points), trace.tip_radius, outward, cells.sweep)
 
     def world(self, points: FloatArray) -> FloatArray:
         """Points (N, 3) of the frame in the object frame."""
@@ -109,6 +110,12 @@ def _roughness(points: FloatArray) -> float:
     rest -= (rest * way).sum(axis=1)[:, None] * way
     bent = float(MAD_TO_SD * np.median(np.linalg.norm(rest, axis=1)) / np.sqrt(70.0))
     return bent if bent < BENT_SCATTER_SHARE * flat else flat
+
+
+def independent_share(correlation: float) -> float:
+    """The share of cells that count as independent if neighbours are so correlated; never less than a hundredth."""
+    kept = float(np.clip(correlation, 0.0, 0.98))
+    return (1.0 - kept) / (1.0 + kept)
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,15 +217,35 @@ def plane(cloud: Cloud) -> Fitted:
     return height_field(plane_design, "plane", cloud)
 
 
-def quadric(cloud: Cloud) -> Fitted:
-    """A quadratic polynomial over the principal plane."""
+def quadric(cloud: Cloud) -> Fitted | None:
+    """A quadratic polynomial over the principal plane; None where two rows cannot tell a bend across them."""
+    if not all(_tells(cloud, axis, 3) for axis in range(2)):
+        return None
     return height_field(quadric_design, "quadric", cloud)
 
 
+def _tells(cloud: Cloud, axis: int, count: int) -> bool:
+    """True if so many coefficients along an axis of the cloud are told apart: as many places of it lie apart.
+
+    A spline is determined only where each of its functions has a place of its own (Schoenberg and Whitney 1953):
+    between two rows a cubic may do what it likes, and takes the rows' noise for a bend. Places are apart by half of
+    what as many even ones would be, for rows waver.
+    """
+    places = np.sort(cloud.points[:, axis])
+    apart, found, last = 0.5 * (places[-1] - places[0]) / (count - 1), 1, places[0]
+    while apart > 0.0 and found < count and last + apart <= places[-1]:
+        last = places[np.searchsorted(places, last + apart)]
+        found += 1
+    return found == count
+
+
 def sheet(cloud: Cloud, shortest: float = SHORTEST_BEND) -> Fitted | None:
-    """A bicubic spline sheet; its pieces are no shorter than so many tip radii."""
+    """A bicubic spline sheet; its pieces are no shorter than so many tip radii, nor than the rows tell apart."""
     low, high = cloud.extent
     pieces = [int(min(8, (high[i] - low[i]) / (shortest * cloud.tip_radius))) for i in range(2)]
+    pieces = [
+        max((n for n in range(1, most + 1) if _tells(cloud, i, n + 3)), default=0) for i, most in enumerate(pieces)
+    ]
     if min(pieces) < 1 or len(cloud.points) < 4 * (pieces[0] + 3) * (pieces[1] + 3):
         return None
     knots = [
@@ -283,7 +310,8 @@ def cylinder(cloud: Cloud) -> Fitted | None:
 
     p = cloud.points
     best = None
-    for axis in range(3):
+    # two rows, as on both sides of a rod, leave open how it bends from one to the other
+    for axis in range(3) if _tells(cloud, 1, 3) else (1,):
         across = [i for i in range(3) if i != axis]
         flat = p[:, across]
         start = np.linalg.lstsq(np.column_stack([2 * flat, np.ones(len(p))]), (flat**2).sum(axis=1), rcond=None)[0]

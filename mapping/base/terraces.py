@@ -11,15 +11,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import FloatArray, IntArray
-from mapping.base.quadrics import Cloud, Design, Fitted, height_field, plane_design, quadric_design
-from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit
+from mapping.base.quadrics import (
+    Cloud,
+    Design,
+    Fitted,
+    height_field,
+    independent_share,
+    plane_design,
+    quadric_design,
+)  # fmt: skip
+from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit, robust_scale
 
 # Cells whose heights are compared lie this share of the cloud's extent apart. Of a staircase of n edges, n eighths of
 # the pairs stand on two levels: the sum of absolute residuals finds the slope as long as these are less than half, that
 # is up to three edges one way; nearer pairs tell less of the slope
 PAIRS_APART = 1 / 8
-# Of all cells so many must have a partner. Where lines are so far apart that it must be half the extent away, half of
-# the cells can have one at most; a fifth of these may lie off the path
+# Of all cells so many must have a partner. Where lines are so far apart that it must be half the extent away, or all of
+# it between two, half of the cells can have one at most; a fifth of these may lie off the path
 FEWEST_PAIRS = 0.4
 # Of a run's samples, the share that is its end: the detail itself lies in the middle, and a median minds nothing that
 # reaches into less than half of an end
@@ -35,16 +43,17 @@ LEVEL_ROUNDS = 6
 
 @dataclass(frozen=True, eq=False)
 class _Levels:
-    """Heights (L,) over the field, m, the first of them 0, and the level (C,) of each cell; -1: on none of them."""
+    """Heights (L,) over the field, m, the first of them 0, the level (C,) of each cell, -1: on none, and its sweep."""
 
     heights: FloatArray
     level: IntArray
+    sweep: IntArray
 
     @property
     def freedom(self) -> int:
-        """Of the levels beyond the first and of the places on the path where one gives way to another."""
-        standing = self.level[self.level >= 0]
-        edges = int((np.diff(standing) != 0).sum())
+        """Of the levels beyond the first and of the places on sweeps where one gives way to another."""
+        standing, sweep = self.level[self.level >= 0], self.sweep[self.level >= 0]
+        edges = int(((np.diff(standing) != 0) & (np.diff(sweep) == 0)).sum())
         return len(self.heights) - 1 + EDGE_FREEDOM * edges
 
 
@@ -59,11 +68,13 @@ def terraced_quadric(cloud: Cloud) -> Fitted | None:
 
 
 def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
-    """A height field z = design(x, y) @ coefficients + one of a few levels, or None where one level is enough.
+    """A height field z = design(x, y) @ coefficients + one of a few levels; None where cells cannot tell levels apart.
 
     The field's slopes come from differences of heights of cells that lie apart, of which most stand on one level. A
     level counts if the cells on it gain more than its height and the places of its edges cost. The field of the level
     with the most cells is the base; the others are what detection finds as steps.
+    Cells on a level may differ by what the cells of such pairs do, and as many count as are independent then: roughness
+    and drift are no levels, however smooth from cell to cell.
     """
     x, y, z = cloud.points.T
     columns = design(x, y)
@@ -74,27 +85,29 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
     # what differences cannot tell, the constant, comes out as zero: the levels hold it
     slopes = robust_fit(columns[one] - columns[other], z[one] - z[other], np.sqrt(2.0) * cloud.scale).coefficients
     rest = z - columns @ slopes
-    levels = _levels(rest, cloud.floor)
+    scale = max(cloud.floor, robust_scale(rest[one] - rest[other]) / np.sqrt(2.0))
+    share = independent_share(1.0 - (cloud.floor / scale) ** 2)
+    levels = _levels(rest, cloud.sweep, scale, share)
     for _ in range(LEVEL_ROUNDS):
         if len(levels.heights) < 2:
-            return None
+            break
         on = np.maximum(levels.level, 0)
         fit = robust_fit(columns, z - levels.heights[on], cloud.scale)
         before, rest = levels, z - columns @ fit.coefficients
-        levels = _levels(rest, cloud.floor)
+        levels = _levels(rest, cloud.sweep, scale, share)
         if np.array_equal(before.level, levels.level):
             break
+    standing, lowered = levels.level >= 0, z - levels.heights[np.maximum(levels.level, 0)]
+    points = np.column_stack([x, y, lowered])[standing]
+    flat = height_field(design, kind, replace(cloud, points=points, sweep=cloud.sweep[standing]))
+    coefficients = np.asarray(flat.parameters["coefficients"], dtype=np.float64)
+    flat = replace(flat, residual=lowered - columns @ coefficients, freedom=flat.freedom + levels.freedom)
     if len(levels.heights) < 2:
-        return None
-    on = np.maximum(levels.level, 0)
-    lowered = replace(cloud, points=np.column_stack([x, y, z - levels.heights[on]]))
-    flat = height_field(design, kind, lowered)
+        return flat
     # along the field's normal in the middle, not along the axis of a cloud that the step itself tilts
-    slope = np.asarray(flat.parameters["coefficients"], dtype=np.float64)[1:3]
+    slope = coefficients[1:3]
     heights = levels.heights / np.sqrt(1.0 + slope @ slope)
-    return replace(
-        flat, parameters=flat.parameters | {"levels": heights.tolist()}, freedom=flat.freedom + levels.freedom
-    )
+    return replace(flat, parameters=flat.parameters | {"levels": heights.tolist()})
 
 
 def _pairs(cloud: Cloud) -> tuple[IntArray, IntArray] | None:
@@ -108,7 +121,7 @@ def _pairs(cloud: Cloud) -> tuple[IntArray, IntArray] | None:
     tree, extent = cKDTree(flat), np.ptp(flat, axis=0)
     one, other = [], []
     for axis in range(2):
-        for share in (PAIRS_APART, 2 * PAIRS_APART, 4 * PAIRS_APART):
+        for share in (PAIRS_APART, 2 * PAIRS_APART, 4 * PAIRS_APART, 8 * PAIRS_APART):
             away = np.zeros(2)
             away[axis] = share * extent[axis]
             distance, found = tree.query(flat + away)
@@ -122,24 +135,24 @@ def _pairs(cloud: Cloud) -> tuple[IntArray, IntArray] | None:
     return np.concatenate(one), np.concatenate(other)
 
 
-def _levels(rest: FloatArray, scale: float) -> _Levels:
-    """Levels of what is left (C,) of the heights, the one with the most cells first, as long as each pays."""
+def _levels(rest: FloatArray, sweep: IntArray, scale: float, share: float) -> _Levels:
+    """Levels of what is left (C,) of the heights of sweeps, the one with the most cells first, as long as each pays."""
     reach = FEATURE_RESIDUAL_SDS * scale
     heights: list[float] = []
     level = np.full(len(rest), -1, dtype=np.int64)
-    price = float(np.log(len(rest)))
+    price = float(np.log(max(share * len(rest), 2.0)))  # Schwarz's, of as many as are independent
     while len(heights) < MOST_LEVELS and (level < 0).any():
         height = _densest(np.sort(rest[level < 0]), reach)
         here = (level < 0) & (np.abs(rest - height) < reach)
         new = np.where(here, len(heights), level)
-        gain = float((FEATURE_RESIDUAL_SDS**2 - ((rest[here] - height) / scale) ** 2).sum())
-        before = _Levels(np.array(heights), level).freedom if heights else 0
-        cost = price * (_Levels(np.array([*heights, height]), new).freedom - before)
+        gain = share * float((FEATURE_RESIDUAL_SDS**2 - ((rest[here] - height) / scale) ** 2).sum())
+        before = _Levels(np.array(heights), level, sweep).freedom if heights else 0
+        cost = price * (_Levels(np.array([*heights, height]), new, sweep).freedom - before)
         if heights and gain <= cost:
             break
         heights.append(height)
         level = new
-    return _Levels(np.array(heights) - heights[0], level)
+    return _Levels(np.array(heights) - heights[0], level, sweep)
 
 
 def _densest(ordered: FloatArray, reach: float) -> float:

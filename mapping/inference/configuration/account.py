@@ -153,8 +153,8 @@ def _is_plain(start: Configuration) -> bool:
 
 
 def _weighed(feature: Feature) -> bool:
-    """True of what has a closed form, and was felt by single sweeps."""
-    return kind_of(feature).sampled and not feature.faint
+    """True of what has a closed form, and was felt by single sweeps; of a line, in more than one place of it."""
+    return kind_of(feature).sampled and not feature.faint and not (kind_of(feature).line and len(feature.axis) < 2)
 
 
 def _groups(
@@ -240,7 +240,8 @@ def _blocks(features: list[Feature], crossings: list[Crossing], origins: Sequenc
 def _felt_by(crossing: Crossing, feature: Feature, tip: float) -> bool:
     """True if what a sweep detected may be a part of what a feature disturbs."""
     reach, axis = sizes_of(feature, tip).half_width + crossing.half_width, feature.axis
-    if kind_of(feature).line and not kind_of(feature).has_ends and not feature.closed:  # it goes on
+    goes_on = kind_of(feature).line and not kind_of(feature).has_ends and not feature.closed
+    if goes_on and len(axis) > 1:  # where to, one place does not say
         far = np.linalg.norm(crossing.point - axis[[0, -1]], axis=1)
         ways = axis[[0, -1]] - axis[[1, -2]]
         ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), np.finfo(float).tiny)

@@ -9,11 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mapping import BoolArray, Feature, FloatArray, IntArray
+from mapping.base import over_levels
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference.configuration.joined_shape import JoinedShape
 from mapping.inference.families import Surroundings
-from mapping.inference.kinds import sizes_of
+from mapping.inference.kinds import kind_of, sizes_of
 from mapping.inference.likelihood import Likelihood, Nuisance, Shape, Window, build_likelihood
 from mapping.instrument import Noise
 
@@ -43,6 +44,8 @@ class Places:
         samples: (M,) samples behind each.
         sweep: (M,) number of the sweep.
         spacing: distance between neighbours along a sweep, m.
+        stepped: (M,) of a base with levels the heights over its lowest, where `height` is over the level that each
+            place stands on; none: it has one level.
     """
 
     points: FloatArray
@@ -51,6 +54,7 @@ class Places:
     samples: IntArray
     sweep: IntArray
     spacing: float
+    stepped: FloatArray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +104,16 @@ def neighbourhood(
     for axis, width in zip(axes, widths, strict=True):
         near |= distances(places.points, axis) < NEIGHBOURHOOD_REACH * width
     near &= places.samples > 0
+    parts_levels = len(places.stepped) > 0 and any(_goes_on(feature) for feature in features)
+    if parts_levels:  # an edge between two levels is nothing to one who stands on both
+        places = replace(places, height=places.stepped)
     if near.sum() < FEWEST_PLACES:
         return None
     window = window_of(places, near)
     if not len(window):  # of sweeps with a few samples each no run of places is left
         return None
+    if parts_levels:
+        window = replace(window, height=over_levels(window.height, window.starts[1:-1], around.base.levels))
     height = max([size.height for size in sizes] or [abs(crossing.height) for crossing in crossings])
     half_width = min([size.half_width for size in sizes] or widths)
     vague = 3.0 * max(height, around.noise.sd)
@@ -117,6 +126,11 @@ def neighbourhood(
         levels.append((likelihood, float(constant)))
     told = np.array([crossing.point for crossing in crossings]).reshape(-1, 3)
     return Neighbourhood(window, _finer(window), around, tuple(levels), half_width, told, false_alarms_per_metre)
+
+
+def _goes_on(feature: Feature) -> bool:
+    """True of a line that has no ends of its own, as an edge between two levels."""
+    return kind_of(feature).line and not kind_of(feature).has_ends
 
 
 def thin_half_width(crossing: Crossing, tip: float) -> float:
