@@ -68,7 +68,7 @@ def terraced_quadric(cloud: Cloud) -> Fitted | None:
 
 
 def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
-    """A height field z = design(x, y) @ coefficients + one of a few levels; None where cells cannot tell levels apart.
+    """A height field z = design(x, y) @ coefficients + one of a few levels, or None where one level is enough.
 
     The field's slopes come from differences of heights of cells that lie apart, of which most stand on one level. A
     level counts if the cells on it gain more than its height and the places of its edges cost. The field of the level
@@ -90,20 +90,20 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
     levels = _levels(rest, cloud.sweep, scale, share)
     for _ in range(LEVEL_ROUNDS):
         if len(levels.heights) < 2:
-            break
+            return None
         on = np.maximum(levels.level, 0)
         fit = robust_fit(columns, z - levels.heights[on], cloud.scale)
         before, rest = levels, z - columns @ fit.coefficients
         levels = _levels(rest, cloud.sweep, scale, share)
         if np.array_equal(before.level, levels.level):
             break
+    if len(levels.heights) < 2:
+        return None
     standing, lowered = levels.level >= 0, z - levels.heights[np.maximum(levels.level, 0)]
     points = np.column_stack([x, y, lowered])[standing]
     flat = height_field(design, kind, replace(cloud, points=points, sweep=cloud.sweep[standing]))
     coefficients = np.asarray(flat.parameters["coefficients"], dtype=np.float64)
     flat = replace(flat, residual=lowered - columns @ coefficients, freedom=flat.freedom + levels.freedom)
-    if len(levels.heights) < 2:
-        return flat
     # along the field's normal in the middle, not along the axis of a cloud that the step itself tilts
     slope = coefficients[1:3]
     heights = levels.heights / np.sqrt(1.0 + slope @ slope)

@@ -87,3 +87,11 @@ def table(path: Path, trace: Trace) -> Path:
     columns = np.column_stack([trace.sweep, 1e3 * trace.centers])
     np.savetxt(path, columns, fmt="%.7f", delimiter=",", header="sweep,x [mm],y [mm],z [mm]", comments="")
     return path
+
+
+def test_an_arc_with_a_slot_is_no_plane_that_half_of_it_lies_off() -> None:
+    base = fit_base(rows_over(slot() - X**2 / (2.0 * 0.3), 16, 40e-6))
+    bare = np.column_stack([np.linspace(1e-3, 9e-3, 17), np.full(17, 300e-6), np.zeros(17)])
+    bare = bare[np.abs(bare[:, 0] - EDGE) > 0.2e-3]
+    bare[:, 2] = STYLUS - (bare[:, 0] - EDGE) ** 2 / (2.0 * 0.3) + 3e-3 * bare[:, 0]
+    assert base.kind != "plane" and np.abs(base.foot(bare, STYLUS).height).max() < 1e-6
