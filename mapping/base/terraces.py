@@ -19,7 +19,7 @@ from mapping.base.quadrics import (
     independent_share,
     plane_design,
     quadric_design,
-)  # fmt: skip
+)
 from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_fit, robust_scale
 
 # Cells whose heights are compared lie this share of the cloud's extent apart. Of a staircase of n edges, n eighths of
@@ -99,15 +99,15 @@ def terraced(design: Design, kind: str, cloud: Cloud) -> Fitted | None:
             break
     if len(levels.heights) < 2:
         return None
-    standing, lowered = levels.level >= 0, z - levels.heights[np.maximum(levels.level, 0)]
-    points = np.column_stack([x, y, lowered])[standing]
-    flat = height_field(design, kind, replace(cloud, points=points, sweep=cloud.sweep[standing]))
-    coefficients = np.asarray(flat.parameters["coefficients"], dtype=np.float64)
-    flat = replace(flat, residual=lowered - columns @ coefficients, freedom=flat.freedom + levels.freedom)
+    on = np.maximum(levels.level, 0)
+    lowered = replace(cloud, points=np.column_stack([x, y, z - levels.heights[on]]))
+    flat = height_field(design, kind, lowered)
     # along the field's normal in the middle, not along the axis of a cloud that the step itself tilts
-    slope = coefficients[1:3]
+    slope = np.asarray(flat.parameters["coefficients"], dtype=np.float64)[1:3]
     heights = levels.heights / np.sqrt(1.0 + slope @ slope)
-    return replace(flat, parameters=flat.parameters | {"levels": heights.tolist()})
+    return replace(
+        flat, parameters=flat.parameters | {"levels": heights.tolist()}, freedom=flat.freedom + levels.freedom
+    )
 
 
 def _pairs(cloud: Cloud) -> tuple[IntArray, IntArray] | None:

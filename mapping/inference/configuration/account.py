@@ -19,6 +19,7 @@ from mapping.inference.configuration.neighbourhood import (
     PARTS_OF_BIN,
     Neighbourhood,
     Places,
+    goes_on,
     neighbourhood,
     thin_half_width,
 )
@@ -240,8 +241,7 @@ def _blocks(features: list[Feature], crossings: list[Crossing], origins: Sequenc
 def _felt_by(crossing: Crossing, feature: Feature, tip: float) -> bool:
     """True if what a sweep detected may be a part of what a feature disturbs."""
     reach, axis = sizes_of(feature, tip).half_width + crossing.half_width, feature.axis
-    goes_on = kind_of(feature).line and not kind_of(feature).has_ends and not feature.closed
-    if goes_on and len(axis) > 1:  # where to, one place does not say
+    if goes_on(feature) and not feature.closed and len(axis) > 1:  # where to, one place does not say
         far = np.linalg.norm(crossing.point - axis[[0, -1]], axis=1)
         ways = axis[[0, -1]] - axis[[1, -2]]
         ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), np.finfo(float).tiny)

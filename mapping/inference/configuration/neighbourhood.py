@@ -104,7 +104,7 @@ def neighbourhood(
     for axis, width in zip(axes, widths, strict=True):
         near |= distances(places.points, axis) < NEIGHBOURHOOD_REACH * width
     near &= places.samples > 0
-    parts_levels = len(places.stepped) > 0 and any(_goes_on(feature) for feature in features)
+    parts_levels = len(places.stepped) > 0 and any(goes_on(feature) for feature in features)
     if parts_levels:  # an edge between two levels is nothing to one who stands on both
         places = replace(places, height=places.stepped)
     if near.sum() < FEWEST_PLACES:
@@ -128,7 +128,7 @@ def neighbourhood(
     return Neighbourhood(window, _finer(window), around, tuple(levels), half_width, told, false_alarms_per_metre)
 
 
-def _goes_on(feature: Feature) -> bool:
+def goes_on(feature: Feature) -> bool:
     """True of a line that has no ends of its own, as an edge between two levels."""
     return kind_of(feature).line and not kind_of(feature).has_ends
 
