@@ -35,7 +35,7 @@ VISIBLE_HEIGHT_MARGIN = 1.05
 # of the height asked for: closer sweeps cost more than slower ones
 LEAST_VISIBLE_SHARE, MOST_VISIBLE_SHARE = 0.1, 5.0 / 6.0
 # Sweeps that were laid out before the first told the noise stand if what it told leaves so much of the surface
-# inspected, and would make strips no wider than by one over that
+# inspected, and would make strips no wider than by one over that; so much is asked of a run in the end
 STANDS = 0.95
 # Lines that are worked out before each sweep: one takes some 13 ms on the bench's bodies, and the finger is to wait no
 # longer than 50 ms; all are after a third of the sweeps
