@@ -14,6 +14,7 @@ from mapping import Feature, length_text, place_text
 from mapping.detection import CLEAR
 from mapping.detection.path import PathLedger
 from mapping.inference.configuration import numbers_in
+from mapping.model import probability
 
 # One and several of each reason for which a sweep is cut
 CUT_NAMES = {
@@ -25,6 +26,7 @@ CUT_NAMES = {
 # What a job's folder may hold, the first of which that is there is named last
 RESULTS = (("report", "report.html"), ("features", "features.csv"))
 MOST_REMARKS = 5  # remarks on the form of features; the report and model.json have them all
+AS_GOOD_AS_CERTAIN = 0.995  # probability from which on a feature is not said to be doubtful: 100 % where it is rounded
 MOST_LISTED_FEATURES = 20  # features that are listed one by one; the report has them all
 
 
@@ -300,7 +302,9 @@ def tolerance_lines(analysis: Analysis) -> list[str]:
 
 
 def feature_line(feature: Feature) -> str:
-    """A feature's name and its sizes with their intervals, in one line."""
+    """A feature's name, its sizes with their intervals, and how probable it is where it is not certain, in one line."""
     sizes = [("height", feature.height), ("width", feature.width), ("length", feature.length)]
     known = [f"{name} {interval}" for name, interval in sizes if interval.median or interval.censored]
-    return f"  {feature.id}: {', '.join(known)}"
+    share = probability(feature)
+    doubt = "" if share is None or share >= AS_GOOD_AS_CERTAIN else f"; probable as told: {100 * share:.0f} %"
+    return f"  {feature.id}: {', '.join(known)}{doubt}"

@@ -13,7 +13,7 @@ from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference import describe
 from mapping.inference.configuration.configuration import Configuration, fitted, part_of
-from mapping.inference.configuration.joined_shape import JoinedShape, OneOfMany
+from mapping.inference.configuration.joined_shape import OneOfMany
 from mapping.inference.configuration.neighbourhood import (
     NEIGHBOURHOOD_REACH,
     PARTS_OF_BIN,
@@ -268,6 +268,8 @@ def _described(best: Configuration, around: Surroundings, algorithms: tuple[int,
     draws = theta + rng.standard_normal((PRELIMINARY_DRAWS, len(theta))) @ root_of(best.found.covariance).T
     features = []
     for k, (part, own) in enumerate(zip(best.parts, best.shape.columns, strict=True)):
+        if not best.stands[k]:
+            continue
         others = [*(other.shape for other in best.parts if other is not part), *best.place.held]
         theirs = np.append(np.delete(theta, np.arange(own.start, own.stop)), best.place.theirs)
         target = OneOfMany(part.shape, likelihood, None, others, theirs, PARTS_OF_BIN)
@@ -278,16 +280,9 @@ def _described(best: Configuration, around: Surroundings, algorithms: tuple[int,
         some[0] = theta[own]
         posterior = Posterior(part.shape.names, part.shape.units, some, nan, nan, "not needed", "preliminary")
         found = describe(problem, posterior, around.base)
-        features.append(replace(found, posterior=None, evidence=_support(k, best, algorithms)))
+        support = Support(best.strength(k), best.runs(k), algorithms)
+        features.append(replace(found, posterior=None, evidence=support))
     return features
-
-
-def _support(k: int, best: Configuration, algorithms: tuple[int, ...]) -> Support:
-    """Signal-to-noise ratio of the k-th part, and the runs that felt it."""
-    part = best.parts[k]
-    template = JoinedShape([part.shape], len(best.place.window), PARTS_OF_BIN).templates(part.start[None])
-    white = best.place.levels[0][0].filter.whiten(template)[0]
-    return Support(float(np.sqrt(white @ white)), best.runs(k), algorithms)
 
 
 def _meeting(features: list[Feature], tip: float) -> list[Feature]:

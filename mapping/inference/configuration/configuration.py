@@ -13,10 +13,10 @@ from mapping import Feature, FloatArray
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import crest_trace
 from mapping.inference.configuration.common_deviation import Deviation, Fitted, common_deviation
-from mapping.inference.configuration.joined_shape import JoinedShape
+from mapping.inference.configuration.joined_shape import JoinedShape, stands_out
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood
 from mapping.inference.curves import HIGHEST_DEGREE
-from mapping.inference.families import RidgeShape, TwinShape, bell_beside, trapezoid_beside, twin_beside
+from mapping.inference.families import RidgeShape, StepShape, TwinShape, bell_beside, trapezoid_beside, twin_beside
 from mapping.inference.kinds import LineKind, PointKind, kind_of, sizes_of
 from mapping.inference.likelihood import LogPosterior, Shape
 from mapping.inference.sampler import Laplace, find_optima, laplace
@@ -81,7 +81,31 @@ class Configuration:
     @property
     def kinds(self) -> tuple[str, ...]:
         """The features that it consists of."""
-        return tuple(sorted(kind for part in self.parts for kind in part.kinds))
+        standing = zip(self.parts, self.stands, strict=True)
+        return tuple(sorted(kind for part, stands in standing if stands for kind in part.kinds))
+
+    @cached_property
+    def stands(self) -> list[bool]:
+        """Of each part whether it is a detail of its own: not a crest that only bounds the hollow beside it.
+
+        The ball that sinks into a hollow rests on the crests at its rims however low they are. Standing on the bare
+        base a crest explains half of its signal-to-noise ratio squared at most; where that does not pay for one detail
+        more, what it gains beyond it gains as a part of the hollow's section.
+        """
+        if not any(_is_hollow(part) for part in self.parts):
+            return [True] * len(self.parts)
+        strengths = [self.strength(k) for k in range(len(self.parts))]
+        return [
+            not stands_out(part.shape) or 0.5 * strength**2 > -_log_prior(part, self.place)
+            for part, strength in zip(self.parts, strengths, strict=True)
+        ]
+
+    def strength(self, k: int) -> float:
+        """Signal-to-noise ratio of the k-th part alone, over the bare base."""
+        part = self.parts[k]
+        template = JoinedShape([part.shape], len(self.place.window), PARTS_OF_BIN).templates(part.start[None])
+        white = self.place.levels[0][0].filter.whiten(template)[0]
+        return float(np.sqrt(white @ white))
 
     @cached_property
     def shape(self) -> JoinedShape:
@@ -223,6 +247,11 @@ def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | N
     prior = sum(_log_prior(part, place) for part in parts)
     odds = evidence + float(constants[level]) - float(np.log(len(constants))) + plain + prior
     return Configuration(moved, place, found, level, float(odds), deviation)
+
+
+def _is_hollow(part: Part) -> bool:
+    """True of what the ball sinks into."""
+    return not stands_out(part.shape) and not isinstance(part.shape, StepShape)
 
 
 def _log_prior(part: Part, place: Neighbourhood) -> float:

@@ -25,6 +25,7 @@ def feature(name: str, finer: bool, length: Interval) -> SimpleNamespace:
         length=length,
         details=SimpleNamespace(misfit=None, account=()),
         posterior=None,
+        log_odds=None,
     )
 
 
@@ -117,6 +118,14 @@ def test_each_feature_has_a_line_with_its_intervals() -> None:
     )
     assert "length" not in bump
     assert cut.endswith("length at least 40 mm")
+
+
+def test_what_is_not_certain_has_its_probability() -> None:
+    doubtful, sure = (feature(name, True, Interval(0.0, 0.0, 0.0)) for name in ("ridge-1", "ridge-2"))
+    doubtful.log_odds, sure.log_odds = 1.53, 5.4
+    _, first, second, _ = summary(analysis(doubtful, sure))
+    assert first.endswith("width 1 mm; probable as told: 82 %")
+    assert second.endswith("width 1 mm")
 
 
 def test_a_table_says_how_it_was_read_and_how_far_its_samples_reach() -> None:

@@ -253,3 +253,22 @@ def test_places_without_a_sample_between_others_end_no_run() -> None:
     inside = np.arange(count) != 10
     parted = window_of(Places(points, up, np.zeros(count), samples, sweep, spacing), inside)
     np.testing.assert_array_equal(parted.starts, [0, 4, 8])
+
+
+def test_what_only_bounds_a_hollow_is_no_ridge() -> None:
+    """A hollow that runs out like a cosine, and under a noise that hides its form: crests of no height along its rims
+    hold the ball as its flanks do, and are no features."""
+    tip, depth, width, sweeps = 3e-3, 0.5e-3, 3.5e-3, 16
+    x, fine = np.arange(-8e-3, 8e-3, 20e-6), np.arange(-12e-3, 12e-3, 10e-6)
+    ground = -0.5 * depth * (1.0 + np.cos(np.pi * np.clip(np.abs(fine) / (0.5 * width), 0.0, 1.0)))
+    aside = x[:, None] - fine
+    ball = np.where(np.abs(aside) < tip, np.sqrt(np.maximum(tip**2 - aside**2, 0.0)), -np.inf)
+    felt = (ground + ball).max(axis=1) - tip
+    corners = 0.1 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    base, sweep = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]])), np.repeat(np.arange(sweeps), len(x))
+    y = 1e-3 * (sweep - 0.5 * (sweeps - 1))
+    z = tip + np.where(np.abs(y) < 5.2e-3, np.tile(felt, sweeps), 0.0)
+    for seed in (1, 4):
+        noise = 30e-6 * np.random.default_rng(seed).standard_normal(len(z))
+        trace = Trace(1e-3 * np.arange(len(z)), np.column_stack([np.tile(x, sweeps), y, z + noise]), sweep, tip)
+        assert [feature.kind for feature in assemble(detect(trace, base), trace, base, faint=False)] == ["groove"]
