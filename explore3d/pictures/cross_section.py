@@ -21,6 +21,9 @@ SECTION_BINS = 60
 GRID = 241
 # Sine of the angle at which a sweep must cross a line to show its section: 30 degrees
 LEAST_SINE = 0.5
+# Half-widths, and standard deviations of places along the sweep, by which samples may go back before it has turned: not
+# to be seen, and more than noise moves one of thousands
+GONE_BACK, GONE_BACK_SDS = 0.05, 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,7 @@ def cross_section(
     half = max(half_width(feature, trace.tip_radius), 0.0 if crossing is None else crossing.half_width)
     heading = _heading(feature, feet.points, half)
     x, beside = _place(feature, feet.points, feet.normals, heading)
-    near = (np.abs(x) < SECTION_REACH * half) & (beside < half)
+    near = (np.abs(x) < SECTION_REACH * half) & (beside < half) & _one_way(x, beside, half)
     index = np.flatnonzero(near)[np.argsort(x[near], kind="stable")]
     if len(index) < 3:
         return None
@@ -142,6 +145,29 @@ def _window(feature: Feature, crossing: Crossing | None, trace: Trace) -> IntArr
     # A sweep may cross a feature many times: what is far from this crossing is another one.
     margin = 1.5 * (crossing.stop - crossing.start) + 10
     return own[max(0, int(crossing.start - margin)) : int(crossing.stop + margin)]
+
+
+def _one_way(x: FloatArray, beside: FloatArray, half: float) -> BoolArray:
+    """Samples from the one in the middle of the section to where the sweep turns on either side.
+
+    A sweep that turns within the section passes the same distances twice, at other places of the feature.
+    """
+    # second differences of places along an even way are noise, of a variance six times as large
+    noise = float(np.median(np.abs(np.diff(x, 2)))) / (0.6745 * np.sqrt(6.0)) if len(x) > 2 else 0.0
+    least = max(GONE_BACK * half, GONE_BACK_SDS * noise)
+    on, ways = int(np.hypot(x, beside).argmin()), list[tuple[float, IntArray]]()
+    for own in (np.arange(on, len(x)), np.arange(on, -1, -1)):
+        away = x[own] - x[on]
+        way = float(np.sign(away[int(np.argmax(np.abs(away) > least))]))
+        gone = way * away
+        back = np.maximum.accumulate(gone) - gone > least
+        ways.append((way, own[: int(np.argmax(gone[: int(np.argmax(back))])) + 1] if back.any() else own))
+    if ways[0][0] == ways[1][0]:  # it turns just there
+        ways = [max(ways, key=lambda each: len(each[1]))]
+    kept = np.zeros(len(x), dtype=bool)
+    for _, own in ways:
+        kept[own] = True
+    return kept
 
 
 def _nearest_passage(feature: Feature, trace: Trace) -> IntArray:

@@ -28,6 +28,18 @@ def test_without_a_crossing_the_nearest_sweep_is_taken() -> None:
     assert section is not None and section.sweep == 5
 
 
+def test_a_sweep_that_turns_beside_the_line_shows_one_passage() -> None:
+    """To and fro under one number, the way back 3 mm further along the line, where it is only half as high."""
+    there = np.arange(-5e-3, 2e-3, 20e-6)
+    y, x = np.concatenate([there, there[::-1]]), np.repeat([0.0, 3e-3], len(there))
+    felt = cap_height(y, HEIGHT, 0.5 * HEIGHT, TIP) * np.where(x > 0.0, 0.5, 1.0)
+    trace = Trace(np.arange(len(y)), np.column_stack([x, y, TIP + felt]), np.zeros(len(y), dtype=np.int64), TIP)
+    section = cross_section(ridge(), trace, BASE, [crossing(0, 0.0)])
+    assert section is not None
+    np.testing.assert_allclose(section.height, cap_height(section.x, HEIGHT, 0.5 * HEIGHT, TIP), atol=1e-9)
+    assert (np.diff(section.x) > 0.0).all() and np.ptp(section.x) > 4.5e-3
+
+
 def test_a_feature_that_no_sweep_came_near_has_no_section() -> None:
     size = Interval.normal(1e-4, 1e-6)
     far = Feature("bump", np.array([[0.0, 0.5, 0.0]]), UP[None], size, size, size, Support(9.0, 1), True, 1e-5)
