@@ -44,7 +44,7 @@ def test_the_script_makes_exactly_what_is_shipped(tmp_path: Path) -> None:
     assert made == shipped
     for path in shipped:
         # another processor's sine may differ in the last digit
-        assert len((tmp_path / "assets" / path).read_bytes()) == (ASSETS / path).stat().st_size < 1_000_000
+        assert len((tmp_path / "assets" / path).read_bytes()) == (ASSETS / path).stat().st_size < 1_600_000
 
 
 @pytest.mark.parametrize("name", NAMES)

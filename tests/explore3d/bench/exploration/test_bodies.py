@@ -14,6 +14,7 @@ from explore3d.bench.scenes.any_body import BODY_BUILDING_SEEDS, BODY_REPORTED_S
 from explore3d.bench.scenes.bodies import sphere_mesh
 from explore3d.bench.scenes.laid_on import Detail, drawn_details, laid_on
 from explore3d.log import Event
+from mapping.geometry.contact import BallContact
 from mapping.geometry.mesh.nearest import NearestPoint
 from mapping.surface import Surface
 
@@ -35,7 +36,7 @@ def test_a_detail_has_its_height_and_leaves_the_rest_of_the_body_where_it_was() 
     detailed = Surface(*laid_on((plain.vertices, plain.faces), [ridge]))
     assert not detailed.open_sides.any()
     top = detailed.vertices[:, 2].max() - 0.02
-    assert 0.97 * 0.5e-3 < top < 0.5e-3 + 1e-12
+    assert 0.994 * 0.5e-3 < top < 0.5e-3 + 1e-12
     off = NearestPoint(plain).query(detailed.vertices).distance
     assert off[ridge.distance(detailed.vertices) > 1.2e-3].max() < 1e-12
     # the sum of what stands out: half the height over the width along the course, a round end at either side
@@ -51,6 +52,25 @@ def test_a_bump_is_as_high_as_it_is_said_to_be_wherever_it_lies() -> None:
         detailed = Surface(*laid_on((plain.vertices, plain.faces), [bump]))
         assert not detailed.open_sides.any()
         assert detailed.vertices[:, 2].max() == pytest.approx(0.0206, abs=1e-9)
+
+
+@pytest.mark.parametrize(("kind", "height", "width"), [("bump", 0.6e-3, 3e-3), ("ridge", 0.5e-3, 2e-3)])
+def test_the_ball_feels_a_detail_as_high_as_its_section(kind: str, height: float, width: float) -> None:
+    plain = box(0.04)
+    course = np.array([[0.0, 0.0, 0.02]]) if kind == "bump" else np.array([[-6e-3, -2e-3, 0.02], [6e-3, 3e-3, 0.02]])
+    detail = Detail(kind, course, np.tile([0.0, 0.0, 1.0], (len(course), 1)), height, width)
+    detailed = BallContact(Surface(*laid_on((plain.vertices, plain.faces), [detail])), R)
+    rng = np.random.default_rng(3)
+    along = rng.uniform(0.25, 0.75, (400, 1))
+    beside = course[0] + along * (course[-1] - course[0]) + rng.uniform(-0.3, 0.3, (400, 3)) * [1e-3, 1e-3, 0.0]
+    distance = detail.distance(beside)
+    felt = 0.03 - detailed.first_contact(beside + np.array([0.0, 0.0, 0.01]), [0.0, 0.0, -1.0]).distance - 0.02 - R
+    u = np.linspace(0.0, 0.5 * width, 2001)
+    ideal = height * np.cos(np.pi * u / width) ** 2 + np.sqrt(R**2 - (u - distance[:, None]) ** 2)
+    off = felt - (ideal.max(axis=1) - R)
+    # half of a standard deviation of a height that a run measures, 4.6 um of a bump and 1.9 of a ridge
+    assert abs(off.mean()) < (2.3e-6 if kind == "bump" else 0.95e-6)
+    assert off.min() > -4.5e-6 and off.max() < 1e-9
 
 
 def volume(surface: Surface) -> float:
