@@ -76,6 +76,7 @@ def test_the_seeds_that_are_reported_are_not_those_of_tuning():
     assert not set(bench.CURVATURE_SEEDS) & set(bench.CURVATURE_TUNING_SEEDS)
 
 
+@pytest.mark.slow
 def test_a_cell_compares_all_methods_at_the_same_vertices(tmp_path):
     cells = bench.measure_cell("saddle", "thin", 1e-3, ["explore3d", "jets alone", "libigl, 2 rings"], [1, 5])
     ours, jets, libigl = cells

@@ -66,6 +66,7 @@ def test_no_line_gets_sizes_that_are_wrong_and_sure(body: str) -> None:
     assert record["judged"] in JUDGED_RIGHT + open_, record
 
 
+@pytest.mark.slow
 def test_a_line_that_grows_is_remarked_upon() -> None:
     record = section_trial("taper", "white", SEED)
     assert record["flagged"] and "its height varies along it" in " ".join(record["notes"])

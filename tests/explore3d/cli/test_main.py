@@ -143,6 +143,7 @@ def test_a_wrong_call_is_refused_with_status_2(
     assert "Traceback" not in captured.err
 
 
+@pytest.mark.slow
 def test_a_plan_is_told_in_words_and_as_json(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -33,6 +33,7 @@ def sweeping(plan: DryRun) -> float:
     return sum(move.duration for move in plan.moves if move.purpose == "sweep")
 
 
+@pytest.mark.slow
 def test_the_span_of_the_shortest_ridge_and_the_fastest_speed_save_finger_time(tmp_path: Path) -> None:
     ridges, fast = planned(tmp_path, RIDGE), planned(tmp_path, FASTEST)
     assert sweeping(ridges) < 80.0  # 253 s where bumps are looked for, too
@@ -41,6 +42,7 @@ def test_the_span_of_the_shortest_ridge_and_the_fastest_speed_save_finger_time(t
     assert sweeping(fast) == pytest.approx(sweeping(ridges) * 0.03 / 0.25, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_what_a_detail_adds_is_foretold(tmp_path: Path) -> None:
     text = TEXT.replace("wire_on_plate.ply", "wire_on_tile.ply").replace("meshes/plate.ply", "meshes/tile.ply")
     text = text.replace('radius = "10 mm"', 'radius = "5 mm"').replace('white = "0.2 mm"', 'white = "0.05 mm"')
@@ -153,6 +155,7 @@ def test_pecks_far_apart_leave_surface_between_them(tmp_path: Path) -> None:
     assert swept[0] > 0.99 and swept[1] < 0.96
 
 
+@pytest.mark.slow
 def test_how_far_the_finger_leaves_its_region_is_told(tmp_path: Path) -> None:
     scene = block_scene(tmp_path, 2.0, 4.0)
     told = plan_scene(scene).account
@@ -167,6 +170,7 @@ def test_how_far_the_finger_leaves_its_region_is_told(tmp_path: Path) -> None:
     assert "Sweeps leave the region by up to" in away.sentence()
 
 
+@pytest.mark.slow
 def test_the_underside_is_told_and_left_out_where_the_scene_names_sides(tmp_path: Path) -> None:
     text = block_scene(tmp_path, 2.0, 4.0).read_text()
     whole, above = tmp_path / "whole.toml", tmp_path / "above.toml"

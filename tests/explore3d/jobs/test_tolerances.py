@@ -65,6 +65,7 @@ def test_a_sidecar_says_them_and_the_option_wins(scan: Path, tmp_path: Path) -> 
     assert [each.verdict for each in judged] == [PASS]
 
 
+@pytest.mark.slow
 def test_a_batch_keeps_the_verdict_of_each_log(
     scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

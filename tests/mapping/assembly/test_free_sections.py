@@ -109,6 +109,7 @@ def test_what_stands_on_the_floor_of_a_wide_hollow_is_a_detail_of_its_own() -> N
     assert abs(wire.height.median - 2e-6) < 0.3e-6 and abs(wire.axis[0, 0] - 2e-3) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_step_through_which_the_base_was_drawn_stays_a_step() -> None:
     found = felt(lambda u: np.where(u > 0.0, 4.6e-6, 0.0), 4)
     assert [feature.kind for feature in found] == ["step"] and not found[0].details.free_section

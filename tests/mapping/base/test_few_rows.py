@@ -51,7 +51,7 @@ def test_two_or_three_rows_over_a_slot_are_a_plane(rows: int) -> None:
     assert fit_base(rows_over(slot(), rows, 20e-6)).kind in ("plane", "quadric")
 
 
-@pytest.mark.parametrize("rows", [2, 3, 8, 16])
+@pytest.mark.parametrize("rows", [2, 3, *(pytest.param(rows, marks=pytest.mark.slow) for rows in (8, 16))])
 def test_a_step_across_rough_rows_parts_two_levels(rows: int) -> None:
     base = fit_base(rows_over(step(), rows, 30e-6))
     parted = levels(base)
@@ -60,12 +60,13 @@ def test_a_step_across_rough_rows_parts_two_levels(rows: int) -> None:
     assert np.diff(parted)[0] == pytest.approx(6e-6, abs=0.3e-6)
 
 
+@pytest.mark.slow
 def test_rough_rows_without_a_step_have_one_level() -> None:
     for rows in (2, 3, 16):
         assert len(levels(fit_base(rows_over(np.zeros(10000), rows, 30e-6, seed=11)))) == 1
 
 
-@pytest.mark.parametrize("rows", [2, 8])
+@pytest.mark.parametrize("rows", [2, pytest.param(8, marks=pytest.mark.slow)])
 def test_a_slot_that_a_few_rough_rows_cross_is_found(tmp_path: Path, rows: int) -> None:
     (found,) = analyze(
         table(tmp_path / "rows.csv", rows_over(slot(), rows, 20e-6)), tip_radius=STYLUS, quick=True
@@ -76,6 +77,7 @@ def test_a_slot_that_a_few_rough_rows_cross_is_found(tmp_path: Path, rows: int) 
     assert found.width.median == pytest.approx(100e-6, abs=2e-6)
 
 
+@pytest.mark.slow
 def test_an_edge_between_levels_is_weighed_over_the_lower_one(tmp_path: Path) -> None:
     model = analyze(table(tmp_path / "rows.csv", rows_over(step(), 3, 20e-6)), tip_radius=STYLUS, quick=True).model
     highest = max(model, key=lambda feature: abs(feature.height.median))

@@ -314,6 +314,7 @@ def test_sparse_sweeps_among_dense_ones_raise_no_more_false_alarms_than_asked() 
     assert {round(1e5 * p) for p in np.diff(trace.centers[:25, 0])} == {50}
 
 
+@pytest.mark.slow
 def test_places_under_correlated_noise_lie_within_their_intervals() -> None:
     # the highest of the likelihood's tops is sharper than the truth is near: by its bend alone 90 % held 72 %
     noise, inside = Noise(2e-5, 4e-5, 1.5e-3), []

@@ -86,6 +86,7 @@ def test_an_end_that_was_not_explored_is_censored():
     assert 10e-3 < found.length.low < 4e-3 - min(path[0, 0] for path in CROSSINGS) + 0.1e-3
 
 
+@pytest.mark.slow
 def test_zigzag_leaves_the_end_anywhere_between_two_sweeps():
     # crossings 16 mm apart: beyond 3.6 mm from either, nothing is felt of the end
     paths = [line((x, -12e-3), (x, 12e-3)) for x in (-32e-3, -16e-3, 0.0, 16e-3, 32e-3)]
@@ -182,6 +183,7 @@ def test_a_pit_with_a_bottom_has_its_depth():
     assert not found.height.censored and inside(found.height, -0.1e-3, 1e-6) and inside(found.width, 4e-3, 20e-6)
 
 
+@pytest.mark.slow
 def test_a_high_step_felt_finely_is_found_from_beside_it():
     # between single samples the steep foot of the arc makes hollows in the density, and a doubtful tip goes with them
     noise = Noise(25e-6)

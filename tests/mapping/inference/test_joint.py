@@ -59,6 +59,7 @@ def test_arms_that_meet_share_the_place_where_they_do():
     assert np.array_equal(found[0].axis[0], found[1].axis[0]) and np.array_equal(found[0].axis[0], found[2].axis[0])
 
 
+@pytest.mark.slow
 def test_features_far_from_each_other_are_refined_each_for_itself():
     pair = [np.array([[-12e-3, y, 0.0], [12e-3, y, 0.0]]) for y in (-15e-3, 15e-3)]
     tops = [wire(ends) for ends in pair]

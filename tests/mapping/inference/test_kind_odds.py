@@ -53,6 +53,7 @@ def test_a_ridge_is_told_from_a_bump():
     assert odds[0] > 10.0 and odds[1] < 0.0
 
 
+@pytest.mark.slow
 def test_something_is_told_from_nothing():
     feature, base = setting("bump")
     ball = np.array([[0, 0, D / 2]])

@@ -16,7 +16,9 @@ def test_what_is_on_a_profile_is_found(name: str) -> None:
         assert abs(feature.height.median) == pytest.approx(abs(height), rel=0.05)
 
 
-@pytest.mark.parametrize("name", ["faint scratch", "slot", "hump"])
+@pytest.mark.parametrize(
+    "name", ["faint scratch", *(pytest.param(name, marks=pytest.mark.slow) for name in ("slot", "hump"))]
+)
 def test_what_crosses_a_raster_is_found(name: str) -> None:
     found, wanted, length = raster_trial(name, 1, 16)
     assert [feature.kind for feature in found] == [kind for kind, _, _ in wanted]

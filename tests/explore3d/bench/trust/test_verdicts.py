@@ -71,6 +71,7 @@ def test_every_body_is_its_own_base_and_wires_stand_on_it():
     assert len(TRUST_BODIES) == 4
 
 
+@pytest.mark.slow
 def test_a_wire_is_as_high_as_it_stands_over_the_facets_of_a_round_body():
     wired, base, truth, _ = wired_path("sphere", BUILDING.sizes[0], BUILDING.tips[1], (1, 2))
     feet = base.foot(wired.centers, wired.tip_radius)

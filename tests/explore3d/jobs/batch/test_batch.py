@@ -44,6 +44,7 @@ def rows(store: Path, table: str) -> list[dict[str, Any]]:
     return [row for file in sorted((store / table).glob("*.parquet")) for row in pq.read_table(file).to_pylist()]
 
 
+@pytest.mark.slow
 def test_each_log_has_its_row_equal_to_a_single_run_and_is_not_done_again(here: Path) -> None:
     scans = here / "scans"
     scans.mkdir()

@@ -99,7 +99,7 @@ def test_an_hjif_file_keeps_the_rules_of_the_reference_software() -> None:
         assert band["lower_frequency_limit"] <= band["upper_frequency_limit"]
 
 
-@pytest.mark.parametrize("empty", [True, False])
+@pytest.mark.parametrize("empty", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_crossings_without_events_and_long_ones_validate_too(empty: bool) -> None:
     samples = 10_000 if empty else 48_000 * 70  # longer than one continuous event of Core Haptics
     height = np.zeros(samples) if empty else 1e-4 * np.sin(np.arange(samples) / 500.0)

@@ -58,6 +58,7 @@ def test_of_noise_alone_nothing_is_told(reach: int) -> None:
     assert told == [0, 0]
 
 
+@pytest.mark.slow
 def test_the_command_finds_it_on_a_raster_as_on_a_profile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

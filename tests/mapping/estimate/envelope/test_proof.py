@@ -161,6 +161,7 @@ def test_a_tolerance_that_is_no_length_is_refused(tolerance):
         estimate_surface(raster(lambda x, y: 0 * x + 1), tolerance=tolerance)
 
 
+@pytest.mark.slow
 def test_a_part_with_holes_lies_within_its_intervals():
     positions, contacts = bench_labels(["holed_plate"], None, [0.05], [5], directions=1)
     assert positions.outside == contacts.outside == 0
@@ -169,7 +170,7 @@ def test_a_part_with_holes_lies_within_its_intervals():
     assert contacts.worst <= 1e-6
 
 
-@pytest.mark.parametrize("lean", [0.0, 0.7, 1.2])
+@pytest.mark.parametrize("lean", [pytest.param(0.0, marks=pytest.mark.slow), 0.7, 1.2])
 def test_what_a_plane_allows_to_prove_is_what_is_proven_of_it(lean):
     way = np.array([np.sin(lean) * 0.6, np.sin(lean) * 0.8, -np.cos(lean)])
     half = 4 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])

@@ -78,6 +78,7 @@ def test_details_together_leave_what_the_ball_feels_of_them(body: str, off: floa
         assert np.abs(beside.templates(np.tile(start[k], (2, 1))) - felt).max() < 1e-15
 
 
+@pytest.mark.slow
 def test_more_details_than_are_weighed_at_once_are_weighed_beside_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five wires in a row, each within the disturbance of the next, in blocks of three."""
     tip, pitch, height, count, together = 5e-3, 2.2e-3, 0.15e-3, 5, 3
