@@ -75,8 +75,9 @@ def assemble(
     wide = list[Feature]()
     if base.kind != "mesh":  # a given base that is off is no detail, however wide
         sections, upon, rest = free_sections(detections, laid)
-        wide = free_lines(sections, detections, laid)
-        crossings = tuple(c for c in (*rest, *upon) if not any(lies_on(c, feature) for feature in wide))
+        wide, slanted = free_lines(sections, detections, laid)
+        fine = [*rest, *upon, *(crossing for section in slanted for crossing in section.inside)]
+        crossings = tuple(c for c in fine if not any(lies_on(c, feature) for feature in wide))
         detections = replace(detections, crossings=crossings)
     features = [] if spacing is None or not crossings else _linked(detections, laid, inspections.at(spacing))
     if features and spacing is not None and proposals:

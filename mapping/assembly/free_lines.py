@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from mapping import Details, Feature, FloatArray, Support
-from mapping.assembly.free import CORE, FreeSection, free_spot, mean_sizes
+from mapping.assembly.free import CORE, WIDER_THAN_CREST, FreeSection, free_spot, mean_sizes
 from mapping.assembly.lines import FULL_HEIGHT, ONE_POINT, mean_point, merged
 from mapping.assembly.linking import Branch, Inspection, Inspections, LineEnd, branches, ended_length, groups
 from mapping.base import LaidTrace
@@ -31,12 +31,15 @@ LAST_LEGS = 4
 UNIFORM_HALF_90 = 0.45
 
 
-def free_lines(sections: Sequence[FreeSection], detections: Detections, trace: LaidTrace) -> list[Feature]:
-    """The ridges, grooves, bumps and pits that the sections of several sweeps are of.
+def free_lines(
+    sections: Sequence[FreeSection], detections: Detections, trace: LaidTrace
+) -> tuple[list[Feature], list[FreeSection]]:
+    """The ridges, grooves, bumps and pits that the sections of several sweeps are of, and the sections that are wide
+    only because their sweeps run at a slant to a line.
 
     Reference: theory section 5.4.
     """
-    found = list[Feature]()
+    found, slanted = list[Feature](), list[FreeSection]()
     for sign in (1.0, -1.0):
         alike = [section for section in sections if section.sign == sign]
         if alike:
@@ -48,9 +51,10 @@ def free_lines(sections: Sequence[FreeSection], detections: Detections, trace: L
             for members in sorted(linked, key=len, reverse=True):  # what ends a line is found with it
                 group = [alike[k] for k in members]
                 if not any(lies_on(section.crossing, line) for line in own for section in group):
-                    own += _of_group(group, inspection, detections, trace)
+                    lines, not_wide = _of_group(group, inspection, detections, trace)
+                    own, slanted = [*own, *lines], [*slanted, *not_wide]
             found += own
-    return found
+    return found, slanted
 
 
 def lies_on(crossing: Crossing, feature: Feature) -> bool:
@@ -62,23 +66,26 @@ def lies_on(crossing: Crossing, feature: Feature) -> bool:
 
 def _of_group(
     group: list[FreeSection], inspection: Inspection, detections: Detections, trace: LaidTrace
-) -> list[Feature]:
-    """The spot, or the lines, that linked sections are of."""
+) -> tuple[list[Feature], list[FreeSection]]:
+    """The spot, or the lines, that linked sections are of; and those of them that across their line are not wide."""
     highest = max(group, key=lambda section: abs(section.crossing.height))
     points = np.array([section.crossing.point for section in group])
     if np.linalg.norm(np.ptp(points, axis=0)) <= highest.sizes.width:
         spot = free_spot(_between_sweeps(highest, group), detections.algorithm)
-        return [replace(spot, evidence=_evidence(group, detections.algorithm))]
+        return [replace(spot, evidence=_evidence(group, detections.algorithm))], []
     half_width = 0.5 * float(np.median([section.sizes.width for section in group]))
     # a row that was swept to and fro crosses twice in one place
     places = np.array([mean_point(each) for each in merged([s.crossing for s in group], ONE_POINT * half_width)])
     lines = [line for line in branches(places, half_width) if len(line.axis) > 1]
     apart = np.array([distances(points, line.axis) for line in lines])
-    found = list[Feature]()
+    found, slanted = list[Feature](), list[FreeSection]()
     for number, line in enumerate(lines):
         own = [group[k] for k in np.flatnonzero(apart.argmin(axis=0) == number)]
-        found += [_line(line, own, inspection, detections, trace)] if own else []
-    return found
+        if own and np.median([_squareness(line.axis, each) * each.times_crest for each in own]) > WIDER_THAN_CREST:
+            found.append(_line(line, own, inspection, detections, trace))
+        else:
+            slanted += own
+    return found, slanted
 
 
 def _between_sweeps(highest: FreeSection, group: list[FreeSection]) -> FreeSection:

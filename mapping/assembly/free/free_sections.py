@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import Details, Feature, FloatArray, Interval, Support
-from mapping.assembly.free.outline import of_all_scales, overlap
+from mapping.assembly.free.outline import of_all_scales, overlap, times_crest
 from mapping.assembly.free.section import Section
 from mapping.assembly.free.sizes import SectionSizes, sizes_of_section
 from mapping.base import LaidSweep, LaidTrace, SweepHeights
@@ -37,14 +37,16 @@ class FreeSection:
         sizes: along the sweep.
         piece: heights of the sweep about it, in the finest bins.
         log_odds: for it, on this sweep.
-        parts: crossings that are parts of it.
+        times_crest: how many times as wide it was felt as a crest of no width across the sweep.
+        inside: crossings that are parts of it.
     """
 
     crossing: Crossing
     sizes: SectionSizes
     piece: SweepHeights
     log_odds: float
-    parts: int
+    times_crest: float
+    inside: tuple[Crossing, ...]
 
     @property
     def sign(self) -> float:
@@ -106,7 +108,7 @@ def free_spot(section: FreeSection, algorithm: int) -> Feature:
         height=sizes.height_interval(section.sign),
         width=sizes.width_interval(),
         length=Interval(0.0, 0.0, 0.0),
-        evidence=Support(crossing.snr, section.parts, (algorithm,), section.log_odds),
+        evidence=Support(crossing.snr, len(section.inside), (algorithm,), section.log_odds),
         curvature_feature=False,
         position_sd=crossing.position_sd,
         details=Details(top=sizes.top, free_section=True),
@@ -153,7 +155,9 @@ def _measured(
         start=int(piece.first[section.begin]),
         stop=int(piece.first[section.end + 1]),
     )
-    return FreeSection(crossing, sizes, over, float(log_odds), len(inside))
+    return FreeSection(
+        crossing, sizes, over, float(log_odds), times_crest(section, sweep.trace.tip_radius), tuple(inside)
+    )
 
 
 def _overlaps(section: Section, crossing: Crossing, t: FloatArray) -> bool:

@@ -50,7 +50,7 @@ def _sections(piece: SweepHeights, tip_radius: float) -> list[Section]:
             if begin == 0 or end >= len(z):
                 continue  # what goes on beyond the profile's end is no detail
             section = outlined(piece, sign, int(begin), int(end), usual, SHORTEST_LEVEL * piece.length)
-            if section is not None and _is_wide(section, tip_radius):
+            if section is not None and times_crest(section, tip_radius) > WIDER_THAN_CREST:
                 found.append(section)
     return found
 
@@ -81,10 +81,10 @@ def outlined(piece: SweepHeights, sign: float, begin: int, end: int, usual: floa
     return Section(piece, sign, first, last, first + top, monotone)
 
 
-def _is_wide(section: Section, tip_radius: float) -> bool:
-    """True if a crest of no width of its own would be felt over much less."""
+def times_crest(section: Section, tip_radius: float) -> float:
+    """How many times as wide it was felt as a crest of its height and no width of its own, crossed at a right angle."""
     high = float(section.monotone.max())
     drop = min((1.0 - FLANK) * high, tip_radius)
     crest = 2.0 * np.sqrt(drop * (2.0 * tip_radius - drop))
     left, right = flanks(section, FLANK)
-    return bool(right.place - left.place > WIDER_THAN_CREST * crest)
+    return float((right.place - left.place) / crest)

@@ -12,6 +12,7 @@ from mapping import Feature, FloatArray, Trace
 from mapping.assembly import assemble
 from mapping.base import fit_base
 from mapping.detection import detect
+from mapping.geometry.templates.shapes import cap_height
 from mapping.inference import refine_all
 
 TIP, FINE, SAMPLING, PITCH = 2e-6, 0.125e-6, 8, 15e-6
@@ -64,6 +65,23 @@ def test_a_wide_line_is_one_with_the_sizes_of_its_mean_section(
     assert abs(found.width.median - width) < 1.0e-6
     assert abs(found.length.median - 121e-6) < PITCH
     assert not found.length.censored and found.evidence.crossings >= 7
+
+
+def test_a_wire_that_rows_cross_at_a_slant_is_no_wider_for_that() -> None:
+    """The paper's wire under rows at 18 degrees to it: each feels it over 23 mm, square to it over 7.2."""
+    tip, size, rng = 10e-3, 0.65e-3, np.random.default_rng(13)
+    x = np.arange(-100e-3, 100e-3, 0.1e-3)
+    places = np.concatenate([np.column_stack([x, np.full_like(x, y)]) for y in 2.5e-3 * np.arange(-5.5, 6.0)])
+    along = np.array([np.cos(np.radians(18.0)), np.sin(np.radians(18.0))])
+    away = np.hypot(places @ [-along[1], along[0]], np.maximum(np.abs(places @ along) - 30e-3, 0.0))
+    heights = tip + cap_height(away, size, 0.5 * size, tip) + 20e-6 * rng.standard_normal(len(places))
+    raster = Trace(1e-3 * np.arange(len(places)), np.column_stack([places, heights]), np.repeat(range(12), len(x)), tip)
+    base = fit_base(raster)
+    (found,) = refine_all(assemble(detect(raster, base), raster, base), raster, 13, base=base)
+    assert found.kind == "ridge" and not found.details.free_section and found.curvature_feature
+    assert found.height.low < size < found.height.high and found.height.high - found.height.low < 20e-6
+    assert found.width.low < size < found.width.high
+    assert abs(found.length.median - 60e-3) < 0.5e-3
 
 
 def test_a_line_to_the_rasters_border_is_at_least_so_long() -> None:
