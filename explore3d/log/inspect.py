@@ -246,7 +246,7 @@ def _with_log(found: Inspection, log: Log, assumed: set[str]) -> Inspection:
         tuple(float(size) for size in np.ptp(centers, axis=0)),
         spacing,
         int((steps > SAMPLE_GAP * spacing).sum()),
-        int((steps == 0).sum()),
+        int((steps == 0).sum()) + int(log.metadata.get("rows_repeated", 0)),
         None if "tip_radius" in assumed else log.trace.tip_radius,
         metres,
         (*found.doubtful, *(part.removeprefix("doubtful: ") for part in odd)),

@@ -191,7 +191,7 @@ class _Taking:
             dropped,
             [*self.said, *said],
             about,
-            self.cut_short,
+            cut_short=self.cut_short,
         )
 
     def _order(self, values: Columns, table: FloatArray) -> Order:

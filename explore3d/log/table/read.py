@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from explore3d.log.table.rows import (
     nothing_left,
     order_of,
     read_as,
+    repeated,
     trace_of,
     with_texts,
 )
@@ -163,9 +165,20 @@ def table_log(text: TableText, settings: TableSettings, sidecar: Path | None) ->
         said += [assumed] * bool(assumed)
     order = order_of(values, settings.jump, text, blocks_of(text, good))
     values = {role: value[order.rows] for role, value in values.items()} if is_moved(order) else values
-    said += [order.said] * bool(order.said) + doubts(text, roles, values, settings)
-    left_out = len(rows) - int(good.sum())
-    return _log(Samples(text, roles, factors, values, order, len(rows), left_out, dropped, said), settings, sidecar)
+    said += [order.said] * bool(order.said)
+    again = repeated(values, order.sweep)
+    if again.any():
+        count = int(again.sum())
+        words = f"{count} of {len(rows)} rows repeat the one before and are left out"
+        dropped.append((words, f"{count} left out: they repeat the one before"))
+        values = {role: value[~again] for role, value in values.items()}
+        order = replace(order, sweep=order.sweep[~again])
+    said += doubts(text, roles, values, settings)
+    left_out = len(rows) - len(order.sweep)
+    samples = Samples(
+        text, roles, factors, values, order, len(rows), left_out, dropped, said, repeated=int(again.sum())
+    )
+    return _log(samples, settings, sidecar)
 
 
 def _must_know_the_tip(path: Path, settings: TableSettings) -> None:
@@ -189,6 +202,7 @@ def _log(found: Samples, settings: TableSettings, sidecar: Path | None) -> Log:
             "metres_per_unit": found.factors,
             "rows": found.rows,
             "rows_left_out": found.left_out,
+            "rows_repeated": found.repeated,
             "sidecar": str(sidecar) if sidecar else None,
             "settings": settings.model_dump(mode="json"),
             "read_as": [read_as(text, roles, found.factors, trace, found.dropped, found.said)],

@@ -38,6 +38,7 @@ class Samples:
         dropped: what is said of those, in a clause and in few words.
         said: what was recognised or is doubtful.
         average: what averaging did, for the log; None: nothing.
+        repeated: rows of those left out that say again what the one before said.
     """
 
     text: TableText
@@ -50,6 +51,7 @@ class Samples:
     dropped: list[tuple[str, str]]
     said: list[str]
     average: dict[str, Any] | None = None
+    repeated: int = 0
     cut_short: bool = False
 
     @property
@@ -222,6 +224,18 @@ def blocks_of(text: TableText, good: BoolArray) -> IntArray | None:
     if text.blocks is None or text.blocks[0] == text.blocks[-1]:
         return None
     return np.asarray(text.blocks[good].astype(np.int64))
+
+
+def repeated(values: Columns, sweep: IntArray) -> BoolArray:
+    """(N,) mask of the rows that say again what the one before said, but for the time: one reading, and no second one.
+
+    A controller is asked more often than it looks, a program writes a row twice; taken for readings of their own they
+    make the noise look smaller, and correlated.
+    """
+    again: BoolArray = np.append(False, np.diff(sweep) == 0)
+    for role in values.keys() - {"t"}:
+        again[1:] &= values[role][1:] == values[role][:-1]
+    return again
 
 
 def doubts(text: TableText, roles: dict[str, int], values: Columns, settings: TableSettings) -> list[str]:

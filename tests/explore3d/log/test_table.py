@@ -97,7 +97,20 @@ def test_numbers_written_in_full_come_back_bit_for_bit(
     path = table(tmp_path_factory.mktemp("table"), text)
     decimal = "," if delimiter == ";comma" else "."
     trace = read_table(path, units="m", tip_radius=1.0, jump=1e30, decimal=decimal).trace
-    assert trace.centers.tolist() == [list(row) for row in rows]
+    assert trace.centers.tolist() == [list(row) for k, row in enumerate(rows) if k == 0 or row != rows[k - 1]]
+
+
+def test_rows_that_say_again_what_the_one_before_said_are_left_out(tmp_path: Path) -> None:
+    lines = [f"{k},{0.1 * k},{0.01 * (k % 7):.2f},{k // 10}" for k in range(40)]
+    once = read(tmp_path, "x,y,z,sweep\n" + "\n".join(lines) + "\n")
+    thrice = read(tmp_path, "x,y,z,sweep\n" + "\n".join(line for line in lines for _ in range(3)) + "\n")
+    assert np.array_equal(thrice.trace.centers, once.trace.centers)
+    assert np.array_equal(thrice.trace.sweep, once.trace.sweep)
+    assert "80 of 120 rows repeat the one before and are left out" in thrice.recovered
+    assert (thrice.metadata["rows_left_out"], thrice.metadata["rows_repeated"]) == (80, 80)
+    # the same place in another sweep is another reading
+    again = read(tmp_path, "x,y,z,sweep\n0,0,0,0\n1,0,0,0\n1,0,0,1\n0,0,0,1\n")
+    assert len(again.trace) == 4
 
 
 def test_units_come_from_the_header_even_if_they_differ(tmp_path: Path) -> None:
