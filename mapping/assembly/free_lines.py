@@ -71,6 +71,9 @@ def _of_group(
     highest = max(group, key=lambda section: abs(section.crossing.height))
     points = np.array([section.crossing.point for section in group])
     if np.linalg.norm(np.ptp(points, axis=0)) <= highest.sizes.width:
+        alone = len({section.crossing.sweep for section in group}) == 1
+        if not _is_wide(_through(points), group) or (alone and highest.sizes.width > 2.0 * inspection.pitch):
+            return [], group  # what is as wide across its sweeps as along them is felt by those beside, too
         spot = free_spot(_between_sweeps(highest, group), detections.algorithm)
         return [replace(spot, evidence=_evidence(group, detections.algorithm))], []
     half_width = 0.5 * float(np.median([section.sizes.width for section in group]))
@@ -81,11 +84,27 @@ def _of_group(
     found, slanted = list[Feature](), list[FreeSection]()
     for number, line in enumerate(lines):
         own = [group[k] for k in np.flatnonzero(apart.argmin(axis=0) == number)]
-        if own and np.median([_squareness(line.axis, each) * each.times_crest for each in own]) > WIDER_THAN_CREST:
+        if own and _is_wide(line.axis, own):
             found.append(_line(line, own, inspection, detections, trace))
         else:
             slanted += own
     return found, slanted
+
+
+def _through(points: FloatArray) -> FloatArray:
+    """(2, 3) or (1, 3): the straight line through places (N, 3), or the one place; middles of a spot lie across its
+    sweeps."""
+    middle = points.mean(axis=0)
+    way = np.linalg.svd(points - middle, full_matrices=False)[2][0]
+    return np.stack([middle - way, middle + way]) if len(points) > 1 else points
+
+
+def _is_wide(axis: FloatArray, group: Sequence[FreeSection]) -> bool:
+    """True of sections that are wide across a line (K, 3), too; on a place (1, 3) alone nothing tells a slant."""
+    square = [_squareness(axis, section) if len(axis) > 1 else 1.0 for section in group]
+    return bool(
+        np.median([by * section.times_crest for by, section in zip(square, group, strict=True)]) > WIDER_THAN_CREST
+    )
 
 
 def _between_sweeps(highest: FreeSection, group: list[FreeSection]) -> FreeSection:
