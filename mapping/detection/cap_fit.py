@@ -20,9 +20,12 @@ ZOOM_ROUNDS = 5
 # Shares of a plateau's half-width that its flanks may take, and how often the best share is refined.
 FLANKS = (0.4, 0.02)
 FLANK_ROUNDS = 4
-# Places to either side of the best, from a tenth of its own standard deviation to a half-width, and half-widths about
-# the best, over which its likelihood is averaged.
-SPREAD_PLACES, SPREAD_WIDTHS = 24, np.geomspace(1 / 1.5, 1.5, 7)
+# Places to either side of the best, from a tenth of its own standard deviation to a half-width, and half-widths from
+# half the best to twice it, over which its likelihood is averaged. Its tops lie on ridges, place against half-width, as
+# narrow as one part in the signal-to-noise ratio: steps of 15 % up to 1.5 fell between them. Of 678 crossings of wires
+# under a process those held 87 % (rms 1.21 of what is stated); steps of 2.3, 4.7 and 10 % up to 3 hold 91, 90 and 89 %
+# (0.95, 0.96, 1.02), of 4.7 % up to 2 as many (0.96).
+SPREAD_PLACES, SPREAD_WIDTHS = 24, np.geomspace(0.5, 2.0, 31)
 # A stretch is fitted with this share of its length to either side; twice as much where the base may drift. Of 240
 # simulated crests, steps and slots a tenth, a quarter, a half and all of it find the same numbers of crossings and the
 # same heights; places of wires are off by 0.90, 0.92, 1.01 and 1.04 of what is stated. What is longer meets neighbours.

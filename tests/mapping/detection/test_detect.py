@@ -11,6 +11,7 @@ import pytest
 
 from mapping.base.base import Base
 from mapping.base.height_profile import SweepHeights, height_profiles
+from mapping.detection import cap_fit
 from mapping.detection.candidates import search
 from mapping.detection.detect import Detections, detect
 from mapping.detection.filters.false_alarms import _intensity, false_alarm_rate, threshold_for
@@ -329,6 +330,24 @@ def test_places_under_correlated_noise_lie_within_their_intervals() -> None:
         inside += [abs(c.point[0] - place) < 1.6449 * c.position_sd for c in near[:1]]
     assert len(inside) > 60
     assert 0.82 <= np.mean(inside) <= 0.98
+
+
+def test_the_doubt_of_a_place_is_that_of_all_half_widths_however_finely_they_are_looked_at(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    noise = Noise(2e-5, 4e-5, 1.5e-3)
+    x = np.arange(-0.1, 0.1, 6e-5)
+    root = np.linalg.cholesky(noise.covariance(x))
+    errors = [root @ np.random.default_rng([43, seed]).standard_normal(len(x)) for seed in range(16)]
+    traces = [Trace.from_profile(x, TIP + wire(x, 0.25e-3) + each, TIP, x / 0.03) for each in errors]
+
+    def doubts() -> np.ndarray:
+        return np.array([c.position_sd for trace in traces for c in detect(trace, plate(), noise=noise).crossings])
+
+    stated = doubts()
+    monkeypatch.setattr(cap_fit, "SPREAD_WIDTHS", np.geomspace(1 / 3, 3, 193))
+    assert len(stated) >= 12
+    np.testing.assert_allclose(stated, doubts(), rtol=0.1)
 
 
 def test_sweeps_detected_one_by_one_say_the_same_as_all_at_once() -> None:

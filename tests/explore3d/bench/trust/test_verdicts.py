@@ -14,6 +14,7 @@ from explore3d.bench.trust.paths import TRUST_BODIES, bare_path, wired_path
 from explore3d.bench.trust.verdicts import VERDICT_HEAD, body_verdicts, law_verdicts, poisson_range, write_trust
 from explore3d.cli.bench import bench
 from mapping.geometry.mesh import nearest_on
+from mapping.geometry.templates import chain_height
 
 
 def record(law: str, often: int, crossings: int, wires: bool = False) -> dict:
@@ -81,6 +82,19 @@ def test_a_wire_is_as_high_as_it_stands_over_the_facets_of_a_round_body():
         crossed = [top for top in tops if top > 0.9 * wire.height]
         # the round body's own surface lies 2 um over its facets
         assert np.mean(crossed) == pytest.approx(wire.height, abs=0.3e-6) and wire.height - wire.width > 1.5e-6
+
+
+def test_a_wire_is_felt_as_the_round_one_that_its_height_is_held_against():
+    tip = BUILDING.tips[1]
+    wired, base, truth, _ = wired_path("plane", BUILDING.sizes[0], tip, (1, 2))
+    feet = base.foot(wired.centers, tip)
+    for wire in truth:
+        crest = wire.axis[[0, -1]] + [0.0, 0.0, 0.5 * wire.height]
+        round_one = chain_height(feet.points, feet.normals, crest, 0.5 * wire.height, tip)
+        under = round_one > 0.0
+        # as many samples tell of its height; a tenth of what they leave in doubt under the least level of both sets
+        known = min(BUILDING.levels[0], REPORTED_TRUST.levels[0]) * tip / np.sqrt(under.sum())
+        assert abs((feet.height - round_one)[under].mean()) < 0.1 * known
 
 
 def test_a_recording_is_analysed_once_and_told(tmp_path: Path):
