@@ -17,6 +17,8 @@ M_MMAP_THRESHOLD, OWN_PAGES = -3, 2**24
 # And how much may stay free before it goes back: by default 128 kB, so that every array of a few hundred kB has its
 # pages made and cleared anew: on the paper's wire 650,000 of them, in 1.3 CPU s; with 4 MB 220,000, in 0.7
 M_TRIM_THRESHOLD, KEPT_FREE = -1, 2**22
+# And in how many places memory is taken from: one for each thread by default, each with holes of its own
+M_ARENA_MAX, PLACES = -8, 1
 
 
 def main() -> None:
@@ -51,6 +53,7 @@ def _give_memory_back() -> None:
     if setting is not None:
         setting(M_MMAP_THRESHOLD, OWN_PAGES)
         setting(M_TRIM_THRESHOLD, KEPT_FREE)
+        setting(M_ARENA_MAX, PLACES)
 
 
 def _end_before_the_beginning(cause: str, status: int) -> None:

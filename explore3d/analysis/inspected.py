@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -97,6 +97,11 @@ class Inspected:
     def area(self) -> FloatArray:
         """(N,) that each place stands for, m^2."""
         return self.found.area
+
+    def counted(self) -> Inspected:
+        """The same without where the places are, which takes three quarters of its memory: nobody asks any more."""
+        nowhere = np.zeros((0, 3))
+        return replace(self, found=replace(self.found, points=nowhere, normals=nowhere))
 
     def share(self, height: float) -> float:
         """Share of the area on which every crest at least `height` m high would have been found."""

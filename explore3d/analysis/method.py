@@ -656,6 +656,7 @@ def inspected(work: Work, share: Share) -> None:
     seen = {number for number, length in work.detections.inspected_sweeps if length > 0.0} if told else None
     work.inspected = Inspected.of(work.laid, work.base, work.detections, work.smallest_feature, **asked, seen=seen)
     work.account = SurfaceAccount.of_log(work.log, work.laid, work.base, work.scene, work.inspected, seen)
+    work.inspected = work.inspected.counted()
 
 
 def modelled(work: Work, share: Share) -> None:

@@ -206,9 +206,10 @@ def _maps_seen(
     tip_radius: float,
     top: float,
 ) -> list[bytes]:
-    """PNG of k1 and of k2 as a camera sees them; what is rendered, 20 bytes a sample, is let go of before they are."""
+    """PNG of k1 and of k2 as a camera sees them; what is rendered, 20 bytes a sample, is let go of early."""
     picture = replace(render(bodies, camera), flat=sides)
     lit = picture.reduced(SUPERSAMPLING)
+    picture.pixels = picture.pixels[:0].copy()
     coarse = _map_colours(picture, felt, lines, tip_radius, top)
     del picture
     maps = []

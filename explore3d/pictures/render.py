@@ -72,7 +72,8 @@ class Picture:
         for row in range(factor):
             for column in range(factor):
                 sums += self.pixels[row : height * factor : factor, column : width * factor : factor]
-        return np.asarray(np.rint(sums * (255.0 / factor**2)), dtype=np.uint8)
+        sums *= 255.0 / factor**2
+        return np.rint(sums, out=sums).astype(np.uint8)
 
 
 def render(bodies: Sequence[Body], camera: Camera) -> Picture:
@@ -88,13 +89,13 @@ def render(bodies: Sequence[Body], camera: Camera) -> Picture:
     colours = np.concatenate([np.broadcast_to(body.colours, body.surface.vertices.shape) for body in bodies])
     shape = camera.height, camera.width
     depth, seen = np.full(shape, np.inf, dtype=np.float32), np.full(shape, -1, dtype=np.int32)
-    weights, pixels = np.empty((*shape, 2), dtype=np.float32), np.ones((*shape, 3), dtype=np.float32)
-    see(corners, faces, camera.pixel, depth, seen, weights)
+    pixels = np.empty((*shape, 3), dtype=np.float32)
+    see(corners, faces, camera.pixel, depth, seen, pixels)
     light = -forward - BESIDE_CAMERA * right + ABOVE_CAMERA * np.clip(-forward[2] / RISEN, -1.0, 1.0) * up
     light = light / np.linalg.norm(light)
     first = forward + camera.pixel * (0.5 * (camera.height - 1) * up - 0.5 * (camera.width - 1) * right)
     rays = np.stack([camera.pixel * right, -camera.pixel * up, first])
-    shade(seen, weights, faces, flat, bent, bends, colours, light, rays, AMBIENT, BRIGHTEST, pixels)
+    shade(seen, faces, flat, bent, bends, colours, light, rays, AMBIENT, BRIGHTEST, pixels)
     outline(depth, OUTLINE_PIXELS * camera.pixel, OUTLINE, pixels)
     return Picture(camera, pixels, depth, seen, flat)
 

@@ -19,9 +19,9 @@ def see(
     pixel: float,
     depth: NDArray[np.float32],
     seen: NDArray[np.int32],
-    weights: NDArray[np.float32],
+    pixels: NDArray[np.float32],
 ) -> None:
-    """Fill depth (H, W), seen (H, W) and weights (H, W, 2) with what the pixels see of faces (F, 3).
+    """Fill depth (H, W), seen (H, W) and pixels (H, W, 3) with what the pixels see of faces (F, 3).
 
     A point of a face is a weighted mean of its corners; along a ray (x, y, 1) t the weights over t are linear in x and
     y (Olano and Greer, Triangle scan conversion using 2D homogeneous coordinates, 1997), so nothing must be clipped.
@@ -31,7 +31,7 @@ def see(
         pixel: size of a pixel at distance one.
         depth: along forward, inf where nothing is seen.
         seen: number of the face, -1 where none is.
-        weights: of the face's second and third corner.
+        pixels: weights of the face's second and third corner, until they are shaded: there are millions.
     """
     height, width = depth.shape
     for face in range(len(faces)):
@@ -69,8 +69,8 @@ def see(
                 if nearness * depth[row, column] > 1.0:
                     depth[row, column] = 1.0 / nearness
                     seen[row, column] = face
-                    weights[row, column, 0] = second / nearness
-                    weights[row, column, 1] = third / nearness
+                    pixels[row, column, 0] = second / nearness
+                    pixels[row, column, 1] = third / nearness
 
 
 @njit(cache=True)
@@ -99,7 +99,6 @@ def sums_of_alike(flat: FloatArray, weighted: FloatArray, face: IntArray, vertex
 @njit(cache=True)
 def shade(
     seen: NDArray[np.int32],
-    weights: NDArray[np.float32],
     faces: IntArray,
     flat: FloatArray,
     bent: FloatArray,
@@ -111,10 +110,10 @@ def shade(
     brightest: float,
     pixels: NDArray[np.float32],
 ) -> None:
-    """Fill pixels (H, W, 3) where a face is seen, by Lambert's law.
+    """Fill pixels (H, W, 3) by Lambert's law where a face is seen, with white elsewhere.
 
     Args:
-        seen, weights: of `see`.
+        seen, pixels: of `see`.
         faces: (F, 3).
         flat: (F, 3) unit normals of the faces.
         bent, bends: (N, 3) normals at corners, and (F, 3) which of them each corner of a face has.
@@ -129,10 +128,11 @@ def shade(
         for column in range(width):
             face = seen[row, column]
             if face < 0:
+                pixels[row, column] = 1.0
                 continue
             i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
             a, b, c = bends[face, 0], bends[face, 1], bends[face, 2]
-            second, third = weights[row, column, 0], weights[row, column, 1]
+            second, third = pixels[row, column, 0], pixels[row, column, 1]
             first = 1.0 - second - third
             size = 0.0
             facing = 0.0

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mapping import BoolArray, FloatArray, IntArray, Trace
 from mapping.base.base import Base, Feet
@@ -41,7 +42,7 @@ class LaidSweep:
         # feet of the samples laid by now, in the order in which they were asked for, and each sample's row among them:
         # few are, and those of all would take more memory than the trace itself
         self._feet = _empty(0)
-        self._row: IntArray = np.full(len(trace), NOT_LAID, dtype=np.int64)
+        self._row: NDArray[np.int32] = np.full(len(trace), NOT_LAID, dtype=np.int32)
 
     @property
     def arclength(self) -> FloatArray:
@@ -141,7 +142,7 @@ class LaidSweep:
             return np.zeros((0, 3)), np.zeros((0, 3))
         return np.concatenate([centers for centers, _ in known]), np.concatenate([up for _, up in known])
 
-    def kept(self) -> tuple[Feet, IntArray]:
+    def kept(self) -> tuple[Feet, NDArray[np.int32]]:
         """Feet of the samples laid by now, and (N,) each sample's row among them, or NOT_LAID: nothing is laid."""
         return self._feet, self._row
 
@@ -288,5 +289,5 @@ def _empty(count: int) -> Feet:
     )
 
 
-def _rows(feet: Feet, rows: IntArray | slice) -> Feet:
+def _rows(feet: Feet, rows: NDArray[np.int32] | IntArray | slice) -> Feet:
     return Feet(*(getattr(feet, each.name)[rows] for each in fields(Feet)))

@@ -77,7 +77,8 @@ def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Poste
     if chart.closed:
         axis[-1], normals[-1] = axis[0], normals[0]
     section = kind_of(problem.feature).section(problem.feature, shape, draws)
-    best = draws[int(np.argmax(problem.target.log_density(draws)))] if has_ends else None
+    distinct = np.unique(draws, axis=0)  # a weighted draw is there as often as it weighs
+    best = distinct[int(np.argmax(problem.target.log_density(distinct)))] if has_ends else None
     seen = None if best is None else explored(problem, best)
     length, notes = _length(problem, shape, draws, best, seen)
     # Along the axis: how well it is known across itself, and its two ends along itself (first, last).

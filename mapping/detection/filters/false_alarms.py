@@ -90,7 +90,7 @@ def _intensity(noise: Noise, smallest: float, count: int, drift: int, threshold:
     return _clumps(noise, smallest, count, drift).intensity(threshold)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=1)
 def _clumps(noise: Noise, smallest: float, count: int, drift: int) -> BankClumps:
     """The clumps of a bank in such units: one threshold is asked for after another."""
     return clumps_of(build_bank(noise, 1.0, 1.0, smallest, smallest * LADDER ** (count - 1), drift))

@@ -19,6 +19,9 @@ from mapping.geometry.curvature import TOLD_SIDE
 
 # Samples whose neighbourhoods are fitted together: a bound on the memory that they take
 SAMPLES_AT_ONCE = 4096
+# Distance along a sweep between the samples that are fitted, in distances between sweeps. A fit reaches over two and a
+# half of these, and errs as the square of that: between two samples an eighth apart a straight line adds 1/400 of it
+FITTED_APART = 1.0 / 8.0
 
 
 def surface_normals(
@@ -97,35 +100,47 @@ def _fitted(
 
     The doubt is three times the residual over the width; it is a right angle where the neighbours lie on one line.
     Around a sharp edge, or behind a thin wall, the nearest samples are those of another side: they do not count.
+    Samples that lie far closer together than the sweeps have slopes between those of some that are fitted.
     """
     from scipy.spatial import cKDTree
 
-    kept = thinned(trace.centers, trace.sweep, pitch(trace.centers, trace.sweep))
+    apart = pitch(trace.centers, trace.sweep)
+    kept = thinned(trace.centers, trace.sweep, apart)
     cloud, sides = trace.centers[kept], outward[kept]
     tree, count = cKDTree(cloud), min(neighbours, len(cloud))
-    tangents, doubt = np.empty((len(samples), 3)), np.empty(len(samples))
-    for start in range(0, len(samples), SAMPLES_AT_ONCE):
+    centers = trace.centers[samples]
+    fitted = thinned(centers, trace.sweep[samples], FITTED_APART * apart)
+    frames = _frames(along[samples], outward[samples])
+    slopes, doubt = np.empty(len(fitted)), np.empty(len(fitted))
+    for start in range(0, len(fitted), SAMPLES_AT_ONCE):
         part = slice(start, start + SAMPLES_AT_ONCE)
-        distance, index = (
-            np.asarray(found) for found in tree.query(trace.centers[samples[part]], [*range(1, count + 1)])
-        )
-        own = samples[part]
-        arm = cloud[index] - trace.centers[own, None]
-        counts = np.einsum("nc,nkc->nk", outward[own], sides[index]) > TOLD_SIDE
-        tangents[part], doubt[part] = _across(arm, distance, counts, along[own], outward[own])
-    return tangents, doubt
+        own = fitted[part]
+        distance, index = (np.asarray(found) for found in tree.query(centers[own], [*range(1, count + 1)]))
+        arm = cloud[index] - centers[own, None]
+        counts = np.einsum("nc,nkc->nk", outward[samples[own]], sides[index]) > TOLD_SIDE
+        slopes[part], doubt[part] = _slopes(arm, distance, counts, *(axis[own] for axis in frames))
+    _, across, up = frames
+    # both ends of every sweep are fitted, so nothing lies between two sweeps
+    s = np.cumsum(np.linalg.norm(np.diff(centers, axis=0, prepend=centers[:1]), axis=1))
+    slope = np.interp(s, s[fitted], slopes)
+    return unit(across + slope[:, None] * up), np.interp(s, s[fitted], doubt)
 
 
-def _across(
-    arm: FloatArray, distance: FloatArray, counts: BoolArray, along: FloatArray, outward: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Tangents across and their doubt from the ways (N, K, 3) to the neighbours of each sample, their lengths (N, K),
-    and which of them count (N, K)."""
-    from mapping.estimate.sweeps.tangent_kernels import slopes_across
-
+def _frames(along: FloatArray, outward: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Unit directions (N, 3) along the sweeps, across them, and up."""
     across = unit(np.cross(outward, along))
     up = unit(np.cross(along, across))
     up *= np.where(np.einsum("ij,ij->i", up, outward) < 0, -1.0, 1.0)[:, None]
+    return along, across, up
+
+
+def _slopes(
+    arm: FloatArray, distance: FloatArray, counts: BoolArray, along: FloatArray, across: FloatArray, up: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Slopes across and their doubt, rad, from the ways (N, K, 3) to the neighbours of each sample, their lengths
+    (N, K), and which of them count (N, K), in frames of three (N, 3)."""
+    from mapping.estimate.sweeps.tangent_kernels import slopes_across
+
     scale = np.maximum(distance[:, -1:], 1e-300)
     arm = arm / scale[..., None]
     u, v, w = (np.einsum("nkc,nc->nk", arm, axis) for axis in (along, across, up))
@@ -136,7 +151,7 @@ def _across(
         slope[rest], residual[rest] = _least_slopes(u[rest], v[rest], w[rest], weight[rest, :, None])
     width = np.sqrt((weight * v**2).mean(axis=1))
     doubt = np.where(width > 1e-3, 3 * residual / np.maximum(width, 1e-3), np.pi / 2)
-    return unit(across + slope[:, None] * up), doubt
+    return slope, doubt
 
 
 def _least_slopes(u: FloatArray, v: FloatArray, w: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:

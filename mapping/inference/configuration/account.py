@@ -291,7 +291,7 @@ def _meeting(features: list[Feature], tip: float) -> list[Feature]:
     met: set[int] = set()
     for k, m in itertools.combinations(lines, 2):
         half = min(sizes_of(features[n], tip).half_width for n in (k, m))
-        gaps = [distances(lines[one], lines[other]) for one, other in ((k, m), (m, k))]
+        gaps = [distances(lines[one], features[other].axis) for one, other in ((k, m), (m, k))]
         touching = min(gap.min() for gap in gaps) < MEETING_REACH * half  # an end beneath the other line is not told
         if touching and all(np.median(gap) > half for gap in gaps):
             met |= {k, m}

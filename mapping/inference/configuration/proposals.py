@@ -403,8 +403,8 @@ def _faces(first: Part, second: Part, place: Neighbourhood, share: float = 1.0) 
     """True if two lines run beside each other, nearer than both of their disturbances reach, or this share of it."""
     tip = place.around.trace.tip_radius
     reach = share * sum(sizes_of(each.feature, tip).half_width for each in (first, second))
-    one, other = dense(axis_of(first)), dense(axis_of(second))
-    return bool(np.median(distances(one, other)) < reach and np.median(distances(other, one)) < reach)
+    one, other = axis_of(first), axis_of(second)
+    return all(np.median(distances(dense(of), line)) < reach for of, line in ((one, other), (other, one)))
 
 
 def dense(axis: FloatArray) -> FloatArray:

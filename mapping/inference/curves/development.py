@@ -28,36 +28,42 @@ def developed(points: FloatArray, normals: FloatArray) -> FloatArray:
         points: (K, 3) on the surface, m.
         normals: (K, 3) unit normals there.
     """
-    turned, legs = np.eye(3), np.diff(points, axis=0)
-    rolled = np.zeros_like(legs)
-    for k, leg in enumerate(legs):
-        rolled[k] = turned @ _unfolded(leg, normals[k], normals[k + 1])
-        turned = turned @ _rotation(normals[k + 1], normals[k])
+    legs = _unfolded(np.diff(points, axis=0), normals[:-1], normals[1:])
+    turned, rolled = np.eye(3), np.zeros_like(legs)
+    for k, back in enumerate(_rotations(normals[1:], normals[:-1])):
+        rolled[k] = turned @ legs[k]
+        turned = turned @ back
     along = rolled[0] - (rolled[0] @ normals[0]) * normals[0]
     along /= np.linalg.norm(along)
     places = np.vstack([np.zeros(3), np.cumsum(rolled, axis=0)])
     return np.asarray(places @ np.stack([along, np.cross(normals[0], along)], axis=1))
 
 
-def _unfolded(leg: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """(3,) a chord between two planes with unit normals, unfolded about their common line onto the first.
+def _unfolded(legs: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """(K, 3) chords between two planes with unit normals (K, 3), unfolded about their common lines onto the first.
 
     With the angle t between the planes the chord of a way a on one and b on the other, square to their line, has
     (a + b) cos(t / 2) along the plane that halves them; unfolded the way is a + b, wherever the fold crosses it.
     """
-    halving = (start + end) / np.linalg.norm(start + end)
-    flat = _rotation(halving, start) @ leg
-    flat = flat - (flat @ start) * start
-    fold = np.cross(start, end)
-    fold /= max(float(np.linalg.norm(fold)), np.finfo(float).tiny)
-    return np.asarray(flat + (1.0 / float(halving @ start) - 1.0) * (flat - (flat @ fold) * fold))
+    halving = (start + end) / np.linalg.norm(start + end, axis=1, keepdims=True)
+    flat = np.einsum("kij,kj->ki", _rotations(halving, start), legs)
+    flat = flat - _dots(flat, start) * start
+    folds = np.cross(start, end)
+    folds /= np.maximum(np.linalg.norm(folds, axis=1, keepdims=True), np.finfo(float).tiny)
+    return np.asarray(flat + (1.0 / _dots(halving, start) - 1.0) * (flat - _dots(flat, folds) * folds))
 
 
-def _rotation(start: FloatArray, to: FloatArray) -> FloatArray:
-    """(3, 3) the smallest rotation from one unit vector to another that is not opposite (Rodrigues)."""
-    x, y, z = np.cross(start, to)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + cross + cross @ cross / max(1.0 + float(start @ to), 1e-6))
+def _rotations(start: FloatArray, to: FloatArray) -> FloatArray:
+    """(K, 3, 3) the smallest rotations from unit vectors (K, 3) to others that are not opposite (Rodrigues)."""
+    x, y, z = np.cross(start, to).T
+    none = np.zeros_like(x)
+    cross = np.array([[none, -z, y], [z, none, -x], [-y, x, none]]).transpose(2, 0, 1)
+    return np.asarray(np.eye(3) + cross + cross @ cross / np.maximum(1.0 + _dots(start, to), 1e-6)[:, :, None])
+
+
+def _dots(one: FloatArray, other: FloatArray) -> FloatArray:
+    """(K, 1) products of vectors (K, 3)."""
+    return np.asarray(np.einsum("ki,ki->k", one, other)[:, None])
 
 
 def smooth_on_base(

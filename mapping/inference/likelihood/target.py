@@ -97,5 +97,5 @@ class LogPosterior:
         return self.likelihood.residuals(self.templates(theta))
 
     def with_likelihood(self, likelihood: Likelihood) -> LogPosterior:
-        """The same shape under another noise."""
-        return replace(self, likelihood=likelihood)
+        """The same shape under another noise; itself under its own."""
+        return self if likelihood is self.likelihood else replace(self, likelihood=likelihood)

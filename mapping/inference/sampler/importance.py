@@ -15,9 +15,9 @@ from mapping.inference.sampler.psis import effective_size, smooth_weights
 
 PROPOSAL_ROUNDS = 12
 DRAWS_PER_ROUND = 1000
-FINAL_DRAWS = 4000
-# The proposal learns from the final draws, too, if they cannot be trusted yet: so often at most are they drawn.
-FINALS = 3
+# Final draws, those that found the proposal good among them: half are effective at least, as many as are kept. The
+# proposal learns from them, too, if they cannot be trusted yet, and more are drawn the next time.
+FINAL_DRAWS = (2000, 4000, 4000)
 # Below this k-hat importance sampling may stand for the posterior (theory section 8).
 TRUSTED_K_HAT = 0.5
 # The proposal is good enough when this share of the draws is effective.
@@ -67,7 +67,7 @@ def importance_sample(
     Reference: theory section 8.2; Cappé et al. 2008 for the adaptation (proposal.py has it in full), Vehtari et al.
     2024 for the test (psis.py).
     """
-    proposal, was_sure = _first_proposal(modes), False
+    proposal, was_sure, known = _first_proposal(modes), False, 0
     for _ in range(PROPOSAL_ROUNDS):
         draws, ratios = _weigh(target, proposal, rng, DRAWS_PER_ROUND)
         weights, k_hat = smooth_weights(ratios)
@@ -78,12 +78,14 @@ def importance_sample(
             return Importance(proposal, draws, weights, k_hat, ess, _log_mean(ratios))
         was_sure = sure
         if ess > EFFICIENT * DRAWS_PER_ROUND and k_hat < TRUSTED_K_HAT and not sure:
+            known = len(draws)
             break
         proposal = _learned(proposal, draws, ratios)
-    for final in range(FINALS):
+    for final, count in enumerate(FINAL_DRAWS):
         if final:
-            proposal = _learned(proposal, draws, ratios)
-        draws, ratios = _weigh(target, proposal, rng, FINAL_DRAWS)
+            proposal, known = _learned(proposal, draws, ratios), 0
+        more = _weigh(target, proposal, rng, count - known)
+        draws, ratios = (np.concatenate([old[:known], new]) for old, new in zip((draws, ratios), more, strict=True))
         weights, k_hat = smooth_weights(ratios)
         if k_hat < TRUSTED_K_HAT:
             break

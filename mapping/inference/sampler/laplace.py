@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -10,13 +12,18 @@ from mapping import FloatArray
 from mapping.inference.likelihood import LogPosterior
 
 ITERATIONS = 60
-# Gain in chi-square of a step after which the optimum is known: a thirtieth of a standard deviation.
-SETTLED_CHI_SQUARE_GAIN = 1e-3
+# Gain in chi-square of a step after which the optimum is known: a tenth of a standard deviation.
+SETTLED_CHI_SQUARE_GAIN = 1e-2
+# Chi-square within which a search goes where an earlier one ended: half of a standard deviation.
+SAME_OPTIMUM = 0.25
 # What differs by less of itself is equally good, and the first of them is taken: rounding (1e-13 of the chi-square of
 # thousands of bins) must not choose between steps, nor between optima.
 SAME_COST = 1e-9
 # Log density below the best optimum at which another one does not matter, and how many are kept.
 NEGLIGIBLE_LOG_DENSITY = 12.0
+# Places of a scan: over 4 standard deviations to both sides they are 0.27 of one apart, and a sum over a Gaussian is
+# exact to 1e-8 with one; where they are three apart its width is known to a third
+SCAN = 31
 MOST_MODES = 3
 
 
@@ -46,9 +53,18 @@ def find_optima(target: LogPosterior, starts: FloatArray, iterations: int = ITER
 
     Equally good ones (a crest that ends between either pair of sweeps, mirrored) come in the order of their starts.
     Optima that hold a negligible share of the probability, or lie within a fraction of a step of a better one, are
-    left out; at most MOST_MODES are kept. After so many iterations a search stops where it is.
+    left out; at most MOST_MODES are kept. After so many iterations a search stops where it is. One that begins where
+    an earlier one ended is over.
     """
-    found = np.array([_descend(target, start, iterations) for start in starts])
+    ends = _known(target).optima
+    reached: list[tuple[FloatArray, float]] = []
+    for start in starts:
+        if start.tobytes() in ends:
+            reached.append((start, np.inf))
+        else:
+            reached.append(_descend(target, start, iterations, reached))
+    found = np.array([optimum for optimum, _ in reached])
+    ends.update(optimum.tobytes() for optimum in found if iterations >= ITERATIONS)
     values = target.log_density(found)
     kept: list[FloatArray] = []
     for i in _best_first(values):
@@ -73,11 +89,19 @@ def laplace(target: LogPosterior, optimum: FloatArray, *, scanned: bool = True) 
 
     A posterior with kinks (an end between two sweeps) has no useful curvature at a point: along each parameter whose
     density over +-3 standard deviations disagrees with the Gaussian's, the spread of a scan along it counts (unless
-    it is not `scanned`, at a third of the cost).
+    it is not `scanned`, at a third of the cost). What was asked before is not worked out again.
     """
+    known = _known(target).modes
+    key = optimum.tobytes(), scanned
+    if key not in known:
+        known[key] = _laplace(target, optimum, scanned)
+    return known[key]
+
+
+def _laplace(target: LogPosterior, optimum: FloatArray, scanned: bool) -> Laplace:
     step = target.shape.step.copy()
     for _ in range(3):
-        jacobian = _jacobian(target, optimum, step)[1]
+        jacobian = _central(target, optimum, step)[1]
         covariance = _inverse(jacobian.T @ jacobian, target)
         step = np.clip(0.3 * np.sqrt(np.diag(covariance)), 1e-3 * target.shape.step, 10 * target.shape.step)
     if scanned:
@@ -85,17 +109,38 @@ def laplace(target: LogPosterior, optimum: FloatArray, *, scanned: bool = True) 
     return Laplace(optimum, covariance, float(target.log_density(optimum[None])[0]))
 
 
+@dataclass(eq=False)
+class _Known:
+    """What was found out about a density: where searches ended, and the Gaussian at some places, scanned or not."""
+
+    optima: set[bytes] = field(default_factory=set)
+    modes: dict[tuple[bytes, bool], Laplace] = field(default_factory=dict)
+
+
+# Kept as long as the density is: families are weighed roughly, and those that may be likely once more, by draws
+_KNOWN: WeakKeyDictionary[LogPosterior, _Known] = WeakKeyDictionary()
+
+
+def _known(target: LogPosterior) -> _Known:
+    return _KNOWN.setdefault(target, _Known())
+
+
 def linearised(target: LogPosterior, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Residuals (m,) at parameters (P,), priors as data, and their derivatives (m, P)."""
-    return _jacobian(target, theta, 0.1 * target.shape.step)
+    return _central(target, theta, 0.1 * target.shape.step)
 
 
-def _descend(target: LogPosterior, start: FloatArray, iterations: int) -> FloatArray:
+def _descend(
+    target: LogPosterior, start: FloatArray, iterations: int, earlier: Sequence[tuple[FloatArray, float]]
+) -> tuple[FloatArray, float]:
+    """Where a search from a start (P,) ends, and chi-square there; those of an earlier one if it comes as near."""
     low, high, scale = target.low, target.high, target.shape.step
     theta = np.clip(start, low, high)
     # Where the data say nothing the prior's width is the curvature: rounding is not divided by nothing there
     prior = np.diag((scale / _widths(target)) ** 2)
-    damping, (residual, jacobian) = 1e-3, _jacobian(target, theta, 0.1 * scale)
+    damping, sure = 1e-3, False
+    residual = target.residuals(theta[None])[0]
+    jacobian = _ahead(target, theta, residual, 0.1 * scale)
     cost = float(residual @ residual)
     for _ in range(iterations):
         scaled = jacobian * scale
@@ -109,23 +154,43 @@ def _descend(target: LogPosterior, start: FloatArray, iterations: int) -> FloatA
         ridge = np.maximum(np.diag(hessian), 1e-6 * max(float(np.diag(hessian).max()), 1e-300))
         moves = np.stack([np.linalg.solve(hessian + prior + d * np.diag(ridge), -gradient) for d in dampings])
         candidates = np.clip(theta + moves * scale, low, high)
-        costs = (target.residuals(candidates) ** 2).sum(axis=1)
+        residuals = target.residuals(candidates)
+        costs = (residuals**2).sum(axis=1)
         pick = int(np.argmax(costs <= costs.min() * (1.0 + SAME_COST)))
-        if not costs[pick] < cost - 1e-9 * max(1.0, abs(cost)) * 1e-3:
+        gain = cost - float(costs[pick])
+        if better := gain > 1e-9 * max(1.0, abs(cost)) * 1e-3:
+            theta, damping = candidates[pick], max(float(dampings[pick]), 1e-12)
+            cost, residual = float(costs[pick]), residuals[pick]
+            for optimum, least in earlier:
+                apart = (optimum - theta) / scale
+                if least <= cost < least + SAME_OPTIMUM and float(apart @ (hessian + prior) @ apart) < SAME_OPTIMUM:
+                    return optimum, least
+        if sure and not better:
             if damping > 1e6:
                 break
             damping *= 1e3
             continue
-        gain = cost - float(costs[pick])
-        theta, damping = candidates[pick], max(float(dampings[pick]), 1e-12)
-        residual, jacobian = _jacobian(target, theta, 0.1 * scale)
-        cost = float(residual @ residual)
-        if gain < SETTLED_CHI_SQUARE_GAIN:
+        settled = gain < SETTLED_CHI_SQUARE_GAIN
+        if sure and settled:
             break
-    return np.asarray(theta)
+        # Quotients to one side lead down at half of the cost; where they lead no further, both sides are asked
+        sure = settled
+        jacobian = _central(target, theta, 0.1 * scale)[1] if sure else _ahead(target, theta, residual, 0.1 * scale)
+    return np.asarray(theta), cost
 
 
-def _jacobian(target: LogPosterior, theta: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _ahead(target: LogPosterior, theta: FloatArray, residual: FloatArray, step: FloatArray) -> FloatArray:
+    """Differences (m, P) of the residuals (m,) to that side on which there is more room."""
+    count = len(theta)
+    up, down = np.minimum(theta + step, target.high), np.maximum(theta - step, target.low)
+    beside = np.where(up - theta >= theta - down, up, down)
+    batch = np.tile(theta, (count, 1))
+    np.fill_diagonal(batch, beside)
+    span = beside - theta
+    return ((target.residuals(batch) - residual) / np.where(span == 0.0, np.finfo(float).tiny, span)[:, None]).T
+
+
+def _central(target: LogPosterior, theta: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Residuals (m,) and their central differences (m, P), one-sided at a bound; a single batch of templates."""
     count = len(theta)
     up = np.minimum(theta + step, target.high)
@@ -157,7 +222,7 @@ def _scanned(target: LogPosterior, optimum: FloatArray, covariance: FloatArray) 
     precision = np.linalg.inv(covariance)
     conditional = 1.0 / np.sqrt(np.diag(precision))
     factors = np.ones(len(optimum))
-    grid = np.linspace(-1.0, 1.0, 61)
+    grid = np.linspace(-1.0, 1.0, SCAN)
     for i in range(len(optimum)):
         reach = max(4.0 * conditional[i], 8.0 * target.shape.step[i])
         low, high = max(optimum[i] - reach, target.low[i]), min(optimum[i] + reach, target.high[i])
