@@ -72,7 +72,9 @@ def _of_group(
     points = np.array([section.crossing.point for section in group])
     if np.linalg.norm(np.ptp(points, axis=0)) <= highest.sizes.width:
         alone = len({section.crossing.sweep for section in group}) == 1
-        if not _is_wide(_through(points), group) or (alone and highest.sizes.width > 2.0 * inspection.pitch):
+        if not _is_wide(_through(points, CORE * highest.sizes.width), group) or (
+            alone and highest.sizes.width > 2.0 * inspection.pitch
+        ):
             return [], group  # what is as wide across its sweeps as along them is felt by those beside, too
         spot = free_spot(_between_sweeps(highest, group), detections.algorithm)
         return [replace(spot, evidence=_evidence(group, detections.algorithm))], []
@@ -91,12 +93,14 @@ def _of_group(
     return found, slanted
 
 
-def _through(points: FloatArray) -> FloatArray:
-    """(2, 3) or (1, 3): the straight line through places (N, 3), or the one place; middles of a spot lie across its
-    sweeps."""
+def _through(points: FloatArray, core: float) -> FloatArray:
+    """(2, 3) or (1, 3): the straight line through places (N, 3), or the one place that they are if they lie within the
+    core (m) of a section: the same row again. Middles of a spot lie across its sweeps."""
     middle = points.mean(axis=0)
+    if np.linalg.norm(np.ptp(points, axis=0)) < core:
+        return np.asarray(middle[None])
     way = np.linalg.svd(points - middle, full_matrices=False)[2][0]
-    return np.stack([middle - way, middle + way]) if len(points) > 1 else points
+    return np.stack([middle - way, middle + way])
 
 
 def _is_wide(axis: FloatArray, group: Sequence[FreeSection]) -> bool:

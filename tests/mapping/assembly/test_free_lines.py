@@ -19,13 +19,13 @@ TIP, FINE, SAMPLING, PITCH = 2e-6, 0.125e-6, 8, 15e-6
 Form = Callable[[FloatArray, FloatArray], FloatArray]
 
 
-def felt(form: Form, seed: int, noise: float, rows: int = 14) -> tuple[Feature, ...]:
+def felt(form: Form, seed: int, noise: float, rows: int = 14, pitch: float = PITCH) -> tuple[Feature, ...]:
     """What is found on a raster of 0.5 mm, each row by brute-force dilation of heights over x and y from its middle."""
     x, rng, sweeps = FINE * np.arange(-2000, 2000), np.random.default_rng(seed), []
     reach = int(TIP / FINE)
     ball = np.sqrt(TIP**2 - (FINE * np.arange(-reach, reach + 1)) ** 2) - TIP
     for k in range(rows):
-        y = PITCH * (k - 0.5 * (rows - 1))
+        y = pitch * (k - 0.5 * (rows - 1))
         trace = grey_dilation(form(x, np.full_like(x, y)), structure=ball, mode="nearest")[::SAMPLING]
         height = trace + noise * rng.standard_normal(len(trace)) + TIP
         sweeps.append(np.column_stack([x[::SAMPLING], np.full(len(trace), y), height]))
@@ -65,6 +65,15 @@ def test_a_wide_line_is_one_with_the_sizes_of_its_mean_section(
     assert abs(found.width.median - width) < 1.0e-6
     assert abs(found.length.median - 121e-6) < PITCH
     assert not found.length.censored and found.evidence.crossings >= 7
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_same_row_again_tells_no_slant_of_a_wide_detail(seed: int) -> None:
+    (found,) = felt(
+        lambda x, _: -np.maximum(0.0, 1.5e-6 * (1.0 - np.abs(x) / 10e-6)), seed, 40e-9, rows=2, pitch=0.05e-6
+    )
+    assert found.kind == "pit" and found.details.free_section
+    assert abs(found.width.median - 20e-6) < 2e-6
 
 
 @pytest.mark.parametrize("degrees", [18.0, pytest.param(10.0, marks=pytest.mark.slow)])
