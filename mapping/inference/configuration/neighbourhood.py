@@ -13,7 +13,7 @@ from mapping.base import over_levels
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference.configuration.joined_shape import JoinedShape
-from mapping.inference.families import Surroundings
+from mapping.inference.families import Surroundings, tells_of_line
 from mapping.inference.kinds import kind_of, sizes_of
 from mapping.inference.likelihood import Likelihood, Nuisance, Shape, Window, build_likelihood
 from mapping.instrument import Noise
@@ -103,6 +103,7 @@ def neighbourhood(
     near = np.zeros(len(places.points), dtype=bool)
     for axis, width in zip(axes, widths, strict=True):
         near |= distances(places.points, axis) < NEIGHBOURHOOD_REACH * width
+    near &= ~_ended(features, widths, places)
     near &= places.samples > 0
     parts_levels = len(places.stepped) > 0 and any(goes_on(feature) for feature in features)
     if parts_levels:  # an edge between two levels is nothing to one who stands on both
@@ -126,6 +127,24 @@ def neighbourhood(
         levels.append((likelihood, float(constant)))
     told = np.array([crossing.point for crossing in crossings]).reshape(-1, 3)
     return Neighbourhood(window, _finer(window), around, tuple(levels), half_width, told, false_alarms_per_metre)
+
+
+def _ended(features: Sequence[Feature], widths: Sequence[float], places: Places) -> BoolArray:
+    """(M,) True of places where a line that has no ends of its own had ended, and no other feature is."""
+    ended = np.zeros(len(places.points), dtype=bool)
+    about = [
+        distances(places.points, feature.axis) < NEIGHBOURHOOD_REACH * width
+        for feature, width in zip(features, widths, strict=False)
+    ]
+    for feature, width, near in zip(features, widths, about, strict=False):
+        if goes_on(feature) and not feature.closed:
+            index = np.flatnonzero(near)
+            run = np.cumsum((np.diff(index, prepend=-2) > 1) | (np.diff(places.sweep[index], prepend=-1) != 0))
+            tells = tells_of_line(feature.axis, feature.normals, places.points[index], run, width)
+            ended[index[~tells]] = True
+    for feature, near in zip(features, about, strict=True):
+        ended &= goes_on(feature) | ~near
+    return ended
 
 
 def goes_on(feature: Feature) -> bool:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from mapping.inference.families.bump import BumpShape as BumpShape, Spot as Spot, spot_at as spot_at
     from mapping.inference.families.free_tip import with_free_tip as with_free_tip, with_nominal_tip as with_nominal_tip
     from mapping.inference.families.hollow import GrooveShape as GrooveShape, PitShape as PitShape
+    from mapping.inference.families.line_ends import tells_of_line as tells_of_line
     from mapping.inference.families.problem import (
         MEETING_REACH as MEETING_REACH,
         MODEL_FLOOR as MODEL_FLOOR,
@@ -48,6 +49,7 @@ _PUBLIC = {
     "bump": ("BumpShape", "Spot", "spot_at"),
     "free_tip": ("with_free_tip", "with_nominal_tip"),
     "hollow": ("GrooveShape", "PitShape"),
+    "line_ends": ("tells_of_line",),
     "problem": (
         "MEETING_REACH",
         "MODEL_FLOOR",

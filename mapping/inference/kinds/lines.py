@@ -18,7 +18,15 @@ from mapping.inference.curves import (
     smooth_axis,
     smooth_on_base,
 )
-from mapping.inference.families import MEETING_REACH, PosteriorProblem, Sizes, Surroundings, touches, window_for
+from mapping.inference.families import (
+    MEETING_REACH,
+    PosteriorProblem,
+    Sizes,
+    Surroundings,
+    tells_of_line,
+    touches,
+    window_for,
+)
 from mapping.inference.kinds.kind import Kind, sizes_of
 from mapping.inference.kinds.posterior_density import pose
 from mapping.inference.likelihood import Normal, Prior, Shape, Uniform, Window
@@ -120,6 +128,8 @@ class LineKind(Kind):
         course = self._chart(axis, normals, sizes, crossings, HIGHEST_DEGREE, around, bends=False)
         rises = (0.0, sizes.height, -sizes.height) if self.sided else (0.0,)
         window = window_for(_crest(course, tip, sizes, rises), sizes, around)
+        if not self.has_ends and not course.closed:
+            window = window.only(tells_of_line(axis, normals, window.feet, window.run, sizes.half_width))
         laid = replace(feature, axis=axis, normals=normals, evidence=replace(feature.evidence, crossings=crossings))
         beside = replace(around, others=[other for other in around.others if other is not feature])
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mapping import EmptyWindowError, FloatArray, IntArray, Trace
+from mapping import BoolArray, EmptyWindowError, FloatArray, IntArray, Trace
 from mapping.base import Base, Feet, LaidTrace, over_levels
 from mapping.instrument import Levels
 
@@ -65,6 +65,31 @@ class Window:
     def run(self) -> IntArray:
         """(n,) number of the run that each bin belongs to."""
         return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
+
+    def only(self, keep: BoolArray) -> Window:
+        """The bins to keep (n,); a run that loses some in its midst is two."""
+        run = self.run[keep]
+        index = np.flatnonzero(keep)
+        starts = np.flatnonzero(np.diff(index, prepend=-1) + np.diff(run, prepend=-1) > 1)
+
+        def own(values: NDArray[Any] | float) -> Any:
+            return values[keep] if isinstance(values, np.ndarray) else values
+
+        return replace(
+            self,
+            feet=self.feet[keep],
+            normals=self.normals[keep],
+            tangents=self.tangents[keep],
+            height=self.height[keep],
+            count=self.count[keep],
+            place=self.place[keep],
+            last=self.last[keep],
+            half=self.half[keep],
+            starts=np.append(starts, len(index)).astype(np.int64),
+            samples=int(self.count[keep].sum()),
+            passes=own(self.passes),
+            level=own(self.level),
+        )
 
 
 def samples_near(trace: Trace, points: FloatArray, reach: float) -> IntArray:

@@ -1,0 +1,51 @@
+"""The walls of a pocket and of a boss under a raster: a step ends where another wall begins."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mapping.assembly.assemble import assemble
+from mapping.base.fit import fit_base
+from mapping.detection.detect import detect
+from mapping.inference.joint import refine_all
+from mapping.trace import Trace
+
+TIP, DEPTH, WHITE = 1.5e-3, 0.5e-3, 4e-6
+HALF = np.array([8e-3, 5e-3])  # of the rectangle, along the sweeps and across
+
+
+def felt(inside_is_high: bool, pitch: float) -> Trace:
+    """A raster over a rectangle of upright walls, by closed form: the ball rests on a floor, or on the nearest rim."""
+    rows = np.arange(-0.011, 0.0111, pitch)
+    x = np.arange(-0.016, 0.016, 0.1e-3)
+    centers = []
+    for k, y in enumerate(rows):
+        way = x if k % 2 == 0 else x[::-1]
+        beyond = np.abs(np.column_stack([way, np.full(len(way), y)])) - HALF
+        outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)  # distance from the rectangle
+        within = np.maximum(-beyond.max(axis=1), 0.0)  # and, inside, from its rim
+        to_high = outside if inside_is_high else within
+        rolling = np.sqrt(np.maximum(TIP**2 - to_high**2, 0.0)) - TIP
+        height = np.where(to_high < TIP, np.maximum(rolling, -DEPTH), -DEPTH) + (DEPTH if inside_is_high else 0.0)
+        centers.append(np.column_stack([way, np.full(len(way), y), TIP + height]))
+    points = np.concatenate(centers)
+    points[:, 2] += WHITE * np.random.default_rng(3).standard_normal(len(points))
+    sweep = np.repeat(np.arange(len(rows)), len(x))
+    return Trace(1e-2 * np.arange(len(points)), points, sweep, TIP)
+
+
+@pytest.mark.parametrize("inside_is_high", [False, True])
+@pytest.mark.parametrize("pitch", [1e-3, pytest.param(0.5e-3, marks=pytest.mark.slow)])
+def test_two_walls_are_steps_of_its_depth_and_nothing_else_is_there(inside_is_high, pitch):
+    trace = felt(inside_is_high, pitch)
+    base = fit_base(trace)
+    detections = detect(trace, base)
+    found = assemble(detections, trace, base)
+    features = refine_all(found, trace, 1, base=base, noise=detections.noise, confirm=None)
+    assert [feature.kind for feature in features] == ["step", "step"]
+    for feature in features:
+        assert feature.height.low <= DEPTH <= feature.height.high
+        assert abs(np.abs(feature.axis[:, 0]).mean() - HALF[0]) < 20e-6
+        assert feature.length.censored
+        assert 2.0 * (HALF[1] - TIP) < feature.length.median < 2.0 * (HALF[1] + TIP)
