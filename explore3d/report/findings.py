@@ -11,7 +11,7 @@ import numpy as np
 from explore3d import count_text
 from explore3d.analysis import ABSORBED, FAILED, Analysis, swept_share
 from mapping import Feature, length_text, place_text
-from mapping.detection import CLEAR
+from mapping.detection import CLEAR, LARGEST
 from mapping.detection.path import PathLedger
 from mapping.inference.configuration import numbers_in
 from mapping.model import probability
@@ -273,8 +273,18 @@ def limit_sentence(analysis: Analysis) -> str:
     return (
         f"A sharp crest {length_text(detections.detection_limit, 2)} high or higher is seen with "
         f"{100 * detections.probability:.0f} % probability where a sweep crosses it{swept_part(analysis)}"
-        f"{measured_part(analysis)}."
+        f"{wide_part(analysis)}{measured_part(analysis)}."
     )
+
+
+def wide_part(analysis: Analysis) -> str:
+    """'', but not on bump-1, which is wider than 8 mm'': a detail as wide as no fine one is hides what is on it."""
+    widest = 2.0 * LARGEST * analysis.trace.tip_radius
+    wide = [feature.id for feature in analysis.model.features if feature.width.median > widest]
+    if not wide:
+        return ""
+    which = f"{len(wide)} features" if len(wide) > MOST_REMARKS else " and ".join(wide)
+    return f", but not on {which}, wider than {length_text(widest, 2)}"
 
 
 def measured_part(analysis: Analysis) -> str:

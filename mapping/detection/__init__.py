@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     )
     from mapping.detection.crossing import Crossing as Crossing
     from mapping.detection.detect import (
+        LARGEST as LARGEST,
         SHORTEST_SWEEP_SAMPLES as SHORTEST_SWEEP_SAMPLES,
         Detections as Detections,
         detect as detect,
@@ -35,7 +36,7 @@ _PUBLIC = {
     "candidates": ("CLEAR",),
     "coverage": ("Coverage", "FoundHeights", "coverage", "face_samples", "found_heights", "lost_heights"),
     "crossing": ("Crossing",),
-    "detect": ("SHORTEST_SWEEP_SAMPLES", "Detections", "detect", "expected_limit"),
+    "detect": ("LARGEST", "SHORTEST_SWEEP_SAMPLES", "Detections", "detect", "expected_limit"),
     "filters.matched_filter": ("LADDER",),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
     "quiet_noise": ("RAW_SAMPLES", "smallest_crest"),

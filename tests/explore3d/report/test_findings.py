@@ -99,6 +99,16 @@ def test_what_would_have_been_seen_is_said_with_every_result() -> None:
     )
 
 
+def test_on_a_detail_as_wide_as_no_fine_one_nothing_is_promised() -> None:
+    wide, fine = (feature(name, True, Interval(0.0, 0.0, 0.0)) for name in ("bump-1", "bump-2"))
+    wide.width, fine.width = Interval(90e-3, 85e-3, 95e-3), Interval(79e-3, 78e-3, 81e-3)
+    assert summary(analysis(wide, fine))[-1].endswith("where a sweep crosses it, but not on bump-1, wider than 80 mm.")
+    several = [feature(f"pit-{k}", True, Interval(0.0, 0.0, 0.0)) for k in range(6)]
+    for each in several:
+        each.width = wide.width
+    assert summary(analysis(*several))[-1].endswith("but not on 6 features, wider than 80 mm.")
+
+
 def test_no_sentence_speaks_of_a_surface_that_was_not_swept() -> None:
     first, last = summary(analysis(untouched=0.79))
     assert first == "no features found on the 21 % of the surface that was swept"
