@@ -241,6 +241,7 @@ def test_a_fastest_speed_that_cannot_be_known_is_refused() -> None:
         parse_scene(FASTEST.replace('"fastest"', '"fast"'), WIRE)
 
 
+@pytest.mark.slow
 def test_plan_and_run_promise_the_same_and_keep_it(tmp_path: Path) -> None:
     """Sweeps lie so close that the noise lets the height asked for be found halfway between two of them."""
     text = TEXT.replace("wire_on_plate.ply", "tile.ply").replace("meshes/plate.ply", "meshes/tile.ply")
@@ -259,6 +260,7 @@ def test_plan_and_run_promise_the_same_and_keep_it(tmp_path: Path) -> None:
     assert counts[1] > 2 * counts[0]
 
 
+@pytest.mark.slow
 def test_noise_that_hides_what_was_asked_for_is_said_first(tmp_path: Path) -> None:
     text = TEXT.replace("wire_on_plate.ply", "tile.ply").replace("meshes/plate.ply", "meshes/tile.ply")
     text = text.partition("[[truth]]")[0].replace('"0.3 mm"', '"0.1 mm"').replace('radius = "10 mm"', 'radius = "5 mm"')

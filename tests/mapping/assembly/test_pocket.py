@@ -35,7 +35,7 @@ def felt(inside_is_high: bool, pitch: float) -> Trace:
     return Trace(1e-2 * np.arange(len(points)), points, sweep, TIP)
 
 
-@pytest.mark.parametrize("inside_is_high", [False, True])
+@pytest.mark.parametrize("inside_is_high", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("pitch", [1e-3, pytest.param(0.5e-3, marks=pytest.mark.slow)])
 def test_two_walls_are_steps_of_its_depth_and_nothing_else_is_there(inside_is_high, pitch):
     trace = felt(inside_is_high, pitch)

@@ -52,6 +52,7 @@ def test_each_family_is_recognised_and_fits_to_the_noise(kind: str) -> None:
     assert height.std() < 1.1 * NOISE
 
 
+@pytest.mark.slow
 def test_radii_of_fitted_bodies_are_the_truth_less_the_tip() -> None:
     for kind in ("sphere", "cylinder"):
         assert fit_base(_sweeps(CENTERS[kind])).parameters["radius"] == pytest.approx(BODY, abs=2e-5)

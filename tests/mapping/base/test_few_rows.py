@@ -45,13 +45,13 @@ def levels(base: Base) -> FloatArray:
     return np.sort(np.asarray(base.parameters.get("levels", [0.0]), dtype=np.float64))
 
 
-@pytest.mark.parametrize("rows", [2, 3])
+@pytest.mark.parametrize("rows", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_two_or_three_rows_over_a_slot_are_a_plane(rows: int) -> None:
     # between them a sheet could wind as it likes, and a rod run with the rows on its two sides
     assert fit_base(rows_over(slot(), rows, 20e-6)).kind in ("plane", "quadric")
 
 
-@pytest.mark.parametrize("rows", [2, 3, *(pytest.param(rows, marks=pytest.mark.slow) for rows in (8, 16))])
+@pytest.mark.parametrize("rows", [2, *(pytest.param(rows, marks=pytest.mark.slow) for rows in (3, 8, 16))])
 def test_a_step_across_rough_rows_parts_two_levels(rows: int) -> None:
     base = fit_base(rows_over(step(), rows, 30e-6))
     parted = levels(base)

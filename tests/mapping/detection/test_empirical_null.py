@@ -134,6 +134,7 @@ def test_noise_of_another_law_gives_no_more_than_thrice_the_false_alarms_asked_f
     assert all(told) if law is level_by_sweep else all(run.noise.further for run in runs)
 
 
+@pytest.mark.slow
 def test_beside_a_crest_in_noise_that_wanders_there_is_no_pit() -> None:
     """A sweep that stands off the base does so under a crest, too: the base there would be a pit as wide as the crest,
     with a step down and a step up at its ends, and the next one beside it."""

@@ -51,6 +51,7 @@ def test_every_line_crosses_the_step_and_nothing_else(height: float) -> None:
         assert crossing.height == pytest.approx(height, rel=0.02)
 
 
+@pytest.mark.slow
 def test_each_edge_of_a_staircase_is_crossed() -> None:
     stairs = (-15e-3, -2e-3, 17e-3)
     detections = found(lambda x: sum(step_height(x - place, 0.2e-3, TIP) for place in stairs))

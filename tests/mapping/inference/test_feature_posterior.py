@@ -213,6 +213,7 @@ def test_kinds_without_a_closed_form_come_back_with_a_note():
     assert same.posterior is None and "no closed-form" in same.notes[0]
 
 
+@pytest.mark.slow
 def test_a_tip_of_unknown_radius_widens_the_wire_and_nothing_else():
     # only a + r counts under a ball: 0.2 mm that are not known of the tip are not known of the wire
     def answer(tip_sd, seed=0):

@@ -26,7 +26,7 @@ KINDS = [
 ]
 
 
-@pytest.mark.parametrize("body", ["bump", "junction Y"])
+@pytest.mark.parametrize("body", ["bump", pytest.param("junction Y", marks=pytest.mark.slow)])
 def test_a_kind_is_told_at_the_noise_of_the_apparatus(body: str) -> None:
     assert trial(body, "apparatus", "two ways", 0)["right"]
 

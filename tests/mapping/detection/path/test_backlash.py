@@ -52,7 +52,7 @@ def asked(trace: Trace) -> tuple[LaidTrace, Detections, Backlash | None]:
     return laid, found, backlash(laid, found)
 
 
-@pytest.mark.parametrize("back", [False, True])
+@pytest.mark.parametrize("back", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("play", [pytest.param(20e-6, marks=pytest.mark.slow), 40e-6])
 def test_a_play_is_told_and_heights_without_it_are_right(play: float, back: bool) -> None:
     trace = swept(play, seed=1, back=back)

@@ -31,15 +31,16 @@ from mapping.inference.configuration.search import searched
 from mapping.inference.families import Surroundings
 from mapping.instrument import Noise
 
-SLOW_PAIRS = [pytest.param(body, marks=pytest.mark.slow) for body in ("acute crossing", "wire over a step")]
+SLOW_PAIRS = [pytest.param(body, marks=pytest.mark.slow) for body in ("flat bar", "acute crossing", "wire over a step")]
 
 
-@pytest.mark.parametrize("body", ["wires 2 mm apart", "flat bar", *SLOW_PAIRS])
+@pytest.mark.parametrize("body", ["wires 2 mm apart", *SLOW_PAIRS])
 def test_neighbours_are_told_apart_and_a_bar_is_not_taken_for_two(body: str) -> None:
     result = trial(body, "apparatus", "two ways", FIRST_BUILT_WITH)
     assert result["right"], result
 
 
+@pytest.mark.slow
 def test_what_stands_off_a_step_that_explains_every_detection_is_looked_for() -> None:
     result = trial("bar on a terrace", "apparatus", "two ways", FIRST_BUILT_WITH + 1)
     assert result["right"], result
