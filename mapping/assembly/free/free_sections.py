@@ -39,6 +39,7 @@ class FreeSection:
         log_odds: for it, on this sweep.
         times_crest: how many times as wide it was felt as a crest of no width across the sweep.
         inside: crossings that are parts of it.
+        round_body: True if it is felt as far as where the body faces the other way, as no spot is.
     """
 
     crossing: Crossing
@@ -47,6 +48,7 @@ class FreeSection:
     log_odds: float
     times_crest: float
     inside: tuple[Crossing, ...]
+    round_body: bool = False
 
     @property
     def sign(self) -> float:
@@ -101,8 +103,13 @@ def without_wide(detections: Detections, trace: LaidTrace) -> Detections:
 def free_spot(section: FreeSection, algorithm: int) -> Feature:
     """The bump or pit of which one sweep shows a section."""
     crossing, sizes = section.crossing, section.sizes
+    kind = kind_made_of(crossing.kind, line=False).name
+    round_it = (
+        f"it is felt as far as where the body faces the other way, as no {kind} is: a line along the sweep may be"
+    )
+    misfit = round_it if section.round_body else None
     return Feature(
-        kind=kind_made_of(crossing.kind, line=False).name,
+        kind=kind,
         axis=crossing.point[None],
         normals=crossing.normal[None],
         height=sizes.height_interval(section.sign),
@@ -111,7 +118,8 @@ def free_spot(section: FreeSection, algorithm: int) -> Feature:
         evidence=Support(crossing.snr, len(section.inside), (algorithm,), section.log_odds),
         curvature_feature=False,
         position_sd=crossing.position_sd,
-        details=Details(top=sizes.top, free_section=True),
+        notes=() if misfit is None else (misfit,),
+        details=Details(top=sizes.top, free_section=True, misfit=misfit),
     )
 
 
@@ -138,6 +146,7 @@ def _measured(
     around = sizes.middle + np.array([-0.5, 0.0, 0.5]) * sizes.width
     before, center, after = (np.array([np.interp(s, piece.s, one) for one in piece.centers.T]) for s in around)
     foot, way = sweep.base.foot(center[None], sweep.trace.tip_radius), after - before
+    passed = sweep.base.foot(piece.centers[section.begin : section.end + 1], sweep.trace.tip_radius)
     crossing = Crossing(
         sweep=sweep.number,
         t=float(np.interp(sizes.middle, piece.s, piece.t)),
@@ -156,7 +165,13 @@ def _measured(
         stop=int(piece.first[section.end + 1]),
     )
     return FreeSection(
-        crossing, sizes, over, float(log_odds), times_crest(section, sweep.trace.tip_radius), tuple(inside)
+        crossing,
+        sizes,
+        over,
+        float(log_odds),
+        times_crest(section, sweep.trace.tip_radius),
+        tuple(inside),
+        bool((passed.normals @ foot.normals[0] < 0.0).any()),
     )
 
 

@@ -131,3 +131,20 @@ def test_a_doubtful_tip_makes_the_width_doubtful() -> None:
     (sure,), (doubtful,) = (refine_all(found, profile, 0, base=base, tip_sd=sd) for sd in (0.0, 0.5e-6))
     assert sure.width.median == doubtful.width.median
     assert doubtful.width.high - doubtful.width.low > sure.width.high - sure.width.low + 0.5e-6
+
+
+@pytest.mark.slow
+def test_what_a_helix_feels_all_round_a_body_is_remarked_as_no_spot() -> None:
+    radius, tip, fine = 0.03, 2e-3, 5e-6
+    z = np.arange(-5e-3, 30e-3, fine)
+    ring = np.where(np.abs(z - 12e-3) < 0.5e-3, 0.2e-3 * np.cos(np.pi * (z - 12e-3) / 1e-3), 0.0)
+    ball = np.sqrt(tip**2 - np.arange(-tip + fine, tip, fine) ** 2) - tip
+    felt_over = grey_dilation(ring, structure=ball, mode="nearest")
+    turned = np.arange(0.0, 2.0 * np.pi * 16.0, 0.02)
+    along = 1.5e-3 * turned / (2.0 * np.pi)
+    out = radius + tip + np.interp(along, z, felt_over) + 4e-6 * np.random.default_rng(4).standard_normal(len(turned))
+    centers = np.column_stack([out * np.cos(turned), out * np.sin(turned), along])
+    trace = Trace(1e-3 * np.arange(len(turned)), centers, np.zeros(len(turned), dtype=int), tip)
+    base = fit_base(trace)
+    spots = [each for each in assemble(detect(trace, base), trace, base) if each.width.median > 2.0 * radius]
+    assert spots and all("faces the other way" in str(each.details.misfit) for each in spots)
