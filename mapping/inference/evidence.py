@@ -15,6 +15,7 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Interval, Posterior, length_text
 from mapping.inference.families import (
+    BellRidgeShape,
     BellShape,
     PosteriorProblem,
     Surroundings,
@@ -97,62 +98,50 @@ def probabilities(log_evidences: list[float]) -> FloatArray:
 def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, Posterior]]) -> Feature:
     """The feature with the sizes that all likely families agree on.
 
+    What most probably runs out has no foot: its width is that at half height, in all families. Beside a section with an
+    edge, whose width is that of its foot, what runs out counts as one that is as wide half way up.
+
     Args:
         feature: as its most probable family describes it.
         likely: weight, problem and posterior of each family, the most probable one first.
     """
-    kind = kind_of(feature)
-    if len(likely) == 1 and not isinstance(_shape(likely[0][1]), TrapezoidShape):
+    kind, shapes = kind_of(feature), [_shape(problem) for _, problem, _ in likely]
+    if len(likely) == 1 and not isinstance(shapes[0], BellRidgeShape | TrapezoidShape):
         return feature
-    total = sum(share for share, _, _ in likely)
-    parts = []
-    for share, problem, posterior in likely:
-        shape = _shape(problem)
+    bells = [isinstance(shape, BellShape | BellRidgeShape) for shape in shapes]
+    total, foot = sum(share for share, _, _ in likely), 1.0
+    parts: list[FloatArray] = []
+    for shape, bell, (share, _, posterior) in zip(shapes, bells, likely, strict=True):
         draws = posterior.samples[:, : len(shape.names)]
         count = round(AVERAGED_DRAWS * share / total)
         some = draws[np.linspace(0, len(draws) - 1, count).astype(np.int64)]
-        parts.append(np.column_stack([kind.draws_of_height(shape, some), *kind.widths_felt(shape, some)]))
+        widths = kind.widths_felt(shape, some, half_way=bells[0])
+        if not parts and any(bells) and not bell:
+            half = float(np.median(kind.widths_felt(shape, some, half_way=True)[0]))
+            foot = float(np.median(widths[0])) / half if half > 0.0 else 1.0  # of a roof nothing but its top is touched
+        factor = foot if bell else 1.0
+        parts.append(np.column_stack([kind.draws_of_height(shape, some), *(factor * each for each in widths)]))
     height, touched, bridged = np.concatenate(parts).T
     interval = Interval.from_draws(height)
     names = ", ".join(f"{name_of(problem)} {100 * share / total:.0f} %" for share, problem, _ in likely)
+    known = f"sections that leave this trace: {names}"
     if np.mean(bridged > touched) <= UNLIKELY_FAMILY:
-        return _with_bells(feature, interval, parts[0][:, 1], touched, likely, names)
+        notes = (f"{known}; width at half height" if bells[0] else known,) if any(bells) and len(likely) > 1 else ()
+        return replace(feature, height=interval, width=Interval.from_draws(touched), notes=(*feature.notes, *notes))
     low, median = np.quantile(touched, [0.05, 0.5])
     width = Interval(float(median), float(low), float(np.quantile(bridged, 0.95)), censored=True, bounded=True)
     note = (
-        f"the tip bridged its flanks: it touched a width of {length_text(float(median), 2)}, and the foot may be "
-        f"anything up to {length_text(width.high, 2)} wide (sections that leave this trace: {names})"
+        f"the tip bridged its flanks: it touched a width of {length_text(float(median), 2)}, and "
+        f"{'at half height it' if bells[0] else 'the foot'} may be anything up to {length_text(width.high, 2)} wide "
+        f"({known})"
     )
     return replace(feature, height=interval, width=width, notes=(*feature.notes, note))
-
-
-def _with_bells(
-    feature: Feature,
-    height: Interval,
-    first: FloatArray,
-    touched: FloatArray,
-    likely: Sequence[tuple[float, PosteriorProblem, Posterior]],
-    names: str,
-) -> Feature:
-    """The feature with the width that all families agree on; that of bumps is drawn at half height, (S,) m.
-
-    What is most probably a cap is said to be as wide as at its foot, a bell among its draws as a cap that is as wide
-    half way up.
-    """
-    bells = [isinstance(_shape(problem), BellShape) for _, problem, _ in likely]
-    if not any(bells):
-        return replace(feature, height=height, width=Interval.from_draws(touched))
-    note = f"sections that leave this trace: {names}"
-    if not bells[0]:
-        touched = touched * (feature.width.median / float(np.median(first)))
-    note += "; width at half height" if bells[0] else ""
-    return replace(feature, height=height, width=Interval.from_draws(touched), notes=(*feature.notes, note))
 
 
 def name_of(problem: PosteriorProblem) -> str:
     """What people call a problem's section."""
     shape = _shape(problem)
-    if isinstance(shape, BellShape):
+    if isinstance(shape, BellShape | BellRidgeShape):
         return "bell"
     if not isinstance(shape, TrapezoidShape):
         return "round"

@@ -6,9 +6,12 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from mapping.inference.families.bell import (
+        BellRidgeShape as BellRidgeShape,
         BellShape as BellShape,
         bell_beside as bell_beside,
+        bell_ridge_beside as bell_ridge_beside,
         bell_section as bell_section,
+        bell_widths as bell_widths,
         width_at_half_height as width_at_half_height,
     )
     from mapping.inference.families.broken_ridge import BrokenRidgeShape as BrokenRidgeShape
@@ -43,7 +46,15 @@ if TYPE_CHECKING:
     from mapping.inference.families.twin import TwinShape as TwinShape, twin_beside as twin_beside
 
 _PUBLIC = {
-    "bell": ("BellShape", "bell_beside", "bell_section", "width_at_half_height"),
+    "bell": (
+        "BellRidgeShape",
+        "BellShape",
+        "bell_beside",
+        "bell_ridge_beside",
+        "bell_section",
+        "bell_widths",
+        "width_at_half_height",
+    ),
     "broken_ridge": ("BrokenRidgeShape",),
     "bump": ("BumpShape", "Spot", "spot_at"),
     "free_tip": ("with_free_tip", "with_nominal_tip"),

@@ -96,13 +96,16 @@ def trapezoid_beside(ridge: RidgeShape, sizes: Sizes, *, roof: bool) -> Trapezoi
     return TrapezoidShape(ridge.window, ridge.chart, ridge.modes, ridge.tip_radius, roof, priors, start, step)
 
 
-def touched_widths(height: FloatArray, top: FloatArray, run: FloatArray, tip: float) -> tuple[FloatArray, FloatArray]:
+def touched_widths(
+    height: FloatArray, top: FloatArray, run: FloatArray, tip: float, *, half_way: bool = False
+) -> tuple[FloatArray, FloatArray]:
     """(W,) widths of trapezoids that the ball touches, and within which alone there may be more of them, m.
 
     The second reaches from where the ball leaves the base on the one side to where it does on the other. Where the
-    flanks are so gentle that the ball rolls down on them, both are the width of the foot that they lead to.
+    flanks are so gentle that the ball rolls down on them, both are the width of the foot that they lead to, or that at
+    half of the height.
     """
-    foot = top + 2.0 * run
+    foot = top + (1.0 if half_way else 2.0) * run
     # the ball that rests on base and edge stands kink = x_c beside the edge, and falls there by x_c to each r - H
     kink = np.sqrt(np.clip(height * (2.0 * tip - height), 0.0, None))
     hidden = height * np.clip(tip - height, 0.0, None) > run * kink
