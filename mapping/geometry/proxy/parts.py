@@ -63,6 +63,23 @@ class Bell:
 
 
 @dataclass(frozen=True, eq=False)
+class Swell:
+    """A ridge whose flanks run out: the section of a bell along an axis. An open one ends as halves of that bell.
+
+    Args:
+        axis: (K, 3) points of the base under the crest, m, K >= 2; first equals last of a closed one.
+        normals: (K, 3) outward unit normals there.
+        height, scale, exponent: as of a bell.
+    """
+
+    axis: FloatArray
+    normals: FloatArray
+    height: float
+    scale: float
+    exponent: float
+
+
+@dataclass(frozen=True, eq=False)
 class Trench:
     """A groove or a pit: all of the base that is nearer to the axis than half the width, lowered, with upright walls.
 
@@ -100,4 +117,4 @@ class Terrace:
     high_side: float
 
 
-Part = Chain | Bar | Bell | Trench | Terrace
+Part = Chain | Bar | Bell | Swell | Trench | Terrace

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
+from mapping.geometry.proxy import Part, Swell
 from mapping.geometry.templates import contact_half_width, width_of_cap
 from mapping.inference.families import (
     BellRidgeShape,
@@ -39,6 +40,13 @@ BEGUN_HALVES = (0.02, 2.0, 15)
 
 class Ridge(Crest, LineKind):
     """Capsule chains: course, rounding and places of the ends, height and log radius."""
+
+    def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
+        """The chain, the bar, or the swell that the feature's details describe."""
+        scale, exponent, height = feature.details.scale, feature.details.exponent, feature.height.median
+        if scale is None or exponent is None or not height > 0.0:
+            return super().part(feature, exaggeration)
+        return Swell(feature.axis, feature.normals, exaggeration * height, exaggeration * scale, exponent)
 
     def shape(self, traced: Traced) -> RidgeShape:
         sizes, tip = traced.sizes, traced.tip_radius
