@@ -1,9 +1,10 @@
 """Evidence: the marginal likelihood of the trace under one family of shapes, its parameters integrated out.
 
 By it a section is chosen. A ball of 10 mm feels the top of a line and bridges its flanks: a round wire, a bar and a
-roof may leave one trace, and so may a cap and a bell. Each family's weight is its evidence; heights are drawn from all
-that remain likely, and where a flank was not touched in them the width is a bound. Where the round section alone
-remains, its width is a number, as that of a wire is.
+roof may leave one trace, and so may a cap and a bell. Each family's weight is its evidence; sizes are drawn from all
+that remain likely. A round section has a width, as a wire has; of one whose flanks were not touched the width lies
+between bounds. The interval reaches from the least to the most that any of them may have, and where such sections are
+more probable than not, it is all that is known.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from mapping.inference.families import (
     BellRidgeShape,
     BellShape,
     PosteriorProblem,
+    ShoulderedShape,
     Surroundings,
     TrapezoidShape,
     with_free_tip,
@@ -30,6 +32,8 @@ from mapping.inference.sampler import find_optima, importance_sample, laplace
 # A family whose probability is below this one leaves every 90 % interval as it is, to within half of its tail
 UNLIKELY_FAMILY = 0.05
 AVERAGED_DRAWS = 4000
+# Probability of sections whose flanks the ball bridged from which on the median width is none of its own
+MOSTLY_BRIDGED = 0.5
 # The Gaussian approximation of a log evidence was off by -2.0 to +2.9 (33 families of 11 lines of explore3d bench
 # sections --building): what it takes for less likely by more than both of these is
 ROUGH_EVIDENCE = 5.0
@@ -125,14 +129,16 @@ def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, P
     interval = Interval.from_draws(height)
     names = ", ".join(f"{name_of(problem)} {100 * share / total:.0f} %" for share, problem, _ in likely)
     known = f"sections that leave this trace: {names}"
-    if np.mean(bridged > touched) <= UNLIKELY_FAMILY:
-        notes = (f"{known}; width at half height" if bells[0] else known,) if any(bells) and len(likely) > 1 else ()
-        return replace(feature, height=interval, width=Interval.from_draws(touched), notes=(*feature.notes, *notes))
-    low, median = np.quantile(touched, [0.05, 0.5])
-    width = Interval(float(median), float(low), float(np.quantile(bridged, 0.95)), censored=True, bounded=True)
+    low, high = float(np.quantile(touched, 0.05)), float(np.quantile(bridged, 0.95))
+    open_ = bridged > touched
+    if open_.mean() < MOSTLY_BRIDGED:
+        width = Interval(float(np.median(touched[~open_])), low, high)
+        notes = (f"{known}; width at half height" if bells[0] else known,) if len(likely) > 1 else ()
+        return replace(feature, height=interval, width=width, notes=(*feature.notes, *notes))
+    width = Interval(float(np.median(touched)), low, high, censored=True, bounded=True)
     note = (
-        f"the tip bridged its flanks: it touched a width of {length_text(float(median), 2)}, and "
-        f"{'at half height it' if bells[0] else 'the foot'} may be anything up to {length_text(width.high, 2)} wide "
+        f"the tip bridged its flanks: it touched a width of {length_text(width.median, 2)}, and "
+        f"{'at half height it' if bells[0] else 'the foot'} may be anything up to {length_text(high, 2)} wide "
         f"({known})"
     )
     return replace(feature, height=interval, width=width, notes=(*feature.notes, note))
@@ -143,6 +149,8 @@ def name_of(problem: PosteriorProblem) -> str:
     shape = _shape(problem)
     if isinstance(shape, BellShape | BellRidgeShape):
         return "bell"
+    if isinstance(shape, ShoulderedShape):
+        return "flat-topped with round edges"
     if not isinstance(shape, TrapezoidShape):
         return "round"
     return "triangular" if shape.roof else "flat-topped"

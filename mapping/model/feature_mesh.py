@@ -1,4 +1,4 @@
-"""Meshes of features for viewers: tubes or swells along ridges, caps or bells on bumps, ribbons for hollows and steps."""
+"""Meshes of features: tubes or swells along ridges, caps or bells on bumps, ribbons in hollows, on steps."""
 
 from __future__ import annotations
 

@@ -265,10 +265,10 @@ def _touched(vertices: FloatArray, faces: IntArray, trenches: Sequence[Trench]) 
 def _check(part: Part) -> None:
     """Raises ContactError for sizes that no part can have."""
     if isinstance(part, Bar):
-        for name, size in (("top", part.top), ("run", part.run)):
+        for name, size in (("top", part.top), ("run", part.run), ("shoulder", part.shoulder)):
             if not (np.isfinite(size) and size >= 0.0):
                 raise ContactError(f"a bar's {name} must be finite and at least 0; found {size!r}")
-        if part.top + part.run == 0.0:
+        if part.top + part.run + part.shoulder == 0.0:
             raise ContactError("a bar needs a top or flanks that run; found both 0")
     p = part.exponent if isinstance(part, Bell | Swell) else 1.0
     if not (np.isfinite(p) and (p > 0.0 or p < -1.0)):

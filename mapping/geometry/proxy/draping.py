@@ -105,6 +105,13 @@ def bar_mesh(bar: Bar, base: NearestPoint) -> Mesh:
         if outer > inner or falls:
             offsets = np.append(offsets, inner + shares * (outer - inner))
             rises = np.append(rises, 1.0 - shares if falls else np.ones(len(shares)))
+    if bar.shoulder > 0.0:  # before the wall, which a run of nothing is
+        a = bar.shoulder
+        least = max(1.0 - bar.height / a, 0.0)
+        turn = np.linspace(0.0, np.arccos(least), 2 + int(_chords(a) * np.arccos(least) / (2.0 * np.pi)))[1:]
+        wall = [half + a] if a < bar.height else []
+        offsets = np.concatenate([offsets[:-1], half + a * np.sin(turn), wall])
+        rises = np.concatenate([rises[:-1], 1.0 - a * (1.0 - np.cos(turn)) / bar.height, np.zeros(len(wall))])
     offsets, rises = np.append(-offsets[:0:-1], offsets), np.append(rises[:0:-1], rises)
     feet = [draped(bar.axis + away * laterals, base) for away in offsets]
     rows = [points + rise * bar.height * normals for (points, normals), rise in zip(feet, rises, strict=True)]

@@ -29,14 +29,16 @@ class Chain:
 
 @dataclass(frozen=True, eq=False)
 class Bar:
-    """A ridge with a flat top and straight flanks, from upright walls (run 0) to a roof (top 0); its ends are square.
+    """A ridge with a flat top and straight flanks, from upright walls (run 0) to a roof (top 0), or with round
+    edges over upright walls; its ends are square.
 
     Args:
         axis: (K, 3) points of the base under the middle, m, K >= 2; first equals last of a closed one.
         normals: (K, 3) outward unit normals there.
         height: of the top over the base, m, positive.
         top: width of the top, m, at least 0.
-        run: how far each flank goes beside it, m, at least 0; not both 0.
+        run: how far each flank goes beside it, m, at least 0.
+        shoulder: radius of its edges, m, at least 0, instead of a run; not all 0.
     """
 
     axis: FloatArray
@@ -44,6 +46,7 @@ class Bar:
     height: float
     top: float
     run: float
+    shoulder: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ TABLE_BENDS = 5
 SHARE_TO_EDGE = 0.25
 # Places of half of a section at which a ball may rest, and halvings of the stretch in which it changes from one to the
 # next: both are then known to a few thousandths of the ball's half-width
-PLACES_OF_FLANK, HALVINGS = 400, 12
+PLACES_OF_FLANK, FLANK_HALVINGS = 400, 12
 # A place is touched where no other one lifts the ball off it by more than rounding, in parts of the height
 TOUCHING = 1e-9
 # Below this taper a power of 1/taper loses digits, eps/taper; the first two terms of its series lose taper^2. Both err
@@ -247,7 +247,7 @@ def half_ways_touched(heights: FloatArray, halves: FloatArray, tapers: FloatArra
         if _rest(level, spacing, beside, tip)[1] <= touching + TOUCHING * height:
             continue
         low, high = 0.0, (PLACES_OF_FLANK - 1) * spacing
-        for _ in range(HALVINGS):
+        for _ in range(FLANK_HALVINGS):
             middle = 0.5 * (low + high)
             at = _rest(level, spacing, middle, tip)[0] * spacing
             if at < half:

@@ -39,7 +39,10 @@ if TYPE_CHECKING:
     )
     from mapping.inference.families.step import StepShape as StepShape
     from mapping.inference.families.trapezoid import (
+        ShoulderedShape as ShoulderedShape,
         TrapezoidShape as TrapezoidShape,
+        shouldered_beside as shouldered_beside,
+        shouldered_widths as shouldered_widths,
         touched_widths as touched_widths,
         trapezoid_beside as trapezoid_beside,
     )
@@ -79,7 +82,14 @@ _PUBLIC = {
         "smooth_section",
     ),
     "step": ("StepShape",),
-    "trapezoid": ("TrapezoidShape", "touched_widths", "trapezoid_beside"),
+    "trapezoid": (
+        "ShoulderedShape",
+        "TrapezoidShape",
+        "shouldered_widths",
+        "shouldered_beside",
+        "touched_widths",
+        "trapezoid_beside",
+    ),
     "twin": ("TwinShape", "twin_beside"),
 }
 doorway(__name__, _PUBLIC)

@@ -45,15 +45,16 @@ class Crest(Kind):
         if not height > 0.0:
             return None
         if is_flat_topped(feature):
-            top, run = feature.details.top or 0.0, feature.details.run or 0.0
-            return Bar(feature.axis, feature.normals, height, exaggeration * top, exaggeration * run)
+            sizes = (exaggeration * (each or 0.0) for each in _flat_parts(feature))
+            return Bar(feature.axis, feature.normals, height, *sizes)
         return Chain(feature.axis, feature.normals, height, exaggeration * crest_radius(feature))
 
     def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
         """Height and width of a round section, and its radius."""
         radii = np.exp(draws[:, -1])
         cap = Interval.from_draws(width_of_cap(draws[:, -2], radii))
-        return Section(Interval.from_draws(draws[:, -2]), cap, {"radius": float(np.median(radii))})
+        known = {"radius": float(np.median(radii)), "top": None, "run": None, "shoulder": None}
+        return Section(Interval.from_draws(draws[:, -2]), cap, known)
 
 
 def bell_said(draws: FloatArray) -> Section:
@@ -65,9 +66,16 @@ def bell_said(draws: FloatArray) -> Section:
 
 
 def is_flat_topped(feature: Feature) -> bool:
-    """True of a line whose section has straight flanks, with a flat top or none."""
-    details = feature.details
-    return details.radius is None and details.top is not None and details.run is not None
+    """True of a line whose section has straight flanks, with a flat top or none, or a flat top with round edges."""
+    _, run, shoulder = _flat_parts(feature)
+    return (
+        feature.details.radius is None and feature.details.top is not None and (run is not None or shoulder is not None)
+    )
+
+
+def _flat_parts(feature: Feature) -> tuple[float | None, float | None, float | None]:
+    """Width of the top, run of each flank, and radius of the edges, m."""
+    return feature.details.top, feature.details.run, feature.details.shoulder
 
 
 def crest_radius(feature: Feature) -> float:
@@ -82,12 +90,12 @@ def _flat_topped(feature: Feature, feet: FloatArray, tip_radius: float) -> Float
     from mapping.geometry.templates import section_heights
 
     away = axis_distance(feet, feature.axis)[:, None]
-    top, run = feature.details.top or 0.0, feature.details.run or 0.0
+    top, run, shoulder = (each or 0.0 for each in _flat_parts(feature))
     across, up = np.array([[0.5 * top, 0.5 * top + run]]), np.array([[feature.height.median, 0.0]])
     nowhere, endless = np.zeros_like(away), np.array([[-1e300, 1e300]])
     out = np.empty((1, len(feet)))
     section_heights(nowhere, away, np.zeros((2, 0, *away.shape)), nowhere, nowhere, np.zeros((1, 0)), endless,
-                    np.zeros(1), across, up, tip_radius, out)  # fmt: skip
+                    np.zeros(1), across, up, np.array([shoulder]), tip_radius, out)  # fmt: skip
     return np.asarray(out[0])
 
 

@@ -10,16 +10,19 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Interval
 from mapping.geometry.proxy import Part, Swell
-from mapping.geometry.templates import contact_half_width, width_of_cap
+from mapping.geometry.templates import width_of_cap
 from mapping.inference.families import (
     BellRidgeShape,
     PosteriorProblem,
     RidgeShape,
+    ShoulderedShape,
     Sizes,
     TrapezoidShape,
     bell_ridge_beside,
     bell_widths,
     rounding_of,
+    shouldered_beside,
+    shouldered_widths,
     touched_widths,
     trapezoid_beside,
 )
@@ -33,6 +36,7 @@ from mapping.inference.likelihood import Shape
 # upright and gentle flanks, tops that are hardly felt and such as fill the disturbance
 FLAT_STARTS = ((0.3, 0.02), (1.0, 0.02), (0.1, 0.6))
 ROOF_STARTS = ((0.02,), (0.6,))
+SHOULDER_STARTS = ((0.3, 0.05), (1.0, 0.05))
 # Half widths of a section that runs out, in half-widths of the disturbance, of which the best begins the search for its
 # optimum: from the least to the most, and how many
 BEGUN_HALVES = (0.02, 2.0, 15)
@@ -67,9 +71,13 @@ class Ridge(Crest, LineKind):
         ridge: Any = problem.target.shape
         course, last = ridge.modes.count, len(optimum) - 1
         posed = []
-        for roof, parts in ((False, FLAT_STARTS), (True, ROOF_STARTS)):
-            kept = np.delete(optimum, [course, last] if roof and not ridge.chart.closed else [last])
-            shape = trapezoid_beside(ridge, problem.sizes, roof=roof)
+        families = (
+            (trapezoid_beside(ridge, problem.sizes, roof=False), FLAT_STARTS),
+            (trapezoid_beside(ridge, problem.sizes, roof=True), ROOF_STARTS),
+            (shouldered_beside(ridge, problem.sizes), SHOULDER_STARTS),
+        )
+        for shape, parts in families:
+            kept = np.delete(optimum, [course, last] if shape.roof and not ridge.chart.closed else [last])
             begun = np.log(problem.sizes.half_width * np.array(parts))
             beginnings = np.column_stack([np.tile(kept, (len(parts), 1)), begun])
             alike = [ended(beginnings, shape.names, turn) for turn in SQUARE_OR_ROUND]
@@ -84,8 +92,10 @@ class Ridge(Crest, LineKind):
         if not isinstance(shape, TrapezoidShape):
             return super().section(feature, shape, draws)
         height, top, run = shape.parts(draws)
-        parts = {"top": float(np.median(top)), "run": float(np.median(run)), "radius": None}
-        return Section(Interval.from_draws(height), Interval.from_draws(top + 2.0 * run), parts)
+        flank = "shoulder" if isinstance(shape, ShoulderedShape) else "run"
+        parts = {"top": float(np.median(top)), flank: float(np.median(run)), "radius": None}
+        foot = top + (width_of_cap(height, run) if flank == "shoulder" else 2.0 * run)
+        return Section(Interval.from_draws(height), Interval.from_draws(foot), parts)
 
     def has_plain_member(self, shape: Any) -> bool:
         return isinstance(shape, RidgeShape)
@@ -114,16 +124,12 @@ class Ridge(Crest, LineKind):
         tip = shape.tip_radius
         if isinstance(shape, BellRidgeShape):
             return bell_widths(draws, tip)
+        if isinstance(shape, ShoulderedShape):
+            return shouldered_widths(*shape.parts(draws), tip, half_way=half_way)
         if isinstance(shape, TrapezoidShape):
             return touched_widths(*shape.parts(draws), tip, half_way=half_way)
-        height, radius = draws[:, -2], np.exp(draws[:, -1])
-        kink = contact_half_width(height, radius, tip)
-        touched, bridged = 2.0 * kink * radius / (radius + tip), 2.0 * kink
-        if half_way:  # of a low cap the ball touches more than that
-            width = width_of_cap(0.5 * height, radius)
-            inside = (width <= touched) & (0.5 * height < radius)
-            touched, bridged = np.where(inside, width, touched), np.where(inside, width, bridged)
-        return touched, bridged
+        width = width_of_cap((0.5 if half_way else 1.0) * draws[:, -2], np.exp(draws[:, -1]))
+        return width, width
 
     def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
         """The compiled form, over points instead of bins."""

@@ -69,7 +69,7 @@ def bar_form(top: float, run: float) -> Form:
         corners = np.array([[0.5 * top, 0.5 * top + run]]), np.array([[0.2e-3, 0.0]])
         section_heights(
             nothing, np.c_[x], np.zeros((2, 0, len(x), 1)), nothing, nothing, np.zeros((1, 0)),
-            np.array([[-1e300, 1e300]]), np.zeros(1), *corners, r, out,
+            np.array([[-1e300, 1e300]]), np.zeros(1), *corners, np.zeros(1), r, out,
         )  # fmt: skip
         return np.asarray(out[0])
 
