@@ -3,8 +3,8 @@
 By it a section is chosen. A ball of 10 mm feels the top of a line and bridges its flanks: a round wire, a bar and a
 roof may leave one trace, and so may a cap and a bell. Each family's weight is its evidence; sizes are drawn from all
 that remain likely. A round section has a width, as a wire has; of one whose flanks were not touched the width lies
-between bounds. The interval reaches from the least to the most that any of them may have, and where such sections are
-more probable than not, it is all that is known.
+between bounds, and where such sections are more probable than not these are all that is known. Else a bell beside them
+is as wide as its prior has it: like a round one it is about as wide as high, within a factor of e or so.
 """
 
 from __future__ import annotations
@@ -124,21 +124,23 @@ def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, P
             half = float(np.median(kind.widths_felt(shape, some, half_way=True)[0]))
             foot = float(np.median(widths[0])) / half if half > 0.0 else 1.0  # of a roof nothing but its top is touched
         factor = foot if bell else 1.0
-        parts.append(np.column_stack([kind.draws_of_height(shape, some), *(factor * each for each in widths)]))
-    height, touched, bridged = np.concatenate(parts).T
+        own = (2.0 * np.exp(some[:, -2]),) * 2 if bell else widths
+        columns = kind.draws_of_height(shape, some), *(factor * each for each in (*widths, *own))
+        parts.append(np.column_stack(columns))
+    height, touched, bridged, least, most = np.concatenate(parts).T
     interval = Interval.from_draws(height)
     names = ", ".join(f"{name_of(problem)} {100 * share / total:.0f} %" for share, problem, _ in likely)
     known = f"sections that leave this trace: {names}"
-    low, high = float(np.quantile(touched, 0.05)), float(np.quantile(bridged, 0.95))
-    open_ = bridged > touched
-    if open_.mean() < MOSTLY_BRIDGED:
-        width = Interval(float(np.median(touched[~open_])), low, high)
+    if np.mean(bridged > touched) < MOSTLY_BRIDGED:
+        low, high = np.quantile(least, 0.05), np.quantile(most, 0.95)
+        width = Interval(float(np.median(least[least == most])), float(low), float(high))
         notes = (f"{known}; width at half height" if bells[0] else known,) if len(likely) > 1 else ()
         return replace(feature, height=interval, width=width, notes=(*feature.notes, *notes))
-    width = Interval(float(np.median(touched)), low, high, censored=True, bounded=True)
+    low, high = np.quantile(touched, 0.05), np.quantile(bridged, 0.95)
+    width = Interval(float(np.median(touched)), float(low), float(high), censored=True, bounded=True)
     note = (
         f"the tip bridged its flanks: it touched a width of {length_text(width.median, 2)}, and "
-        f"{'at half height it' if bells[0] else 'the foot'} may be anything up to {length_text(high, 2)} wide "
+        f"{'at half height it' if bells[0] else 'the foot'} may be anything up to {length_text(width.high, 2)} wide "
         f"({known})"
     )
     return replace(feature, height=interval, width=width, notes=(*feature.notes, note))
