@@ -202,7 +202,7 @@ class Details:
         scale, exponent: of a bump of revolution whose flank runs out (m, 1).
         taper, bottom: of a hollow whose walls run out without an edge (1, and the depth that they lead to, m); scale is
             then its half width at half of that.
-        top, run: width of a flat top and run of each flank beside it, m.
+        top, run, shoulder: width of a flat top, and the run of each flank beside it or the radius of its edges, m.
         misfit: in which way no family of its kind fits it, in words.
         axis_sd: (K,) standard deviation of the axis across itself, at even steps along it, m.
         end_intervals: (2, 2) 90 % interval of the first and the last end along the axis, m, from where it is stated.
@@ -221,6 +221,7 @@ class Details:
     bottom: float | None = None
     top: float | None = None
     run: float | None = None
+    shoulder: float | None = None
     misfit: str | None = None
     axis_sd: FloatArray | None = None
     end_intervals: FloatArray | None = None

@@ -8,6 +8,7 @@ section was dilated by brute force. Every trial is one line of a JSONL file; wha
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from explore3d.analysis import Stages, build_model
-from explore3d.bench.scenes import TRUE_FAMILIES, section_body, section_trace
+from explore3d.bench.scenes import SECTION_TIP, TRUE_FAMILIES, section_body, section_trace
 from explore3d.log import Log
 from mapping import Feature, Interval
 from mapping.inference.configuration import in_words
@@ -31,28 +32,37 @@ STATED_SHARE = 0.9
 
 
 def bench_sections(
-    bodies: Sequence[str], noises: Sequence[str], seeds: range, store: Path, seconds: float = np.inf
+    bodies: Sequence[str],
+    noises: Sequence[str],
+    seeds: range,
+    store: Path,
+    seconds: float = np.inf,
+    tips: Sequence[float] = (SECTION_TIP,),
 ) -> Iterator[dict[str, Any]]:
     """Run what is not yet in the store and append it there, until so many seconds have passed; yields all records."""
     begin = perf_counter()
     lines = store.read_text(encoding="utf-8").splitlines() if store.exists() else []
-    done = {(each["body"], each["noise"], each["seed"]): each for each in map(json.loads, lines)}
-    for seed in seeds:
-        for body in bodies:
-            for noise in noises:
-                if (body, noise, seed) not in done:
-                    if perf_counter() - begin > seconds:
-                        return
-                    record = {"body": body, "noise": noise, "seed": seed} | section_trial(body, noise, seed)
-                    with store.open("a", encoding="utf-8") as file:
-                        file.write(json.dumps(record) + "\n")
-                    done[body, noise, seed] = record
-                yield done[body, noise, seed]
+    done = {_trial_of(each): each for each in map(json.loads, lines)}
+    for seed, body, noise, tip in itertools.product(seeds, bodies, noises, tips):
+        trial = {"body": body, "noise": noise, "seed": seed, "tip": tip}
+        if _trial_of(trial) not in done:
+            if perf_counter() - begin > seconds:
+                return
+            record = trial | section_trial(body, noise, seed, tip)
+            with store.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(record) + "\n")
+            done[_trial_of(trial)] = record
+        yield done[_trial_of(trial)]
 
 
-def section_trial(body: str, noise: str, seed: int) -> dict[str, Any]:
+def _trial_of(record: dict[str, Any]) -> tuple[str, str, int, float]:
+    """What tells a trial from others: section, noise, seed, and the tip's radius, m."""
+    return record["body"], record["noise"], record["seed"], record.get("tip", SECTION_TIP)
+
+
+def section_trial(body: str, noise: str, seed: int, tip: float = SECTION_TIP) -> dict[str, Any]:
     """Analyse one trace, and judge what is said of its line."""
-    truth, trace = section_body(body, seed), section_trace(body, noise, seed)
+    truth, trace = section_body(body, seed), section_trace(body, noise, seed, tip)
     begin = process_time()
     analysis = build_model(Log(trace), None, None, Stages())
     features = analysis.model.features
@@ -63,11 +73,14 @@ def section_trial(body: str, noise: str, seed: int) -> dict[str, Any]:
         "posterior": analysis.timings.get("posterior", 0.0),
         "true_height": truth.height,
         "true_widths": list(truth.widths),
+        "half_way": truth.width_half_way,
     }
     if not features:
         return record | {"judged": "missed"}
     main = max(features, key=lambda feature: feature.evidence.snr)
-    judged = {"height": _judged(main.height, (truth.height,) * 2), "width": _judged(main.width, truth.widths)}
+    # what runs out is said to be as wide as at half of its height
+    widths = truth.widths if main.details.exponent is None else (truth.width_half_way,) * 2
+    judged = {"height": _judged(main.height, (truth.height,) * 2), "width": _judged(main.width, widths)}
     flagged = is_flagged(main)
     if record["kinds"] != truth.count * [truth.kind]:
         stated = is_stated(features, truth.count * [truth.kind])
@@ -82,6 +95,7 @@ def section_trial(body: str, noise: str, seed: int) -> dict[str, Any]:
     }
     return (
         record
+        | {"runs_out": main.details.exponent is not None}
         | {"judged": whole, "flagged": flagged, "sizes": sizes, "notes": list(main.notes)}
         | {f"{name}_judged": each for name, each in judged.items()}
     )
@@ -111,13 +125,14 @@ def _judged(interval: Interval, truth: tuple[float, float]) -> str:
 
 
 def section_lines(records: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """A line for each section and noise: share and sorts of what is right, and coverage and bias of the height."""
-    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    """A line for each section, noise and tip: share and sorts of what is right, and coverage and bias of the height."""
+    groups: dict[tuple[str, str, float], list[dict[str, Any]]] = {}
     for record in records:
-        groups.setdefault((record["body"], record["noise"]), []).append(record)
+        body, noise, _, tip = _trial_of(record)
+        groups.setdefault((body, noise, tip), []).append(record)
     judged = (*JUDGED_RIGHT, *JUDGED_OPEN, *JUDGED_WRONG)
-    yield ",".join(["section", "noise", "trials", "right %", *judged, "covered %", "bias %", "posterior s"])
-    for (body, noise), some in groups.items():
+    yield ",".join(["section", "noise", "tip mm", "trials", "right %", *judged, "covered %", "bias %", "posterior s"])
+    for (body, noise, tip), some in groups.items():
         counts = {name: sum(each["judged"] == name for each in some) for name in JUDGED_RIGHT}
         rest = {name: sum(each["judged"] == name for each in some) for name in JUDGED_OPEN + JUDGED_WRONG}
         shares = [100.0 * sum(counts.values()) / len(some), *counts.values(), *rest.values()]
@@ -127,7 +142,7 @@ def section_lines(records: Sequence[dict[str, Any]]) -> Iterator[str]:
         bias = 100.0 * float(np.mean(ratios)) if sized else np.nan
         seconds = float(np.mean([each["posterior"] for each in some]))
         numbers = [*(f"{share:.0f}" for share in shares), f"{covered:.0f}", f"{bias:+.1f}", f"{seconds:.2f}"]
-        yield ",".join([body, noise, str(len(some)), *numbers])
+        yield ",".join([body, noise, f"{1e3 * tip:g}", str(len(some)), *numbers])
     known = [each for each in records if each["body"] in TRUE_FAMILIES and "flagged" in each]
     if known:
         false = sum(each["flagged"] for each in known)

@@ -417,7 +417,8 @@ def trust(
 def sections(
     store: Store,
     bodies: Annotated[str | None, typer.Option(help="Sections, separated by commas; all if left out.")] = None,
-    noises: Annotated[str | None, typer.Option(help="white, OU or both, separated by a comma.")] = None,
+    noises: Annotated[str | None, typer.Option(help="Noises, separated by commas; all if left out.")] = None,
+    tips: Annotated[str, typer.Option(help="Radii of the tip, mm, separated by commas.")] = "10",
     seeds: Annotated[int, typer.Option(min=1, help="Seeds of place, slant, number of sweeps and noise.")] = 20,
     building: Annotated[bool, typer.Option("--building", help="The seeds and sizes that may be looked into.")] = False,
     seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
@@ -431,7 +432,8 @@ def sections(
 
     chosen = _names(bodies, "--bodies", list(SECTION_BODIES)), _names(noises, "--noises", list(SECTION_NOISES))
     first = FIRST_BUILT_WITH if building else 0
-    _print(section_lines(list(bench_sections(*chosen, range(first, first + seeds), store, seconds))))
+    radii = [1e-3 * int(each) for each in _numbers(tips, "--tips", 1)]
+    _print(section_lines(list(bench_sections(*chosen, range(first, first + seeds), store, seconds, radii))))
 
 
 @bench.command()

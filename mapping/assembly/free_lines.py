@@ -127,9 +127,12 @@ def _line(
     square = np.array([_squareness(line.axis, section) for section in whole])
     sizes = mean_sizes(whole, square, trace.tip_radius, detections.noise)
     sign, crossings = group[0].sign, [section.crossing for section in whole]
+    notes = sizes.notes
     axis, ends = _ended(line, sign * sizes.height, sizes.width, inspection)
     feet = trace.base.foot(axis, trace.tip_radius)
     length = ended_length(axis, ends)
+    if length.censored:
+        notes = (*notes, "runs on where nothing was inspected: its length is at least this")
     return Feature(
         kind=kind_made_of(crossings[0].kind, line=True).name,
         axis=np.vstack([feet.points[:-1], feet.points[:1]]) if line.closed else feet.points,
@@ -140,7 +143,7 @@ def _line(
         evidence=_evidence(group, detections.algorithm),
         curvature_feature=False,
         position_sd=float(np.median([c.position_sd for c in crossings])),
-        notes=("runs on where nothing was inspected: its length is at least this",) if length.censored else (),
+        notes=notes,
         junction=line.junction,
         details=Details(top=sizes.top, free_section=True),
     )

@@ -1,9 +1,10 @@
 """Evidence: the marginal likelihood of the trace under one family of shapes, its parameters integrated out.
 
 By it a section is chosen. A ball of 10 mm feels the top of a line and bridges its flanks: a round wire, a bar and a
-roof may leave one trace, and so may a cap and a bell. Each family's weight is its evidence; heights are drawn from all
-that remain likely, and where a flank was not touched in them the width is a bound. Where the round section alone
-remains, its width is a number, as that of a wire is.
+roof may leave one trace, and so may a cap and a bell. Each family's weight is its evidence; sizes are drawn from all
+that remain likely. A round section has a width, as a wire has; of one whose flanks were not touched the width lies
+between bounds, and where such sections are more probable than not these are all that is known. Else a bell beside them
+is as wide as its prior has it: like a round one it is about as wide as high, within a factor of e or so.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Interval, Posterior, length_text
 from mapping.inference.families import (
+    BellRidgeShape,
     BellShape,
     PosteriorProblem,
+    ShoulderedShape,
     Surroundings,
     TrapezoidShape,
     with_free_tip,
@@ -29,6 +32,8 @@ from mapping.inference.sampler import find_optima, importance_sample, laplace
 # A family whose probability is below this one leaves every 90 % interval as it is, to within half of its tail
 UNLIKELY_FAMILY = 0.05
 AVERAGED_DRAWS = 4000
+# Probability of sections whose flanks the ball bridged from which on the median width is none of its own
+MOSTLY_BRIDGED = 0.5
 # The Gaussian approximation of a log evidence was off by -2.0 to +2.9 (33 families of 11 lines of explore3d bench
 # sections --building): what it takes for less likely by more than both of these is
 ROUGH_EVIDENCE = 5.0
@@ -97,63 +102,57 @@ def probabilities(log_evidences: list[float]) -> FloatArray:
 def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, Posterior]]) -> Feature:
     """The feature with the sizes that all likely families agree on.
 
+    What most probably runs out has no foot: its width is that at half height, in all families. Beside a section with an
+    edge, whose width is that of its foot, what runs out counts as one that is as wide half way up.
+
     Args:
         feature: as its most probable family describes it.
         likely: weight, problem and posterior of each family, the most probable one first.
     """
-    kind = kind_of(feature)
-    if len(likely) == 1 and not isinstance(_shape(likely[0][1]), TrapezoidShape):
+    kind, shapes = kind_of(feature), [_shape(problem) for _, problem, _ in likely]
+    if len(likely) == 1 and not isinstance(shapes[0], BellRidgeShape | TrapezoidShape):
         return feature
-    total = sum(share for share, _, _ in likely)
-    parts = []
-    for share, problem, posterior in likely:
-        shape = _shape(problem)
+    bells = [isinstance(shape, BellShape | BellRidgeShape) for shape in shapes]
+    total, foot = sum(share for share, _, _ in likely), 1.0
+    parts: list[FloatArray] = []
+    for shape, bell, (share, _, posterior) in zip(shapes, bells, likely, strict=True):
         draws = posterior.samples[:, : len(shape.names)]
         count = round(AVERAGED_DRAWS * share / total)
         some = draws[np.linspace(0, len(draws) - 1, count).astype(np.int64)]
-        parts.append(np.column_stack([kind.draws_of_height(shape, some), *kind.widths_felt(shape, some)]))
-    height, touched, bridged = np.concatenate(parts).T
+        widths = kind.widths_felt(shape, some, half_way=bells[0])
+        if not parts and any(bells) and not bell:
+            half = float(np.median(kind.widths_felt(shape, some, half_way=True)[0]))
+            foot = float(np.median(widths[0])) / half if half > 0.0 else 1.0  # of a roof nothing but its top is touched
+        factor = foot if bell else 1.0
+        own = (2.0 * np.exp(some[:, -2]),) * 2 if bell else widths
+        columns = kind.draws_of_height(shape, some), *(factor * each for each in (*widths, *own))
+        parts.append(np.column_stack(columns))
+    height, touched, bridged, least, most = np.concatenate(parts).T
     interval = Interval.from_draws(height)
     names = ", ".join(f"{name_of(problem)} {100 * share / total:.0f} %" for share, problem, _ in likely)
-    if np.mean(bridged > touched) <= UNLIKELY_FAMILY:
-        return _with_bells(feature, interval, parts[0][:, 1], touched, likely, names)
-    low, median = np.quantile(touched, [0.05, 0.5])
-    width = Interval(float(median), float(low), float(np.quantile(bridged, 0.95)), censored=True, bounded=True)
+    known = f"sections that leave this trace: {names}"
+    if np.mean(bridged > touched) < MOSTLY_BRIDGED:
+        low, high = np.quantile(least, 0.05), np.quantile(most, 0.95)
+        width = Interval(float(np.median(least[least == most])), float(low), float(high))
+        notes = (f"{known}; width at half height" if bells[0] else known,) if len(likely) > 1 else ()
+        return replace(feature, height=interval, width=width, notes=(*feature.notes, *notes))
+    low, high = np.quantile(touched, 0.05), np.quantile(bridged, 0.95)
+    width = Interval(float(np.median(touched)), float(low), float(high), censored=True, bounded=True)
     note = (
-        f"the tip bridged its flanks: it touched a width of {length_text(float(median), 2)}, and the foot may be "
-        f"anything up to {length_text(width.high, 2)} wide (sections that leave this trace: {names})"
+        f"the tip bridged its flanks: it touched a width of {length_text(width.median, 2)}, and "
+        f"{'at half height it' if bells[0] else 'the foot'} may be anything up to {length_text(width.high, 2)} wide "
+        f"({known})"
     )
     return replace(feature, height=interval, width=width, notes=(*feature.notes, note))
-
-
-def _with_bells(
-    feature: Feature,
-    height: Interval,
-    first: FloatArray,
-    touched: FloatArray,
-    likely: Sequence[tuple[float, PosteriorProblem, Posterior]],
-    names: str,
-) -> Feature:
-    """The feature with the width that all families agree on; that of bumps is drawn at half height, (S,) m.
-
-    What is most probably a cap is said to be as wide as at its foot, a bell among its draws as a cap that is as wide
-    half way up.
-    """
-    bells = [isinstance(_shape(problem), BellShape) for _, problem, _ in likely]
-    if not any(bells):
-        return replace(feature, height=height, width=Interval.from_draws(touched))
-    note = f"sections that leave this trace: {names}"
-    if not bells[0]:
-        touched = touched * (feature.width.median / float(np.median(first)))
-    note += "; width at half height" if bells[0] else ""
-    return replace(feature, height=height, width=Interval.from_draws(touched), notes=(*feature.notes, note))
 
 
 def name_of(problem: PosteriorProblem) -> str:
     """What people call a problem's section."""
     shape = _shape(problem)
-    if isinstance(shape, BellShape):
+    if isinstance(shape, BellShape | BellRidgeShape):
         return "bell"
+    if isinstance(shape, ShoulderedShape):
+        return "flat-topped with round edges"
     if not isinstance(shape, TrapezoidShape):
         return "round"
     return "triangular" if shape.roof else "flat-topped"

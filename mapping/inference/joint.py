@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapping import Feature, Interval, Trace
+from mapping import Feature, Trace
 from mapping.base import Base
 from mapping.geometry.mesh import distances
 from mapping.inference.families import Surroundings
 from mapping.inference.feature_posterior import refine, settle
-from mapping.inference.junctions import NORMAL_QUANTILE_95, Meeting, brought_together, meetings
+from mapping.inference.junctions import Meeting, brought_together, meetings
 from mapping.inference.kinds import sizes_of
 from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise
@@ -84,8 +84,7 @@ def refine_all(
 
 def _with_tip_doubt(feature: Feature, tip_sd: float) -> Feature:
     """A free section whose flanks are doubtful by the tip's radius: by r tan(a/2) <= r each (theory section 5.4)."""
-    sd = np.hypot((feature.width.high - feature.width.low) / (2.0 * NORMAL_QUANTILE_95), 2.0 * tip_sd)
-    return replace(feature, width=Interval.normal(feature.width.median, float(sd)))
+    return replace(feature, width=feature.width.with_doubt(2.0 * tip_sd))
 
 
 def _beside(features: Sequence[Feature], half_widths: Sequence[float]) -> list[set[int]]:

@@ -1,4 +1,4 @@
-"""Meshes of features, for viewers: a tube along a ridge, a cap or bell on a bump, a ribbon in a groove or on a step."""
+"""Meshes of features: tubes or swells along ridges, caps or bells on bumps, ribbons in hollows, on steps."""
 
 from __future__ import annotations
 
@@ -19,14 +19,17 @@ DRAWN_BELL_SHARE = 0.03
 def feature_mesh(feature: Feature) -> Surface:
     """The feature's estimated body as a mesh on the base, m, object frame.
 
-    Ridges and bumps are half ellipses of the median height and width, bumps with a skirt the bells that were fitted,
-    grooves and pits flat ribbons and discs of the median width, steps walls of the median height: a picture of the
-    record, not of the data.
+    Ridges and bumps are half ellipses of the median height and width, those whose flanks run out the bells that were
+    fitted, grooves and pits flat ribbons and discs of the median width, steps walls of the median height: a picture of
+    the record, not of the data.
     """
     height, width = _size(feature)
     if len(feature.axis) == 1:
         return _turned(feature, _meridian(feature, max(height, RIBBON_LIFT * width), width))
     section, closed = kind_of(feature).outline(height, width)
+    if feature.details.exponent is not None and feature.height.median > 0.0:
+        flank = _meridian(feature, height, width)
+        section = np.vstack([flank[::-1], flank[1:] * [-1.0, 1.0]])
     return _sweep(feature, section, closed=closed)
 
 

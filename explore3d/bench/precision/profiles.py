@@ -30,7 +30,8 @@ RASTER_LENGTH, ROW_PITCH, MOST_ASIDE, ROWS_BESIDE = 3e-3, 40e-6, 0.5, 4
 # Seeds that the analysis was built with lie below
 FIRST_REPORTED = 3000
 # A form: heights over places (m) from its middle, and what is to be found: kind, height and width (NaN: has none), m
-Form = tuple[Callable[[FloatArray], FloatArray], tuple[tuple[str, float, float], ...]]
+Heights = Callable[[FloatArray], FloatArray]
+Form = tuple[Heights, tuple[tuple[str, float, float], ...]]
 
 
 def _slot(rng: np.random.Generator) -> Form:
@@ -83,6 +84,14 @@ def _bare(rng: np.random.Generator) -> Form:
     return lambda u: 0.0 * u, ()
 
 
+def without_detail(name: str, seed: Sequence[int]) -> Heights:
+    """The body of a form beyond the ends of its detail: the arc goes on where the slot does not."""
+    if name != "slot on an arc":
+        return _bare(np.random.default_rng(seed))[0]
+    slot, arc = (make(np.random.default_rng(seed))[0] for make in (_slot, _on_an_arc))
+    return lambda u: arc(u) - slot(u)
+
+
 PROFILE_FORMS: dict[str, Callable[[np.random.Generator], Form]] = {
     "slot": _slot,
     "scratch": _scratch,
@@ -132,11 +141,12 @@ def raster_trial(name: str, seed: int, rows: int) -> tuple[list[Feature], tuple[
     """As `profile_trial`, of a raster of so many rows, and the detail's length between its ends, m (NaN: none)."""
     rng = np.random.default_rng([seed, rows, *name.encode()])
     form, wanted = PROFILE_FORMS[name](rng)
+    beside = without_detail(name, [seed, rows, *name.encode()])
     aside, y = rng.uniform(-MOST_ASIDE, MOST_ASIDE), ROW_PITCH * (np.arange(rows) - 0.5 * (rows - 1))
     square, table = 1.0 / np.hypot(1.0, aside), list[FloatArray]()
     ends = ROW_PITCH * (0.5 * rows - ROWS_BESIDE + rng.uniform(-0.5, 0.5, 2)) * [-1.0, 1.0]
     for number, at in enumerate(y):
-        crossed = form if ends[0] < at < ends[1] else _bare(rng)[0]
+        crossed = form if ends[0] < at < ends[1] else beside
         x, z = _felt(crossed, 0.5 * RASTER_LENGTH + aside * at, rng, RASTER_LENGTH, square)
         table.append(np.column_stack([np.full(len(x), number), 1e3 * x, np.full(len(x), 1e3 * at), 1e3 * z]))
     found = _analysed(np.concatenate(table), "sweep,x [mm],y [mm],z [mm]")
@@ -156,7 +166,7 @@ def _analysed(table: FloatArray, head: str) -> list[Feature]:
 
 
 def _felt(
-    form: Callable[[FloatArray], FloatArray],
+    form: Heights,
     middle: float,
     rng: np.random.Generator,
     length: float = PROFILE_LENGTH,

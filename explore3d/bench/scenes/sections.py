@@ -22,8 +22,14 @@ SECTION_PITCH = 3e-3
 EVERY = 3
 # How many sweeps cross the line, in turn
 SWEEP_COUNTS = (3, 5, 9, 14, 20)
-# 0.06 mm of a sample: all of it white, and a third of its variance correlated over 0.3 mm
-SECTION_NOISES = {"white": Noise(0.06e-3), "OU": Noise(0.049e-3, 0.0346e-3, 0.3e-3)}
+# 0.06 mm of a sample: all of it white, and a third of its variance correlated over 0.3 mm; and what better instruments
+# have, white: the less noise there is, the more surely a section that is another is told
+SECTION_NOISES = {
+    "white": Noise(0.06e-3),
+    "OU": Noise(0.049e-3, 0.0346e-3, 0.3e-3),
+    "10um": Noise(0.01e-3),
+    "2um": Noise(0.002e-3),
+}
 # Seeds that were looked into while building, and those that are reported; what is built with has sizes of its own, too
 FIRST_BUILT_WITH = 1000
 
@@ -52,6 +58,12 @@ class SectionBody:
     widths: tuple[float, float]
     factor: Profile | None = None
     count: int = 1
+
+    @property
+    def width_half_way(self) -> float:
+        """Its width where it has half of its height, m."""
+        x = np.linspace(-self.half, self.half, 2 * int(np.ceil(self.half / SECTION_GRID)) + 1)
+        return float(np.ptp(x[self.profile(x) / self.height >= 0.5]))
 
 
 def _wire(size: float) -> SectionBody:
@@ -157,8 +169,8 @@ def section_body(name: str, seed: int) -> SectionBody:
     return SECTION_BODIES[name](float(np.random.default_rng((seed, 1)).uniform(0.8, 1.25)))
 
 
-def section_trace(name: str, noise: str, seed: int) -> Trace:
-    """Sweeps across the line, which lies at any place and slants by up to 20 degrees."""
+def section_trace(name: str, noise: str, seed: int, tip: float = SECTION_TIP) -> Trace:
+    """Sweeps of a tip's radius, m, across the line, which lies at any place and slants by up to 20 degrees."""
     body, rng = section_body(name, seed), np.random.default_rng((seed, list(SECTION_BODIES).index(name)))
     count = SWEEP_COUNTS[seed % len(SWEEP_COUNTS)]
     slant, place = rng.uniform(-0.35, 0.35), rng.uniform(-1e-3, 1e-3)
@@ -167,12 +179,12 @@ def section_trace(name: str, noise: str, seed: int) -> Trace:
     feet = np.column_stack([np.repeat(across, len(run)), np.tile(run, count), np.zeros(len(run) * count)])
     distance = -np.sin(slant) * feet[:, 0] + np.cos(slant) * (feet[:, 1] - place)
     along = np.cos(slant) * feet[:, 0] + np.sin(slant) * (feet[:, 1] - place)
-    height = felt(body, distance, along, SECTION_TIP)
+    height = felt(body, distance, along, tip)
     height += simulate_noise(SECTION_NOISES[noise], [run] * count, rng)
     kept = np.tile(np.arange(len(run)) % EVERY == 0, count)
-    centers = (feet + (SECTION_TIP + height)[:, None] * [0.0, 0.0, 1.0])[kept]
+    centers = (feet + (tip + height)[:, None] * [0.0, 0.0, 1.0])[kept]
     sweeps = np.repeat(np.arange(count), len(run))[kept]
-    return Trace(2e-4 * np.arange(float(len(centers))), centers, sweeps, SECTION_TIP)
+    return Trace(2e-4 * np.arange(float(len(centers))), centers, sweeps, tip)
 
 
 def felt(body: SectionBody, distance: FloatArray, along: FloatArray, tip: float) -> FloatArray:

@@ -118,7 +118,7 @@ def free_spot(section: FreeSection, algorithm: int) -> Feature:
         evidence=Support(crossing.snr, len(section.inside), (algorithm,), section.log_odds),
         curvature_feature=False,
         position_sd=crossing.position_sd,
-        notes=() if misfit is None else (misfit,),
+        notes=(*sizes.notes, *(() if misfit is None else (misfit,))),
         details=Details(top=sizes.top, free_section=True, misfit=misfit),
     )
 

@@ -47,8 +47,7 @@ def mean_sizes(group: Sequence[FreeSection], square: FloatArray, tip: float, noi
     if sizes is not None:
         return sizes
     usual = sorted(range(len(group)), key=lambda k: group[k].sizes.height)[len(group) // 2]
-    own = group[usual].sizes
-    return replace(own, width=square[usual] * own.width, top=square[usual] * own.top)
+    return group[usual].sizes.across(float(square[usual]))
 
 
 def _of_mean(group: Sequence[FreeSection], square: FloatArray, tip: float, noise: Noise) -> SectionSizes | None:
@@ -81,6 +80,8 @@ def _of_mean(group: Sequence[FreeSection], square: FloatArray, tip: float, noise
                 return sizes
             width = float(np.mean(square * [each.sizes.width for each in group]))
             doubt = float(np.median([each.sizes.foot_doubt for each in group]))
+            if sizes.most == sizes.least:
+                sizes = replace(sizes, least=width, most=width)
             return replace(sizes, width=width, foot_doubt=doubt)
         piece, noise = piece.coarser(), noise.scaled(white=2.0**-0.5)
     return None

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapping import Interval
+from mapping import Interval, length_text
 from mapping.assembly.free.section import FLANK, WALL, Section, flanks
 from mapping.instrument import Noise
 
@@ -20,6 +20,9 @@ EXTREME_SD, EXTREME_WINDOW = 0.005, 4
 # What lies above this share of the height is called the top (or floor); of a parabola that is 0.22 of the width, less
 # than the third from which a top counts as flat by the standard. 0.9 and 0.98 are alike
 NEARLY_FLAT = 0.95
+# Between these shares of the height a flank is asked whether the ball went down on it, or rolled over an edge: then the
+# trace between them is an arc of the ball's radius. It is surely none where it bends by less than half as much
+NEAR_TOP, HALF_AS_BENT = 0.75, 0.5
 # A floor, which was touched: that of a parabola is 0.22 of the width, and by the standard it is a third
 FLOOR = 1.0 / 3.0
 
@@ -36,6 +39,9 @@ class SectionSizes:
         top: width of what is nearly as high as the extreme.
         middle: of the width, from the profile's start.
         steep: the largest rise from one bin to the next, as a share of the height.
+        least, most: of what stands up, between which its foot is as wide where the ball rolled over an edge and did not
+            touch the flank below; else both are the width.
+        least_sd: standard deviation of the least, by noise.
     """
 
     height: float
@@ -47,6 +53,24 @@ class SectionSizes:
     top: float
     middle: float
     steep: float
+    least: float
+    most: float
+    least_sd: float
+
+    def across(self, square: float) -> SectionSizes:
+        """The sizes across a line that a sweep crosses at an angle of this sine."""
+        sizes = (square * each for each in (self.width, self.top, self.least, self.most))
+        return replace(self, **dict(zip(("width", "top", "least", "most"), sizes, strict=True)))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said of the width."""
+        if self.most == self.least:
+            return ()
+        return (
+            f"the tip rolled over its edges: it touched a width of {length_text(self.least, 2)}, and the foot may be "
+            f"anything up to {length_text(self.most, 2)} wide",
+        )
 
     def height_interval(self, sign: float, sd: float = 0.0) -> Interval:
         """The signed height: what was felt, down to what may be below, by its own standard deviation or a larger."""
@@ -55,7 +79,11 @@ class SectionSizes:
         return Interval(0.5 * (low.median + deep.median), min(low.low, deep.low), max(low.high, deep.high))
 
     def width_interval(self, sd: float = 0.0) -> Interval:
-        """The width by noise (its own, or more), and by its foot."""
+        """The width by noise (its own, or more), and by its foot; or its bounds."""
+        if self.most > self.least:
+            low = Interval.normal(self.least, max(sd, self.least_sd)).low
+            high = Interval.normal(self.most, max(sd, self.width_sd)).high
+            return Interval(self.least, max(low, 0.0), high, censored=True, bounded=True)
         wide = Interval.normal(self.width, float(np.hypot(max(sd, self.width_sd), self.foot_doubt)))
         return replace(wide, low=max(wide.low, 0.0))
 
@@ -64,6 +92,7 @@ def sizes_of_section(section: Section, tip: float, noise: Noise) -> SectionSizes
     """What a section measures, by the noise of its bins; None if its flanks tell no size."""
     height = _extreme(section, noise.sd)
     width, width_sd, foot_doubt, middle = _width(section, tip, noise)
+    least, most, least_sd = _bounds(section, tip, noise, width)
     steep = float(np.abs(np.diff(section.monotone)).max() / section.monotone.max())
     if not np.isfinite([height, width, width_sd, foot_doubt]).all() or width <= 0.0:
         return None
@@ -71,7 +100,7 @@ def sizes_of_section(section: Section, tip: float, noise: Noise) -> SectionSizes
     top = right.place - left.place
     hollow = section.sign < 0.0 and top < FLOOR * width
     below = _unfelt_depth(section, tip, height, noise.sd) if hollow else 0.0
-    return SectionSizes(height, noise.sd, below, width, width_sd, foot_doubt, top, middle, steep)
+    return SectionSizes(height, noise.sd, below, width, width_sd, foot_doubt, top, middle, steep, least, most, least_sd)
 
 
 def _extreme(section: Section, sd: float) -> float:
@@ -115,6 +144,38 @@ def _width(section: Section, tip: float, noise: Noise) -> tuple[float, float, fl
     steepest = float(np.abs(np.diff(section.monotone)).max()) / (WALL * high)
     foot_doubt = float(np.hypot(foot_doubt, min(steepest, 1.0) ** 2 * section.piece.spacing / np.sqrt(6.0)))
     return widths[1], sds[1], foot_doubt, 0.5 * float(begin + end)
+
+
+def _bounds(section: Section, tip: float, noise: Noise, width: float) -> tuple[float, float, float]:
+    """Least and largest width of the foot, m, and the standard deviation of the least; both are the width where the
+    ball surely went down on the flanks.
+
+    On an edge the ball rolls, and the trace is an arc about it. What is below the edge leaves no trace, as far out as
+    the ball's own way to the base. So far down it touches what lies on the chord's perpendicular, at least.
+    """
+    if section.sign < 0.0:
+        return width, width, 0.0
+    high, top = float(section.monotone.max()), section.top - section.begin
+    s, z = section.piece.s[section.begin : section.end + 1], section.monotone
+    bridged, least, most, variance = False, 0.0, 0.0, 0.0
+    sides = (-s[: top + 1], z[: top + 1]), (s[top:][::-1], z[top:][::-1])  # from the base up, outwards positive
+    for (out, rise), flank in zip(sides, flanks(section, FLANK), strict=True):
+        foot = flank.foot if out is sides[1][0] else -flank.foot
+        low, middle, near_top = np.interp(np.array([FLANK, 0.5 * (FLANK + NEAR_TOP), NEAR_TOP]) * high, rise, out)
+        run, fall = low - near_top, (NEAR_TOP - FLANK) * high
+        chord = float(np.hypot(run, fall))
+        bowed = (middle - 0.5 * (low + near_top)) * fall / chord
+        place_sd = noise.sd * run / fall
+        doubt = float(np.sqrt(1.5) * place_sd * fall / chord)
+        if np.isnan(flank.wall) and Interval.normal(bowed, doubt).high > HALF_AS_BENT * chord**2 / (8.0 * tip):
+            away = np.sqrt(max(tip**2 - 0.25 * chord**2, 1e-6 * tip**2))
+            least, most, bridged = least + 0.5 * (low + near_top) - away * fall / chord, most + foot, True
+            turned = fall * run * tip**2 / (chord**3 * away)  # of it by one of the chord's run
+            variance += place_sd**2 * (0.5 + 2.0 * turned**2)
+        else:
+            foot -= flank.hidden(tip, high - flank.wall)
+            least, most = least + foot, most + foot
+    return (max(float(least), 0.0), float(most), float(np.sqrt(variance))) if bridged else (width, width, 0.0)
 
 
 def _unfelt_depth(section: Section, tip: float, height: float, sd: float) -> float:

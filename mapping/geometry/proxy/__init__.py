@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         Bell as Bell,
         Chain as Chain,
         Part as Part,
+        Swell as Swell,
         Terrace as Terrace,
         Trench as Trench,
     )
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "body": ("ProxyBody",),
-    "parts": ("Bar", "Bell", "Chain", "Part", "Terrace", "Trench"),
+    "parts": ("Bar", "Bell", "Chain", "Part", "Swell", "Terrace", "Trench"),
     "proxy": ("Followed", "Proxy", "free_place", "pressed_along"),
     "proxy_kernels": ("proxy_step", "workspace"),
 }

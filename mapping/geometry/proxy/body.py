@@ -11,16 +11,17 @@ import numpy as np
 from mapping import BoolArray, ContactError, FloatArray, IntArray, Surface
 from mapping.geometry.mesh import NearestPoint, TriangleTree, arclengths, distances
 from mapping.geometry.proxy.draping import (
-    CHORD_ERROR,
     bar_mesh,
     followed,
     is_closed,
     joined,
+    meridian,
     rim_arcs,
+    swell_mesh,
     terrace_mesh,
     trench_meshes,
 )
-from mapping.geometry.proxy.parts import Bar, Bell, Chain, Part, Terrace, Trench
+from mapping.geometry.proxy.parts import Bar, Bell, Chain, Part, Swell, Terrace, Trench
 
 # Legs of a chain, and rings of a bell, that share a bounding sphere
 LEGS_PER_GROUP = 16
@@ -34,8 +35,6 @@ CAP_REACH = 1.5
 END_ROUNDING = 0.5
 # In place of its depth: a triangle that no trench cuts open
 NEVER_OPEN = np.inf
-# A bell ends where it is hardly higher than the base: this share of its height
-BELL_END = 1e-4
 
 
 class ProxyBody:
@@ -69,6 +68,7 @@ class ProxyBody:
             meshes += [floor, walls]
             depths += [np.where(deeper, trench.depth, NEVER_OPEN), np.full(len(walls[1]), NEVER_OPEN)]
         meshes += [bar_mesh(each, self.base) for each in parts if isinstance(each, Bar)]
+        meshes += [swell_mesh(each, self.base) for each in parts if isinstance(each, Swell)]
         meshes += [terrace_mesh(each, self.base) for each in parts if isinstance(each, Terrace)]
         whole = joined(meshes)
         self._tree = TriangleTree(Surface(*whole), 2.0 * radius)
@@ -114,14 +114,16 @@ class ProxyBody:
         proxy_kernels.least_gaps(self.arrays, scale * self.radius, self.into(centers), scale * reach, out)
         return out / scale
 
-    def _laid(self, part: Chain | Bar | Trench | Terrace) -> Chain | Bar | Trench | Terrace:
+    def _laid(self, part: Chain | Bar | Swell | Trench | Terrace) -> Chain | Bar | Swell | Trench | Terrace:
         axis, normals = followed(part.axis, part.normals, self.base)
         return replace(part, axis=axis, normals=normals)
 
     def _rounds(self, parts: Sequence[Part]) -> tuple[FloatArray, FloatArray]:
         trenches = [part for part in parts if isinstance(part, Trench)]
         rows = [self._capsules(part) for part in parts if isinstance(part, Chain)]
-        rows += [self._rings(part) for part in parts if isinstance(part, Bell)]
+        bells = [part for part in parts if isinstance(part, Bell)]
+        bells += [bell for part in parts if isinstance(part, Swell) for bell in _ends_of(part)]
+        rows += [self._rings(bell) for bell in bells]
         rows += [self._arcs(part, [each for each in trenches if each is not part])
                  for part in trenches if len(part.axis) == 1]  # fmt: skip
         groups: list[tuple[FloatArray, float, int, int]] = []
@@ -219,20 +221,11 @@ class ProxyBody:
         return _rows(rows, 11), _rows([np.array(hulls)] if hulls else [], 7)
 
 
-def meridian(bell: Bell) -> FloatArray:
-    """(M,) distances from the axis between which chords of a bell miss it by CHORD_ERROR at most, m."""
-    p, w = bell.exponent, bell.scale
-    end = w * np.sqrt(p * np.expm1(-np.log(BELL_END) / p))
-    fine = w * np.sinh(np.linspace(0.0, np.arcsinh(end / w), 4001))
-    base = 1.0 + (fine / w) ** 2 / p
-    z = bell.height * base**-p
-    slope = np.gradient(z, fine)
-    bend = np.abs(np.gradient(slope, fine)) / (1.0 + slope**2) ** 1.5
-    speed = np.sqrt(1.0 + slope**2)
-    # a chord of length l misses a curve of curvature k by k l^2 / 8
-    density = speed * np.sqrt(bend / (8.0 * CHORD_ERROR))
-    parts = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))])
-    return np.asarray(np.interp(np.linspace(0.0, parts[-1], 2 + int(parts[-1])), parts, fine))
+def _ends_of(swell: Swell) -> list[Bell]:
+    """The bells that an open swell ends as; their other halves lie within it."""
+    ends = () if is_closed(swell.axis) else (0, -1)
+    section = swell.height, swell.scale, swell.exponent
+    return [Bell(swell.axis[end], swell.normals[end], *section) for end in ends]
 
 
 def _ends(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -272,13 +265,14 @@ def _touched(vertices: FloatArray, faces: IntArray, trenches: Sequence[Trench]) 
 def _check(part: Part) -> None:
     """Raises ContactError for sizes that no part can have."""
     if isinstance(part, Bar):
-        for name, size in (("top", part.top), ("run", part.run)):
+        for name, size in (("top", part.top), ("run", part.run), ("shoulder", part.shoulder)):
             if not (np.isfinite(size) and size >= 0.0):
                 raise ContactError(f"a bar's {name} must be finite and at least 0; found {size!r}")
-        if part.top + part.run == 0.0:
+        if part.top + part.run + part.shoulder == 0.0:
             raise ContactError("a bar needs a top or flanks that run; found both 0")
-    if isinstance(part, Bell) and not (np.isfinite(part.exponent) and (part.exponent > 0.0 or part.exponent < -1.0)):
-        raise ContactError(f"a bell's exponent must be positive, or below -1, and finite; found {part.exponent!r}")
+    p = part.exponent if isinstance(part, Bell | Swell) else 1.0
+    if not (np.isfinite(p) and (p > 0.0 or p < -1.0)):
+        raise ContactError(f"a bell's exponent must be positive, or below -1, and finite; found {p!r}")
     for name in ("height", "radius", "scale", "width", "depth"):
         size = getattr(part, name, 1.0)
         if not (np.isfinite(size) and size > 0.0):
@@ -289,7 +283,7 @@ def _check(part: Part) -> None:
         raise ContactError(
             f"an axis and its normals must be finite and of one shape (K, 3); found {axis.shape} and {normals.shape}"
         )
-    if isinstance(part, Bar) and len(axis) < 2:
-        raise ContactError("a bar runs along an axis of two points at least; found one")
+    if isinstance(part, Bar | Swell) and len(axis) < 2:
+        raise ContactError(f"a {type(part).__name__.lower()} runs along an axis of two points at least; found one")
     if isinstance(part, Terrace) and (len(axis) < 2 or is_closed(axis)):
         raise ContactError("a step's edge needs two ends; a closed one, or a single point, says no higher side")

@@ -1,4 +1,4 @@
-"""Draping: what has straight sections (hollows, bars, steps) as triangles that follow a base."""
+"""Draping: hollows, bars, swells and steps as triangles that follow a base."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray
 from mapping.geometry.mesh import NearestPoint, arclengths, directions, distances
-from mapping.geometry.proxy.parts import Bar, Terrace, Trench
+from mapping.geometry.proxy.parts import Bar, Bell, Swell, Terrace, Trench
 
 # By how much chords of an outline, and facets of a floor, may miss the curve that they stand for, m: less than a third
 # of the smallest edge that people feel (0.85 um, LaMotte and Whitehouse 1986)
@@ -24,6 +24,11 @@ RIM_ARCS = 24
 MOST_FLOOR_ROWS = 33
 # The ramps at the far sides of a step fall by one in so many: 1.1 degrees, below what people call a slope in a crossing
 RAMP = 50.0
+# A bell ends where it is hardly higher than the base: this share of its height
+BELL_END = 1e-4
+# Nor does a swell go further than so many of its scales: farther out a bent base is no longer beside it. What is left
+# of its height there is taken off along the flank
+SWELL_REACH = 10.0
 
 Mesh = tuple[FloatArray, IntArray]
 
@@ -100,6 +105,13 @@ def bar_mesh(bar: Bar, base: NearestPoint) -> Mesh:
         if outer > inner or falls:
             offsets = np.append(offsets, inner + shares * (outer - inner))
             rises = np.append(rises, 1.0 - shares if falls else np.ones(len(shares)))
+    if bar.shoulder > 0.0:  # before the wall, which a run of nothing is
+        a = bar.shoulder
+        least = max(1.0 - bar.height / a, 0.0)
+        turn = np.linspace(0.0, np.arccos(least), 2 + int(_chords(a) * np.arccos(least) / (2.0 * np.pi)))[1:]
+        wall = [half + a] if a < bar.height else []
+        offsets = np.concatenate([offsets[:-1], half + a * np.sin(turn), wall])
+        rises = np.concatenate([rises[:-1], 1.0 - a * (1.0 - np.cos(turn)) / bar.height, np.zeros(len(wall))])
     offsets, rises = np.append(-offsets[:0:-1], offsets), np.append(rises[:0:-1], rises)
     feet = [draped(bar.axis + away * laterals, base) for away in offsets]
     rows = [points + rise * bar.height * normals for (points, normals), rise in zip(feet, rises, strict=True)]
@@ -109,6 +121,37 @@ def bar_mesh(bar: Bar, base: NearestPoint) -> Mesh:
     caps = [_strips([np.array([points[end] for points, _ in feet]), np.array([row[end] for row in rows])])
             for end in (0, -1)]  # fmt: skip
     return joined([mesh, *caps])
+
+
+def swell_mesh(swell: Swell, base: NearestPoint) -> Mesh:
+    """(vertices, faces) of the flanks of a swell, m; the foot and the ends are left open."""
+    laterals = _mitres(swell.axis)[:, None] * _laterals(swell.axis, swell.normals)
+    away = meridian(swell)
+    away = away[away <= SWELL_REACH * swell.scale]
+    share = (1.0 + (away / swell.scale) ** 2 / swell.exponent) ** -swell.exponent
+    share -= share[-1] * away / away[-1]
+    sides, rises = np.append(-away[:0:-1], away), np.append(share[:0:-1], share)
+    rows = []
+    for side, rise in zip(sides, rises, strict=True):
+        points, normals = draped(swell.axis + side * laterals, base)
+        rows.append(points + rise * swell.height * normals)
+    return _strips(rows)
+
+
+def meridian(bell: Bell | Swell) -> FloatArray:
+    """(M,) distances from the axis between which chords of a bell miss it by CHORD_ERROR at most, m."""
+    p, w = bell.exponent, bell.scale
+    end = w * np.sqrt(p * np.expm1(-np.log(BELL_END) / p))
+    fine = w * np.sinh(np.linspace(0.0, np.arcsinh(end / w), 4001))
+    base = 1.0 + (fine / w) ** 2 / p
+    z = bell.height * base**-p
+    slope = np.gradient(z, fine)
+    bend = np.abs(np.gradient(slope, fine)) / (1.0 + slope**2) ** 1.5
+    speed = np.sqrt(1.0 + slope**2)
+    # a chord of length l misses a curve of curvature k by k l^2 / 8
+    density = speed * np.sqrt(bend / (8.0 * CHORD_ERROR))
+    parts = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(fine))])
+    return np.asarray(np.interp(np.linspace(0.0, parts[-1], 2 + int(parts[-1])), parts, fine))
 
 
 def terrace_mesh(terrace: Terrace, base: NearestPoint) -> Mesh:

@@ -29,14 +29,16 @@ class Chain:
 
 @dataclass(frozen=True, eq=False)
 class Bar:
-    """A ridge with a flat top and straight flanks, from upright walls (run 0) to a roof (top 0); its ends are square.
+    """A ridge with a flat top and straight flanks, from upright walls (run 0) to a roof (top 0), or with round
+    edges over upright walls; its ends are square.
 
     Args:
         axis: (K, 3) points of the base under the middle, m, K >= 2; first equals last of a closed one.
         normals: (K, 3) outward unit normals there.
         height: of the top over the base, m, positive.
         top: width of the top, m, at least 0.
-        run: how far each flank goes beside it, m, at least 0; not both 0.
+        run: how far each flank goes beside it, m, at least 0.
+        shoulder: radius of its edges, m, at least 0, instead of a run; not all 0.
     """
 
     axis: FloatArray
@@ -44,6 +46,7 @@ class Bar:
     height: float
     top: float
     run: float
+    shoulder: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +60,23 @@ class Bell:
 
     point: FloatArray
     normal: FloatArray
+    height: float
+    scale: float
+    exponent: float
+
+
+@dataclass(frozen=True, eq=False)
+class Swell:
+    """A ridge whose flanks run out: the section of a bell along an axis. An open one ends as halves of that bell.
+
+    Args:
+        axis: (K, 3) points of the base under the crest, m, K >= 2; first equals last of a closed one.
+        normals: (K, 3) outward unit normals there.
+        height, scale, exponent: as of a bell.
+    """
+
+    axis: FloatArray
+    normals: FloatArray
     height: float
     scale: float
     exponent: float
@@ -100,4 +120,4 @@ class Terrace:
     high_side: float
 
 
-Part = Chain | Bar | Bell | Trench | Terrace
+Part = Chain | Bar | Bell | Swell | Trench | Terrace

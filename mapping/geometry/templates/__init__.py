@@ -31,7 +31,8 @@ if TYPE_CHECKING:
         robust_cost as robust_cost,
     )
     from mapping.geometry.templates.smooth_kernels import (
-        smooth_groove_heights as smooth_groove_heights,
+        half_ways_touched as half_ways_touched,
+        smooth_line_heights as smooth_line_heights,
         smooth_point_heights as smooth_point_heights,
     )
 
@@ -52,6 +53,6 @@ _PUBLIC = {
         "step_height",
     ),
     "small_heights": ("CREST_OUTLIER_SDS", "SHAPE_ERROR", "crest_trace", "robust_cost"),
-    "smooth_kernels": ("smooth_groove_heights", "smooth_point_heights"),
+    "smooth_kernels": ("half_ways_touched", "smooth_line_heights", "smooth_point_heights"),
 }
 doorway(__name__, _PUBLIC)

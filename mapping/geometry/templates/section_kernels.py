@@ -26,6 +26,7 @@ def section_heights(
     rounded: FloatArray,
     across: FloatArray,
     up: FloatArray,
+    shoulders: FloatArray,
     tip: float,
     out: FloatArray,
 ) -> None:
@@ -35,8 +36,10 @@ def section_heights(
     and `up` (W, K), which falls from the crest. The ball rests on the top, on a corner (an arc of its own radius) or on
     a flank (a line parallel to it), whichever holds it highest: dilation distributes over unions. The section goes on
     round the ends, about a top whose corners are rounded in plan: the ball touches it square to its outline, so that
-    only the distance from that counts (theory equation 7.3). On a curved base heights over it are felt as a ball of
-    curvature 1/r + k feels them over a plane, k being the base's in that direction.
+    only the distance from that counts (theory equation 7.3). A section with round edges is a core that a ball was
+    rolled along: what the tip feels of it, a tip that is larger by that ball feels of the core. On a curved base
+    heights over it are felt as a ball of curvature 1/r + k feels them over a plane, k being the base's in that
+    direction.
 
     Args:
         s, lateral, basis: of the nodes, as for `about_course`.
@@ -45,28 +48,27 @@ def section_heights(
         ends: (W, 2) where the top begins and ends along the chart, m.
         rounded: (W,) radius of the corners of the top in plan, up to half of its width, m.
         across, up: (W, K) corners, m.
+        shoulders: (W,) radius by which they are rounded, whose top stands as high as they do, m.
         tip: radius of the fingertip, m.
         out: (W, n) heights, m.
     """
     walkers, bins = out.shape
     modes, nodes, corners = basis.shape[1], s.shape[1], across.shape[1]
-    nearest, farthest, widest = np.empty(bins), np.zeros(bins), np.empty(bins)
+    nearest, farthest, lowest = np.empty(bins), np.zeros(bins), np.full(bins, np.inf)
     sway, turn = np.zeros((bins, modes)), np.zeros((bins, modes))
     first, last = np.full(bins, np.inf), np.full(bins, -np.inf)
     runs, falls, flanks = np.empty(corners), np.empty(corners), np.empty(corners)
     for i in range(bins):
-        nearest[i], lowest = np.inf, np.inf
+        nearest[i] = np.inf
         for q in range(nodes):
             nearest[i], farthest[i] = min(nearest[i], abs(lateral[i, q])), max(farthest[i], abs(lateral[i, q]))
-            lowest = min(lowest, bend[i, q], bend_along[i, q])
+            lowest[i] = min(lowest[i], bend[i, q], bend_along[i, q])
             first[i], last[i] = min(first[i], s[i, q]), max(last[i], s[i, q])
             for m in range(modes):
                 sway[i, m] = max(sway[i, m], abs(basis[0, m, i, q]))
                 turn[i, m] = max(turn[i, m], abs(basis[1, m, i, q]))
-        # the ball over a plane, at most, that is felt as the tip is over the base
-        widest[i] = tip / max(1.0 + tip * lowest, 1e-3)
     for w in range(walkers):
-        top, crest = across[w, 0], up[w, 0]
+        top, crest, radius = across[w, 0], up[w, 0], tip + shoulders[w]
         least = (1.0 + BOUND_MARGIN) * 2.0 * crest
         for k in range(corners - 1):
             runs[k], falls[k] = across[w, k + 1] - across[w, k], up[w, k] - up[w, k + 1]
@@ -80,7 +82,8 @@ def section_heights(
             foot = across[w, corners - 1]
             beyond = max(ends[w, 0] - last[i], first[i] - ends[w, 1]) - turned * (farthest[i] + swayed) - (foot - top)
             gap = max((nearest[i] - swayed) / np.sqrt(1.0 + turned * turned) - foot, beyond)
-            if gap > 0.0 and gap * gap > least * widest[i]:
+            # the ball over a plane, at most, that is felt as the tip is over the base
+            if gap > 0.0 and gap * gap > least * radius / max(1.0 + radius * lowest[i], 1e-3):
                 out[w, i] = 0.0
                 continue
             total = 0.0
@@ -96,7 +99,7 @@ def section_heights(
                     away = np.sqrt(around * around + side * side)
                     bent += (around / away) ** 2 * (bend_along[i, q] - bent)
                     aside = core + away
-                ball, best = tip / max(1.0 + tip * bent, 1e-3), 0.0
+                ball, best = radius / max(1.0 + radius * bent, 1e-3), 0.0
                 if aside <= top:
                     best = crest
                 for k in range(corners):

@@ -25,6 +25,11 @@ TABLE_BENDS = 5
 # Share of the way to the edge of a section that has one that a step covers at most, lest it oversteps: shares of 0.1,
 # 0.25 and 0.5 err alike, by 8e-7 of the depth (tapers -0.65 and -0.4, four sections)
 SHARE_TO_EDGE = 0.25
+# Places of half of a section at which a ball may rest, and halvings of the stretch in which it changes from one to the
+# next: both are then known to a few thousandths of the ball's half-width
+PLACES_OF_FLANK, FLANK_HALVINGS = 400, 12
+# A place is touched where no other one lifts the ball off it by more than rounding, in parts of the height
+TOUCHING = 1e-9
 # Below this taper a power of 1/taper loses digits, eps/taper; the first two terms of its series lose taper^2. Both err
 # by 5e-11 of the depth at most there
 GAUSSIAN = 1e-5
@@ -140,7 +145,7 @@ def _means(
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def smooth_groove_heights(
+def smooth_line_heights(
     s: FloatArray,
     lateral: FloatArray,
     basis: FloatArray,
@@ -154,12 +159,12 @@ def smooth_groove_heights(
     tip: float,
     out: FloatArray,
 ) -> None:
-    """Heights (W, n) of W smooth grooves over bins with q nodes; the first arguments as for `groove_heights`.
+    """Heights (W, n) of W smooth lines over bins with q nodes; the first arguments as for `groove_heights`.
 
-    An end is half of a pit with the same section.
+    An end is half of a pit, or of a bell, with the same section.
 
     Args:
-        heights (negative), halves, tapers: (W,) m, m, and 1: see `smooth_trace`.
+        heights (negative of grooves), halves, tapers: (W,) m, m, and 1: see `smooth_trace`.
     """
     walkers, bins = out.shape
     nodes = s.shape[1]
@@ -201,3 +206,51 @@ def smooth_point_heights(
                 away[i, q] = np.sqrt(square)
                 toward[i, q] = share * bends[0] + (1.0 - share) * bends[1]
         _means(away, toward, heights[w], halves[w], tapers[w], tip, out[w])
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _rest(level, spacing, middle, tip):  # type: ignore[no-untyped-def]
+    """Number of the place of a section, of heights `level` at 0, spacing, ..., that holds a ball highest, and how high
+    over the base, m, if its centre is `middle` beside the section's."""
+    best, at = -np.inf, 0
+    for k in range(len(level)):
+        gap = abs(k * spacing - middle)
+        if gap < tip:
+            held = level[k] - gap * gap / (tip + np.sqrt((tip - gap) * (tip + gap)))
+            if held > best:
+                best, at = held, k
+    return at, best
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def half_ways_touched(heights: FloatArray, halves: FloatArray, tapers: FloatArray, tip: float, out: FloatArray) -> None:
+    """Distances (W, 2), m, from the middle of W bells on a plane between which they have half of their height, as far
+    as the ball knows.
+
+    Both are the bell's own where the ball touches it there. Else the ball that leaves the flank above comes to rest
+    below at once, and whatever lies between those two places leaves one trace.
+    """
+    level = np.empty(PLACES_OF_FLANK)
+    for w in range(len(heights)):
+        height, half, taper = heights[w], halves[w], tapers[w]
+        out[w, :] = half
+        scale, least = section_scale(half, taper), min(height, tip)
+        # what holds a ball above half of the height lies no farther from where it then comes to rest
+        spacing = (half + np.sqrt(least * (2.0 * tip - least))) / (PLACES_OF_FLANK - 1)
+        for k in range(PLACES_OF_FLANK):
+            level[k] = height * share_left((k * spacing / scale) ** 2, taper)[0]
+        left, base = share_left((half / scale) ** 2, taper)
+        slope = 2.0 * height * left * half / (scale * scale * base)
+        stretch = np.sqrt(1.0 + slope * slope)
+        beside = half + tip * slope / stretch
+        touching = height * left - tip * slope * slope / (stretch * (1.0 + stretch))
+        if _rest(level, spacing, beside, tip)[1] <= touching + TOUCHING * height:
+            continue
+        low, high = 0.0, (PLACES_OF_FLANK - 1) * spacing
+        for _ in range(FLANK_HALVINGS):
+            middle = 0.5 * (low + high)
+            at = _rest(level, spacing, middle, tip)[0] * spacing
+            if at < half:
+                low, out[w, 0] = middle, at
+            else:
+                high, out[w, 1] = middle, at

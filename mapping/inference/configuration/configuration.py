@@ -16,7 +16,15 @@ from mapping.inference.configuration.common_deviation import Deviation, Fitted, 
 from mapping.inference.configuration.joined_shape import JoinedShape, stands_out
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood
 from mapping.inference.curves import HIGHEST_DEGREE
-from mapping.inference.families import RidgeShape, StepShape, TwinShape, bell_beside, trapezoid_beside, twin_beside
+from mapping.inference.families import (
+    RidgeShape,
+    StepShape,
+    TwinShape,
+    bell_beside,
+    bell_ridge_beside,
+    trapezoid_beside,
+    twin_beside,
+)
 from mapping.inference.kinds import LineKind, PointKind, kind_of, sizes_of
 from mapping.inference.likelihood import LogPosterior, Shape
 from mapping.inference.sampler import Laplace, find_optima, laplace
@@ -192,11 +200,15 @@ def as_bar(part: Part, place: Neighbourhood, top: float) -> Part:
 
 
 def as_bell(part: Part, half: float) -> Part:
-    """A round bump as one whose flank runs out, of a half width (m)."""
-    cap: Any = part.shape
-    bell = bell_beside(cap, sizes_of(part.feature, cap.tip_radius))
-    start = np.concatenate([part.start[: cap.free + 1], [np.log(half), bell.start[-1]]])
-    return Part(part.feature, bell, start)
+    """A round bump or ridge as one whose flanks run out, of a half width (m)."""
+    crest: Any = part.shape
+    sizes, known = sizes_of(part.feature, crest.tip_radius), part.start[:-1]
+    if isinstance(crest, RidgeShape):
+        bell: Shape = bell_ridge_beside(crest, sizes)
+        known = np.array([part.start[crest.names.index(name)] for name in bell.names[:-2]])
+    else:
+        bell = bell_beside(crest, sizes)
+    return Part(part.feature, bell, np.concatenate([known, [np.log(half), bell.start[-1]]]))
 
 
 def as_twin(part: Part, place: Neighbourhood, gap: float) -> Part:

@@ -17,13 +17,13 @@ from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_bell, as_twin, laid, part_of
 from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, Neighbourhood
 from mapping.inference.curves import HIGHEST_DEGREE
-from mapping.inference.families import BumpShape, GrooveShape, RidgeShape, TrapezoidShape, TwinShape
+from mapping.inference.families import BellRidgeShape, BumpShape, GrooveShape, RidgeShape, TrapezoidShape, TwinShape
 from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 
 Parts = list[Part]
 # Tops of a bar and gaps of a twin, in half-widths of the disturbance, that their optima are searched from
 TOPS, GAPS = (0.5,), (0.2, 0.7)
-# Half widths of a bump whose flank runs out, in those of the disturbance, that its optimum is searched from
+# Half widths of what runs out, in those of the disturbance, that its optimum is searched from
 SKIRTS = (0.3, 0.8)
 # Points so near to a straight line, in half-widths, may be of it
 ON_LINE = 0.35
@@ -51,8 +51,8 @@ MOST_DRAWN_THROUGH = 60
 
 
 def sections(now: Configuration) -> Iterator[Parts]:
-    """Another section of a line that is wider than a wire of its height: round, flat-topped, or two in one; and a bump
-    with a skirt."""
+    """Another section of a line that is wider than a wire of its height: round, flat, running out, or two in one; and a
+    bump whose flank runs out."""
     for k, part in enumerate(now.parts):
         if isinstance(part.shape, BumpShape):
             half = sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
@@ -63,6 +63,7 @@ def sections(now: Configuration) -> Iterator[Parts]:
             continue
         half = sizes_of(ridge.feature, now.place.around.trace.tip_radius).half_width
         others = [as_bar(ridge, now.place, share * half) for share in TOPS]
+        others += [as_bell(ridge, share * half) for share in SKIRTS]
         others += [as_twin(ridge, now.place, share * half) for share in GAPS]
         if not isinstance(part.shape, RidgeShape):
             others.append(ridge)
@@ -225,6 +226,8 @@ def _alike(part: Part, axis: FloatArray, place: Neighbourhood, most: int = HIGHE
         return as_twin(line, place, float(np.exp(part.start[0])))
     if isinstance(shape, TrapezoidShape):
         return as_bar(line, place, float(shape.parts(part.start[None])[1][0]))
+    if isinstance(shape, BellRidgeShape):
+        return as_bell(line, float(np.exp(part.start[-2])))
     return line
 
 

@@ -6,9 +6,12 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from mapping.inference.families.bell import (
+        BellRidgeShape as BellRidgeShape,
         BellShape as BellShape,
         bell_beside as bell_beside,
+        bell_ridge_beside as bell_ridge_beside,
         bell_section as bell_section,
+        bell_widths as bell_widths,
         width_at_half_height as width_at_half_height,
     )
     from mapping.inference.families.broken_ridge import BrokenRidgeShape as BrokenRidgeShape
@@ -37,14 +40,25 @@ if TYPE_CHECKING:
     )
     from mapping.inference.families.step import StepShape as StepShape
     from mapping.inference.families.trapezoid import (
+        ShoulderedShape as ShoulderedShape,
         TrapezoidShape as TrapezoidShape,
+        shouldered_beside as shouldered_beside,
+        shouldered_widths as shouldered_widths,
         touched_widths as touched_widths,
         trapezoid_beside as trapezoid_beside,
     )
     from mapping.inference.families.twin import TwinShape as TwinShape, twin_beside as twin_beside
 
 _PUBLIC = {
-    "bell": ("BellShape", "bell_beside", "bell_section", "width_at_half_height"),
+    "bell": (
+        "BellRidgeShape",
+        "BellShape",
+        "bell_beside",
+        "bell_ridge_beside",
+        "bell_section",
+        "bell_widths",
+        "width_at_half_height",
+    ),
     "broken_ridge": ("BrokenRidgeShape",),
     "bump": ("BumpShape", "Spot", "spot_at"),
     "free_tip": ("with_free_tip", "with_nominal_tip"),
@@ -70,7 +84,14 @@ _PUBLIC = {
         "smooth_section",
     ),
     "step": ("StepShape",),
-    "trapezoid": ("TrapezoidShape", "touched_widths", "trapezoid_beside"),
+    "trapezoid": (
+        "ShoulderedShape",
+        "TrapezoidShape",
+        "shouldered_widths",
+        "shouldered_beside",
+        "touched_widths",
+        "trapezoid_beside",
+    ),
     "twin": ("TwinShape", "twin_beside"),
 }
 doorway(__name__, _PUBLIC)

@@ -36,14 +36,14 @@ class SmoothGrooveShape(GrooveShape):
 
     def templates(self, theta: FloatArray) -> FloatArray:
         """(W, n) heights (negative) over the base's trace, m."""
-        from mapping.geometry.templates import smooth_groove_heights
+        from mapping.geometry.templates import smooth_line_heights
 
         first = self.modes.count
         closed = np.tile([-1e300, 1e300], (len(theta), 1))
         ends = closed if self.chart.closed else np.ascontiguousarray(theta[:, first : first + 2])
         courses = np.ascontiguousarray(theta[:, :first])
         out = np.empty((len(theta), len(self.window)))
-        smooth_groove_heights(*self._places, courses, ends, *smooth_section(theta), self.tip_radius, out)
+        smooth_line_heights(*self._places, courses, ends, *smooth_section(theta), self.tip_radius, out)
         return out
 
 

@@ -1,4 +1,4 @@
-"""TrapezoidShape: a line whose section has a flat top and straight flanks, from a bar to a roof."""
+"""TrapezoidShape, ShoulderedShape: lines with a flat top, from a bar to a roof, or with round edges."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from mapping import FloatArray
+from mapping.geometry.templates import contact_half_width, width_of_cap
 from mapping.inference.curves import Chart, CurveModes
 from mapping.inference.families.hollow import line_nodes
 from mapping.inference.families.problem import Sizes
@@ -65,9 +66,8 @@ class TrapezoidShape:
         if "end rounding" in self.names:
             rounded = half * rounding_of(theta[:, self.modes.count])
         out = np.empty((len(theta), len(self.window)))
-        section_heights(
-            *self._places, courses, ends, rounded, np.column_stack([half, half + run]), up, self.tip_radius, out
-        )
+        corners = np.column_stack([half, half + run])
+        section_heights(*self._places, courses, ends, rounded, corners, up, np.zeros_like(half), self.tip_radius, out)
         return out
 
     def parts(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -79,6 +79,35 @@ class TrapezoidShape:
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         return line_nodes(self.window, self.chart, self.modes)
+
+
+@dataclass(frozen=True, eq=False)
+class ShoulderedShape(TrapezoidShape):
+    """Lines with a flat top whose edges are round: as `TrapezoidShape`, with the log radius of the edges for the run.
+
+    From a bar, whose edges are sharp, to a cap with a flattened crest. What is below the edges, upright, slanting, or a
+    fillet at the foot, is not touched by a ball that leaves the edge above it.
+    """
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*super().names[:-1], "log shoulder")
+
+    def templates(self, theta: FloatArray) -> FloatArray:
+        """(W, n) heights over the base's trace, m."""
+        from mapping.geometry.templates import section_heights
+
+        ends, rounded = np.tile([-1e300, 1e300], (len(theta), 1)), np.zeros(len(theta))
+        height, top, shoulder = self.parts(theta)
+        if not self.chart.closed:
+            first = self.modes.count
+            ends = np.ascontiguousarray(theta[:, first + 1 : first + 3])
+            rounded = 0.5 * top * rounding_of(theta[:, first])
+        courses = np.ascontiguousarray(theta[:, : self.modes.count])
+        out = np.empty((len(theta), len(self.window)))
+        edge, up = 0.5 * top[:, None], np.ascontiguousarray(height[:, None])
+        section_heights(*self._places, courses, ends, rounded, edge, up, shoulder, self.tip_radius, out)
+        return out
 
 
 def trapezoid_beside(ridge: RidgeShape, sizes: Sizes, *, roof: bool) -> TrapezoidShape:
@@ -96,15 +125,39 @@ def trapezoid_beside(ridge: RidgeShape, sizes: Sizes, *, roof: bool) -> Trapezoi
     return TrapezoidShape(ridge.window, ridge.chart, ridge.modes, ridge.tip_radius, roof, priors, start, step)
 
 
-def touched_widths(height: FloatArray, top: FloatArray, run: FloatArray, tip: float) -> tuple[FloatArray, FloatArray]:
+def shouldered_beside(ridge: RidgeShape, sizes: Sizes) -> ShoulderedShape:
+    """The same with round edges."""
+    bar = trapezoid_beside(ridge, sizes, roof=False)
+    return ShoulderedShape(
+        ridge.window, ridge.chart, ridge.modes, ridge.tip_radius, False, bar.priors, bar.start, bar.step
+    )
+
+
+def touched_widths(
+    height: FloatArray, top: FloatArray, run: FloatArray, tip: float, *, half_way: bool = False
+) -> tuple[FloatArray, FloatArray]:
     """(W,) widths of trapezoids that the ball touches, and within which alone there may be more of them, m.
 
     The second reaches from where the ball leaves the base on the one side to where it does on the other. Where the
-    flanks are so gentle that the ball rolls down on them, both are the width of the foot that they lead to.
+    flanks are so gentle that the ball rolls down on them, both are the width of the foot that they lead to, or that at
+    half of the height.
     """
-    foot = top + 2.0 * run
+    foot = top + (1.0 if half_way else 2.0) * run
     # the ball that rests on base and edge stands kink = x_c beside the edge, and falls there by x_c to each r - H
     kink = np.sqrt(np.clip(height * (2.0 * tip - height), 0.0, None))
     hidden = height * np.clip(tip - height, 0.0, None) > run * kink
     hidden |= height >= tip
     return np.where(hidden, top, foot), np.where(hidden, top + 2.0 * kink, foot)
+
+
+def shouldered_widths(
+    height: FloatArray, top: FloatArray, shoulder: FloatArray, tip: float, *, half_way: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """The same of flat tops with round edges: where the ball that leaves an edge rests on it, and on the base."""
+    kink = contact_half_width(height, shoulder, tip)
+    touched, bridged = 2.0 * kink * shoulder / (shoulder + tip), 2.0 * kink
+    if half_way:  # of a low cap the ball touches more than that
+        width = width_of_cap(0.5 * height, shoulder)
+        inside = (width <= touched) & (0.5 * height < shoulder)
+        touched, bridged = np.where(inside, width, touched), np.where(inside, width, bridged)
+    return top + touched, top + bridged

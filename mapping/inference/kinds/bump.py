@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mapping import Feature, FloatArray, Interval
+from mapping import Feature, FloatArray
 from mapping.geometry.proxy import Bell, Part
 from mapping.geometry.templates import chain_height, width_of_cap
 from mapping.inference.families import (
@@ -18,28 +18,16 @@ from mapping.inference.families import (
     Sizes,
     Spot,
     bell_beside,
-    bell_section,
-    width_at_half_height,
 )
-from mapping.inference.kinds.crests import Crest
+from mapping.inference.kinds.crests import BEGUN_TAPERS, Crest, bell_said
 from mapping.inference.kinds.kind import Section
 from mapping.inference.kinds.points import PointKind, Seen
 from mapping.inference.kinds.posterior_density import height_prior, place_prior, radius_prior
 from mapping.inference.likelihood import Shape, Window
 
-# Tapers that a bell's optimum is searched from: with an edge, nearly a Gaussian, and with a long skirt
-BEGUN_TAPERS = (-0.4, 0.1, 1.0)
-RUNS_OUT = "its flank runs out into the base: width at half height"
-
 
 class Bump(Crest, PointKind):
     """Sphere caps and bells, which compete."""
-
-    def trace(self, feature: Feature, feet: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
-        """(N,) heights of a cap, or of the bell that the feature's details describe, m; see `Kind.trace`."""
-        if feature.details.exponent is None:
-            return super().trace(feature, feet, normals, tip_radius)
-        return _bell(feature, feet, tip_radius)
 
     def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
         """The cap, or the bell that the feature's details describe."""
@@ -66,22 +54,19 @@ class Bump(Crest, PointKind):
     def draws_of_height(self, shape: Shape, draws: FloatArray) -> FloatArray:
         return draws[:, -3] if isinstance(shape, BellShape) else draws[:, -2]
 
-    def widths_felt(self, shape: Shape, draws: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """At half height, where caps and bells are alike: each family's own."""
+    def widths_felt(self, shape: Shape, draws: FloatArray, *, half_way: bool = False) -> tuple[FloatArray, FloatArray]:
+        """Each family's own."""
         if isinstance(shape, BellShape):
             width = 2.0 * np.exp(draws[:, -2])
         else:
-            width = width_of_cap(0.5 * draws[:, -2], np.exp(draws[:, -1]))
+            width = width_of_cap((0.5 if half_way else 1.0) * draws[:, -2], np.exp(draws[:, -1]))
         return width, width
 
     def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
         """Of a cap, or of a bell: its width at half height, scale and exponent."""
         if not isinstance(shape, BellShape):
             return super().section(feature, shape, draws)
-        width = Interval.from_draws(2.0 * np.exp(draws[:, -2]))
-        scale, exponent = bell_section(float(np.exp(np.median(draws[:, -2]))), float(np.median(draws[:, -1])))
-        bell = {"scale": float(scale), "exponent": float(exponent)}
-        return Section(Interval.from_draws(draws[:, -3]), width, bell, RUNS_OUT)
+        return bell_said(draws)
 
     def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
         place = np.zeros(2)
@@ -98,18 +83,6 @@ def bump_shape(window: Window, spot: Spot, sizes: Sizes, tip: float, free: int) 
     start = np.array([0.0] * free + [sizes.height, np.log(sizes.radius)])
     step = np.array([0.02 * sizes.half_width] * free + [0.02 * sizes.height, 0.1])
     return BumpShape(window, spot, tip, free, priors, start, step)
-
-
-def _bell(feature: Feature, feet: FloatArray, tip_radius: float) -> FloatArray:
-    """(N,) heights that a bump of revolution with the feature's scale and exponent leaves, m."""
-    from mapping.geometry.templates import smooth_point_heights
-
-    details, away = feature.details, np.linalg.norm(feet - feature.axis[0], axis=1)[:, None]
-    scale, exponent = float(details.scale or 0.0), float(details.exponent or 0.0)
-    known = feature.height.median, 0.5 * float(width_at_half_height(scale, exponent)), 1.0 / exponent
-    section, out = [np.array([each]) for each in known], np.empty((1, len(feet)))
-    smooth_point_heights(away, np.zeros_like(away), np.zeros(2), np.zeros((1, 2)), *section, tip_radius, out)
-    return np.asarray(out[0])
 
 
 BUMP = Bump(

@@ -1,4 +1,4 @@
-"""Crests: what bumps and ridges have in common, a round section that stands on the base."""
+"""Crests: what bumps and ridges have in common, a round section that stands on the base, or one that runs out."""
 
 from __future__ import annotations
 
@@ -9,21 +9,27 @@ import numpy as np
 from mapping import Feature, FloatArray, Interval
 from mapping.geometry.proxy import Bar, Chain, Part
 from mapping.geometry.templates import chain_height, contact_half_width, radius_of_cap, width_of_cap
+from mapping.inference.families import bell_section, width_at_half_height
 from mapping.inference.kinds.kind import Kind, Section
 from mapping.inference.likelihood import Shape
 
 # A crest disturbs the trace up to its half-width over a flat base, and hardly further over a hollow one
 CREST_TRACE_REACH = 1.5
+# Tapers that a bell's optimum is searched from: with an edge, nearly a Gaussian, and with a long skirt
+BEGUN_TAPERS = (-0.4, 0.1, 1.0)
+RUNS_OUT = "its flank runs out into the base: width at half height"
 
 
 class Crest(Kind):
     """Capsules: the last two parameters are the height and the log radius of the section."""
 
     def trace(self, feature: Feature, feet: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
-        """(N,) heights of a chain of capsules, m; see `Kind.trace`."""
+        """(N,) heights of a chain of capsules, or of the section that its details describe, m; see `Kind.trace`."""
         height = feature.height.median
         if height <= 0.0:
             return np.zeros(len(feet))
+        if feature.details.exponent is not None:
+            return _bell(feature, feet, tip_radius)
         if is_flat_topped(feature):
             return _flat_topped(feature, feet, tip_radius)
         radius = crest_radius(feature)
@@ -39,21 +45,37 @@ class Crest(Kind):
         if not height > 0.0:
             return None
         if is_flat_topped(feature):
-            top, run = feature.details.top or 0.0, feature.details.run or 0.0
-            return Bar(feature.axis, feature.normals, height, exaggeration * top, exaggeration * run)
+            sizes = (exaggeration * (each or 0.0) for each in _flat_parts(feature))
+            return Bar(feature.axis, feature.normals, height, *sizes)
         return Chain(feature.axis, feature.normals, height, exaggeration * crest_radius(feature))
 
     def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
         """Height and width of a round section, and its radius."""
         radii = np.exp(draws[:, -1])
         cap = Interval.from_draws(width_of_cap(draws[:, -2], radii))
-        return Section(Interval.from_draws(draws[:, -2]), cap, {"radius": float(np.median(radii))})
+        known = {"radius": float(np.median(radii)), "top": None, "run": None, "shoulder": None}
+        return Section(Interval.from_draws(draws[:, -2]), cap, known)
+
+
+def bell_said(draws: FloatArray) -> Section:
+    """What draws (S, P) that end in height, log half width and taper say of a bell: how wide it is at half height."""
+    width = Interval.from_draws(2.0 * np.exp(draws[:, -2]))
+    scale, exponent = bell_section(float(np.exp(np.median(draws[:, -2]))), float(np.median(draws[:, -1])))
+    bell = {"scale": float(scale), "exponent": float(exponent), "radius": None}
+    return Section(Interval.from_draws(draws[:, -3]), width, bell, RUNS_OUT)
 
 
 def is_flat_topped(feature: Feature) -> bool:
-    """True of a line whose section has straight flanks, with a flat top or none."""
-    details = feature.details
-    return details.radius is None and details.top is not None and details.run is not None
+    """True of a line whose section has straight flanks, with a flat top or none, or a flat top with round edges."""
+    _, run, shoulder = _flat_parts(feature)
+    return (
+        feature.details.radius is None and feature.details.top is not None and (run is not None or shoulder is not None)
+    )
+
+
+def _flat_parts(feature: Feature) -> tuple[float | None, float | None, float | None]:
+    """Width of the top, run of each flank, and radius of the edges, m."""
+    return feature.details.top, feature.details.run, feature.details.shoulder
 
 
 def crest_radius(feature: Feature) -> float:
@@ -68,12 +90,24 @@ def _flat_topped(feature: Feature, feet: FloatArray, tip_radius: float) -> Float
     from mapping.geometry.templates import section_heights
 
     away = axis_distance(feet, feature.axis)[:, None]
-    top, run = feature.details.top or 0.0, feature.details.run or 0.0
+    top, run, shoulder = (each or 0.0 for each in _flat_parts(feature))
     across, up = np.array([[0.5 * top, 0.5 * top + run]]), np.array([[feature.height.median, 0.0]])
     nowhere, endless = np.zeros_like(away), np.array([[-1e300, 1e300]])
     out = np.empty((1, len(feet)))
     section_heights(nowhere, away, np.zeros((2, 0, *away.shape)), nowhere, nowhere, np.zeros((1, 0)), endless,
-                    np.zeros(1), across, up, tip_radius, out)  # fmt: skip
+                    np.zeros(1), across, up, np.array([shoulder]), tip_radius, out)  # fmt: skip
+    return np.asarray(out[0])
+
+
+def _bell(feature: Feature, feet: FloatArray, tip_radius: float) -> FloatArray:
+    """(N,) heights that a section of the feature's scale and exponent leaves, m; an end is half of a bump."""
+    from mapping.geometry.templates import smooth_point_heights
+
+    details, away = feature.details, axis_distance(feet, feature.axis)[:, None]
+    scale, exponent = float(details.scale or 0.0), float(details.exponent or 0.0)
+    known = feature.height.median, 0.5 * float(width_at_half_height(scale, exponent)), 1.0 / exponent
+    section, out = [np.array([each]) for each in known], np.empty((1, len(feet)))
+    smooth_point_heights(away, np.zeros_like(away), np.zeros(2), np.zeros((1, 2)), *section, tip_radius, out)
     return np.asarray(out[0])
 
 

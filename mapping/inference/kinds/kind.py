@@ -150,8 +150,13 @@ class Kind:
         """
         raise MappingError(f"no families compete for a {self.name!r}")
 
-    def widths_felt(self, shape: Shape, draws: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def widths_felt(self, shape: Shape, draws: FloatArray, *, half_way: bool = False) -> tuple[FloatArray, FloatArray]:
         """(S,) widths that were touched if draws (S, P) are true, and within which the foot lies, m.
+
+        Args:
+            shape: one of the competing families; what runs out has no foot, and its width is that at half height.
+            draws: of it.
+            half_way: True to ask where half of the height lies instead, in every family.
 
         Raises:
             MappingError: the kind has no families that compete.

@@ -9,17 +9,24 @@ from typing import Any
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
-from mapping.geometry.templates import contact_half_width
+from mapping.geometry.proxy import Part, Swell
+from mapping.geometry.templates import width_of_cap
 from mapping.inference.families import (
+    BellRidgeShape,
     PosteriorProblem,
     RidgeShape,
+    ShoulderedShape,
     Sizes,
     TrapezoidShape,
+    bell_ridge_beside,
+    bell_widths,
     rounding_of,
+    shouldered_beside,
+    shouldered_widths,
     touched_widths,
     trapezoid_beside,
 )
-from mapping.inference.kinds.crests import Crest
+from mapping.inference.kinds.crests import BEGUN_TAPERS, Crest, bell_said
 from mapping.inference.kinds.kind import Section
 from mapping.inference.kinds.lines import ROUNDING_OF_ENDS, SQUARE_OR_ROUND, LineKind, Parameters, Traced, ended
 from mapping.inference.kinds.posterior_density import height_prior, radius_prior
@@ -29,10 +36,21 @@ from mapping.inference.likelihood import Shape
 # upright and gentle flanks, tops that are hardly felt and such as fill the disturbance
 FLAT_STARTS = ((0.3, 0.02), (1.0, 0.02), (0.1, 0.6))
 ROOF_STARTS = ((0.02,), (0.6,))
+SHOULDER_STARTS = ((0.3, 0.05), (1.0, 0.05))
+# Half widths of a section that runs out, in half-widths of the disturbance, of which the best begins the search for its
+# optimum: from the least to the most, and how many
+BEGUN_HALVES = (0.02, 2.0, 15)
 
 
 class Ridge(Crest, LineKind):
     """Capsule chains: course, rounding and places of the ends, height and log radius."""
+
+    def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
+        """The chain, the bar, or the swell that the feature's details describe."""
+        scale, exponent, height = feature.details.scale, feature.details.exponent, feature.height.median
+        if scale is None or exponent is None or not height > 0.0:
+            return super().part(feature, exaggeration)
+        return Swell(feature.axis, feature.normals, exaggeration * height, exaggeration * scale, exponent)
 
     def shape(self, traced: Traced) -> RidgeShape:
         sizes, tip = traced.sizes, traced.tip_radius
@@ -49,27 +67,35 @@ class Ridge(Crest, LineKind):
         return float(np.log(4.0 * sizes.radius)), float(np.log(0.5 * sizes.height))
 
     def rivals(self, problem: PosteriorProblem, optimum: FloatArray) -> Sequence[PosteriorProblem]:
-        """Lines with straight flanks, and with a flat top or none, on the same course."""
+        """Lines with straight flanks, with a flat top or none, and such whose flanks run out, on the same course."""
         ridge: Any = problem.target.shape
         course, last = ridge.modes.count, len(optimum) - 1
         posed = []
-        for roof, parts in ((False, FLAT_STARTS), (True, ROOF_STARTS)):
-            kept = np.delete(optimum, [course, last] if roof and not ridge.chart.closed else [last])
-            shape = trapezoid_beside(ridge, problem.sizes, roof=roof)
+        families = (
+            (trapezoid_beside(ridge, problem.sizes, roof=False), FLAT_STARTS),
+            (trapezoid_beside(ridge, problem.sizes, roof=True), ROOF_STARTS),
+            (shouldered_beside(ridge, problem.sizes), SHOULDER_STARTS),
+        )
+        for shape, parts in families:
+            kept = np.delete(optimum, [course, last] if shape.roof and not ridge.chart.closed else [last])
             begun = np.log(problem.sizes.half_width * np.array(parts))
             beginnings = np.column_stack([np.tile(kept, (len(parts), 1)), begun])
             alike = [ended(beginnings, shape.names, turn) for turn in SQUARE_OR_ROUND]
             beginnings = np.concatenate(alike) if len(alike[0]) else beginnings
             posed.append(replace(problem, target=replace(problem.target, shape=shape), beginnings=beginnings))
-        return posed
+        return [*posed, _running_out(problem, optimum)]
 
     def section(self, feature: Feature, shape: Shape, draws: FloatArray) -> Section:
-        """Of a round section, or of one with a flat top: what its flanks lead to."""
+        """Of a round section; of one with a flat top, what its flanks lead to; of one that runs out, at half height."""
+        if isinstance(shape, BellRidgeShape):
+            return bell_said(draws)
         if not isinstance(shape, TrapezoidShape):
             return super().section(feature, shape, draws)
         height, top, run = shape.parts(draws)
-        parts = {"top": float(np.median(top)), "run": float(np.median(run)), "radius": None}
-        return Section(Interval.from_draws(height), Interval.from_draws(top + 2.0 * run), parts)
+        flank = "shoulder" if isinstance(shape, ShoulderedShape) else "run"
+        parts = {"top": float(np.median(top)), flank: float(np.median(run)), "radius": None}
+        foot = top + (width_of_cap(height, run) if flank == "shoulder" else 2.0 * run)
+        return Section(Interval.from_draws(height), Interval.from_draws(foot), parts)
 
     def has_plain_member(self, shape: Any) -> bool:
         return isinstance(shape, RidgeShape)
@@ -90,14 +116,20 @@ class Ridge(Crest, LineKind):
         return float(after / before)
 
     def draws_of_height(self, shape: Shape, draws: FloatArray) -> FloatArray:
+        if isinstance(shape, BellRidgeShape):
+            return draws[:, -3]
         return shape.parts(draws)[0] if isinstance(shape, TrapezoidShape) else draws[:, -2]
 
-    def widths_felt(self, shape: Any, draws: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def widths_felt(self, shape: Any, draws: FloatArray, *, half_way: bool = False) -> tuple[FloatArray, FloatArray]:
+        tip = shape.tip_radius
+        if isinstance(shape, BellRidgeShape):
+            return bell_widths(draws, tip)
+        if isinstance(shape, ShoulderedShape):
+            return shouldered_widths(*shape.parts(draws), tip, half_way=half_way)
         if isinstance(shape, TrapezoidShape):
-            return touched_widths(*shape.parts(draws), shape.tip_radius)
-        height, radius = draws[:, -2], np.exp(draws[:, -1])
-        kink = contact_half_width(height, radius, shape.tip_radius)
-        return 2.0 * kink * radius / (radius + shape.tip_radius), 2.0 * kink
+            return touched_widths(*shape.parts(draws), tip, half_way=half_way)
+        width = width_of_cap((0.5 if half_way else 1.0) * draws[:, -2], np.exp(draws[:, -1]))
+        return width, width
 
     def heights(self, shape: Any, truth: FloatArray, feet: FloatArray, normals: FloatArray) -> FloatArray:
         """The compiled form, over points instead of bins."""
@@ -112,6 +144,20 @@ class Ridge(Crest, LineKind):
             feet, normals, np.zeros_like(normals), point, *whole, chain, radius, rounding, shape.tip_radius, out
         )
         return np.asarray(out[0])
+
+
+def _running_out(problem: PosteriorProblem, optimum: FloatArray) -> PosteriorProblem:
+    """Lines with the section of a bell, begun with each taper at the half width that fits best where the ridge lies."""
+    ridge: Any = problem.target.shape
+    shape = bell_ridge_beside(ridge, problem.sizes)
+    target = replace(problem.target, shape=shape)
+    kept = np.delete(optimum, [len(optimum) - 1] if ridge.chart.closed else [ridge.modes.count, len(optimum) - 1])
+    halves = np.log(problem.sizes.half_width * np.geomspace(*BEGUN_HALVES))
+    begun = []
+    for taper in BEGUN_TAPERS:
+        tried = np.column_stack([np.tile(kept, (len(halves), 1)), halves, np.full(len(halves), taper)])
+        begun.append(tried[int(np.argmax(target.log_density(tried)))])
+    return replace(problem, target=target, beginnings=np.array(begun))
 
 
 RIDGE = Ridge(

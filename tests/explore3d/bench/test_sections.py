@@ -23,6 +23,14 @@ def test_what_is_built_with_and_what_is_reported_differ() -> None:
     assert built.height != reported.height
 
 
+def test_half_way_up_bars_are_as_wide_as_their_flanks_say() -> None:
+    sizes = {
+        name: section_body(name, 0).width_half_way for name in ("wire", "trapezoid", "triangle", "V-scratch", "cosine")
+    }
+    expected = {"wire": 0.65e-3, "trapezoid": 1.7e-3, "triangle": 0.4e-3, "V-scratch": 1.5e-3, "cosine": 1.5e-3}
+    assert sizes == pytest.approx(expected, abs=4e-6)
+
+
 def test_dilation_by_brute_force_finds_the_closed_form_of_a_wire() -> None:
     u = np.linspace(-6e-3, 6e-3, 301)
     wire = section_body("wire", 0)
@@ -39,7 +47,7 @@ def test_a_bar_gets_its_height_and_bounds_of_its_width(tmp_path: Path) -> None:
     # what is in the store is not run again
     assert list(bench_sections(["trapezoid"], ["white"], range(SEED, SEED + 1), store)) == [record]
     lines = list(section_lines([record]))
-    assert lines[1].startswith("trapezoid,white,1,100,0,1,0,0,0,0,0,100,")
+    assert lines[1].startswith("trapezoid,white,10,1,100,0,1,0,0,0,0,0,100,")
     assert lines[-1] == "remarks on sections of a family that the house has: 0 of 1"
 
 

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 from scipy.ndimage import grey_dilation
 
-from mapping import Feature, FloatArray, Trace
+from mapping import Feature, FloatArray, Interval, Trace
 from mapping.assembly import assemble
-from mapping.base import fit_base
+from mapping.assembly.free.outline import outlined
+from mapping.assembly.free.sizes import sizes_of_section
+from mapping.base import SweepHeights, fit_base
 from mapping.detection import detect
 from mapping.inference import refine_all
+from mapping.instrument import Noise
 
 TIP, FINE, SAMPLING = 2e-6, 0.04e-6, 25
 Form = Callable[[FloatArray], FloatArray]
@@ -148,3 +151,51 @@ def test_what_a_helix_feels_all_round_a_body_is_remarked_as_no_spot() -> None:
     base = fit_base(trace)
     spots = [each for each in assemble(detect(trace, base), trace, base) if each.width.median > 2.0 * radius]
     assert spots and all("faces the other way" in str(each.details.misfit) for each in spots)
+
+
+def bar(u: FloatArray) -> FloatArray:
+    return np.where(np.abs(u) < 1.1e-3, 0.44e-3, 0.0)
+
+
+def rounded(u: FloatArray) -> FloatArray:
+    """The same with edges of 0.2 mm, and fillets of as much at its foot."""
+    out, a = np.abs(u) - 0.9e-3, 0.2e-3
+    top = 0.24e-3 + np.sqrt(np.clip(a**2 - np.clip(out, 0.0, None) ** 2, 0.0, None))
+    foot = a - np.sqrt(np.clip(a**2 - np.clip(2.0 * a - out, 0.0, None) ** 2, 0.0, None))
+    return np.where(out <= a, top, np.where(out < 2.0 * a, foot, 0.0))
+
+
+def gentle(u: FloatArray) -> FloatArray:
+    return np.clip(0.44e-3 * (1.5 - np.abs(u) / 1.1e-3), 0.0, 0.44e-3)
+
+
+@pytest.mark.parametrize(("form", "low", "high"), [(bar, 2.2e-3, 2.2e-3), (rounded, 2.2e-3, 2.6e-3)])
+@pytest.mark.parametrize("noise", [1e-6, 20e-6])
+def test_of_walls_that_the_ball_did_not_touch_the_width_is_between_bounds(
+    form: Form, low: float, high: float, noise: float
+) -> None:
+    width = of_one_section(form, noise)
+    assert width.bounded and width.low < low and high < width.high < 4.2e-3
+    if form is bar:  # the ball leaves an edge at sqrt(H (2 r - H)) beside it
+        assert width.median == pytest.approx(2.2e-3, abs=0.03e-3 + 2.0 * (width.median - width.low))
+        assert 2.2e-3 + 2.0 * 0.828e-3 < width.high < 3.95e-3 + 15.0 * noise
+
+
+def test_of_flanks_that_it_went_down_on_the_width_is_a_number() -> None:
+    width = of_one_section(gentle, 1e-6)
+    assert not width.bounded and width.low < 3.3e-3 < width.high and width.high - width.low < 0.2e-3
+
+
+def of_one_section(form: Form, noise: float) -> Interval:
+    """The width under a ball of 1 mm, in bins of 0.05 mm."""
+    x = 2e-6 * np.arange(-2500, 2501)
+    ball = np.sqrt(1e-6 - (2e-6 * np.arange(-499, 500)) ** 2) - 1e-3
+    z = grey_dilation(form(x), structure=ball, mode="nearest")[::25]
+    z += noise * np.random.default_rng(3).standard_normal(len(z))
+    index, nowhere = np.arange(len(z) + 1), np.zeros((len(z), 3))
+    piece = SweepHeights(0, -5e-3, 50e-6, z, 1.0, index, np.zeros(len(z)), nowhere)
+    section = outlined(piece, 1.0, 60, 140, max(noise, 1e-6), np.inf)
+    assert section is not None
+    sizes = sizes_of_section(section, 1e-3, Noise(noise))
+    assert sizes is not None
+    return sizes.width_interval()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,16 @@ def test_a_bell_is_drawn_as_the_bell_that_was_fitted() -> None:
     assert u[~above].min() == pytest.approx(u.max())  # the skirt is cut off where it is hardly higher than the base
     assert z[above].min() < 0.05 * HEIGHT
     assert (mesh.face_normals[:, 2] > -1e-12).all()
+
+
+def test_a_ridge_that_runs_out_is_drawn_as_its_section_along_its_axis() -> None:
+    axis = np.array([[0.0, 0.0, 0.0], [9e-3, 0.0, 0.0]])
+    mesh = feature_mesh(replace(BELL, kind="ridge", axis=axis, normals=np.repeat(UP, 2, axis=0)))
+    u, z = np.abs(mesh.vertices[:, 1]), mesh.vertices[:, 2]
+    assert z[z > 0] == pytest.approx(HEIGHT / (1.0 + (u[z > 0] / SCALE) ** 2))
+    assert set(np.round(1e3 * mesh.vertices[:, 0])) == {0.0, 9.0}
+    flank = (mesh.face_normals[:, 2] > 0.0) & (np.abs(mesh.face_normals[:, 0]) < 1e-9)
+    assert flank.sum() == 2 * (len(u) // 2 - 3)  # all but the foot and the ends look outwards
 
 
 def test_a_bell_enlarged_to_be_seen_keeps_its_proportions() -> None:

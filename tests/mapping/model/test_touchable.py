@@ -7,7 +7,7 @@ import pytest
 
 from mapping import Details, Feature, Interval, ModelError, ObjectModel, Support, Surface
 from mapping.base import Base
-from mapping.geometry.proxy import Bar, Bell, Chain, Terrace, Trench
+from mapping.geometry.proxy import Bar, Bell, Chain, Swell, Terrace, Trench
 from mapping.model import touchable
 
 PLATE = Surface(0.03 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), [[0, 1, 2], [0, 2, 3]])
@@ -28,6 +28,7 @@ def test_each_kind_has_its_closed_form() -> None:
     known = model(
         feature("ridge", LINE, 0.3e-3, details=Details(radius=0.2e-3)),
         feature("ridge", LINE, 0.1e-3, 1e-3, Details(top=0.4e-3, run=0.3e-3)),
+        feature("ridge", LINE, 0.1e-3, 1e-3, Details(scale=0.5e-3, exponent=-2.5)),
         feature("bump", LINE[:1], 0.2e-3),
         feature("bump", LINE[:1], 0.2e-3, details=Details(scale=0.5e-3, exponent=2.0)),
         feature("groove", LINE, -0.1e-3, 1e-3),
@@ -36,8 +37,8 @@ def test_each_kind_has_its_closed_form() -> None:
     )
     body, left_out = touchable(known, 5e-3, 2.0)
     assert left_out == ()
-    assert [type(part) for part in body.parts] == [Chain, Bar, Chain, Bell, Trench, Trench, Terrace]
-    ridge, bar, groove = body.parts[0], body.parts[1], body.parts[4]
+    assert [type(part) for part in body.parts] == [Chain, Bar, Swell, Chain, Bell, Trench, Trench, Terrace]
+    ridge, bar, groove = body.parts[0], body.parts[1], body.parts[5]
     assert isinstance(bar, Bar) and (bar.height, bar.top, bar.run) == (0.2e-3, 0.8e-3, 0.6e-3)
     assert isinstance(ridge, Chain) and (ridge.height, ridge.radius) == (0.6e-3, 0.4e-3)
     assert isinstance(groove, Trench) and (groove.width, groove.depth) == (2e-3, 0.2e-3)

@@ -121,6 +121,16 @@ def test_a_bar_ends_as_its_own_direction_is_bent(lengthwise: bool) -> None:
     across, up = np.array([[half, half + 1e-9]]), np.array([[height, 0.0]])
     places, nothing = (s[:, None], aside[:, None]), np.zeros((2, 0, len(s), 1))
     section_heights(
-        *places, nothing, *bends, np.zeros((1, 0)), np.array([[-end, end]]), np.zeros(1), across, up, TIP, out
+        *places,
+        nothing,
+        *bends,
+        np.zeros((1, 0)),
+        np.array([[-end, end]]),
+        np.zeros(1),
+        across,
+        up,
+        np.zeros(1),
+        TIP,
+        out,
     )
     np.testing.assert_allclose(out[0], true, atol=6e-6)

@@ -16,6 +16,7 @@ def trace(
     tip: float,
     bend: float = 0.0,
     rounded: float = 0.0,
+    shoulder: float = 0.0,
 ) -> FloatArray:
     """Heights at distances u across and s along a line that ends at s = 0."""
     across, up = (np.array([each]) for each in zip(*corners, strict=True))
@@ -32,6 +33,7 @@ def trace(
         radius,
         across,
         up,
+        np.array([shoulder]),
         tip,
         out,
     )
@@ -112,9 +114,34 @@ def test_a_line_that_runs_at_an_angle_to_its_chart_is_felt_as_along_it(heading: 
     across, up = (np.array([each]) for each in zip(*corners, strict=True))
     ends, course = np.array([[-1.0, 0.0]]), np.array([[heading]])
     section_heights(
-        place[:, None], aside[:, None], basis, flat, flat, course, ends, np.zeros(1), across, up, 10e-3, out
+        place[:, None],
+        aside[:, None],
+        basis,
+        flat,
+        flat,
+        course,
+        ends,
+        np.zeros(1),
+        across,
+        up,
+        np.zeros(1),
+        10e-3,
+        out,
     )
     straight = trace(u, s, corners, 10e-3)
     np.testing.assert_allclose(out[0], straight, atol=1e-15)
     beyond = (s > 0.0) & (straight > 0.0)
     assert (np.abs(u[beyond]) > 0.5e-3).sum() > 100
+
+
+@pytest.mark.parametrize(("shoulder", "tip"), [(0.2e-3, 1e-3), (0.2e-3, 10e-3), (0.4e-3, 3e-3), (2e-3, 10e-3)])
+def test_round_edges_are_felt_as_the_arcs_that_they_are(shoulder: float, tip: float) -> None:
+    """A bar 0.4 mm high with a flat top of 1 mm, by trying all points of its section."""
+    u = np.linspace(0.0, 5e-3, 301)
+    turn = np.linspace(0.0, np.arccos(max(1.0 - 0.4e-3 / shoulder, 0.0)), 4001)
+    across = np.concatenate([np.linspace(0.0, 0.5e-3, 1001), 0.5e-3 + shoulder * np.sin(turn)])
+    up = np.concatenate([np.full(1001, 0.4e-3), 0.4e-3 - shoulder * (1.0 - np.cos(turn))])
+    gap = across - u[:, None]
+    rest = np.where(np.abs(gap) < tip, up + np.sqrt(np.maximum(tip**2 - gap**2, 0.0)) - tip, 0.0).max(axis=1)
+    felt = trace(u, np.full_like(u, -0.5), [(0.5e-3, 0.4e-3)], tip, shoulder=shoulder)
+    np.testing.assert_allclose(felt, np.maximum(rest, 0.0), atol=1e-9)

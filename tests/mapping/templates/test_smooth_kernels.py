@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapping import FloatArray
-from mapping.geometry.templates import smooth_groove_heights, smooth_point_heights
+from mapping.geometry.templates import half_ways_touched, smooth_line_heights, smooth_point_heights
 from mapping.geometry.templates.smooth_kernels import smooth_trace
 
 TIP = 3e-3
@@ -73,13 +73,13 @@ def test_a_groove_is_felt_as_its_section_as_the_base_bends_and_ends_round() -> N
     shape = np.array([-depth]), np.array([half]), np.array([taper])
     line = np.zeros((2, 0, *bend.shape)), bend, 0.0 * bend, np.zeros((1, 0)), np.array([[0.0, 10e-3]])
     out = np.empty((1, len(bend)))
-    smooth_groove_heights(s, aside, *line, *shape, TIP, out)
+    smooth_line_heights(s, aside, *line, *shape, TIP, out)
     expected = [on_a_circle(0.5e-3, k, -depth, half, taper) for k in bend[:, 0]]
     np.testing.assert_allclose(out[0], expected, atol=1e-3 * depth)
     assert np.ptp(expected) > 0.05 * depth
     beyond = np.linspace(0.0, 2e-3, 33)[:, None]
     flat = np.zeros((2, 0, *bend.shape)), 0.0 * bend, 0.0 * bend, np.zeros((1, 0)), np.array([[0.0, 10e-3]])
-    smooth_groove_heights(10e-3 + beyond, 0.0 * beyond, *flat, *shape, TIP, out)
+    smooth_line_heights(10e-3 + beyond, 0.0 * beyond, *flat, *shape, TIP, out)
     np.testing.assert_allclose(out[0], rolled(beyond[:, 0], TIP, depth, half, taper), atol=2e-5 * depth)
 
 
@@ -99,3 +99,22 @@ def test_the_trace_of_a_bell_is_the_highest_place_of_the_ball(height: float, sca
         under = u[np.abs(u - x) < 1.0]
         felt = (z[np.abs(u - x) < 1.0] + np.sqrt(1.0 - (under - x) ** 2) - 1.0).max()
         assert max(traced, 0.0) == pytest.approx(max(felt, 0.0), abs=3e-5 * height + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("height", "half", "taper"),
+    [(0.1, 1.0, -0.4), (0.1, 0.1, -0.4), (0.2, 0.15, 0.0), (0.1, 0.2, 1.0), (2.0, 0.1, 0.3)],
+)
+def test_what_a_ball_knows_of_the_width_is_where_it_lay(height: float, half: float, taper: float) -> None:
+    """Against every place that a ball of radius 1 touches on its way over the bell."""
+    out = np.empty((1, 2))
+    half_ways_touched(np.array([height]), np.array([half]), np.array([taper]), 1.0, out)
+    u = np.linspace(0.0, 4.0, 8001)
+    z = -section(u, height, half, taper)
+    with np.errstate(invalid="ignore"):
+        lain = [u[np.nanargmax(z + np.sqrt(1.0 - (u - x) ** 2))] for x in np.linspace(0.0, 3.5, 3501)]
+    above, below = max(at for at in lain if at <= half + 1e-3), min(at for at in lain if at >= half - 1e-3)
+    if below - above < 0.02:
+        np.testing.assert_array_equal(out, half)
+    else:
+        np.testing.assert_allclose(out[0], [above, below], atol=0.01)

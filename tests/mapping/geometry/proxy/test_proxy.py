@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mapping import ContactError, FloatArray, Surface
-from mapping.geometry.proxy import Bar, Bell, Chain, Part, Proxy, ProxyBody, Terrace, Trench
+from mapping.geometry.proxy import Bar, Bell, Chain, Part, Proxy, ProxyBody, Swell, Terrace, Trench
 from mapping.geometry.templates import (
     BumpOfRevolution,
     cap_height,
@@ -69,7 +69,7 @@ def bar_form(top: float, run: float) -> Form:
         corners = np.array([[0.5 * top, 0.5 * top + run]]), np.array([[0.2e-3, 0.0]])
         section_heights(
             nothing, np.c_[x], np.zeros((2, 0, len(x), 1)), nothing, nothing, np.zeros((1, 0)),
-            np.array([[-1e300, 1e300]]), np.zeros(1), *corners, r, out,
+            np.array([[-1e300, 1e300]]), np.zeros(1), *corners, np.zeros(1), r, out,
         )  # fmt: skip
         return np.asarray(out[0])
 
@@ -82,6 +82,7 @@ CASES: dict[str, tuple[tuple[Part, ...], Form]] = {
     "bump": ((Chain(*POINT, 0.2e-3, 0.2e-3),), lambda x, y, r: cap_height(np.hypot(x, y), 0.2e-3, 0.2e-3, r)),
     "bell": ((Bell(np.zeros(3), UP, 0.2e-3, 0.6e-3, 2.0),), bell_form(0.6e-3, 2.0)),
     "cosine bell": ((Bell(np.zeros(3), UP, 0.2e-3, 0.6e-3, -2.5),), bell_form(0.6e-3, -2.5)),
+    "swell": ((Swell(*LINE, 0.2e-3, 0.6e-3, -2.5),), lambda x, y, r: bell_form(0.6e-3, -2.5)(x, 0.0 * y, r)),
     "bar": ((Bar(*LINE, 0.2e-3, 0.8e-3, 0.0),), bar_form(0.8e-3, 0.0)),
     "roof": ((Bar(*LINE, 0.2e-3, 0.0, 1.2e-3),), bar_form(0.0, 1.2e-3)),
     "trapezoid": ((Bar(*LINE, 0.2e-3, 0.7e-3, 0.5e-3),), bar_form(0.7e-3, 0.5e-3)),
@@ -114,7 +115,8 @@ def test_the_path_over_a_feature_is_its_closed_form(name: str, r: float) -> None
             assert np.abs(x - felt.device[:, 0]).max() < 0.1e-3
 
 
-@pytest.mark.parametrize("name", [name for name in CASES if "bell" not in name])
+# the flanks of a swell are facets, each straight: its path is true to what their chords miss, the slope steps
+@pytest.mark.parametrize("name", [name for name in CASES if "bell" not in name and name != "swell"])
 @pytest.mark.parametrize("r", TIPS)
 def test_lateral_over_normal_force_is_the_slope(name: str, r: float) -> None:
     parts, form = CASES[name]
