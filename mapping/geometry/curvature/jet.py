@@ -27,7 +27,7 @@ BIAS_ALLOWANCE_SDS = 3.5
 WEIGHT_EXPONENT = 0.75
 # Points that speak for all of the noise, and at most for all of the bends: one in so many, for a bend is found over a
 # dozen points or more
-SAMPLE, ONE_OF, FEWEST = 3000, 10, 500
+SAMPLE, BENT_ONE_OF, FEWEST_BENT = 3000, 10, 500
 # Share of the weight that may be lost at either end.
 LOST_WEIGHT_SHARE = 0.1
 # Meshes above this size try only the neighbourhoods that a sample of their points chooses.
@@ -205,7 +205,7 @@ class _Jets:
         """Bend all ordinates by the larger curvature at the nearest point of a sample, found without bending."""
         from scipy.spatial import cKDTree
 
-        sample = self.sample(min(max(len(self.place) // ONE_OF, FEWEST), SAMPLE))
+        sample = self.sample(min(max(len(self.place) // BENT_ONE_OF, FEWEST_BENT), SAMPLE))
         found, tree = self.fit(sample, sizes), cKDTree(self.place[sample])
         pools = tree.query(self.place[sample], k=min(POOL // POOL_STEP, len(sample)))[1].reshape(len(sample), -1)
         weights = self._weights(found, found.deviations(noise), np.arange(len(sample)), pools, sizes, noise)[0]

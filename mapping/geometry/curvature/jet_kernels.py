@@ -13,11 +13,11 @@ CONDITION = 1e5  # ratio of the diagonal of R beyond which the stencil does not 
 # curvature's, and five standard deviations of it are 25 / 2.
 CERTAIN_GAP = 12.5
 
-# Points up to which a fit is by reflections, whose triangle keeps all digits; beyond them the sums of products are added
-# up, a fifth of the work for an eighth of the digits: of a disc of points 13 remain, of a half-disc 8
+# Points up to which a fit is by reflections, whose triangle keeps all digits. Beyond them sums of products are added,
+# in half of the time: 13 digits remain where points fill a disc, 8 where they fill half of one
 REFLECTED = 97
 POOL_LANES = 16  # numbers that compiled sums take at a time
-MOMENTS = 13  # powers of a coordinate up to twice the highest degree: what products of two monomials are made of
+PRODUCT_POWERS = 13  # powers of a coordinate up to twice the highest degree: what products of two monomials are made of
 
 LEAST_SQUARED_ERROR = 1e-28  # squared error of a curvature that is never undercut, for bodies of about unit size
 
@@ -375,8 +375,8 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
     place = np.empty((3, widest))
     rows = np.empty((MONOMIALS + 1, widest))
     triangle = np.empty((MONOMIALS + 1, MONOMIALS))
-    gram, powers = np.empty((MONOMIALS + 1, MONOMIALS + 1)), np.empty((2, MOMENTS, widest))
-    moments, work, column = np.empty((MOMENTS, MOMENTS)), np.empty((MONOMIALS, MONOMIALS)), np.empty(MONOMIALS)
+    gram, powers = np.empty((MONOMIALS + 1, MONOMIALS + 1)), np.empty((2, PRODUCT_POWERS, widest))
+    moments, work, column = np.empty((PRODUCT_POWERS, PRODUCT_POWERS)), np.empty((MONOMIALS, MONOMIALS)), np.empty(MONOMIALS)
     coefficients, inverse, variances = np.zeros(MONOMIALS), np.zeros((3, MONOMIALS)), np.zeros(options)
     ends = np.zeros(len(sizes), dtype=np.int64)
     for m in range(count):

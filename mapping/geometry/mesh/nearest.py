@@ -80,7 +80,9 @@ class NearestPoint:
             on_vertex = part[border] >= kernels.ON_VERTEX
             edges, vertices = border[~on_vertex], border[on_vertex]
             normals[edges] = self.edge_normals[face[edges], part[edges] - kernels.ON_EDGE]
-            normals[vertices] = self._vertex_normals[self.surface.faces[face[vertices], part[vertices] - kernels.ON_VERTEX]]
+            normals[vertices] = self._vertex_normals[
+                self.surface.faces[face[vertices], part[vertices] - kernels.ON_VERTEX]
+            ]
         side = np.where(((query - points) * normals).sum(axis=1) >= 0.0, 1.0, -1.0)
         return Nearest(points, tree.scale_out(distance), side, normals, face, barycentric)
 

@@ -12,7 +12,6 @@ from mapping.geometry.mesh.bvh_kernels import BOX_ROUNDING, STACK, WIDTH, push_l
 from mapping.geometry.mesh.triangle_row_kernels import QUERIES_PER_BLOCK, closest, corners
 from mapping.geometry.mesh.vector_kernels import dot, moved, sub, vector
 
-
 # A barycentric coordinate below this counts as zero: the point lies on an edge or a vertex
 ON_BORDER = 1e-9
 # What a point lies in, as the kernels tell it: from the first of each on, one for each corner of the face
@@ -29,7 +28,7 @@ def nearest_points(  # type: ignore[no-untyped-def]
         points, distance: (N, 3) nearest points, and (N,) how far they are.
         face: (N,) number of the face that holds it, the lowest of equally near ones.
         barycentric: (N, 3) the point's coordinates in that face.
-        part: (N,) INSIDE of it, or ON_EDGE plus the number of the corner opposite, or ON_VERTEX plus that of the corner.
+        part: (N,) INSIDE of it, or ON_EDGE and the number of the corner opposite, or ON_VERTEX and that of the corner.
     """
     stack = np.empty(STACK, np.int32)
     apart, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)

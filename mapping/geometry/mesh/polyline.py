@@ -49,7 +49,7 @@ def resample(points: FloatArray, count: int) -> FloatArray:
 
 
 def nearest_on(points: FloatArray, polyline: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The nearest point (N, 3) of a polyline (K, 3) to each of (N, 3) points, and its arclength (N,), m; or all (., 2)."""
+    """The nearest point (N, D) of a polyline (K, D) to each of (N, D) points, and its arclength (N,), m; D = 2, 3."""
     if len(polyline) == 1:
         return np.broadcast_to(polyline[0], points.shape).copy(), np.zeros(len(points))
     from mapping.geometry.mesh.nearest_kernels import nearest_on_legs
