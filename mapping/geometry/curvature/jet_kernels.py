@@ -376,7 +376,8 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
     rows = np.empty((MONOMIALS + 1, widest))
     triangle = np.empty((MONOMIALS + 1, MONOMIALS))
     gram, powers = np.empty((MONOMIALS + 1, MONOMIALS + 1)), np.empty((2, PRODUCT_POWERS, widest))
-    moments, work, column = np.empty((PRODUCT_POWERS, PRODUCT_POWERS)), np.empty((MONOMIALS, MONOMIALS)), np.empty(MONOMIALS)
+    moments = np.empty((PRODUCT_POWERS, PRODUCT_POWERS))
+    work, column = np.empty((MONOMIALS, MONOMIALS)), np.empty(MONOMIALS)
     coefficients, inverse, variances = np.zeros(MONOMIALS), np.zeros((3, MONOMIALS)), np.zeros(options)
     ends = np.zeros(len(sizes), dtype=np.int64)
     for m in range(count):

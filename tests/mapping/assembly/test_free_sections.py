@@ -7,9 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scipy.ndimage import grey_dilation
+from scipy.optimize import isotonic_regression
 
 from mapping import Feature, FloatArray, Trace
 from mapping.assembly import assemble
+from mapping.assembly.free import outline
 from mapping.base import fit_base
 from mapping.detection import detect
 from mapping.inference import refine_all
@@ -131,3 +133,12 @@ def test_a_doubtful_tip_makes_the_width_doubtful() -> None:
     (sure,), (doubtful,) = (refine_all(found, profile, 0, base=base, tip_sd=sd) for sd in (0.0, 0.5e-6))
     assert sure.width.median == doubtful.width.median
     assert doubtful.width.high - doubtful.width.low > sure.width.high - sure.width.low + 0.5e-6
+
+
+@pytest.mark.parametrize("count", [1, 2, 60, 500])
+def test_a_monotone_outline_is_the_isotonic_regression(count: int) -> None:
+    rng = np.random.default_rng(count)
+    values = np.linspace(0.0, 2.0, count) + rng.normal(size=count)
+    np.testing.assert_allclose(outline._rising(values), isotonic_regression(values).x, atol=1e-14)
+    falling = outline._rising(values[::-1])[::-1]
+    np.testing.assert_allclose(falling, isotonic_regression(values, increasing=False).x, atol=1e-14)
