@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         run_key as run_key,
     )
     from explore3d.analysis.forecast import Forecast as Forecast, forecast as forecast, worst_errors as worst_errors
+    from explore3d.analysis.memory import give_memory_back as give_memory_back, leave_no_holes as leave_no_holes
     from explore3d.analysis.method import ABSORBED as ABSORBED, FAILED as FAILED
     from explore3d.analysis.result import Analysis as Analysis, Computing as Computing
     from explore3d.analysis.roughness import (
@@ -43,6 +44,7 @@ _PUBLIC = {
     "build_model": ("build_model",),
     "feature_table": ("FEATURE_COLUMNS", "csv_text", "feature_rows", "parquet_bytes", "run_key"),
     "forecast": ("Forecast", "forecast", "worst_errors"),
+    "memory": ("give_memory_back", "leave_no_holes"),
     "method": ("ABSORBED", "FAILED"),
     "result": ("Analysis", "Computing"),
     "roughness": ("Roughness", "residual", "roughness_of", "why_no_roughness_of"),

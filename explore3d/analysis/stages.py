@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import ctypes
-import sys
 import time
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from explore3d import UserError
+from explore3d.analysis.memory import give_memory_back
 from mapping import LeftOut
 
 # The stage in which a finger moves
@@ -76,7 +75,7 @@ class Stages:
             yield lambda share: self.progress(name, share)
         finally:
             self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - start
-        _give_memory_back()
+        give_memory_back()
         self.progress(name, 1.0)
 
     def is_forced(self, name: str) -> bool:
@@ -92,11 +91,3 @@ class Stages:
             return True
         self.left_out.append(LeftOut(name, why_not, saved))
         return False
-
-
-def _give_memory_back() -> None:
-    """Have what a stage set free go back to the system, where the allocator is glibc's: holes between what lives on
-    stay otherwise, 100 MB of the 550 that the paper's wire took."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
-    if trim is not None:
-        trim(0)

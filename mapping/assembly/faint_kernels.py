@@ -27,6 +27,7 @@ def best_segment(flat, height, weight, angles, size, cell_u, cell_v, section, le
     low_v, low_u = -0.5 * rows * cell_v, -0.5 * columns * cell_u
     total, count = np.zeros((rows, columns)), np.zeros((rows, columns))
     signal, square = np.zeros(columns + 1), np.zeros(columns + 1)
+    match, power = np.empty(columns), np.empty(columns)
     best_square, best = 0.0, np.zeros(5)
     for angle in angles:
         c, s = np.cos(angle), np.sin(angle)
@@ -37,19 +38,23 @@ def best_segment(flat, height, weight, angles, size, cell_u, cell_v, section, le
             total[row, column] += height[i] * weight[i]
             count[row, column] += weight[i] ** 2
         for row in range(wings, rows - wings):
+            match[:], power[:] = 0.0, 0.0
+            for k in range(2 * wings + 1):  # along memory, several columns at a time
+                share, share2 = section[k], section[k] ** 2
+                for column in range(columns):
+                    match[column] += share * total[row - wings + k, column]
+                for column in range(columns):
+                    power[column] += share2 * count[row - wings + k, column]
             for column in range(columns):
-                match, power = 0.0, 0.0
-                for k in range(2 * wings + 1):
-                    match += section[k] * total[row - wings + k, column]
-                    power += section[k] ** 2 * count[row - wings + k, column]
-                signal[column + 1], square[column + 1] = signal[column] + match, square[column] + power
+                signal[column + 1] = signal[column] + match[column]
+                square[column + 1] = square[column] + power[column]
             for length in lengths:
                 for column in range(columns - length + 1):
-                    power = square[column + length] - square[column]
-                    match = signal[column + length] - signal[column]
-                    if power > least and match * match > best_square * power:
-                        best_square = match * match / power
+                    worth = square[column + length] - square[column]
+                    felt = signal[column + length] - signal[column]
+                    if worth > least and felt * felt > best_square * worth:
+                        best_square = felt * felt / worth
                         begin = low_u + column * cell_u
-                        best[0], best[1], best[2] = match / np.sqrt(power), angle, low_v + (row + 0.5) * cell_v
+                        best[0], best[1], best[2] = felt / np.sqrt(worth), angle, low_v + (row + 0.5) * cell_v
                         best[3], best[4] = begin, begin + length * cell_u
     return best

@@ -56,20 +56,28 @@ class _Whitened:
         step: width of the bins, m.
         root: (n, n) whitening matrix, with the drift projected out.
         values: (n,) whitened heights.
+        triangular: True where nothing was projected out: the root is then zero above its diagonal.
     """
 
     x: FloatArray
     step: float
     root: FloatArray
     values: FloatArray
+    triangular: bool
 
     def gains(
         self, place: FloatArray, half_width: FloatArray, flat: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Gain in twice the log-likelihood, height and its information for caps (C,), by least squares."""
+        from scipy.linalg.blas import dtrmm
+
         from mapping.detection.filters import caps
 
-        seen = caps(self.x[0], self.step, len(self.x), place, half_width, flat * half_width) @ self.root.T
+        shapes = caps(self.x[0], self.step, len(self.x), place, half_width, flat * half_width)
+        if self.triangular:  # half of the products are by zero
+            seen = dtrmm(1.0, self.root.T, shapes.T, lower=0, trans_a=1, overwrite_b=1).T
+        else:
+            seen = shapes @ self.root.T
         information = np.maximum(np.einsum("ij,ij->i", seen, seen), np.finfo(float).tiny)
         height = seen @ self.values / information
         return height * np.abs(height) * information, height, information
@@ -214,7 +222,7 @@ def _whitened(
         nuisance = ((x - x.mean()) / max(float(np.ptp(x)), step))[:, None] ** np.arange(drift)
         basis = np.linalg.qr(root @ nuisance)[0]
         root = root - basis @ (basis.T @ root)
-    return _Whitened(x, step, root, root @ values)
+    return _Whitened(x, step, root, root @ values, not drift)
 
 
 def _plateau(window: _Whitened, sign: float, low: float, high: float, half: float) -> tuple[float, float, float, float]:

@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike
 from mapping import FloatArray, IntArray, MappingError, Surface
 from mapping.geometry.mesh.tree import TriangleTree
 
-# A barycentric coordinate below this counts as zero: the point lies on an edge or a vertex.
-ON_BORDER = 1e-9
 # More queries at once than this only cost memory: some 500 bytes each on the way
 QUERIES_AT_ONCE = 100_000
 
@@ -66,20 +64,27 @@ class NearestPoint:
         return Nearest(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Nearest)))
 
     def _answered(self, query: FloatArray) -> Nearest:
-        face, closest = self._closest(query)
-        barycentric = self._barycentric(closest, face)
-        normals = self._pseudonormals(face, barycentric)
-        offset = query - closest
-        side = np.where(np.einsum("ij,ij->i", offset, normals) >= 0.0, 1.0, -1.0)
-        return Nearest(closest, np.linalg.norm(offset, axis=1), side, normals, face, barycentric)
+        from mapping.geometry.mesh import nearest_kernels as kernels
 
-    def _closest(self, query: FloatArray) -> tuple[IntArray, FloatArray]:
-        from mapping.geometry.mesh.nearest_kernels import nearest_points
-
-        index, tree = self._tree
-        points, face = np.empty(query.shape), np.empty(len(query), dtype=np.int64)
-        nearest_points(tree.rows, tree.order, tree.leaves, tree.boxes, tree.links, tree.into(query), points, face)
-        return index[face], tree.out(points)
+        (index, tree), count = self._tree, len(query)
+        points, distance, barycentric = np.empty((count, 3)), np.empty(count), np.empty((count, 3))
+        face, part = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int8)
+        kernels.nearest_points(
+            tree.rows, tree.order, tree.leaves, tree.boxes, tree.links, tree.into(query),
+            points, distance, face, barycentric, part,
+        )  # fmt: skip
+        face, points = index[face], tree.out(points)
+        normals = self.surface.face_normals[face]
+        border = np.flatnonzero(part)
+        if len(border):  # a plane's inside needs no edges to be told apart
+            on_vertex = part[border] >= kernels.ON_VERTEX
+            edges, vertices = border[~on_vertex], border[on_vertex]
+            normals[edges] = self.edge_normals[face[edges], part[edges] - kernels.ON_EDGE]
+            normals[vertices] = self._vertex_normals[
+                self.surface.faces[face[vertices], part[vertices] - kernels.ON_VERTEX]
+            ]
+        side = np.where(((query - points) * normals).sum(axis=1) >= 0.0, 1.0, -1.0)
+        return Nearest(points, tree.scale_out(distance), side, normals, face, barycentric)
 
     @cached_property
     def _tree(self) -> tuple[IntArray, TriangleTree]:
@@ -87,28 +92,6 @@ class NearestPoint:
         proper = np.flatnonzero((self.surface.face_normals != 0).any(axis=1))
         index = proper if len(proper) else np.arange(len(self.surface.faces))
         return index, TriangleTree(Surface(self.surface.vertices, self.surface.faces[index]))
-
-    def _barycentric(self, points: FloatArray, face: IntArray) -> FloatArray:
-        a, b, c = (self.surface.vertices[self.surface.faces[face, i]] for i in range(3))
-        u, v, w = b - a, c - a, points - a
-        uu, uv, vv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v)))
-        wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
-        det = uu * vv - uv * uv
-        safe = np.where(det > 0, det, 1.0)
-        second = np.where(det > 0, (vv * wu - uv * wv) / safe, 0.0)
-        third = np.where(det > 0, (uu * wv - uv * wu) / safe, 0.0)
-        weights = np.clip(np.column_stack([1.0 - second - third, second, third]), 0.0, 1.0)
-        return np.asarray(weights / weights.sum(axis=1, keepdims=True))
-
-    def _pseudonormals(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
-        zero = barycentric < ON_BORDER
-        normals = self.surface.face_normals[face].copy()
-        on_edge = np.flatnonzero(zero.sum(axis=1) == 1)
-        normals[on_edge] = self.edge_normals[face[on_edge], zero[on_edge].argmax(axis=1)]
-        on_vertex = np.flatnonzero(zero.sum(axis=1) == 2)
-        corner = barycentric[on_vertex].argmax(axis=1)
-        normals[on_vertex] = self._vertex_normals[self.surface.faces[face[on_vertex], corner]]
-        return normals
 
     @cached_property
     def edge_normals(self) -> FloatArray:

@@ -6,9 +6,6 @@ import numpy as np
 
 from mapping import FloatArray
 
-# Points against legs that are compared at once: 24 MB for each of the arrays between
-_MOST_PAIRS = 1_000_000
-
 
 def arclengths(points: FloatArray) -> FloatArray:
     """(K,) distance from the first of the points (K, 3) along the polyline, m."""
@@ -52,21 +49,17 @@ def resample(points: FloatArray, count: int) -> FloatArray:
 
 
 def nearest_on(points: FloatArray, polyline: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The nearest point (N, 3) of a polyline (K, 3) to each of (N, 3) points, and its arclength (N,), m."""
+    """The nearest point (N, D) of a polyline (K, D) to each of (N, D) points, and its arclength (N,), m; D = 2, 3."""
     if len(polyline) == 1:
         return np.broadcast_to(polyline[0], points.shape).copy(), np.zeros(len(points))
-    block = max(1, _MOST_PAIRS // len(polyline))
-    if len(points) > block:
-        parts = [nearest_on(points[k : k + block], polyline) for k in range(0, len(points), block)]
-        return np.concatenate([on for on, _ in parts]), np.concatenate([along for _, along in parts])
-    start, leg = polyline[:-1], np.diff(polyline, axis=0)
-    square = np.einsum("ij,ij->i", leg, leg)
-    along = np.einsum("nkj,kj->nk", points[:, None] - start, leg)
-    share = np.clip(along / np.where(square > 0, square, 1.0), 0.0, 1.0)
-    candidates = start + share[..., None] * leg
-    best = np.linalg.norm(points[:, None] - candidates, axis=2).argmin(axis=1)
-    row = np.arange(len(points))
-    return candidates[row, best], arclengths(polyline)[best] + share[row, best] * np.sqrt(square[best])
+    from mapping.geometry.mesh.nearest_kernels import nearest_on_legs
+
+    size = points.shape[1]
+    at, line = (np.zeros((len(each), 3)) for each in (points, polyline))  # in the plane there is no third coordinate
+    at[:, :size], line[:, :size] = points, polyline
+    on, along = np.empty(at.shape), np.empty(len(at))
+    nearest_on_legs(at, line, arclengths(line), on, along)
+    return on[:, :size], along
 
 
 def distances(points: FloatArray, axis: FloatArray) -> FloatArray:

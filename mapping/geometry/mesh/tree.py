@@ -24,8 +24,10 @@ class TriangleTree:
 
         low, high = bvh_kernels.bounds(surface.vertices, surface.faces)
         self.extent = float((0.5 * high - 0.5 * low).max()) * 2.0
-        self._exponent = int(np.frexp(max(self.extent, length))[1])
-        self._center = np.ldexp(np.round(np.ldexp(0.5 * low + 0.5 * high, -self._exponent)), self._exponent)
+        exponent = int(np.frexp(max(self.extent, length))[1])
+        # by a power of two a product is exact, and takes a quarter of ldexp's time
+        self._unit, self._per_unit = 2.0**exponent, 2.0**-exponent
+        self._center = np.round((0.5 * low + 0.5 * high) * self._per_unit) * self._unit
         vertices = self.into(surface.vertices)
         self.order: NDArray[np.int32] = bvh_kernels.leaf_order(vertices, surface.faces)
         self.rows: FloatArray = triangle_row_kernels.lay_out(vertices, surface.faces, self.order)
@@ -34,16 +36,16 @@ class TriangleTree:
 
     def into(self, points: FloatArray) -> FloatArray:
         """Points (N, 3), m, in the tree's frame."""
-        return np.asarray(np.ldexp(points - self._center, -self._exponent))
+        return np.asarray((points - self._center) * self._per_unit)
 
     def out(self, points: FloatArray) -> FloatArray:
         """Points (N, 3) of the tree's frame, m."""
-        return np.asarray(np.ldexp(points, self._exponent) + self._center)
+        return np.asarray(points * self._unit + self._center)
 
     def scale_in(self, lengths: ArrayLike) -> FloatArray:
         """Lengths, m, in the tree's frame."""
-        return np.asarray(np.ldexp(lengths, -self._exponent))
+        return np.asarray(np.asarray(lengths) * self._per_unit)
 
     def scale_out(self, lengths: ArrayLike) -> FloatArray:
         """Lengths of the tree's frame, m."""
-        return np.asarray(np.ldexp(lengths, self._exponent))
+        return np.asarray(np.asarray(lengths) * self._unit)

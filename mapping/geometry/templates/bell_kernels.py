@@ -17,6 +17,8 @@ CENTRE_ROUNDS, CENTRE_SETTLED = 6, 1e-5
 LEAST_ROOM = 0.01
 # Share by which the table goes further than the furthest of the bins
 TABLE_SPARE = 0.05
+# Tangents of angles up to which five terms of the arc tangent's series are exact to rounding: t^11 / 11 of t
+SLIGHT = 0.04
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -36,7 +38,14 @@ def _place(level, square, curvature):  # type: ignore[no-untyped-def]
     aside = np.sqrt(max(square - level * level, 0.0))
     toward = 1.0 + curvature * level
     over = (2.0 * level + curvature * square) / (np.sqrt(toward**2 + (curvature * aside) ** 2) + 1.0)
-    return (aside if curvature == 0.0 else np.arctan2(curvature * aside, toward) / curvature), over
+    if curvature == 0.0:
+        return aside, over
+    if toward > 0.0 and abs(curvature) * aside < SLIGHT * toward:  # nearly everywhere, at a third of the time
+        t = curvature * aside / toward
+        u = t * t
+        series = 1.0 - u * (1.0 / 3.0 - u * (1.0 / 5.0 - u * (1.0 / 7.0 - u * (1.0 / 9.0))))
+        return aside / toward * series, over
+    return np.arctan2(curvature * aside, toward) / curvature, over
 
 
 @njit(cache=True, error_model="numpy", inline="always")
