@@ -66,12 +66,15 @@ class NearestPoint:
         return Nearest(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Nearest)))
 
     def _answered(self, query: FloatArray) -> Nearest:
+        from mapping.geometry.mesh.nearest_kernels import places_on_faces
+
         face, closest = self._closest(query)
-        barycentric = self._barycentric(closest, face)
-        normals = self._pseudonormals(face, barycentric)
-        offset = query - closest
-        side = np.where(np.einsum("ij,ij->i", offset, normals) >= 0.0, 1.0, -1.0)
-        return Nearest(closest, np.linalg.norm(offset, axis=1), side, normals, face, barycentric)
+        barycentric, normals = np.empty(query.shape), np.empty(query.shape)
+        distance, side = np.empty(len(query)), np.empty(len(query))
+        surface = self.surface
+        places_on_faces(surface.vertices, surface.faces, surface.face_normals, self.edge_normals, self._vertex_normals,
+                        ON_BORDER, query, closest, face, barycentric, normals, distance, side)  # fmt: skip
+        return Nearest(closest, distance, side, normals, face, barycentric)
 
     def _closest(self, query: FloatArray) -> tuple[IntArray, FloatArray]:
         from mapping.geometry.mesh.nearest_kernels import nearest_points
@@ -87,28 +90,6 @@ class NearestPoint:
         proper = np.flatnonzero((self.surface.face_normals != 0).any(axis=1))
         index = proper if len(proper) else np.arange(len(self.surface.faces))
         return index, TriangleTree(Surface(self.surface.vertices, self.surface.faces[index]))
-
-    def _barycentric(self, points: FloatArray, face: IntArray) -> FloatArray:
-        a, b, c = (self.surface.vertices[self.surface.faces[face, i]] for i in range(3))
-        u, v, w = b - a, c - a, points - a
-        uu, uv, vv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v)))
-        wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
-        det = uu * vv - uv * uv
-        safe = np.where(det > 0, det, 1.0)
-        second = np.where(det > 0, (vv * wu - uv * wv) / safe, 0.0)
-        third = np.where(det > 0, (uu * wv - uv * wu) / safe, 0.0)
-        weights = np.clip(np.column_stack([1.0 - second - third, second, third]), 0.0, 1.0)
-        return np.asarray(weights / weights.sum(axis=1, keepdims=True))
-
-    def _pseudonormals(self, face: IntArray, barycentric: FloatArray) -> FloatArray:
-        zero = barycentric < ON_BORDER
-        normals = self.surface.face_normals[face].copy()
-        on_edge = np.flatnonzero(zero.sum(axis=1) == 1)
-        normals[on_edge] = self.edge_normals[face[on_edge], zero[on_edge].argmax(axis=1)]
-        on_vertex = np.flatnonzero(zero.sum(axis=1) == 2)
-        corner = barycentric[on_vertex].argmax(axis=1)
-        normals[on_vertex] = self._vertex_normals[self.surface.faces[face[on_vertex], corner]]
-        return normals
 
     @cached_property
     def edge_normals(self) -> FloatArray:
