@@ -23,8 +23,8 @@ from explore3d.jobs import explorer, scene_finger
 from explore3d.log import Event, Log
 from hw import Move
 from hw.simulated import SimulatedFinger
-from mapping import Trace
-from mapping.base import Base
+from mapping import FloatArray, Trace
+from mapping.base import Base, Pose
 
 # Of the finger: samples per second, and noise that leaves 5 um on a block of half a tip radius, m
 WRONG_MODEL_FINGER = {"rate": 1000.0, "white": 0.03e-3, "correlated": 0.005e-3, "correlation_length": 1e-3}
@@ -80,7 +80,14 @@ def wrong_model_run(body: BenchScene, wrong: str, seed: int) -> dict[str, Any]:
         outcome = explorer(scene, finger.workspace).go(execute)
     explored = process_time() - begin
     log = Log(Trace.concatenate(felt), events=tuple(events))
-    analysis = build_model(log, scene, Base(body.base), Stages())
+    base = outcome.value.base if body.misplaced else Base(body.base)
+    if base is None:  # the finger says that the object is not where it may be
+        return {"causes": [], "instead": [], "named": False, "said": outcome.detail, "outcome": outcome.reason} | {
+            "found": 0, "missed": len(body.truth), "invented": 0, "finger_seconds": finger.clock
+        }  # fmt: skip
+    analysis = build_model(log, scene, base, Stages())
+    placed = Pose.of(analysis.model.base)
+    stands_off = None if placed is None else float(_astray(analysis.model.base, placed, body).max())
     deviation = analysis.deviation
     causes = [] if deviation is None else list(deviation.causes)
     instead = [] if deviation is None else list(deviation.instead)
@@ -88,7 +95,11 @@ def wrong_model_run(body: BenchScene, wrong: str, seed: int) -> dict[str, Any]:
     return {
         "causes": causes,
         "instead": instead,
-        "named": is_named(wrong, causes, instead),
+        "named": is_named(wrong, causes, instead) and (
+            not body.misplaced or (stands_off is not None and stands_off < WRONG_MODEL_PRECISION)
+        ),
+        "stands_off": stands_off,
+        "observable": None if placed is None else placed.observable,
         "said": "" if deviation is None else deviation.sentence(),
         "beyond_repair": deviation is not None and deviation.beyond_repair,
         "found": statuses.count("found"),
@@ -101,6 +112,25 @@ def wrong_model_run(body: BenchScene, wrong: str, seed: int) -> dict[str, Any]:
         "deviation_seconds": analysis.timings.get("deviation", 0.0),
         "outcome": outcome.reason,
     }
+
+
+def _astray(base: Base, pose: Pose, body: BenchScene) -> FloatArray:
+    """(N,) how far the model's vertices are from where they really are, m, but for motions that it says are not known.
+
+    Those are the directions in which its covariance is as wide as the bound: a plane's sliding in itself, for example.
+    """
+    truth = body.object.vertices[: len(body.base.vertices)]
+    arm = base.surface.vertices - pose.onto(pose.center[None])
+    length = float(np.sqrt((arm**2).sum(axis=1).mean()))
+    scale = np.array([length] * 3 + [1.0] * 3)
+    _, motions = np.linalg.eigh(pose.covariance * np.outer(scale, scale))
+    unknown = (motions / scale[:, None])[:, pose.observable :]
+    moved = np.stack([np.cross(turn, arm) + shift for turn, shift in zip(unknown[:3].T, unknown[3:].T, strict=True)]
+                     ) if unknown.size else np.zeros((0, *arm.shape))  # fmt: skip
+    off = (base.surface.vertices - truth).ravel()
+    rows = moved.reshape(len(moved), off.size).T
+    off = off - rows @ np.linalg.lstsq(rows, off, rcond=None)[0] if len(moved) else off
+    return np.asarray(np.linalg.norm(off.reshape(-1, 3), axis=1))
 
 
 def is_named(wrong: str, causes: Sequence[str], instead: Sequence[str]) -> bool:
