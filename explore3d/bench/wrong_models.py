@@ -23,12 +23,14 @@ from explore3d.jobs import explorer, scene_finger
 from explore3d.log import Event, Log
 from hw import Move
 from hw.simulated import SimulatedFinger
-from mapping import FloatArray, Trace
+from mapping import Trace
 from mapping.base import Base, Pose
 
 # Of the finger: samples per second, and noise that leaves 5 um on a block of half a tip radius, m
 WRONG_MODEL_FINGER = {"rate": 1000.0, "white": 0.03e-3, "correlated": 0.005e-3, "correlation_length": 1e-3}
 WRONG_MODEL_PRECISION, WRONG_MODEL_SPEED = 0.1e-3, 0.1
+# Standard deviations, by its own account, within which a pose is right that is not known to the precision
+STANDS_SDS = 3.0
 # The cause that a run must give for each wrong
 CAUSE_OF = {
     "pose": "pose", "scale": "scale", "deformation": "deformation", "dent": "part", "missing part": "part"
@@ -87,7 +89,8 @@ def wrong_model_run(body: BenchScene, wrong: str, seed: int) -> dict[str, Any]:
         }  # fmt: skip
     analysis = build_model(log, scene, base, Stages())
     placed = Pose.of(analysis.model.base)
-    stands_off = None if placed is None else float(_astray(analysis.model.base, placed, body).max())
+    stands_off, doubt = (None, None) if placed is None else _astray(analysis.model.base, placed, body)
+    right = stands_off is not None and doubt is not None and stands_off < max(WRONG_MODEL_PRECISION, STANDS_SDS * doubt)
     deviation = analysis.deviation
     causes = [] if deviation is None else list(deviation.causes)
     instead = [] if deviation is None else list(deviation.instead)
@@ -95,10 +98,9 @@ def wrong_model_run(body: BenchScene, wrong: str, seed: int) -> dict[str, Any]:
     return {
         "causes": causes,
         "instead": instead,
-        "named": is_named(wrong, causes, instead) and (
-            not body.misplaced or (stands_off is not None and stands_off < WRONG_MODEL_PRECISION)
-        ),
+        "named": is_named(wrong, causes, instead) and (right or not body.misplaced),
         "stands_off": stands_off,
+        "doubt": doubt,
         "observable": None if placed is None else placed.observable,
         "said": "" if deviation is None else deviation.sentence(),
         "beyond_repair": deviation is not None and deviation.beyond_repair,
@@ -114,23 +116,25 @@ def wrong_model_run(body: BenchScene, wrong: str, seed: int) -> dict[str, Any]:
     }
 
 
-def _astray(base: Base, pose: Pose, body: BenchScene) -> FloatArray:
-    """(N,) how far the model's vertices are from where they really are, m, but for motions that it says are not known.
+def _astray(base: Base, pose: Pose, body: BenchScene) -> tuple[float, float]:
+    """Farthest that a vertex of the model is from where it really is, and the pose's own standard deviation of that, m.
 
-    Those are the directions in which its covariance is as wide as the bound: a plane's sliding in itself, for example.
+    But for motions that the pose says are not known, a plane's sliding in itself, for example: those are the directions
+    in which its covariance is as wide as the bound.
     """
     truth = body.object.vertices[: len(body.base.vertices)]
     arm = base.surface.vertices - pose.onto(pose.center[None])
     length = float(np.sqrt((arm**2).sum(axis=1).mean()))
     scale = np.array([length] * 3 + [1.0] * 3)
-    _, motions = np.linalg.eigh(pose.covariance * np.outer(scale, scale))
-    unknown = (motions / scale[:, None])[:, pose.observable :]
-    moved = np.stack([np.cross(turn, arm) + shift for turn, shift in zip(unknown[:3].T, unknown[3:].T, strict=True)]
-                     ) if unknown.size else np.zeros((0, *arm.shape))  # fmt: skip
+    variances, motions = np.linalg.eigh(pose.covariance * np.outer(scale, scale))
+    # (6, N, 3) what each motion of length one does to the vertices
+    moved = np.stack([np.cross(each[:3], arm) + each[3:] for each in (motions / scale[:, None]).T])
+    known, unknown = moved[: pose.observable], moved[pose.observable :]
     off = (base.surface.vertices - truth).ravel()
-    rows = moved.reshape(len(moved), off.size).T
-    off = off - rows @ np.linalg.lstsq(rows, off, rcond=None)[0] if len(moved) else off
-    return np.asarray(np.linalg.norm(off.reshape(-1, 3), axis=1))
+    rows = unknown.reshape(len(unknown), off.size).T
+    off = (off - rows @ np.linalg.lstsq(rows, off, rcond=None)[0]).reshape(-1, 3)
+    doubt = np.einsum("k,knx->n", variances[: pose.observable], known**2)
+    return float(np.linalg.norm(off, axis=1).max()), float(np.sqrt(doubt.max()))
 
 
 def is_named(wrong: str, causes: Sequence[str], instead: Sequence[str]) -> bool:

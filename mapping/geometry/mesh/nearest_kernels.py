@@ -55,8 +55,8 @@ def nearest_triangle(rows, order, leaves, boxes, links, o, guess, stack, apart, 
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def places_on_faces(vertices, faces, face_normals, edge_normals, vertex_normals, border, queries, points, face,
-                    barycentric, normals, distance, side):  # type: ignore[no-untyped-def]  # fmt: skip
+def places_on_faces(vertices, faces, face_normals, edge_normals, vertex_normals, border,  # type: ignore[no-untyped-def]
+                    queries, points, face, barycentric, normals, distance, side):  # fmt: skip
     """Write where the nearest points lie in their faces, the pseudonormals there, distances, and sides of the queries.
 
     A barycentric coordinate below `border` counts as zero: the point lies on an edge, or on a vertex. In one pass: as
