@@ -33,6 +33,8 @@ OUT_DISTANCE = 6.0
 # and how many neighbours of each are tried
 NEAR_LIFTS = (0.2, 0.5)
 MOST_NEAR_PLACES, NEAR_NEIGHBOURS = 2000, 10
+# Nodes about a place that may be reached straight, the nearest of all
+NODES_TRIED = 24
 # Where along a way it is looked whether there is room, the middle first: what is blocked there needs no second look
 WAY_SHARES = (0.5, 0.25, 0.75, 0.125, 0.875, 0.375, 0.625)
 
@@ -363,7 +365,13 @@ class Ways:
     def _node(self, place: FloatArray) -> int | None:
         """The nearest node that can be reached straight, or None."""
         points, _ = self._graph
-        order = np.argsort(np.linalg.norm(points - place, axis=1))[:24]
+        distance = np.linalg.norm(points - place, axis=1)
+        near = (
+            np.argpartition(distance, NODES_TRIED)[:NODES_TRIED]
+            if len(points) > NODES_TRIED
+            else np.arange(len(points))
+        )
+        order = near[np.argsort(distance[near])]
         return next((int(node) for node in order if self.free(np.stack([place, points[node]]))), None)
 
     def _shortened(self, path: FloatArray, room: float) -> FloatArray:
