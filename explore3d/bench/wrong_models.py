@@ -24,11 +24,13 @@ from explore3d.log import Event, Log
 from hw import Move
 from hw.simulated import SimulatedFinger
 from mapping import Trace
-from mapping.base import Base
+from mapping.base import Base, Pose
 
 # Of the finger: samples per second, and noise that leaves 5 um on a block of half a tip radius, m
 WRONG_MODEL_FINGER = {"rate": 1000.0, "white": 0.03e-3, "correlated": 0.005e-3, "correlation_length": 1e-3}
 WRONG_MODEL_PRECISION, WRONG_MODEL_SPEED = 0.1e-3, 0.1
+# Standard deviations, by its own account, within which a pose is right that is not known to the precision
+STANDS_SDS = 3.0
 # The cause that a run must give for each wrong
 CAUSE_OF = {
     "pose": "pose", "scale": "scale", "deformation": "deformation", "dent": "part", "missing part": "part"
@@ -80,7 +82,15 @@ def wrong_model_run(body: BenchScene, wrong: str, seed: int) -> dict[str, Any]:
         outcome = explorer(scene, finger.workspace).go(execute)
     explored = process_time() - begin
     log = Log(Trace.concatenate(felt), events=tuple(events))
-    analysis = build_model(log, scene, Base(body.base), Stages())
+    base = outcome.value.base if body.misplaced else Base(body.base)
+    if base is None:  # the finger says that the object is not where it may be
+        return {"causes": [], "instead": [], "named": False, "said": outcome.detail, "outcome": outcome.reason} | {
+            "found": 0, "missed": len(body.truth), "invented": 0, "finger_seconds": finger.clock
+        }  # fmt: skip
+    analysis = build_model(log, scene, base, Stages())
+    placed = Pose.of(analysis.model.base)
+    stands_off, doubt = (None, None) if placed is None else _astray(analysis.model.base, placed, body)
+    right = stands_off is not None and doubt is not None and stands_off < max(WRONG_MODEL_PRECISION, STANDS_SDS * doubt)
     deviation = analysis.deviation
     causes = [] if deviation is None else list(deviation.causes)
     instead = [] if deviation is None else list(deviation.instead)
@@ -88,7 +98,10 @@ def wrong_model_run(body: BenchScene, wrong: str, seed: int) -> dict[str, Any]:
     return {
         "causes": causes,
         "instead": instead,
-        "named": is_named(wrong, causes, instead),
+        "named": is_named(wrong, causes, instead) and (right or not body.misplaced),
+        "stands_off": stands_off,
+        "doubt": doubt,
+        "observable": None if placed is None else placed.observable,
         "said": "" if deviation is None else deviation.sentence(),
         "beyond_repair": deviation is not None and deviation.beyond_repair,
         "found": statuses.count("found"),
@@ -101,6 +114,27 @@ def wrong_model_run(body: BenchScene, wrong: str, seed: int) -> dict[str, Any]:
         "deviation_seconds": analysis.timings.get("deviation", 0.0),
         "outcome": outcome.reason,
     }
+
+
+def _astray(base: Base, pose: Pose, body: BenchScene) -> tuple[float, float]:
+    """Farthest that a vertex of the model is from where it really is, and the pose's own standard deviation of that, m.
+
+    But for motions that the pose says are not known, a plane's sliding in itself, for example: those are the directions
+    in which its covariance is as wide as the bound.
+    """
+    truth = body.object.vertices[: len(body.base.vertices)]
+    arm = base.surface.vertices - pose.onto(pose.center[None])
+    length = float(np.sqrt((arm**2).sum(axis=1).mean()))
+    scale = np.array([length] * 3 + [1.0] * 3)
+    variances, motions = np.linalg.eigh(pose.covariance * np.outer(scale, scale))
+    # (6, N, 3) what each motion of length one does to the vertices
+    moved = np.stack([np.cross(each[:3], arm) + each[3:] for each in (motions / scale[:, None]).T])
+    known, unknown = moved[: pose.observable], moved[pose.observable :]
+    off = (base.surface.vertices - truth).ravel()
+    rows = unknown.reshape(len(unknown), off.size).T
+    off = (off - rows @ np.linalg.lstsq(rows, off, rcond=None)[0]).reshape(-1, 3)
+    doubt = np.einsum("k,knx->n", variances[: pose.observable], known**2)
+    return float(np.linalg.norm(off, axis=1).max()), float(np.sqrt(doubt.max()))
 
 
 def is_named(wrong: str, causes: Sequence[str], instead: Sequence[str]) -> bool:

@@ -12,6 +12,9 @@ from mapping.base import Base
 
 # Places along the stem's axis that are looked at; the first lies where a stem half as thick leaves the ball's shadow
 STEM_PLACES, STEM_START = 6, 1.5
+# Which of them are asked first whether the stem is free: the middle tells most of the others, then those that it tells
+# least
+STEM_ORDER = (3, 0, 5, 1, 4, 2)
 # How far a ball may sink into the base on its way through free space, in tip radii; a way that is planned keeps 0.02
 # free of that even between places a quarter of a radius apart (0.25^2 / 8 = 0.008)
 MOST_SINKING, FREE_SINKING = 0.05, 0.02
@@ -69,6 +72,29 @@ class Carrier:
             height[:, 0] = np.minimum(height[:, 0], drawn + FREE_SINKING * self.tip_radius)
         return np.asarray(height.min(axis=1))
 
+    def is_free(self, path: FloatArray, approach: FloatArray) -> BoolArray:
+        """(K,) True where the `clearance` is not negative.
+
+        The stem's places are asked one after the other, of those that are still in question: what one of them shows to
+        be blocked, or its distance to be free at others (no place is nearer by more than it lies off), is not asked.
+        """
+        free = np.ones(len(path), dtype=bool)
+        if self.length <= 0:
+            return free
+        back = np.linspace(STEM_START * self.tip_radius, self.length + self.backing, STEM_PLACES)
+        left, bound = np.arange(len(path)), np.full((len(path), STEM_PLACES), -np.inf)
+        for k in STEM_ORDER:
+            which = np.flatnonzero(bound[:, k] < 0)
+            height = self.base.foot(path[left[which]] - back[k] * approach[left[which]], self.radius).height
+            bound[which] = np.maximum(bound[which], height[:, None] - np.abs(back - back[k]))
+            blocked = which[height < 0]
+            free[left[blocked]] = False
+            left, bound = np.delete(left, blocked), np.delete(bound, blocked, axis=0)
+        if self.backing > 0:
+            drawn = self.base.foot(path[left] - self.backing * approach[left], self.tip_radius).height
+            free[left] = drawn + FREE_SINKING * self.tip_radius >= 0
+        return free
+
     def turned(self, path: FloatArray, approach: FloatArray, most: float, may: BoolArray | None = None) -> FloatArray:
         """The approaches (K, 3), turned where the stem would touch the body, as little and as evenly as will do.
 
@@ -81,7 +107,7 @@ class Carrier:
             most: rad.
             may: (K,) waypoints whose approach may be turned; None: all.
         """
-        offends = self.clearance(path, approach) < 0
+        offends = ~self.is_free(path, approach)
         if may is not None:
             offends &= may
         if not offends.any():
@@ -92,7 +118,7 @@ class Carrier:
         angle = np.arccos(np.clip(np.einsum("kij,kj->ki", choices, approach), -1.0, 1.0))
         allowed = (angle <= most) & offends[:, None]
         where, which = np.nonzero(allowed)
-        free = self.clearance(path[where], choices[where, which]) >= 0
+        free = self.is_free(path[where], choices[where, which])
         cost = np.full(angle.shape, np.inf)
         cost[where[free], which[free]] = angle[where[free], which[free]] ** 2
         stuck = ~np.isfinite(cost).any(axis=1)

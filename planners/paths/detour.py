@@ -15,6 +15,8 @@ from planners.paths.carrier import FREE_SINKING, Carrier
 HULL_ROOM, LEAVING_SPACING = 1.1, 0.25
 # Of the grid in the open, in tip radii; its most nodes along an axis, and how far beyond the hull it reaches
 OPEN_SPACING, MOST_OPEN_NODES, OPEN_ROOM = 1.5, 24, 4.0
+# Ways out that are looked at together, the shortest first
+WAYS_AT_ONCE = 16
 # Turns in place are looked at by so many steps
 TURNING_STEPS = 8
 
@@ -55,29 +57,36 @@ class Detour:
         """The shortest straight way of ball and stem into the open, its turns in place included; None if none is."""
         if self._open(place[None])[0]:
             return self._turned_outward(place[None], approach[None])
-        as_it_is = np.concatenate([-approach[None], self.carrier.lattice])
-        turned = self._turns(place, approach)
-        ways = np.concatenate([as_it_is, -turned])
-        approaches = np.concatenate([np.tile(approach, (len(as_it_is), 1)), turned])
+        # drawn back as it is, moved in any direction as it is, or turned in place and drawn back along the stem
+        lattice, moved = self.carrier.lattice, 1 + len(self.carrier.lattice)
+        ways = np.concatenate([-approach[None], lattice, -lattice])
         spacing = LEAVING_SPACING * self.carrier.tip_radius
-        last = np.ceil(self._distance_out(place, ways) / spacing)
-        ended = place + spacing * np.where(np.isfinite(last), last, 0.0)[:, None] * ways
-        good = np.isfinite(last) & ((ended >= self.low) & (ended <= self.high)).all(axis=1)
-        number = np.arange(1 + int(last[good].max(initial=0.0)))
-        centers = place + spacing * number[:, None] * ways[:, None]
-        on_way = number <= last[:, None]
-        good[good] = self._all(centers[good], on_way[good], None)
-        good[good] = self._all(centers[good], on_way[good], approaches[good])
-        last = np.where(good, last, 0.0).astype(np.int64)
-        for which in np.flatnonzero(good)[np.argsort(last[good], kind="stable")]:
-            path = centers[which, : last[which] + 1]
-            poses = path, np.tile(approaches[which], (len(path), 1))
-            if which >= len(as_it_is):
-                turning = _turning(approach, approaches[which])
-                poses = np.concatenate([np.tile(place, (len(turning), 1)), path]), np.concatenate([turning, poses[1]])
-            ended = self._turned_outward(*poses)
-            if ended is not None:
-                return ended
+        distance = self._distance_out(place, ways)
+        last = np.ceil(np.where(np.isfinite(distance), distance, 0.0) / spacing).astype(np.int64)
+        ended = place + spacing * last[:, None] * ways
+        possible = np.isfinite(distance) & ((ended >= self.low) & (ended <= self.high)).all(axis=1)
+        order = np.flatnonzero(possible)[np.argsort(last[possible], kind="stable")]
+        # the shortest first, a few at once: most of the others need not be asked
+        for some in np.split(order, np.arange(WAYS_AT_ONCE, len(order), WAYS_AT_ONCE)):
+            number = np.arange(1 + int(last[some].max(initial=0)))
+            centers, on_way = place + spacing * number[:, None] * ways[some][:, None], number <= last[some][:, None]
+            approaches = np.where((some < moved)[:, None], approach, -ways[some])
+            good = self._all(centers, on_way, None)
+            turns = np.flatnonzero(good & (some >= moved))
+            good[turns] = self._can_turn(place, approach, approaches[turns])
+            good[good] = self._all(centers[good], on_way[good], approaches[good])
+            for which in np.flatnonzero(good):
+                path = centers[which, : last[some[which]] + 1]
+                poses = path, np.tile(approaches[which], (len(path), 1))
+                if some[which] >= moved:
+                    turning = _turning(approach, approaches[which])
+                    poses = (
+                        np.concatenate([np.tile(place, (len(turning), 1)), path]),
+                        np.concatenate([turning, poses[1]]),
+                    )
+                outside = self._turned_outward(*poses)
+                if outside is not None:
+                    return outside
         return None
 
     def outward(self, places: FloatArray) -> FloatArray:
@@ -96,22 +105,21 @@ class Detour:
             radius = self.carrier.tip_radius
             free = self.carrier.base.foot(places, radius).height >= -FREE_SINKING * radius
         else:
-            free = self.carrier.clearance(places, approach[which]) >= 0.0
+            free = self.carrier.is_free(places, approach[which])
         return np.asarray(np.bincount(which[~free], minlength=len(centers)) == 0)
 
-    def _turns(self, place: FloatArray, approach: FloatArray) -> FloatArray:
-        """(M, 3) approaches of the lattice that the stem can be turned to in place."""
-        lattice = self.carrier.lattice
-        turning = np.stack([_turning(approach, each) for each in lattice])
-        flat = turning.reshape(-1, 3)
-        free = self.carrier.clearance(np.tile(place, (len(flat), 1)), flat) >= 0.0
-        return np.asarray(lattice[free.reshape(len(lattice), -1).all(axis=1)])
+    def _can_turn(self, place: FloatArray, approach: FloatArray, wanted: FloatArray) -> BoolArray:
+        """(M,) True where the stem can be turned in place to an approach (M, 3)."""
+        turning = [_turning(approach, each) for each in wanted]
+        flat = np.concatenate([np.zeros((0, 3)), *turning])
+        free = self.carrier.is_free(np.tile(place, (len(flat), 1)), flat)
+        return np.asarray(free.reshape(len(wanted), TURNING_STEPS + 1).all(axis=1))
 
     def _turned_outward(self, path: FloatArray, approach: FloatArray) -> Poses | None:
         """The poses, and then the stem turned away from the hull in place; None if it touches the body there."""
         turning = _turning(approach[-1], -self.outward(path[-1:])[0])
         there = np.tile(path[-1], (len(turning), 1))
-        if self.carrier.clearance(there, turning).min() < 0.0:
+        if not self.carrier.is_free(there, turning).all():
             return None
         return np.concatenate([path, there]), np.concatenate([approach, turning])
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -117,6 +117,8 @@ class Limits:
     def _stem_sinks(self, what: str, path: FloatArray, approach: FloatArray, base: Base) -> str | None:
         carrier = Carrier(base, self.tip_radius, self.stem_radius, self.stem_length)
         allowed = FREE_SINKING * self.tip_radius
+        if replace(carrier, radius=self.stem_radius - allowed).is_free(path, approach).all():
+            return None
         clearance = float(carrier.clearance(path, approach).min())
         return f"{what} sinks {length_text(-clearance)} into the body" if clearance < -allowed else None
 

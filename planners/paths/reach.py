@@ -20,12 +20,12 @@ def reachable(points: FloatArray, normals: FloatArray, carrier: Carrier) -> Bool
     """
     centers = points + carrier.tip_radius * normals
     fits = carrier.base.foot(centers, carrier.tip_radius).height >= -MOST_SINKING * carrier.tip_radius
-    blocked = np.flatnonzero(fits)[carrier.clearance(centers[fits], -normals[fits]) < 0]
+    blocked = np.flatnonzero(fits)[~carrier.is_free(centers[fits], -normals[fits])]
     for direction in carrier.lattice:
         if not len(blocked):
             break
         tried = blocked[-normals[blocked] @ direction >= np.cos(MOST_TURNED)]
         ways = np.tile(direction, (len(tried), 1))
-        blocked = np.setdiff1d(blocked, tried[carrier.clearance(centers[tried], ways) >= 0])
+        blocked = np.setdiff1d(blocked, tried[carrier.is_free(centers[tried], ways)])
     fits[blocked] = False
     return np.asarray(fits)

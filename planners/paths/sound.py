@@ -54,12 +54,12 @@ def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     tip = carrier.tip_radius
     roomy = replace(carrier, radius=carrier.radius + DETAIL_ROOM * tip)
     leaving = replace(carrier, backing=BACK_OFF_DISTANCE * tip)
-    if (free & (roomy.clearance(path, approach) >= 0)).all() and can_be_left(move, carrier):
+    if (free & roomy.is_free(path, approach)).all() and can_be_left(move, carrier):
         return [move]
     for each in (roomy, carrier):
         for run in runs(free):
             approach[run] = each.turned(path[run], approach[run], MOST_TURNED)
-    free &= carrier.clearance(path, approach) >= 0
+    free &= carrier.is_free(path, approach)
     stretches = (part for run in runs(free) for part in _left(path[run], approach[run], leaving))
     parts = (replace(move, path=part[0], approach=part[1]) for part in stretches if len(part[0]) > 1)
     return [part for part in parts if part.length >= SHORTEST_PART * tip]
@@ -69,7 +69,7 @@ def can_be_left(move: Move, carrier: Carrier) -> bool:
     """True if the finger can draw back where a sweep ends, and had room to come to where it begins."""
     leaving = replace(carrier, backing=BACK_OFF_DISTANCE * carrier.tip_radius)
     ends = np.array([0, -1])
-    return bool((leaving.clearance(move.path[ends], move.approach[ends]) >= 0).all())
+    return bool(leaving.is_free(move.path[ends], move.approach[ends]).all())
 
 
 def _left(path: FloatArray, approach: FloatArray, leaving: Carrier) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -80,11 +80,11 @@ def _left(path: FloatArray, approach: FloatArray, leaving: Carrier) -> Iterator[
         leaving: the stem and the ball drawn back.
     """
     near, number = int(np.ceil(LEAVING_STRETCH / SOUND_SPACING)), np.arange(len(path))
-    can = leaving.clearance(path, approach) >= 0
+    can = leaving.is_free(path, approach)
     may = ((number < near) & ~can[0]) | ((number >= len(path) - near) & ~can[-1])
     if may.any():
         approach = leaving.turned(path, approach, MOST_TURNED, may)
-        can = leaving.clearance(path, approach) >= 0
+        can = leaving.is_free(path, approach)
     # what is turned may no longer be pressed against what it was
     turning = 0.5 * (approach[1:] + approach[:-1])
     turning /= np.linalg.norm(turning, axis=1, keepdims=True)

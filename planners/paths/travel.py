@@ -33,6 +33,8 @@ OUT_DISTANCE = 6.0
 # and how many neighbours of each are tried
 NEAR_LIFTS = (0.2, 0.5)
 MOST_NEAR_PLACES, NEAR_NEIGHBOURS = 2000, 10
+# Nodes about a place that may be reached straight, the nearest of all
+NODES_TRIED = 24
 # Where along a way it is looked whether there is room, the middle first: what is blocked there needs no second look
 WAY_SHARES = (0.5, 0.25, 0.75, 0.125, 0.875, 0.375, 0.625)
 
@@ -275,7 +277,8 @@ class Ways:
         axes, _ = self._grid
         shape = tuple(len(axis) for axis in axes)
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        free = self.base.foot(nodes.reshape(-1, 3), self.tip_radius).height.reshape(shape) >= self._room
+        height = self.base.foot(nodes.reshape(-1, 3), self.tip_radius).height.reshape(shape)
+        free = height >= self._room
         number = np.where(free, np.cumsum(free).reshape(shape) - 1, -1)
         rows, columns = [], []
         for step in np.argwhere(np.ones((3, 3, 3))) - 1:
@@ -286,7 +289,7 @@ class Ways:
                 rows.append(number[here][both])
                 columns.append(number[there][both])
         points, a, b = nodes[free], np.concatenate(rows), np.concatenate(columns)
-        near = self._near_surface(points)
+        near = self._near_surface(points, height[free])
         points, a, b = np.concatenate([points, near[0]]), np.append(a, near[1]), np.append(b, near[2])
         lengths = np.linalg.norm(points[a] - points[b], axis=1)
         one_way = coo_matrix((lengths, (a, b)), shape=(len(points), len(points))).tocsr()
@@ -294,10 +297,10 @@ class Ways:
         graph = one_way.maximum(one_way.T).tocsr()
         return points, graph
 
-    def _near_surface(self, grid: FloatArray) -> tuple[FloatArray, IntArray, IntArray]:
+    def _near_surface(self, grid: FloatArray, heights: FloatArray) -> tuple[FloatArray, IntArray, IntArray]:
         """Free places (M, 3) off the surface that the grid's nodes (N, 3) are too coarse for, and the ways to others.
 
-        The ways are pairs of numbers, the grid's nodes being counted first.
+        The nodes stand (N,) so high over the body, m. Ways are pairs of numbers, the grid's nodes being counted first.
         """
         from scipy.spatial import cKDTree
 
@@ -313,7 +316,8 @@ class Ways:
         inside = ((near >= self.low) & (near <= self.high)).all(axis=1)
         height = self.base.foot(near, self.tip_radius).height
         # where there is room the grid has nodes of its own
-        near = near[inside & (height > 0.0) & (height < self._room)]
+        kept = inside & (height > 0.0) & (height < self._room)
+        near, heights = near[kept], np.concatenate([heights, height[kept]])
         points = np.concatenate([grid, near])
         if not len(near):
             return near, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
@@ -326,15 +330,22 @@ class Ways:
         _, first, same = np.unique(
             np.minimum(a, b) * len(points) + np.maximum(a, b), return_index=True, return_inverse=True
         )
-        free = self._free_ways(points[a[first]], points[b[first]])[same]
+        ends = a[first], b[first]
+        free = self._free_ways(*(points[end] for end in ends), *(heights[end] for end in ends))[same]
         return near, a[free], b[free]
 
-    def _free_ways(self, starts: FloatArray, stops: FloatArray) -> BoolArray:
-        """(W,) which straight ways have room for the ball at seven places between their ends (W, 3)."""
-        free = np.arange(len(starts))
+    def _free_ways(self, starts: FloatArray, stops: FloatArray, first: FloatArray, last: FloatArray) -> BoolArray:
+        """(W,) which straight ways have room for the ball at seven places between their ends (W, 3).
+
+        The ends stand (W,) so high over the body, m: no place on a way is nearer to it by more than it lies off them.
+        """
+        free, length = np.arange(len(starts)), np.linalg.norm(stops - starts, axis=1)
         for share in WAY_SHARES:
-            between = (1 - share) * starts[free] + share * stops[free]
-            free = free[self.base.foot(between, self.tip_radius).height >= 0.0]
+            known = np.maximum(first - share * length, last - (1 - share) * length)[free] >= 0.0
+            ask = free[~known]
+            between = (1 - share) * starts[ask] + share * stops[ask]
+            blocked = ask[self.base.foot(between, self.tip_radius).height < 0.0]
+            free = np.setdiff1d(free, blocked, assume_unique=True)
         mask = np.zeros(len(starts), dtype=bool)
         mask[free] = True
         return mask
@@ -363,7 +374,13 @@ class Ways:
     def _node(self, place: FloatArray) -> int | None:
         """The nearest node that can be reached straight, or None."""
         points, _ = self._graph
-        order = np.argsort(np.linalg.norm(points - place, axis=1))[:24]
+        distance = np.linalg.norm(points - place, axis=1)
+        near = (
+            np.argpartition(distance, NODES_TRIED)[:NODES_TRIED]
+            if len(points) > NODES_TRIED
+            else np.arange(len(points))
+        )
+        order = near[np.argsort(distance[near])]
         return next((int(node) for node in order if self.free(np.stack([place, points[node]]))), None)
 
     def _shortened(self, path: FloatArray, room: float) -> FloatArray:

@@ -13,7 +13,9 @@ from explore3d.bench.scenes.exploring import UP, WIRE, BenchScene
 from mapping import FloatArray, Surface
 
 # What may be wrong, by the name of the cause that a run must give for it (mapping.estimate.deviation)
-WRONGS = ("nothing", "pose", "scale", "deformation", "dent", "missing part")
+WRONGS = ("nothing", "pose", "scale", "deformation", "dent", "missing part", "placed off")
+# And of the object that is placed off its model, which the scene says and the finger finds out, m and degrees
+PLACED_SHIFT, PLACED_TURN = 3e-3, 2.0
 # How wrong: the object stands off by so much (m, degrees), is so much larger or smaller, is bent and dented by so much
 OFF_SHIFT, OFF_TURN, OFF_SCALE, BENT, DENTED = 0.3e-3, 0.5, 0.01, 0.5e-3, 2e-3
 # Radius of the dent, m, and size of the knob that only the model has
@@ -162,7 +164,8 @@ def wrong_model(body: str, wrong: str, seed: int) -> BenchScene:
         model = joined(made.mesh, _knob(made))
     moved = _motion(wrong, made, rng)
     truth = TrueFeature("ridge", moved(made.axis), WIRE, WIRE)
-    return BenchScene(model, Surface(moved(object.vertices), object.faces), (truth,))
+    object = Surface(moved(object.vertices), object.faces)
+    return BenchScene(model, object, (truth,), misplaced=wrong == "placed off")
 
 
 def _knob(body: Body) -> Mesh:
@@ -177,10 +180,11 @@ def _motion(wrong: str, body: Body, rng: np.random.Generator) -> Callable[[Float
     from scipy.spatial.transform import Rotation
 
     middle, size = body.mesh[0].mean(axis=0), float(np.ptp(body.mesh[0], axis=0).max())
-    if wrong == "pose":
+    if wrong in ("pose", "placed off"):
         shift, axis = (_unit(rng.standard_normal((1, 3)))[0] for _ in range(2))
-        turn = Rotation.from_rotvec(np.radians(OFF_TURN) * axis).as_matrix()
-        return lambda points: (points - middle) @ turn.T + middle + OFF_SHIFT * shift
+        far, angle = (OFF_SHIFT, OFF_TURN) if wrong == "pose" else (PLACED_SHIFT, PLACED_TURN)
+        turn = Rotation.from_rotvec(np.radians(angle) * axis).as_matrix()
+        return lambda points: (points - middle) @ turn.T + middle + far * shift
     if wrong == "scale":
         factor = 1.0 + OFF_SCALE * rng.choice([-1.0, 1.0])
         return lambda points: middle + factor * (points - middle)

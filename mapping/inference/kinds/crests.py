@@ -34,10 +34,13 @@ class Crest(Kind):
             return _flat_topped(feature, feet, tip_radius)
         radius = crest_radius(feature)
         # a low and wide one is a part of a large ball, which on a bent base comes out again elsewhere
-        near = axis_distance(feet, feature.axis) < CREST_TRACE_REACH * contact_half_width(height, radius, tip_radius)
-        crest = feature.axis + (height - radius) * feature.normals
-        over = np.minimum(chain_height(feet, normals, crest, radius, tip_radius), height)
-        return np.where(near, over, 0.0)
+        reach, axis = CREST_TRACE_REACH * contact_half_width(height, radius, tip_radius), feature.axis
+        # most features lie far away, which the box about them tells
+        near = ((feet > axis.min(axis=0) - reach) & (feet < axis.max(axis=0) + reach)).all(axis=1)
+        near[near] = axis_distance(feet[near], axis) < reach
+        crest, over = feature.axis + (height - radius) * feature.normals, np.zeros(len(feet))
+        over[near] = np.minimum(chain_height(feet[near], normals[near], crest, radius, tip_radius), height)
+        return over
 
     def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
         """The chain of capsules, or the bar that its details describe; None of one that does not stand out."""
