@@ -25,9 +25,7 @@ POOL_STEP, POOL = 4, 60
 BIAS_ALLOWANCE_SDS = 3.5
 # Weights fall with this power of the squared error: 1 averages most, large powers choose.
 WEIGHT_EXPONENT = 0.75
-# Points that speak for all of the noise, and at most for all of the bends: one in so many, for a bend is found over a
-# dozen points or more
-SAMPLE, BENT_ONE_OF, FEWEST_BENT = 3000, 10, 500
+SAMPLE = 3000
 # Share of the weight that may be lost at either end.
 LOST_WEIGHT_SHARE = 0.1
 # Meshes above this size try only the neighbourhoods that a sample of their points chooses.
@@ -181,9 +179,9 @@ class _Jets:
         """(M, count) nearest points, nearest first; N where there are no more."""
         return self.tree.query(self.place[chosen], count)
 
-    def sample(self, most: int = SAMPLE) -> IntArray:
+    def sample(self) -> IntArray:
         """Indices of points that speak for all."""
-        return np.linspace(0, len(self.place) - 1, min(most, len(self.place))).astype(np.int64)
+        return np.linspace(0, len(self.place) - 1, min(SAMPLE, len(self.place))).astype(np.int64)
 
     def noise(self) -> float:
         """Noise level from residuals of the highest fits over two small neighbourhoods.
@@ -205,7 +203,7 @@ class _Jets:
         """Bend all ordinates by the larger curvature at the nearest point of a sample, found without bending."""
         from scipy.spatial import cKDTree
 
-        sample = self.sample(min(max(len(self.place) // BENT_ONE_OF, FEWEST_BENT), SAMPLE))
+        sample = self.sample()
         found, tree = self.fit(sample, sizes), cKDTree(self.place[sample])
         pools = tree.query(self.place[sample], k=min(POOL // POOL_STEP, len(sample)))[1].reshape(len(sample), -1)
         weights = self._weights(found, found.deviations(noise), np.arange(len(sample)), pools, sizes, noise)[0]

@@ -13,12 +13,6 @@ CONDITION = 1e5  # ratio of the diagonal of R beyond which the stencil does not 
 # curvature's, and five standard deviations of it are 25 / 2.
 CERTAIN_GAP = 12.5
 
-# Points up to which a fit is by reflections, whose triangle keeps all digits. Beyond them sums of products are added,
-# in half of the time: 13 digits remain where points fill a disc, 8 where they fill half of one
-REFLECTED = 97
-POOL_LANES = 16  # numbers that compiled sums take at a time
-PRODUCT_POWERS = 13  # powers of a coordinate up to twice the highest degree: what products of two monomials are made of
-
 LEAST_SQUARED_ERROR = 1e-28  # squared error of a curvature that is never undercut, for bodies of about unit size
 
 
@@ -105,124 +99,6 @@ def _absorb(triangle, rows, count, columns):  # type: ignore[no-untyped-def]
     for i in range(count):
         rest += rows[MONOMIALS, i] * rows[MONOMIALS, i]
     return rest
-
-
-@njit(cache=True)
-def _products(triangle, rest, columns, gram):  # type: ignore[no-untyped-def]
-    """Sums of products of all columns and the heights (lower triangle, the heights last), from the triangle's.
-
-    Args:
-        rest: sum of squares of the heights that no column explains.
-    """
-    for i in range(columns + 1):
-        c = i if i < columns else MONOMIALS
-        for e in range(i + 1):
-            other = e if e < columns else MONOMIALS
-            total = 0.0
-            for j in range(min(e + 1, columns)):
-                total += triangle[c, j] * triangle[other, j]
-            gram[c, other] = total
-    gram[MONOMIALS, MONOMIALS] += rest
-
-
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _add_products(u, v, z, first, last, scale, degree, powers, moments, gram):  # type: ignore[no-untyped-def]
-    """Add the products of more points, in units of the scale.
-
-    All products of two monomials are sums over u^p v^q, of which there are fewer than a quarter as many.
-    """
-    count, highest = last - first, 2 * degree
-    for i in range(count):
-        powers[0, 0, i] = powers[1, 0, i] = 1.0
-        powers[0, 1, i], powers[1, 1, i] = u[first + i] / scale, v[first + i] / scale
-    for p in range(2, highest + 1):
-        for i in range(count):
-            powers[0, p, i] = powers[0, p - 1, i] * powers[0, 1, i]
-        for i in range(count):
-            powers[1, p, i] = powers[1, p - 1, i] * powers[1, 1, i]
-    _sum_moments(powers[0], powers[1], count, highest, moments)
-    row = 0
-    for d in range(degree + 1):
-        for q in range(d + 1):
-            column = 0
-            for e in range(d + 1):
-                for o in range(e + 1):
-                    if column <= row:
-                        gram[row, column] += moments[d - q + e - o, q + o]
-                    column += 1
-            row += 1
-    square = 0.0
-    for i in range(count):
-        height = z[first + i] / scale
-        square += height * height
-        powers[0, 0, i] = height
-    for p in range(1, degree + 1):
-        for i in range(count):
-            powers[0, p, i] *= powers[0, 0, i]
-    gram[MONOMIALS, MONOMIALS] += square
-    _sum_moments(powers[0], powers[1], count, degree, moments)
-    column = 0
-    for d in range(degree + 1):
-        for q in range(d + 1):
-            gram[MONOMIALS, column] += moments[d - q, q]
-            column += 1
-
-
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _sum_moments(own, others, count, highest, moments):  # type: ignore[no-untyped-def]
-    """Sums over the points of the p-th row of one array times the q-th of another, for p + q up to the highest."""
-    for p in range(highest + 1):
-        q = 0
-        while q + 4 <= highest - p + 1:
-            sum0, sum1, sum2, sum3 = 0.0, 0.0, 0.0, 0.0
-            for i in range(count):
-                x = own[p, i]
-                sum0 += x * others[q, i]
-                sum1 += x * others[q + 1, i]
-                sum2 += x * others[q + 2, i]
-                sum3 += x * others[q + 3, i]
-            moments[p, q], moments[p, q + 1], moments[p, q + 2], moments[p, q + 3] = sum0, sum1, sum2, sum3
-            q += 4
-        while q <= highest - p:
-            sum0 = 0.0
-            for i in range(count):
-                sum0 += own[p, i] * others[q, i]
-            moments[p, q] = sum0
-            q += 1
-
-
-@njit(cache=True, fastmath={"contract"})
-def _root(gram, columns, work, column, triangle):  # type: ignore[no-untyped-def]
-    """The triangle (Cholesky) from the sums of products; sum of squares of the heights that no column explains.
-
-    A column that others hold to rounding gets zero on the diagonal, and determines nothing.
-
-    Args:
-        work, column: (28, 28) and (28,) room for what remains of the products.
-    """
-    for i in range(columns):
-        for k in range(i + 1):
-            work[i, k] = gram[i, k]
-    heights, rest = triangle[MONOMIALS], gram[MONOMIALS, MONOMIALS]
-    for k in range(columns):
-        heights[k] = gram[MONOMIALS, k]
-    for j in range(columns):
-        square = work[j, j]
-        own = np.sqrt(square) if square > 1e-14 * gram[j, j] else 0.0
-        per_own = 1.0 / own if own > 0.0 else 0.0
-        triangle[j, j] = own
-        heights[j] *= per_own
-        rest -= heights[j] * heights[j]
-        for i in range(j + 1, columns):
-            column[i] = work[i, j] * per_own
-            triangle[i, j] = column[i]
-        for k in range(j + 1, columns):
-            heights[k] -= heights[j] * column[k]
-        for i in range(j + 1, columns):
-            size = column[i]
-            for k in range(j + 1, i + 1):
-                work[i, k] -= size * column[k]
-    return max(rest, 1e-15 * gram[MONOMIALS, MONOMIALS])  # the difference knows no less
 
 
 @njit(cache=True)
@@ -375,9 +251,6 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
     place = np.empty((3, widest))
     rows = np.empty((MONOMIALS + 1, widest))
     triangle = np.empty((MONOMIALS + 1, MONOMIALS))
-    gram, powers = np.empty((MONOMIALS + 1, MONOMIALS + 1)), np.empty((2, PRODUCT_POWERS, widest))
-    moments = np.empty((PRODUCT_POWERS, PRODUCT_POWERS))
-    work, column = np.empty((MONOMIALS, MONOMIALS)), np.empty(MONOMIALS)
     coefficients, inverse, variances = np.zeros(MONOMIALS), np.zeros((3, MONOMIALS)), np.zeros(options)
     ends = np.zeros(len(sizes), dtype=np.int64)
     for m in range(count):
@@ -387,21 +260,14 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
         if scale == 0.0:
             continue
         triangle[:] = 0.0
-        rest, first, reach, reflected = 0.0, 0, 0.0, True
+        rest, first, reach = 0.0, 0, 0.0
         for s in range(len(sizes)):
             last = ends[s]
             if last == first:
                 continue
             reach = _reach(place, first, last, reach)
-            if last <= REFLECTED:
-                _design(place[0], place[1], place[2], first, last, scale, degree, rows)
-                rest += _absorb(triangle, rows, last - first, columns)
-            else:
-                if reflected:
-                    _products(triangle, rest, columns, gram)
-                    reflected = False
-                _add_products(place[0], place[1], place[2], first, last, scale, degree, powers, moments, gram)
-                rest = _root(gram, columns, work, column, triangle)
+            _design(place[0], place[1], place[2], first, last, scale, degree, rows)
+            rest += _absorb(triangle, rows, last - first, columns)
             first, over, before, known = last, rest, columns, False
             for d in range(options - 1, -1, -1):
                 terms = TERMS_OF_DEGREE[d]
@@ -440,10 +306,8 @@ def pooled_bias(operators, deviations, pools, sizes, certainty, out):  # type: i
         out: (M, S, D) squared Frobenius norms, written.
     """
     options, pool = operators.shape[2], pools.shape[1]
-    # of the pool's points side by side: variances, NaN where undetermined, and operators; in whole registers, for what
-    # is left over of one is added up by itself
-    lanes = -(-pool // POOL_LANES) * POOL_LANES
-    variances, parts = np.full((len(sizes), options, lanes), np.nan), np.zeros((len(sizes), options, 3, lanes))
+    # of the pool's points side by side: variances, NaN where undetermined, and operators
+    variances, parts = np.empty((len(sizes), options, pool)), np.empty((len(sizes), options, 3, pool))
     for m in range(len(pools)):
         for s in range(len(sizes)):
             for d in range(options):
