@@ -16,20 +16,6 @@ SMALLEST_BODY, LARGEST_BODY = 1e-8, 1e3
 # random it is a half, of one that has a side it is none but for a few seams
 MOST_TURNED_EDGES = 0.1
 FORMATS = ("glb", "gltf", "obj", "off", "ply", "stl")
-# A binary STL file: a header, the number of triangles, and of each its normal, three corners and two bytes more
-STL_HEADER, STL_TRIANGLE = 84, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-# What the scalars of a PLY file are called, and how they lie in it
-PLY_SCALARS = {
-    **dict.fromkeys(("char", "int8"), "<i1"),
-    **dict.fromkeys(("uchar", "uint8"), "<u1"),
-    **dict.fromkeys(("short", "int16"), "<i2"),
-    **dict.fromkeys(("ushort", "uint16"), "<u2"),
-    **dict.fromkeys(("int", "int32"), "<i4"),
-    **dict.fromkeys(("uint", "uint32"), "<u4"),
-    **dict.fromkeys(("float", "float32"), "<f4"),
-    **dict.fromkeys(("double", "float64"), "<f8"),
-}
-PLY_BEGINNING = [["ply"], ["format", "binary_little_endian", "1.0"]]
 
 
 def load_mesh(path: Path | str, units: str = "m") -> Surface:
@@ -135,16 +121,13 @@ def _is_inside_out(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> bool:
 
 
 def _read(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    import trimesh
+
     kind = path.suffix.lower().lstrip(".")
     if not path.is_file():
         raise MeshFileError(f"{path}: {'a folder, not a mesh file' if path.is_dir() else 'no such mesh file'}")
     if kind not in FORMATS:
         raise MeshFileError(f"{path}: not a mesh format that is understood; possible: {', '.join(FORMATS)}")
-    plain = _plain_ply(path) if kind == "ply" else _plain_stl(path) if kind == "stl" else None
-    if plain is not None:
-        return _join_identical(*plain) if kind == "stl" else plain
-    import trimesh
-
     try:
         mesh = trimesh.load_mesh(path, process=False, maintain_order=True)
     except Exception as error:  # the readers of each format raise whatever they stumble over
@@ -152,45 +135,6 @@ def _read(path: Path) -> tuple[np.ndarray, np.ndarray]:
     vertices = np.asarray(getattr(mesh, "vertices", np.zeros((0, 3))), dtype=np.float64)
     faces = np.asarray(getattr(mesh, "faces", np.zeros((0, 3), dtype=np.int64)))
     return _join_identical(vertices, faces) if kind == "stl" and len(faces) else (vertices, faces)
-
-
-def _plain_stl(path: Path) -> tuple[np.ndarray, np.ndarray] | None:
-    """Corners (3 F, 3) and faces (F, 3) of a binary STL file; None of any other.
-
-    The plainest files need no trimesh, whose import is a fortieth of a whole run.
-    """
-    data = path.read_bytes()
-    count = int.from_bytes(data[STL_HEADER - 4 : STL_HEADER], "little")
-    if len(data) <= STL_HEADER or len(data) != STL_HEADER + count * STL_TRIANGLE.itemsize:
-        return None
-    corners = np.frombuffer(data, STL_TRIANGLE, offset=STL_HEADER)["corners"]
-    return corners.reshape(-1, 3).astype(np.float64), np.arange(3 * count).reshape(-1, 3)
-
-
-def _plain_ply(path: Path) -> tuple[np.ndarray, np.ndarray] | None:
-    """Vertices (V, 3) and faces (F, 3) of a binary PLY file of vertices and triangles alone; None of any other."""
-    head, _, body = path.read_bytes().partition(b"end_header\n")
-    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
-    lines = [words for words in lines if words and words[0] not in ("comment", "obj_info")]
-    cuts = [k for k, words in enumerate(lines) if words[0] == "element"]
-    if lines[:2] != PLY_BEGINNING or len(cuts) != 2:
-        return None
-    (vertex, *scalars), (face, *lists) = lines[cuts[0] : cuts[1]], lines[cuts[1] :]
-    names, kinds = [words[-1] for words in scalars], [PLY_SCALARS.get(words[1], "") for words in scalars]
-    corner = PLY_SCALARS.get(lists[0][-2], "") if len(lists) == 1 else ""
-    counted = [words[1] == kind and words[-1].isdigit() for words, kind in ((vertex, "vertex"), (face, "face"))]
-    lone = len(lists) == 1 and lists[0][:2] == ["property", "list"] and lists[0][2] in ("uchar", "uint8")
-    if not all(counted) or not lone or not all([*kinds, corner]) or len({*names}) < len(names):
-        return None
-    point, triangle = np.dtype([*zip(names, kinds, strict=True)]), np.dtype([("count", "u1"), ("corners", corner, 3)])
-    vertices, faces = int(vertex[-1]), int(face[-1])
-    size = vertices * point.itemsize
-    if not {"x", "y", "z"} <= {*names} or len(body) != size + faces * triangle.itemsize:
-        return None
-    points, triangles = np.frombuffer(body, point, vertices), np.frombuffer(body, triangle, faces, size)
-    if (triangles["count"] != triangle["corners"].shape[0]).any():
-        return None
-    return np.column_stack([points[name] for name in "xyz"]).astype(np.float64), triangles["corners"].astype(np.int64)
 
 
 def _join_identical(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -2,40 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mapping import FloatArray, IntArray
 from mapping.instrument import Noise
 
-
-@dataclass(frozen=True, eq=False)
-class CubicSpline:
-    """Cubics between knots, the first and the last going on beyond them.
-
-    scipy's takes a sixth of a second to import, of the 1.5 s of a whole short table.
-
-    Args:
-        x: (N,) knots, increasing.
-        terms: (4, N - 1, D) coefficients of the powers 0 to 3 of the distance from the knot before.
-    """
-
-    x: FloatArray
-    terms: FloatArray
-
-    def __call__(self, at: FloatArray, derivative: int = 0) -> FloatArray:
-        """(M, D) values, or first or second derivatives, at M places."""
-        leg = np.clip(np.searchsorted(self.x, at, side="right") - 1, 0, len(self.x) - 2)
-        along, (value, slope, bend, bow) = (at - self.x[leg])[:, None], self.terms[:, leg]
-        if derivative == 0:
-            return np.asarray(value + slope * along + bend * along**2 + bow * (along**2 * along))
-        if derivative == 1:
-            return np.asarray(slope + 2.0 * bend * along + 3.0 * bow * along**2)
-        return np.asarray(2.0 * bend + 6.0 * bow * along)
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
 
 
-def smoothing_spline(x: FloatArray, y: FloatArray, weight: IntArray, lam: float) -> CubicSpline:
+def smoothing_spline(x: FloatArray, y: FloatArray, weight: IntArray, lam: float) -> CubicHermiteSpline:
     """The curve f that minimises sum weight (y - f)^2 + lam times the integral of f''^2: a natural cubic spline.
 
     Args:
@@ -47,6 +25,7 @@ def smoothing_spline(x: FloatArray, y: FloatArray, weight: IntArray, lam: float)
     Reference: Reinsch, Smoothing by spline functions, Numerische Mathematik 10, 1967; Green and Silverman,
     Nonparametric Regression and Generalized Linear Models, 1994, section 2.3.3.
     """
+    from scipy.interpolate import CubicHermiteSpline
     from scipy.linalg import solveh_banded
 
     h, own = np.diff(x), 1.0 / weight
@@ -64,8 +43,7 @@ def smoothing_spline(x: FloatArray, y: FloatArray, weight: IntArray, lam: float)
     chord = np.diff(value, axis=0) / h[:, None]
     slope[:-1] = chord - h[:, None] * (2 * bend[:-1] + bend[1:]) / 6
     slope[-1] = chord[-1] + h[-1] * bend[-2] / 6
-    bow = (slope[:-1] + slope[1:] - 2 * chord) / h[:, None]
-    return CubicSpline(x, np.stack([value[:-1], slope[:-1], (chord - slope[:-1]) / h[:, None] - bow, bow / h[:, None]]))
+    return CubicHermiteSpline(x, value, slope)
 
 
 def _second_differences(bend: FloatArray, before: FloatArray, middle: FloatArray, after: FloatArray) -> FloatArray:
@@ -79,12 +57,11 @@ def _second_differences(bend: FloatArray, before: FloatArray, middle: FloatArray
 
 # Curvature must stand this many standard deviations out of its noise: theory section 6.2 takes three.
 CONFIDENCE = 3.0
-# The logarithm of a smoothing length is known this well
-LENGTH_KNOWN = 1e-12
 
 
 def smoothing_length(noise: Noise, spacing: float, tip_radius: float) -> float:
     """The smoothing length h at which the curvature's noise is 1/(3 r), m."""
+    from scipy.optimize import brentq
 
     def excess(log_h: float) -> float:
         return float(np.log(curvature_sd(noise, spacing, np.exp(log_h)) * tip_radius * CONFIDENCE))
@@ -92,10 +69,7 @@ def smoothing_length(noise: Noise, spacing: float, tip_radius: float) -> float:
     low, high = np.log(1e-9 * tip_radius), np.log(1e9 * max(tip_radius, noise.sd, noise.length, noise.longest))
     if excess(low) <= 0:
         return float(np.exp(low))
-    while high - low > LENGTH_KNOWN:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
-    return float(np.exp(0.5 * (low + high)))
+    return float(np.exp(brentq(excess, low, high, xtol=1e-6)))
 
 
 def curvature_sd(noise: Noise, spacing: float, h: float) -> float:

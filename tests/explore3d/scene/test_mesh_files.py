@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from explore3d.errors import MeshFileError, SceneError, UnitError
-from explore3d.scene import mesh_files
 from explore3d.scene.begin import begin_scene
 from explore3d.scene.mesh_files import FORMATS, load_mesh, mesh_text
 from mapping import Surface
@@ -47,31 +46,6 @@ def test_a_file_of_ours_keeps_all_its_digits_and_its_order() -> None:
     surface = load_mesh(path)
     assert surface.vertices[0].tolist() == [-0.05, -0.03, 0.0]
     assert surface.faces[0].tolist() == [0, 25, 26]
-
-
-@pytest.mark.parametrize("kind", ["ply", "stl"])
-def test_the_plainest_files_read_as_they_do_by_trimesh(tmp_path: Path, kind: str) -> None:
-    import trimesh
-
-    body = trimesh.creation.icosphere(subdivisions=2)
-    path = written(tmp_path, f"body.{kind}", body.export(file_type=kind))
-    plain = (mesh_files._plain_ply if kind == "ply" else mesh_files._plain_stl)(path)
-    assert plain is not None
-    by_trimesh = trimesh.load_mesh(path, process=False, maintain_order=True)
-    for ours, theirs in zip(plain, (by_trimesh.vertices, by_trimesh.faces), strict=True):
-        np.testing.assert_array_equal(ours, theirs)
-
-
-@pytest.mark.parametrize(
-    "change", [(b"vertex ", b"vertx "), (b"float x", b"float y"), (b"float z", b"flout z"), (b"face", b"edge")]
-)
-def test_a_ply_header_that_is_not_plain_is_left_to_trimesh(tmp_path: Path, change: tuple[bytes, bytes]) -> None:
-    import trimesh
-
-    content = trimesh.creation.box().export(file_type="ply")
-    assert change[0] in content
-    assert mesh_files._plain_ply(written(tmp_path, "body.ply", content)) is not None
-    assert mesh_files._plain_ply(written(tmp_path, "body.ply", content.replace(*change))) is None
 
 
 def test_nothing_is_merged_or_dropped(tmp_path: Path) -> None:

@@ -7,11 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scipy.ndimage import grey_dilation
-from scipy.optimize import isotonic_regression
 
 from mapping import Feature, FloatArray, Interval, Trace
 from mapping.assembly import assemble
-from mapping.assembly.free import outline
 from mapping.assembly.free.outline import outlined
 from mapping.assembly.free.sizes import sizes_of_section
 from mapping.base import SweepHeights, fit_base
@@ -201,12 +199,3 @@ def of_one_section(form: Form, noise: float) -> Interval:
     sizes = sizes_of_section(section, 1e-3, Noise(noise))
     assert sizes is not None
     return sizes.width_interval()
-
-
-@pytest.mark.parametrize("count", [1, 2, 60, 500])
-def test_a_monotone_outline_is_the_isotonic_regression(count: int) -> None:
-    rng = np.random.default_rng(count)
-    values = np.linspace(0.0, 2.0, count) + rng.normal(size=count)
-    np.testing.assert_allclose(outline._rising(values), isotonic_regression(values).x, atol=1e-14)
-    falling = outline._rising(values[::-1])[::-1]
-    np.testing.assert_allclose(falling, isotonic_regression(values, increasing=False).x, atol=1e-14)
