@@ -164,6 +164,7 @@ def test_every_stage_that_is_asked_whether_it_is_needed_can_be_forced():
     assert asked == set(OPTIONAL_STAGES)
 
 
+@pytest.mark.slow
 def test_without_contact_data_the_algorithms_that_need_it_stay_left_out_even_if_forced(wired):
     path, plain = wired
     forced = analyze(path, force=["algorithms 1 and 2"])

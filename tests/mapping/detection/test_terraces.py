@@ -118,6 +118,7 @@ def test_the_terrace_behind_stands_in_however_short_it_is() -> None:
     assert np.abs(over.profile.height).max() < 10 * NOISE
 
 
+@pytest.mark.slow
 def test_a_slot_too_narrow_for_a_terrace_has_its_edges_at_its_rims() -> None:
     # the trace falls from the rim on, by an arc that ends, steep, on the floor: an edge of the body is its upper end
     detections = found(

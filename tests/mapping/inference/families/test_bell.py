@@ -49,7 +49,9 @@ def found_in(heights: Callable[[FloatArray], FloatArray], high: float, wide: flo
     return refine(guess, trace, np.random.default_rng(0), base=PLATE, noise=NOISE), trace
 
 
-@pytest.mark.parametrize("name", SECTIONS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "gaussian")) for name in SECTIONS]
+)
 def test_a_bump_without_an_edge_has_its_height_and_its_width_at_half_height(name: str) -> None:
     found, trace = found_in(lambda away: rolled(SECTIONS[name], away), HIGH, 2.0 * WIDE)
     assert found.details.misfit is None and found.details.exponent is not None
