@@ -48,7 +48,7 @@ class FreeSection:
     log_odds: float
     times_crest: float
     inside: tuple[Crossing, ...]
-    round_body: bool = False
+    round_body: bool
 
     @property
     def sign(self) -> float:
@@ -146,7 +146,6 @@ def _measured(
     around = sizes.middle + np.array([-0.5, 0.0, 0.5]) * sizes.width
     before, center, after = (np.array([np.interp(s, piece.s, one) for one in piece.centers.T]) for s in around)
     foot, way = sweep.base.foot(center[None], sweep.trace.tip_radius), after - before
-    passed = sweep.base.foot(piece.centers[section.begin : section.end + 1], sweep.trace.tip_radius)
     crossing = Crossing(
         sweep=sweep.number,
         t=float(np.interp(sizes.middle, piece.s, piece.t)),
@@ -171,8 +170,17 @@ def _measured(
         float(log_odds),
         times_crest(section, sweep.trace.tip_radius),
         tuple(inside),
-        bool((passed.normals @ foot.normals[0] < 0.0).any()),
+        _reaches_round(section, foot.normals[0], sweep),
     )
+
+
+def _reaches_round(section: Section, normal: FloatArray, sweep: LaidSweep) -> bool:
+    """True of a section part of which lies where the base faces away from the normal (3,) in its middle."""
+    base = sweep.base
+    if (base.surface.face_normals @ normal >= 0.0).all():  # no height field does, whatever is felt on it
+        return False
+    places = section.piece.centers[section.begin : section.end + 1]
+    return bool((base.foot(places, sweep.trace.tip_radius).normals @ normal < 0.0).any())
 
 
 def _overlaps(section: Section, crossing: Crossing, t: FloatArray) -> bool:

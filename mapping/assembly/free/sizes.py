@@ -21,7 +21,8 @@ EXTREME_SD, EXTREME_WINDOW = 0.005, 4
 # than the third from which a top counts as flat by the standard. 0.9 and 0.98 are alike
 NEARLY_FLAT = 0.95
 # Between these shares of the height a flank is asked whether the ball went down on it, or rolled over an edge: then the
-# trace between them is an arc of the ball's radius. It is surely none where it bends by less than half as much
+# trace between them is an arc of the ball's radius. It is surely none where it bends by less than half as much, in the
+# middle between the bow of a straight flank, none, and that of the arc
 NEAR_TOP, HALF_AS_BENT = 0.75, 0.5
 # A floor, which was touched: that of a parabola is 0.22 of the width, and by the standard it is a third
 FLOOR = 1.0 / 3.0

@@ -7,7 +7,8 @@ import numpy as np
 from mapping import BoolArray, FloatArray, IntArray
 from mapping.geometry.mesh import arclengths, nearest_on
 
-# A run that passes nearer to where a line was last felt may have felt it still, in half-widths
+# A run that passes nearer to where a line was last felt may have felt it still, in half-widths. Pockets and bosses
+# under rows 0.4 and 0.8 half-widths apart are told alike with 0.25, 0.5 and 1
 LAST_FELT = 0.5
 # Runs over a line that tell its course
 FEWEST_RUNS = 2
