@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from mapping.geometry.templates.bump_of_revolution import BumpOfRevolution as BumpOfRevolution
     from mapping.geometry.templates.cap_section import radius_of_cap as radius_of_cap, width_of_cap as width_of_cap
     from mapping.geometry.templates.chain_kernels import chain_heights as chain_heights
+    from mapping.geometry.templates.crossing_kernels import crossing_heights as crossing_heights
     from mapping.geometry.templates.hollow_kernels import (
         groove_heights as groove_heights,
         pit_heights as pit_heights,
@@ -41,6 +42,7 @@ _PUBLIC = {
     "bump_of_revolution": ("BumpOfRevolution",),
     "cap_section": ("radius_of_cap", "width_of_cap"),
     "chain_kernels": ("chain_heights",),
+    "crossing_kernels": ("crossing_heights",),
     "hollow_kernels": ("groove_heights", "pit_heights", "step_heights"),
     "section_kernels": ("section_heights",),
     "shapes": (

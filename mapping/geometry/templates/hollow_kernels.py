@@ -12,7 +12,7 @@ from mapping.geometry.templates.course_kernels import about_course
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _rim(distance, tip, depth, bend):  # type: ignore[no-untyped-def]
+def rim(distance, tip, depth, bend):  # type: ignore[no-untyped-def]
     """Height (negative) of a ball at a distance inside the rim of a hollow, as in shapes.rim_height."""
     if distance <= 0.0:
         return 0.0
@@ -61,10 +61,10 @@ def groove_heights(
                 if out_along > 0.0 and out_across > 0.0:
                     square = out_along * out_along + out_across * out_across
                     bent = bend[i, q] + out_along * out_along / square * (bend_along[i, q] - bend[i, q])
-                    total += _rim(rounded[w] - np.sqrt(square), tip, depths[w], bent)
+                    total += rim(rounded[w] - np.sqrt(square), tip, depths[w], bent)
                 else:
-                    beside = _rim(across, tip, depths[w], bend[i, q])
-                    total += max(beside, _rim(along, tip, depths[w], bend_along[i, q]))
+                    beside = rim(across, tip, depths[w], bend[i, q])
+                    total += max(beside, rim(along, tip, depths[w], bend_along[i, q]))
             out[w, i] = total / nodes
 
 
@@ -93,7 +93,7 @@ def pit_heights(
                 away = np.sqrt(along * along + across * across)
                 share = (along / away) ** 2 if away > 0.0 else 0.5
                 bend = share * bends[0] + (1.0 - share) * bends[1]
-                total += _rim(0.5 * widths[w] - away, tip, depths[w], bend)
+                total += rim(0.5 * widths[w] - away, tip, depths[w], bend)
             out[w, i] = total / nodes
 
 

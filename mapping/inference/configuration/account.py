@@ -37,6 +37,8 @@ LOOKS = 2
 TOLD_SHARE = 0.01
 # Proposals that change what the posterior weighs once more
 CHOSEN_LATER = {"section", "smoother"}
+# More of a spot's height than what is not explained of it
+MOST_OF_A_SPOT = 0.5
 # Draws of the Gaussian that preliminary intervals are taken from
 PRELIMINARY_DRAWS = 400
 ENDED_EARLY = "the search for what is felt here, and what beside it, ended before all was tried"
@@ -51,9 +53,10 @@ def accounted(
     around: Surroundings,
     false_alarms_per_metre: float,
     proposals: Sequence[Proposal] = PROPOSALS,
-) -> list[Feature]:
-    """The features of the configurations of highest evidence; those of a neighbourhood that no proposal improves are
-    returned as they are, with what else they may be.
+    alone: Sequence[Feature] = (),
+) -> tuple[list[Feature], list[Feature]]:
+    """The features of the configurations of highest evidence, and what of `alone` these do not explain; features of a
+    neighbourhood that no proposal improves are returned as they are, with what else they may be.
 
     Args:
         features: that rules propose.
@@ -62,8 +65,9 @@ def accounted(
         around: trace, base and noise.
         false_alarms_per_metre: accepted rate of invented features, 1/m of path.
         proposals: what is tried.
+        alone: spots that a single sweep shows, as where lines cross one does that runs over both at once.
     """
-    rest = [feature for feature in features if not _weighed(feature)]
+    rest, left = [feature for feature in features if not _weighed(feature)], list(alone)
     tip = around.trace.tip_radius
     open_to = [c for c in crossings if not any(_felt_by(c, feature, tip) for feature in rest)]
     settled: list[list[Feature]] = [[feature] for feature in features if _weighed(feature)]
@@ -75,11 +79,12 @@ def accounted(
                 found.append(group)
                 continue
             for block in _blocks(group, own, [origin[id(feature)] for feature in group] if again else [], tip):
-                improved = _improved(block, places, around, false_alarms_per_metre, proposals)
+                improved, best = _improved(block, places, around, false_alarms_per_metre, proposals)
+                left = [spot for spot in left if best is None or not _explains(best, spot)]
                 divided = again and bool(block.beside)
                 found.append([_noted(feature, (IN_BLOCKS,)) for feature in improved] if divided else improved)
         settled = found
-    return [*rest, *(feature for group in settled for feature in group)]
+    return [*rest, *(feature for group in settled for feature in group)], left
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,21 +107,21 @@ def _improved(
     around: Surroundings,
     false_alarms_per_metre: float,
     proposals: Sequence[Proposal],
-) -> list[Feature]:
-    """The features of one block, as they are or better."""
+) -> tuple[list[Feature], Configuration | None]:
+    """The features of one block, as they are or better, and the configuration of the highest odds."""
     group, crossings = block.features, block.crossings
     place = neighbourhood(group, crossings, places, around, false_alarms_per_metre)
     if place is None:
-        return group
+        return group, None
     place = _holding(block.beside, place)
     try:
         parts = [part_of(feature, place) for feature in group]
         start = fitted(parts, place)
     except MappingError:  # a feature over whose axis the base does not go on has no family here
-        return group
+        return group, None
     assert start is not None
     if _is_plain(start):
-        return group
+        return group, start
     points = [c.point for c in crossings if c.kind == "convex"]
     points += [
         point for feature in group if kind_of(feature).line and kind_of(feature).sign > 0 for point in feature.axis
@@ -129,10 +134,18 @@ def _improved(
     if (adds and not found.best.fits) or (
         set(found.accepted) <= CHOSEN_LATER and found.best.kinds == found.start.kinds
     ):
-        return [_with_odds(feature, odds if found.best.fits else (), noted) for feature in group]
+        return [_with_odds(feature, odds if found.best.fits else (), noted) for feature in group], found.best
     algorithms = group[0].evidence.algorithms if group else ()
     features = [_with_odds(feature, odds, noted) for feature in _described(found.best, around, algorithms)]
-    return _meeting(features, around.trace.tip_radius)
+    return _meeting(features, around.trace.tip_radius), found.best
+
+
+def _explains(best: Configuration, spot: Feature) -> bool:
+    """True if a configuration leaves nothing over, and most of a spot where that lies."""
+    away = np.linalg.norm(best.place.window.feet - spot.axis[0], axis=1)
+    near = away < best.place.half_width
+    height = spot.height.median
+    return bool(near.any() and best.fits and (best.template[near] / height).max() > MOST_OF_A_SPOT)
 
 
 def _holding(beside: Sequence[Feature], place: Neighbourhood) -> Neighbourhood:

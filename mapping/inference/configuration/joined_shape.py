@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray, IntArray
-from mapping.inference.families import StepShape, TwinShape
+from mapping.inference.families import Crossing, GrooveShape, StepShape, TwinShape
 from mapping.inference.likelihood import LogPosterior, Prior, Shape
 
 # Places along a line at which it is asked on which side of a step it lies; between two of them the side changes where
@@ -24,8 +24,8 @@ class JoinedShape:
     """Shapes over one window, felt together: their parameters in a row.
 
     Dilation distributes over unions: the highest of ground and crests is felt, at each place within a bin, not in its
-    mean. The ground is base, steps and hollows; the part of a crest that stands on the high side of a step is higher by
-    that step, and is felt from the low side too.
+    mean. The ground is base, steps and hollows, whose depths add but where grooves cross; the part of a crest that
+    stands on the high side of a step is higher by that step, and is felt from the low side too.
 
     Args:
         shapes: over a window that has `fine` bins for each one of the likelihood's.
@@ -75,6 +75,10 @@ class JoinedShape:
         felt = np.tile(ground, (len(theta), 1))
         for hollow in hollows:
             felt[hollow.other] += hollow.heights[hollow.which[hollow.other]] - hollow.heights[0]
+        if self._crossing is not None:
+            rows = {k: len(theta) if k in self._varied else 1 for k in self._grooves}
+            taken = [groove.taken(own[k][: rows[k]]) for k, groove in self._grooves.items()]
+            felt += self._crossing.heights(taken, next(iter(self._grooves.values())).tip_radius)
         # a crest beside a hollow holds the ball that sinks into it: crests are known as far down as it does
         sunk = max(-float(felt.min(initial=0.0)), 0.0)
         crests = [_Distinct.of(self._all[k], piece) for k in self._varied for piece in self._crests(k, own, sunk)]
@@ -88,6 +92,19 @@ class JoinedShape:
         """Numbers of the shapes that leave something else when parameters change: a step lifts what stands on it."""
         every = not self.held or any(isinstance(shape, StepShape) for shape in self.shapes)
         return range(len(self._all) if every else len(self.shapes))
+
+    @cached_property
+    def _grooves(self) -> dict[int, GrooveShape]:
+        """The grooves with upright walls, by their numbers."""
+        return {k: shape for k, shape in enumerate(self._all) if isinstance(shape, GrooveShape)}
+
+    @cached_property
+    def _crossing(self) -> Crossing | None:
+        """Where grooves are near one another; None where a sum says it."""
+        if len(self._grooves) < 2:
+            return None
+        crossing = Crossing.of(list(self._grooves.values()))
+        return crossing if len(crossing.bin) else None
 
     @cached_property
     def _held_ground(self) -> FloatArray:

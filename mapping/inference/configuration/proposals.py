@@ -328,6 +328,7 @@ class Proposal:
 
 
 JOIN = Proposal("join", lambda now, points: joined(now))
+REMOVE = Proposal("remove", lambda now, points: without(now))
 PROPOSALS = (
     Proposal("section", lambda now, points: sections(now)),
     Proposal("smoother", lambda now, points: smoother(now)),
@@ -338,7 +339,7 @@ PROPOSALS = (
     Proposal("kind", lambda now, points: other_kinds(now)),
     Proposal("extend", lambda now, points: extended(now)),
     Proposal("add", lambda now, points: more(now)),
-    Proposal("remove", lambda now, points: without(now)),
+    REMOVE,
 )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from mapping import FloatArray, MappingError
 from mapping.inference.configuration.configuration import Configuration, Part, fitted, laid
 from mapping.inference.configuration.neighbourhood import Neighbourhood
-from mapping.inference.configuration.proposals import JOIN, PROPOSALS, Parts, Proposal
+from mapping.inference.configuration.proposals import JOIN, PROPOSALS, REMOVE, Parts, Proposal
 
 # Details that are weighed at once (see `account`), and places that they are usually weighed on: one fit of them takes
 # about one CPU second. Its time grows with the square of the details (rows of a difference quotient times shapes) and
@@ -68,8 +68,15 @@ def searched(
         proposals: the generators that are asked, in order.
     """
     place, best, accepted, idle = start.place, start, list[str](), 0
-    left = MOST_FITTED - max(1.0, _cost(parts, place))
+    left, bounded = MOST_FITTED - max(1.0, _cost(parts, place)), False
     visited = {start.kinds: start}
+    if REMOVE in proposals:
+        # what the others explain as well is no piece of anything; these trials cost less than any other
+        best, kept = _without_idle(start)
+        if best is not start:
+            parts = [parts[k] for k in kept]
+            visited[best.kinds] = best
+            accepted.append(REMOVE.name)
     whole, joining, joins = laid(parts, place), True, MOST_JOINED * len(parts)
     # pieces of one line hide each other once they are fitted: they are joined as the rules left them, those first that
     # gain most by it: both flanks of a wide line may be one step to some extent, and no longer a line after that
@@ -77,6 +84,7 @@ def searched(
         joining = False
         for other_parts in _yielded(JOIN, whole, points) if JOIN in proposals else ():
             if joins <= 0.0:
+                bounded = True
                 break
             other = fitted(other_parts, place)
             cost = _cost(other_parts, place)
@@ -91,7 +99,7 @@ def searched(
         for proposal in proposals:
             found = best
             for proposed in _yielded(proposal, best, points):
-                if left <= 0.0:
+                if left <= 0.0 and proposal is not REMOVE:  # what does not pay for itself goes, however many there are
                     break
                 left -= max(1.0, _cost(proposed, best.place))
                 other = fitted(proposed, best.place, best)
@@ -110,7 +118,20 @@ def searched(
                 break
     order = sorted(visited.values(), key=lambda each: -each.log_odds)
     likely = [each for each in order if each.log_odds > order[0].log_odds - NEGLIGIBLE_ODDS]
-    return Account(start, order[0], tuple(likely), tuple(accepted), min(left, joins) <= 0.0)
+    return Account(start, order[0], tuple(likely), tuple(accepted), bounded or left <= 0.0)
+
+
+def _without_idle(start: Configuration) -> tuple[Configuration, list[int]]:
+    """The configuration without the parts that do not pay for themselves, the idlest first, and who is left."""
+    best, kept = start, list(range(len(start.parts)))
+    while True:
+        trials = [fitted([*best.parts[:k], *best.parts[k + 1 :]], best.place, best) for k in range(len(best.parts))]
+        odds = [-np.inf if trial is None else trial.log_odds for trial in trials]
+        idlest = int(np.argmax(odds)) if odds else 0
+        other = trials[idlest] if odds else None
+        if other is None or odds[idlest] <= best.log_odds + WORTH:
+            return best, kept
+        best, kept = other, [*kept[:idlest], *kept[idlest + 1 :]]
 
 
 def _cost(parts: Sequence[Part], place: Neighbourhood) -> float:

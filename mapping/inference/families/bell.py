@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from mapping import FloatArray
 from mapping.inference.curves import Chart, CurveModes
 from mapping.inference.families.bump import BumpShape, Spot
-from mapping.inference.families.hollow import bin_nodes, line_nodes
+from mapping.inference.families.nodes import bin_nodes, line_nodes
 from mapping.inference.families.problem import Sizes
 from mapping.inference.families.ridge import RidgeShape
 from mapping.inference.likelihood import Prior, Uniform, Window

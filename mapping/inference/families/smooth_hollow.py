@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import FloatArray
-from mapping.inference.families.hollow import GrooveShape, PitShape
+from mapping.inference.families.groove import GrooveShape
+from mapping.inference.families.pit import PitShape
 from mapping.inference.families.problem import Sizes
 from mapping.inference.likelihood import Prior, Uniform
 
@@ -43,7 +44,7 @@ class SmoothGrooveShape(GrooveShape):
         ends = closed if self.chart.closed else np.ascontiguousarray(theta[:, first : first + 2])
         courses = np.ascontiguousarray(theta[:, :first])
         out = np.empty((len(theta), len(self.window)))
-        smooth_line_heights(*self._places, courses, ends, *smooth_section(theta), self.tip_radius, out)
+        smooth_line_heights(*self.places, courses, ends, *smooth_section(theta), self.tip_radius, out)
         return out
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mapping import FloatArray
 from mapping.inference.curves import Chart, CurveModes
-from mapping.inference.families.hollow import line_nodes
+from mapping.inference.families.nodes import line_nodes
 from mapping.inference.likelihood import Prior, Window
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from mapping import FloatArray
 from mapping.geometry.templates import contact_half_width, width_of_cap
 from mapping.inference.curves import Chart, CurveModes
-from mapping.inference.families.hollow import line_nodes
+from mapping.inference.families.nodes import line_nodes
 from mapping.inference.families.problem import Sizes
 from mapping.inference.families.ridge import RidgeShape, rounding_of
 from mapping.inference.likelihood import Prior, Uniform, Window

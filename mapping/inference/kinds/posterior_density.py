@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mapping import Feature, FloatArray
-from mapping.inference.families import PosteriorProblem, Sizes, Surroundings
+from mapping.geometry.mesh import arclengths
+from mapping.inference.curves import CurveModes, chart_along
+from mapping.inference.families import GrooveShape, PosteriorProblem, Sizes, Surroundings
 from mapping.inference.kinds.kind import feature_trace
 from mapping.inference.likelihood import Prior, Shape, StudentT, Uniform, Window
 
 # Prior of log radius: a ball lying on the base (a = H/2) unless the data say otherwise, with heavy tails.
 RADIUS_SCALE = 1.0
+# Legs in which the course of a groove is followed that crosses another
+LEGS_OF_OTHERS = 64
 
 
 def pose(
@@ -23,7 +29,27 @@ def pose(
         traces = [feature_trace(other, window.feet, window.normals, around.trace.tip_radius) for other in near]
         highest, lowest = np.max(traces, axis=0), np.min(traces, axis=0)
         beside = np.where(highest > 0.0, highest, lowest)
+        if type(shape) is GrooveShape:
+            shape = replace(shape, crossed=tuple(_laid(other, window, around) for other in near if _is_upright(other)))
     return PosteriorProblem.posed(feature, sizes, shape, window, around, beginnings, beside)
+
+
+def _is_upright(other: Feature) -> bool:
+    """True of a groove with upright walls."""
+    return other.kind == "groove" and other.details.taper is None and len(other.axis) > 1 and other.height.median < 0.0
+
+
+def _laid(groove: Feature, window: Window, around: Surroundings) -> tuple[GrooveShape, FloatArray]:
+    """A groove as it is known over any window, and its parameters (1, P); where the ball hangs it has no bottom."""
+    tip, closed = around.trace.tip_radius, groove.closed
+    spacing = float(arclengths(groove.axis)[-1]) / LEGS_OF_OTHERS
+    reach = 0.5 * groove.width.median
+    chart = chart_along(groove.axis, groove.normals, around.base, tip, spacing, 0.0, reach, bends=False)
+    ends = [] if closed else [0.0, float(chart.s[0]), float(chart.s[-1])]
+    depth = tip if groove.height.censored else -groove.height.median
+    known = np.array([0.0, *ends, np.log(groove.width.median), np.log(depth)])
+    modes = CurveModes(0, 0.5 * chart.length, 0.5 * chart.length, closed)
+    return GrooveShape(window, chart, modes, tip, (), known, np.zeros_like(known)), known[None]
 
 
 def place_prior(sizes: Sizes) -> Prior:

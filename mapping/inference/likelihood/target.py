@@ -70,7 +70,7 @@ class LogPosterior:
             return heights
         if heights.min(initial=0.0) == 0.0:  # nothing is hollow: the common case at a fifth of the cost
             return np.maximum(heights, self.beside)
-        return np.where(heights < 0.0, heights + self.beside, np.maximum(heights, self.beside))
+        return np.where(heights > 0.0, np.maximum(heights, self.beside), heights + self.beside)
 
     def log_density(self, theta: FloatArray) -> FloatArray:
         """(W,) log posterior densities of (W, P) parameters; -inf outside the priors' support."""

@@ -183,7 +183,8 @@ def _ahead(target: LogPosterior, theta: FloatArray, residual: FloatArray, step: 
     """Differences (m, P) of the residuals (m,) to that side on which there is more room."""
     count = len(theta)
     up, down = np.minimum(theta + step, target.high), np.maximum(theta - step, target.low)
-    beside = np.where(up - theta >= theta - down, up, down)
+    # away from bounds both sides are as long, and rounding must not choose one
+    beside = np.where(up - theta >= (1.0 - SAME_COST) * (theta - down), up, down)
     batch = np.tile(theta, (count, 1))
     np.fill_diagonal(batch, beside)
     span = beside - theta
