@@ -1,7 +1,8 @@
 """Free lines: what several sweeps cross that is so wide that each of them shows its section.
 
 The sections of the sweeps (`free_sections`) are linked as crossings of fine details are. Together they are a line, or a
-spot if they lie no further apart than it is wide. Its sizes are means over its sections, laid square to the line.
+spot if they lie no further apart than one of them is felt. Its sizes are means over its sections, laid square to the
+line.
 """
 
 from __future__ import annotations
@@ -70,12 +71,14 @@ def _of_group(
     """The spot, or the lines, that linked sections are of; and those of them that across their line are not wide."""
     highest = max(group, key=lambda section: abs(section.crossing.height))
     points = np.array([section.crossing.point for section in group])
-    if np.linalg.norm(np.ptp(points, axis=0)) <= highest.sizes.width:
+    # a round spot is felt as far across the sweeps as along them, wider than it is by what the ball adds to either side
+    if np.linalg.norm(np.ptp(points, axis=0)) <= highest.extent:
         alone = len({section.crossing.sweep for section in group}) == 1
-        if not _is_wide(_through(points, CORE * highest.sizes.width), group) or (
-            alone and highest.sizes.width > 2.0 * inspection.pitch
-        ):
-            return [], group  # what is as wide across its sweeps as along them is felt by those beside, too
+        long = alone and highest.sizes.width > 2.0 * inspection.pitch
+        if long or _is_long(highest, group, inspection):
+            return [], group
+        if not _is_wide(_through(points, CORE * highest.sizes.width), group):
+            return [], group
         spot = free_spot(_between_sweeps(highest, group), detections.algorithm)
         return [replace(spot, evidence=_evidence(group, detections.algorithm))], []
     half_width = 0.5 * float(np.median([section.sizes.width for section in group]))
@@ -91,6 +94,14 @@ def _of_group(
         else:
             slanted += own
     return found, slanted
+
+
+def _is_long(highest: FreeSection, group: Sequence[FreeSection], inspection: Inspection) -> bool:
+    """True of sections that are of no spot but of what runs along their sweeps: what is as wide across its sweeps as
+    along them is felt half as high by all that pass within that, but for one to either side."""
+    high = {each.crossing.sweep for each in group if each.sizes.height > 0.5 * highest.sizes.height}
+    places = inspection.near(highest.crossing.point[None], 0.5 * highest.half_extent)
+    return len(high.union(inspection.sweep[places].tolist())) > len(high) + 2
 
 
 def _through(points: FloatArray, core: float) -> FloatArray:

@@ -17,7 +17,7 @@ from mapping import Details, Feature, FloatArray, Interval, Support
 from mapping.assembly.free.outline import of_all_scales, overlap, times_crest
 from mapping.assembly.free.section import Section
 from mapping.assembly.free.sizes import SectionSizes, sizes_of_section
-from mapping.base import LaidSweep, LaidTrace, SweepHeights
+from mapping.base import SHORTEST_LEVEL, LaidSweep, LaidTrace, SweepHeights
 from mapping.detection import Crossing, Detections, terraced
 from mapping.inference import POOLED_SPLINES
 from mapping.inference.kinds import kind_made_of
@@ -26,6 +26,8 @@ from mapping.instrument import Noise
 # Bins are no finer than this share of the tip's radius: a wall between two of them is told to 0.1 / sqrt(12) = 0.03
 # radii, a thirtieth of what the ball itself takes of a width there
 FINEST = 0.1
+# The base is what most of a sweep lies on: where several lie on one level, a detail of one of them is shorter than half
+LONGEST_OF_A_ROW = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,8 @@ class FreeSection:
         log_odds: for it, on this sweep.
         times_crest: how many times as wide it was felt as a crest of no width across the sweep.
         inside: crossings that are parts of it.
+        extent: along the sweep from where it leaves the base to where it returns, m.
+        half_extent: so far it is more than half as high, m.
         round_body: True if it is felt as far as where the body faces the other way, as no spot is.
     """
 
@@ -48,6 +52,8 @@ class FreeSection:
     log_odds: float
     times_crest: float
     inside: tuple[Crossing, ...]
+    extent: float
+    half_extent: float
     round_body: bool
 
     @property
@@ -73,12 +79,14 @@ def free_sections(detections: Detections, trace: LaidTrace) -> tuple[list[FreeSe
     for crossing in detections.crossings:
         by_sweep.setdefault(crossing.sweep, []).append(crossing)
     levelled = len(trace.base.levels) > 1  # nothing was noticed of what one of them is the floor or the plateau of
+    # a single profile, or one on levels, may have a level wherever it lies as high for long
+    share = SHORTEST_LEVEL if levelled or trace.base.kind == "profile" else LONGEST_OF_A_ROW
     for sweep in trace.laid_sweeps:
         left = by_sweep.pop(sweep.number, [])
         if left or levelled:
             between = float(np.median(np.diff(sweep.arclength)))
             for over in sweep.heights(max(between, FINEST * trace.tip_radius)):
-                own, above = of_all_scales(over, trace.tip_radius), _on_levels(over, trace)
+                own, above = of_all_scales(over, trace.tip_radius, share), _on_levels(over, trace)
                 above = [each for each in above if not any(overlap(each, other) for other in own)]
                 for number, section in enumerate([*own, *above]):
                     inside = [c for c in left if _overlaps(section, c, sweep.trace.t)]
@@ -170,6 +178,8 @@ def _measured(
         float(log_odds),
         times_crest(section, sweep.trace.tip_radius),
         tuple(inside),
+        float(np.ptp(place)),
+        piece.spacing * int((section.monotone > 0.5 * section.monotone.max()).sum()),
         _reaches_round(section, foot.normals[0], sweep),
     )
 

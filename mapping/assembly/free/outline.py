@@ -22,12 +22,16 @@ LEAST_BINS = 8
 FLANK_SDS = 2.5
 
 
-def of_all_scales(piece: SweepHeights, tip_radius: float) -> list[Section]:
-    """The sections of a piece, each in the finest bins in which it stands clear of their scatter."""
-    found = _sections(piece, tip_radius)
+def of_all_scales(piece: SweepHeights, tip_radius: float, share: float = SHORTEST_LEVEL) -> list[Section]:
+    """The sections of a piece, up to a share of its length, each in the finest bins in which it stands clear of their
+    scatter."""
+    longest = share * piece.length
+    found = _sections(piece, tip_radius, longest)
     piece = piece.coarser()
     while LEAST_BINS * piece.spacing < SHORTEST_LEVEL * piece.length:
-        clear = [section for section in _sections(piece, tip_radius) if section.end - section.begin >= LEAST_BINS]
+        clear = [
+            section for section in _sections(piece, tip_radius, longest) if section.end - section.begin >= LEAST_BINS
+        ]
         found += [section for section in clear if not any(overlap(section, other) for other in found)]
         piece = piece.coarser()
     return found
@@ -39,8 +43,8 @@ def overlap(one: Section, other: Section) -> bool:
     return bool(begin < stop and start < end)
 
 
-def _sections(piece: SweepHeights, tip_radius: float) -> list[Section]:
-    """What stands clear of the usual scatter of a profile, and is wide."""
+def _sections(piece: SweepHeights, tip_radius: float, longest: float) -> list[Section]:
+    """What stands clear of the usual scatter of a profile, and is wide, up to `longest`, m."""
     z, found = piece.height, []
     usual = max(robust_scale(z), neighbour_scatter(z), np.finfo(float).tiny)
     for sign in (1.0, -1.0):
@@ -49,7 +53,7 @@ def _sections(piece: SweepHeights, tip_radius: float) -> list[Section]:
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
             if begin == 0 or end >= len(z):
                 continue  # what goes on beyond the profile's end is no detail
-            section = outlined(piece, sign, int(begin), int(end), usual, SHORTEST_LEVEL * piece.length)
+            section = outlined(piece, sign, int(begin), int(end), usual, longest)
             if section is not None and times_crest(section, tip_radius) > WIDER_THAN_CREST:
                 found.append(section)
     return found
@@ -72,6 +76,9 @@ def outlined(piece: SweepHeights, sign: float, begin: int, end: int, usual: floa
     if (last - first) * piece.spacing > longest:
         return None
     inside = z[first : last + 1]
+    above = np.flatnonzero(inside > FLANK * high)
+    if (inside[above[0] : above[-1]] < FLANK * high - FLANK_SDS * usual).any():
+        return None  # between its flanks it goes down to where they are read: two details
     top = int(np.argmax(np.convolve(inside, np.ones(3) / 3.0, mode="same")))
     if not 0 < top < len(inside) - 1:
         return None  # all within a bin

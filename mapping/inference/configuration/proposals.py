@@ -31,6 +31,9 @@ ON_LINE = 0.35
 SHORT_LINE = 0.3
 # Two points that may be meant instead of one lie so many of its half-widths to either side
 POINTS_APART = 0.3
+# A course whose ends lie no farther apart than this share of its length may be closed: three quarters of a circle's are
+# 0.3 of it apart, half a circle's 0.64
+CLOSING_GAP = 0.5
 # Points of a leg that distances between lines are taken at
 POINTS_OF_LEG = 65
 # Half-widths by which a line goes on beyond what it is extended to: the end is sought from there. With 0.1 and 0.3
@@ -107,6 +110,62 @@ def joined(now: Configuration) -> Iterator[Parts]:
             if isinstance(line.shape, RidgeShape):
                 yield [*rest, as_bar(line, now.place, width)]
                 yield [*rest, as_twin(line, now.place, width)]
+
+
+def chained(now: Configuration) -> Iterator[Parts]:
+    """All pieces of one course as one line, open and closed: rows leave a ring in pieces where they run along it."""
+    kinds = {kind_of(part.feature).made_of for part in now.parts} - {""}
+    for made_of in sorted(kinds):
+        if not kind_made_of(made_of, line=True).has_ends:
+            continue
+        alike = [k for k, part in enumerate(now.parts) if kind_of(part.feature).made_of == made_of]
+        alike = [k for k in alike if not now.parts[k].feature.closed]
+        course, used = _course_of([axis_of(now.parts[k]) for k in alike])
+        if not used:
+            continue
+        pieces = [now.parts[alike[k]].feature for k in used]
+        rest = [part for k, part in enumerate(now.parts) if k not in {alike[m] for m in used}]
+        like = max(pieces, key=lambda piece: (kind_of(piece).line, piece.evidence.snr))
+        support = replace(like.evidence, crossings=sum(piece.evidence.crossings for piece in pieces))
+        like = replace(like, evidence=support)
+        courses = [course] if len(used) > 1 else []
+        if float(np.linalg.norm(course[-1] - course[0])) < CLOSING_GAP * float(arclengths(course)[-1]):
+            courses.append(np.vstack([course, course[:1]]))
+        for each, degree in itertools.product(courses, (*LOWER_DEGREES, HIGHEST_DEGREE)):
+            yield [*rest, _line(like, each, now.place, degree, degree)]
+
+
+def _course_of(axes: list[FloatArray]) -> tuple[FloatArray, list[int]]:
+    """Points (K, 3) evenly along the pieces of a course, and the numbers of these: from the longest on, each time the
+    piece that begins nearest to where it ends, no farther off than one of them is long; none without a line."""
+    lengths = [float(arclengths(axis)[-1]) for axis in axes]
+    if not any(lengths):
+        return np.zeros((0, 3)), []
+    used = [int(np.argmax(lengths))]
+    course = _evenly(axes[used[0]])
+    for _ in range(2):  # on at its end, then at its beginning
+        while left := [k for k in range(len(axes)) if k not in used]:
+            gaps = [np.linalg.norm(axes[k][[0, -1]] - course[-1], axis=1) for k in left]
+            at = int(np.argmin([gap.min() for gap in gaps]))
+            nearest = left[at]
+            if gaps[at].min() > max(lengths[nearest], lengths[used[-1]]):
+                break
+            piece = _evenly(axes[nearest][:: 1 if gaps[at].argmin() == 0 else -1])
+            from_end = np.linalg.norm(piece - course[-1], axis=1).argmin()  # what lies before it runs beside the course
+            course = np.vstack([course, piece[from_end:]])
+            used.append(nearest)
+        course, used = course[::-1], used[::-1]
+    return _evenly(course), used
+
+
+def _evenly(axis: FloatArray) -> FloatArray:
+    """(POINTS_OF_LEG, 3) points along a polyline (K, 3), as far from one another; one point as it is."""
+    s = arclengths(axis)
+    apart = np.concatenate([[True], np.diff(s) > 0.0])
+    if apart.sum() < 2:
+        return axis[:1]
+    even = np.linspace(0.0, s[-1], POINTS_OF_LEG)
+    return np.column_stack([np.interp(even, s[apart], axis[apart, i]) for i in range(3)])
 
 
 def between(now: Configuration) -> Iterator[Parts]:
@@ -327,7 +386,7 @@ class Proposal:
     of: Callable[[Configuration, FloatArray], Iterator[Parts]]
 
 
-JOIN = Proposal("join", lambda now, points: joined(now))
+JOIN = Proposal("join", lambda now, points: itertools.chain(chained(now), joined(now)))
 REMOVE = Proposal("remove", lambda now, points: without(now))
 PROPOSALS = (
     Proposal("section", lambda now, points: sections(now)),

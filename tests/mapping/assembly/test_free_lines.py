@@ -113,3 +113,39 @@ def test_a_wide_hollow_no_longer_than_wide_is_a_pit_that_may_be_deeper_between_t
 
 def test_a_bare_raster_holds_nothing_wide() -> None:
     assert not felt(lambda x, _: 0.0 * x, 14, 60e-9)
+
+
+def assembled(height: Callable[[FloatArray, FloatArray], FloatArray], rows: FloatArray) -> list[Feature]:
+    """What rows of a ball of 1 mm assemble to, whose centre is by so much higher than its radius."""
+    x = np.arange(-13e-3, 13e-3, 0.1e-3)
+    feet = np.concatenate([np.column_stack([x[:: 1 - 2 * (k % 2)], np.full(len(x), y)]) for k, y in enumerate(rows)])
+    z = height(*feet.T) + 3e-6 * np.random.default_rng(7).standard_normal(len(feet))
+    sweep = np.repeat(np.arange(len(rows)), len(x))
+    raster = Trace(1e-2 * np.arange(len(feet)), np.column_stack([feet, 1e-3 + z]), sweep, 1e-3)
+    base = fit_base(raster)
+    return list(assemble(detect(raster, base), raster, base))
+
+
+def test_rivets_are_bumps_wherever_the_rows_pass() -> None:
+    # a cap of 2.4 mm is felt over 2.9 mm, across the rows as along them
+    def rivets(x: FloatArray, y: FloatArray) -> FloatArray:
+        z = np.zeros_like(x)
+        for at in (-8e-3, -3e-3, 2e-3, 7e-3):
+            away = np.hypot(x - at, y + 6e-3)
+            z = np.maximum(z, np.sqrt(np.maximum(3.55e-3**2 - away**2, 0.0)) - 3.25e-3)
+        return z
+
+    found = assembled(rivets, np.arange(-12.83e-3, 13e-3, 0.5e-3))
+    assert [feature.kind for feature in found] == ["bump"] * 4
+
+
+def test_a_dent_a_quarter_as_long_as_the_rows_is_one_pit() -> None:
+    # of a raster; on a profile what is as deep for an eighth of it may be a level of its base
+    def dented(x: FloatArray, y: FloatArray) -> FloatArray:
+        dent = -0.15e-3 * np.exp(-((x - 5e-3) ** 2 + (y - 3e-3) ** 2) / (2.0 * 1.25e-3**2))
+        slope = np.hypot(dent * (x - 5e-3), dent * (y - 3e-3)) / 1.25e-3**2
+        return np.asarray(-(x**2) / 0.3 + dent + 0.5e-3 * slope**2)  # of a parallel surface, to the second order
+
+    (found,) = assembled(dented, np.arange(-12.83e-3, 13e-3, 0.5e-3))
+    assert found.kind == "pit"
+    assert found.height.low < -0.15e-3 < found.height.high
