@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
@@ -214,23 +214,24 @@ def _scarcity(profile: SweepHeights, bank: Bank) -> FloatArray:
     return np.asarray(share * (bank.samples / counts - 1.0))
 
 
-def _certainties(profile: SweepHeights, bank: Bank, null: NullScale | None) -> Callable[[int], FloatArray | None]:
-    """Of the k-th filter, when asked: expected over actual sd of what it sees in each bin (n,).
-
-    None where it is 1 throughout.
-    """
+def _certainties(profile: SweepHeights, bank: Bank, null: NullScale | None) -> FloatArray | None:
+    """(F, n) expected over actual sd of what each filter that fits sees in each bin; None where it is 1 throughout."""
     scarcity = _scarcity(profile, bank)
     scarce = scarcity.max(initial=0.0) > SCARCE
     if not scarce and null is None:
-        return lambda _: None
+        return None
+    out = np.ones((len(bank.filters), len(profile.height)))
+    for k in range(bank.fitting(len(profile.height), _longest(profile.height, bank))):
+        if scarce and (share := _certainty(scarcity, int(bank.filters[k].half_width / bank.spacing))) is not None:
+            out[k] = share
+        if null is not None:
+            out[k] /= null.along(k)
+    return out
 
-    def certainty(k: int) -> FloatArray | None:
-        share = _certainty(scarcity, int(bank.filters[k].half_width / bank.spacing)) if scarce else None
-        if null is None:
-            return share
-        return np.asarray((1.0 if share is None else share) / null.along(k))
 
-    return cache(certainty)
+def _longest(height: FloatArray, bank: Bank) -> float:
+    """Half-width of the widest disturbance that is sought in a profile of heights (n,), m."""
+    return LARGEST_SHARE * len(height) * bank.spacing
 
 
 def _certainty(scarcity: FloatArray, bins: int) -> FloatArray | None:
@@ -241,25 +242,12 @@ def _certainty(scarcity: FloatArray, bins: int) -> FloatArray | None:
 
 
 def _candidates(
-    height: FloatArray, bank: Bank, threshold: float, tip_radius: float, certainty: Callable[[int], FloatArray | None]
+    height: FloatArray, bank: Bank, threshold: float, tip_radius: float, certainty: FloatArray | None
 ) -> list[tuple[float, int, float, float]]:
     """(signal-to-noise, bin, half-width in bins, height) of local maxima over place for every width."""
-    result = []
-    for k, f in enumerate(bank.filters):
-        if f.half_width > LARGEST_SHARE * len(height) * bank.spacing or len(height) < 2 * f.coarse:
-            continue
-        crest, sd = f.heights(height)
-        snr = np.abs(crest) / sd
-        if (share := certainty(k)) is not None:
-            snr *= share[: len(crest) * f.coarse : f.coarse]
-        if snr.max() <= threshold:
-            continue
-        snr[np.abs(crest) > PHYSICAL * f.half_width**2 / (2 * tip_radius)] = 0.0
-        around = np.concatenate([[-1.0], snr, [-1.0]])
-        peaks = np.flatnonzero((snr > threshold) & (snr >= around[:-2]) & (snr > around[2:]))
-        width = f.half_width / bank.spacing
-        result += [(float(snr[p]), int((p + 0.5) * f.coarse), width, float(crest[p])) for p in peaks]
-    return result
+    sharpest = PHYSICAL / (2 * tip_radius)
+    found = bank.peaks(height, _longest(height, bank), threshold, sharpest, certainty).tolist()
+    return [(snr, int(place), bank.filters[int(k)].half_width / bank.spacing, crest) for snr, place, k, crest in found]
 
 
 def _dominant(

@@ -9,7 +9,7 @@ is as wide as its prior has it: like a round one it is about as wide as high, wi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -65,6 +65,25 @@ def rough_evidence(problem: PosteriorProblem) -> float:
     return max(laplace(problem.target, optimum).log_evidence for optimum in problem.beginnings)
 
 
+def roughly_weighed(problems: Iterable[PosteriorProblem]) -> list[tuple[float, PosteriorProblem]]:
+    """Rivals that begin at their optima, each with its rough log evidence, as far as they may be likely beside those
+    before them; the first of them is one.
+
+    No evidence is higher than the likelihood at its best: where that is too low for a family to be likely, it is
+    neither searched to its end nor integrated over.
+    """
+    weighed, most = list[tuple[float, PosteriorProblem]](), np.inf
+    for problem in problems:
+        optima = find_optima(problem.target, problem.beginnings, most=most)
+        if not optima:
+            continue
+        found = replace(problem, beginnings=np.array(optima))
+        weighed.append((rough_evidence(found), found))
+        likely = max(evidence for evidence, _ in weighed) + float(np.log(UNLIKELY_FAMILY)) - ROUGH_EVIDENCE
+        most = -2.0 * likely
+    return weighed
+
+
 def better_section(first: PosteriorProblem, around: Surroundings, rng: np.random.Generator) -> PosteriorProblem | None:
     """The alternative of a kind beside which its first family is unlikely under the noise of the trace, else None.
 
@@ -82,8 +101,8 @@ def better_section(first: PosteriorProblem, around: Surroundings, rng: np.random
         return None
     if around.tip_sd > 0.0:
         posed = [with_free_tip(each, around.tip_sd, around.base.kind != "mesh") for each in posed]
-    families = [at_optima(each) for each in (first.under(around.noise), *posed)]
-    evidence = [rough_evidence(each) for each in families]
+    weighed = roughly_weighed((first.under(around.noise), *posed))
+    evidence, families = [each for each, _ in weighed], [each for _, each in weighed]
     least = float(np.log(1.0 / UNLIKELY_FAMILY))
     likely = [k for k, each in enumerate(evidence) if each > max(evidence) - ROUGH_EVIDENCE - least]
     if len(likely) > 1:

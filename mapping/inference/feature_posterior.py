@@ -17,7 +17,7 @@ from mapping.inference.evidence import (
     better_section,
     log_evidence_of_nothing,
     probabilities,
-    rough_evidence,
+    roughly_weighed,
 )
 from mapping.inference.families import PosteriorProblem, Surroundings, with_free_tip, with_nominal_tip
 from mapping.inference.kinds import kind_of
@@ -175,8 +175,8 @@ def _rough(first: PosteriorProblem, around: Surroundings) -> list[PosteriorProbl
     rivals = kind_of(first.feature).rivals(nominal, first.beginnings[0, : len(nominal.target.shape.names)])
     if not rivals:
         return [first]
-    families = [first, *(at_optima(_felt(each, around)) for each in rivals)]
-    weighed = sorted(((rough_evidence(each), each) for each in families), key=lambda each: -each[0])
+    families = roughly_weighed((first, *(_felt(each, around) for each in rivals)))
+    weighed = sorted(families, key=lambda each: -each[0])
     least = weighed[0][0] + np.log(UNLIKELY_FAMILY) - ROUGH_EVIDENCE
     return [problem for evidence, problem in weighed if evidence > least]
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -68,6 +69,48 @@ class Bank:
     noise: Noise
     drift: int = 0
 
+    def peaks(
+        self, profile: FloatArray, longest: float, threshold: float, sharpest: float, certainty: FloatArray | None
+    ) -> FloatArray:
+        """(P, 4) signal-to-noise ratio, bin, number of the filter and height (m) of local maxima over place.
+
+        Args:
+            profile: (n,) heights in bins, m.
+            longest: half-width of the widest filter that is asked, m.
+            threshold: signal-to-noise ratio that a maximum exceeds.
+            sharpest: what is higher than the square of a filter's half-width times this, 1/m, is none of its maxima.
+            certainty: (F, n) expected over actual sd of what each filter sees in each bin; None if it is 1.
+        """
+        from mapping.detection.filters.filter_kernels import peaks
+
+        count = self.fitting(len(profile), longest)
+        known = np.zeros((0, 0)) if certainty is None else certainty
+        highest = sharpest * self.widths**2
+        return np.asarray(peaks(profile, self._in_a_row[0][:count], *self._in_a_row[1:], threshold, highest, known))
+
+    def fitting(self, bins: int, longest: float) -> int:
+        """How many filters, from the narrowest on, are not wider than `longest`, m, and see two of their bins at least
+        in a profile of so many."""
+        return int(((self.widths <= longest) & (2 * self._in_a_row[0] <= bins)).sum())
+
+    @cached_property
+    def widths(self) -> FloatArray:
+        """(F,) half-widths of the filters, m."""
+        return np.array([f.half_width for f in self.filters])
+
+    @cached_property
+    def _in_a_row(self) -> tuple[Any, ...]:
+        """The filters as one row of numbers each, in the order in which `peaks` of the kernels takes them."""
+        rows: list[Any] = [np.array([f.coarse for f in self.filters]), np.array([len(f.edge) for f in self.filters])]
+        for parts in (
+            [f.weights for f in self.filters],
+            [f.edge.ravel() for f in self.filters],
+            [f.edge_sd for f in self.filters],
+        ):
+            rows += [np.cumsum([0, *(len(part) for part in parts)]), np.concatenate(parts)]
+        rows.insert(6, np.array([f.sd for f in self.filters]))
+        return tuple(rows)
+
     def scaled(self, scale: FloatArray) -> Bank:
         """The bank where the outputs of each filter (F,) scatter so many times as much as the noise says."""
         filters = (
@@ -80,7 +123,7 @@ class Bank:
 
         A crest of height D disturbs sqrt(2 r D) on either side; 1.645 is the 95 % quantile of the noise.
         """
-        widths = np.array([f.half_width for f in self.filters])
+        widths = self.widths
         needed = np.array([f.sd for f in self.filters]) * (threshold + 1.6448536)
         available = widths**2 / (2 * tip_radius)
         enough = available >= needed

@@ -17,6 +17,8 @@ CENTRE_ROUNDS, CENTRE_SETTLED = 6, 1e-5
 LEAST_ROOM = 0.01
 # Share by which the table goes further than the furthest of the bins
 TABLE_SPARE = 0.05
+# Share by which a bound is widened that leaves places out: what it leaves out is zero to the last digit
+BOUND_MARGIN = 1e-9
 # Tangents of angles up to which five terms of the arc tangent's series are exact to rounding: t^11 / 11 of t
 SLIGHT = 0.04
 
@@ -46,6 +48,17 @@ def _place(level, square, curvature):  # type: ignore[no-untyped-def]
         series = 1.0 - u * (1.0 / 3.0 - u * (1.0 / 5.0 - u * (1.0 / 7.0 - u * (1.0 / 9.0))))
         return aside / toward * series, over
     return np.arctan2(curvature * aside, toward) / curvature, over
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _tangent_beyond(place, curvature):  # type: ignore[no-untyped-def]
+    """Square of `aside` over `toward` (see `_place`), m^2, above which a place in space lies further along the ball
+    that a bell stands on than so many m."""
+    angle = abs(curvature) * place
+    if angle >= 0.5 * np.pi:
+        return np.inf
+    reach = np.tan(angle) / abs(curvature) if angle > 0.0 else place
+    return (1.0 + BOUND_MARGIN) * reach * reach
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -91,21 +104,33 @@ def bell_heights(
     for w in range(walkers):
         px, py, pz = points[w, 0], points[w, 1], points[w, 2]
         ax, ay, az = axes[w, 0], axes[w, 1], axes[w, 2]
-        far = 1e-3 * tip
+        far, widest = 1e-3 * tip, -1.0
         for i in range(bins):  # nodes of one bin lie closer together than the table has to spare
             x = nodes[i, 0, 0] + tip * normals[i, 0] - px
             y = nodes[i, 0, 1] + tip * normals[i, 1] - py
             z = nodes[i, 0, 2] + tip * normals[i, 2] - pz
-            far = max(far, _place(x * ax + y * ay + z * az, x * x + y * y + z * z, curvature)[0])
+            level, square = x * ax + y * ay + z * az, x * x + y * y + z * z
+            toward = 1.0 + curvature * level
+            # places are in the order of the tangents of their angles, which are quicker told
+            if toward <= 0.0 or square - level * level > widest * (toward * toward):
+                far = max(far, _place(level, square, curvature)[0])
+                widest = (square - level * level) / (toward * toward) if toward > 0.0 else widest
         far = min((1.0 + TABLE_SPARE) * far + heights[w], _reach(heights[w], halves[w], tapers[w], curvature, tip))
         spacing = far / (TABLE_PLACES - 2)
         smooth_trace(heights[w], halves[w], tapers[w], tip, curvature, table, spacing)
+        last = TABLE_PLACES - 1
+        while last > 0 and table[last] == -np.inf:
+            last -= 1
+        beyond = _tangent_beyond(last * spacing, curvature)
         for i in range(bins):
             nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
             upward, total = nx * ax + ny * ay + nz * az, 0.0
             for q in range(count):
                 x, y, z = nodes[i, q, 0] + tip * nx - px, nodes[i, q, 1] + tip * ny - py, nodes[i, q, 2] + tip * nz - pz
                 level, square, along = x * ax + y * ay + z * az, x * x + y * y + z * z, x * nx + y * ny + z * nz
+                toward = 1.0 + curvature * level
+                if beyond < np.inf and (toward <= 0.0 or square - level * level > beyond * (toward * toward)):
+                    continue  # most nodes are further away than the bell is felt
                 rise = 0.0
                 for _ in range(CENTRE_ROUNDS):
                     place, over = _place(level + rise * upward, square + rise * (2.0 * along + rise), curvature)

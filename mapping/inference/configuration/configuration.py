@@ -234,10 +234,11 @@ def fitted(parts: Sequence[Part], place: Neighbourhood, rival: Configuration | N
     constants = np.array([constant for _, constant in place.levels])
     level = len(constants) - 1 if rival is None else rival.level
     if rival is not None and len(theta):
-        target = LogPosterior(shape, place.levels[level][0])
-        theta = find_optima(target, theta[None], SCREENED)[0]
-        if float(target.log_density(theta[None])[0]) < rival.found.log_density - HOPELESS:
+        target, least = LogPosterior(shape, place.levels[level][0]), rival.found.log_density - HOPELESS
+        near = find_optima(target, theta[None], SCREENED, target.chi_square(least))
+        if not near or float(target.log_density(near[0][None])[0]) < least:
             return None
+        theta = near[0]
     for _ in range(MOST_LEVEL_CHANGES):
         if len(theta):
             theta = find_optima(LogPosterior(shape, place.levels[level][0]), theta[None])[0]
