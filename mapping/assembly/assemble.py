@@ -15,6 +15,7 @@ from mapping.assembly.free import free_sections, free_spot
 from mapping.assembly.free_lines import free_lines, lies_on
 from mapping.assembly.lines import Around, line_features
 from mapping.assembly.linking import Inspection, Inspections, groups
+from mapping.assembly.plateaus import plateau_features
 from mapping.assembly.points import outline, point_feature
 from mapping.assembly.runs import along, split_runs, told_crests
 from mapping.base import Base, LaidTrace
@@ -72,14 +73,21 @@ def assemble(
         return _of_profile(detections, laid)
     inspections = inspections or inspected_for(detections, laid, base, spacing=spacing, faint=faint)
     spacing = place_spacing(crossings, trace.tip_radius) if spacing is None and crossings else spacing
-    wide = list[Feature]()
+    wide, flat = list[Feature](), list[Feature]()
+    if spacing is not None and crossings:
+        plain = Around(inspections.at(spacing), base, detections, trace.tip_radius)
+        flat, crossings = plateau_features(crossings, plain)
+        detections = replace(detections, crossings=crossings)
     if base.kind != "mesh":  # a given base that is off is no detail, however wide
         sections, upon, rest = free_sections(detections, laid)
+        sections = [section for section in sections if not any(lies_on(section.crossing, each) for each in flat)]
         wide, slanted = free_lines(sections, detections, laid)
         fine = [*rest, *upon, *(crossing for section in slanted for crossing in section.inside)]
         crossings = tuple(c for c in fine if not any(lies_on(c, feature) for feature in wide))
         detections = replace(detections, crossings=crossings)
-    features = [] if spacing is None or not crossings else _linked(detections, laid, inspections.at(spacing))
+    features = (
+        [*flat, *_linked(detections, laid, inspections.at(spacing))] if spacing is not None and crossings else flat
+    )
     if features and spacing is not None and proposals:
         places = _places(inspections.at(spacing))
         around = Surroundings(laid, base, detections.noise.rounded(laid.resolution))
