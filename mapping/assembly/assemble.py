@@ -15,7 +15,7 @@ from mapping.assembly.free import free_sections, free_spot
 from mapping.assembly.free_lines import free_lines, lies_on
 from mapping.assembly.lines import Around, line_features
 from mapping.assembly.linking import Inspection, Inspections, groups
-from mapping.assembly.plateaus import plateau_features
+from mapping.assembly.plateaus import across_sweeps, plateau_features
 from mapping.assembly.points import outline, point_feature
 from mapping.assembly.runs import along, split_runs, told_crests
 from mapping.base import Base, LaidTrace
@@ -160,8 +160,9 @@ def _crests_and_steps(
     runs, steps = split_runs([c for c in crossings if c not in crests and comes_down(c, fine)])
     edges = [c for run in runs for c in (run.first, run.last)] + steps
     pitch = around.inspection.pitch
+    banded = across_sweeps([c for run in runs for c in (run.first, run.last)], around)
     for run in runs:
-        if run.is_band(edges, pitch, around.tip_radius):
+        if id(run.first) in banded or run.is_band(edges, pitch, around.tip_radius):
             steps += [run.first, run.last]
         else:
             crests += _on_crest(run.points(max(min(pitch, run.length), scale), around.base, around.tip_radius), around)

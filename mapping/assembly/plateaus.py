@@ -101,6 +101,17 @@ def plateau_features(crossings: Sequence[Crossing], around: Around) -> tuple[lis
     return [plateau.feature for plateau in plateaus], rest
 
 
+def across_sweeps(crossings: Sequence[Crossing], around: Around) -> set[int]:
+    """Identities of the steps that sweeps side by side felt on a plateau that goes on beyond them on both sides.
+
+    It runs across them: none ran along a line there (see `runs`).
+    """
+    spans = [span for span in _spans(crossings) if _off_base(span, around)]
+    groups = [group for group in _side_by_side(spans, around.inspection.pitch) if not any(_ended(group, around))]
+    wide = [group for group in groups if len({span.first.sweep for span in _full(group)}) >= FEWEST_FULL]
+    return {id(c) for group in wide for span in group for c in (span.first, span.last)}
+
+
 def _spans(crossings: Sequence[Crossing]) -> list[Span]:
     """Of each sweep the steps of opposite ways and like heights that follow each other."""
     by_sweep: dict[int, list[Crossing]] = {}
@@ -165,18 +176,13 @@ def _plateau(group: list[Span], around: Around) -> Plateau | None:
 
     It lies along its longer side; how square or round its ends are, the posterior says.
     """
-    top = float(np.quantile([abs(span.height) for span in group], 0.8))
-    full = [span for span in group if abs(span.height) > FULL_HEIGHT * top]
-    if len({span.first.sweep for span in full}) < FEWEST_FULL:
+    full = _full(group)
+    if len({span.first.sweep for span in full}) < FEWEST_FULL or not all(_ended(group, around)):
         return None
     longest = max(full, key=lambda span: span.length)
     normal, way = longest.first.normal, longest.chord / longest.length
     aside = np.cross(normal, way)
     sign, pitch = float(np.sign(longest.height)), around.inspection.pitch
-    across = np.array([(span.middle - longest.middle) @ aside for span in full])
-    outer = [full[int(across.argmin())], full[int(across.argmax())]]
-    if not all(_ends(span, side * aside, sign * top, around) for span, side in zip(outer, (-1.0, 1.0), strict=True)):
-        return None
     outline = _outline(group, full, longest.middle, np.stack([way, aside]), around)
     middle, sides, (length, width) = _rectangle(outline)
     line, centre = (each @ np.stack([way, aside]) for each in (sides, middle))
@@ -249,6 +255,23 @@ def _rectangle(outline: FloatArray) -> tuple[FloatArray, FloatArray, tuple[float
             best = size.prod(), 0.5 * (low + high) @ sides, sides[k], (float(size[k]), float(size[1 - k]))
     assert best is not None  # there are turns
     return best[1:]
+
+
+def _full(group: Sequence[Span]) -> list[Span]:
+    """Those at the height of most of them: sweeps beside a wall are held by its rim."""
+    top = float(np.quantile([abs(span.height) for span in group], 0.8))
+    return [span for span in group if abs(span.height) > FULL_HEIGHT * top]
+
+
+def _ended(group: Sequence[Span], around: Around) -> tuple[bool, bool]:
+    """Of both sides of spans side by side whether sweeps were felt to be back on the base there."""
+    full = _full(group)
+    longest = max(full, key=lambda span: span.length)
+    aside = np.cross(longest.first.normal, longest.chord / longest.length)
+    across = [float((span.middle - longest.middle) @ aside) for span in full]
+    height = float(np.median([span.height for span in full]))
+    low, high = full[int(np.argmin(across))], full[int(np.argmax(across))]
+    return _ends(low, -aside, height, around), _ends(high, aside, height, around)
 
 
 def _ends(outermost: Span, aside: FloatArray, height: float, around: Around) -> bool:

@@ -77,3 +77,23 @@ def test_a_pocket_beside_another_is_no_part_of_it():
     for feature in features:
         assert abs(feature.width.median - 2.0 * HALF[1]) < 0.15e-3
         assert abs(feature.length.median - 2.0 * HALF[0]) < 0.15e-3
+
+
+def test_a_bar_across_three_rows_runs_across_them():
+    half, high, tip = 1e-3, 0.4e-3, 3e-3
+    x = np.arange(0.0, 40e-3, 0.1e-3)
+    rng = np.random.default_rng(10)
+    rows = []
+    for k in range(3):
+        away = np.maximum(np.abs(x - 20e-3) - half, 0.0)
+        z = np.maximum(high + np.sqrt(np.maximum(tip**2 - away**2, 0.0)), tip)
+        rows.append(np.column_stack([x, np.full(len(x), 1e-3 * k), z + rng.normal(0.0, 10e-6, len(x))]))
+    points = np.concatenate(rows)
+    trace = Trace(1e-2 * np.arange(len(points)), points, np.repeat(np.arange(3), len(x)), tip)
+    base = fit_base(trace)
+    detections = detect(trace, base)
+    found = assemble(detections, trace, base)
+    (bar,) = refine_all(found, trace, 1, base=base, noise=detections.noise, confirm=None)
+    assert bar.kind == "ridge" and bar.length.censored
+    assert bar.width.low < 2.0 * half < bar.width.high
+    assert np.ptp(bar.axis[:, 1]) > 5.0 * np.ptp(bar.axis[:, 0])
