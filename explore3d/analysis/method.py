@@ -590,11 +590,12 @@ def standing_told(work: Work, share: Share) -> None:
         felt = work.base.kind != "mesh" and not work.log.detections
         found = [asdict(each) for each in left_standing(work.laid)] if felt else []
     found = [bend for bend in found if not any(_accounts_for(each, bend) for each in work.features)]
+    beside = list[Feature]()
     for feature in work.features:
         for note in (note for note in feature.notes if note.startswith(RUNS_ALONG)):
             at = place_text(feature.axis.mean(axis=0), work.trace.tip_radius)
             work.stages.left_out.append(LeftOut(ABSORBED, f"the {feature.kind} at {at} {note}"))
-    beside = () if work.along is None else work.along.features
+            beside.append(feature)
     for level in unclimbed_levels(work.laid):
         told = any(_stands_between(each, level, work.trace.tip_radius) for each in work.features)
         if not told and not any(_climbs_at(each, level, work.trace.tip_radius) for each in beside):

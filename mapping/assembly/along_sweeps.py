@@ -32,8 +32,8 @@ MAD_EFFICIENCY = 0.37
 CHORDS_ALIKE, LENGTHS_ALIKE = 0.99, 1.2
 # Of the standard deviation of a mean that of a median is, of Gaussian values
 MEDIAN_SD = 1.2533
-# Sweeps at one level, at least, of what has a flat top
-FEWEST_ON_TOP = 3
+# Sweeps at one level, at least, of what may have a flat top
+FEWEST_ON_TOP = 2
 # Sweeps more than half-way off, at least: a single one may have been put off by the instrument. Of plates of 31 and of
 # 100 sweeps whose offsets are Student's t of 3 degrees, 0.022 and 0.21 had a line with 1
 FEWEST_OFF = 2
