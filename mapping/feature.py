@@ -203,6 +203,7 @@ class Details:
         taper, bottom: of a hollow whose walls run out without an edge (1, and the depth that they lead to, m); scale is
             then its half width at half of that.
         top, run, shoulder: width of a flat top, and the run of each flank beside it or the radius of its edges, m.
+        end_rounding: of the ends of a line with a flat top or bottom, in plan: 0 square, 1 a half circle.
         misfit: in which way no family of its kind fits it, in words.
         axis_sd: (K,) standard deviation of the axis across itself, at even steps along it, m.
         end_intervals: (2, 2) 90 % interval of the first and the last end along the axis, m, from where it is stated.
@@ -222,6 +223,7 @@ class Details:
     top: float | None = None
     run: float | None = None
     shoulder: float | None = None
+    end_rounding: float | None = None
     misfit: str | None = None
     axis_sd: FloatArray | None = None
     end_intervals: FloatArray | None = None

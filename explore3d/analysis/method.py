@@ -23,7 +23,16 @@ from explore3d.analysis.truth import TrueFeature
 from explore3d.log import Log, stop_of
 from explore3d.scene import AnalysisSettings, Scene
 from mapping import Dropped, EnvelopeError, Feature, LeftOut, Trace, length_text, place_text
-from mapping.assembly import Inspections, assemble, inspected_for, why_none_sought, without_wide
+from mapping.assembly import (
+    RUNS_ALONG,
+    AlongSweeps,
+    Inspections,
+    along_sweeps,
+    assemble,
+    inspected_for,
+    why_none_sought,
+    without_wide,
+)
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
 from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
 from mapping.detection.path import (
@@ -113,6 +122,7 @@ class Work:
         detections: crossings, noise, detection limit.
         features: as they are known by now.
         dropped: what was detected and is no feature.
+        along: lines that run along the sweeps, and what they are fitted to; None if there are none.
         inspections: the heights of the trace that the features were assembled from.
         sound: the trace under sound sweep numbers; None for a log that was searched while it was read.
         path: what became of the recorded path.
@@ -144,6 +154,7 @@ class Work:
     curvature: Curvature | None = None
     account: SurfaceAccount | None = None
     judgements: tuple[Judgement, ...] = ()
+    along: AlongSweeps | None = None
     inspections: Inspections | None = None
     sound: SoundSweeps | None = None
     path: PathLedger | None = None
@@ -487,6 +498,14 @@ def assembled(work: Work, share: Share) -> None:
     )
 
 
+def sought_along(work: Work, share: Share) -> None:
+    """Lines that run along the sweeps of a raster, which none of them crosses; a given model takes what is off of each
+    sweep for drift, and a log that was searched while it was read has been thinned out."""
+    if work.base.kind not in ("mesh", "profile") and not work.log.detections:
+        rate = work.settings.false_alarms_per_metre
+        work.along = along_sweeps(work.laid, work.detections, rate)
+
+
 def tip_asked_of_lines(work: Work, share: Share) -> None:
     """The radius of the tip, held against all crossings of a ridge together: noise hides little of so many."""
     if work.sound is not None and work.refuted_tip is None:
@@ -497,7 +516,7 @@ def tip_asked_of_lines(work: Work, share: Share) -> None:
 
 def why_no_posterior(work: Work) -> str:
     """Nothing found needs none."""
-    return "" if work.features else "no feature was found, so no chain was run"
+    return "" if work.features or work.along is not None else "no feature was found, so no chain was run"
 
 
 def refined_all(work: Work, share: Share) -> None:
@@ -512,6 +531,17 @@ def refined_all(work: Work, share: Share) -> None:
         confirm=work.stages.is_forced("long chain") or (None if work.stages.quick else False),
         progress=share,
     )
+    if work.along is not None:
+        beside = refine_all(
+            work.along.features,
+            work.along.trace,
+            work.settings.seed,
+            base=work.base,
+            noise=work.along.noise,
+            tip_sd=work.settings.tip_sd,
+            confirm=None if work.stages.quick else False,
+        )
+        work.features = (*work.features, *beside)
 
 
 def why_no_chain(work: Work) -> str | None:
@@ -560,8 +590,15 @@ def standing_told(work: Work, share: Share) -> None:
         felt = work.base.kind != "mesh" and not work.log.detections
         found = [asdict(each) for each in left_standing(work.laid)] if felt else []
     found = [bend for bend in found if not any(_accounts_for(each, bend) for each in work.features)]
+    beside = list[Feature]()
+    for feature in work.features:
+        for note in (note for note in feature.notes if note.startswith(RUNS_ALONG)):
+            at = place_text(feature.axis.mean(axis=0), work.trace.tip_radius)
+            work.stages.left_out.append(LeftOut(ABSORBED, f"the {feature.kind} at {at} {note}"))
+            beside.append(feature)
     for level in unclimbed_levels(work.laid):
-        if not any(_stands_between(each, level, work.trace.tip_radius) for each in work.features):
+        told = any(_stands_between(each, level, work.trace.tip_radius) for each in work.features)
+        if not told and not any(_climbs_at(each, level, work.trace.tip_radius) for each in beside):
             work.stages.left_out.append(LeftOut(ABSORBED, _unclimbed_text(level)))
     for bend in found[:MOST_STANDING]:
         seen = f" in {count_text(bend['sweeps'], 'sweep')}" if "sweeps" in bend else ""
@@ -586,6 +623,13 @@ def _stands_between(feature: Feature, level: UnclimbedLevel, tip_radius: float) 
     # the sweeps' centres are a radius above the body
     near = float(distances(level.place[None], feature.axis)[0]) < level.apart + 2.0 * tip_radius
     return kind_of(feature).sided and as_high and near
+
+
+def _climbs_at(feature: Feature, level: UnclimbedLevel, tip_radius: float) -> bool:
+    """True of a line along the sweeps if one of its walls stands between the two sweeps."""
+    rolled = float(np.sqrt(2.0 * tip_radius * abs(feature.height.median)))
+    feet = level.place[None] - tip_radius * feature.normals[:1]
+    return bool(distances(feet, feature.axis)[0] < 0.5 * feature.width.high + rolled + level.apart)
 
 
 def _accounts_for(feature: Feature, bend: dict[str, Any]) -> bool:

@@ -5,6 +5,11 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from mapping.assembly.along_sweeps import (
+        RUNS_ALONG as RUNS_ALONG,
+        AlongSweeps as AlongSweeps,
+        along_sweeps as along_sweeps,
+    )
     from mapping.assembly.assemble import (
         assemble as assemble,
         inspected_for as inspected_for,
@@ -16,6 +21,7 @@ if TYPE_CHECKING:
     from mapping.assembly.linking.inspection import Inspections as Inspections
 
 _PUBLIC = {
+    "along_sweeps": ("RUNS_ALONG", "AlongSweeps", "along_sweeps"),
     "assemble": ("assemble", "inspected_for", "place_spacing"),
     "faint_features": ("why_none_sought", "with_faint_lines"),
     "faint_lines": ("load_faint_kernel",),

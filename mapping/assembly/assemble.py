@@ -15,6 +15,7 @@ from mapping.assembly.free import free_sections, free_spot
 from mapping.assembly.free_lines import free_lines, lies_on
 from mapping.assembly.lines import Around, line_features
 from mapping.assembly.linking import Inspection, Inspections, groups
+from mapping.assembly.plateaus import across_sweeps, plateau_features
 from mapping.assembly.points import outline, point_feature
 from mapping.assembly.runs import along, split_runs, told_crests
 from mapping.base import Base, LaidTrace
@@ -72,14 +73,21 @@ def assemble(
         return _of_profile(detections, laid)
     inspections = inspections or inspected_for(detections, laid, base, spacing=spacing, faint=faint)
     spacing = place_spacing(crossings, trace.tip_radius) if spacing is None and crossings else spacing
-    wide = list[Feature]()
+    wide, flat = list[Feature](), list[Feature]()
+    if spacing is not None and crossings:
+        plain = Around(inspections.at(spacing), base, detections, trace.tip_radius)
+        flat, crossings = plateau_features(crossings, plain)
+        detections = replace(detections, crossings=crossings)
     if base.kind != "mesh":  # a given base that is off is no detail, however wide
         sections, upon, rest = free_sections(detections, laid)
+        sections = [section for section in sections if not any(lies_on(section.crossing, each) for each in flat)]
         wide, slanted = free_lines(sections, detections, laid)
         fine = [*rest, *upon, *(crossing for section in slanted for crossing in section.inside)]
         crossings = tuple(c for c in fine if not any(lies_on(c, feature) for feature in wide))
         detections = replace(detections, crossings=crossings)
-    features = [] if spacing is None or not crossings else _linked(detections, laid, inspections.at(spacing))
+    features = (
+        [*flat, *_linked(detections, laid, inspections.at(spacing))] if spacing is not None and crossings else flat
+    )
     if features and spacing is not None and proposals:
         places = _places(inspections.at(spacing))
         around = Surroundings(laid, base, detections.noise.rounded(laid.resolution))
@@ -154,8 +162,9 @@ def _crests_and_steps(
     runs, steps = split_runs([c for c in crossings if c not in crests and comes_down(c, fine)])
     edges = [c for run in runs for c in (run.first, run.last)] + steps
     pitch = around.inspection.pitch
+    banded = across_sweeps([c for run in runs for c in (run.first, run.last)], around)
     for run in runs:
-        if run.is_band(edges, pitch, around.tip_radius):
+        if id(run.first) in banded or run.is_band(edges, pitch, around.tip_radius):
             steps += [run.first, run.last]
         else:
             crests += _on_crest(run.points(max(min(pitch, run.length), scale), around.base, around.tip_radius), around)

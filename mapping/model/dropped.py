@@ -51,6 +51,7 @@ def dropped_crossings(
     accounted = np.zeros(len(points), dtype=bool)
     own = np.array([crossing.half_width for crossing in crossings])
     begin, end = (np.array([getattr(crossing, name) for crossing in crossings]) for name in ("start", "stop"))
+    steps = np.array([crossing.is_step for crossing in crossings])
     sweeps = np.array([crossing.sweep for crossing in crossings])
     for number, feature in enumerate(features):
         apart = distances(points, feature.axis)
@@ -65,7 +66,9 @@ def dropped_crossings(
             if not kind_of(feature).sided:  # what a step leaves goes on to wherever its level does
                 beside = np.flatnonzero(~accounted)
                 left = feature_trace(feature, points[beside], normals[beside], tip_radius)
-                accounted[beside] = left * np.sign(height[beside]) > MOST * np.abs(height[beside])
+                # of a step the sign says which side it was fitted from, not which way the detail goes
+                sign = np.where(steps[beside], np.sign(left), np.sign(height[beside]))
+                accounted[beside] = left * sign > MOST * np.abs(height[beside])
         nearest, away = np.where(apart < away, number, nearest), np.minimum(apart, away)
     return tuple(
         Dropped(

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     )
     from mapping.assembly.linking.linking import (
         FELT_REACH as FELT_REACH,
+        HEIGHT_RATIO as HEIGHT_RATIO,
         LONGEST_LINK as LONGEST_LINK,
         between as between,
         groups as groups,
@@ -30,6 +31,6 @@ _PUBLIC = {
     "branches": ("Branch", "branches", "main_line", "rejoined"),
     "inspection": ("Inspection", "Inspections"),
     "line_ends": ("LineEnd", "closes", "ended_length", "line_end"),
-    "linking": ("FELT_REACH", "LONGEST_LINK", "between", "groups", "uphill"),
+    "linking": ("FELT_REACH", "HEIGHT_RATIO", "LONGEST_LINK", "between", "groups", "uphill"),
 }
 doorway(__name__, _PUBLIC)

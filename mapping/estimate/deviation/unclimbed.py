@@ -42,11 +42,12 @@ def unclimbed_levels(trace: LaidTrace) -> list[UnclimbedLevel]:
     for (one, here), (other, there) in itertools.pairwise(rows):
         if here == there:
             continue
-        # neighbours that all differ stand on the arc of one edge
-        if begun is None or found[-1].behind != one.number:
+        by = float(levels[there] - levels[here])
+        # neighbours that all differ, one way, stand on the arc of one edge
+        if begun is None or found[-1].behind != one.number or climbed * by < 0.0:
             begun, climbed = one, 0.0
             found.append(UnclimbedLevel(0.0, one.number, one.number, _middle(one), 0.0))
-        climbed += float(levels[there] - levels[here])
+        climbed += by
         first, last = _middle(begun), _middle(other)
         apart = float(np.linalg.norm(last - first))
         found[-1] = UnclimbedLevel(climbed, begun.number, other.number, 0.5 * (first + last), apart)

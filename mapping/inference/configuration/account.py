@@ -12,7 +12,7 @@ from mapping import Feature, MappingError, Posterior, Support
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference import describe
-from mapping.inference.configuration.configuration import Configuration, fitted, part_of
+from mapping.inference.configuration.configuration import Configuration, Part, as_bar, fitted, part_of
 from mapping.inference.configuration.joined_shape import OneOfMany
 from mapping.inference.configuration.neighbourhood import (
     NEIGHBOURHOOD_REACH,
@@ -115,7 +115,7 @@ def _improved(
         return group, None
     place = _holding(block.beside, place)
     try:
-        parts = [part_of(feature, place) for feature in group]
+        parts = [_begun(feature, place) for feature in group]
         start = fitted(parts, place)
     except MappingError:  # a feature over whose axis the base does not go on has no family here
         return group, None
@@ -146,6 +146,12 @@ def _explains(best: Configuration, spot: Feature) -> bool:
     near = away < best.place.half_width
     height = spot.height.median
     return bool(near.any() and best.fits and (best.template[near] / height).max() > MOST_OF_A_SPOT)
+
+
+def _begun(feature: Feature, place: Neighbourhood) -> Part:
+    """The part of a feature, in the family that it was proposed in."""
+    part, top = part_of(feature, place), feature.details.top
+    return as_bar(part, place, top) if top and isinstance(part.shape, RidgeShape) else part
 
 
 def _holding(beside: Sequence[Feature], place: Neighbourhood) -> Neighbourhood:

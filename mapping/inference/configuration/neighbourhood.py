@@ -13,7 +13,7 @@ from mapping.base import over_levels
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference.configuration.joined_shape import JoinedShape
-from mapping.inference.families import Surroundings, tells_of_line
+from mapping.inference.families import Sizes, Surroundings, tells_of_line
 from mapping.inference.kinds import kind_of, sizes_of
 from mapping.inference.likelihood import Likelihood, Nuisance, Shape, Window, build_likelihood
 from mapping.instrument import Noise
@@ -30,6 +30,9 @@ NEIGHBOURHOOD_REACH = 2.0
 PARTS_OF_BIN = 3
 # Places that can tell a feature from another: what the smallest has parameters
 FEWEST_PLACES = 8
+# Share of its height by which a detail may differ from the level that it is: the next one is at least twice the noise
+# away (see mapping.base.terraces), and what is half as high has a wall of its own
+SAME_LEVEL = 0.25
 # Faces whose normals differ by less are one plane
 SAME_PLANE = 1e-9
 
@@ -105,7 +108,9 @@ def neighbourhood(
         near |= distances(places.points, axis) < NEIGHBOURHOOD_REACH * width
     near &= ~_ended(features, widths, places)
     near &= places.samples > 0
-    parts_levels = len(places.stepped) > 0 and any(goes_on(feature) for feature in features)
+    parts_levels = len(places.stepped) > 0 and any(
+        goes_on(feature) or _is_level(feature, size, around) for feature, size in zip(features, sizes, strict=True)
+    )
     if parts_levels:  # an edge between two levels is nothing to one who stands on both
         places = replace(places, height=places.stepped)
     if near.sum() < FEWEST_PLACES:
@@ -150,6 +155,14 @@ def _ended(features: Sequence[Feature], widths: Sequence[float], places: Places)
 def goes_on(feature: Feature) -> bool:
     """True of a line that has no ends of its own, as an edge between two levels."""
     return kind_of(feature).line and not kind_of(feature).has_ends
+
+
+def _is_level(feature: Feature, size: Sizes, around: Surroundings) -> bool:
+    """True of a hollow or ridge whose bottom or top one of the base's levels is: as high, and wider than what the ball
+    rounds off beside its walls."""
+    rounded = 2.0 * float(np.sqrt(2.0 * around.trace.tip_radius * size.height))
+    apart = np.abs(np.delete(around.base.levels, 0) - feature.height.median)
+    return feature.width.low > rounded and bool((apart < SAME_LEVEL * size.height).any())
 
 
 def thin_half_width(crossing: Crossing, tip: float) -> float:

@@ -29,6 +29,9 @@ SKIRTS = (0.3, 0.8)
 ON_LINE = 0.35
 # Half of a line that may be meant instead of a point, in half-widths of its disturbance
 SHORT_LINE = 0.3
+# A line no longer than that, in half-widths of its disturbance, may be a point: twice that is as long as it is wide,
+# and its ends are known to a tenth of that at least
+AS_WIDE = 2.2
 # Two points that may be meant instead of one lie so many of its half-widths to either side
 POINTS_APART = 0.3
 # A course whose ends lie no farther apart than this share of its length may be closed: three quarters of a circle's are
@@ -217,7 +220,7 @@ def other_kinds(now: Configuration) -> Iterator[Parts]:
         if kind.sided or not kind.made_of:
             continue
         other, axis = kind_made_of(kind.made_of, line=not kind.line), axis_of(part)
-        if kind.line and float(arclengths(axis)[-1]) < 2.0 * half:
+        if kind.line and float(arclengths(axis)[-1]) < AS_WIDE * half:
             point = replace(part.feature, kind=other.name, axis=axis[[len(axis) // 2]],
                             normals=part.feature.normals[:1])  # fmt: skip
             yield [*rest, part_of(_plainly(point), now.place)]

@@ -126,7 +126,10 @@ class PosteriorProblem:
 def window_for(crest: FloatArray, sizes: Sizes, around: Surroundings) -> Window:
     """The bins near a crest polyline (K, 3) on the base, lifted by the caller to the ball's centre, m."""
     width = sizes.half_width / WINDOW_BINS_PER_HALF_WIDTH
-    reach = WINDOW_REACH * sizes.half_width + 2.0 * sizes.position_sd
+    # beside a wide detail the base is told within as much as beside a thin one of its height: what stands farther off
+    # is another's
+    thin = float((2.0 * around.trace.tip_radius * sizes.height) ** 0.5)
+    reach = min(WINDOW_REACH * sizes.half_width, sizes.half_width + WINDOW_REACH * thin) + 2.0 * sizes.position_sd
     samples = gather(around.trace, around.base, crest, reach)
     precise = around.noise.sd <= PRECISE * sizes.height
     most, smooth_over = (2 * MOST_BINS, 0.0) if precise else (MOST_BINS, sizes.half_width)

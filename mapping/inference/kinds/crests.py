@@ -7,9 +7,10 @@ import itertools
 import numpy as np
 
 from mapping import Feature, FloatArray, Interval
+from mapping.geometry.mesh import nearest_on
 from mapping.geometry.proxy import Bar, Chain, Part
 from mapping.geometry.templates import chain_height, contact_half_width, radius_of_cap, width_of_cap
-from mapping.inference.families import bell_section, width_at_half_height
+from mapping.inference.families import bell_section, rounding_of, width_at_half_height
 from mapping.inference.kinds.kind import Kind, Section
 from mapping.inference.likelihood import Shape
 
@@ -68,6 +69,13 @@ def bell_said(draws: FloatArray) -> Section:
     return Section(Interval.from_draws(draws[:, -3]), width, bell, RUNS_OUT)
 
 
+def rounding_said(shape: Shape, draws: FloatArray) -> dict[str, float | None]:
+    """What draws (S, P) say of the ends of a line with a flat top or bottom."""
+    if "end rounding" not in shape.names:
+        return {}
+    return {"end_rounding": float(np.median(rounding_of(draws[:, shape.names.index("end rounding")])))}
+
+
 def is_flat_topped(feature: Feature) -> bool:
     """True of a line whose section has straight flanks, with a flat top or none, or a flat top with round edges."""
     _, run, shoulder = _flat_parts(feature)
@@ -92,13 +100,18 @@ def _flat_topped(feature: Feature, feet: FloatArray, tip_radius: float) -> Float
     """(N,) heights of a line with a flat top and straight flanks, m."""
     from mapping.geometry.templates import section_heights
 
-    away = axis_distance(feet, feature.axis)[:, None]
+    rounding, ends = feature.details.end_rounding, np.array([[-1e300, 1e300]])
+    if rounding is None or feature.closed:
+        away, rounding = axis_distance(feet, feature.axis)[:, None], 0.0
+        along = np.zeros_like(away)
+    else:
+        along, away = (each[:, None] for each in along_and_aside(feet, feature.axis))
+        ends = np.array([[0.0, feature.length.median]])
     top, run, shoulder = (each or 0.0 for each in _flat_parts(feature))
     across, up = np.array([[0.5 * top, 0.5 * top + run]]), np.array([[feature.height.median, 0.0]])
-    nowhere, endless = np.zeros_like(away), np.array([[-1e300, 1e300]])
-    out = np.empty((1, len(feet)))
-    section_heights(nowhere, away, np.zeros((2, 0, *away.shape)), nowhere, nowhere, np.zeros((1, 0)), endless,
-                    np.zeros(1), across, up, np.array([shoulder]), tip_radius, out)  # fmt: skip
+    flat, out = np.zeros_like(away), np.empty((1, len(feet)))
+    section_heights(along, away, np.zeros((2, 0, *away.shape)), flat, flat, np.zeros((1, 0)), ends,
+                    np.array([0.5 * top * rounding]), across, up, np.array([shoulder]), tip_radius, out)  # fmt: skip
     return np.asarray(out[0])
 
 
@@ -112,6 +125,18 @@ def _bell(feature: Feature, feet: FloatArray, tip_radius: float) -> FloatArray:
     section, out = [np.array([each]) for each in known], np.empty((1, len(feet)))
     smooth_point_heights(away, np.zeros_like(away), np.zeros(2), np.zeros((1, 2)), *section, tip_radius, out)
     return np.asarray(out[0])
+
+
+def along_and_aside(points: FloatArray, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(N,) places of points along a polyline (K, 3) from its beginning, which goes on straight at both ends, and their
+    distances from it, m."""
+    far = float(np.linalg.norm(points - axis[0], axis=1).max(initial=0.0)) + float(np.ptp(axis, axis=0).sum())
+    before, behind = axis[0] - axis[1], axis[-1] - axis[-2]
+    longer = np.vstack([
+        axis[0] + far * before / np.linalg.norm(before), axis, axis[-1] + far * behind / np.linalg.norm(behind)
+    ])  # fmt: skip
+    on, along = nearest_on(points, longer)
+    return along - far, np.linalg.norm(points - on, axis=1)
 
 
 def axis_distance(points: FloatArray, axis: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ from mapping.inference.families import (
     smooth_beginnings,
     smooth_groove_beside,
 )
-from mapping.inference.kinds.hollows import Hollow
+from mapping.inference.kinds.hollows import Hollow, within_ends
 from mapping.inference.kinds.lines import ROUNDING_OF_ENDS, LineKind, Parameters, Traced
 from mapping.inference.kinds.posterior_density import hollow_priors
 
@@ -48,9 +48,7 @@ class Groove(Hollow, LineKind):
         s, lateral, _ = shape.chart.coordinates(feet)
         x = lateral - shape.modes.lateral(truth[None, : shape.modes.count], s)[0]
         along, across = np.minimum(s - truth[-4], truth[-3] - s), 0.5 * np.exp(truth[-2]) - np.abs(x)
-        radius = 0.5 * np.exp(truth[-2]) * rounding_of(truth[-5])
-        corner = radius - np.hypot(np.maximum(radius - along, 0.0), np.maximum(radius - across, 0.0))
-        inside = np.where((along < radius) & (across < radius), corner, np.minimum(along, across))
+        inside = within_ends(along, across, 0.5 * float(np.exp(truth[-2])) * float(rounding_of(truth[-5])))
         return rim_height(inside, shape.tip_radius, np.exp(truth[-1]))
 
 

@@ -8,7 +8,7 @@ from mapping import Feature, FloatArray, Interval
 from mapping.geometry.proxy import Part, Trench
 from mapping.geometry.templates import rim_height
 from mapping.inference.families import Sizes, SmoothGrooveShape, SmoothPitShape, smooth_section
-from mapping.inference.kinds.crests import axis_distance
+from mapping.inference.kinds.crests import along_and_aside, axis_distance, rounding_said
 from mapping.inference.kinds.kind import Kind, Section, place_sd, preliminary
 from mapping.inference.likelihood import Shape
 
@@ -32,12 +32,12 @@ class Hollow(Kind):
 
     def trace(self, feature: Feature, feet: FloatArray, normals: FloatArray, tip_radius: float) -> FloatArray:
         """(N,) heights of the ball that rests on the nearer rim or on the bottom, m; see `Kind.trace`."""
-        height, width = feature.height.median, max(feature.width.median, 1e-12)
+        height = feature.height.median
         if height >= 0.0:
             return np.zeros(len(feet))
         if feature.details.taper is not None:
             return _smooth(feature, axis_distance(feet, feature.axis), tip_radius)
-        return rim_height(0.5 * width - axis_distance(feet, feature.axis), tip_radius, -height)
+        return rim_height(_inside(feet, feature), tip_radius, -height)
 
     def part(self, feature: Feature, exaggeration: float = 1.0) -> Part | None:
         """The trench; None of one that is not hollow. Where the bottom was not felt, it is as deep as the ball sank."""
@@ -51,7 +51,22 @@ class Hollow(Kind):
         width, depth = np.exp(draws[:, -2]), np.exp(draws[:, -1])
         tip = shape.tip_radius  # type: ignore[attr-defined]
         height = _depth(depth, np.minimum(-rim_height(0.5 * width, tip), depth))
-        return Section(height, Interval.from_draws(width), {}, _remark(height))
+        return Section(height, Interval.from_draws(width), rounding_said(shape, draws), _remark(height))
+
+
+def _inside(feet: FloatArray, feature: Feature) -> FloatArray:
+    """(N,) distances from the rim of a mouth, positive within it, m."""
+    half, rounding = 0.5 * max(feature.width.median, 1e-12), feature.details.end_rounding
+    if rounding is None or len(feature.axis) < 2 or feature.closed:
+        return np.asarray(half - axis_distance(feet, feature.axis))
+    along, aside = along_and_aside(feet, feature.axis)
+    return within_ends(np.minimum(along, feature.length.median - along), half - aside, rounding * half)
+
+
+def within_ends(along: FloatArray, across: FloatArray, radius: float) -> FloatArray:
+    """(N,) distances from a rim whose corners are arcs of a radius, of places so far from its end and from its side."""
+    corner = radius - np.hypot(np.maximum(radius - along, 0.0), np.maximum(radius - across, 0.0))
+    return np.where((along < radius) & (across < radius), corner, np.minimum(along, across))
 
 
 def _smooth_section(shape: SmoothGrooveShape | SmoothPitShape, draws: FloatArray) -> Section:

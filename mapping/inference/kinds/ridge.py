@@ -26,7 +26,7 @@ from mapping.inference.families import (
     touched_widths,
     trapezoid_beside,
 )
-from mapping.inference.kinds.crests import BEGUN_TAPERS, Crest, bell_said
+from mapping.inference.kinds.crests import BEGUN_TAPERS, Crest, bell_said, rounding_said
 from mapping.inference.kinds.kind import Section
 from mapping.inference.kinds.lines import ROUNDING_OF_ENDS, SQUARE_OR_ROUND, LineKind, Parameters, Traced, ended
 from mapping.inference.kinds.posterior_density import height_prior, radius_prior
@@ -35,6 +35,8 @@ from mapping.inference.likelihood import Shape
 # Widths of a flat top and runs of a flank, in half-widths of the disturbance, from which their optimum is searched:
 # upright and gentle flanks, tops that are hardly felt and such as fill the disturbance
 FLAT_STARTS = ((0.3, 0.02), (1.0, 0.02), (0.1, 0.6))
+# Run of an upright flank
+UPRIGHT_RUN = 0.02
 ROOF_STARTS = ((0.02,), (0.6,))
 SHOULDER_STARTS = ((0.3, 0.05), (1.0, 0.05))
 # Half widths of a section that runs out, in half-widths of the disturbance, of which the best begins the search for its
@@ -80,6 +82,9 @@ class Ridge(Crest, LineKind):
             kept = np.delete(optimum, [course, last] if shape.roof and not ridge.chart.closed else [last])
             begun = np.log(problem.sizes.half_width * np.array(parts))
             beginnings = np.column_stack([np.tile(kept, (len(parts), 1)), begun])
+            if (top := problem.feature.details.top) and not shape.roof:  # a round one is no guide to it
+                as_detected = np.append(ridge.start[:last], np.log([top, UPRIGHT_RUN * problem.sizes.half_width]))
+                beginnings = np.vstack([beginnings, as_detected])
             alike = [ended(beginnings, shape.names, turn) for turn in SQUARE_OR_ROUND]
             beginnings = np.concatenate(alike) if len(alike[0]) else beginnings
             posed.append(replace(problem, target=replace(problem.target, shape=shape), beginnings=beginnings))
@@ -94,6 +99,7 @@ class Ridge(Crest, LineKind):
         height, top, run = shape.parts(draws)
         flank = "shoulder" if isinstance(shape, ShoulderedShape) else "run"
         parts = {"top": float(np.median(top)), flank: float(np.median(run)), "radius": None}
+        parts |= rounding_said(shape, draws)
         foot = top + (width_of_cap(height, run) if flank == "shoulder" else 2.0 * run)
         return Section(Interval.from_draws(height), Interval.from_draws(foot), parts)
 

@@ -20,3 +20,21 @@ def test_what_became_a_feature_is_not_told_as_left_standing_too(tmp_path: Path) 
     assert sorted(round(1e3 * feature.axis[0, 0]) for feature in found.model.features) == [4, 15]
     (told,) = (each.reason for each in found.left_out if each.stage == ABSORBED)
     assert told.startswith("a hollow") and " at (9.0" in told
+
+
+def test_a_slot_along_the_rows_is_a_feature_that_says_so_and_no_step_beside_it(tmp_path: Path) -> None:
+    tip, rng = 3e-3, np.random.default_rng(5)
+    x = np.arange(0.0, 40e-3, 0.2e-3)
+    rows = []
+    for k in range(31):
+        y = 1e-3 * k
+        inside = np.clip(3.25e-3 - abs(y - 15.2e-3), 0.0, tip)
+        z = tip - min(tip - np.sqrt(tip**2 - inside**2), 0.3e-3) + rng.normal(0.0, 10e-6, len(x))
+        rows.append(np.column_stack([x, np.full(len(x), y), z, np.full(len(x), k)]))
+    table = np.concatenate(rows) * [1e3, 1e3, 1e3, 1.0]
+    np.savetxt(tmp_path / "scan.csv", table, delimiter=",", header="x [mm],y [mm],z [mm],sweep", comments="")
+    found = analyze(tmp_path / "scan.csv", tip_radius="3 mm", quick=True)
+    (slot,) = found.model.features
+    assert slot.kind == "groove" and abs(slot.width.median - 6.5e-3) < 40e-6
+    (told,) = (each.reason for each in found.left_out if each.stage == ABSORBED)
+    assert told.startswith("the groove at (") and "runs along the sweeps" in told

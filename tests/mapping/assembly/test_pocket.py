@@ -1,4 +1,4 @@
-"""The walls of a pocket and of a boss under a raster: a step ends where another wall begins."""
+"""The walls of a pocket and of a boss under a raster: together they are one hollow or ridge."""
 
 from __future__ import annotations
 
@@ -37,15 +37,63 @@ def felt(inside_is_high: bool, pitch: float) -> Trace:
 
 @pytest.mark.parametrize("inside_is_high", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("pitch", [1e-3, pytest.param(0.5e-3, marks=pytest.mark.slow)])
-def test_two_walls_are_steps_of_its_depth_and_nothing_else_is_there(inside_is_high, pitch):
+def test_all_four_walls_are_those_of_one_feature(inside_is_high, pitch):
     trace = felt(inside_is_high, pitch)
     base = fit_base(trace)
     detections = detect(trace, base)
     found = assemble(detections, trace, base)
+    (feature,) = refine_all(found, trace, 1, base=base, noise=detections.noise, confirm=None)
+    assert feature.kind == ("ridge" if inside_is_high else "groove")
+    assert abs(abs(feature.height.median) - DEPTH) < 2e-6
+    assert abs(feature.length.median - 2.0 * HALF[0]) < 60e-6
+    assert np.abs(feature.axis[:, 1]).max() < 60e-6
+    touched = feature.details.top if inside_is_high else feature.width.median
+    assert abs(touched - 2.0 * HALF[1]) < 60e-6
+
+
+def test_a_plateau_that_goes_on_beyond_the_rows_keeps_its_two_steps():
+    whole = felt(False, 1e-3)
+    trace = whole.select(np.abs(whole.centers[:, 1]) < HALF[1] - TIP)
+    base = fit_base(trace)
+    kinds = [feature.kind for feature in assemble(detect(trace, base), trace, base)]
+    assert kinds == ["step", "step"]
+
+
+@pytest.mark.slow
+def test_a_pocket_beside_another_is_no_part_of_it():
+    """What a neighbour's hollow leaves in the window is the neighbour's."""
+    whole = felt(False, 1e-3)
+    beside = whole.centers.copy()
+    beside[:, 0] += 0.024
+    both = np.concatenate([whole.centers, beside])
+    row = np.concatenate([whole.sweep, whole.sweep])
+    order = np.lexsort((both[:, 0], row))
+    trace = Trace(1e-2 * np.arange(len(both)), both[order], row[order], TIP)
+    base = fit_base(trace)
+    detections = detect(trace, base)
+    found = assemble(detections, trace, base)
     features = refine_all(found, trace, 1, base=base, noise=detections.noise, confirm=None)
-    assert [feature.kind for feature in features] == ["step", "step"]
+    assert [feature.kind for feature in features] == ["groove", "groove"]
     for feature in features:
-        assert feature.height.low <= DEPTH <= feature.height.high
-        assert abs(np.abs(feature.axis[:, 0]).mean() - HALF[0]) < 20e-6
-        assert feature.length.censored
-        assert 2.0 * (HALF[1] - TIP) < feature.length.median < 2.0 * (HALF[1] + TIP)
+        assert abs(feature.width.median - 2.0 * HALF[1]) < 0.15e-3
+        assert abs(feature.length.median - 2.0 * HALF[0]) < 0.15e-3
+
+
+def test_a_bar_across_three_rows_runs_across_them():
+    half, high, tip = 1e-3, 0.4e-3, 3e-3
+    x = np.arange(0.0, 40e-3, 0.1e-3)
+    rng = np.random.default_rng(10)
+    rows = []
+    for k in range(3):
+        away = np.maximum(np.abs(x - 20e-3) - half, 0.0)
+        z = np.maximum(high + np.sqrt(np.maximum(tip**2 - away**2, 0.0)), tip)
+        rows.append(np.column_stack([x, np.full(len(x), 1e-3 * k), z + rng.normal(0.0, 10e-6, len(x))]))
+    points = np.concatenate(rows)
+    trace = Trace(1e-2 * np.arange(len(points)), points, np.repeat(np.arange(3), len(x)), tip)
+    base = fit_base(trace)
+    detections = detect(trace, base)
+    found = assemble(detections, trace, base)
+    (bar,) = refine_all(found, trace, 1, base=base, noise=detections.noise, confirm=None)
+    assert bar.kind == "ridge" and bar.length.censored
+    assert bar.width.low < 2.0 * half < bar.width.high
+    assert np.ptp(bar.axis[:, 1]) > 5.0 * np.ptp(bar.axis[:, 0])

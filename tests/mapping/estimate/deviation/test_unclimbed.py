@@ -42,3 +42,15 @@ def test_a_step_along_the_sweeps_is_told_once_with_its_height_and_place() -> Non
 @pytest.mark.parametrize("across, heights", [(True, (1.0, 0.0)), (False, (0.0, 0.0)), (False, (0.0, 0.05))])
 def test_a_step_that_is_climbed_and_a_plain_plate_are_not(across: bool, heights: tuple[float, float]) -> None:
     assert told(across, np.array(heights)) == []
+
+
+def test_levels_that_come_back_at_once_are_told_as_two() -> None:
+    u, rng = np.arange(0.0, 40e-3, 0.1e-3), np.random.default_rng(0)
+    rows = []
+    for k in range(LINES):
+        z = TIP - 0.2e-3 * (k in (9, 10)) + rng.normal(0.0, 5e-6, len(u))
+        rows.append(np.column_stack([u, np.full(len(u), PITCH * k), z]))
+    trace = Trace(np.arange(LINES * len(u)) * 1e-3, np.concatenate(rows), np.repeat(np.arange(LINES), len(u)), TIP)
+    laid = LaidTrace.of(trace, fit_base(trace))
+    detect(laid, laid.base)
+    assert [level.height for level in unclimbed_levels(laid)] == pytest.approx([-0.2e-3, 0.2e-3], abs=3e-6)
