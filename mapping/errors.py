@@ -45,7 +45,7 @@ class EnvelopeError(MappingError):
 
 
 class EmptyWindowError(MappingError):
-    """No sample of the trace is near the feature, or it does not lie over the base."""
+    """No sample of the trace is near the feature, or its axis does not lie over the base, or turns back on itself."""
 
 
 class CurvatureError(MappingError):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mapping import BoolArray, Feature, FloatArray, Interval, Support
+from mapping import BoolArray, Feature, FloatArray, Interval, MappingError, Support
 from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_bell, as_twin, laid, part_of
 from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, Neighbourhood
@@ -135,7 +135,11 @@ def chained(now: Configuration) -> Iterator[Parts]:
         if float(np.linalg.norm(course[-1] - course[0])) < CLOSING_GAP * float(arclengths(course)[-1]):
             courses.append(np.vstack([course, course[:1]]))
         for each, degree in itertools.product(courses, (*LOWER_DEGREES, HIGHEST_DEGREE)):
-            yield [*rest, _line(like, each, now.place, degree, degree)]
+            try:
+                line = _line(like, each, now.place, degree, degree)
+            except MappingError:  # pieces that are of no course: as smooth as that it turns back, or leaves the base
+                continue
+            yield [*rest, line]
 
 
 def _course_of(axes: list[FloatArray]) -> tuple[FloatArray, list[int]]:

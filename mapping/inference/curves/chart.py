@@ -103,7 +103,7 @@ def chart_along(
         bends: False for a trial of the course alone: the base is not asked how it bends across, and taken for flat.
 
     Raises:
-        EmptyWindowError: the line does not lie over the base.
+        EmptyWindowError: the line does not lie over the base, or turns back on itself.
     """
     closed = len(axis) > 3 and bool(np.array_equal(axis[0], axis[-1]))
     line, lift = _resampled(axis, normals, spacing)
@@ -176,7 +176,10 @@ def _tangents(points: FloatArray, closed: bool) -> FloatArray:
         along = np.concatenate([along, along[:1]])
     else:
         along = np.gradient(points, axis=0)
-    return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    if length.min() <= 1e-9 * length.max():
+        raise EmptyWindowError("its axis turns back on itself")
+    return np.asarray(along / length)
 
 
 def _bend(

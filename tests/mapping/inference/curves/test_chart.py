@@ -40,3 +40,11 @@ def test_a_line_that_does_not_lie_over_the_base_has_none() -> None:
     axis = np.linspace([0.05, 0.05, 0.0], [0.06, 0.06, 0.0], 5)
     with pytest.raises(EmptyWindowError, match="does not lie over the base"):
         chart_along(axis, np.tile(UP, (5, 1)), plate(), TIP, 1e-3, 0.01, 3.6e-3)
+
+
+def test_a_course_that_turns_back_on_itself_has_no_chart() -> None:
+    there = np.linspace(-5e-3, 5e-3, 9)
+    axis = np.zeros((17, 3))
+    axis[:, 0] = np.concatenate([there, there[-2::-1]])
+    with pytest.raises(EmptyWindowError, match="turns back"):
+        chart_along(axis, np.tile([0.0, 0.0, 1.0], (17, 1)), plate(), TIP, 1.25e-3, 0.0, 1e-3)
