@@ -89,8 +89,10 @@ class Plateau:
 def plateau_features(crossings: Sequence[Crossing], around: Around) -> tuple[list[Feature], tuple[Crossing, ...]]:
     """Hollows with a flat bottom and ridges with a flat top whose ends sweeps passed by, and the crossings that are
     parts of none."""
-    spans = [span for span in _spans(crossings) if _off_base(span, around)]
     pitch, tip = around.inspection.pitch, around.tip_radius
+    # at a wall higher than its radius the ball drops: the trace is no smooth function of where that stands, and each
+    # sweep shows it between two samples (`free_sections`)
+    spans = [span for span in _spans(crossings) if _off_base(span, around) and abs(span.height) < tip]
     plateaus, used = list[Plateau](), set[int]()
     for group in _side_by_side(spans, pitch):
         plateau = _plateau(group, around)

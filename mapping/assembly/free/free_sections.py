@@ -15,7 +15,7 @@ import numpy as np
 
 from mapping import Details, Feature, FloatArray, Interval, Support
 from mapping.assembly.free.outline import of_all_scales, overlap, times_crest
-from mapping.assembly.free.section import Section
+from mapping.assembly.free.section import FLANK, Section, flanks
 from mapping.assembly.free.sizes import SectionSizes, sizes_of_section
 from mapping.base import SHORTEST_LEVEL, LaidSweep, LaidTrace, SweepHeights
 from mapping.detection import Crossing, Detections, terraced
@@ -41,7 +41,7 @@ class FreeSection:
         log_odds: for it, on this sweep.
         times_crest: how many times as wide it was felt as a crest of no width across the sweep.
         inside: crossings that are parts of it.
-        extent: along the sweep from where it leaves the base to where it returns, m.
+        extent: of the trace along the sweep, between where the tangents of its flanks meet the base, m.
         half_extent: so far it is more than half as high, m.
         round_body: True if it is felt as far as where the body faces the other way, as no spot is.
     """
@@ -151,6 +151,7 @@ def _measured(
     sizes = sizes_of_section(section, sweep.trace.tip_radius, noise)
     if sizes is None or not np.isfinite(log_odds):
         return None
+    left, right = flanks(section, FLANK)
     around = sizes.middle + np.array([-0.5, 0.0, 0.5]) * sizes.width
     before, center, after = (np.array([np.interp(s, piece.s, one) for one in piece.centers.T]) for s in around)
     foot, way = sweep.base.foot(center[None], sweep.trace.tip_radius), after - before
@@ -178,7 +179,7 @@ def _measured(
         float(log_odds),
         times_crest(section, sweep.trace.tip_radius),
         tuple(inside),
-        float(np.ptp(place)),
+        right.foot - left.foot,
         piece.spacing * int((section.monotone > 0.5 * section.monotone.max()).sum()),
         _reaches_round(section, foot.normals[0], sweep),
     )
