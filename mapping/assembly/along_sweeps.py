@@ -22,22 +22,29 @@ from mapping.instrument import Noise, robust_sd
 
 # How the note begins that is on every such line
 RUNS_ALONG = "runs along the sweeps from end to end"
-# A scatter is told by fewer neighbours only so badly that nothing stands out of it
+# What follows was varied over 60 plates (20 slots, 20 wires, 20 bare; 15 to 44 sweeps, offsets to 8 um under noise of
+# 10 um, a ball of 3 mm; seeds 500 to 559): 17 slots and 18 wires are told, no bare plate has a line.
+#
+# A scatter is told by fewer neighbours only so badly that nothing stands out of it: at 0.01 a metre and a pitch of 1 mm
+# Student's t asks for 63 scatters of 9 sweeps, for 480 of 6, and for 7.6 of 31
 ROWS_THAT_TELL = 9
-# Parts of each sweep whose means are kept apart: a line whose height varies along it is seen to vary
+# Parts of each sweep whose means are kept apart: a line whose height varies along it is seen to vary. Of 4 parts 19
+# wires are told, of 16 parts 17, slots alike
 PARTS_OF_ROW = 8
-# A median absolute deviation tells a scatter as well as the standard deviation of this share of the values
+# A median absolute deviation tells a scatter as well as the standard deviation of this share of the values (Rousseeuw
+# and Croux, J. Am. Stat. Assoc. 88, 1993)
 MAD_EFFICIENCY = 0.37
-# Cosine of the angle between chords of sweeps that run side by side, and how much their lengths may differ
+# Cosine of the angle between chords of sweeps that run side by side, and how much their lengths may differ: 0.95 and
+# 0.999, and 1.1 and 1.5 are alike
 CHORDS_ALIKE, LENGTHS_ALIKE = 0.99, 1.2
-# Of the standard deviation of a mean that of a median is, of Gaussian values
+# Of the standard deviation of a mean that of a median is, of Gaussian values: sqrt(pi / 2)
 MEDIAN_SD = 1.2533
-# Sweeps at one level, at least, of what may have a flat top
+# Sweeps at one level, at least, of what may have a flat top: of one nothing tells a flat top from a crest
 FEWEST_ON_TOP = 2
 # Sweeps more than half-way off, at least: a single one may have been put off by the instrument. Of plates of 31 and of
 # 100 sweeps whose offsets are Student's t of 3 degrees, 0.022 and 0.21 had a line with 1
 FEWEST_OFF = 2
-# Share of a jump by which the way back may differ from it, beside the scatter
+# Share of a jump by which the way back may differ from it, beside the scatter: 0.05 and 0.2 are alike
 COMES_BACK = 0.1
 
 

@@ -19,7 +19,8 @@ from mapping.assembly.points import evidence
 from mapping.detection import Crossing
 from mapping.inference.kinds import kind_made_of
 
-# Steps up and down on one sweep that differ in height by no more than this factor bound one level
+# Steps up and down on one sweep that differ in height by no more than this factor bound one level; 1.2 and 2 are alike
+# over 8 pockets and bosses of random sizes (4 to 9 mm, 0.1 to 0.6 mm deep, rows 0.6 to 1.2 mm apart)
 ALIKE_STEPS = 1.4
 # Sweeps no further apart than so many pitches are neighbours: the next but one is 2 away
 NEXT_SWEEP = 1.5

@@ -96,7 +96,7 @@ class JoinedShape:
     @cached_property
     def _grooves(self) -> dict[int, GrooveShape]:
         """The grooves with upright walls, by their numbers."""
-        return {k: shape for k, shape in enumerate(self._all) if isinstance(shape, GrooveShape)}
+        return {k: shape for k, shape in enumerate(self._all) if type(shape) is GrooveShape}
 
     @cached_property
     def _crossing(self) -> Crossing | None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapping import Feature, FloatArray
+from mapping import EmptyWindowError, Feature, FloatArray
 from mapping.geometry.mesh import arclengths
 from mapping.inference.curves import CurveModes, chart_along
 from mapping.inference.families import GrooveShape, PosteriorProblem, Sizes, Surroundings
@@ -30,7 +30,8 @@ def pose(
         highest, lowest = np.max(traces, axis=0), np.min(traces, axis=0)
         beside = np.where(highest > 0.0, highest, lowest)
         if type(shape) is GrooveShape:
-            shape = replace(shape, crossed=tuple(_laid(other, window, around) for other in near if _is_upright(other)))
+            laid = [_laid(other, window, around) for other in near if _is_upright(other)]
+            shape = replace(shape, crossed=tuple(each for each in laid if each is not None))
     return PosteriorProblem.posed(feature, sizes, shape, window, around, beginnings, beside)
 
 
@@ -39,12 +40,16 @@ def _is_upright(other: Feature) -> bool:
     return other.kind == "groove" and other.details.taper is None and len(other.axis) > 1 and other.height.median < 0.0
 
 
-def _laid(groove: Feature, window: Window, around: Surroundings) -> tuple[GrooveShape, FloatArray]:
-    """A groove as it is known over any window, and its parameters (1, P); where the ball hangs it has no bottom."""
+def _laid(groove: Feature, window: Window, around: Surroundings) -> tuple[GrooveShape, FloatArray] | None:
+    """A groove as it is known over any window, and its parameters (1, P); where the ball hangs it has no bottom. None
+    where its axis has no chart: it must not cost the groove that it crosses its posterior."""
     tip, closed = around.trace.tip_radius, groove.closed
     spacing = float(arclengths(groove.axis)[-1]) / LEGS_OF_OTHERS
     reach = 0.5 * groove.width.median
-    chart = chart_along(groove.axis, groove.normals, around.base, tip, spacing, 0.0, reach, bends=False)
+    try:
+        chart = chart_along(groove.axis, groove.normals, around.base, tip, spacing, 0.0, reach, bends=False)
+    except EmptyWindowError:
+        return None
     ends = [] if closed else [0.0, float(chart.s[0]), float(chart.s[-1])]
     depth = tip if groove.height.censored else -groove.height.median
     known = np.array([0.0, *ends, np.log(groove.width.median), np.log(depth)])
