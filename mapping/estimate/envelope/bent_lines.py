@@ -13,9 +13,16 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mapping import Feature, FloatArray, IntArray
+from mapping import BoolArray, Feature, FloatArray, IntArray
 from mapping.base import LaidSweep, LaidTrace
-from mapping.estimate.envelope.refuted_tip import FEWEST_BENDS, RADIUS_SDS, RADIUS_STEP, REFUTED_BY_CHANCE, RefutedTip
+from mapping.estimate.envelope.refuted_tip import (
+    BEND_SDS,
+    FEWEST_BENDS,
+    RADIUS_SDS,
+    RADIUS_STEP,
+    REFUTED_BY_CHANCE,
+    RefutedTip,
+)
 from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.instrument import Noise
 
@@ -75,32 +82,37 @@ class _Crossed:
     ) -> None:
         away = sweep.trace.centers - middle
         x = away @ along
-        # the run of samples that advances through the place, no farther than the ball's own radius
-        near = np.abs(x) < sweep.trace.tip_radius
-        first = at - int(np.argmin(near[at::-1])) + 1 if not near[: at + 1].all() else 0
-        last = at + int(np.argmin(near[at:])) if not near[at:].all() else len(near)
-        self.x, self.z = x[first:last], (away @ up)[first:last]
+        first, last = _run(np.abs(x) < sweep.trace.tip_radius, at)
+        self.x, self.z, self.at = x[first:last], (away @ up)[first:last], at - first
         self.height = height
 
     def bend(self, half: float, radius: float, noise: Noise) -> tuple[float, float] | None:
         """Share of a ball's bend that the path has over a stretch, and its information; None with too few samples."""
-        inside = np.abs(self.x) <= half
-        count = int(inside.sum())
+        # a sweep that turns may come by again; noise of the places parts none
+        first, last = _run(np.abs(self.x) <= half + BEND_SDS * noise.sd, self.at)
+        inside = np.abs(self.x[first:last]) <= half
+        x, z, count = self.x[first:last][inside], self.z[first:last][inside], int(inside.sum())
         if count < FEWEST_STRETCHED:
             return None
         bins = min(BENT_BINS, count // 2)
-        row = np.minimum(((self.x[inside] / half + 1.0) * 0.5 * bins).astype(np.int64), bins - 1)
+        row = np.minimum(((x / half + 1.0) * 0.5 * bins).astype(np.int64), bins - 1)
         held = np.bincount(row, minlength=bins)
         if held.min() == 0:
             return None  # samples are missing here
-        x, z = (np.bincount(row, of[inside], bins) / held for of in (self.x, self.z))
-        arc = np.bincount(row, np.sqrt(radius**2 - self.x[inside] ** 2) - radius, bins) / held
+        arc, x, z = (np.bincount(row, of, bins) / held for of in (np.sqrt(radius**2 - x**2) - radius, x, z))
         lags = np.abs(np.subtract.outer(np.arange(bins), np.arange(bins)))
         covariance = noise.block_covariances(bins, 2.0 * half / bins, count / bins)[lags]
         columns = np.column_stack([arc, np.ones(bins), x])
         weighted = np.linalg.solve(covariance, columns)
         inverse = np.linalg.inv(columns.T @ weighted)
         return float((inverse @ (weighted.T @ z))[0]), float(1.0 / inverse[0, 0])
+
+
+def _run(within: BoolArray, at: int) -> tuple[int, int]:
+    """First, and one past the last, of the samples in a row around one that are all within."""
+    first = at - int(np.argmin(within[at::-1])) + 1 if not within[: at + 1].all() else 0
+    last = at + int(np.argmin(within[at:])) if not within[at:].all() else len(within)
+    return first, last
 
 
 def _chance(crossed: list[_Crossed], noise: Noise, radius: float) -> tuple[float, int]:
@@ -152,8 +164,9 @@ def _crossings(laid: LaidTrace, line: Feature) -> Iterator[_Crossed]:
         # noise of the places makes several of one
         for run in np.split(flips, np.flatnonzero(np.diff(flips) > FEWEST_STRETCHED) + 1) if len(flips) else []:
             k = int(run[len(run) // 2])
-            there = np.abs(np.arange(len(near)) - k) <= max(3, int((np.abs(aside) < reach).sum()) // 4)
-            first, last = np.flatnonzero(there)[[0, -1]]
+            passed = _run((np.abs(aside) < reach) & (near - np.arange(len(near)) == near[k] - k), k)
+            about = max(3, (passed[1] - passed[0]) // 4)
+            first, last = max(k - about, passed[0]), min(k + about, passed[1] - 1)
             along = centers[near[last]] - centers[near[first]]
             along -= (along @ up[k]) * up[k]
             along /= max(float(np.linalg.norm(along)), float(np.finfo(float).tiny))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from mapping import FloatArray, Surface, Trace
+from mapping import FloatArray, Interval, Surface, Trace
 from mapping.assembly import assemble
 from mapping.base import Base, LaidTrace
 from mapping.detection import detect
 from mapping.estimate.envelope import RefutedTip, refuted_by_lines, refuted_tip
 from mapping.instrument import Noise
+from tests.support.reported_wire import ridge
 
 STEP, SWEEPS, PITCH = 0.01, 8, 0.5  # in true radii of the ball
 
@@ -84,6 +87,31 @@ def test_a_doubt_that_covers_the_true_radius_leaves_it() -> None:
 
 def test_crests_of_a_few_samples_tell_nothing() -> None:
     assert asked(1.0, 0.3, 0.05, 1e-3, seed=3, step=0.25)[0] is None
+
+
+@pytest.mark.parametrize("told", [1.0, 1.5])
+def test_a_sweep_that_turns_beside_the_line_is_asked_for_one_passage(told: float) -> None:
+    """Straight over a ring around a rod, and back aslant, all under one number and within a radius of the ring."""
+    rod, height, turn, forth = 4.0, 0.1, 0.8, 0.8
+    knots = np.arange(12.0)
+    at = np.arange(0.0, knots[-1], STEP / (2.0 * turn))
+    x = np.interp(at, knots, turn * (-1.0) ** knots)
+    azimuth = np.interp(at, knots, forth * np.floor(0.5 * knots))
+    far = rod + np.maximum(1.0, np.sqrt((1.0 + height) ** 2 - x**2))
+    far += 5e-3 * np.random.default_rng(5).standard_normal(len(x))
+    centers = np.column_stack([x, far * np.sin(azimuth), far * np.cos(azimuth)])
+    # a rod of 400 flat sides is nowhere further from a round one than 1e-4
+    sides = np.linspace(0.0, 2.0 * np.pi, 401)
+    rim = np.column_stack([np.full(401, -5.0), rod * np.sin(sides), rod * np.cos(sides)])
+    k = np.arange(400)
+    quads = np.concatenate([np.column_stack([k, k + 401, k + 1]), np.column_stack([k + 1, k + 401, k + 402])])
+    base = Base(Surface(np.concatenate([rim, rim + np.array([10.0, 0.0, 0.0])]), quads))
+    laid = LaidTrace.of(Trace(at, centers, np.zeros(len(x), dtype=int), told), base)
+    ring = np.linspace(0.0, azimuth[-1], 60)
+    up = np.column_stack([0 * ring, np.sin(ring), np.cos(ring)])
+    line = replace(ridge(), axis=rod * up, normals=up, height=Interval(height, height, height))
+    refuted = refuted_by_lines(laid, [line], Noise(5e-3))
+    assert (refuted is not None) == (told > 1.0)
 
 
 def test_a_trace_without_a_line_is_not_asked() -> None:
