@@ -10,6 +10,7 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Interval, Posterior
 from mapping.base import Base, onto_base
+from mapping.inference.curves import Chart
 from mapping.inference.families import PosteriorProblem, with_nominal_tip
 from mapping.inference.kinds import LineShape, PointShape, kind_of
 
@@ -116,7 +117,7 @@ def _length(
     chart = shape.chart
     some = draws[:: max(1, len(draws) // FEW_DRAWS)]
     ends = np.tile(chart.s[[0, -1]], (len(some), 1)) if seen is None else some[:, _ends(problem)]
-    interval = Interval.from_draws(_lengths(shape, some, ends))
+    interval = _of_smooth(Interval.from_draws(_lengths(shape, some, ends)), chart)
     if chart.closed:
         return interval, []
     if best is None or seen is None:
@@ -132,16 +133,27 @@ def _length(
 
 
 def _lengths(shape: LineShape, draws: FloatArray, ends: FloatArray) -> FloatArray:
-    """(S,) lengths of the courses of draws (S, P) between two places along the chart (S, 2), m."""
-    chart, modes = shape.chart, shape.modes
+    """(S,) lengths of the courses of draws (S, P) between two places along the chart (S, 2), m.
+
+    Each is as long on its chords as the chart there, and as a smooth curve.
+    """
+    chart, modes, arcs = shape.chart, shape.modes, shape.chart.arcs
     share = np.linspace(0.0, 1.0, AXIS_POINTS if len(chart.s) > 8 or modes.degree > 1 else 2)
     lengths = np.empty(len(draws))
     for k, (theta, (first, last)) in enumerate(zip(draws, ends, strict=True)):
         s = first + share * (last - first)
         points, laterals, _, _ = chart.at(s)
         course = points + modes.lateral(theta[None, : modes.count], s)[0][:, None] * laterals
-        lengths[k] = np.linalg.norm(np.diff(course, axis=0), axis=1).sum()
+        chords, own = (np.linalg.norm(np.diff(of, axis=0), axis=1) for of in (points, course))
+        smooth = np.diff(np.interp(s, chart.s, arcs))
+        lengths[k] = own @ np.divide(smooth, chords, out=np.ones_like(chords), where=chords > 0.0)
     return lengths
+
+
+def _of_smooth(length: Interval, chart: Chart) -> Interval:
+    """A length with the doubt of its course between the chart's points: it may be as short as the chords there."""
+    cut = (float(chart.arcs[-1]) / chart.length - 1.0) * length.median
+    return replace(length, low=length.low - cut, high=length.high + cut)
 
 
 def with_ends_of_all(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, Posterior]]) -> Feature:
@@ -166,7 +178,9 @@ def with_ends_of_all(feature: Feature, likely: Sequence[tuple[float, PosteriorPr
         lengths.append(_lengths(shape, some, some[:, columns]))
     spans = np.quantile(np.concatenate(places), [0.05, 0.95], axis=0)
     details = replace(feature.details, end_intervals=spans.T)
-    return replace(feature, length=Interval.from_draws(np.concatenate(lengths)), details=details)
+    line: Any = likely[0][1].target.shape
+    length = _of_smooth(Interval.from_draws(np.concatenate(lengths)), line.chart)
+    return replace(feature, length=length, details=details)
 
 
 # An end that may as well lie at the limit of what was looked at was not seen: no more log density against it.

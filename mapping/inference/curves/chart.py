@@ -40,6 +40,15 @@ class Chart:
         """Length of the curve, m."""
         return float(self.s[-1] - self.s[0])
 
+    @property
+    def arcs(self) -> FloatArray:
+        """(K,) length of the smooth curve through the points up to each, m: on `s` chords cut its bends.
+
+        From point to point it is a circle that turns by the angle between their tangents.
+        """
+        half = np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(self.tangents, axis=0), axis=1), 0.0, 1.0))
+        return np.concatenate([[0.0], np.cumsum(np.diff(self.s) / np.sinc(half / np.pi))])
+
     def at(self, s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Points, laterals, normals (..., 3) and bends (...) at distances s, interpolated linearly."""
         leg = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)

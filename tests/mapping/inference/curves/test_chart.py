@@ -48,3 +48,16 @@ def test_a_course_that_turns_back_on_itself_has_no_chart() -> None:
     axis[:, 0] = np.concatenate([there, there[-2::-1]])
     with pytest.raises(EmptyWindowError, match="turns back"):
         chart_along(axis, np.tile([0.0, 0.0, 1.0], (17, 1)), plate(), TIP, 1.25e-3, 0.0, 1e-3)
+
+
+def test_arcs_are_as_long_as_the_smooth_curve_and_chords_are_not() -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 41)
+    circle = 0.01 * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+    circle[-1] = circle[0]
+    chart = chart_along(circle, np.tile(UP, (41, 1)), plate(), TIP, 0.00314, 0.0, 3.6e-3)
+    # each second corner is kept, or a point within 4e-5 of a side
+    assert chart.closed and chart.arcs[0] == 0.0
+    assert chart.arcs[-1] == pytest.approx(2.0 * np.pi * 0.01, rel=1e-4)
+    assert chart.length < 0.9965 * 2.0 * np.pi * 0.01
+    straight = along(-0.01, 0.01)
+    assert straight.arcs == pytest.approx(straight.s - straight.s[0], rel=1e-12)
