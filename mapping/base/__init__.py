@@ -24,7 +24,11 @@ if TYPE_CHECKING:
     from mapping.base.laid_trace import LaidSweep as LaidSweep, LaidTrace as LaidTrace
     from mapping.base.pose import Pose as Pose, estimate_pose as estimate_pose
     from mapping.base.profiles import SHORTEST_LEVEL as SHORTEST_LEVEL, Form as Form
-    from mapping.base.projection import onto_base as onto_base
+    from mapping.base.projection import (
+        between_walls as between_walls,
+        on_walls as on_walls,
+        onto_base as onto_base,
+    )
     from mapping.base.terraces import over_levels as over_levels
 
 _PUBLIC = {
@@ -37,7 +41,7 @@ _PUBLIC = {
     "laid_trace": ("LaidSweep", "LaidTrace"),
     "pose": ("Pose", "estimate_pose"),
     "profiles": ("SHORTEST_LEVEL", "Form"),
-    "projection": ("onto_base",),
+    "projection": ("between_walls", "on_walls", "onto_base"),
     "terraces": ("over_levels",),
 }
 doorway(__name__, _PUBLIC)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, TypedDict
 
@@ -41,6 +41,10 @@ class Feet:
     height: FloatArray
     face: IntArray
     barycentric: FloatArray
+
+    def select(self, index: BoolArray) -> Feet:
+        """Those of them alone."""
+        return Feet(*(getattr(self, each.name)[index] for each in fields(self)))
 
 
 # A number, a flag, or rows of numbers

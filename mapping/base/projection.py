@@ -1,17 +1,23 @@
-"""Onto the base: points near a base moved along smooth normals until they lie on it."""
+"""Onto the base: points near a base moved along smooth normals until they lie on it, as far as no wall begins.
+
+A wall is a face that rises out of the base beside a feature: in the corner a ball leaps from one to the other.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from mapping import FloatArray
-from mapping.base.base import Base
+from mapping import BoolArray, FloatArray
+from mapping.base.base import Base, Feet
 
 # Each round leaves of a sideways error the share by which facet and smooth normal differ: 1e-2 for 1 degree, but a
 # third beside a fold of 40 degrees, where rounds go on until a point moves by less than this share of the tip's radius.
 FEWEST_PROJECTION_ROUNDS, MOST_PROJECTION_ROUNDS, SETTLED_POINT_MOVE = 2, 12, 1e-4
 # A sideways error of less than this share of the tip's radius is rounding, as over a plane: no round takes it out
 SIDEWAYS_ROUNDING = 1e-12
+# Cosine of the angle by which a face is turned at least to be a wall. What is taken together of feet on both sides of a
+# blunter corner, as by a bin, stands in mid-air by r (1 - cos 22.5 deg) = 0.08 r at most
+WALL_COSINE = float(np.cos(np.radians(45.0)))
 
 
 def onto_base(
@@ -59,3 +65,45 @@ def averaged(normals: FloatArray, neighbours: int) -> FloatArray:
     half = np.minimum(neighbours, np.minimum(here, here[::-1]))
     mean = total[here + half + 1] - total[here - half]
     return np.asarray(mean / np.linalg.norm(mean, axis=1, keepdims=True))
+
+
+def on_walls(feet: Feet, crest: FloatArray, normals: FloatArray) -> BoolArray:
+    """Which balls rest on a wall: the base under them faces elsewhere than under a feature, and rises above it.
+
+    Args:
+        feet: N places of the ball.
+        crest: (K, 3) points of the base under the feature, m.
+        normals: (K, 3) outward unit normals there.
+
+    Returns:
+        (N,) True for those.
+    """
+    from scipy.spatial import cKDTree
+
+    turned = [np.arccos(np.clip((of @ normals[0]).min(), -1.0, 1.0)) for of in (feet.normals, normals)]
+    if sum(turned) < np.arccos(WALL_COSINE):
+        return np.zeros(len(feet.height), dtype=bool)
+    nearest = cKDTree(crest).query(feet.points)[1]
+    away = np.einsum("ij,ij->i", feet.normals, normals[nearest]) < WALL_COSINE
+    return np.asarray(away & (np.einsum("ij,ij->i", feet.points - crest[nearest], normals[nearest]) > 0.0))
+
+
+def between_walls(line: FloatArray, normals: FloatArray, base: Base, tip_radius: float) -> slice:
+    """The stretch of a line about its middle over which a ball does not touch a wall that the line runs into.
+
+    Args:
+        line: (K, 3) points near the base, in order, m.
+        normals: (K, 3) outward unit normals there.
+        base: the global model.
+        tip_radius: radius of the fingertip, m.
+    """
+    feet = base.foot(line + tip_radius * normals, tip_radius)
+    middle, ends = len(line) // 2, [0, len(line)]
+    for k, steps in enumerate((range(middle, 0, -1), range(middle, len(line) - 1))):
+        ahead = (-1, 1)[k]
+        for here in steps:
+            away = feet.normals[here + ahead] @ feet.normals[here] < WALL_COSINE
+            if away and (feet.points[here + ahead] - feet.points[here]) @ feet.normals[here] > 0.0:
+                ends[k] = here + (0, 1)[k]
+                break
+    return slice(*ends)

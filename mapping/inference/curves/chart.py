@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import EmptyWindowError, FloatArray, IntArray
-from mapping.base import Base, onto_base
+from mapping.base import Base, between_walls, onto_base
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,8 @@ def chart_along(
         base: the global model.
         tip_radius: radius of the fingertip, m: feet are sought from this high above.
         spacing: wanted distance of the chart's points, m.
-        extension: length added at both ends of an open curve, m; less where the base ends.
+        extension: length added at both ends of an open curve, m; less where the base ends, or a wall
+            begins.
         reach: distance over which the bends of the base are measured, m.
         bends: False for a trial of the course alone: the base is not asked how it bends across, and taken for flat.
 
@@ -118,6 +119,9 @@ def chart_along(
     line, lift = _resampled(axis, normals, spacing)
     if not closed and extension > 0.0:
         line, lift = _extended(line, lift, spacing, extension)
+    if not closed:
+        reached = between_walls(line, lift, base, tip_radius)
+        line, lift = line[reached], lift[reached]
     points, up = onto_base(line, lift, base, tip_radius, smooth=int(0.5 * reach / spacing))
     if not closed:
         keep = _on_base(points - line, up, 0.1 * reach)

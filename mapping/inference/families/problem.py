@@ -123,14 +123,14 @@ class PosteriorProblem:
         return replace(self, noise=noise, target=self.target.with_likelihood(likelihood))
 
 
-def window_for(crest: FloatArray, sizes: Sizes, around: Surroundings) -> Window:
-    """The bins near a crest polyline (K, 3) on the base, lifted by the caller to the ball's centre, m."""
+def window_for(crest: FloatArray, normals: FloatArray, sizes: Sizes, around: Surroundings) -> Window:
+    """The bins near a crest polyline (K, 3) on the base, lifted by the caller to the ball's centre, m; its normals."""
     width = sizes.half_width / WINDOW_BINS_PER_HALF_WIDTH
     # beside a wide detail the base is told within as much as beside a thin one of its height: what stands farther off
     # is another's
     thin = float((2.0 * around.trace.tip_radius * sizes.height) ** 0.5)
     reach = min(WINDOW_REACH * sizes.half_width, sizes.half_width + WINDOW_REACH * thin) + 2.0 * sizes.position_sd
-    samples = gather(around.trace, around.base, crest, reach)
+    samples = gather(around.trace, around.base, crest, normals, reach)
     precise = around.noise.sd <= PRECISE * sizes.height
     most, smooth_over = (2 * MOST_BINS, 0.0) if precise else (MOST_BINS, sizes.half_width)
     window = bin_samples(samples, width, around.noise.sd, smooth_over, around.noise.levels)

@@ -127,7 +127,7 @@ class LineKind(Kind):
         axis, normals, crossings = _axis_of(feature, sizes, around)
         course = self._chart(axis, normals, sizes, crossings, HIGHEST_DEGREE, around, bends=False)
         rises = (0.0, sizes.height, -sizes.height) if self.sided else (0.0,)
-        window = window_for(_crest(course, tip, sizes, rises), sizes, around)
+        window = window_for(*_crest(course, tip, sizes, rises), sizes, around)
         if not self.has_ends and not course.closed:
             window = window.only(tells_of_line(axis, normals, window.feet, window.run, sizes.half_width))
         laid = replace(feature, axis=axis, normals=normals, evidence=replace(feature.evidence, crossings=crossings))
@@ -253,7 +253,7 @@ def _axis_of(feature: Feature, sizes: Sizes, around: Surroundings) -> tuple[Floa
     axis, normals = np.asarray(feature.axis), np.asarray(feature.normals)
     if len(axis) > 1 and np.ptp(axis, axis=0).max() > 0.0:
         return axis, normals, max(feature.evidence.crossings, 2 if len(axis) == 2 else len(axis))
-    window = window_for(axis[:1] + around.trace.tip_radius * normals[:1], sizes, around)
+    window = window_for(axis[:1] + around.trace.tip_radius * normals[:1], normals[:1], sizes, around)
     nearest = int(np.argmin(np.linalg.norm(window.feet - axis[0], axis=1)))
     across = np.cross(normals[0], window.tangents[nearest])
     if not across.any():
@@ -273,14 +273,15 @@ def _modes(chart: Chart, ends: FloatArray, degree: int, spare: int, crossings: i
     return CurveModes(highest, float(ends.mean()), reach, False)
 
 
-def _crest(chart: Chart, tip_radius: float, sizes: Sizes, rises: tuple[float, ...]) -> FloatArray:
-    """Points along the chart one tip radius above the base, close enough together to measure distances from.
+def _crest(chart: Chart, tip_radius: float, sizes: Sizes, rises: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
+    """Points along the chart one tip radius above the base, close enough together to measure distances from, and its
+    normals there.
 
     They stand that far above the base and, of an edge between two levels, above where the other may be: rises, m.
     """
     count = max(2, int(np.ceil(chart.length / (0.25 * sizes.half_width))) + 1)
     points, _, normals, _ = chart.at(np.linspace(chart.s[0], chart.s[-1], count))
-    return np.concatenate([points + (tip_radius + rise) * normals for rise in rises])
+    return np.concatenate([points + (tip_radius + rise) * normals for rise in rises]), np.tile(normals, (len(rises), 1))
 
 
 def _end_limits(

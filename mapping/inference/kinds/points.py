@@ -48,7 +48,7 @@ def seen_about(feature: Feature, around: Surroundings, window: Window | None = N
     sizes = sizes_of(feature, tip)
     point, normal = feature.axis[:1], feature.normals[:1]
     if window is None:
-        window = window_for(point + tip * normal, sizes, around)
+        window = window_for(point + tip * normal, normal, sizes, around)
     middle = int(np.argmin(np.linalg.norm(window.feet - point, axis=1)))
     spot = spot_at(point[0], normal[0], window.tangents[middle], around.base, tip, sizes.half_width)
     free = 2 if np.ptp((window.feet - spot.point) @ spot.axes[1]) > SPREAD * sizes.half_width else 1

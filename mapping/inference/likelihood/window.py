@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapping import BoolArray, EmptyWindowError, FloatArray, IntArray, Trace
-from mapping.base import Base, Feet, LaidTrace, over_levels
+from mapping.base import Base, Feet, LaidTrace, on_walls, over_levels
 from mapping.instrument import Levels
 
 # Samples are looked at in blocks of this many: the cost of the rest of a long log is that of its boxes.
@@ -123,13 +123,16 @@ class Samples:
     t: FloatArray
 
 
-def gather(trace: Trace, base: Base, points: FloatArray, reach: float) -> Samples:
+def gather(trace: Trace, base: Base, points: FloatArray, normals: FloatArray, reach: float) -> Samples:
     """The samples near a feature; the cost of the rest of the trace is one look at the boxes of its blocks.
+
+    Where the ball rests on a wall that rises out of the base beside the feature it tells nothing of it.
 
     Args:
         trace: the whole trace.
         base: the global model.
         points: (K, 3) crest of the feature lifted to the ball's centre, densely spaced, m.
+        normals: (K, 3) unit normals of the base under it.
         reach: distance from it that still counts, m.
 
     Raises:
@@ -143,6 +146,10 @@ def gather(trace: Trace, base: Base, points: FloatArray, reach: float) -> Sample
         )
     index, breaks = _whole_runs(index, trace.sweep)
     feet = LaidTrace.of(trace, base).feet(index)
+    walls = on_walls(feet, points - trace.tip_radius * normals, normals)
+    if walls.any() and not walls.all():
+        feet, index = feet.select(~walls), index[~walls]
+        breaks = _breaks(index, trace.sweep)
     if len(base.levels) > 1:
         feet = replace(feet, height=over_levels(feet.height, breaks, base.levels))
     return Samples(feet, breaks, _on_one_plane(feet, base), trace.sweep[index], trace.t[index])
@@ -284,12 +291,17 @@ def _mean_of_passes(passes: list[_Run], width: float, noise_level: float, scale:
 
 def _whole_runs(index: IntArray, sweep: IntArray) -> tuple[IntArray, IntArray]:
     """Indices with short gaps closed (noise scatters samples about the rim of a window), and where runs begin."""
-    gaps = np.flatnonzero((np.diff(index) > SAMPLES_PER_BLOCK) | (np.diff(sweep[index]) != 0))
-    firsts, lasts = index[np.append(0, gaps + 1)], index[np.append(gaps, len(index) - 1)]
+    begins = _breaks(index, sweep)
+    firsts, lasts = index[np.append(0, begins)], index[np.append(begins - 1, len(index) - 1)]
     sizes = lasts - firsts + 1
     begins = np.cumsum(sizes) - sizes
     whole = np.arange(int(sizes.sum())) + np.repeat(firsts - begins, sizes)
     return whole, begins[1:]
+
+
+def _breaks(index: IntArray, sweep: IntArray) -> IntArray:
+    """Where among samples other runs begin, but for the first."""
+    return np.flatnonzero((np.diff(index) > SAMPLES_PER_BLOCK) | (np.diff(sweep[index]) != 0)) + 1
 
 
 def _join(runs: list[Window]) -> Window:

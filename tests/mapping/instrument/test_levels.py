@@ -59,7 +59,8 @@ def test_what_is_louder_is_known_to_be_and_weighs_less() -> None:
 def test_a_likelihood_takes_each_bin_at_its_level() -> None:
     trace, base = swept(1, 3.0)
     noise = detect(trace, base).noise
-    samples = gather(trace, base, np.column_stack([np.full(10, 0.05), 3e-3 * np.arange(10), np.full(10, TIP)]), 8e-3)
+    crest = np.column_stack([np.full(10, 0.05), 3e-3 * np.arange(10), np.full(10, TIP)])
+    samples = gather(trace, base, crest, np.tile([0.0, 0.0, 1.0], (10, 1)), 8e-3)
     window = bin_samples(samples, 2e-4, noise.sd, 0.0, noise.levels)
     vague = Nuisance(1e-3, 1e-3)
     white = build_likelihood(window, noise, vague, 1e-9).residuals(np.zeros((1, len(window))))[0]

@@ -31,7 +31,9 @@ def crossing(spikes: int = 0, spacing: float = 5e-6) -> Trace:
 def window_of(trace: Trace, scale: float = 2.5e-3):
     corners = 0.02 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     base = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
-    return bin_samples(gather(trace, base, np.array([[0.0, 0.0, R]]), 7e-3), WIDTH, SIGMA, scale)
+    return bin_samples(
+        gather(trace, base, np.array([[0.0, 0.0, R]]), np.array([[0.0, 0.0, 1.0]]), 7e-3), WIDTH, SIGMA, scale
+    )
 
 
 def test_the_samples_of_a_steep_flank_are_no_spikes() -> None:
