@@ -249,7 +249,7 @@ def _rehearsed(scene: Scene, planned: Explorer, base: Base, finger: SimulatedFin
         return spent if shown else float("nan")
 
     surface = planned.explore(base=base).survey.surface or base.surface
-    places, _ = face_samples(surface, float(np.sqrt(surface.face_areas.sum() / WAY_PLACES)))
+    places = face_samples(surface, float(np.sqrt(surface.face_areas.sum() / WAY_PLACES))).points
     less = seconds() - float(pdist(places).mean()) / planned.workspace.max_speed
     ridge, bump = seconds(wire) - less, None if ridges_only else seconds(cap) - less
     return DetailTime(bump, ridge, length, height) if np.isfinite([ridge, bump or 0.0]).all() else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -11,6 +11,15 @@ from mapping.geometry.mesh import NEAREST_COST, by_shares
 
 # Samples of faces looked at, at most
 MOST_FACE_SAMPLES = 2_000_000
+# Subdivisions of a side, at most: a face of so many already has 40 000 samples
+MOST_PARTS = 200
+# Square of the longest side over the area above which a face is thin, less high than a third of its length: cells of
+# its own shape would lie as close across it as there are many along it. The triangles of a machined part as CAD draws
+# it are: a flange with bolt holes had 50 times as many samples as its area asks for
+THIN = 6.0
+# Of the wanted spacing, the width of the columns across thin faces: a place is half of it away along a face, and half
+# of it across, as far as 0.55 of the spacing, as in the cells of others
+COLUMN_WIDTH = 0.775
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +45,12 @@ def coverage(surface: Surface, touched: FloatArray, reach: float) -> Coverage:
     """
     from scipy.spatial import cKDTree
 
-    points, owner = face_samples(surface, reach / 3.0)
-    near = np.zeros(len(points), dtype=bool)
+    samples, count = face_samples(surface, reach / 3.0), len(surface.faces)
+    near = np.zeros(len(samples.points), dtype=bool)
     if len(touched):
-        distance, _ = cKDTree(touched).query(points, distance_upper_bound=reach)
+        distance, _ = cKDTree(touched).query(samples.points, distance_upper_bound=reach)
         near = np.isfinite(distance)
-    count = len(surface.faces)
-    share = np.bincount(owner, weights=near, minlength=count) / np.bincount(owner, minlength=count)
+    share = np.asarray(np.bincount(samples.owner, samples.share * near, count), dtype=np.float64)
     areas = surface.face_areas
     total = float(areas.sum())
     return Coverage(share, float((share * areas).sum() / total) if total > 0 else 0.0, reach)
@@ -91,19 +99,19 @@ def found_heights(
     if not len(touched):
         nowhere, middle = np.full(len(surface.faces), np.inf), surface.vertices[surface.faces].mean(axis=1)
         return FoundHeights(nowhere, nowhere, surface.face_areas, middle, surface.face_normals)
-    step = 0.06 * tip_radius
-    while _sample_count(surface, step) > MOST_FACE_SAMPLES:
+    # two samples for the square of a step
+    step = max(0.06 * tip_radius, float(np.sqrt(2.0 * surface.face_areas.sum() / MOST_FACE_SAMPLES)))
+    # a spacing that leaves each face one sample, or two, cannot be made coarser
+    while len((samples := face_samples(surface, step)).owner) > max(MOST_FACE_SAMPLES, 2 * len(surface.faces)):
         step *= 1.5
-    points, owner = face_samples(surface, step)
-    normals = surface.face_normals[owner]
-    lost = lost_heights(points, normals, touched, up, tip_radius)
-    # as far as a place of the face may lie from the nearest sample
-    parts = _parts(surface, step)
+    normals = surface.face_normals[samples.owner]
+    lost = lost_heights(samples.points, normals, touched, up, tip_radius)
     low = np.minimum(lost, tip_radius)
-    further = np.sqrt(low * (2.0 * tip_radius - low)) + 0.55 * (_longest_sides(surface) / parts)[owner]
+    further = np.sqrt(low * (2.0 * tip_radius - low)) + samples.gap
     worst = np.zeros(len(surface.faces))
-    np.maximum.at(worst, owner, _lost_on_a_plane(further, tip_radius))
-    return FoundHeights(limit + worst, limit + lost, (surface.face_areas / parts**2)[owner], points, normals)
+    np.maximum.at(worst, samples.owner, _lost_on_a_plane(further, tip_radius))
+    area = surface.face_areas[samples.owner] * samples.share
+    return FoundHeights(limit + worst, limit + lost, area, samples.points, normals)
 
 
 def lost_heights(
@@ -179,36 +187,89 @@ def found_probability(
     return np.where(seen > 0, ndtr(signal - threshold), 0.0)
 
 
-def _parts(surface: Surface, spacing: float) -> IntArray:
-    """(F,) subdivisions of each face's sides."""
-    longest = _longest_sides(surface)
-    # a face of 200 subdivisions already has 40 000 samples
-    return np.asarray(np.clip(np.ceil(longest / spacing), 1, 200).astype(np.int64))
+@dataclass(frozen=True, eq=False)
+class FaceSamples:
+    """Points spread evenly over every face.
+
+    Args:
+        points: (N, 3) m.
+        owner: (N,) the face of each.
+        share: (N,) of that face's area which each stands for.
+        gap: (N,) as far as a place of the face may lie from the nearest of them, m.
+    """
+
+    points: FloatArray
+    owner: IntArray
+    share: FloatArray
+    gap: FloatArray
 
 
-def _longest_sides(surface: Surface) -> FloatArray:
-    """(F,) m."""
-    corners = surface.vertices[surface.faces]
-    return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1))
+def face_samples(surface: Surface, spacing: float) -> FaceSamples:
+    """Points all over a mesh, at most about `spacing` apart (m)."""
+    corners, faces = surface.vertices[surface.faces], np.arange(len(surface.faces))
+    longest = _sides(corners).max(axis=1)
+    thin = longest**2 > THIN * surface.face_areas
+    parts = [_of_cells(corners[~thin], faces[~thin], longest[~thin], spacing)]
+    if thin.any():
+        parts.append(_of_columns(corners[thin], faces[thin], spacing))
+    columns = ([getattr(part, each.name) for part in parts] for each in fields(FaceSamples))
+    return FaceSamples(*(np.concatenate(column) for column in columns))
 
 
-def _sample_count(surface: Surface, spacing: float) -> int:
-    parts = _parts(surface, spacing)
-    # a spacing that leaves each face one sample cannot be made coarser
-    return int((parts**2).sum()) if parts.max(initial=1) > 1 else 0
-
-
-def face_samples(surface: Surface, spacing: float) -> tuple[FloatArray, IntArray]:
-    """Points (N, 3) spread evenly over every face, at most about `spacing` apart, and the face of each."""
-    corners, parts = surface.vertices[surface.faces], _parts(surface, spacing)
-    points, owner = [], []
+def _of_cells(corners: FloatArray, faces: IntArray, longest: FloatArray, spacing: float) -> FaceSamples:
+    """Two points in each of the cells that lines parallel to two sides of a triangle (F, 3, 3) make."""
+    parts = np.clip(np.ceil(longest / spacing), 1, MOST_PARTS).astype(np.int64)
+    points, owner = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int64)]
     for n in np.unique(parts):
-        faces = np.flatnonzero(parts == n)
+        alike = np.flatnonzero(parts == n)
         i, j = np.divmod(np.arange(n * n), n)
         flip = i + j >= n
         u = np.where(flip, n - i - 1 / 3, i + 1 / 3) / n
         v = np.where(flip, n - j - 1 / 3, j + 1 / 3) / n
         weights = np.column_stack([1 - u - v, u, v])
-        points.append(np.einsum("sk,fkx->fsx", weights, corners[faces]).reshape(-1, 3))
-        owner.append(np.repeat(faces, n * n))
-    return np.concatenate(points), np.concatenate(owner)
+        points.append(np.einsum("sk,fkx->fsx", weights, corners[alike]).reshape(-1, 3))
+        owner.append(np.repeat(alike, n * n))
+    of = np.concatenate(owner)
+    return FaceSamples(np.concatenate(points), faces[of], (1.0 / parts**2)[of], (0.55 * longest / parts)[of])
+
+
+def _of_columns(corners: FloatArray, faces: IntArray, spacing: float) -> FaceSamples:
+    """Points in columns across triangles (F, 3, 3): each is cut at its altitude, and both parts along their longer
+    leg, so that no column's end is steeper than 45 degrees."""
+    sides = _sides(corners)
+    turned = (sides.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    a, b, c = np.moveaxis(np.take_along_axis(corners, turned[:, :, None], axis=1), 1, 0)
+    along, longest = b - a, sides.max(axis=1)
+    square = np.maximum(longest**2, np.finfo(float).tiny)
+    split = np.clip(np.einsum("ij,ij->i", c - a, along) / square, 0.0, 1.0)
+    foot = a + split[:, None] * along
+    # the two parts: from the altitude's foot to either end, and up to the apex
+    legs = np.stack([np.concatenate([a, b]) - np.tile(foot, (2, 1)), np.tile(c - foot, (2, 1))], axis=1)
+    lengths = np.linalg.norm(legs, axis=2)
+    order = np.argsort(-lengths, axis=1, kind="stable")
+    (long, short), (p, q) = (
+        np.moveaxis(np.take_along_axis(of, at, axis=1), 1, 0)
+        for of, at in ((legs, order[:, :, None]), (lengths, order))
+    )
+    width = COLUMN_WIDTH * np.maximum(spacing, np.tile(longest, 2) / MOST_PARTS)
+    count = np.maximum(np.ceil(p / width), 1).astype(np.int64)
+    part = np.repeat(np.arange(len(count)), count)
+    i = np.arange(len(part)) - np.repeat(np.cumsum(count) - count, count)
+    n = count[part]
+    x = (i + 0.5) / n
+    across = np.maximum(np.ceil((1.0 - i / n) * (q / width)[part]), 1).astype(np.int64)
+    column = np.repeat(np.arange(len(part)), across)
+    j = np.arange(len(column)) - np.repeat(np.cumsum(across) - across, across)
+    of, x, m = part[column], x[column], across[column]
+    y = (j + 0.5) / m * (1.0 - x)
+    points = np.tile(foot, (2, 1))[of] + x[:, None] * long[of] + y[:, None] * short[of]
+    share = np.concatenate([split, 1.0 - split])[of] * (2.0 / n[column]) * (1.0 - x) / m
+    half = 0.5 * np.minimum(p / count, width)
+    upwards = half * q / np.maximum(p, np.finfo(float).tiny) + 0.5 * np.minimum(q, width)
+    gap = np.hypot(half, upwards).reshape(2, -1).max(axis=0)
+    return FaceSamples(points, np.tile(faces, 2)[of], share, np.tile(gap, 2)[of])
+
+
+def _sides(corners: FloatArray) -> FloatArray:
+    """(P, 3) lengths of the sides of triangles (P, 3, 3), each from one corner to the next, m."""
+    return np.asarray(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2))

@@ -306,7 +306,8 @@ class Ways:
 
         surface = self.base.surface
         spacing = max(self.tip_radius, float(np.sqrt(surface.face_areas.sum() / MOST_NEAR_PLACES)))
-        on, face = face_samples(surface, spacing)
+        samples = face_samples(surface, spacing)
+        on, face = samples.points, samples.owner
         # of long faces, and small ones, samples lie closer: one for each cell half as wide, and side of the body
         cells = np.column_stack([np.floor(2.0 * on / spacing), np.rint(surface.face_normals[face])])
         one = np.sort(np.unique(cells, axis=0, return_index=True)[1])

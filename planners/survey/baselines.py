@@ -53,8 +53,8 @@ class RandomSweeps:
         """Sweeps until the time is spent; places are uniform over the surface's area."""
         surface = self.base.surface
         strokes = Strokes(self.base, self.tip_radius, self.speed, self.force)
-        points, owner = face_samples(surface, self.tip_radius)
-        share = surface.face_areas[owner] / np.bincount(owner, minlength=len(surface.faces))[owner]
+        samples = face_samples(surface, self.tip_radius)
+        points, share = samples.points, surface.face_areas[samples.owner] * samples.share
         spent, half = 0.0, 0.25 * surface.size
         while spent < self.seconds:
             middle = points[rng.choice(len(points), p=share / share.sum())]

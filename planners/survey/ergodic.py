@@ -78,7 +78,7 @@ class Ergodic:
 
 def even_places(base: Base, spacing: float) -> FloatArray:
     """Points (N, 3) of the surface, one for each cell of a cubic grid that it passes, m."""
-    points, _ = face_samples(base.surface, 0.5 * spacing)
+    points = face_samples(base.surface, 0.5 * spacing).points
     cell = np.floor((points - points.min(axis=0)) / spacing).astype(np.int64)
     _, index, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     index = index.ravel()

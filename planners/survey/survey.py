@@ -89,14 +89,16 @@ class Survey:
         """(K, 3) places of the base that a sweep touches at its waypoints, m."""
         return self.base.foot(move.path, self.tip_radius).points
 
-    def covered(self, paths: list[FloatArray], pitch: float | None = None) -> Coverage:
-        """Coverage of the region by touched paths (each (K, 3), m) that see strips as wide as the pitch."""
+    def covered(self, paths: list[FloatArray], pitch: float | None = None, faces: IntArray | None = None) -> Coverage:
+        """Coverage of the region, or of some of its faces, by touched paths (each (K, 3), m) that see strips as wide as
+        the pitch."""
         pitch = pitch or self.pitch
         dense = [_dense(path, 0.2 * pitch) for path in paths]
         points = np.concatenate(dense) if dense else np.zeros((0, 3))
         if self.surface is None:
             return Coverage(np.zeros(0), 0.0, 0.55 * pitch)
-        return coverage(self.surface, points, 0.55 * pitch)
+        part = self.surface if faces is None else Surface(self.surface.vertices, self.surface.faces[faces])
+        return coverage(part, points, 0.55 * pitch)
 
     def crossed(self, visible: float) -> Slices | None:
         """The crossed plane sections that see a visible share, or None where strips are asked for or are shorter."""
@@ -170,8 +172,10 @@ class Survey:
                     here = line.points[-1]
                     touched.append(line.points)
                     yield line
-            if len(chart) < len(surface.faces):
-                done |= self.covered(touched, pitch).share > 0.999
+            later = np.concatenate([np.zeros(0, dtype=np.int64), *self._charts[number + 1 :]])
+            later = later[~done[later]]
+            if len(later):
+                done[later] = self.covered(touched, pitch, later).share > 0.999
 
     def pressed(self, line: Isoline) -> Iterator[Move]:
         """The sweeps along a line that ball and stem can make."""

@@ -192,9 +192,10 @@ class _Ground:
 
         self.tip_radius = tip_radius
         self.nearest = NearestPoint(body)
-        self.places, owner = face_samples(body, 0.25 * SMOOTH_ROOM)
-        self.normals = body.face_normals[owner]
-        weights = body.face_areas[owner] / np.bincount(owner, minlength=len(body.faces))[owner]
+        samples = face_samples(body, 0.25 * SMOOTH_ROOM)
+        self.places = samples.points
+        self.normals = body.face_normals[samples.owner]
+        weights = body.face_areas[samples.owner] * samples.share
         self.share = np.cumsum(weights) / weights.sum()
         self.tree = cKDTree(self.places)
 

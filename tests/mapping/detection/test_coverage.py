@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from explore3d.analysis.inspected import Inspected
 from hw.simulated.finger import SimulatedFinger
 from mapping import length_text
 from mapping.base.base import Base
 from mapping.base.fit import fit_base
-from mapping.detection.coverage import found_heights, found_probability, lost_heights
+from mapping.detection.coverage import face_samples, found_heights, found_probability, lost_heights
 from mapping.detection.detect import detect, expected_limit
 from mapping.geometry.templates.shapes import cap_height
 from mapping.instrument.noise import Noise
@@ -163,3 +164,30 @@ def test_the_share_that_was_passed_does_not_depend_on_how_large_the_faces_are():
     # the strip of a tip radius to either side, and the round ends
     passed = found.area[np.isfinite(found.place)].sum()
     assert passed == pytest.approx(0.1 * 0.02 + np.pi * 0.01**2, rel=0.02)
+
+
+def thin_faces() -> Surface:
+    """A fan of slivers, an obtuse one, a right one of 40 x 1 mm, one without area, and one that is as high as long."""
+    rim = [[0.02, y, 0.0] for y in np.linspace(-5e-3, 5e-3, 30)]
+    fan = [[0, k + 1, k + 2] for k in range(29)]
+    more = [[-0.02, 0, 0.01], [0.02, 0, 0.01], [3e-3, 2e-3, 0.01], [0.02, 1e-3, 0.01], [0.0, 0, 0.01], [0, 0.03, 0.01]]
+    others = [[31, 32, 33], [31, 32, 34], [31, 35, 32], [31, 32, 36]]
+    return Surface([[-0.02, 0, 0], *rim, *more], [*fan, *others])
+
+
+def test_samples_of_thin_faces_are_as_near_as_those_of_others_and_not_more() -> None:
+    surface, spacing = thin_faces(), 4e-4
+    samples = face_samples(surface, spacing)
+    count = np.bincount(samples.owner, minlength=len(surface.faces))
+    assert np.bincount(samples.owner, samples.share) == pytest.approx(1.0)
+    area, longest = surface.face_areas, 0.0475
+    # along a face one for each spacing, and for each of its squares two
+    assert (count < 4.0 * longest / spacing + 4.0 * area / spacing**2).all()
+    rng = np.random.default_rng(3)
+    for face, corners in enumerate(surface.vertices[surface.faces]):
+        weights = np.concatenate([rng.dirichlet([0.3, 0.3, 0.3], 3000), np.eye(3)])
+        own = samples.owner == face
+        away = cKDTree(samples.points[own]).query(weights @ corners)
+        assert (away[0] <= 1.02 * samples.gap[own][away[1]]).all() and away[0].max() < 1.1 * spacing
+        mean = samples.share[own] @ samples.points[own]
+        assert mean == pytest.approx(corners.mean(axis=0), abs=0.2 * spacing)

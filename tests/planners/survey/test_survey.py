@@ -161,8 +161,8 @@ def test_coverage_counts_the_share_of_each_face_near_a_sweep() -> None:
     seen = coverage(body, line, 0.0075)
     assert seen.fraction == pytest.approx(0.1, abs=0.01)
     assert coverage(body, np.zeros((0, 3)), 0.01).fraction == 0.0
-    points, owner = face_samples(body, 0.01)
-    assert np.bincount(owner).min() >= 100 and np.ptp(points[:, 2]) == 0.0
+    samples = face_samples(body, 0.01)
+    assert np.bincount(samples.owner).min() >= 100 and np.ptp(samples.points[:, 2]) == 0.0
 
 
 def test_settings_that_cannot_work_are_refused() -> None:
