@@ -36,6 +36,10 @@ END_SHARE = 8
 EDGE_FREEDOM = 2
 # More levels than that have no two cells PAIRS_APART of the extent from each other on one of them
 MOST_LEVELS = 8
+# Mean square, in standard deviations, up to which what lies about a height (FEATURE_RESIDUAL_SDS to either side) is as
+# likely to scatter about it as to lie anywhere there: 2 log(2 FEATURE_RESIDUAL_SDS / sqrt(2 pi)). Of a level it is 1,
+# of a crest or a flank that passes through the height 3 and more
+PASSING_SQUARE = 2.0 * float(np.log(2.0 * FEATURE_RESIDUAL_SDS / np.sqrt(2.0 * np.pi)))
 # Rounds until no cell changes its level: of 108 fits to noisy rasters over steps, stairs and slopes 103 took no more
 # than five; after six the last levels stand
 LEVEL_ROUNDS = 6
@@ -145,10 +149,11 @@ def _levels(rest: FloatArray, sweep: IntArray, scale: float, share: float) -> _L
         height = _densest(np.sort(rest[level < 0]), reach)
         here = (level < 0) & (np.abs(rest - height) < reach)
         new = np.where(here, len(heights), level)
-        gain = share * float((FEATURE_RESIDUAL_SDS**2 - ((rest[here] - height) / scale) ** 2).sum())
+        square = ((rest[here] - height) / scale) ** 2
+        gain = share * float((FEATURE_RESIDUAL_SDS**2 - square).sum())
         before = _Levels(np.array(heights), level, sweep).freedom if heights else 0
         cost = price * (_Levels(np.array([*heights, height]), new, sweep).freedom - before)
-        if heights and gain <= cost:
+        if heights and (gain <= cost or square.mean() > PASSING_SQUARE):
             break
         heights.append(height)
         level = new

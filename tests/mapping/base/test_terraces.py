@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from explore3d.bench.scenes import FIRST_BUILT_WITH, section_trace
 from mapping import FloatArray, Trace
 from mapping.base import Base, fit_base
 from mapping.geometry.templates import step_height
@@ -74,3 +75,9 @@ def test_a_plate_whose_noise_wanders_is_not_foretold() -> None:
     walk = np.cumsum(rng.normal(0.0, 2e-6, 12 * 600))
     base = fit_base(raster(lambda u, v: walk))
     assert not base.known
+
+
+def test_two_crests_side_by_side_are_no_level() -> None:
+    """Between them the ball comes down by a third: the trace stays for long at about one height, and passes through."""
+    base = fit_base(section_trace("crack with burrs", "10um", FIRST_BUILT_WITH + 2))
+    assert base.kind == "plane" and levels(base) == [0.0]
