@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from mapping import FloatArray
 from mapping.assembly.free.section import FLANK, Section, flanks
 from mapping.base import SHORTEST_LEVEL, SweepHeights
 from mapping.instrument import neighbour_scatter, robust_scale
@@ -54,7 +55,9 @@ def _sections(piece: SweepHeights, tip_radius: float, longest: float) -> list[Se
             if begin == 0 or end >= len(z):
                 continue  # what goes on beyond the profile's end is no detail
             section = outlined(piece, sign, int(begin), int(end), usual, longest)
-            if section is not None and times_crest(section, tip_radius) > WIDER_THAN_CREST:
+            if section is None or times_crest(section, tip_radius) <= WIDER_THAN_CREST:
+                continue
+            if _widest(*_above_flanks(section), 2.0 * FLANK_SDS * usual, tip_radius) > WIDER_THAN_CREST:
                 found.append(section)
     return found
 
@@ -95,3 +98,33 @@ def times_crest(section: Section, tip_radius: float) -> float:
     crest = 2.0 * np.sqrt(drop * (2.0 * tip_radius - drop))
     left, right = flanks(section, FLANK)
     return float((right.place - left.place) / crest)
+
+
+def _above_flanks(section: Section) -> tuple[FloatArray, FloatArray]:
+    """Places along the sweep and heights, upwards, of a section from flank to flank, there at the height that they are
+    read at, m."""
+    s = section.piece.s[section.begin : section.end + 1]
+    z = section.sign * section.piece.height[section.begin : section.end + 1]
+    level = FLANK * section.monotone.max()
+    first, last = np.flatnonzero(z > level)[[0, -1]]
+    ends = [np.interp(level, z[k], s[k]) for k in ([first - 1, first], [last + 1, last])]
+    return np.array([ends[0], *s[first : last + 1], ends[1]]), np.array([level, *z[first : last + 1], level])
+
+
+def _widest(s: FloatArray, z: FloatArray, clear: float, tip_radius: float) -> float:
+    """How many times as wide as a crest the widest is of the details that heights (N,) at places (N,) are of.
+
+    Where they come down between two tops by more than is `clear` (m), they are of two details: crests side by side, as
+    burrs are, are together as wide as one bar, but between them the ball hides what is there.
+    """
+    fallen = np.minimum(np.maximum.accumulate(z), np.maximum.accumulate(z[::-1])[::-1]) - z
+    deepest = int(np.argmax(fallen))
+    if fallen[deepest] > clear:
+        # the bottom lies anywhere in its bin
+        half = 0.25 * (s[deepest + 1] - s[deepest - 1])
+        before, after = np.append(s[:deepest], s[deepest] - half), np.append(s[deepest] + half, s[deepest + 1 :])
+        parts = (before, z[: deepest + 1]), (after, z[deepest:])
+        return max(_widest(*part, clear, tip_radius) for part in parts)
+    drops = np.clip(z.max() - z[[0, -1]], 0.0, tip_radius)
+    crest = float(np.sqrt(drops * (2.0 * tip_radius - drops)).sum())
+    return float(np.ptp(s)) / crest if crest > 0.0 else np.inf

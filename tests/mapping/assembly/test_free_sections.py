@@ -10,7 +10,7 @@ from scipy.ndimage import grey_dilation
 
 from mapping import Feature, FloatArray, Interval, Trace
 from mapping.assembly import assemble
-from mapping.assembly.free.outline import outlined
+from mapping.assembly.free.outline import of_all_scales, outlined
 from mapping.assembly.free.sizes import sizes_of_section
 from mapping.base import SweepHeights, fit_base
 from mapping.detection import detect
@@ -199,3 +199,28 @@ def of_one_section(form: Form, noise: float) -> Interval:
     sizes = sizes_of_section(section, 1e-3, Noise(noise))
     assert sizes is not None
     return sizes.width_interval()
+
+
+def piece_of(form: Form, noise: float = 1e-6) -> SweepHeights:
+    """A ball of 1 mm over 30 mm with a detail in the middle, in bins of 0.1 mm."""
+    fine = np.arange(-15e-3, 15e-3, 1e-5)
+    ball = np.sqrt(1e-6 - np.arange(-1e-3, 1e-3, 1e-5) ** 2) - 1e-3
+    felt = grey_dilation(form(fine), structure=ball, mode="nearest")[5::10]
+    s = fine[5::10]
+    heights = felt + noise * np.random.default_rng(4).standard_normal(len(s))
+    centers = np.column_stack([s, 0.0 * s, heights + 1e-3])
+    return SweepHeights(0, 0.0, 1e-4, heights, 1.0, np.arange(len(s) + 1), s, centers)
+
+
+@pytest.mark.parametrize(
+    ("form", "wide"),
+    [
+        # crests of 0.1 mm side by side, each as wide as a ball over a wire; with a bar instead of what lies between
+        (lambda u: np.where(np.abs(np.abs(u) - 0.35e-3) < 3e-5, 1e-4, 0.0), 0),
+        (lambda u: np.where(np.abs(u) < 0.38e-3, 1e-4, 0.0), 1),
+        # a bar with a scratch across it is a bar
+        (lambda u: np.where(np.abs(u) < 1.2e-3, np.where(np.abs(u) < 0.1e-3, 0.0, 1e-4), 0.0), 1),
+    ],
+)
+def test_crests_side_by_side_are_no_wide_detail(form: Form, wide: int) -> None:
+    assert len(of_all_scales(piece_of(form), 1e-3)) == wide
