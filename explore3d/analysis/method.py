@@ -391,8 +391,7 @@ def detected(work: Work, share: Share) -> None:
         taken = 0.0 if work.backlash is None else work.backlash.play
         play = backlash(work.laid, without_wide(work.detections, work.laid), taken)
         if play is None:
-            if work.backlash is not None and not work.backlash.told:
-                work.backlash = None
+            work.backlash = None
             break
         if work.backlash is not None and abs(play.play - taken) < 0.5 * play.sd:
             work.backlash = replace(play, play=taken)

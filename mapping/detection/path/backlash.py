@@ -45,6 +45,8 @@ KNOT_STEP, KNOT_REACH, SECTION_SDS = 0.125, 1.5, (0.0, 0.01, 0.03, 0.1, 0.3)
 # would. In so many bins at most, ten to a half-width: from the middle of one to its edge a crest falls by
 # (1 / 20)^2 of its height, a quarter of a hundredth
 WINDOW_HALF_WIDTHS, WINDOW_BINS = 8.0, 160
+# Of a crossing free are height, place and width of its crest, and offset and slope of the base
+WINDOW_FREEDOM = 5
 # Crossings that are asked: two hundred of 160 bins tell half a play of 1 / sqrt(200 * 160) = 0.006 standard deviations
 # of a sample, less than the least that is tried
 MOST_WINDOWS = 200
@@ -138,10 +140,12 @@ def backlash(laid: LaidTrace, found: Detections, taken: float = 0.0) -> Backlash
         return None
     halves = sd * HALF_PLAYS
     section = _Section(windows, halves, 0.5 * taken)
-    log = section.gains()
+    # what no play explains, as where two crests lie side by side, speaks for none: all is as unsure as it is off
+    misfit = section.misfit()
+    log = section.gains() / misfit
     # the path is reckoned with crests as they were recorded: higher than the play, or the axis would not have moved
     log[halves > 0.5 * float(np.median([abs(window.height) for window in windows]))] = -np.inf
-    gain = _evidence(log) - max(0.0, _evidence_of_each(section.gains_of_each()))
+    gain = _evidence(log) - max(0.0, _evidence_of_each(section.gains_of_each() / misfit))
     if gain < np.log(LIKELY_PLAY) + WORTH_MENTIONING:
         return None
     weight = np.exp(log - log.max())
@@ -304,15 +308,28 @@ class _Section:
         self.after = [sd**2 * np.linalg.inv(unit + sd**2 * gram) for sd in SECTION_SDS]
         self.cost = [-0.5 * float(np.linalg.slogdet(unit + sd**2 * gram)[1]) for sd in SECTION_SDS]
 
+    @property
+    def _sds(self) -> range:
+        """Numbers of SECTION_SDS."""
+        return range(len(SECTION_SDS))
+
     def gains(self) -> FloatArray:
         """(H,) gain in the log-likelihood for the half plays."""
         tried = range(len(self.seen[0]))
         left = ([y - seen[k] for y, seen in zip(self.heights, self.seen, strict=True)] for k in tried)
         return np.array([self._log(each) for each in left]) - self._log(self.heights)
 
+    def misfit(self) -> float:
+        """Mean square that the play which fits best leaves over, in variances of the noise; at least 1."""
+        tried = range(len(self.seen[0]))
+        left = [[y - seen[k] for y, seen in zip(self.heights, self.seen, strict=True)] for k in tried]
+        over = [-2.0 * (self._log_of(each, k) - self.cost[k]) for each in (*left, self.heights) for k in self._sds]
+        free = sum(len(y) - WINDOW_FREEDOM for y in self.heights)
+        return max(1.0, min(over) / max(free, 1))
+
     def gains_of_each(self) -> FloatArray:
         """(W, H) the same of every crossing alone, beside the section that all have without a play."""
-        logs = [self._log_of(self.heights, k) for k in range(len(SECTION_SDS))]
+        logs = [self._log_of(self.heights, k) for k in self._sds]
         common = self.after[int(np.argmax(logs))] @ self._moment(self.heights)
         each = zip(self.seen, self.heights, self.columns, strict=True)
         return np.array([seen @ (y - columns @ common) - 0.5 * (seen**2).sum(axis=1) for seen, y, columns in each])
@@ -321,7 +338,7 @@ class _Section:
         return np.asarray(np.sum([each.T @ y for each, y in zip(self.columns, left, strict=True)], axis=0))
 
     def _log(self, left: Sequence[FloatArray]) -> float:
-        logs = np.array([self._log_of(left, k) for k in range(len(SECTION_SDS))])
+        logs = np.array([self._log_of(left, k) for k in self._sds])
         return float(logs.max() + np.log(np.exp(logs - logs.max()).mean()))
 
     def _log_of(self, left: Sequence[FloatArray], k: int) -> float:

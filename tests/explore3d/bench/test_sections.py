@@ -78,3 +78,10 @@ def test_no_line_gets_sizes_that_are_wrong_and_sure(body: str) -> None:
 def test_a_line_that_grows_is_remarked_upon() -> None:
     record = section_trial("taper", "white", SEED)
     assert record["flagged"] and "its height varies along it" in " ".join(record["notes"])
+
+
+@pytest.mark.slow
+def test_two_burrs_beside_a_crack_are_two_ridges_and_neither_a_bar_nor_a_play_of_the_axes() -> None:
+    record = section_trial("crack with burrs", "10um", FIRST_BUILT_WITH + 2)
+    assert record["kinds"] == ["ridge", "ridge"] and not record["flagged"], record
+    assert record["sizes"]["height"][0] == pytest.approx(record["true_height"], rel=0.01)
