@@ -97,13 +97,10 @@ def between_walls(line: FloatArray, normals: FloatArray, base: Base, tip_radius:
         base: the global model.
         tip_radius: radius of the fingertip, m.
     """
-    feet = base.foot(line + tip_radius * normals, tip_radius)
-    middle, ends = len(line) // 2, [0, len(line)]
-    for k, steps in enumerate((range(middle, 0, -1), range(middle, len(line) - 1))):
-        ahead = (-1, 1)[k]
-        for here in steps:
-            away = feet.normals[here + ahead] @ feet.normals[here] < WALL_COSINE
-            if away and (feet.points[here + ahead] - feet.points[here]) @ feet.normals[here] > 0.0:
-                ends[k] = here + (0, 1)[k]
-                break
-    return slice(*ends)
+    up, middle, count = base.foot(line + tip_radius * normals, tip_radius).normals, len(line) // 2, len(line)
+    # as the base lies under the place before it, seen from the middle: a line that was led on to a wall stands on it
+    before = np.clip(np.where(np.arange(count) < middle, np.arange(count) + 1, np.arange(count) - 1), 0, count - 1)
+    feet = base.foot(line + tip_radius * up[before], tip_radius)
+    turned = np.einsum("ij,ij->i", feet.normals, up[before]) < WALL_COSINE
+    walls = np.flatnonzero(turned & (np.einsum("ij,ij->i", feet.points - line[before], up[before]) > 0.0))
+    return slice(int(walls[walls < middle].max(initial=-1)) + 1, int(walls[walls > middle].min(initial=count)))
