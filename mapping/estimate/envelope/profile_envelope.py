@@ -85,7 +85,7 @@ def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[Float
         if one_row and (points[:, 1] == centers[0, 1]).all():
             return _below_profile(points, centers, tip_radius)
         near = max((tip_radius - least) * (1.0 + BOUND_ROUNDING), 0.0)
-        from mapping.estimate.envelope.penetration_kernels import nearest_within
+        from mapping.geometry.mesh import nearest_within
 
         laid, boxes = boxed()
         return np.asarray(tip_radius - nearest_within(laid, boxes, read_only(points), near))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, IntArray
+from mapping import BoolArray, FloatArray, IntArray, read_only
 
 # Places along a line from which its distance to another is taken: the distance that a fifth of them lie beyond is then
 # that of a fifth of the line to within 5 % of it (binomial)
@@ -47,11 +46,11 @@ def _across(points: FloatArray, rows: list[IntArray]) -> list[int]:
 
 
 class _Beside:
-    """How far polylines are apart: each has one tree, and what a pair was asked for once is known."""
+    """How far polylines are apart: each has boxes about it, and what a pair was asked for once is known."""
 
     def __init__(self, lines: list[FloatArray]) -> None:
         self.lines = lines
-        self._trees: dict[int, Any] = {}
+        self._boxes: dict[int, FloatArray] = {}
         self._ways: dict[tuple[int, int], tuple[float, float, float]] = {}
 
     def distance(self, first: int, second: int) -> float:
@@ -64,14 +63,14 @@ class _Beside:
 
     def _way(self, first: int, second: int) -> tuple[float, float, float]:
         """Distances from places along one line to another: usual, least, and the one that a fifth is beyond."""
-        from scipy.spatial import cKDTree
+        from mapping.geometry.mesh import boxes_about, nearest_within
 
         if (first, second) not in self._ways:
-            if second not in self._trees:
-                self._trees[second] = cKDTree(self.lines[second])
-            line = self.lines[first]
+            line, other = self.lines[first], self.lines[second]
+            if second not in self._boxes:
+                self._boxes[second] = boxes_about(read_only(other))
             places = np.linspace(0, len(line) - 1, min(len(line), PROBES)).astype(int)
-            distance = self._trees[second].query(line[places])[0]
+            distance = nearest_within(read_only(other), self._boxes[second], read_only(line[places]), np.inf)
             told = float(np.median(distance)), float(np.min(distance)), float(np.quantile(distance, 0.8))
             self._ways[first, second] = told
         return self._ways[first, second]
@@ -79,7 +78,7 @@ class _Beside:
 
 def pitch(points: FloatArray, sweep: IntArray) -> float:
     """Usual distance from a sample to the nearest sample of another sweep, m; 0 for a single sweep."""
-    from scipy.spatial import cKDTree
+    from mapping.geometry.mesh import boxes_about, nearest_within
 
     rows = _of_each(sweep)
     if len(rows) < 2:
@@ -87,7 +86,8 @@ def pitch(points: FloatArray, sweep: IntArray) -> float:
     distances = []
     for own, following in pairwise(rows):
         probes = points[own[np.linspace(0, len(own) - 1, min(len(own), 33)).astype(int)]]
-        distances.append(float(np.median(cKDTree(points[following]).query(probes)[0])))
+        other = read_only(points[following])
+        distances.append(float(np.median(nearest_within(other, boxes_about(other), read_only(probes), np.inf))))
     return float(np.median(distances))
 
 

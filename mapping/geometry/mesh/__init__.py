@@ -11,6 +11,9 @@ if TYPE_CHECKING:
         MOST_WAITING as MOST_WAITING,
         POINTS_PER_BOX as POINTS_PER_BOX,
         boxes_about as boxes_about,
+        nearest_boxed as nearest_boxed,
+        nearest_from as nearest_from,
+        nearest_within as nearest_within,
     )
     from mapping.geometry.mesh.bvh_kernels import STACK as STACK, WIDTH as WIDTH, push_lanes as push_lanes
     from mapping.geometry.mesh.clip import (
@@ -61,7 +64,7 @@ _PUBLIC = {
     "spline": ("Spline", "spline_design"),
     "atomic_write": ("write_whole",),
     "borrowing_kernels": ("borrowing", "inlined"),
-    "box_kernels": ("MOST_WAITING", "POINTS_PER_BOX", "boxes_about"),
+    "box_kernels": ("MOST_WAITING", "POINTS_PER_BOX", "boxes_about", "nearest_boxed", "nearest_from", "nearest_within"),
     "bvh_kernels": ("STACK", "WIDTH", "push_lanes"),
     "clip": ("FELT_SIDE_COSINE", "asked_part", "clipped", "faces_side"),
     "nearest": ("MovedNearestPoint", "NearestPoint"),
