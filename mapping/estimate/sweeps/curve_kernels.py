@@ -26,7 +26,7 @@ def plane_crossings(nodes, boxes, arriving, leaving, points, normals, waiting, o
     last, nearest = len(nodes) - 2, 0
     for q in range(len(points)):
         p, n = vector(points, q), vector(normals, q)
-        nearest = nearest_from(nodes, boxes, nearest, p, waiting)
+        nearest = nearest_from(nodes, boxes, nearest, p, np.inf, waiting)[1]
         i = min(nearest, last)
         start = dot(sub(vector(nodes, i), p), n)
         stop = dot(sub(vector(nodes, i + 1), p), n)

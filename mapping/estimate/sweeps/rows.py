@@ -6,7 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from mapping import BoolArray, FloatArray, IntArray, read_only
+from mapping import BoolArray, FloatArray, IntArray
+from mapping.geometry.mesh import BoxedPoints
 
 # Places along a line from which its distance to another is taken: the distance that a fifth of them lie beyond is then
 # that of a fifth of the line to within 5 % of it (binomial)
@@ -50,7 +51,7 @@ class _Beside:
 
     def __init__(self, lines: list[FloatArray]) -> None:
         self.lines = lines
-        self._boxes: dict[int, FloatArray] = {}
+        self._boxed: dict[int, BoxedPoints] = {}
         self._ways: dict[tuple[int, int], tuple[float, float, float]] = {}
 
     def distance(self, first: int, second: int) -> float:
@@ -63,14 +64,12 @@ class _Beside:
 
     def _way(self, first: int, second: int) -> tuple[float, float, float]:
         """Distances from places along one line to another: usual, least, and the one that a fifth is beyond."""
-        from mapping.geometry.mesh import boxes_about, nearest_within
-
         if (first, second) not in self._ways:
-            line, other = self.lines[first], self.lines[second]
-            if second not in self._boxes:
-                self._boxes[second] = boxes_about(read_only(other))
+            if second not in self._boxed:
+                self._boxed[second] = BoxedPoints(self.lines[second])
+            line = self.lines[first]
             places = np.linspace(0, len(line) - 1, min(len(line), PROBES)).astype(int)
-            distance = nearest_within(read_only(other), self._boxes[second], read_only(line[places]), np.inf)
+            distance = self._boxed[second].nearest(line[places])[0]
             told = float(np.median(distance)), float(np.min(distance)), float(np.quantile(distance, 0.8))
             self._ways[first, second] = told
         return self._ways[first, second]
@@ -78,16 +77,13 @@ class _Beside:
 
 def pitch(points: FloatArray, sweep: IntArray) -> float:
     """Usual distance from a sample to the nearest sample of another sweep, m; 0 for a single sweep."""
-    from mapping.geometry.mesh import boxes_about, nearest_within
-
     rows = _of_each(sweep)
     if len(rows) < 2:
         return 0.0
     distances = []
     for own, following in pairwise(rows):
         probes = points[own[np.linspace(0, len(own) - 1, min(len(own), 33)).astype(int)]]
-        other = read_only(points[following])
-        distances.append(float(np.median(nearest_within(other, boxes_about(other), read_only(probes), np.inf))))
+        distances.append(float(np.median(BoxedPoints(points[following]).nearest(probes)[0])))
     return float(np.median(distances))
 
 

@@ -35,16 +35,15 @@ def boxes_about(points):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def nearest_within(points, boxes, places, reach):  # type: ignore[no-untyped-def]
-    """(N,) distance of each place (N, 3) from the nearest boxed point that is nearer than `reach`, else infinite."""
-    out = np.empty(len(places))
-    waiting = np.empty(MOST_WAITING, np.int64)
+def nearest_within(points, boxes, places, reach, distance, number):  # type: ignore[no-untyped-def]
+    """Write the number of the boxed point nearest to each place (N, 3), looked for from the one before on, and how far
+    it is; len(points) and infinity where none is nearer than `reach`."""
+    waiting, near = np.empty(MOST_WAITING, np.int64), 0
     for n in range(len(places)):
-        out[n] = np.inf
-        square, found = nearest_boxed(points, boxes, 1, vector(places, n), reach * reach, waiting)
-        if found >= 0:
-            out[n] = np.sqrt(square)
-    return out
+        square, found = nearest_from(points, boxes, near, vector(places, n), reach * reach, waiting)
+        near = found if found >= 0 else near
+        distance[n] = np.sqrt(square) if found >= 0 else np.inf
+        number[n] = found if found >= 0 else len(points)
 
 
 @borrowing
@@ -82,19 +81,19 @@ def nearest_boxed(points, boxes, within, place, best, waiting):  # type: ignore[
 
 
 @borrowing
-def nearest_from(points, boxes, start, place, waiting):  # type: ignore[no-untyped-def]
-    """Number of the boxed point nearest to a place, looked for from the point `start` on: at once if it is near.
+def nearest_from(points, boxes, start, place, best, waiting):  # type: ignore[no-untyped-def]
+    """As `nearest_boxed`, of all points, looked for from the point `start` on: found at once if it is near.
 
     In the leaf of that point first, then in each box beside one that has been looked through, up to the root.
     """
     box = len(boxes) // 2 + start // POINTS_PER_BOX
-    square, nearest = nearest_boxed(points, boxes, box, place, np.inf, waiting)
+    best, nearest = nearest_boxed(points, boxes, box, place, best, waiting)
     while box > 1:
-        there, found = nearest_boxed(points, boxes, box ^ 1, place, square, waiting)
+        best, found = nearest_boxed(points, boxes, box ^ 1, place, best, waiting)
         if found >= 0:
-            square, nearest = there, found
+            nearest = found
         box //= 2
-    return nearest
+    return best, nearest
 
 
 @inlined
