@@ -23,8 +23,8 @@ FEWEST_FINAL, MOST_FINAL, FINAL_ROUNDS = 2000, 4000, 3
 # Below this k-hat importance sampling may stand for the posterior (theory section 8).
 TRUSTED_K_HAT = 0.5
 # The proposal is good enough when this share of the draws is effective: one more round to learn from takes the draws
-# that it can save at most, WANTED / EFFICIENT - FEWEST_FINAL = DRAWS_PER_ROUND. A groove was at 0.34 after two
-# rounds, at 0.47 after three and at no more after twelve: half, as was asked before, is not always there to be had.
+# that it can save at most, WANTED / EFFICIENT - FEWEST_FINAL = DRAWS_PER_ROUND. More is not always there to be had: of
+# a normal density cut off in 3 of 6 parameters no mixture has half of its draws effective.
 EFFICIENT = 1.0 / 3.0
 # Standard deviations by which a log evidence must lie below what is asked for to be given up before it is known well
 GIVEN_UP_SDS = 5.0
