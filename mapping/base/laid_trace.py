@@ -12,6 +12,7 @@ from mapping import BoolArray, FloatArray, IntArray, Trace
 from mapping.base.base import Base, Feet
 from mapping.base.cells import Cells
 from mapping.base.height_profile import SweepHeights, arclength, height_profiles
+from mapping.geometry.mesh import BoxedPoints
 
 # Feet whose directions differ by no more (rad), and whose places rise off the first one's plane by no more of their
 # distance, lie as in one plane: by a bend of t lateral noise of sd sigma changes single heights by t sigma / 2 at most,
@@ -235,17 +236,15 @@ class LaidTrace(Trace):
         What is known now is laid out once; a centre with nothing known within LONGEST_KNOWN_GAP of a tip radius is laid
         on the base.
         """
-        from scipy.spatial import cKDTree
-
         parts = [sweep.directions() for sweep in self.laid_sweeps]
         known = np.concatenate([np.zeros((0, 3)), *(places for places, _ in parts)])
         up = np.concatenate([np.zeros((0, 3)), *(normals for _, normals in parts)])
         if len(known) < 2:
             return lambda centers: self.base.foot(centers, self.tip_radius).normals
-        tree = cKDTree(known)
+        boxed = BoxedPoints(known)
 
         def between_known(centers: FloatArray) -> FloatArray:
-            distance, near = tree.query(centers)
+            distance, near = boxed.nearest(centers)
             found = up[near]
             for step in (-1, 1):  # linearly towards the neighbour beyond which the centre does not lie
                 beside = np.clip(near + step, 0, len(known) - 1)
@@ -254,7 +253,7 @@ class LaidTrace(Trace):
                 share = np.einsum("ij,ij->i", centers - known[near], leg) / np.maximum(square, np.finfo(float).tiny)
                 between = (share > 0.0) & (share < 1.0) & (square < (LONGEST_KNOWN_GAP * self.tip_radius) ** 2)
                 found[between] += share[between, None] * (up[beside] - up[near])[between]
-            far = np.asarray(distance) > LONGEST_KNOWN_GAP * self.tip_radius
+            far = distance > LONGEST_KNOWN_GAP * self.tip_radius
             if far.any():
                 found[far] = self.base.foot(centers[far], self.tip_radius).normals
             return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))

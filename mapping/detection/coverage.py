@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Surface
-from mapping.geometry.mesh import NEAREST_COST, by_shares
+from mapping.geometry.mesh import NEAREST_COST, BoxedPoints, by_shares
 
 # Samples of faces looked at, at most
 MOST_FACE_SAMPLES = 2_000_000
@@ -43,13 +43,10 @@ def coverage(surface: Surface, touched: FloatArray, reach: float) -> Coverage:
     Every face is sampled three times as finely as `reach`; a sample is inspected if a touched point lies within
     `reach` of it in space.
     """
-    from scipy.spatial import cKDTree
-
     samples, count = face_samples(surface, reach / 3.0), len(surface.faces)
     near = np.zeros(len(samples.points), dtype=bool)
     if len(touched):
-        distance, _ = cKDTree(touched).query(samples.points, distance_upper_bound=reach)
-        near = np.isfinite(distance)
+        near = np.isfinite(BoxedPoints(touched).nearest(samples.points, reach)[0])
     share = np.asarray(np.bincount(samples.owner, samples.share * near, count), dtype=np.float64)
     areas = surface.face_areas
     total = float(areas.sum())
@@ -130,16 +127,14 @@ def lost_heights(
 
     Reference: theory section 4.
     """
-    from scipy.spatial import cKDTree
-
     lost = np.full(len(points), np.inf)
     if not len(touched):
         return lost
     centres = touched + tip_radius * up
-    tree = cKDTree(centres)
+    boxed = BoxedPoints(centres)
 
-    def nearest(at: FloatArray) -> FloatArray:
-        return np.asarray(tree.query(at, distance_upper_bound=tip_radius)[1])
+    def nearest(at: FloatArray) -> IntArray:
+        return boxed.nearest(at, tip_radius)[1]
 
     # the ball that would rest on a place tells on which side of a thin wall it is
     index = by_shares(nearest, points + tip_radius * normals, NEAREST_COST)

@@ -65,8 +65,6 @@ def _sections(piece: SweepHeights, tip_radius: float, longest: float) -> list[Se
 def outlined(piece: SweepHeights, sign: float, begin: int, end: int, usual: float, longest: float) -> Section | None:
     """The section from where it leaves the scatter of the base to where it comes back, monotone on either side; None of
     one that is not clear of it, or longer than `longest`, m."""
-    from scipy.optimize import isotonic_regression
-
     z = sign * piece.height
     high = float(z[begin:end].max())
     if high * FLANK < FLANK_SDS * usual:
@@ -85,6 +83,8 @@ def outlined(piece: SweepHeights, sign: float, begin: int, end: int, usual: floa
     top = int(np.argmax(np.convolve(inside, np.ones(3) / 3.0, mode="same")))
     if not 0 < top < len(inside) - 1:
         return None  # all within a bin
+    from scipy.optimize import isotonic_regression  # takes longer to import than most profiles to outline
+
     rise = isotonic_regression(inside[: top + 1], increasing=True).x
     fall = isotonic_regression(inside[top:], increasing=False).x
     monotone = np.concatenate([rise[:-1], [max(rise[-1], fall[0])], fall[1:]])

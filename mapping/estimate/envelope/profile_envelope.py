@@ -11,7 +11,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mapping import EnvelopeError, FloatArray, IntArray, read_only
+from mapping import EnvelopeError, FloatArray, IntArray
+from mapping.geometry.mesh import BoxedPoints
 
 # Share by which the bound of a search is widened: its rounding, and that of distances, is some 1e-16
 BOUND_ROUNDING = 1e-12
@@ -76,8 +77,8 @@ def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[Float
     one_row = np.ptp(centers[:, 1]) == 0 and bool((np.diff(centers[:, 0]) > 0).all())
 
     @cache
-    def boxed() -> tuple[FloatArray, FloatArray]:
-        return boxed_centers(centers)
+    def boxed() -> BoxedPoints:
+        return BoxedPoints(centers)
 
     def depth(points: FloatArray, least: float) -> FloatArray:
         if len(points) == 0:
@@ -85,25 +86,9 @@ def penetration_below(centers: FloatArray, tip_radius: float) -> Callable[[Float
         if one_row and (points[:, 1] == centers[0, 1]).all():
             return _below_profile(points, centers, tip_radius)
         near = max((tip_radius - least) * (1.0 + BOUND_ROUNDING), 0.0)
-        from mapping.estimate.envelope.penetration_kernels import nearest_within
-
-        laid, boxes = boxed()
-        return np.asarray(tip_radius - nearest_within(laid, boxes, read_only(points), near))
+        return tip_radius - boxed().nearest(points, near)[0]
 
     return depth
-
-
-def boxed_centers(centers: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The centres (M, 3) in an order in which neighbours lie together, and (K, 6) boxes about pieces of it."""
-    from mapping.geometry.mesh import POINTS_PER_BOX, boxes_about
-
-    laid = read_only(centers)
-    steps = np.linalg.norm(np.diff(laid, axis=0), axis=1)
-    if len(steps) and POINTS_PER_BOX * np.median(steps) > 0.5 * float(np.ptp(laid, axis=0).max()):
-        from scipy.spatial import cKDTree
-
-        laid = read_only(laid[cKDTree(laid, leafsize=POINTS_PER_BOX).indices])
-    return laid, boxes_about(laid)
 
 
 def _below_profile(points: FloatArray, centers: FloatArray, tip_radius: float) -> FloatArray:

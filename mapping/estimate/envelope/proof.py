@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import FloatArray, IntArray, read_only
-from mapping.estimate.envelope.profile_envelope import boxed_centers
 from mapping.estimate.sweeps import unit
+from mapping.geometry.mesh import BoxedPoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Balls:
         """
         from mapping.estimate.envelope.proof_kernels import proven_reach, rings
 
-        nothing = np.zeros((0, 3))
+        nothing, boxed = np.zeros((0, 3)), BoxedPoints(self.centers)
         starts, ring = rings(read_only(faces), len(spot))
         below, above = np.empty((2, len(points)))
         proven_reach(
@@ -61,7 +61,8 @@ class Balls:
             starts,
             ring,
             read_only(self.centers),
-            *boxed_centers(self.centers),
+            boxed.points,
+            boxed.boxes,
             read_only(self.sweep),
             read_only(unit(self.outward)),
             read_only(nothing if across is None else across),

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from mapping.estimate.envelope.penetration_kernels import nearest_center
-from mapping.geometry.mesh import MOST_WAITING, borrowing, vector
+from mapping.geometry.mesh import MOST_WAITING, borrowing, nearest_boxed, vector
 
 # Constraints to a ball: the more, the sharper the bound and the slower (pairs of them are met). A raster gives six to
 # eight, and some more where it is oblique to the body; leaving some out is allowed, for it only widens the bound. Of an
@@ -111,7 +110,7 @@ def proven_reach(  # type: ignore[no-untyped-def]
         spot: (V,) sample of each vertex, -1 where it has none that is known to touch.
         starts, ring: neighbours of vertex v are ring[starts[v] : starts[v + 1]].
         centers, sweep, outward: (N, 3), (N,) and (N, 3) of the samples, outward of length one.
-        laid, boxes: the centres once more, and the boxes about them (see `nearest_center`).
+        laid, boxes: the centres once more, and the boxes about them (see `nearest_boxed`).
         across: (V, 3) unit vectors across a lone sweep, in whose plane the contact is taken to be; else (0, 3).
         slack: by which two balls may overlap a contact of either, m.
         known: (N, 3) contacts, or (0, 3) if only positions are known.
@@ -155,9 +154,8 @@ def _holding(centers, s, contact, laid, boxes, radius, slack, waiting):  # type:
     if square <= 0.0:
         return -1
     x, y, z = vector(centers, s)
-    return nearest_center(
-        laid, boxes, x + radius * contact[0], y + radius * contact[1], z + radius * contact[2], square, waiting
-    )[1]
+    center = (x + radius * contact[0], y + radius * contact[1], z + radius * contact[2])
+    return nearest_boxed(laid, boxes, 1, center, square, waiting)[1]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

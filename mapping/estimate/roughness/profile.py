@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -118,14 +117,13 @@ def _elements(heights: FloatArray, sections: int, spacing: float, limit: float) 
         side = np.where(z > limit, 1, np.where(z < -limit, -1, 0))
         told = np.flatnonzero(side)
         rises = told[1:][(side[told[1:]] == 1) & (side[told[:-1]] == -1)]
-        places = []
-        for k in rises:
-            below = k - 1
-            while z[below] > 0.0:  # the last crossing before the peak
-                below -= 1
-            if np.isfinite(z[below : below + 2]).all():
-                places.append(below + z[below] / (z[below] - z[below + 1]))
-        for begin, end in pairwise(places):
-            if missing[int(begin)] == missing[int(end) + 1]:
-                table[min(int(0.5 * (begin + end)) // size, sections - 1)] += 1.0, (end - begin) * spacing
+        # the last crossing before each peak
+        below = np.maximum.accumulate(np.where(z > 0.0, 0, np.arange(len(z))))[rises - 1]
+        below = below[np.isfinite(z[below]) & np.isfinite(z[below + 1])]
+        places = below + z[below] / (z[below] - z[below + 1])
+        begin, end = places[:-1], places[1:]
+        whole = missing[begin.astype(np.int64)] == missing[end.astype(np.int64) + 1]
+        begin, end = begin[whole], end[whole]
+        section = np.minimum((0.5 * (begin + end)).astype(np.int64) // size, sections - 1)
+        np.add.at(table, section, np.column_stack([np.ones(len(begin)), (end - begin) * spacing]))
     return table

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -41,14 +40,14 @@ class SweepCurve:
         if len(self.nodes) < 2:
             return np.full_like(points, np.nan)
         from mapping.estimate.sweeps.curve_kernels import plane_crossings
+        from mapping.geometry.mesh import MOST_WAITING
 
-        nearest = np.asarray(self._tree.query(points)[1], dtype=np.int64)
-        out = np.empty(points.shape)
-        plane_crossings(self.nodes, self.arriving, self.leaving, nearest, points, normals, out)
+        out, waiting = np.empty(points.shape), np.empty(MOST_WAITING, np.int64)
+        plane_crossings(self.nodes, self._boxes, self.arriving, self.leaving, points, normals, waiting, out)
         return out
 
     @cached_property
-    def _tree(self) -> Any:
-        from scipy.spatial import cKDTree
+    def _boxes(self) -> FloatArray:
+        from mapping.geometry.mesh import boxes_about
 
-        return cKDTree(self.nodes)
+        return np.asarray(boxes_about(self.nodes))

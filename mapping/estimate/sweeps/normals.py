@@ -247,40 +247,8 @@ def smooth_slope(v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray, 
     middle and its neighbours, the one of highest degree whose last term is small beside its curvature. A kink that
     runs along the sweeps therefore stays outside, even where it mimics a curvature in three rows.
     """
-    middle = v.shape[1] // 2
-    with np.errstate(invalid="ignore", divide="ignore"):  # missing rows are NaN and lose every comparison
-        table = [w]
-        for order in range(1, 5):
-            table.append(np.diff(table[-1], axis=1) / (v[:, order:] - v[:, :-order]))
-        slope, bend, doubt, _ = _polynomial(v, w, table, 2, middle)
-        for order in (3, 4):
-            candidate, curved, last, falling = _polynomial(v, w, table, order, middle)
-            # A cubic that is refused still tells how little the parabola knew.
-            doubt = np.where(falling, last, np.fmax(doubt, last) if order == 3 else doubt)
-            slope, bend = np.where(falling, candidate, slope), np.where(falling, curved, bend)
+    from mapping.estimate.sweeps.tangent_kernels import smooth_slopes
+
+    slope, bend, doubt = np.empty((3, len(v)))
+    smooth_slopes(v, w, ONE_SIDED_PENALTY, HIGHER_TERM_SHARE, slope, bend, doubt)
     return slope, bend, doubt
-
-
-def _polynomial(
-    v: FloatArray, w: FloatArray, table: list[FloatArray], order: int, middle: int
-) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Slope and curvature of the smoothest polynomial of an order, doubt of the slope, if its last term is small."""
-    index = np.arange(len(v))
-    size = np.abs(table[order][:, middle - order : middle + 1])
-    size = np.where(np.isnan(size), np.inf, size) * np.r_[ONE_SIDED_PENALTY, np.ones(order - 1), ONE_SIDED_PENALTY]
-    best, second = np.argsort(size, axis=1, kind="stable")[:, :2].T
-    first = middle - order + best
-    slope, other = _slope(v, w, first, order), _slope(v, w, middle - order + second, order)
-    inner = np.clip(middle - 1, first, first + order - 2)
-    bend = 2 * table[2][index, inner]
-    spacing = np.abs(v[index, first + order] - v[index, first]) / order
-    last = np.abs(table[order][index, first]) * spacing ** (order - 1)
-    # Where the second smoothest window sees another slope, a kink or a jump of curvature lies beside the sample.
-    return slope, bend, np.fmax(last, np.abs(slope - other)), last <= HIGHER_TERM_SHARE * np.abs(bend) * spacing
-
-
-def _slope(v: FloatArray, w: FloatArray, first: IntArray, order: int) -> FloatArray:
-    """Slope at v = 0 of the polynomials through columns first to first + order."""
-    nodes = first[:, None] + np.arange(order + 1)
-    at, heights = np.take_along_axis(v, nodes, 1), np.take_along_axis(w, nodes, 1)
-    return np.asarray(np.einsum("km,km->k", lagrange(at, np.zeros(len(v)))[1], heights))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray
+from mapping.geometry.mesh import BoxedPoints
 
 # Places along a line from which its distance to another is taken: the distance that a fifth of them lie beyond is then
 # that of a fifth of the line to within 5 % of it (binomial)
@@ -47,11 +47,11 @@ def _across(points: FloatArray, rows: list[IntArray]) -> list[int]:
 
 
 class _Beside:
-    """How far polylines are apart: each has one tree, and what a pair was asked for once is known."""
+    """How far polylines are apart: each has boxes about it, and what a pair was asked for once is known."""
 
     def __init__(self, lines: list[FloatArray]) -> None:
         self.lines = lines
-        self._trees: dict[int, Any] = {}
+        self._boxed: dict[int, BoxedPoints] = {}
         self._ways: dict[tuple[int, int], tuple[float, float, float]] = {}
 
     def distance(self, first: int, second: int) -> float:
@@ -64,14 +64,12 @@ class _Beside:
 
     def _way(self, first: int, second: int) -> tuple[float, float, float]:
         """Distances from places along one line to another: usual, least, and the one that a fifth is beyond."""
-        from scipy.spatial import cKDTree
-
         if (first, second) not in self._ways:
-            if second not in self._trees:
-                self._trees[second] = cKDTree(self.lines[second])
+            if second not in self._boxed:
+                self._boxed[second] = BoxedPoints(self.lines[second])
             line = self.lines[first]
             places = np.linspace(0, len(line) - 1, min(len(line), PROBES)).astype(int)
-            distance = self._trees[second].query(line[places])[0]
+            distance = self._boxed[second].nearest(line[places])[0]
             told = float(np.median(distance)), float(np.min(distance)), float(np.quantile(distance, 0.8))
             self._ways[first, second] = told
         return self._ways[first, second]
@@ -79,15 +77,13 @@ class _Beside:
 
 def pitch(points: FloatArray, sweep: IntArray) -> float:
     """Usual distance from a sample to the nearest sample of another sweep, m; 0 for a single sweep."""
-    from scipy.spatial import cKDTree
-
     rows = _of_each(sweep)
     if len(rows) < 2:
         return 0.0
     distances = []
     for own, following in pairwise(rows):
         probes = points[own[np.linspace(0, len(own) - 1, min(len(own), 33)).astype(int)]]
-        distances.append(float(np.median(cKDTree(points[following]).query(probes)[0])))
+        distances.append(float(np.median(BoxedPoints(points[following]).nearest(probes)[0])))
     return float(np.median(distances))
 
 

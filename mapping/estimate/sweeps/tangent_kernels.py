@@ -82,6 +82,73 @@ def lagrange_weights(nodes: FloatArray, at: FloatArray, value: FloatArray, slope
             value[i, j], slope[i, j] = product, total
 
 
+HIGHEST_ORDER = 4  # of the polynomials across sweeps
+
+
+@njit(cache=True, error_model="numpy")
+def smooth_slopes(
+    v: FloatArray,
+    w: FloatArray,
+    one_sided: float,
+    higher: float,
+    slope: FloatArray,
+    bend: FloatArray,
+    doubt: FloatArray,
+) -> None:
+    """Write slope, second derivative and doubt of each row's w(v) (N, 2 k + 1) at the middle (see `smooth_slope`).
+
+    Args:
+        one_sided: factor by which a polynomial to one side must be smoother than the others.
+        higher: share of the curvature that a higher term may have.
+    """
+    middle = v.shape[1] // 2
+    table = np.empty((HIGHEST_ORDER + 1, v.shape[1]))  # divided differences, NaN where one is missing
+    for n in range(len(v)):
+        at = v[n]
+        table[0] = w[n]
+        for order in range(1, HIGHEST_ORDER + 1):
+            for k in range(v.shape[1] - order):
+                table[order, k] = (table[order - 1, k + 1] - table[order - 1, k]) / (at[k + order] - at[k])
+        for order in range(2, HIGHEST_ORDER + 1):
+            best, second = _smoothest(table[order], middle, order, one_sided)
+            found, other = _slope_there(at, table, best, order), _slope_there(at, table, second, order)
+            bent = 2.0 * table[2, min(max(middle - 1, best), best + order - 2)]
+            spacing = abs(at[best + order] - at[best]) / order
+            last = abs(table[order, best]) * spacing ** (order - 1)
+            falling = last <= higher * abs(bent) * spacing
+            # where the second smoothest window sees another slope, a kink or a jump of curvature lies beside the sample
+            last = np.fmax(last, abs(found - other))
+            if order == 2 or falling:
+                slope[n], bend[n], doubt[n] = found, bent, last
+            elif order == 3:  # a cubic that is refused still tells how little the parabola knew
+                doubt[n] = np.fmax(doubt[n], last)
+
+
+@njit(cache=True, error_model="numpy")
+def _smoothest(differences, middle, order, one_sided):  # type: ignore[no-untyped-def]
+    """First columns of the two windows of an order about the middle whose highest difference is smallest."""
+    best, second = -1, -1
+    least = next_ = np.inf
+    for k in range(order + 1):
+        size = abs(differences[middle - order + k]) * (one_sided if k in (0, order) else 1.0)
+        size = np.inf if np.isnan(size) else size
+        if best < 0 or size < least:
+            best, second, least, next_ = k, best, size, least
+        elif second < 0 or size < next_:
+            second, next_ = k, size
+    return middle - order + best, middle - order + second
+
+
+@njit(cache=True, error_model="numpy")
+def _slope_there(v, table, first, order):  # type: ignore[no-untyped-def]
+    """Slope at v = 0 of the polynomial through columns first to first + order, by Newton's form."""
+    value, slope = table[order, first], 0.0
+    for k in range(order - 1, -1, -1):
+        slope = value - slope * v[first + k]
+        value = table[k, first] - value * v[first + k]
+    return slope
+
+
 QUADRATIC_TERMS = 6  # terms of a quadratic of two variables
 # Ratio of the diagonal of R below which neighbours do not determine all terms: on one line it is rounding, 1e-16, and
 # at 1e-6 the coefficients have ten digits; what lies between is as well left to a singular value decomposition.

@@ -12,6 +12,7 @@ from mapping.geometry.mesh import (
     STACK,
     WIDTH,
     borrowing,
+    closest,
     closest_on_triangle,
     closing_step,
     corners,
@@ -59,27 +60,34 @@ def leave_overlap(rows, leaves, boxes, links, ball, o, d, stack, apart, late):  
 
 @borrowing
 def overlap_ahead(rows, leaves, boxes, links, ball, o, d, stack, apart, late):  # type: ignore[no-untyped-def]
-    """How far the ball at o moves along d to leave every triangle that it overlaps now."""
+    """How far the ball at o moves along d to leave every triangle that it overlaps now.
+
+    A triangle is convex: one that the ball has left when it is free of another does not hold it further. So those far
+    ahead come first, which a ball that comes back meets first.
+    """
     radius, _, graze = ball
-    step = 0.0
+    step, end, back = 0.0, o, scaled(-1.0, d)
     stack[0] = len(links) - 1
     waiting = 1
     while waiting > 0:
         i = -1 - stack[waiting - 1]
         if i < 0:
-            waiting = push_lanes(leaves, boxes, links, stack, waiting, o, o, d, 0.0, radius, apart, late)
+            waiting = push_lanes(leaves, boxes, links, stack, waiting, end, end, back, 0.0, radius, apart, late)
             continue
         waiting -= 1
+        p = closest(rows, i, end)
+        if dot(p, p) >= radius * radius:
+            continue
         a, b, c, n = corners(rows, i, o)
         p = closest_on_triangle(a, b, c, n)
         gap = sqrt(dot(p, p))
         if gap < radius - graze:
             beyond = max(dot(a, d), dot(b, d), dot(c, d)) + radius  # free there: it comes back until it touches
             a, b, c = moved(a, -beyond, d), moved(b, -beyond, d), moved(c, -beyond, d)
-            back = scaled(-1.0, d)
             closing = dot(p, back)
             start = max(beyond + closing_step(gap, closing, radius), 0.0) if closing > 0.0 else 0.0
             step = max(step, beyond - enter_triangle(a, b, c, n, back, ball, start, inf))
+            end = moved(o, step, d)
     return step
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from mapping import BoolArray, CurvatureError, FloatArray, IntArray, Surface
 from mapping.geometry.curvature.curvature import Curvature, from_operators
 from mapping.geometry.curvature.neighbours import Neighbours
-from mapping.geometry.mesh import NEAREST_COST, by_shares, cores
+from mapping.geometry.mesh import NEAREST_COST, BoxedPoints, by_shares, cores
 
 # Neighbourhoods from which points choose. Regular grids are symmetric in 25, 37, 49, 69 and 97 neighbours, which
 # cancels odd errors; 33 are the fewest that a jet of degree 6 needs with some to spare.
@@ -210,7 +210,8 @@ class _Jets:
         a, b, c = np.einsum("msd,msdk->km", weights, np.nan_to_num(found.operators))
         mean, half = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
         larger = np.nan_to_num(np.where(mean < 0, mean - half, mean + half))
-        self.bends = larger[by_shares(lambda place: np.asarray(tree.query(place)[1]), self.place, NEAREST_COST)]
+        boxed = BoxedPoints(self.place[sample])
+        self.bends = larger[by_shares(lambda place: boxed.nearest(place)[1], self.place, NEAREST_COST)]
 
     def worthwhile(self, sizes: IntArray, noise: float) -> IntArray:
         """The sizes that points of a sample give most weight to, with those that judge them."""

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
         MOST_WAITING as MOST_WAITING,
         POINTS_PER_BOX as POINTS_PER_BOX,
         boxes_about as boxes_about,
+        nearest_boxed as nearest_boxed,
+        nearest_from as nearest_from,
     )
     from mapping.geometry.mesh.bvh_kernels import STACK as STACK, WIDTH as WIDTH, push_lanes as push_lanes
     from mapping.geometry.mesh.clip import (
@@ -19,7 +21,11 @@ if TYPE_CHECKING:
         clipped as clipped,
         faces_side as faces_side,
     )
-    from mapping.geometry.mesh.nearest import MovedNearestPoint as MovedNearestPoint, NearestPoint as NearestPoint
+    from mapping.geometry.mesh.nearest import (
+        BoxedPoints as BoxedPoints,
+        MovedNearestPoint as MovedNearestPoint,
+        NearestPoint as NearestPoint,
+    )
     from mapping.geometry.mesh.open3d_import import open3d as open3d
     from mapping.geometry.mesh.polyline import (
         arclengths as arclengths,
@@ -61,10 +67,10 @@ _PUBLIC = {
     "spline": ("Spline", "spline_design"),
     "atomic_write": ("write_whole",),
     "borrowing_kernels": ("borrowing", "inlined"),
-    "box_kernels": ("MOST_WAITING", "POINTS_PER_BOX", "boxes_about"),
+    "box_kernels": ("MOST_WAITING", "POINTS_PER_BOX", "boxes_about", "nearest_boxed", "nearest_from"),
     "bvh_kernels": ("STACK", "WIDTH", "push_lanes"),
     "clip": ("FELT_SIDE_COSINE", "asked_part", "clipped", "faces_side"),
-    "nearest": ("MovedNearestPoint", "NearestPoint"),
+    "nearest": ("BoxedPoints", "MovedNearestPoint", "NearestPoint"),
     "open3d_import": ("open3d",),
     "polyline": ("arclengths", "directions", "distances", "middle", "nearest_on", "resample"),
     "threads": ("NEAREST_COST", "algebra_in_one_thread", "by_shares", "cores"),
