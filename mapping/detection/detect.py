@@ -152,7 +152,7 @@ def detect(
         return Detections((), noise or Noise(0.0), algorithm, np.inf, PROBABILITY, np.inf, 0.0, left_out)
     raw = float(np.median([_step(sweep) for sweep in usable]))
     stretches = [] if noise else raw_stretches(usable)
-    first = floored(noise, tip) if noise else first_noise(stretches, raw, tip)
+    first = floored(noise, tip) if noise else first_noise(stretches, raw, tip, base.known)
     widest = LARGEST * tip if largest is None else largest
     of_sweeps = _profiles(usable, first, tip)
     keep, unfelt = _felt(laid, dict(zip(map(id, usable), of_sweeps, strict=True)))
