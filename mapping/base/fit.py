@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from mapping import FloatArray, FormError, IntArray, Trace, TraceError
+from mapping import BoolArray, FloatArray, FormError, IntArray, Trace, TraceError
 from mapping.base.base import Base
-from mapping.base.cells import Cells
+from mapping.base.cells import Cells, rows_of
 from mapping.base.polyhedron import polyhedron
 from mapping.base.profiles import AUTO, Form, fit_profile, profile_frame
 from mapping.base.quadrics import (
@@ -19,17 +19,20 @@ from mapping.base.quadrics import (
     Family,
     Fitted,
     cylinder,
+    height_field,
     independent_share,
     plane,
+    plane_design,
     quadric,
+    quadric_design,
     sheet,
     sphere,
 )
 from mapping.base.star import star
-from mapping.base.terraces import terraced_plane, terraced_quadric
+from mapping.base.terraces import END_SHARE, terraced_plane, terraced_quadric
 from mapping.base.tube import tube
 from mapping.geometry.mesh import NearestPoint
-from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_scale, robust_sd
+from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_scale, robust_sd, unshared
 
 MOST_BASE_CELLS = 4000
 # Families for what no simple one explains
@@ -59,6 +62,8 @@ FEWEST_HALF = 3
 FORETOLD = 2.0
 # Variance of a median of Gaussian values over that of their mean
 OF_MEDIAN = 0.5 * np.pi
+# Rounds in which a base through the ends of sweeps takes in what lies as it does
+ENDS_ROUNDS = 3
 # Families that a form admits over an area
 AREAL_FORMS: dict[str, tuple[Family, ...]] = {
     "auto": (*FAMILIES, terraced_plane, terraced_quadric),
@@ -112,7 +117,12 @@ def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO, *, t
         if all(_missed(fit, cloud) > EXACTLY for fit in fits):
             fits += _last_resort(FREE, cloud)
     residual = min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual
-    scale, share = _noise_of(residual, cloud)
+    alone = _alone(residual, cloud) if all(_missed(fit, cloud) > EXPLAINED for fit in fits) else None
+    scale, share = _noise_of(residual if alone is None else alone, cloud)
+    if alone is not None:
+        # most of the path may lie on one detail, and what all sweeps miss there counts as one sweep's
+        fits += _of_ends(cloud)
+        share /= len(np.unique(cloud.sweep))
     best = min(fits, key=lambda fitted: fitted.cost(scale, share))
     missed = _foretold(best, trace) if tested else None
     return Base(best.surface(cloud, spacing), best.kind, best.parameters, missed=missed)
@@ -198,3 +208,37 @@ def _shares(residual: FloatArray, sweep: IntArray, scale: float) -> tuple[float,
         return alike, 1.0
     apart = max(robust_sd(np.array([np.median(each) for each in own])) ** 2, 1e-12)
     return alike, min(1.0, OF_MEDIAN * square / apart * len(own) / len(kept))
+
+
+def _alone(residual: FloatArray, cloud: Cloud) -> FloatArray | None:
+    """Residuals (C,) of the cells without what their sweeps share with those beside them; None if that is no more than
+    noise (see `unshared`)."""
+    rest = unshared(rows_of(cloud.points, residual, cloud.sweep))
+    return None if rest is None else np.concatenate(rest)
+
+
+def _of_ends(cloud: Cloud) -> list[Fitted]:
+    """Height fields through the ends of the sweeps, and what lies as they do.
+
+    What sweeps were laid over to feel it lies in their middle; where that is most of them no sum of residuals finds the
+    base.
+    """
+    found = []
+    for design, kind in ((plane_design, "plane"), (quadric_design, "quadric")):
+        near = _ends(cloud.sweep)
+        for _ in range(ENDS_ROUNDS):
+            fit = height_field(design, kind, cloud, among=near)
+            near = np.abs(fit.residual) < FEATURE_RESIDUAL_SDS * cloud.floor
+            if near.sum() < len(near) // END_SHARE:
+                break
+            found.append(fit)
+    return found
+
+
+def _ends(sweep: IntArray) -> BoolArray:
+    """(C,) True for the first and the last cells of each sweep."""
+    begins = np.flatnonzero(np.diff(sweep, prepend=sweep[0] - 1))
+    counts = np.diff(np.append(begins, len(sweep)))
+    place = np.arange(len(sweep)) - np.repeat(begins, counts)
+    end = np.repeat(np.maximum(1, counts // END_SHARE), counts)
+    return np.asarray((place < end) | (place >= np.repeat(counts, counts) - end))

@@ -260,7 +260,7 @@ def _fit(
     if not base.known:
         return NoiseFit(_robust(profiles, quiet, first))
     size = max(1, -(-sum(len(stretch.s) for stretch in stretches) // NOISE_FIT_BLOCKS))
-    blocks = [_raw_blocks(stretches, profiles, quiet, size)]
+    blocks = [_raw_blocks(stretches, profiles, quiet, size)] if stretches else []
     if sum(p.samples * len(p.height) for p in profiles) > 1.1 * sum(len(stretch.s) for stretch in stretches):
         blocks += [_profile_blocks(p, keep) for p, keep in zip(profiles, quiet, strict=True)]
     return fit_noise(blocks, start, stated, several=several, one=one)
