@@ -7,7 +7,7 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from mapping.base.anchor import anchor as anchor, tangent_frame as tangent_frame
     from mapping.base.base import Base as Base, Feet as Feet
-    from mapping.base.cells import Cells as Cells
+    from mapping.base.cells import Cells as Cells, rows_of as rows_of
     from mapping.base.extent import (
         BASE_TRIANGLE_SIZE as BASE_TRIANGLE_SIZE,
         over_base as over_base,
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _PUBLIC = {
     "anchor": ("anchor", "tangent_frame"),
     "base": ("Base", "Feet"),
-    "cells": ("Cells",),
+    "cells": ("Cells", "rows_of"),
     "extent": ("BASE_TRIANGLE_SIZE", "over_base", "refined", "rolled_off", "touched_part"),
     "fit": ("FORETOLD", "fit_base"),
     "height_profile": ("FEW_SAMPLES_PER_BIN", "UNEVEN", "SweepHeights"),

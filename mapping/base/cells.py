@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Trace
+from mapping.instrument import Row
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,3 +46,12 @@ class Cells:
         """Some of the cells as a trace of their own; their times count cells."""
         normals = None if self.normals is None else self.normals[keep]
         return Trace(np.flatnonzero(keep).astype(np.float64), self.centers[keep], self.sweep[keep], tip_radius, normals)
+
+
+def rows_of(points: FloatArray, height: FloatArray, sweep: IntArray, samples: float = 1.0) -> list[Row]:
+    """What each sweep read in cells (C) of so many samples, its points (C, 3) and heights (C,), m; sweeps ascend."""
+    begins = np.flatnonzero(np.diff(sweep, prepend=sweep[:1] - 1))
+    along = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    step = float(np.median(np.append(along[np.diff(sweep) == 0], 0.0)))
+    each = zip(np.split(points, begins[1:]), np.split(height, begins[1:]), strict=True)
+    return [Row(places, own, step, samples) for places, own in each]

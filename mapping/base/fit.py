@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from mapping import FloatArray, FormError, Trace, TraceError
+from mapping import BoolArray, FloatArray, FormError, IntArray, Trace, TraceError
 from mapping.base.base import Base
-from mapping.base.cells import Cells
+from mapping.base.cells import Cells, rows_of
 from mapping.base.polyhedron import polyhedron
 from mapping.base.profiles import AUTO, Form, fit_profile, profile_frame
 from mapping.base.quadrics import (
@@ -19,17 +19,20 @@ from mapping.base.quadrics import (
     Family,
     Fitted,
     cylinder,
+    height_field,
     independent_share,
     plane,
+    plane_design,
     quadric,
+    quadric_design,
     sheet,
     sphere,
 )
 from mapping.base.star import star
-from mapping.base.terraces import terraced_plane, terraced_quadric
+from mapping.base.terraces import END_SHARE, terraced_plane, terraced_quadric
 from mapping.base.tube import tube
 from mapping.geometry.mesh import NearestPoint
-from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_scale
+from mapping.instrument import FEATURE_RESIDUAL_SDS, robust_scale, robust_sd, unshared
 
 MOST_BASE_CELLS = 4000
 # Families for what no simple one explains
@@ -57,6 +60,10 @@ FEWEST_HALF = 3
 # A base foretells a path if it misses it by no more than so many times the scatter from cell to cell, that is if of the
 # variance at most three quarters are of something else: of the fit's own error, and of noise that wanders
 FORETOLD = 2.0
+# Variance of a median of Gaussian values over that of their mean
+OF_MEDIAN = 0.5 * np.pi
+# Rounds in which a base through the ends of sweeps takes in what lies as it does
+ENDS_ROUNDS = 3
 # Families that a form admits over an area
 AREAL_FORMS: dict[str, tuple[Family, ...]] = {
     "auto": (*FAMILIES, terraced_plane, terraced_quadric),
@@ -109,7 +116,15 @@ def fit_base(trace: Trace, spacing: float | None = None, form: Form = AUTO, *, t
         fits += [body for body in bodies if not _walked_through(body, cloud, trace)]
         if all(_missed(fit, cloud) > EXACTLY for fit in fits):
             fits += _last_resort(FREE, cloud)
-    scale, share = _noise_of(min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual, cloud.floor)
+    residual = min(fits, key=lambda fitted: fitted.cost(cloud.floor)).residual
+    scale, share = _noise_of(residual, cloud)
+    alone = _alone(residual, cloud) if all(_missed(fit, cloud) > EXPLAINED for fit in fits) else None
+    if alone is not None:
+        # most of the path may lie on one detail, and what all sweeps miss there counts as one sweep's
+        own, of_own = _noise_of(alone, cloud)
+        if all(np.median(np.abs(fit.residual)) > EXPLAINED * own for fit in fits):
+            fits += _of_ends(cloud)
+            scale, share = own, of_own / len(np.unique(cloud.sweep))
     best = min(fits, key=lambda fitted: fitted.cost(scale, share))
     missed = _foretold(best, trace) if tested else None
     return Base(best.surface(cloud, spacing), best.kind, best.parameters, missed=missed)
@@ -147,9 +162,16 @@ def _foretold(best: Fitted, trace: Trace) -> float | None:
     if not fits:
         return None
     fit = min(fits, key=lambda fitted: fitted.cost(cloud.floor))
-    centers = Cells.of(trace.select(~half), MOST_BASE_CELLS).centers
-    missed, scatter = Base(fit.surface(cloud, None), fit.kind, fit.parameters).misses(centers, trace.tip_radius)
-    return missed if missed <= FORETOLD * scatter else None
+    others = Cells.of(trace.select(~half), MOST_BASE_CELLS)
+    base = Base(fit.surface(cloud, None), fit.kind, fit.parameters)
+    missed, scatter = base.misses(others.centers, trace.tip_radius)
+    if missed > FORETOLD * scatter:
+        return None
+    # nor by more as a whole sweep than so many times what its cells make of that
+    over = base.foot(others.centers, trace.tip_radius).height[:, None] - base.levels
+    height = over[np.arange(len(over)), np.abs(over).argmin(axis=1)]
+    alike, apart = _shares(height, others.sweep, max(scatter, cloud.floor))
+    return missed if apart >= alike / FORETOLD**2 else None
 
 
 def _fits(families: Iterable[Family], cloud: Cloud) -> list[Fitted]:
@@ -165,13 +187,60 @@ def _missed(fit: Fitted, cloud: Cloud) -> float:
     return float(np.median(np.abs(fit.residual))) / cloud.floor
 
 
-def _noise_of(residual: FloatArray, floor: float) -> tuple[float, float]:
+def _noise_of(residual: FloatArray, cloud: Cloud) -> tuple[float, float]:
     """Scale of the cells' scatter about the freest fit, m, and the share of them that count as independent.
 
     Noise that is correlated along the path makes neighbours agree: by the scatter from cell to cell alone, a
-    plane would be bent to follow it.
+    plane would be bent to follow it. So it would be by sweeps that stand off each other as a whole: as many count as
+    their medians scatter like those of.
     """
     # the scatter from cell to cell is too large where sweeps are short and bend over features
-    scale = max(0.5 * floor, robust_scale(residual))
+    scale = max(0.5 * cloud.floor, robust_scale(residual))
+    return scale, min(_shares(residual, cloud.sweep, scale))
+
+
+def _shares(residual: FloatArray, sweep: IntArray, scale: float) -> tuple[float, float]:
+    """The share of cells (C,) that count as independent, by how alike neighbours are along the sweeps, and by how far
+    the sweeps' medians scatter; of few sweeps that is no less."""
     kept = np.clip(residual / scale, -FEATURE_RESIDUAL_SDS, FEATURE_RESIDUAL_SDS)
-    return scale, independent_share(float((kept[1:] * kept[:-1]).mean() / max((kept**2).mean(), 1e-12)))
+    square = max(float((kept**2).mean()), 1e-12)
+    alike = independent_share(float((kept[1:] * kept[:-1]).mean()) / square)
+    own = [kept[sweep == number] for number in np.unique(sweep)]
+    if len(own) < FEWEST_HALF:
+        return alike, 1.0
+    apart = max(robust_sd(np.array([np.median(each) for each in own])) ** 2, 1e-12)
+    return alike, min(1.0, OF_MEDIAN * square / apart * len(own) / len(kept))
+
+
+def _alone(residual: FloatArray, cloud: Cloud) -> FloatArray | None:
+    """Residuals (C,) of the cells without what their sweeps share with those beside them; None if that is no more than
+    noise (see `unshared`)."""
+    rest = unshared(rows_of(cloud.points, residual, cloud.sweep))
+    return None if rest is None else np.concatenate(rest)
+
+
+def _of_ends(cloud: Cloud) -> list[Fitted]:
+    """Height fields through the ends of the sweeps, and what lies as they do.
+
+    What sweeps were laid over to feel it lies in their middle; where that is most of them no sum of residuals finds the
+    base.
+    """
+    found = []
+    for design, kind in ((plane_design, "plane"), (quadric_design, "quadric")):
+        near = _ends(cloud.sweep)
+        for _ in range(ENDS_ROUNDS):
+            fit = height_field(design, kind, cloud, among=near)
+            near = np.abs(fit.residual) < FEATURE_RESIDUAL_SDS * cloud.floor
+            if near.sum() < len(near) // END_SHARE:
+                break
+            found.append(fit)
+    return found
+
+
+def _ends(sweep: IntArray) -> BoolArray:
+    """(C,) True for the first and the last cells of each sweep."""
+    begins = np.flatnonzero(np.diff(sweep, prepend=sweep[0] - 1))
+    counts = np.diff(np.append(begins, len(sweep)))
+    place = np.arange(len(sweep)) - np.repeat(begins, counts)
+    end = np.repeat(np.maximum(1, counts // END_SHARE), counts)
+    return np.asarray((place < end) | (place >= np.repeat(counts, counts) - end))

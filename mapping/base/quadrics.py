@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from mapping import FloatArray, IntArray, Surface, Trace
+from mapping import BoolArray, FloatArray, IntArray, Surface, Trace
 from mapping.base.base import FIT_MARGIN, FitValue
 from mapping.base.cells import Cells
 from mapping.base.profiles import SHORTEST_BEND
@@ -147,15 +147,19 @@ class Fitted:
         return self.mesh(cloud, spacing)
 
 
-def height_field(design: Design, kind: str, cloud: Cloud, bends: FloatArray | None = None) -> Fitted:
+def height_field(
+    design: Design, kind: str, cloud: Cloud, bends: FloatArray | None = None, among: BoolArray | None = None
+) -> Fitted:
     """A height field z = design(x, y) @ coefficients over the principal plane.
 
     Args:
         bends: (B, P) rows of which each times the coefficients is 0 +- 1: what holds where nothing was felt.
+        among: (C,) cells that it is fitted to; None: all.
     """
     x, y, z = cloud.points.T
     prior = np.zeros((0, design(x[:1], y[:1]).shape[1])) if bends is None else cloud.floor * bends
-    fit = robust_fit(np.vstack([design(x, y), prior]), np.append(z, np.zeros(len(prior))), cloud.scale)
+    columns, which = design(x, y), slice(None) if among is None else among
+    fit = robust_fit(np.vstack([columns[which], prior]), np.append(z[which], np.zeros(len(prior))), cloud.scale)
 
     def height(u: FloatArray, v: FloatArray) -> FloatArray:
         return np.asarray(design(u, v) @ fit.coefficients)
@@ -164,7 +168,7 @@ def height_field(design: Design, kind: str, cloud: Cloud, bends: FloatArray | No
     return Fitted(
         kind,
         {"coefficients": fit.coefficients.tolist()},
-        fit.residual[: len(z)],
+        fit.residual[: len(z)] if among is None else z - columns @ fit.coefficients,
         len(fit.coefficients),
         lambda cloud, spacing: _height_mesh(height, cells, cloud, spacing),
     )

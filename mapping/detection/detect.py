@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping import BoolArray, DetectionError, FloatArray, IntArray, Trace, length_text
-from mapping.base import Base, LaidSweep, LaidTrace, SweepHeights, fit_base
+from mapping.base import Base, Cells, LaidSweep, LaidTrace, SweepHeights, fit_base, rows_of
 from mapping.detection.candidates import LARGEST_SHARE, Searched, search, without
 from mapping.detection.cap_fit import FITTED_BESIDE, Disturbance
 from mapping.detection.crossing import STEP_CROSSINGS, Crossing
@@ -26,6 +26,7 @@ from mapping.detection.quiet_noise import (
     CONTACT_ROUNDING,
     RAW_SAMPLES,
     SMALLEST_CREST_SNR,
+    Background,
     Stretch,
     background,
     first_noise,
@@ -33,7 +34,7 @@ from mapping.detection.quiet_noise import (
     raw_stretches,
 )
 from mapping.detection.terraces import Terraced, terraced
-from mapping.instrument import Levels, Noise, StatedNoise
+from mapping.instrument import ROWS_THAT_SHARE, Levels, Noise, Row, StatedNoise, unshared
 
 # Half-width of the widest disturbance that counts as fine, in tip radii.
 LARGEST = 4.0
@@ -45,6 +46,8 @@ PROBABILITY = 0.95
 UNRESOLVED = 2.5
 # Distances between samples that differ by no more than this factor are as good as equal.
 ALIKE = 1.15
+# Cells of all sweeps that tell whether these share what looks correlated: as many as a base is fitted to
+MOST_CELLS = 4000
 # A sweep of fewer samples has no level, slope and noise of its own, and half a crest.
 SHORTEST_SWEEP_SAMPLES = 8
 # Share of the path that may be taken by what exceeds the threshold without being clear, before the law is doubted:
@@ -152,8 +155,12 @@ def detect(
         return Detections((), noise or Noise(0.0), algorithm, np.inf, PROBABILITY, np.inf, 0.0, left_out)
     raw = float(np.median([_step(sweep) for sweep in usable]))
     stretches = [] if noise else raw_stretches(usable)
-    first = floored(noise, tip) if noise else first_noise(stretches, raw, tip)
+    first = floored(noise, tip) if noise else first_noise(stretches, raw, tip, base.known)
     widest = LARGEST * tip if largest is None else largest
+    # what looks correlated may be what the sweeps share
+    asked = noise is None and first.correlated > 0 and len(usable) >= ROWS_THAT_SHARE
+    of_each = _noise_of_each(laid) if asked else None
+    first = first if of_each is None else of_each
     of_sweeps = _profiles(usable, first, tip)
     keep, unfelt = _felt(laid, dict(zip(map(id, usable), of_sweeps, strict=True)))
     if unfelt:
@@ -170,13 +177,16 @@ def detect(
     over = [terraced(profile, base, tip) for each in of_sweeps for profile in each]
     profiles = [each.profile for each in over]
     stretches = [_over_terraces(stretch, over) for stretch in stretches]
-    behind = background(profiles, base, noise, stretches, first, tip, widest, stated)
+    alone, foretold = profiles, None if of_each is None else _unshared(profiles)
+    if foretold is not None:
+        alone, stretches = foretold, []
+    behind = background(alone, base, noise, stretches, first, tip, widest, stated)
     level = behind.noise
     thresholds = {
         spacing: threshold_for(bank, false_alarms_per_metre, behind.uncertainties[spacing])
         for spacing, bank in behind.banks.items()
     }
-    found: list[Searched] = [search(p, behind.banks[p.spacing], level, thresholds[p.spacing], tip) for p in profiles]
+    found = _searched(profiles, behind, thresholds, tip)
     lengths = {spacing: sum(p.length for p in profiles if p.spacing == spacing) for spacing in thresholds}
     # what is stated of the whole trace holds for the sweeps that make most of it
     usual = max(lengths, key=lambda spacing: lengths[spacing])
@@ -186,7 +196,10 @@ def detect(
     doubt = threshold / threshold_for(bank, false_alarms_per_metre)
     # a noise that is given is the caller's word; one that was fitted is held against the quiet path
     if noise is None and level.white > CONTACT_ROUNDING * tip:
-        weighed, nulls = _weighed(profiles, list(found), behind.banks, level, thresholds, tip)
+        quiet = found if alone is profiles else _searched(alone, behind, thresholds, tip)
+        weighed, nulls = _weighed(alone, list(quiet), behind.banks, level, thresholds, tip)
+        if alone is not profiles:
+            weighed = _searched(profiles, behind, thresholds, tip, nulls)
         told = [null for p, null in zip(profiles, nulls, strict=True) if p.spacing == usual and null is not None]
         measured = limit_along(bank, told, threshold, tip) if told else found_from
         # where all that is kept must stand out of the rounding of the positions, the law of what is less than that
@@ -218,7 +231,7 @@ def detect(
     if algorithm != 3:
         crossings = _judged(crossings, usable, algorithm, level)
     limit = max(found_from, rounding)
-    of_each = _inspected(profiles, behind.banks)
+    lengths_of_each = _inspected(profiles, behind.banks)
     return Detections(
         tuple(crossings),
         level,
@@ -228,7 +241,7 @@ def detect(
         threshold,
         sum(lengths.values()),
         left_out,
-        of_each,
+        lengths_of_each,
         remarks,
         doubt=doubt,
     )
@@ -254,6 +267,44 @@ def expected_limit(noise: Noise, spacing: float, tip_radius: float, false_alarms
     smallest = smallest_half_width(noise, samples * spacing, samples, tip_radius, SMALLEST_CREST_SNR)
     bank = build_bank(noise, samples * spacing, samples, smallest, max(LARGEST * tip_radius, smallest))
     return bank.detection_limit(threshold_for(bank, false_alarms_per_metre), tip_radius)
+
+
+def _noise_of_each(laid: LaidTrace) -> Noise | None:
+    """Noise of what each sweep reads alone, if its neighbours foretell more of it than noise does (see `unshared`); by
+    cells of all sweeps."""
+    cells = Cells.of(laid, MOST_CELLS)
+    if len(laid) <= RAW_SAMPLES:  # all of so few are laid
+        height = np.bincount(cells.cell, laid.feet().height) / np.bincount(cells.cell)
+    else:
+        height = laid.base.foot(cells.centers, laid.tip_radius).height
+    rows = rows_of(cells.centers, height, cells.sweep, len(laid) / len(height))
+    rest = unshared(rows)
+    if rest is None:
+        return None
+    each = [Stretch(k, h, rows[k].step * np.arange(float(len(h)))) for k, h in enumerate(rest)]
+    found = first_noise(each, rows[0].step, laid.tip_radius)
+    return floored(replace(found, white=found.white * float(np.sqrt(rows[0].samples))), laid.tip_radius)
+
+
+def _unshared(profiles: list[SweepHeights]) -> list[SweepHeights] | None:
+    """The profiles without what their sweeps' neighbours foretell of them, if that is more than noise (see `unshared`);
+    None of sweeps in pieces, or in bins of several lengths."""
+    if len({p.sweep for p in profiles}) < len(profiles) or len({p.spacing for p in profiles}) > 1:
+        return None
+    rest = unshared([Row(p.centers, p.height, p.spacing, p.samples) for p in profiles])
+    return None if rest is None else [replace(p, height=h) for p, h in zip(profiles, rest, strict=True)]
+
+
+def _searched(
+    profiles: list[SweepHeights],
+    behind: Background,
+    thresholds: dict[float, float],
+    tip: float,
+    nulls: Sequence[NullScale | None] | None = None,
+) -> list[Searched]:
+    """Every profile, searched under the noise behind it."""
+    each = zip(profiles, nulls or [None] * len(profiles), strict=True)
+    return [search(p, behind.banks[p.spacing], behind.noise, thresholds[p.spacing], tip, null) for p, null in each]
 
 
 def _over_terraces(stretch: Stretch, over: Sequence[Terraced]) -> Stretch:

@@ -287,7 +287,7 @@ def _outputs(height: FloatArray, quiet: BoolArray, local: FloatArray, bank: Bank
     f = bank.filters[k]
     if len(height) < 2 * f.coarse:
         return np.full(0, np.nan)
-    crest, sd = f.heights(height)
+    crest, sd = f.heights(bank.levelled(height))
     z, bins, places = crest / sd, f.half_width / bank.spacing, slice(None, len(crest) * f.coarse, f.coarse)
     if not (local == 1.0).all():
         z /= np.maximum(_seen(local, bins)[places], least)

@@ -36,6 +36,8 @@ NOISE_FIT_BLOCKS = 8000
 # what a finger explored, most of it on details, after 5 to 9. Where one process is not enough, as many again: a first
 # look through one process takes the slow parts of 1/f noise for features, and two fifths of the path for quiet.
 QUIET_NOISE_ROUNDS = 12
+# Values of a sweep from which on it has a line of its own
+LINE_VALUES = 12
 GOLDEN_RATIO = 0.5 * (1.0 + 5.0**0.5)
 
 
@@ -105,9 +107,13 @@ def _piece(count: int, share: int, number: int) -> slice:
     return slice(begin, begin + share)
 
 
-def first_noise(stretches: Sequence[Stretch], spacing: float, tip_radius: float) -> Noise:
-    """Noise of the stretches, features included, by robust statistics; spacing in m between samples."""
-    height = np.concatenate([stretch.height for stretch in stretches])
+def first_noise(stretches: Sequence[Stretch], spacing: float, tip_radius: float, known: bool = True) -> Noise:
+    """Noise of the stretches, features included, by robust statistics; spacing in m between samples.
+
+    Args:
+        known: whether the base is; over another one each sweep has an offset and a slope of its own.
+    """
+    height = np.concatenate([s.height if known else without_line(s.s, s.height) for s in stretches])
     if len(height) < 16:
         return floored(Noise(float(np.std(height))), tip_radius)
     places, offset = [], 0.0
@@ -115,6 +121,18 @@ def first_noise(stretches: Sequence[Stretch], spacing: float, tip_radius: float)
         places.append(stretch.s - stretch.s[0] + offset)
         offset = places[-1][-1] + 1000 * spacing
     return floored(estimate_noise(height, np.concatenate(places)), tip_radius)
+
+
+def without_line(s: FloatArray, height: FloatArray) -> FloatArray:
+    """Heights (n,) at arclengths s (n,) without the sweep's own offset and slope, which no filter sees over a base that
+    is not known: of sweeps that stand off each other they would be noise that is correlated for ever."""
+    if len(s) < LINE_VALUES:
+        return height
+    # medians: details on less than a quarter of it do not move the slope, on less than half of it the offset
+    half = len(s) // 2
+    rise = float(np.median((height[-half:] - height[:half]) / np.maximum(s[-half:] - s[:half], np.finfo(float).tiny)))
+    rest = height - rise * s
+    return np.asarray(rest - np.median(rest))
 
 
 def floored(noise: Noise, tip_radius: float) -> Noise:
@@ -242,7 +260,7 @@ def _fit(
     if not base.known:
         return NoiseFit(_robust(profiles, quiet, first))
     size = max(1, -(-sum(len(stretch.s) for stretch in stretches) // NOISE_FIT_BLOCKS))
-    blocks = [_raw_blocks(stretches, profiles, quiet, size)]
+    blocks = [_raw_blocks(stretches, profiles, quiet, size)] if stretches else []
     if sum(p.samples * len(p.height) for p in profiles) > 1.1 * sum(len(stretch.s) for stretch in stretches):
         blocks += [_profile_blocks(p, keep) for p, keep in zip(profiles, quiet, strict=True)]
     return fit_noise(blocks, start, stated, several=several, one=one)
@@ -303,7 +321,7 @@ def _robust(profiles: Sequence[SweepHeights], quiet: Sequence[BoolArray], first:
     """Noise of the profiles' quiet bins by robust statistics; the white level of single samples."""
     heights, places, offset = [], [], 0.0
     for profile, keep in zip(profiles, quiet, strict=True):
-        heights.append(profile.height[keep])
+        heights.append(without_line(profile.s[keep], profile.height[keep]))
         places.append(profile.s[keep] - profile.s[0] + offset)
         offset += profile.length + 1000 * profile.spacing
     height = np.concatenate(heights)

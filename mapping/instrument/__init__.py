@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from mapping.instrument.states import Filter as Filter, mean_steps as mean_steps
     from mapping.instrument.term import Term as Term
     from mapping.instrument.tip_calibration import TipCalibration as TipCalibration, calibrate_tip as calibrate_tip
+    from mapping.instrument.unshared_heights import ROWS_THAT_SHARE as ROWS_THAT_SHARE, Row as Row, unshared as unshared
 
 _PUBLIC = {
     "averaging": ("Means", "RunMeans", "running_mean"),
@@ -50,5 +51,6 @@ _PUBLIC = {
     "states": ("Filter", "mean_steps"),
     "term": ("Term",),
     "tip_calibration": ("TipCalibration", "calibrate_tip"),
+    "unshared_heights": ("ROWS_THAT_SHARE", "Row", "unshared"),
 }
 doorway(__name__, _PUBLIC)
