@@ -48,6 +48,9 @@ UNRESOLVED = 2.5
 ALIKE = 1.15
 # Cells of all sweeps that tell whether these share what looks correlated: as many as a base is fitted to
 MOST_CELLS = 4000
+# A law that says more noise than the sweeps have alone by so many times, of crests of one of so many half-widths from
+# this share of a tip radius on, is of a detail: three times the 16 % to which ROUGHNESS_VALUES tell a level
+MUCH_MORE, SMALLEST_ASKED, WIDTHS_ASKED = 1.5, 0.1, 8
 # A sweep of fewer samples has no level, slope and noise of its own, and half a crest.
 SHORTEST_SWEEP_SAMPLES = 8
 # Share of the path that may be taken by what exceeds the threshold without being clear, before the law is doubted:
@@ -146,21 +149,35 @@ def detect(
         raise DetectionError("cannot detect in a trace without samples")
     if base is None:
         base = fit_base(trace)
-    tip = trace.tip_radius
     laid = LaidTrace.of(trace, base)
     if noise is None and len(trace) <= RAW_SAMPLES:
         laid.feet()  # the noise is read from nearly all of them: whatever else is read follows from that
+    asked = _Asked(algorithm, false_alarms_per_metre, noise, stated, largest)
+    return _detected(trace, laid, asked)
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What `detect` is told beside the trace and its base."""
+
+    algorithm: int
+    false_alarms_per_metre: float
+    noise: Noise | None
+    stated: StatedNoise | None
+    largest: float | None
+
+
+def _detected(trace: Trace, laid: LaidTrace, asked: _Asked, of_each: Noise | None = None) -> Detections:
+    """What `detect` returns; `of_each`: the noise that sweeps have alone, where what they share passed for noise."""
+    algorithm, false_alarms_per_metre, noise = asked.algorithm, asked.false_alarms_per_metre, asked.noise
+    base, tip = laid.base, trace.tip_radius
     usable, left_out = _usable(laid)
     if not usable:
         return Detections((), noise or Noise(0.0), algorithm, np.inf, PROBABILITY, np.inf, 0.0, left_out)
     raw = float(np.median([_step(sweep) for sweep in usable]))
     stretches = [] if noise else raw_stretches(usable)
-    first = floored(noise, tip) if noise else first_noise(stretches, raw, tip, base.known)
-    widest = LARGEST * tip if largest is None else largest
-    # what looks correlated may be what the sweeps share
-    asked = noise is None and first.correlated > 0 and len(usable) >= ROWS_THAT_SHARE
-    of_each = _noise_of_each(laid) if asked else None
-    first = first if of_each is None else of_each
+    first = of_each or (floored(noise, tip) if noise else first_noise(stretches, raw, tip, base.known))
+    widest = LARGEST * tip if asked.largest is None else asked.largest
     of_sweeps = _profiles(usable, first, tip)
     keep, unfelt = _felt(laid, dict(zip(map(id, usable), of_sweeps, strict=True)))
     if unfelt:
@@ -170,8 +187,8 @@ def detect(
             algorithm=algorithm,
             false_alarms_per_metre=false_alarms_per_metre,
             noise=noise,
-            stated=stated,
-            largest=largest,
+            stated=asked.stated,
+            largest=asked.largest,
         )
         return _in_all(felt, keep, laid, unfelt)
     over = [terraced(profile, base, tip) for each in of_sweeps for profile in each]
@@ -180,8 +197,13 @@ def detect(
     alone, foretold = profiles, None if of_each is None else _unshared(profiles)
     if foretold is not None:
         alone, stretches = foretold, []
-    behind = background(alone, base, noise, stretches, first, tip, widest, stated)
+    behind = background(alone, base, noise, stretches, first, tip, widest, asked.stated)
     level = behind.noise
+    if noise is None and of_each is None and level.correlated > 0 and len(usable) >= ROWS_THAT_SHARE:
+        # what looks correlated may be what the sweeps share; where a quiet path tells as much, all of it tells it best
+        apart, widths = _noise_of_each(laid), tip * np.geomspace(SMALLEST_ASKED, LARGEST, WIDTHS_ASKED)
+        if apart is not None and (level.cap_sd(widths, raw) > MUCH_MORE * apart.cap_sd(widths, raw)).any():
+            return _detected(trace, laid, asked, apart)
     thresholds = {
         spacing: threshold_for(bank, false_alarms_per_metre, behind.uncertainties[spacing])
         for spacing, bank in behind.banks.items()

@@ -96,7 +96,7 @@ class _Beside:
     def foretell(self) -> bool:
         """True if the sweeps on either side tell every other one better than the likeliest noise of its own does."""
         inner = self.order[1:-1:2]
-        rest = [np.sqrt(self._variance(k)) * self.rest(k) for k in inner.tolist()]
+        rest = [self.rows[k].height - self._told(k)[0] for k in inner.tolist()]
         own = [np.where(np.isfinite(r), self.rows[k].height, np.nan) for k, r in zip(inner, rest, strict=True)]
         count = max(2, MOST_COMPARED // len(inner))
         return self._misfit(rest, count) < self._misfit(own, count)
@@ -105,7 +105,6 @@ class _Beside:
         """Twice the negative log-likelihood of so many bins of each row under the likeliest noise of one process."""
         row = self.rows[0]
         cut = [h[(len(h) - count) // 2 :][:count] if len(h) > count else h for h in heights]
-        steps = np.concatenate([np.where(np.arange(len(h)) > 0, 1.0, -1.0) for h in cut]) * row.step
         values = np.concatenate(cut)
         steps = np.concatenate([np.where(np.arange(len(h)) > 0, 1.0, -1.0) for h in cut]) * row.step
         jumps = np.concatenate([np.diff(h) for h in cut])
@@ -116,12 +115,18 @@ class _Beside:
     def rest(self, k: int) -> FloatArray:
         """(n,) heights of a row less what its neighbours foretell, as large as its own noise, m; NaN where these
         do not lie beside it."""
-        told = sum(weight * self._beside(k, j) for j, weight in self._neighbours(k))
-        return np.asarray((self.rows[k].height - told) / np.sqrt(self._variance(k)))
+        told, variance = self._told(k)
+        return np.asarray((self.rows[k].height - told) / np.sqrt(variance))
 
-    def _variance(self, k: int) -> float:
-        """Of the noise in a row less what its neighbours foretell, in that of one."""
-        return 1.0 + sum(weight**2 for _, weight in self._neighbours(k))
+    def _told(self, k: int) -> tuple[FloatArray, FloatArray]:
+        """(n,) heights that its neighbours foretell of a row, m, NaN where these do not lie beside it, and variances of
+        the noise in what that leaves of it, in that of a bin."""
+        told, variance = np.zeros(len(self.rows[k].height)), np.ones(len(self.rows[k].height))
+        for j, weight in self._neighbours(k):
+            height, shares = self._beside(k, j)
+            told += weight * height
+            variance += weight**2 * shares
+        return told, variance
 
     def _neighbours(self, k: int) -> tuple[tuple[int, float], ...]:
         """The two nearest rows on either side, or on the one side of the last, and their weights: a straight line
@@ -133,8 +138,9 @@ class _Beside:
         share = float((self.across[k] - self.across[i]) / (self.across[j] - self.across[i]))
         return (i, 1.0 - share), (j, share)
 
-    def _beside(self, k: int, j: int) -> FloatArray:
-        """(n,) heights of another row at the places nearest to a row's bins, between its bins; NaN beyond."""
+    def _beside(self, k: int, j: int) -> tuple[FloatArray, FloatArray]:
+        """(n,) heights of another row at the places nearest to a row's bins, between its bins, NaN beyond, and the
+        variances of white noise in them, in that of a bin."""
         from scipy.spatial import cKDTree
 
         if j not in self._trees:
@@ -144,7 +150,9 @@ class _Beside:
         way = centers[near + 1] - centers[near - 1]
         ahead = 2.0 * np.einsum("ij,ij->i", self.rows[k].places - centers[near], way)
         place = near + ahead / np.einsum("ij,ij->i", way, way)
-        return np.asarray(np.interp(place, np.arange(len(height)), height, left=np.nan, right=np.nan))
+        share = place - np.floor(place)
+        at = np.interp(place, np.arange(len(height)), height, left=np.nan, right=np.nan)
+        return np.asarray(at), np.asarray(share**2 + (1.0 - share) ** 2)
 
     def shared_values(self) -> float:
         """How many independent values of what the sweeps share were felt.
@@ -153,7 +161,7 @@ class _Beside:
         squares is the number of equal ones.
         """
         middle = int(self.order[len(self.order) // 2])
-        rows = np.array([self._beside(middle, j) for j in self.order.tolist()])
+        rows = np.array([self._beside(middle, j)[0] for j in self.order.tolist()])
         rows = np.where(np.isfinite(rows), rows, 0.0)
         return _effective(rows @ rows.T) * _effective(_autocovariance(rows))
 

@@ -48,7 +48,7 @@ def test_a_wire_that_takes_most_of_every_row_is_no_noise(base):
     assert found.noise.sd < 2.0 * SD
     assert found.detection_limit < 0.02e-3
     heights = {c.sweep: c.height for c in found.crossings if c.kind == "convex"}
-    assert len(heights) == 25
+    assert len(heights) >= 16  # of 25; a feature needs three
     assert np.median(list(heights.values())) == pytest.approx(0.6e-3, rel=0.05)
 
 
