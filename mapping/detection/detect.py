@@ -49,8 +49,10 @@ ALIKE = 1.15
 # Cells of all sweeps that tell whether these share what looks correlated: as many as a base is fitted to
 MOST_CELLS = 4000
 # A law that says more noise than the sweeps have alone by so many times, of crests of one of so many half-widths from
-# this share of a tip radius on, is of a detail: three times the 16 % to which ROUGHNESS_VALUES tell a level
-MUCH_MORE, SMALLEST_ASKED, WIDTHS_ASKED = 1.5, 0.1, 8
+# this share of a tip radius on, is of a detail. Rows of 12 mm over a groove of 0.3 x 8 mm (ball of 10 mm, noise of
+# 3 um): 30 times, and 1.5 where details left a quiet path. What an instrument repeats on every sweep is no detail: axes
+# with a play of two standard deviations of a sample, 5 times. Between both
+MUCH_MORE, SMALLEST_ASKED, WIDTHS_ASKED = 12.0, 0.1, 8
 # A sweep of fewer samples has no level, slope and noise of its own, and half a crest.
 SHORTEST_SWEEP_SAMPLES = 8
 # Share of the path that may be taken by what exceeds the threshold without being clear, before the law is doubted:
