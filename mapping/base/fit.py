@@ -62,7 +62,8 @@ FEWEST_HALF = 3
 FORETOLD = 2.0
 # Variance of a median of Gaussian values over that of their mean
 OF_MEDIAN = 0.5 * np.pi
-# Rounds in which a base through the ends of sweeps takes in what lies as it does
+# Rounds in which a base through the ends of sweeps takes in what lies as it does: each is a candidate, so that one
+# more costs a fit and decides nothing
 ENDS_ROUNDS = 3
 # Families that a form admits over an area
 AREAL_FORMS: dict[str, tuple[Family, ...]] = {

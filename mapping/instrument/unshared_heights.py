@@ -23,12 +23,14 @@ from mapping.instrument.robust import robust_sd
 
 # Sweeps, at least: one between two others tells, and a second one that it was not chance
 ROWS_THAT_SHARE = 5
-# Bins that a row has at least: between two of them and one to either side heights are interpolated
+# Bins that a row has at least: the start of a law of two numbers is told by seven differences to 1 / sqrt(14), 27 %
 ROW_BINS = 8
 # Bins that the two laws are held against each other with: a difference in the level of a tenth is one of ten in the
 # logarithm of the likelihood
 MOST_COMPARED = 2000
-# Share of a sweep that its neighbours must lie beside
+# Share of the scatter that a fit's white noise begins with at least: its logarithm is searched, and must be a number
+LEAST_WHITE = 1e-6
+# Share of a sweep that its neighbours must lie beside: what is filled up elsewhere would else be most of it
 MOSTLY_BESIDE = 0.5
 # Independent values of what is shared from which on it is a surface's roughness: by so many a law's level is known to
 # 1 / sqrt(2 * 20), 16 %. Of simulated shapes of 6 to 96 values that all rows share 0.6 of them are counted, for each
@@ -64,10 +66,12 @@ def unshared(rows: Sequence[Row]) -> list[FloatArray] | None:
     if len(rows) < ROWS_THAT_SHARE or min(len(row.height) for row in rows) < ROW_BINS:
         return None
     beside = _Beside(rows)
-    if beside.one_on_another or not beside.foretell() or beside.shared_values() >= ROUGHNESS_VALUES:
+    if beside.one_on_another:
         return None
     rest = [beside.rest(k) for k in range(len(rows))]
     if any(np.isfinite(each).mean() < MOSTLY_BESIDE for each in rest):
+        return None
+    if not beside.foretell() or beside.shared_values() >= ROUGHNESS_VALUES:
         return None
     return [_filled(each) for each in rest]
 
@@ -102,14 +106,19 @@ class _Beside:
         return self._misfit(rest, count) < self._misfit(own, count)
 
     def _misfit(self, heights: Sequence[FloatArray], count: int) -> float:
-        """Twice the negative log-likelihood of so many bins of each row under the likeliest noise of one process."""
+        """Twice the negative log-likelihood of so many bins of each row under the likeliest noise of one process;
+        minus infinity of heights that are all one."""
         row = self.rows[0]
         cut = [h[(len(h) - count) // 2 :][:count] if len(h) > count else h for h in heights]
         values = np.concatenate(cut)
         steps = np.concatenate([np.where(np.arange(len(h)) > 0, 1.0, -1.0) for h in cut]) * row.step
         jumps = np.concatenate([np.diff(h) for h in cut])
-        white = robust_sd(jumps[np.isfinite(jumps)]) * np.sqrt(0.5 * row.samples)
-        start = Noise(white, float(np.nanstd(values)), 0.25 * count * row.step)
+        scatter = float(np.nanstd(values))
+        if scatter == 0.0:
+            return -np.inf
+        # where the fit begins: without noise most bins are as high as the next one
+        white = max(robust_sd(jumps[np.isfinite(jumps)]), LEAST_WHITE * scatter) * np.sqrt(0.5 * row.samples)
+        start = Noise(white, scatter, 0.25 * count * row.step)
         return most_likely([Blocks(values, steps, row.samples)], start, None)[1]
 
     def rest(self, k: int) -> FloatArray:

@@ -82,7 +82,9 @@ def lagrange_weights(nodes: FloatArray, at: FloatArray, value: FloatArray, slope
             value[i, j], slope[i, j] = product, total
 
 
-HIGHEST_ORDER = 4  # of the polynomials across sweeps
+# Of the polynomials across sweeps: those through five sweeps have error terms of the fifth derivative, as the stencils
+# along a sweep do
+HIGHEST_ORDER = 4
 
 
 @njit(cache=True, error_model="numpy")

@@ -13,7 +13,8 @@ from mapping.geometry.mesh.tree import TriangleTree
 
 # More queries at once than this only cost memory: some 500 bytes each on the way
 QUERIES_AT_ONCE = 100_000
-# Points of which a box holds about so long a share of all in a row are in no order
+# Points of which a box, of a few in a row, is longer than this share of all are in no order: half of all boxes would be
+# asked at each query, and a tree is quicker
 LONGEST_BOX = 0.5
 
 

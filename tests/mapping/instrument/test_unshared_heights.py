@@ -70,3 +70,17 @@ def test_few_rows_and_rows_in_one_place_tell_nothing():
     rng = np.random.default_rng(4)
     assert unshared(rows_over(crest, rng, count=4)) is None
     assert unshared(rows_over(crest, rng, apart=0.0)) is None
+
+
+@pytest.mark.filterwarnings("error")
+def test_rows_without_noise_and_rows_in_a_line_are_asked_without_a_word() -> None:
+    x = np.arange(0.0, 12e-3, 0.05e-3)
+
+    def rows(aside: float, height: np.ndarray) -> list[Row]:
+        return [Row(np.column_stack([x + k * aside, 0 * x + 5e-4 * k, 0 * x]), height, 0.05e-3, 1.0) for k in range(8)]
+
+    exact = unshared(rows(0.0, np.maximum(0.0, 4e-3 - np.abs(x - 6e-3))))
+    assert exact is not None and np.abs(np.concatenate(exact)).max() < 1e-12
+    assert unshared(rows(0.0, 0 * x)) is None
+    # none lies beside another
+    assert unshared(rows(15e-3, 1e-6 * np.sin(1e4 * x))) is None
