@@ -178,7 +178,7 @@ def with_ends_of_all(feature: Feature, likely: Sequence[tuple[float, PosteriorPr
         lengths.append(_lengths(shape, some, some[:, columns]))
     spans = np.quantile(np.concatenate(places), [0.05, 0.95], axis=0)
     details = replace(feature.details, end_intervals=spans.T)
-    line: Any = likely[0][1].target.shape
+    line: Any = with_nominal_tip(likely[0][1]).target.shape
     length = _of_smooth(Interval.from_draws(np.concatenate(lengths)), line.chart)
     return replace(feature, length=length, details=details)
 
