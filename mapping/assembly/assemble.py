@@ -8,15 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from mapping import Feature, FloatArray, Trace
+from mapping.assembly.details import details_of, made_of
 from mapping.assembly.edges import edge_features, step_features
 from mapping.assembly.faint_features import faint_spacing, why_none_sought, with_faint_lines
 from mapping.assembly.false_crossings import comes_down, is_open, is_plateau_end, is_unseen, on_a_step
 from mapping.assembly.free import free_sections, free_spot
 from mapping.assembly.free_lines import free_lines, lies_on
-from mapping.assembly.lines import Around, line_features
+from mapping.assembly.lines import Around
 from mapping.assembly.linking import Inspection, Inspections, groups
 from mapping.assembly.plateaus import across_sweeps, plateau_features
-from mapping.assembly.points import outline, point_feature
+from mapping.assembly.points import point_feature
 from mapping.assembly.runs import along, split_runs, told_crests
 from mapping.base import Base, LaidTrace
 from mapping.detection import Crossing, Detections
@@ -25,9 +26,6 @@ from mapping.inference.configuration import PROPOSALS, Places, Proposal, account
 from mapping.inference.families import Surroundings
 from mapping.inference.kinds import kind_made_of
 
-# A group of crossings that spreads over more than this many half-widths cannot be one round bump: sweeps further
-# than one half-width from its crest miss it.
-WIDEST_SPOT = 2.6
 # A crossing lower than this share of its group's is an outlier if it lies so many half-widths off the others, and so
 # many from any other low one; where others are so many that they are a line, not a spot with low rims.
 STRAY, STRAY_DISTANCE, MATES, LINE = 0.6, 1.3, 3.0, 5
@@ -141,10 +139,10 @@ def _linked(detections: Detections, trace: LaidTrace, inspection: Inspection) ->
     crests, steps = _crests_and_steps(crossings, around, scale)
     fine = replace(around, inspection=inspection.over_terraces)
     certain, doubtful = _grouped(crests, fine.inspection, scale)
-    details = [feature for group in certain for feature in _details(group, fine)]
+    details = [feature for group in certain for feature in details_of(group, fine)]
     stepped = step_features(steps, _without_shadows(details, tip), around, scale)
     for group in doubtful:
-        details += _details([c for c in group if not on_a_step(c, steps, stepped)], fine)
+        details += details_of([c for c in group if not on_a_step(c, steps, stepped)], fine)
     return [*_without_shadows(details, tip), *stepped, *edges]
 
 
@@ -231,12 +229,7 @@ def _of_profile(detections: Detections, laid: LaidTrace) -> tuple[Feature, ...]:
 
 def _name(crossing: Crossing) -> str:
     """What a crossing of a single profile is called."""
-    return kind_made_of(_crossings_of(crossing), line=False).name
-
-
-def _crossings_of(crossing: Crossing) -> str:
-    """What a kind is made of (`Kind.made_of`) that such a crossing belongs to."""
-    return "step" if crossing.is_step else "convex" if crossing.height > 0 else "concave"
+    return kind_made_of(made_of(crossing), line=False).name
 
 
 def _strongest_first(features: Sequence[Feature]) -> tuple[Feature, ...]:
@@ -247,23 +240,6 @@ def _scale(crossings: Sequence[Crossing], tip_radius: float) -> float:
     """Half-width of a sharp crest of the typical height, m."""
     heights = np.array([abs(c.height) for c in crossings])
     return float(np.sqrt(2 * tip_radius * np.median(heights)))
-
-
-def _details(members: list[Crossing], around: Around) -> list[Feature]:
-    """One bump, one ridge, or the ridges that meet; nothing of no crossings."""
-    if not members:
-        return []
-    highest = max(members, key=lambda c: abs(c.height))
-    spot_name, line_name = (kind_made_of(_crossings_of(highest), line=line).name for line in (False, True))
-    half_width = float(np.sqrt(2 * around.tip_radius * abs(highest.height)))
-    half_width = max(half_width, min(c.half_width for c in members if abs(c.height) > 0.7 * abs(highest.height)))
-    points = np.array([c.point for c in members])
-    if np.linalg.norm(points - highest.point, axis=1).max() <= WIDEST_SPOT * half_width:
-        spot = outline(members, around.inspection, half_width)
-        if spot.length == 0.0:
-            return [point_feature(members, spot_name, around.detections, around.tip_radius, spot)]
-    lines = line_features(members, line_name, around)
-    return lines or [point_feature(members, spot_name, around.detections, around.tip_radius)]
 
 
 def _without_shadows(features: list[Feature], tip_radius: float) -> list[Feature]:

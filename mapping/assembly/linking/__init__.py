@@ -26,11 +26,13 @@ if TYPE_CHECKING:
         groups as groups,
         uphill as uphill,
     )
+    from mapping.assembly.linking.summits import summits as summits
 
 _PUBLIC = {
     "branches": ("Branch", "branches", "main_line", "rejoined"),
     "inspection": ("Inspection", "Inspections"),
     "line_ends": ("LineEnd", "closes", "ended_length", "line_end"),
     "linking": ("FELT_REACH", "HEIGHT_RATIO", "LONGEST_LINK", "between", "groups", "uphill"),
+    "summits": ("summits",),
 }
 doorway(__name__, _PUBLIC)

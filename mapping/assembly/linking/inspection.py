@@ -121,7 +121,10 @@ class Inspection:
 
     def of_sweeps(self, numbers: Collection[int]) -> Inspection:
         """The places of the sweeps with these numbers."""
-        keep = np.isin(self.sweep, list(numbers))
+        return self.of_places(np.flatnonzero(np.isin(self.sweep, list(numbers))))
+
+    def of_places(self, keep: IntArray) -> Inspection:
+        """The places with these indices alone."""
         normals = self.normals[keep] if len(self.normals) else self.normals
         lowered = self.lowered[keep] if len(self.lowered) else self.lowered
         samples = self.samples[keep] if len(self.samples) else self.samples

@@ -1,0 +1,116 @@
+"""Details: a group of linked crossings is one spot, one line, lines that meet, or such ones of each of its summits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from mapping import Feature, IntArray
+from mapping.assembly.lines import Around, line_features
+from mapping.assembly.linking import Inspection, summits
+from mapping.assembly.points import LINE_OVER_SPOT_GAIN, OUTLINE_REACH, outline, point_feature
+from mapping.detection import Crossing
+from mapping.geometry.mesh import distances
+from mapping.geometry.templates import CREST_OUTLIER_SDS, SHAPE_ERROR, crest_trace, robust_cost
+from mapping.inference.kinds import kind_made_of, sizes_of
+
+# A group of crossings that spreads over more than this many half-widths cannot be one round bump: sweeps further
+# than one half-width from its crest miss it.
+WIDEST_SPOT = 2.6
+# Twice the log-likelihood by which one detail more must explain the heights better: it has four parameters, and both
+# that make a line of a spot are asked LINE_OVER_SPOT_GAIN
+DETAIL_COST = 2.0 * LINE_OVER_SPOT_GAIN
+# Lower than this share of the highest a top is the flank of what lies beside the group: crossings link down to half of
+# the lower one (`Inspection.denies`)
+LOW_TOP = 0.5
+
+
+def details_of(members: list[Crossing], around: Around) -> list[Feature]:
+    """One bump, one ridge, or the ridges that meet; or those of each summit, where these explain the heights better.
+
+    Args:
+        members: crossings of one group; of none nothing is made.
+        around: the heights of all places, and what they stand on.
+
+    Reference: theory section 5.2.
+    """
+    if not members:
+        return []
+    whole, parted = _undivided(members, around), _of_summits(members, around)
+    return min((whole, parted), key=partial(_unexplained, members, around)) if parted else whole
+
+
+def made_of(crossing: Crossing) -> str:
+    """What a kind is made of (`Kind.made_of`) that such a crossing belongs to."""
+    return "step" if crossing.is_step else "convex" if crossing.height > 0 else "concave"
+
+
+def _undivided(members: list[Crossing], around: Around) -> list[Feature]:
+    """One bump, one ridge, or the ridges that meet."""
+    highest = _highest(members)
+    spot_name, line_name = (kind_made_of(made_of(highest), line=line).name for line in (False, True))
+    half_width = float(np.sqrt(2 * around.tip_radius * abs(highest.height)))
+    half_width = max(half_width, min(c.half_width for c in members if abs(c.height) > 0.7 * abs(highest.height)))
+    points = np.array([c.point for c in members])
+    if np.linalg.norm(points - highest.point, axis=1).max() <= WIDEST_SPOT * half_width:
+        spot = outline(members, around.inspection, half_width)
+        if spot.length == 0.0:
+            return [point_feature(members, spot_name, around.detections, around.tip_radius, spot)]
+    lines = line_features(members, line_name, around)
+    return lines or [point_feature(members, spot_name, around.detections, around.tip_radius)]
+
+
+def _of_summits(members: list[Crossing], around: Around) -> list[Feature]:
+    """The details of each summit of a group; nothing if it has only one."""
+    points, inspection = np.array([c.point for c in members]), around.inspection
+    near = _near(members, around)
+    basins = summits(near, float(np.sign(_highest(members).height)), inspection)
+    tops = np.abs(inspection.height[[basin[0] for basin in basins]])
+    basins = [basin for basin, top in zip(basins, tops, strict=True) if top > LOW_TOP * tops[0]]
+    if len(basins) < 2:
+        return []
+    places = np.concatenate(basins)
+    home = np.repeat(np.arange(len(basins)), [len(basin) for basin in basins])
+    nearest = inspection.of_places(places).nearest(points)
+    # a sweep over two that are felt together may see one, between them and higher than what was felt there
+    off = np.abs([c.height for c in members] - inspection.height[places[nearest]])
+    true = off < CREST_OUTLIER_SDS * SHAPE_ERROR * np.abs([c.height for c in members])
+    details = list[Feature]()
+    for k, basin in enumerate(basins):
+        own = [c for c, at, told in zip(members, home[nearest], true, strict=True) if told and at == k]
+        own = _with_top(own, members, int(basin[0]), inspection)
+        details += _undivided(own, replace(around, inspection=inspection.of_places(np.sort(basin))))
+    return details
+
+
+def _with_top(own: list[Crossing], members: list[Crossing], top: int, inspection: Inspection) -> list[Crossing]:
+    """The crossings of a basin, the one nearest to its top (index of a place) moved there; else the nearest of all."""
+    point = inspection.points[top]
+    nearest = min(own or members, key=lambda c: float(np.linalg.norm(c.point - point)))
+    moved = replace(nearest, point=point, height=float(inspection.height[top]))
+    return [moved, *(c for c in own if c is not nearest)]
+
+
+def _unexplained(members: list[Crossing], around: Around, details: Sequence[Feature]) -> float:
+    """Squares of what the details leave over about a group, in standard deviations, and what they cost themselves."""
+    near, inspection = _near(members, around), around.inspection
+    felt = np.zeros(len(near))
+    for feature in details:
+        half = sizes_of(feature, around.tip_radius).half_width
+        own = crest_trace(distances(inspection.points[near], feature.axis), feature.height.median, half)
+        felt = np.where(np.abs(own) > np.abs(felt), own, felt)
+    over = robust_cost(inspection.height[near] - felt, inspection.sd[near], abs(_highest(members).height))
+    return float(over.sum()) + DETAIL_COST * len(details)
+
+
+def _near(members: Sequence[Crossing], around: Around) -> IntArray:
+    """Places (indices) as near to a group as its highest crossing disturbs them."""
+    reach = OUTLINE_REACH * float(np.sqrt(2.0 * around.tip_radius * abs(_highest(members).height)))
+    return around.inspection.near(np.array([c.point for c in members]), reach)
+
+
+def _highest(members: Sequence[Crossing]) -> Crossing:
+    return max(members, key=lambda c: abs(c.height))
