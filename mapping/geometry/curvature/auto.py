@@ -16,7 +16,7 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray, Surface
 from mapping.geometry.curvature.cloud_mesh import meshed
-from mapping.geometry.curvature.curvature import Curvature
+from mapping.geometry.curvature.curvature import Curvature, principal_sd
 from mapping.geometry.curvature.jet import LARGE_MESH_POINTS, jets_and_noise, least_alike, oriented
 from mapping.geometry.curvature.libigl_fits import SMALLEST_COMPONENT, libigl_curvatures
 from mapping.geometry.curvature.neighbours import Neighbours
@@ -168,18 +168,19 @@ def _the_better(
     best = errors.argmin(axis=0)
     error, every = CHOICE_FACTOR * errors.min(axis=0), np.arange(count)
     k1, k2, d1, d2 = (np.array([getattr(one, name) for one in found])[best, every] for name in ("k1", "k2", "d1", "d2"))
+    sd = principal_sd(0.5 * (k1 - k2), error)
     apart = np.maximum(np.abs(k1 - jets.k1), np.abs(k2 - jets.k2))
     # what the narrow fits of the jets cannot follow, libigl's rings smooth over: no better for that
-    better = np.isfinite(error) & ~(jets.sd <= error) & ~(jets.valid & (INTERVAL * jets.sd * reach >= 1.0))
+    better = np.isfinite(sd) & ~(jets.sd <= sd) & ~(jets.valid & (INTERVAL * jets.sd * reach >= 1.0))
     answered[better] = "libigl"
-    plain = better & ~(0.5 * (k1 - k2) > error)
+    plain = better & ~(0.5 * (k1 - k2) > np.sqrt(0.5) * error)
     d1[plain], d2[plain] = np.nan, np.nan
     return Curvature(
         np.where(better, k1, jets.k1),
         np.where(better, k2, jets.k2),
         np.where(better[:, None], d1, jets.d1),
         np.where(better[:, None], d2, jets.d2),
-        np.where(better, error, jets.sd),
+        np.where(better, sd, jets.sd),
         jets.valid | better,
         answered,
         apart,
@@ -194,18 +195,18 @@ def _sizes(found: Sequence[Curvature]) -> list[tuple[Curvature, int]]:
 def _expected(
     own: tuple[Curvature, int], wider: tuple[Curvature, int], faces: IntArray, noise: float, reach: FloatArray
 ) -> FloatArray:
-    """(N,) expected standard deviation of libigl's curvatures over n points, judged by those over m > n.
+    """(N,) expected error (Frobenius norm) of libigl's curvature tensors over n points, judged by those over m > n.
 
-    A quadratic fit to n points over a disc of the radius R has curvatures with the standard deviation
-    noise sqrt(96 / n) / R^2 (theory equation 9.5). Its bias grows as R^2, that is as n: of the fits' difference,
+    A quadratic fit to n points over a disc of the radius R has tensors with the root mean square error
+    noise sqrt(192 / n) / R^2 (theory equation 9.5). Its bias grows as R^2, that is as n: of the fits' difference,
     n / (m - n) is the bias of the narrower one. The difference is the mean over the faces around a vertex, since at a
     single vertex both may happen to agree.
     """
     (narrow, n), (wide, m) = own, wider
     # the disc of n points in units of that of two rings
     radius2 = n / TWO_RINGS * reach**2
-    variance = 96.0 / n * np.divide(noise, radius2, out=np.full(len(reach), np.inf), where=radius2 > 0) ** 2
-    gap = 0.5 * ((_tensors(narrow) - _tensors(wide)) ** 2).sum(axis=(1, 2))
+    variance = 192.0 / n * np.divide(noise, radius2, out=np.full(len(reach), np.inf), where=radius2 > 0) ** 2
+    gap = ((_tensors(narrow) - _tensors(wide)) ** 2).sum(axis=(1, 2))
     known = np.isfinite(gap)[faces].all(axis=1)
     total, times = np.zeros(len(gap)), np.zeros(len(gap))
     for corner in range(3):

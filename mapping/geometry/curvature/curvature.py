@@ -12,6 +12,8 @@ from mapping import BoolArray, FloatArray
 
 # Who may have answered a vertex
 METHOD_NAMES = ("jet", "libigl")
+# Standard deviations that k1 and k2 are apart from which on they hardly mix: 1e-3 of the variance is left
+DISTINCT = 16.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +72,41 @@ class Curvature:
         return np.where(np.abs(self.k1) >= np.abs(self.k2), self.k1, self.k2)
 
 
-def from_operators(operators: FloatArray, bases: FloatArray, sd: FloatArray, valid: BoolArray) -> Curvature:
-    """Curvatures from symmetric shape operators (V, 3) = (a, b, c) in tangent bases (V, 2, 3)."""
+def from_operators(operators: FloatArray, bases: FloatArray, error: FloatArray, valid: BoolArray) -> Curvature:
+    """Curvatures from symmetric shape operators (V, 3) = (a, b, c) in tangent bases (V, 2, 3).
+
+    Args:
+        error: (V,) root mean square of the Frobenius norm of the operators' errors, 1/m.
+    """
     a, b, c = operators.T
     mean, half = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
     angle = 0.5 * np.arctan2(2 * b, a - c)
     d1 = np.cos(angle)[:, None] * bases[:, 0] + np.sin(angle)[:, None] * bases[:, 1]
     d2 = -np.sin(angle)[:, None] * bases[:, 0] + np.cos(angle)[:, None] * bases[:, 1]
-    umbilic = ~(half > np.nan_to_num(sd, nan=0.0) + 0.5e-9 * np.abs(mean)) | ~valid
+    umbilic = ~(half > np.sqrt(0.5) * np.nan_to_num(error, nan=0.0) + 0.5e-9 * np.abs(mean)) | ~valid
     d1[umbilic], d2[umbilic] = np.nan, np.nan
     k1, k2 = np.where(valid, mean + half, np.nan), np.where(valid, mean - half, np.nan)
-    return Curvature(k1, k2, d1, d2, np.where(valid, sd, np.nan), valid)
+    return Curvature(k1, k2, d1, d2, np.where(valid, principal_sd(half, error), np.nan), valid)
+
+
+def principal_sd(half: FloatArray, error: FloatArray) -> FloatArray:
+    """(V,) standard deviation of either principal curvature, 1/m.
+
+    Half of the error's square is that of the mean curvature, a quarter that of each of the two other parts of the
+    operator (theory section 9). Where k1 and k2 are far apart, one of these only turns the directions; at an umbilic
+    both drive them apart.
+
+    Args:
+        half: (V,) half of k1 - k2, as found, 1/m.
+        error: (V,) root mean square of the Frobenius norm of the operator's error, 1/m.
+    """
+    from scipy.special import ive
+
+    part = np.divide(error, np.sqrt(8.0))  # standard deviation of each of the two parts
+    known = np.isfinite(half) & (part > 0)
+    # what noise drives k1 and k2 apart by is taken off
+    apart = np.sqrt(np.maximum(np.divide(half, part, out=np.zeros_like(part), where=known) ** 2 - 2.0, 0.0))
+    apart = np.minimum(apart, DISTINCT)
+    y = 0.25 * apart**2
+    mean = np.sqrt(0.5 * np.pi) * ((1.0 + 2.0 * y) * ive(0, y) + 2.0 * y * ive(1, y))  # of a Rice distribution
+    return np.asarray(part * np.sqrt(4.0 + 2.0 * apart * (apart - mean)))

@@ -9,6 +9,8 @@ MONOMIALS = 28  # monomials of two variables up to degree 6
 TERMS_OF_DEGREE = np.array([6, 15, 28])  # those of degree 2, 4 and 6
 SPARE_POINTS = np.array([2, 4, 4])  # points that a fit needs beyond its terms
 CONDITION = 1e5  # ratio of the diagonal of R beyond which the stencil does not determine the jet
+# Independent neighbourhoods among those of a pool: one, and so many for each time that the pool's points fill one
+INDEPENDENT_SHARE = 0.75
 # Squared gap at one point over its expectation that noise does not make: half of the expectation is the mean
 # curvature's, and five standard deviations of it are 25 / 2.
 CERTAIN_GAP = 12.5
@@ -290,33 +292,43 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
 
 
 @njit(cache=True, nogil=True)
-def pooled_bias(operators, deviations, pools, sizes, certainty, out):  # type: ignore[no-untyped-def]
+def pooled_bias(operators, deviations, pools, reaches, sizes, certainty, out):  # type: ignore[no-untyped-def]
     """Squared bias of every candidate, from its disagreement with less biased ones around each point.
 
     The variance of the difference of two nested fits is the difference of their variances if the wider one is
     unbiased (Hausman): what exceeds it on average over the pool, and `certainty` standard deviations of that
-    average, is bias.
+    average, is bias. Fits side by side share their noise, and the bias of a wide one changes slowly, over its own
+    width: it is judged by a pool as wide as itself, which holds more of what is independent.
 
     Args:
         operators: (N, S, D, 3) of `fit_jets`.
         deviations: (N, S, D) their standard deviations, infinite where undetermined.
-        pools: (M, P) indices of points around each of M points.
+        pools: (M, L, P) indices of points around each of M points, in L pools of growing reach.
+        reaches: (L,) nearest points among which the members of each pool are; each judges the sizes from its reach on,
+            the first all below, too.
         sizes: (S,) neighbourhood sizes.
         certainty: standard deviations.
         out: (M, S, D) squared Frobenius norms, written.
     """
-    options, pool = operators.shape[2], pools.shape[1]
+    options, pool, levels = operators.shape[2], pools.shape[2], pools.shape[1]
     # of the pool's points side by side: variances, NaN where undetermined, and operators
     variances, parts = np.empty((len(sizes), options, pool)), np.empty((len(sizes), options, 3, pool))
     for m in range(len(pools)):
+        level = -1
         for s in range(len(sizes)):
-            for d in range(options):
-                for i in range(pool):
-                    y = pools[m, i]
-                    variances[s, d, i] = deviations[y, s, d] ** 2 if np.isfinite(deviations[y, s, d]) else np.nan
-                    for k in range(3):
-                        parts[s, d, k, i] = operators[y, s, d, k]
-        for s in range(len(sizes)):
+            while level + 1 < levels and (level < 0 or reaches[level + 1] <= sizes[s]):
+                level += 1
+                last = s  # of the sizes that are judged by this pool
+                while last + 1 < len(sizes) and (level + 1 == levels or sizes[last + 1] < reaches[level + 1]):
+                    last += 1
+                for size in range(min(last + 2, len(sizes))):
+                    for d in range(options):
+                        for i in range(pool):
+                            y = pools[m, level, i]
+                            sd = deviations[y, size, d]
+                            variances[size, d, i] = sd * sd if np.isfinite(sd) else np.nan
+                            for k in range(3):
+                                parts[size, d, k, i] = operators[y, size, d, k]
             for d in range(options):
                 worst = 0.0
                 for other in range(min(s + 2, len(sizes))):
@@ -332,7 +344,9 @@ def pooled_bias(operators, deviations, pools, sizes, certainty, out):  # type: i
                             worst = max(worst, _gap(parts, s, d, other, higher, 0) - CERTAIN_GAP * expected)
                         if members > 0.0:
                             # neighbourhoods overlap: the pool holds fewer independent values than points
-                            independent = 1.0 + 3.0 * members / sizes[other]
+                            independent = 1.0 + INDEPENDENT_SHARE * reaches[level] * (members - 1.0) / (
+                                pool * sizes[other]
+                            )
                             allowance = certainty * np.sqrt(2.0 * members / (3.0 * independent * weight))
                             worst = max(worst, excess / weight - allowance)
                 out[m, s, d] = worst

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mapping.errors import CurvatureError, SurfaceError
+from mapping.geometry.curvature.curvature import principal_sd
 from mapping.geometry.curvature.principal_curvatures import principal_curvatures
 from mapping.geometry.templates.bump_of_revolution import BumpOfRevolution
 from mapping.surface import Surface
@@ -139,6 +140,30 @@ def test_noise_widens_the_neighbourhood_and_the_standard_deviation_is_honest():
     error = (0.5 * (curvature.k1 + curvature.k2) - truth)[inside]
     assert np.abs(error).max() < 0.1
     assert 0.3 < np.sqrt(np.mean((error / curvature.sd[inside]) ** 2)) < 1.5
+
+
+@pytest.mark.parametrize("half", [0.0, 0.5, 2.0, 50.0])
+def test_principal_curvatures_are_as_doubtful_as_their_distance_lets_them_be(half):
+    rng = np.random.default_rng(5)
+    mean, own, other = np.array([[0.5], [8**-0.5], [8**-0.5]]) * rng.standard_normal((3, 100_000))
+    found = np.hypot(half + own, other)
+    error = mean + found - half
+    sd = principal_sd(found, np.ones(len(found)))
+    # at an umbilic some are taken for apart by what noise does
+    assert 0.86 < np.mean(np.abs(error) < 1.645 * sd) < 0.92
+    assert np.sqrt(np.mean(sd**2)) == pytest.approx(np.sqrt(np.mean(error**2)), rel=0.08)
+
+
+def test_the_widest_fits_of_a_paraboloid_are_not_taken_for_unbiased():
+    rng = np.random.default_rng(4)
+    surface = grid(lambda x, y: -0.25 * (x**2 + y**2), 50)
+    noisy = Surface(surface.vertices + np.array([0, 0, 1e-3]) * rng.standard_normal((2500, 1)), surface.faces)
+    curvature = principal_curvatures(noisy, "jet")
+    inside = (np.abs(surface.vertices[:, :2]) < 0.6).all(axis=1)
+    radius2 = (surface.vertices[inside, :2] ** 2).sum(axis=1)
+    along, around = 0.5 / (1 + 0.25 * radius2) ** 1.5, 0.5 / np.sqrt(1 + 0.25 * radius2)
+    error = np.abs(np.stack([curvature.k1[inside] - around, curvature.k2[inside] - along]))
+    assert (error < 1.645 * curvature.sd[inside]).mean() > 0.63  # 0.54 by pools of the nearest 60 points alone
 
 
 def test_a_sphere_has_curvature_but_no_principal_directions():
