@@ -34,7 +34,7 @@ from mapping.assembly import (
     without_wide,
 )
 from mapping.base import Base, Form, LaidTrace, Pose, estimate_pose, fit_base, over_base, refined
-from mapping.detection import RAW_SAMPLES, Detections, detect, recovered
+from mapping.detection import RAW_SAMPLES, Detections, detect, narrowest_groove, recovered
 from mapping.detection.path import (
     Backlash,
     PathLedger,
@@ -201,7 +201,7 @@ class Work:
     @property
     def smallest_feature(self) -> float | None:
         """Height of the smallest feature that the scene asks for, m, or None."""
-        return None if self.scene is None else self.scene.survey.smallest_feature
+        return None if self.scene is None else self.scene.smallest
 
     def wants(self, name: str) -> bool:
         """True if the part of a stage with this name was asked for."""
@@ -812,6 +812,7 @@ def _provenance(work: Work) -> dict[str, Any]:
         "average": log.metadata.get("average"),
         "noise": noise.record,
         "detection_limit": work.detections.detection_limit,
+        "narrowest_groove": narrowest_groove(work.detections.detection_limit, log.trace.tip_radius),
         "limit_measured": {"injected": work.detections.injected, "recovered": work.detections.recovered},
         "warnings": list(work.detections.remarks),
         "false_alarms_per_metre": work.settings.false_alarms_per_metre,

@@ -16,7 +16,7 @@ from explore3d.log import Log
 from explore3d.scene import Scene
 from mapping import FloatArray, Trace, length_text
 from mapping.base import Base, LaidTrace
-from mapping.detection import FoundHeights, found_heights, lost_heights
+from mapping.detection import FoundHeights, found_heights, lost_heights, narrowest_groove
 from mapping.geometry.mesh import asked_part, faces_side
 from planners import Survey
 from planners.paths import Carrier, reachable, resampled
@@ -49,6 +49,7 @@ class SurfaceAccount:
         reach: distance from a sweep up to which the smallest feature asked for is seen on a plane, m; where no
             noise is known, or hides that from all sweeps, half a strip.
         hidden: height from which on features show on a sweep, m, if that is more than was asked for; else None.
+        hidden_groove: width from which on grooves show, m, if a groove was asked for that noise hides; else None.
         swept_path, other_path: lengths of executed sweeps, and of other executed moves, m.
         refused_path: length of refused sweeps, m.
         moves: executed.
@@ -80,6 +81,7 @@ class SurfaceAccount:
     unseen_path: float = 0.0
     below: float = 0.0
     hidden: float | None = None
+    hidden_groove: float | None = None
 
     @classmethod
     def of_log(
@@ -181,9 +183,9 @@ class SurfaceAccount:
         if not self.short:
             if self.hidden is None or self.shortest_ridge is not None:
                 return ""
-            return (
-                f"NOT INSPECTED: no sweep shows sharp features lower than {length_text(self.hidden, 2)} in its noise."
-            )
+            grooves = f", or grooves narrower than {length_text(self.hidden_groove, 2)}," if self.hidden_groove else ""
+            lower = f"sharp features lower than {length_text(self.hidden, 2)}{grooves}"
+            return f"NOT INSPECTED: no sweep shows {lower} in its noise."
         why = f", most often because {self.causes[0][0]}" if self.causes else ""
         if self.unseen_path > self.refused_path:
             sweeps = f"{length_text(self.unseen_path, 2)} of sweeps"
@@ -242,7 +244,7 @@ def _shares(
         found: places of what was to be inspected, and what is lost at each.
         limit: height found where a sweep crosses it, m; None: not known.
     """
-    tip, smallest = scene.tip.radius, scene.survey.smallest_feature
+    tip, smallest = scene.tip.radius, scene.smallest
     survey = Survey(base=base, tip_radius=tip, smallest=smallest, **scene.model.asked)
     hidden = limit if limit is not None and smallest <= limit < np.inf else None
     if limit is None or limit >= smallest:
@@ -251,7 +253,10 @@ def _shares(
         lost = min(smallest - limit, tip)
         reach = float(np.sqrt(lost * (2.0 * tip - lost)))
     most_lost = tip - np.sqrt((tip - reach) * (tip + reach))
-    told = {"reach": reach, "hidden": hidden}
+    asked, hidden_groove = scene.survey.narrowest_groove, None
+    if hidden is not None and asked is not None and asked < narrowest_groove(hidden, tip):
+        hidden_groove = narrowest_groove(hidden, tip)
+    told = {"reach": reach, "hidden": hidden, "hidden_groove": hidden_groove}
     if survey.surface is None:  # the body stands elsewhere than its mesh said
         nothing = {"swept": 0.0, "refused": 0.0, "unreachable": 0.0, "not_inspected": 1.0}
         return nothing | {"area": 0.0} | told

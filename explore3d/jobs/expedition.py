@@ -148,7 +148,7 @@ def explorer(scene: Scene, workspace: Workspace) -> Explorer:
         SceneError: a mesh that cannot be read, a region without surface or too small for a sweep, or a speed that
             cannot be known.
     """
-    model, tip, smallest = scene.model, scene.tip.radius, scene.survey.smallest_feature
+    model, tip, smallest = scene.model, scene.tip.radius, scene.smallest
     speed, force = scene.sweep_speed, scene.survey.force
     base = known_base(scene)
     discover = locate = None

@@ -16,13 +16,14 @@ from explore3d.jobs.expedition import Explorer, explorer
 from explore3d.jobs.run import open_scene, scene_digest, scene_finger
 from explore3d.jobs.session import Job, Session
 from explore3d.pictures import plan_picture
+from explore3d.report import groove_sentence
 from explore3d.scene import Scene, mesh_text
 from hw import Finger, Move
 from hw.probing import GrblFinger
 from hw.simulated import SimulatedFinger
 from mapping import Surface, Trace, length_text
 from mapping.base import Base
-from mapping.detection import face_samples
+from mapping.detection import face_samples, narrowest_groove
 from mapping.geometry.mesh import algebra_in_one_thread
 from planners import Spent, drive, dry_run
 from planners.explore import Discover, SurveyCount
@@ -77,6 +78,7 @@ class DryRun:
         pecking: s that the moves will take by the finger's own forecast, where it touches point by point; else None.
         detail: what each detail that is found adds; None where that cannot be rehearsed.
         mesh: size, faces and borders of the global model's mesh in words, "" without one.
+        limit: height of a sharp crest that a sweep will show with 95 % probability, m; None: the noise is not known.
     """
 
     base: Base
@@ -91,6 +93,7 @@ class DryRun:
     pecking: float | None = None
     detail: DetailTime | None = None
     mesh: str = ""
+    limit: float | None = None
 
     def record(self) -> dict[str, Any]:
         """The plan in JSON values: SI units."""
@@ -103,11 +106,19 @@ class DryRun:
             "pecking_time": self.pecking,
             "detail_time": None if self.detail is None else asdict(self.detail),
             "speed": self.speed,
+            "detection_limit": self.limit,
+            "narrowest_groove": self.narrowest_groove,
             "covered": None if self.account is None else self.account.swept,
             "reach": None if self.account is None else self.account.reach,
             "violations": [{"move": number, "what": what} for number, what in self.violations],
             "surface": None if self.account is None else self.account.record(),
         }
+
+    @property
+    def narrowest_groove(self) -> float | None:
+        """Width from which on a sweep will show a groove so, m; None where the noise is not known, or hides it."""
+        narrowest = np.inf if self.limit is None else narrowest_groove(self.limit, self.tip_radius)
+        return narrowest if np.isfinite(narrowest) else None
 
     def lines(self) -> list[str]:
         """The plan in words."""
@@ -124,7 +135,13 @@ class DryRun:
         more = [] if self.detail is None else [self.detail.sentence()]
         mesh = [f"the mesh: {self.mesh}"] if self.mesh else []
         before = [*warning, *mesh, *assumed]
-        return [*before, first, *more, *told, *account, *(broken or ["no move breaks a limit"])]
+        shown = []
+        if self.limit is not None:
+            crest = (
+                f"A sharp crest {length_text(self.limit, 2)} high or higher is seen with 95 % where a sweep crosses it."
+            )
+            shown = [f"{crest} {groove_sentence(self.limit, self.tip_radius)}"]
+        return [*before, first, *more, *told, *shown, *account, *(broken or ["no move breaks a limit"])]
 
     def picture(self) -> bytes:
         """PNG of the base with the planned sweeps on it."""
@@ -210,6 +227,7 @@ def _planned(scene: Scene, finger: Finger, stages: Stages) -> DryRun:
         sum(map(finger.forecast, moves)) if isinstance(finger, GrblFinger) and finger.peck is not None else None,
         detail,
         "" if planned.given is None else mesh_text(planned.given.surface),
+        scene.expected_limit,
     )
 
 
@@ -223,7 +241,7 @@ def _rehearsed(scene: Scene, planned: Explorer, base: Base, finger: SimulatedFin
     from trimesh.transformations import rotation_matrix
 
     tip, ridges_only = scene.tip.radius, scene.survey.shortest_ridge
-    height = REHEARSED_HEIGHT * scene.survey.smallest_feature
+    height = REHEARSED_HEIGHT * scene.smallest
     length = max(ridges_only or REHEARSED_LENGTH * tip, REHEARSED_WIDTH * height)
     wire = trimesh.creation.capsule(height=length - height, radius=0.5 * height)
     wire.apply_translation([0.0, 0.0, 0.5 * height] - wire.bounds.mean(axis=0))

@@ -1,4 +1,4 @@
-"""Picture of extents: each axis seen from above with its 90 % band, and its ends with theirs."""
+"""Picture of extents: each line laid out straight with its 90 % band, and its ends with theirs."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from explore3d.pictures.chart import DASHED, Panel, sheet
 from explore3d.pictures.figure import BAND, ESTIMATED, INK, TRUTH
 from mapping import Feature, FloatArray, length_text, length_unit
+from mapping.geometry.mesh import arclengths, directions, nearest_on
 
 EXTENTS_PER_ROW = 2
 EXTENT_SIZE = (530.0, 250.0)  # of a panel, px
@@ -16,7 +17,7 @@ NORMAL_QUANTILE_95 = 1.6448536
 
 
 def extent_picture(features: Sequence[Feature], truths: Sequence[FloatArray | None]) -> bytes | None:
-    """SVG with one panel for each feature along a curve: place along its chord, and across it, not to one scale.
+    """SVG with one panel for each feature along a curve: place along it, and beside it, not to one scale.
 
     Args:
         features: those to show; bumps and pits have no extent and are left out.
@@ -31,30 +32,40 @@ def extent_picture(features: Sequence[Feature], truths: Sequence[FloatArray | No
 
 
 def _panel(feature: Feature, true: FloatArray | None) -> Panel:
-    """The axis in a plane: along the chord between its ends (a ring: its first diameter), and across."""
-    along, across, origin = _plane(feature)
-    x, y = (feature.axis - origin) @ along, (feature.axis - origin) @ across
-    sd = feature.details.axis_sd
-    if sd is None or len(sd) != len(x):
-        sd = np.full(len(x), feature.position_sd)
-    tangent = np.gradient(np.column_stack([x, y]), axis=0)
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), np.finfo(float).tiny)
-    side = NORMAL_QUANTILE_95 * sd[:, None] * tangent[:, ::-1] * [-1.0, 1.0]
-    x_factor, x_name = length_unit(float(np.abs(x).max()))
-    spread = [y, y + side[:, 1], y - side[:, 1]]
-    if true is not None:
-        spread.append((true - origin) @ across)
-    y_factor, y_name = length_unit(float(np.max([np.abs(each).max() for each in spread])))
-    band = np.concatenate([np.column_stack([x, y]) + side, (np.column_stack([x, y]) - side)[::-1]])
-    panel = Panel(f"{feature.id}: {_worst(feature, sd)}", f"along ({x_name})", f"across ({y_name})", y_ticks=5)
-    panel.area(band[:, 0] / x_factor, band[:, 1] / y_factor, BAND, name="axis, 90 %")
-    panel.line(x / x_factor, y / y_factor, ESTIMATED, name="axis, median")
-    if true is not None:
-        place = (true - origin) @ along, (true - origin) @ across
+    """The line laid out straight: place along it, and how far the truth and the band lie beside it on the surface."""
+    s, sd = arclengths(feature.axis), feature.details.axis_sd
+    if sd is None or len(sd) != len(s):
+        sd = np.full(len(s), feature.position_sd)
+    side, straight = NORMAL_QUANTILE_95 * sd, np.zeros(len(s))
+    place = None if true is None else _beside(feature, true)
+    x_factor, x_name = length_unit(float(s[-1]))
+    y_factor, y_name = length_unit(max(float(side.max()), 0.0 if place is None else float(np.abs(place[1]).max())))
+    panel = Panel(f"{feature.id}: {_worst(feature, sd)}", f"along it ({x_name})", f"beside it ({y_name})", y_ticks=5)
+    band = np.concatenate([side, -side[::-1]])
+    panel.area(np.concatenate([s, s[::-1]]) / x_factor, band / y_factor, BAND, name="axis, 90 %")
+    panel.line(s / x_factor, straight, ESTIMATED, name="axis, median")
+    if place is not None:
         panel.line(place[0] / x_factor, place[1] / y_factor, TRUTH, dash=DASHED, name="truth")
     for end, direction in ((0, -1.0), (-1, 1.0)):
-        _end(panel, feature, end, direction, (x[end] / x_factor, y[end] / y_factor), x_factor)
+        _end(panel, feature, end, direction, (s[end] / x_factor, 0.0), x_factor)
     return panel
+
+
+def _beside(feature: Feature, true: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Where the points (K, 3) of another line lie along the feature's, and beside it on the surface, to the left, m.
+
+    Beyond an end the line goes straight on.
+    """
+    axis, way = feature.axis, directions(feature.axis)
+    on, s = nearest_on(true, axis)
+    near = np.linalg.norm(axis[:, None] - on, axis=2).argmin(axis=0)
+    away, along = true - on, way[near]
+    ahead = np.einsum("ij,ij->i", away, along)
+    left = np.einsum("ij,ij->i", away, np.cross(feature.normals[near], along))
+    beyond = np.zeros(len(s), dtype=bool) if feature.closed else (s == 0.0) | (s == arclengths(axis)[-1])
+    s = np.where(beyond, s + ahead, s)
+    order = np.argsort(s, kind="stable")
+    return s[order], left[order]
 
 
 def _end(panel: Panel, feature: Feature, end: int, direction: float, place: tuple[float, float], factor: float) -> None:
@@ -69,19 +80,6 @@ def _end(panel: Panel, feature: Feature, end: int, direction: float, place: tupl
     low, high = (x + direction * value / factor for value in intervals[end])
     panel.bars([[min(low, x), max(high, x)]], [[y, y]], INK, width=1.8)
     panel.marks([low, x, high], [y, y, y], INK, "o", size=4.0)
-
-
-def _plane(feature: Feature) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Unit vectors along and across, and the origin."""
-    axis = feature.axis
-    far = axis[len(axis) // 2] if feature.closed else axis[-1]
-    along = far - axis[0]
-    if not np.any(along):
-        along = axis[1] - axis[0]
-    along = along / np.linalg.norm(along)
-    up = feature.normals.mean(axis=0)
-    across = np.cross(up, along)
-    return along, across / max(float(np.linalg.norm(across)), np.finfo(float).tiny), axis[0]
 
 
 def _worst(feature: Feature, sd: FloatArray) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,6 +31,16 @@ LEAST_FEATURE_PIXELS = 5.0
 # Size of the words in a picture, and how high a label is, px
 LABEL_SIZE = 13.0
 LABEL_HEIGHT = 18.0
+# Height of the strip below a view that its scale bar stands in, px
+SCALE_STRIP = 24.0
+# A label stands at most so many rows above or below its place. What it costs to cover a place of something found, or a
+# line that leads to another label, in px that the label would rather be farther away; and another label, which is
+# covered only where nothing else is possible
+LABEL_ROWS, ON_FOUND, ON_LABEL = 9, 40.0, 1e4
+FOUND_AIR = 7.0  # px about a found line that are its own
+# Places along a found line, along the line to a label, and about a label, for what covers what
+DRAWN_PLACES, LEAD_PLACES = 41, 12
+LABEL_PLACES = np.array([[x, y] for x in np.linspace(0.0, 1.0, 9) for y in (0.0, 0.5, 1.0)])
 # Views of a closed body: from so many sides, a little from above, steeply from above, from below; at most so many
 AZIMUTHS, MOST_VIEWS = 16, 4
 VIEW_HEIGHTS = (0.45, 1.3, -0.45)
@@ -37,6 +48,7 @@ FIRST_AZIMUTH = -0.25 * np.pi - 0.5
 # Two views beside each other count less, by so much of a feature that is seen squarely; one from an unusual height, too
 BESIDE_EACH_OTHER, LOWERED = 0.2, 0.3
 SEEN_PLACES = 7  # along a line
+WELL_SEEN = 0.6  # of as squarely as any view shows a feature, one of those taken shows it at least
 # A line of sight is so wide, in sizes of the body; flatter than this cosine nobody makes out a detail
 SIGHT_SHARE, LEAST_FACING = 1e-3, 0.25
 # A body that leans less than this, 3 degrees, is looked at as a level one: a step of 1 mm leans the estimated surface
@@ -60,7 +72,7 @@ def object_picture(base: Surface, features: Sequence[Feature], sweeps: Sequence[
         for camera in row:
             content += shifted(_drawn(_scene(base, features, camera, sweeps), features), left, down)
             left += camera.width / SUPERSAMPLING
-        right, down = max(right, left), down + max(camera.height for camera in row) / SUPERSAMPLING
+        right, down = max(right, left), down + max(camera.height for camera in row) / SUPERSAMPLING + SCALE_STRIP
     return drawing(right, down, content)
 
 
@@ -87,7 +99,7 @@ def view_directions(
 
     Args:
         normals: (N, 3) outward, of the parts that are to be seen.
-        features: as many views are taken, up to MOST_VIEWS, as it needs for each of them to be in sight.
+        features: as many views are taken, up to MOST_VIEWS, as it needs for each of them to be well in sight.
         base: what may stand before them.
         shown: (P, 3) what the pictures have room for, m; None: the base.
     """
@@ -115,10 +127,11 @@ def view_directions(
     lower = LOWERED * (wishes[:, 2] != VIEW_HEIGHTS[0])
     merit = len(features) * ((both > 0.0).sum(axis=2) + shown) + both.sum(axis=2) - BESIDE_EACH_OTHER * beside
     chosen = list(np.unravel_index((merit - lower[:, None] - lower[None]).argmax(), merit.shape))
-    while (
-        len(chosen) < MOST_VIEWS and (unseen := (facing[chosen] == 0.0).all(axis=0) & (facing > 0.0).any(axis=0)).any()
-    ):
-        chosen.append(np.lexsort([facing[:, unseen].sum(axis=1), (facing[:, unseen] > 0.0).sum(axis=1)])[-1])
+    # more of them while a feature is seen only at a slant, or in part, that another view shows
+    squarely = WELL_SEEN * facing.max(axis=0)
+    while len(chosen) < MOST_VIEWS and (slanted := facing[chosen].max(axis=0) < squarely).any():
+        well = facing[:, slanted] >= squarely[slanted]
+        chosen.append(np.lexsort([facing[:, slanted].sum(axis=1), well.sum(axis=1)])[-1])
     return list(wishes[chosen])
 
 
@@ -185,51 +198,123 @@ def pictured(picture: Picture) -> str:
 
 
 def _drawn(picture: Picture, features: Sequence[Feature]) -> str:
-    """The pixels with the features' names and a scale bar."""
+    """The pixels with the features' names beside them, and a scale bar below."""
     content = pictured(picture)
     width, height = picture.camera.width / SUPERSAMPLING, picture.camera.height / SUPERSAMPLING
-    taken: list[tuple[float, float, float]] = []
-    for feature in features:
-        reference = feature.axis[len(feature.axis) // 2] if feature.anchor is None else feature.anchor.position
-        # A wide bump hides its own foot: the label points at what stands out.
-        crest = reference + max(feature.height.median, 0.0) * feature.normals[len(feature.axis) // 2]
-        place, depth = picture.camera.project(crest[None, :])
-        column, row = np.rint(place[0]).astype(int)
-        hidden = not (0 <= row < picture.depth.shape[0] and 0 <= column < picture.depth.shape[1])
-        if hidden or depth[0] > 1.02 * picture.depth[row, column]:
+    crests = [_crest(feature) for feature in features]
+    lines = [_in_sight(picture, resample(crest, DRAWN_PLACES)) for crest in crests]
+    taken: list[Label] = []
+    for feature, crest, line in zip(features, crests, lines, strict=True):
+        # a part of a line that is in sight bears its name, the nearest to its middle
+        if not len(line):
             continue
+        middle = picture.camera.project(crest[len(crest) // 2][None])[0][0] / SUPERSAMPLING
+        place = line[np.linalg.norm(line - middle, axis=1).argmin()]
         words = f"{feature.id}  {feature.height.text()[0]}"
-        x, y = (place[0] / SUPERSAMPLING).tolist()
         wide = text_width(words, LABEL_SIZE) + 6.0
-        left = min(max(x + 30.0, 2.0), width - wide - 2.0)
-        top = free_row(left, wide, min(max(y - 72.0, 2.0), height - LABEL_HEIGHT - 2.0), taken, height)
-        taken.append((left, wide, top))
-        content += stroke(f"M{number(x)} {number(y)}L{number(left)} {number(top + 0.5 * LABEL_HEIGHT)}", INK, 0.8)
-        content += (
-            f'<rect x="{number(left)}" y="{number(top)}" width="{number(wide)}" height="{LABEL_HEIGHT:g}" rx="3" '
-            'fill="#fff" opacity="0.85"/>'
+        label = placed(place, wide, np.concatenate(lines), taken, (width, height))
+        taken.append(label)
+        content += stroke(
+            f"M{number(place[0])} {number(place[1])}L{number(label.foot[0])} {number(label.foot[1])}", INK, 0.8
         )
-        content += text_at(left + 3.0, top + 13.0, words, size=LABEL_SIZE)
+        content += (
+            f'<rect x="{number(label.left)}" y="{number(label.top)}" width="{number(wide)}" height="{LABEL_HEIGHT:g}" '
+            'rx="3" fill="#fff" opacity="0.85"/>'
+        )
+        # words may be narrower than the box: they begin, or end, where the line meets it
+        leads_left = label.foot[0] == label.left
+        edge = label.left + 3.0 if leads_left else label.left + wide - 3.0
+        content += text_at(edge, label.top + 13.0, words, size=LABEL_SIZE, anchor="start" if leads_left else "end")
     return content + _scale_bar(picture.camera)
 
 
-def free_row(
-    left: float, wide: float, wish: float, taken: Sequence[tuple[float, float, float]], height: float
-) -> float:
-    """Where a label may stand, px from the top: as near as possible to where it wants to, on no other label.
+def _crest(feature: Feature) -> FloatArray:
+    """(K, 3) places of the line or spot that stand out, m: a wide bump hides its own foot."""
+    reference = feature.axis if len(feature.axis) > 1 or feature.anchor is None else feature.anchor.position[None]
+    return np.asarray(reference + max(feature.height.median, 0.0) * feature.normals)
+
+
+def _in_sight(picture: Picture, places: FloatArray) -> FloatArray:
+    """(N, 2) where those of the places (K, 3) that nothing hides are in the picture, px."""
+    pixels, depth = picture.camera.project(places)
+    column, row = np.rint(pixels).astype(int).T
+    inside = (row >= 0) & (row < picture.depth.shape[0]) & (column >= 0) & (column < picture.depth.shape[1])
+    before = np.zeros(len(places), dtype=bool)
+    before[inside] = depth[inside] <= 1.02 * picture.depth[row[inside], column[inside]]
+    return np.asarray(pixels[before] / SUPERSAMPLING)
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """Where a label stands, px: its box, and the line that leads to it from its place (2,).
 
     Args:
-        left, wide: of the label.
-        wish: its wanted top.
-        taken: (left, width, top) of the labels that stand already.
-        height: of the picture; a label that finds no free place keeps the one it wished for.
+        left, top, wide: of the box, which is LABEL_HEIGHT high.
+        place: that it names.
     """
-    beside = [top for other, size, top in taken if other < left + wide and left < other + size]
-    for step in range(int(height / LABEL_HEIGHT)):
-        for top in (wish - step * LABEL_HEIGHT, wish + step * LABEL_HEIGHT):
-            if 0.0 <= top <= height - LABEL_HEIGHT and all(abs(top - other) >= LABEL_HEIGHT for other in beside):
-                return top
-    return wish
+
+    left: float
+    top: float
+    wide: float
+    place: FloatArray
+
+    @property
+    def foot(self) -> FloatArray:
+        """(2,) where the line meets the box: on the side that is nearer."""
+        right = self.left + self.wide
+        nearer = self.left if abs(self.place[0] - self.left) < abs(self.place[0] - right) else right
+        return np.array([nearer, self.top + 0.5 * LABEL_HEIGHT])
+
+    def lead(self) -> FloatArray:
+        """(N, 2) places along the line."""
+        return self.place + np.linspace(0.0, 1.0, LEAD_PLACES)[:, None] * (self.foot - self.place)
+
+    def covers(self, places: FloatArray, air: float) -> int:
+        """How many of the places (N, 2) lie on the box, or so near to it, px."""
+        x, y = places.T - np.array([[self.left], [self.top]])
+        return int(((x > -air) & (x < self.wide + air) & (y > -air) & (y < LABEL_HEIGHT + air)).sum())
+
+
+def placed(
+    place: FloatArray, wide: float, lines: FloatArray, taken: Sequence[Label], size: tuple[float, float]
+) -> Label:
+    """A label for a place (2,): near it, on no other label or its line, on as little as may be of what is found.
+
+    Args:
+        wide: of the label, px.
+        lines: (N, 2) places of all that was found and is in sight, px.
+        taken: labels that stand already.
+        size: width and height of the picture, px.
+    """
+    x, y = place
+    lefts = [x + 30.0, x - 30.0 - wide, x + 80.0, x - 80.0 - wide]
+    tops = y - 0.5 * LABEL_HEIGHT + LABEL_HEIGHT * np.arange(-LABEL_ROWS, LABEL_ROWS + 1)
+    best, least = None, np.inf
+    for left in lefts:
+        for top in tops:
+            inside = min(max(left, 2.0), size[0] - wide - 2.0), min(max(top, 2.0), size[1] - LABEL_HEIGHT - 2.0)
+            label = Label(*inside, wide, place)
+            lead = label.lead()
+            cost = float(np.linalg.norm(label.foot - place)) + ON_FOUND * label.covers(lines, FOUND_AIR)
+            for other in taken:
+                corners = np.array([[other.left, other.top]]) + LABEL_PLACES * [other.wide, LABEL_HEIGHT]
+                on_label = label.covers(corners, 2.0) + other.covers(lead, 1.0)
+                on_lead = label.covers(other.lead(), 1.0) + _crossed(lead, other.lead())
+                cost += ON_LABEL * on_label + ON_FOUND * on_lead
+            if cost < least:
+                best, least = label, cost
+    assert best is not None  # there are places to try
+    return best
+
+
+def _crossed(one: FloatArray, other: FloatArray) -> bool:
+    """True if two straight lines, each of places (N, 2), cross."""
+    a, b, c, d = one[0], one[-1], other[0], other[-1]
+
+    def side(p: FloatArray, q: FloatArray, r: FloatArray) -> bool:
+        return bool((q[0] - p[0]) * (r[1] - p[1]) > (q[1] - p[1]) * (r[0] - p[0]))
+
+    return side(a, b, c) != side(a, b, d) and side(c, d, a) != side(c, d, b)
 
 
 def round_length(camera: Camera) -> tuple[float, float]:
@@ -242,7 +327,8 @@ def round_length(camera: Camera) -> tuple[float, float]:
 
 
 def _scale_bar(camera: Camera) -> str:
+    """In a strip of its own, below the pixels."""
     length, wide = round_length(camera)
-    left, row = 0.03 * camera.width / SUPERSAMPLING, 0.965 * camera.height / SUPERSAMPLING
+    left, row = 0.03 * camera.width / SUPERSAMPLING, camera.height / SUPERSAMPLING + 0.5 * SCALE_STRIP
     bar = stroke(f"M{number(left)} {number(row)}h{number(wide)}", INK, 3.0)
-    return bar + text_at(left, row - 7.0, length_text(length), size=LABEL_SIZE)
+    return bar + text_at(left + wide + 8.0, row + 0.35 * LABEL_SIZE, length_text(length), size=LABEL_SIZE)

@@ -5,7 +5,11 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
-    from explore3d.report.findings import feature_line as feature_line, show as show
+    from explore3d.report.findings import (
+        feature_line as feature_line,
+        groove_sentence as groove_sentence,
+        show as show,
+    )
     from explore3d.report.markup import (
         Html as Html,
         badge as badge,
@@ -26,7 +30,7 @@ if TYPE_CHECKING:
     )
 
 _PUBLIC = {
-    "findings": ("feature_line", "show"),
+    "findings": ("feature_line", "groove_sentence", "show"),
     "markup": ("Html", "badge", "element", "figure", "paragraph", "section", "table"),
     "page": ("machine", "machine_section", "page"),
     "report": ("write_report",),

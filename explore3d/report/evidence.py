@@ -39,8 +39,8 @@ def posteriors(pictures: Pictures) -> Html:
     content: list[str] = []
     if "extents" in pictures.files:
         caption = (
-            "Axes seen from above, along and across not to one scale: median and 90 % band; bars: 90 % intervals of "
-            "the ends; triangles: the axis goes on beyond what was explored."
+            "Lines laid out straight, along and beside them not to one scale: 90 % band about the median; bars: 90 % "
+            "intervals of the ends; triangles: the line goes on beyond what was explored."
         )
         content.append(figure(pictures.files["extents"], "Extents with their intervals", caption))
     for name, picture in pictures.files.items():

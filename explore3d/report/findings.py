@@ -11,7 +11,7 @@ import numpy as np
 from explore3d import count_text
 from explore3d.analysis import ABSORBED, FAILED, Analysis, swept_share
 from mapping import Feature, length_text, place_text
-from mapping.detection import CLEAR, LARGEST
+from mapping.detection import CLEAR, LARGEST, groove_dip, narrowest_groove
 from mapping.detection.path import PathLedger
 from mapping.inference.configuration import numbers_in
 from mapping.model import probability
@@ -273,7 +273,19 @@ def limit_sentence(analysis: Analysis) -> str:
     return (
         f"A sharp crest {length_text(detections.detection_limit, 2)} high or higher is seen with "
         f"{100 * detections.probability:.0f} % probability where a sweep crosses it{swept_part(analysis)}"
-        f"{wide_part(analysis)}{measured_part(analysis)}."
+        f"{wide_part(analysis)}{measured_part(analysis)}. "
+        f"{groove_sentence(detections.detection_limit, analysis.trace.tip_radius)}"
+    )
+
+
+def groove_sentence(limit: float, tip_radius: float) -> str:
+    """From which width on a groove is seen like a crest of the limit's height: a ball feels no more of its depth."""
+    narrowest = narrowest_groove(limit, tip_radius)
+    if not isfinite(narrowest):
+        return "No groove that is narrower than the ball is seen so."
+    return (
+        f"So is a groove {length_text(narrowest, 2)} wide or wider, if it is at least as deep as the "
+        f"{length_text(groove_dip(limit), 2)} that this ball sinks into it."
     )
 
 

@@ -28,6 +28,7 @@ from explore3d.report.findings import (
 from explore3d.report.markup import Html, Row, badge, element, figure, paragraph, section, table
 from explore3d.report.pictures import Pictures, is_profile
 from mapping import UNKNOWN_TEXT, Feature, Interval, length_text, place_decimals
+from mapping.detection import narrowest_groove
 from mapping.geometry.mesh import arclengths
 from mapping.inference.kinds import kind_named, kind_of
 from mapping.model import FAIL, PASS, UNDECIDED
@@ -87,6 +88,10 @@ def facts(analysis: Analysis) -> Html:
         (f"{len(trace):,}", "samples in contact"),
         (length_text(detections.noise.sd, 2), "noise of a sample (estimated)"),
         (length_text(detections.detection_limit, 2), "detection limit of a sharp crest"),
+        (
+            length_text(narrowest_groove(detections.detection_limit, trace.tip_radius), 2),
+            "narrowest groove that is seen",
+        ),
     ]
     return element("div", *(element("div", element("b", a), element("span", b)) for a, b in pairs), class_="facts")
 

@@ -33,7 +33,7 @@ from explore3d.scene.values import (
 )
 from hw import Finger
 from mapping import KINDS, FloatArray, Surface, length_text
-from mapping.detection import expected_limit
+from mapping.detection import crest_like_groove, expected_limit
 from mapping.instrument import Noise, StatedNoise
 from mapping.model import Tolerance
 from planners.survey import fastest_speed
@@ -47,8 +47,9 @@ USUAL_SPEED = 0.03
 
 
 # In radii of the tip: a crest of 1e-5 shows over 1e-2 of them, too fine for a survey's lines over one body;
-# noise of ten radii hides the fingertip itself
+# noise of ten radii hides the fingertip itself; the ball sinks 1e-5 radii into a groove of 1e-2, and fills one of two
 FINEST_FEATURE, COARSEST_FEATURE, MOST_NOISE = 1e-5, 1e3, 10.0
+NARROWEST_GROOVE, WIDEST_GROOVE = 1e-2, 2.0
 # A body of more than 1e5 radii is no fingertip's to survey; a tip of ten bodies feels no shape
 CONTACT_ALGORITHMS = (1, 2)  # of the paper's figure 4
 LARGEST_TIPS, LARGEST_TIP_SHARE = 1e5, 10.0
@@ -125,17 +126,34 @@ class GlobalModel(Table):
 
 
 class SurveyTable(Table):
-    """Sweeps over the whole model: the least height to be found (m), the least span of a ridge (m), m/s, N.
+    """Sweeps over the whole model: the least height and the least width of a groove to be found (m), the least span of
+    a ridge (m), m/s, N.
 
     Without `shortest_ridge` nothing of that height is missed, bumps included; with it, ridges that span less may be.
+    A groove is asked for by its width, for a ball that bridges it sinks no further than that lets it.
     The speed "fastest" is the greatest at which a sweep still shows the smallest feature (`Scene.sweep_speed`); so it
     is where none is named and that can be known.
     """
 
-    smallest_feature: Length
+    smallest_feature: Length | None = None
+    narrowest_groove: Length | None = None
     shortest_ridge: Length | None = None
     speed: SweepSpeed | None = None
     force: Force = 1.0
+
+    @model_validator(mode="after")
+    def _asks_for_something(self) -> SurveyTable:
+        if self.smallest_feature is None and self.narrowest_groove is None:
+            raise ValueError(
+                "give survey.smallest_feature, survey.narrowest_groove, or both: what is to be found sets the sweeps"
+            )
+        return self
+
+    def faintest(self, tip_radius: float) -> float:
+        """Height of the faintest sharp crest that must not be missed, m: of the smallest feature, or as hard to see as
+        the narrowest groove, whichever is less."""
+        groove = inf if self.narrowest_groove is None else crest_like_groove(self.narrowest_groove, tip_radius)
+        return min(self.smallest_feature or inf, groove)
 
 
 class Detection(Table):
@@ -197,7 +215,8 @@ class Scene(Table):
         """Lengths that no unit but a wrong one gives are refused before anything is planned from them."""
         radius = self.tip.radius
         bounds = {
-            "survey.smallest_feature": (self.survey.smallest_feature, FINEST_FEATURE, COARSEST_FEATURE),
+            "survey.smallest_feature": (self.survey.smallest_feature or radius, FINEST_FEATURE, COARSEST_FEATURE),
+            "survey.narrowest_groove": (self.survey.narrowest_groove or radius, NARROWEST_GROOVE, WIDEST_GROOVE),
             "finger.noise.white": (self.finger.noise.white, 0.0, MOST_NOISE),
             "finger.noise.correlated": (self.finger.noise.correlated, 0.0, MOST_NOISE),
         }
@@ -243,6 +262,11 @@ class Scene(Table):
         return scene_text(self.model_dump(mode="json", by_alias=True, exclude_none=True))
 
     @property
+    def smallest(self) -> float:
+        """Height of the faintest sharp crest that must not be missed, m (see SurveyTable.faintest)."""
+        return self.survey.faintest(self.tip.radius)
+
+    @property
     def noise(self) -> StatedNoise | None:
         """The noise of the centres as the scene states it, None where it states none."""
         told = self.finger.noise
@@ -253,7 +277,7 @@ class Scene(Table):
     def expected_limit(self) -> float | None:
         """Height of a sharp crest that a sweep will show with 95 % probability, m, as far as the noise that the scene
         states foretells it; None where it states none, or nobody knows how often the finger samples."""
-        follows = self.finger.follows(self.tip.radius, self.survey.smallest_feature)
+        follows = self.finger.follows(self.tip.radius, self.smallest)
         if self.noise is None or follows is None:
             return None
         spacing = self.sweep_speed / follows[1]
@@ -275,7 +299,7 @@ class Scene(Table):
         Raises:
             SceneError: "fastest" is asked for, and the finger's noise or what it can follow is not known.
         """
-        speed, smallest, tip = self.survey.speed, self.survey.smallest_feature, self.tip.radius
+        speed, smallest, tip = self.survey.speed, self.smallest, self.tip.radius
         if isinstance(speed, float):
             return speed
         follows = self.finger.follows(tip, smallest)

@@ -182,6 +182,14 @@ class LaidTrace(Trace):
         """The trace itself if it lies on this base already, else laid on it."""
         return trace if isinstance(trace, cls) and trace.base is base else cls(trace, base)
 
+    @classmethod
+    def together(cls, parts: Sequence[Trace], base: Base) -> LaidTrace:
+        """Traces of sweeps that have numbers of their own, one after the other; what is known of each stays known."""
+        laid = [cls.of(part, base) for part in parts]
+        if len(laid) == 1:
+            return laid[0]
+        return cls(Trace.concatenate(laid), base, tuple(sweep for part in laid for sweep in part.laid_sweeps))
+
     def touched(self, most: int) -> tuple[FloatArray, FloatArray]:
         """Points of the base under the trace, and directions from there to the ball, both (M, 3).
 

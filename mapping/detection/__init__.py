@@ -22,6 +22,12 @@ if TYPE_CHECKING:
         detect as detect,
         expected_limit as expected_limit,
     )
+    from mapping.detection.filters.groove_limit import (
+        DIP as DIP,
+        crest_like_groove as crest_like_groove,
+        groove_dip as groove_dip,
+        narrowest_groove as narrowest_groove,
+    )
     from mapping.detection.filters.matched_filter import LADDER as LADDER
     from mapping.detection.paper_algorithms import (
         along_chord as along_chord,
@@ -38,6 +44,7 @@ _PUBLIC = {
     "crossing": ("Crossing",),
     "detect": ("LARGEST", "SHORTEST_SWEEP_SAMPLES", "Detections", "detect", "expected_limit"),
     "filters.matched_filter": ("LADDER",),
+    "filters.groove_limit": ("DIP", "crest_like_groove", "groove_dip", "narrowest_groove"),
     "paper_algorithms": ("along_chord", "curvature_features", "curvature_profile"),
     "quiet_noise": ("RAW_SAMPLES", "smallest_crest"),
     "recovery": ("recovered",),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mapping import Dropped, Feature, length_text
+from mapping import Dropped, Feature, FloatArray, length_text
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference.kinds import feature_trace, kind_of, sizes_of
@@ -32,11 +32,19 @@ def dropped_features(features: Sequence[Feature]) -> tuple[Dropped, ...]:
     )
 
 
+def _gap_to_crest(centers: FloatArray, feature: Feature, tip_radius: float) -> FloatArray:
+    """(N,) distances between balls at centres (N, 3) and the feature's crest, round as its cap is, m."""
+    radius = feature.details.radius or 0.0
+    crest = feature.axis + (feature.height.median - radius) * feature.normals
+    return distances(centers, crest) - tip_radius - radius
+
+
 def dropped_crossings(
     crossings: Sequence[Crossing], features: Sequence[Feature], tip_radius: float
 ) -> tuple[Dropped, ...]:
     """Crossings that no feature accounts for: none lies within their disturbance, or within its own, or leaves most of
-    what was felt there, as the flank of a bump that runs out does to the rows that pass beside it.
+    what was felt there, as the flank of a bump that runs out does to the rows that pass beside it; nor did the ball
+    stand on one, whose foot was on a wall beside it: in the corner before a ridge's end it touches all three.
 
     Args:
         crossings: all that was detected.
@@ -47,6 +55,7 @@ def dropped_crossings(
         return ()
     points, normals = (np.array([getattr(crossing, name) for crossing in crossings]) for name in ("point", "normal"))
     height = np.array([crossing.height for crossing in crossings])
+    centers = points + (tip_radius + height)[:, None] * normals
     nearest, away = np.full(len(points), -1), np.full(len(points), np.inf)
     accounted = np.zeros(len(points), dtype=bool)
     own = np.array([crossing.half_width for crossing in crossings])
@@ -69,6 +78,9 @@ def dropped_crossings(
                 # of a step the sign says which side it was fitted from, not which way the detail goes
                 sign = np.where(steps[beside], np.sign(left), np.sign(height[beside]))
                 accounted[beside] = left * sign > MOST * np.abs(height[beside])
+        if feature.height.median > 0.0 and not kind_of(feature).sided:
+            # a ball rests on what it is nearest to: the base is so far away as it stands over it
+            accounted |= np.abs(_gap_to_crest(centers, feature, tip_radius)) < (1.0 - MOST) * height
         nearest, away = np.where(apart < away, number, nearest), np.minimum(apart, away)
     return tuple(
         Dropped(

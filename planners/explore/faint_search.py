@@ -12,7 +12,7 @@ import numpy as np
 from mapping import Feature, Trace
 from mapping.assembly import with_faint_lines
 from mapping.base import Base
-from mapping.detection import Crossing, Detections, detect
+from mapping.detection import DIP, Crossing, Detections, detect
 from mapping.instrument import Noise, StatedNoise
 from planners import Outcome, Plan
 from planners.follow import DECISIVE, FaintLead
@@ -26,9 +26,6 @@ ANYWHERE = 1.3
 LEADS, FALSE_LEADS = 0.75, 3.0
 # A need of fewer sweeps more, once the noise is known better, is not seen to
 FEW_MORE = 0.1
-# Signal-to-noise ratio of a dip between two rims against that of a crest as high, in white noise (theory section 4:
-# the integrals of (1 - x)^4 and (1 - x^2)^2)
-DIP = float(np.sqrt(3.0 / 8.0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,9 +37,6 @@ LEAST_VISIBLE_SHARE, MOST_VISIBLE_SHARE = 0.1, 5.0 / 6.0
 # Sweeps that were laid out before the first told the noise stand if what it told leaves so much of the surface
 # inspected, and would make strips no wider than by one over that; so much is asked of a run in the end
 STANDS = 0.95
-# Lines that are worked out before each sweep: one takes some 13 ms on the bench's bodies, and the finger is to wait no
-# longer than 50 ms; all are after a third of the sweeps
-LAID_OUT = 3
 # Samples that a sweep must have to be looked at
 FEWEST_SWEEP_SAMPLES = 16
 
@@ -50,7 +47,7 @@ class SurveyCount:
 
     Args:
         planned: sweeps that it wants, known once the first has told the noise; None before. A line is one, until it is
-            known whether ball and stem can make it whole: it changes in the first third where they cannot.
+            known whether ball and stem can make it whole.
         made: sweeps that it was answered, also those that could not be made.
     """
 
@@ -102,9 +99,9 @@ class Surveyor:
             self.visible = self.survey.visible
         sweeps, waiting, felt = self._laid_out(), list[Trace](), 0.0
         while (move := next(sweeps, None)) is not None:
-            trace = yield move
+            answer = yield move
             self.count.made += 1
-            done = executed(move, trace)
+            done, trace = executed(move, answer), LaidTrace.of(answer, self.survey.base)
             self._keep(done, trace)
             if strips and self.count.made == 1 and not self._stands(done, trace):
                 sweeps = self._laid_out()
@@ -125,16 +122,14 @@ class Surveyor:
         return Outcome("done")
 
     def _laid_out(self) -> Iterator[Move]:
-        """The sweeps; what ball and stem can make of a few lines is worked out before each, not of all at once."""
-        lines, ahead = deque(self.survey.lines(self.visible)), deque[Move]()
-        while True:
-            for _ in range(min(LAID_OUT, len(lines))):
-                ahead.extend(self.survey.pressed(lines.popleft()))
-            self.count.planned = self.count.made + len(ahead) + len(lines)
-            if ahead:
+        """The sweeps; what ball and stem can make of a line is worked out before it, not of all at once."""
+        lines = deque(self.survey.lines(self.visible))
+        while lines:
+            ahead = deque(self.survey.pressed(lines.popleft()))
+            while ahead:
+                self.count.planned = self.count.made + len(ahead) + len(lines)
                 yield ahead.popleft()
-            elif not lines:
-                return
+        self.count.planned = self.count.made
 
     def _keep(self, done: Sequence[Move], trace: Trace) -> None:
         self.commanded.extend(part.path for part in done)
@@ -143,7 +138,7 @@ class Surveyor:
     def deviation(self) -> Deviation | None:
         """What all that was felt shows to be wrong with the model, None if nothing."""
         base = self.survey.base
-        return explain(Trace.concatenate(self.felt), base, self.commanded) if self.felt else None
+        return explain(LaidTrace.together(self.felt, base), base, self.commanded) if self.felt else None
 
     def look_again(self, deviation: Deviation) -> None:
         """What was found on a wrong model is forgotten, and looked for on the corrected one; not where parts differ."""
@@ -196,7 +191,7 @@ class Surveyor:
 
     def _detect(self, waiting: list[Trace]) -> None:
         felt = detect(
-            waiting[0] if len(waiting) == 1 else Trace.concatenate(waiting),
+            LaidTrace.together(waiting, self.survey.base),
             self.survey.base,
             noise=self.found.noise,
             stated=self.stated,

@@ -9,6 +9,7 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray
 from mapping.base import Base
+from planners.paths.room import Room, room_about
 
 # Places along the stem's axis that are looked at; the first lies where a stem half as thick leaves the ball's shadow
 STEM_PLACES, STEM_START = 6, 1.5
@@ -83,17 +84,37 @@ class Carrier:
             return free
         back = np.linspace(STEM_START * self.tip_radius, self.length + self.backing, STEM_PLACES)
         left, bound = np.arange(len(path)), np.full((len(path), STEM_PLACES), -np.inf)
+        if self.room is not None:
+            stem = path[:, None, :] - back[:, None] * approach[:, None, :]
+            least, most = (each.reshape(bound.shape) for each in self.room.bounds(stem.reshape(-1, 3)))
+            bound[least >= self.radius] = 0.0
+            free[(most < self.radius).any(axis=1)] = False
+            left = np.flatnonzero(free)
+            bound = bound[left]
         for k in STEM_ORDER:
             which = np.flatnonzero(bound[:, k] < 0)
+            if not len(which):
+                continue
             height = self.base.foot(path[left[which]] - back[k] * approach[left[which]], self.radius).height
             bound[which] = np.maximum(bound[which], height[:, None] - np.abs(back - back[k]))
             blocked = which[height < 0]
             free[left[blocked]] = False
-            left, bound = np.delete(left, blocked), np.delete(bound, blocked, axis=0)
+            if len(blocked):
+                left, bound = np.delete(left, blocked), np.delete(bound, blocked, axis=0)
         if self.backing > 0:
-            drawn = self.base.foot(path[left] - self.backing * approach[left], self.tip_radius).height
-            free[left] = drawn + FREE_SINKING * self.tip_radius >= 0
+            free[left] = self.ball_is_free(path[left] - self.backing * approach[left])
         return free
+
+    def ball_is_free(self, places: FloatArray, room: float | None = None) -> BoolArray:
+        """(N,) True where a ball at the places (N, 3) is so far off the body (m); None: sinks no deeper into it than
+        FREE_SINKING tip radii."""
+        far = self.tip_radius + (-FREE_SINKING * self.tip_radius if room is None else room)
+        if self.room is None:
+            return np.asarray(self.base.foot(places, far).height >= 0.0)
+        least, most = self.room.bounds(places)
+        free, ask = least >= far, np.flatnonzero((least < far) & (most >= far))
+        free[ask] = self.base.foot(places[ask], far).height >= 0.0
+        return np.asarray(free)
 
     def turned(self, path: FloatArray, approach: FloatArray, most: float, may: BoolArray | None = None) -> FloatArray:
         """The approaches (K, 3), turned where the stem would touch the body, as little and as evenly as will do.
@@ -124,6 +145,11 @@ class Carrier:
         stuck = ~np.isfinite(cost).any(axis=1)
         cost[stuck | ~offends, 0] = 0.0
         return np.asarray(choices[np.arange(len(path)), _course(cost, choices)])
+
+    @cached_property
+    def room(self) -> Room | None:
+        """What is known beforehand of how far places are from the body."""
+        return room_about(self.base)
 
     @cached_property
     def lattice(self) -> FloatArray:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mapping import BoolArray, FloatArray
-from planners.paths.carrier import FREE_SINKING, Carrier
+from planners.paths.carrier import Carrier
 
 # In tip radii: room beyond the hull that a place in the open has, and how far places on a way out lie apart
 HULL_ROOM, LEAVING_SPACING = 1.1, 0.25
@@ -40,6 +40,10 @@ class Detour:
     carrier: Carrier
     low: FloatArray
     high: FloatArray
+
+    def make_ready(self) -> None:
+        """Make the roadmap in the open before the finger waits for it."""
+        _ = self._graph
 
     def between(self, start: Poses, stop: Poses) -> Poses | None:
         """Poses from one (1, 3) to another (1, 3); None if one of them has no straight way out."""
@@ -101,11 +105,8 @@ class Detour:
         """(W,) True where the ball, or the stem behind it, is free all along the ways' places (W, S, 3)."""
         which, _ = np.nonzero(on_way)
         places = centers[on_way]
-        if approach is None:
-            radius = self.carrier.tip_radius
-            free = self.carrier.base.foot(places, radius).height >= -FREE_SINKING * radius
-        else:
-            free = self.carrier.is_free(places, approach[which])
+        carrier = self.carrier
+        free = carrier.ball_is_free(places) if approach is None else carrier.is_free(places, approach[which])
         return np.asarray(np.bincount(which[~free], minlength=len(centers)) == 0)
 
     def _can_turn(self, place: FloatArray, approach: FloatArray, wanted: FloatArray) -> BoolArray:
@@ -159,8 +160,12 @@ class Detour:
 
     def _open(self, places: FloatArray) -> BoolArray:
         """(K,) True where a place lies beyond one of the hull's planes by enough."""
+        return self._beyond(places) >= HULL_ROOM * self.carrier.tip_radius
+
+    def _beyond(self, places: FloatArray) -> FloatArray:
+        """(K,) how far a place lies beyond the hull's planes, the farthest one counting, m."""
         normals, offsets = self._planes
-        return np.asarray((places @ normals.T + offsets).max(axis=1) >= HULL_ROOM * self.carrier.tip_radius)
+        return np.asarray((places @ normals.T + offsets).max(axis=1))
 
     def _distance_out(self, place: FloatArray, ways: FloatArray) -> FloatArray:
         """(W,) how far it is into the open along each way (W, 3), m; infinite along those that lead nowhere."""
@@ -193,12 +198,16 @@ class Detour:
         spacing = max(OPEN_SPACING * radius, float((high - low).max()) / MOST_OPEN_NODES)
         axes = [np.linspace(a, b, max(2, 1 + int(np.ceil((b - a) / spacing)))) for a, b in zip(low, high, strict=True)]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        nodes = grid[self._open(grid)]
+        beyond, open_from = self._beyond(grid), HULL_ROOM * radius
+        nodes, beyond = grid[beyond >= open_from], beyond[beyond >= open_from]
         widest = np.sqrt(3.0) * max(float(axis[1] - axis[0]) for axis in axes)
         pairs = cKDTree(nodes).query_pairs(1.01 * widest, output_type="ndarray")
-        middles = 0.5 * (nodes[pairs[:, 0]] + nodes[pairs[:, 1]])
-        pairs = pairs[self._open(middles)]
         lengths = np.linalg.norm(nodes[pairs[:, 0]] - nodes[pairs[:, 1]], axis=1)
+        # a middle lies beyond by no less than an end does, but for the half way between them: few need be asked
+        is_open = beyond[pairs].max(axis=1) - 0.5 * lengths >= open_from
+        ask = np.flatnonzero(~is_open)
+        is_open[ask] = self._open(0.5 * (nodes[pairs[ask, 0]] + nodes[pairs[ask, 1]]))
+        pairs, lengths = pairs[is_open], lengths[is_open]
         return nodes, coo_matrix((lengths, (pairs[:, 0], pairs[:, 1])), shape=(len(nodes), len(nodes))).tocsr()
 
 

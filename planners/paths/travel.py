@@ -16,6 +16,7 @@ from mapping.detection import face_samples
 from planners import Outcome, Parted, Plan, Refused
 from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
 from planners.paths.detour import Detour
+from planners.paths.room import room_about
 from planners.paths.sound import BACK_OFF_DISTANCE, DETAIL_ROOM, can_be_left, resampled, sound_parts
 
 # Places of a way lie at most so far apart where it is looked whether it is free, in tip radii
@@ -164,15 +165,18 @@ class Ways:
     speed: float
 
     def make_ready(self) -> None:
-        """Make the roadmap before the finger waits for it, for a body that is to be felt from more than one side."""
+        """Make the roadmaps before the finger waits for them, for a body that is to be felt from more than one side."""
         areas = self.base.surface.face_areas
         if np.linalg.norm(areas @ self.base.surface.face_normals) < ONE_SIDED * areas.sum():
             _ = self._graph
+            if (room := room_about(self.base)) is not None:
+                room.bounds(np.zeros((1, 3)))  # compiled, too
+            for detour in (self._detour, self._bare_detour):
+                detour.make_ready()
 
     def free(self, path: FloatArray, room: float = 0.0) -> bool:
         """True if a ball on the polyline (K, 3) stays out of the body, so far off it as `room` (m) says."""
-        lowest = self.base.foot(dense(path, FREE_SPACING * self.tip_radius), self.tip_radius).height.min()
-        return bool(lowest >= (room or -FREE_SINKING * self.tip_radius))
+        return bool(self.carrier.ball_is_free(dense(path, FREE_SPACING * self.tip_radius), room or None).all())
 
     @cached_property
     def carrier(self) -> Carrier:

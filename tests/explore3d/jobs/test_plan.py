@@ -17,6 +17,7 @@ from explore3d.jobs.plan import DryRun, plan_scene
 from explore3d.jobs.run import run, scene_finger
 from explore3d.scene.scene import parse_scene
 from hw.simulated import SimulatedFinger
+from mapping.detection import narrowest_groove
 
 WIRE = Path(__file__).resolve().parents[3] / "assets" / "scenes" / "wire_on_plate.toml"
 TEXT = WIRE.read_text()
@@ -228,6 +229,22 @@ def test_a_scene_that_names_no_speed_sweeps_as_fast_as_it_may() -> None:
     silent = unsaid.replace('white = "0.2 mm"', "").replace('correlated = "0.02 mm"', "")
     assert parse_scene(silent, WIRE).sweep_speed == 0.03
     assert parse_scene(silent.replace('"10 mm"', '"1 mm"', 1), WIRE).sweep_speed == pytest.approx(0.025)
+
+
+def test_a_groove_is_asked_for_by_its_width() -> None:
+    """The ball sinks b^2 / (8 r) = 34 um into 0.9 mm: as hard to see as a crest of two thirds of that."""
+    text = TEXT.replace('radius = "10 mm"', 'radius = "3 mm"').replace('speed = "30 mm/s"', "")
+    text = text.replace('rate = "5 kHz"', 'rate = "1 kHz"').replace('white = "0.2 mm"', 'white = "0.01 mm"')
+    text = text.replace('correlated = "0.02 mm"', 'correlated = "0.001 mm"')
+    crest, groove = 'smallest_feature = "0.3 mm"', 'narrowest_groove = "0.9 mm"'
+    assert crest in text
+    coarse, fine = (parse_scene(text.replace(crest, each), WIRE) for each in (crest, groove))
+    both = parse_scene(text.replace(crest, f"{crest}\n{groove}"), WIRE)
+    assert fine.smallest == both.smallest == pytest.approx(0.66 * 0.9e-3**2 / (8 * 3e-3), rel=0.02)
+    assert fine.sweep_speed == both.sweep_speed < 0.5 * coarse.sweep_speed
+    assert fine.expected_limit is not None and narrowest_groove(fine.expected_limit, 3e-3) < 0.9e-3
+    with pytest.raises(SceneError, match=r"survey\.smallest_feature, survey\.narrowest_groove, or both"):
+        parse_scene(text.replace(crest, ""), WIRE)
 
 
 def test_a_fastest_speed_that_cannot_be_known_is_refused() -> None:

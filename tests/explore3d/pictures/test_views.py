@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from explore3d.pictures.camera import Camera
-from explore3d.pictures.object import MOST_VIEWS, VIEW_HEIGHTS, object_picture, view_directions
+from explore3d.pictures.object import (
+    LABEL_HEIGHT,
+    MOST_VIEWS,
+    VIEW_HEIGHTS,
+    Label,
+    object_picture,
+    placed,
+    view_directions,
+)
 from explore3d.pictures.render import Body, render
 from explore3d.pictures.sweep_paths import SweepPath, over_features
 from explore3d.scene import examples, load_scene
@@ -48,7 +56,31 @@ def test_a_line_that_one_view_can_show_does_not_end_at_a_bodys_rim() -> None:
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     (ridge,) = (each for each in model.features if each.kind == "ridge")  # 80 mm round a mug of 40 mm radius
     facing = directions @ ridge.normals.T
-    assert len(directions) == 2 and facing.min(axis=1).max() > 0.2
+    assert len(directions) <= 3 and facing.min(axis=1).max() > 0.2
+
+
+def test_a_spot_at_the_rim_of_every_view_gets_one_that_faces_it() -> None:
+    """A bump 70 degrees round a cylinder from a ridge, and one opposite: two views show it at a slant only."""
+    model = model_of("mug")
+    directions = np.array(view_directions(ROUND_BODY, model.features, model.base.surface))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    for bump in (each for each in model.features if each.kind == "bump"):
+        assert (directions @ bump.normals[0]).max() > 0.5  # from so far above as the views are, 0.9 at most
+
+
+def test_labels_stand_on_nothing_that_was_found_and_on_no_other_label() -> None:
+    lines = np.column_stack([np.linspace(100.0, 300.0, 81), np.full(81, 150.0)])
+    labels: list[Label] = []
+    for x in (120.0, 150.0, 200.0, 210.0):
+        labels.append(placed(np.array([x, 150.0]), 110.0, lines, labels, (400.0, 300.0)))
+    assert all(each.covers(lines, 2.0) == 0 for each in labels)
+    for one in labels:
+        for other in (each for each in labels if each is not one):
+            apart = abs(one.top - other.top) >= LABEL_HEIGHT
+            assert apart or abs(one.left - other.left) >= one.wide
+    # at the edge of the picture it stays inside
+    edge = placed(np.array([390.0, 20.0]), 110.0, lines, [], (400.0, 300.0))
+    assert edge.left + 110.0 <= 398.0 and edge.top >= 2.0
 
 
 def test_a_picture_knows_the_normals_of_what_its_pixels_see() -> None:

@@ -75,6 +75,16 @@ def test_what_the_sweeps_do_not_decide_is_said_first() -> None:
     assert [number_text(each, "ridge") for each in numbers] == ["2 to 4 ridges", "1 ridge", "0 or 1 ridge"]
 
 
+def test_from_which_width_on_a_groove_is_seen_is_told_beside_the_limit_of_crests() -> None:
+    told = next(line for line in summary(analysis()) if line.startswith("A sharp crest 0.12 mm high"))
+    # 0.18 mm under a tip of 10 mm: 2 sqrt(0.18 * (20 - 0.18))
+    assert told.endswith(
+        "So is a groove 3.8 mm wide or wider, if it is at least as deep as the 0.18 mm that this ball sinks into it."
+    )
+    coarse = next(line for line in summary(analysis(limit=8e-3)) if line.startswith("A sharp crest 8 mm high"))
+    assert coarse.endswith("No groove that is narrower than the ball is seen so.")
+
+
 def test_a_refuted_tip_is_told_once_and_before_anything_else() -> None:
     found = analysis(feature("bump-1", True, Interval(0.0, 0.0, 0.0)))
     found.refuted_tip = RefutedTip(told=2e-3, largest=3.1e-6, places=17, chance=1e-20)
@@ -91,9 +101,9 @@ def test_a_refuted_tip_is_told_once_and_before_anything_else() -> None:
 
 def test_what_would_have_been_seen_is_said_with_every_result() -> None:
     seen = "A sharp crest 0.12 mm high or higher is seen with 95 % probability where a sweep crosses it."
-    assert summary(analysis())[-1] == seen
+    assert summary(analysis())[-1].startswith(f"{seen} So is a groove")
     found = analysis(feature("bump-1", True, Interval(0.0, 0.0, 0.0)))
-    assert summary(found)[-1] == seen
+    assert summary(found)[-1] == summary(analysis())[-1]
     assert summary(analysis(limit=inf))[-1] == (
         "The trace is too short, or its samples too far apart, to say what would have been seen."
     )
@@ -102,17 +112,17 @@ def test_what_would_have_been_seen_is_said_with_every_result() -> None:
 def test_on_a_detail_as_wide_as_no_fine_one_nothing_is_promised() -> None:
     wide, fine = (feature(name, True, Interval(0.0, 0.0, 0.0)) for name in ("bump-1", "bump-2"))
     wide.width, fine.width = Interval(90e-3, 85e-3, 95e-3), Interval(79e-3, 78e-3, 81e-3)
-    assert summary(analysis(wide, fine))[-1].endswith("where a sweep crosses it, but not on bump-1, wider than 80 mm.")
+    assert "where a sweep crosses it, but not on bump-1, wider than 80 mm. So" in summary(analysis(wide, fine))[-1]
     several = [feature(f"pit-{k}", True, Interval(0.0, 0.0, 0.0)) for k in range(6)]
     for each in several:
         each.width = wide.width
-    assert summary(analysis(*several))[-1].endswith("but not on 6 features, wider than 80 mm.")
+    assert summary(analysis(*several))[-1].count("but not on 6 features, wider than 80 mm. So")
 
 
 def test_no_sentence_speaks_of_a_surface_that_was_not_swept() -> None:
     first, last = summary(analysis(untouched=0.79))
     assert first == "no features found on the 21 % of the surface that was swept"
-    assert last.endswith("where a sweep crosses it on the 21 % of the surface that was swept.")
+    assert "where a sweep crosses it on the 21 % of the surface that was swept. So" in last
 
 
 def test_each_feature_has_a_line_with_its_intervals() -> None:

@@ -45,6 +45,24 @@ def test_a_row_beside_a_bump_that_runs_out_felt_its_flank() -> None:
     assert len(dropped_crossings([replace(flank, height=-2e-5)], [wide], 10e-3)) == 1
 
 
+def test_a_ball_in_the_corner_before_a_ridges_end_stands_on_that_end_though_its_foot_is_on_the_wall() -> None:
+    """A wall at x = 0, and on the floor a half-buried wire of 0.3 mm that ends 3.44 mm from it; the ball has 3 mm."""
+    tip, radius, end, off = 3e-3, 3e-4, 3.44e-3, 1.5e-4
+    height, length = Interval(radius, radius, radius), Interval(2e-2, 2e-2, 2e-2)
+    axis = np.array([[end, 0.0, 0.0], [end + 2e-2, 0.0, 0.0]])
+    up, evidence = np.tile([0.0, 0.0, 1.0], (2, 1)), Support(50.0, 9, log_odds=50.0)
+    details = Details(radius=radius)
+    wire = Feature("ridge", axis, up, height, height, length, evidence, True, 1e-5, details=details)
+    # so high the ball stands over the floor that it touches the wire's end, off the wall
+    high = np.sqrt((tip + radius) ** 2 - (end - tip - off) ** 2)
+    wall = replace(crossing(0.0), normal=np.array([1.0, 0.0, 0.0]), height=off)
+    before, beside = (replace(wall, point=np.array([0.0, y, high])) for y in (0.0, 2e-3))
+    assert np.linalg.norm(before.point - axis[0]) > 4e-3  # farther than anything of it reaches on the floor
+    assert dropped_crossings([before], [wire], tip) == ()
+    # 2 mm beside it the ball is 0.5 mm off the wire: something else lifted it
+    assert [each.point[1] for each in dropped_crossings([before, beside], [wire], tip)] == [2e-3]
+
+
 def test_a_feature_that_hardly_anything_speaks_for_is_kept_with_its_odds() -> None:
     (dropped,) = dropped_features([bump(0.0, 0.3), replace(bump(1.0, 0.0), evidence=Support(3.0, 1))])
     assert isinstance(dropped, Dropped) and dropped.log_odds == 0.3 and "log odds 0.3" in dropped.reason

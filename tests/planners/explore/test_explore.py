@@ -371,5 +371,5 @@ def test_a_survey_is_worked_out_as_it_goes_and_knows_how_long_it_is():
         planned.append(surveyor.count.planned)
         surveyor.count.made += 1
     assert moves == [0, 1, 2, 3, 5, 50, 6, 7, 8] and surveyor.count.planned == surveyor.count.made == 9
-    assert known == [3, 6, 9, *[10] * 6]
-    assert planned == [10, 10, 10, *[9] * 6]
+    assert known == [1, 2, 3, 4, 6, 6, 7, 8, 9]  # no line before its time
+    assert planned == [10] * 9  # one line more gives none, one line fewer is in two parts
