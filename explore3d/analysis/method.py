@@ -80,7 +80,7 @@ MOST_STANDING = 5
 NOT_IN_QUICK = "quick results were asked for: existence, places and sizes"
 
 # Rounds in which crests and the play of the axes settle: the first finds crests that the play has moved. A simulated
-# play as large as the noise is found to 0.86 of it by the first and to 0.97 by the last, two or three in all; one twice
+# play as large as the noise is found to 0.86 of it by the first and to 0.97 by the last, two to four in all; one twice
 # as large to 1.0 at once.
 PLAY_ROUNDS = 5
 
