@@ -33,8 +33,12 @@ NOT_WHITE, LEAST_START_GAIN = 2.0, 2.0
 LEAST_TERM_GAIN = 12.0
 # Probability with which the largest of a spectrum's peaks is so high in white noise.
 CHANCE_LINE = 1e-3
-# Blocks in the shortest wave that is looked for: shorter ones may be the echo of one between two samples.
-SHORTEST_TONE = 4.0
+# Blocks in the shortest wave that is looked for: shorter ones may be the echo of one between two samples. A beam that
+# rings at 60 Hz (quality 15, as much as there is white noise) has 3.3 under a tip of 3 mm. As a process it put the
+# limit to 3.45 levels, at which 88 % of 180 crests were found; as a tone to 2.14, with 95 %, and 0.8 false candidates a
+# metre of 1 asked. At 2.2 hums of 50 Hz, of even size, that have 2.4 under a tip of 5 mm are told as well: of 90
+# crests of the limit 82 were found, for all.
+SHORTEST_TONE = 3.0
 # Factor between the lengths that a new term is tried with, and levels over that of a block's mean.
 LENGTH_LADDER, LEVEL_LADDER = 3.0, (0.1, 0.3, 1.0)
 # Fewest sums of innovations that tell anything.

@@ -7,6 +7,7 @@ from mapping.doorway import doorway
 if TYPE_CHECKING:
     from mapping.detection.path.backlash import (
         Backlash as Backlash,
+        Lag as Lag,
         backlash as backlash,
         with_doubt as with_doubt,
         without_backlash as without_backlash,
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from mapping.detection.path.sparse_samples import SparseSamples as SparseSamples, sparse_samples as sparse_samples
 
 _PUBLIC = {
-    "backlash": ("Backlash", "backlash", "with_doubt", "without_backlash"),
+    "backlash": ("Backlash", "Lag", "backlash", "with_doubt", "without_backlash"),
     "ledger": ("PathLedger", "path_ledger"),
     "sound_sweeps": ("SoundSweeps", "sound_sweeps"),
     "sparse_samples": ("SparseSamples", "sparse_samples"),

@@ -3,9 +3,10 @@
 The centre that is recorded hangs behind the true one by up to half the play of each axis: on the way up a crest it is
 too low, on the way down too high, and along a sweep every place lies too far back. The heights over all crossings tell
 the play: beside the crest that fits best, with its place and its width free, they go up later and come down later, and
-stay where the axis was left. Its size is one number, and what is known of it is the likelihood of all crossings. Crests
-that are steeper on one side, or of another section, are so in proportion to their heights and end where they end: a
-section that all crossings have in common is marginalised.
+stay where the axis was left. Of each play that is tried the crests are fitted anew: what is seen of them lies too late
+and too low, and a path over those is turned too late. Its size is one number, and what is known of it is the likelihood
+of all crossings. Crests that are steeper on one side, or of another section, are so in proportion to their heights and
+end where they end: a section that all crossings have in common is marginalised.
 
 What the play does along the sweeps is not felt on level ground: there the axes are taken to be alike, and places carry
 a doubt as large. Where the crossings do not decide whether there is a play, heights and places carry what it would do
@@ -17,7 +18,7 @@ Reference: theory section 6.10.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,11 @@ KNOT_STEP, KNOT_REACH, SECTION_SDS = 0.125, 1.5, (0.0, 0.01, 0.03, 0.1, 0.3)
 WINDOW_HALF_WIDTHS, WINDOW_BINS = 8.0, 160
 # Of a crossing free are height, place and width of its crest, and offset and slope of the base
 WINDOW_FREEDOM = 5
+# The crest that fits best beside a play is sought in so many steps of least squares with the slopes of the one that was
+# found, on from that of the play before, as far as this share of its sizes. A play of one standard deviation of the
+# noise (20 recordings of some 24 crossings) is 0.86 in the mean by that, by six steps the same to 0.002, and 0.69 by
+# crests as they were found
+CREST_STEPS, MOST_CREST_CHANGE = 2, 0.5
 # Crossings that are asked: two hundred of 160 bins tell half a play of 1 / sqrt(200 * 160) = 0.006 standard deviations
 # of a sample, less than the least that is tried
 MOST_WINDOWS = 200
@@ -61,12 +67,14 @@ class Backlash:
         sd: standard deviation of it, m.
         gain: logarithm of how much more probable it is than none.
         one_way: whether all sweeps go one way: then no sweep tells what it does along them.
+        lag: what it does to the samples.
     """
 
     play: float
     sd: float
     gain: float
     one_way: bool
+    lag: Lag
 
     @property
     def told(self) -> bool:
@@ -105,7 +113,8 @@ class Backlash:
     def record(self) -> dict[str, Any]:
         """JSON values, SI units."""
         certain = {"taken_off": self.told, "probability": self.probability}
-        return asdict(self) | certain | {"sentence": self.sentence()}
+        values = {"play": self.play, "sd": self.sd, "gain": self.gain, "one_way": self.one_way}
+        return values | certain | {"sentence": self.sentence()}
 
     def sentence(self) -> str:
         """What was found and done, for people."""
@@ -124,28 +133,37 @@ class Backlash:
         ).removesuffix(".")
 
 
-def backlash(laid: LaidTrace, found: Detections, taken: float = 0.0) -> Backlash | None:
+def backlash(laid: LaidTrace, found: Detections, taken: Backlash | None = None) -> Backlash | None:
     """The play of the axes, by all crossings together; None if they hardly speak for one.
 
     Args:
         laid: the trace that was searched.
         found: in it.
-        taken: play that was taken off it already, m.
+        taken: what was taken off it already.
     """
-    sd = found.noise.sd
-    profiles = _profiles(laid, found.crossings)
-    windows = [window for profile in profiles for window in _windows(profile, found.noise)]
-    windows = windows[:: 1 + len(windows) // MOST_WINDOWS]
+    sd, least, lag = found.noise.sd, 0.0, None
+    if taken is not None:
+        least, lag = taken.play, taken.lag
+    # where a play was taken off, what is no higher than it may be what was taken off too much or too little
+    profiles = list(_profiles(laid, [c for c in found.crossings if abs(c.height) > least]))
+    crests = sum(len(profile.crests) for profile in profiles)
+    asked = [profile for profile in profiles if len(profile.crests)]
+    asked = asked[:: 1 + crests // MOST_WINDOWS]
+    windows = [window for profile in asked for window in profile.opened(found.noise, lag)]
     if not windows or not sd > 0.0:
         return None
+    # the path is reckoned with crests as they were recorded: higher than the play, or the axis would not have moved
     halves = sd * HALF_PLAYS
-    section = _Section(windows, halves, 0.5 * taken)
+    possible = halves <= 0.5 * float(np.median([abs(window.height) for window in windows]))
+    if not possible.any():
+        return None
+    seen = [shapes for profile in asked for shapes in profile.seen([0.0, *halves[possible]])]
+    section = _Section(windows, seen)
     # what no play explains, as where two crests lie side by side, speaks for none: all is as unsure as it is off
     misfit = section.misfit()
-    log = section.gains() / misfit
-    # the path is reckoned with crests as they were recorded: higher than the play, or the axis would not have moved
-    log[halves > 0.5 * float(np.median([abs(window.height) for window in windows]))] = -np.inf
-    gain = _evidence(log) - max(0.0, _evidence_of_each(section.gains_of_each() / misfit))
+    log = np.full(len(halves), -np.inf)
+    log[possible] = section.gains() / misfit
+    gain = _evidence(log) - max(0.0, _evidence_of_each(section.gains_of_each() / misfit, len(halves)))
     if gain < np.log(LIKELY_PLAY) + WORTH_MENTIONING:
         return None
     weight = np.exp(log - log.max())
@@ -156,26 +174,17 @@ def backlash(laid: LaidTrace, found: Detections, taken: float = 0.0) -> Backlash
     spread = float(np.sqrt(weight @ (halves - half) ** 2 + step**2 / 12.0))
     ways = np.array([_way(sweep.trace) for sweep in laid.laid_sweeps if len(sweep.trace) > 1])
     one_way = bool((ways @ ways[0] > 0.0).all())
-    return Backlash(2.0 * half, 2.0 * spread, gain, one_way)
+    return Backlash(2.0 * half, 2.0 * spread, gain, one_way, _lag(profiles, half))
 
 
-def without_backlash(trace: Trace, laid: LaidTrace, found: Detections, play: float) -> Trace:
+def without_backlash(trace: Trace, play: Backlash) -> Trace:
     """A trace without what its axes hang behind, by the path under the crests that were found.
 
     Args:
         trace: the samples (N) to correct; of the same recording as what was searched, under any sweep numbers.
-        laid, found: as given to `backlash`.
-        play: of each axis, m.
+        play: of its axes.
     """
-    from mapping.detection.path.backlash_kernels import hang_behind
-
-    when, behind = [np.zeros(0)], [np.zeros((0, 3))]
-    for profile in _profiles(laid, found.crossings):
-        when.append(profile.heights.t)
-        behind.append(hang_behind(profile.path, 0.5 * play))
-    t, off = np.concatenate(when), np.concatenate(behind)
-    order = np.argsort(t, kind="stable")
-    lag = np.column_stack([np.interp(trace.t, t[order], off[order, k]) for k in range(3)])
+    lag = play.lag.at(trace.t)
     contacts = None if trace.contacts is None else trace.contacts - lag
     return Trace(
         trace.t,
@@ -204,11 +213,12 @@ def _evidence(log: FloatArray) -> float:
     return top + float(np.log(np.exp(log - top).mean())) + float(np.log(LIKELY_PLAY))
 
 
-def _evidence_of_each(log: FloatArray) -> float:
-    """The same if every crossing (K) hangs behind by an amount of its own (K, H), or by none: no machine does that."""
-    top = np.maximum(log.max(axis=1), 0.0)
-    own = LIKELY_PLAY * np.exp(log - top[:, None]).mean(axis=1) + (1.0 - LIKELY_PLAY) * np.exp(-top)
-    return float((top + np.log(own)).sum())
+def _evidence_of_each(log: FloatArray, tried: int) -> float:
+    """The same if every crossing (W) hangs behind by an amount of its own, by these gains (W, H) of those that are
+    possible of so many, or by none: no machine does that."""
+    top = np.maximum(log.max(axis=1, initial=0.0), 0.0)
+    own = LIKELY_PLAY * np.exp(log - top[:, None]).sum(axis=1) / tried + (1.0 - LIKELY_PLAY) * np.exp(-top)
+    return float(np.sum(top + np.log(own)))
 
 
 def _way(trace: Trace) -> FloatArray:
@@ -216,27 +226,94 @@ def _way(trace: Trace) -> FloatArray:
     return np.asarray(way / max(float(np.linalg.norm(way)), float(np.finfo(float).tiny)))
 
 
+@dataclass(frozen=True, eq=False)
+class Lag:
+    """By how much the axes were off where the ball was.
+
+    Args:
+        t: (N,) times, ascending, s.
+        behind: (N, 3) m.
+    """
+
+    t: FloatArray
+    behind: FloatArray
+
+    def at(self, t: FloatArray) -> FloatArray:
+        """(M, 3) at times (M,)."""
+        return np.column_stack([np.interp(t, self.t, self.behind[:, k]) for k in range(3)])
+
+
+def _lag(profiles: Sequence[_Profile], half: float) -> Lag:
+    t = np.concatenate([profile.heights.t for profile in profiles])
+    behind = np.concatenate([profile.behind(half, profile.fitted(half, profile.crests)) for profile in profiles])
+    order = np.argsort(t, kind="stable")
+    return Lag(t[order], behind[order])
+
+
 class _Profile:
     """A profile that was searched, the finest one, with what was found in it.
 
     Args:
         heights: of its bins (n).
-        own: its crests and dips.
-        path: (n, 3) where the ball's centre goes over the base and these, without noise, m.
-        normals: (n, 3) of the base under it.
+        own: its crests and dips (K).
+        sweep: that it is of.
     """
 
     def __init__(self, heights: SweepHeights, own: Sequence[Crossing], sweep: LaidSweep) -> None:
-        self.heights, self.own, self.s = heights, own, heights.s
-        self.places = [float(np.interp(c.t, heights.t, self.s)) for c in own]
+        self.heights, self.s = heights, heights.s
         feet = sweep.feet((heights.first[:-1] + heights.first[1:] - 1) // 2)
         self.normals = np.asarray(feet.normals)
-        self.path = np.asarray(feet.points + (sweep.trace.tip_radius + self.caps())[:, None] * feet.normals)
+        self._level = feet.points + sweep.trace.tip_radius * feet.normals
+        crests = [(c.height, float(np.interp(c.t, heights.t, self.s)), c.half_width) for c in own]
+        # (K, 3) height, place and half-width of each, m
+        self.crests = np.array(crests).reshape(-1, 3)
+        self.windows: dict[int, _Window] = {}
 
-    def caps(self) -> FloatArray:
-        """(n,) heights of all that was found, m."""
-        pairs = zip(self.own, self.places, strict=True)
-        return sum((_cap(self.s, place, c) for c, place in pairs), np.zeros(len(self.s)))
+    def opened(self, noise: Noise, taken: Lag | None) -> Iterator[_Window]:
+        """A window about each crest that has enough about it."""
+        raw = self.heights.height - self._caps(self.crests)
+        if taken is not None:
+            raw = raw + np.einsum("ij,ij->i", taken.at(self.heights.t), self.normals)
+        for which in range(len(self.crests)):
+            window = _window(self, which, raw, noise)
+            if window is not None:
+                self.windows[which] = window
+                yield window
+
+    def _caps(self, crests: FloatArray) -> FloatArray:
+        """(n,) heights of crests (K, 3), m."""
+        height, place, half_width = crests.T[:, :, None]
+        return np.asarray((height * np.maximum(1.0 - ((self.s - place) / half_width) ** 2, 0.0)).sum(axis=0))
+
+    def behind(self, half: float, crests: FloatArray) -> FloatArray:
+        """(n, 3) by how much axes with half a play are off where the ball runs over such crests (K, 3), m."""
+        from mapping.detection.path.backlash_kernels import hang_behind
+
+        path = self._level + self._caps(crests)[:, None] * self.normals
+        return np.asarray(hang_behind(path, half))
+
+    def _shape(self, half: float, crests: FloatArray) -> FloatArray:
+        """(n,) what of the heights is not the crests that were found, with half a play and such crests (K, 3), m."""
+        lowered = np.einsum("ij,ij->i", self.behind(half, crests), self.normals)
+        return np.asarray(lowered + self._caps(crests) - self._caps(self.crests))
+
+    def fitted(self, half: float, crests: FloatArray) -> FloatArray:
+        """(K, 3) the crests that fit best beside half a play, from such ones on: what the play does to the heights
+        depends on where they turn, and where they seem to turn on what the play does."""
+        for _ in range(CREST_STEPS if self.windows else 0):
+            shape, crests = self._shape(half, crests), crests.copy()
+            for which, window in self.windows.items():
+                crests[which] = window.nearer(crests[which], shape)
+        return crests
+
+    def seen(self, halves: Sequence[float]) -> list[FloatArray]:
+        """What each half play, ascending, makes of the heights in each window, beside crests that fit it best: (H, n)
+        of each, whitened."""
+        shapes, crests = [], self.crests
+        for half in halves:
+            crests = self.fitted(half, crests)
+            shapes.append(self._shape(half, crests))
+        return [np.array([window.seen(shape) for shape in shapes]) for window in self.windows.values()]
 
 
 def _profiles(laid: LaidTrace, crossings: Sequence[Crossing]) -> Iterator[_Profile]:
@@ -247,20 +324,15 @@ def _profiles(laid: LaidTrace, crossings: Sequence[Crossing]) -> Iterator[_Profi
                 yield _Profile(heights, [c for c in own if heights.t[0] <= c.t <= heights.t[-1]], sweep)
 
 
-def _cap(s: FloatArray, place: float, crossing: Crossing) -> FloatArray:
-    u = (s - place) / crossing.half_width
-    return np.asarray(crossing.height * np.maximum(1.0 - u**2, 0.0))
-
-
 class _Window:
     """A crossing and what lies beside it.
 
     Args:
         root: (n, n) whitens its noise and projects out its crest and the base's offset and slope.
-        values: (n,) heights beside all crests, whitened.
-        height: of its crest, m.
+        step: (3, n) by how much heights move height, place and half-width of its crest.
+        left: (n,) heights beside all crests, with all of the play, m.
+        crest: (3,) that was found: height, place and half-width, m.
         u: (n,) places in half-widths.
-        path, normals: (N, 3) of the whole profile.
         inside: the window's bins among the profile's.
         merge: bins of the profile in one of the window.
     """
@@ -268,25 +340,38 @@ class _Window:
     def __init__(
         self,
         root: FloatArray,
-        values: FloatArray,
-        crossing: Crossing,
+        step: FloatArray,
+        left: FloatArray,
+        crest: FloatArray,
         u: FloatArray,
-        lifted: _Lifted,
         inside: slice,
         merge: int,
     ) -> None:
-        self.root, self.values, self.height, self.u = root, values, crossing.height, u
-        self.lifted, self.inside, self.merge = lifted, inside, merge
+        self.root, self.values, self._step, self._left = root, root @ left, step, left
+        self._crest, self._u, self._inside, self._merge = crest, u, inside, merge
+
+    @property
+    def height(self) -> float:
+        """Of its crest, m."""
+        return float(self._crest[0])
 
     def section(self) -> FloatArray:
         """(n, K) the height at its knots, whitened."""
         knots = np.arange(-KNOT_REACH, KNOT_REACH + 0.5 * KNOT_STEP, KNOT_STEP)
-        hats = np.maximum(1.0 - np.abs(self.u[:, None] - knots) / KNOT_STEP, 0.0)
+        hats = np.maximum(1.0 - np.abs(self._u[:, None] - knots) / KNOT_STEP, 0.0)
         return np.asarray(self.root @ (self.height * hats))
 
-    def seen(self, half: float) -> FloatArray:
-        """(n,) what a half play makes of the heights, whitened."""
-        return np.asarray(self.root @ _merged(self.lifted.by(half)[self.inside], self.merge))
+    def seen(self, shape: FloatArray) -> FloatArray:
+        """(n,) of heights of the profile, whitened."""
+        return np.asarray(self.root @ _merged(shape[self._inside], self._merge))
+
+    def nearer(self, crest: FloatArray, shape: FloatArray) -> FloatArray:
+        """(3,) a crest that fits better than one beside which the heights of the profile are these."""
+        better = crest + self._step @ (self._left - _merged(shape[self._inside], self._merge))
+        height, _, half_width = self._crest
+        # as far as the crest that was found tells anything of it
+        far = MOST_CREST_CHANGE * np.array([abs(height), half_width, half_width])
+        return np.asarray(np.clip(better, self._crest - far, self._crest + far))
 
 
 class _Section:
@@ -294,19 +379,20 @@ class _Section:
 
     Args:
         windows: the crossings (W).
-        halves: (H,) half plays that are tried, m.
-        taken: half of a play that was taken off their heights already, m.
+        seen: what is made of their heights (H, n) by no play and by each that is tried.
     """
 
-    def __init__(self, windows: Sequence[_Window], halves: FloatArray, taken: float) -> None:
-        self.seen = [np.array([window.seen(half) for half in halves]) for window in windows]
-        self.heights = [window.values + window.seen(taken) for window in windows]
+    def __init__(self, windows: Sequence[_Window], seen: Sequence[FloatArray]) -> None:
+        self._left = [window.values - each for window, each in zip(windows, seen, strict=True)]
         self.columns = [window.section() for window in windows]
         gram = np.sum([each.T @ each for each in self.columns], axis=0)
         unit = np.eye(len(gram))
         # of each standard deviation: covariance of the knots after the heights, and what that costs
         self.after = [sd**2 * np.linalg.inv(unit + sd**2 * gram) for sd in SECTION_SDS]
         self.cost = [-0.5 * float(np.linalg.slogdet(unit + sd**2 * gram)[1]) for sd in SECTION_SDS]
+        # (S, H) log-likelihoods
+        tried = range(len(self._left[0]))
+        self._logs = np.array([[self._log_of([each[k] for each in self._left], sd) for k in tried] for sd in self._sds])
 
     @property
     def _sds(self) -> range:
@@ -314,80 +400,60 @@ class _Section:
         return range(len(SECTION_SDS))
 
     def gains(self) -> FloatArray:
-        """(H,) gain in the log-likelihood for the half plays."""
-        tried = range(len(self.seen[0]))
-        left = ([y - seen[k] for y, seen in zip(self.heights, self.seen, strict=True)] for k in tried)
-        return np.array([self._log(each) for each in left]) - self._log(self.heights)
+        """(H - 1,) gain in the log-likelihood for the half plays."""
+        mean = np.logaddexp.reduce(self._logs, axis=0)
+        return np.asarray(mean[1:] - mean[0])
 
     def misfit(self) -> float:
         """Mean square that the play which fits best leaves over, in variances of the noise; at least 1."""
-        tried = range(len(self.seen[0]))
-        left = [[y - seen[k] for y, seen in zip(self.heights, self.seen, strict=True)] for k in tried]
-        over = [-2.0 * (self._log_of(each, k) - self.cost[k]) for each in (*left, self.heights) for k in self._sds]
-        free = sum(len(y) - WINDOW_FREEDOM for y in self.heights)
-        return max(1.0, min(over) / max(free, 1))
+        over = float((-2.0 * (self._logs - np.array(self.cost)[:, None])).min())
+        free = sum(each.shape[1] - WINDOW_FREEDOM for each in self._left)
+        return float(max(1.0, over / max(free, 1)))
 
     def gains_of_each(self) -> FloatArray:
-        """(W, H) the same of every crossing alone, beside the section that all have without a play."""
-        logs = [self._log_of(self.heights, k) for k in self._sds]
-        common = self.after[int(np.argmax(logs))] @ self._moment(self.heights)
-        each = zip(self.seen, self.heights, self.columns, strict=True)
-        return np.array([seen @ (y - columns @ common) - 0.5 * (seen**2).sum(axis=1) for seen, y, columns in each])
+        """(W, H - 1) the same of every crossing alone, beside the section that all have without a play."""
+        none = [each[0] for each in self._left]
+        common = self.after[int(np.argmax(self._logs[:, 0]))] @ self._moment(none)
+        beside = [left - columns @ common for left, columns in zip(self._left, self.columns, strict=True)]
+        square = np.array([(left**2).sum(axis=1) for left in beside])
+        return np.asarray(0.5 * (square[:, :1] - square[:, 1:]))
 
     def _moment(self, left: Sequence[FloatArray]) -> FloatArray:
         return np.asarray(np.sum([each.T @ y for each, y in zip(self.columns, left, strict=True)], axis=0))
 
-    def _log(self, left: Sequence[FloatArray]) -> float:
-        logs = np.array([self._log_of(left, k) for k in self._sds])
-        return float(logs.max() + np.log(np.exp(logs - logs.max()).mean()))
-
     def _log_of(self, left: Sequence[FloatArray], k: int) -> float:
         moment = self._moment(left)
-        return float(0.5 * moment @ self.after[k] @ moment) + self.cost[k] - 0.5 * sum(float(y @ y) for y in left)
-
-
-class _Lifted:
-    """By how much the heights of a profile are off under any play; each is computed once."""
-
-    def __init__(self, path: FloatArray, normals: FloatArray) -> None:
-        self._path, self._normals = path, normals
-        self._known: dict[float, FloatArray] = {}
-
-    def by(self, half: float) -> FloatArray:
-        """(N,) for a half play, m."""
-        from mapping.detection.path.backlash_kernels import hang_behind
-
-        if half not in self._known:
-            self._known[half] = np.einsum("ij,ij->i", hang_behind(self._path, half), self._normals)
-        return self._known[half]
+        alone = sum(float(y @ y) for y in left)
+        return float(0.5 * (moment @ self.after[k] @ moment - alone) + self.cost[k])
 
 
 def _merged(values: FloatArray, merge: int) -> FloatArray:
     return np.asarray(values[: len(values) // merge * merge].reshape(-1, merge).mean(axis=1))
 
 
-def _windows(profile: _Profile, noise: Noise) -> Iterator[_Window]:
-    s, heights = profile.s, profile.heights
-    lifted, left = _Lifted(profile.path, profile.normals), heights.height - profile.caps()
-    for crossing, place in zip(profile.own, profile.places, strict=True):
-        reach, others = WINDOW_HALF_WIDTHS * crossing.half_width, [at for at in profile.places if at != place]
-        low = max([place - reach, *(0.5 * (at + place) for at in others if at < place)])
-        high = min([place + reach, *(0.5 * (at + place) for at in others if at > place)])
-        first, last = np.searchsorted(s, [low, high])
-        merge = max(1, int(last - first) // WINDOW_BINS)
-        count = int(last - first) // merge
-        if count < 8:
-            continue
-        inside = slice(int(first), int(first) + count * merge)
-        values, x = _merged(left[inside], merge), _merged(s[inside], merge)
-        u = (x - place) / crossing.half_width
-        bump = np.maximum(1.0 - u**2, 0.0)
-        under = (np.abs(u) < 1.0).astype(np.float64)
-        covariances = noise.block_covariances(count, merge * heights.spacing, heights.samples * merge)
-        lags = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
-        root = np.linalg.inv(np.linalg.cholesky(covariances[lags] + 1e-12 * covariances[0] * np.eye(count)))
-        # height, place and width of the crest, and what the base may be off by
-        free = root @ np.column_stack([bump, under * u, under * u**2, np.ones(count), u])
-        basis = np.linalg.qr(free)[0]
-        root = root - basis @ (basis.T @ root)
-        yield _Window(root, root @ values, crossing, u, lifted, inside, merge)
+def _window(profile: _Profile, which: int, left: FloatArray, noise: Noise) -> _Window | None:
+    """The window about a crest of a profile, by heights (N,) beside all crests; None if too little lies about it."""
+    s, crest = profile.s, profile.crests[which]
+    height, place, half_width = crest
+    others = [at for at in profile.crests[:, 1] if at != place]
+    low = max([place - WINDOW_HALF_WIDTHS * half_width, *(0.5 * (at + place) for at in others if at < place)])
+    high = min([place + WINDOW_HALF_WIDTHS * half_width, *(0.5 * (at + place) for at in others if at > place)])
+    first, last = np.searchsorted(s, [low, high])
+    merge = max(1, int(last - first) // WINDOW_BINS)
+    count = int(last - first) // merge
+    if count < 8:
+        return None
+    inside = slice(int(first), int(first) + count * merge)
+    u = (_merged(s[inside], merge) - place) / half_width
+    under = (np.abs(u) < 1.0).astype(np.float64)
+    covariances = noise.block_covariances(count, merge * profile.heights.spacing, profile.heights.samples * merge)
+    lags = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    root = np.linalg.inv(np.linalg.cholesky(covariances[lags] + 1e-12 * covariances[0] * np.eye(count)))
+    # height, place and half-width of the crest, and what the base may be off by
+    slope = 2.0 * height * under / half_width
+    free = np.column_stack([np.maximum(1.0 - u**2, 0.0), slope * u, slope * u**2, np.ones(count), u])
+    basis, triangle = np.linalg.qr(root @ free)
+    if not np.abs(np.diag(triangle)).min() > 1e-12 * np.abs(triangle).max():
+        return None  # a crest between two bins
+    step = np.linalg.solve(triangle, basis.T @ root)[:3]
+    return _Window(root - basis @ (basis.T @ root), step, _merged(left[inside], merge), crest, u, inside, merge)

@@ -28,6 +28,21 @@ def coloured(exponent: float, rng: np.random.Generator) -> tuple[np.ndarray, np.
     return np.fft.irfft(spectrum, count) * count, covariance
 
 
+def test_a_beam_that_rings_with_three_blocks_to_a_wave_is_an_oscillator_and_no_process():
+    from scipy.signal import lfilter
+
+    rng = np.random.default_rng(4)
+    turn = 2 * np.pi / 3.3
+    keep = np.exp(-turn / 30.0)
+    rung = lfilter([1.0], [1.0, -2 * keep * np.cos(turn), keep**2], rng.standard_normal((RUNS, LONG)))
+    noise = fitted(rng.standard_normal(RUNS * LONG) + (rung / rung.std()).ravel())
+    (beam,) = noise.terms
+    assert beam.wavelength == pytest.approx(3.3, rel=1e-2)
+    assert beam.length == pytest.approx(30.0 / turn, rel=0.5)
+    # caps far wider than a wave hardly feel it
+    assert noise.density(np.array([0.1]), 1.0)[0] == pytest.approx(1.0, abs=0.15)
+
+
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 1.5])
 def test_filters_for_the_fitted_law_of_coloured_noise_scatter_as_they_say_and_nearly_as_little_as_can_be(exponent):
     values, covariance = coloured(exponent, np.random.default_rng(1))
