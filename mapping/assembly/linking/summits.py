@@ -16,7 +16,7 @@ from mapping.assembly.linking.inspection import Inspection
 from mapping.geometry.templates import CREST_OUTLIER_SDS, SHAPE_ERROR
 
 # Places of other sweeps that a place is next to: three of the sweep on either side
-NEXT = 6
+NEIGHBOURS_ASIDE = 6
 
 
 def summits(places: IntArray, sign: float, inspection: Inspection) -> list[IntArray]:
@@ -63,7 +63,7 @@ def _next_to(points: FloatArray, sweep: IntArray) -> list[set[int]]:
     for number in np.unique(sweep):
         own, others = np.flatnonzero(sweep == number), np.flatnonzero(sweep != number)
         if len(others):
-            found = cKDTree(points[others]).query(points[own], min(NEXT, len(others)))[1].reshape(len(own), -1)
+            found = cKDTree(points[others]).query(points[own], min(NEIGHBOURS_ASIDE, len(others)))[1].reshape(len(own), -1)
             pairs += [(int(i), int(others[j])) for i, row in zip(own, found, strict=True) for j in row]
     for i, j in pairs:
         near[i].add(j)
