@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -40,7 +39,7 @@ def details_of(members: list[Crossing], around: Around) -> list[Feature]:
     if not members:
         return []
     whole, parted = _undivided(members, around), _of_summits(members, around)
-    return min((whole, parted), key=partial(_unexplained, members, around)) if parted else whole
+    return parted if parted and _explain_better(parted, whole, members, around) else whole
 
 
 def made_of(crossing: Crossing) -> str:
@@ -94,16 +93,30 @@ def _with_top(own: list[Crossing], members: list[Crossing], top: int, inspection
     return [moved, *(c for c in own if c is not nearest)]
 
 
-def _unexplained(members: list[Crossing], around: Around, details: Sequence[Feature]) -> float:
-    """Squares of what the details leave over about a group, in standard deviations, and what they cost themselves."""
-    near, inspection = _near(members, around), around.inspection
+def _explain_better(
+    parted: Sequence[Feature], whole: Sequence[Feature], members: list[Crossing], around: Around
+) -> bool:
+    """True if the details of summits explain the heights about a group better by more than what they cost.
+
+    What is left over by the better of the two as well, as where other details are felt, speaks for neither: the gain is
+    divided by it (a quasi-likelihood; Wedderburn, Biometrika 61, 1974).
+    """
+    near = _near(members, around)
+    before, after = (_left_over(details, near, members, around) for details in (whole, parted))
+    misfit = max(1.0, min(before, after) / len(near))
+    return (before - after) / misfit > DETAIL_COST * (len(parted) - len(whole))
+
+
+def _left_over(details: Sequence[Feature], near: IntArray, members: list[Crossing], around: Around) -> float:
+    """Squares of what details leave over at places (indices), in standard deviations."""
+    inspection = around.inspection
     felt = np.zeros(len(near))
     for feature in details:
         half = sizes_of(feature, around.tip_radius).half_width
         own = crest_trace(distances(inspection.points[near], feature.axis), feature.height.median, half)
         felt = np.where(np.abs(own) > np.abs(felt), own, felt)
     over = robust_cost(inspection.height[near] - felt, inspection.sd[near], abs(_highest(members).height))
-    return float(over.sum()) + DETAIL_COST * len(details)
+    return float(over.sum())
 
 
 def _near(members: Sequence[Crossing], around: Around) -> IntArray:

@@ -63,7 +63,9 @@ def _next_to(points: FloatArray, sweep: IntArray) -> list[set[int]]:
     for number in np.unique(sweep):
         own, others = np.flatnonzero(sweep == number), np.flatnonzero(sweep != number)
         if len(others):
-            found = cKDTree(points[others]).query(points[own], min(NEIGHBOURS_ASIDE, len(others)))[1].reshape(len(own), -1)
+            found = (
+                cKDTree(points[others]).query(points[own], min(NEIGHBOURS_ASIDE, len(others)))[1].reshape(len(own), -1)
+            )
             pairs += [(int(i), int(others[j])) for i, row in zip(own, found, strict=True) for j in row]
     for i, j in pairs:
         near[i].add(j)
