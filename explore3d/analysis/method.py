@@ -84,6 +84,10 @@ NOT_IN_QUICK = "quick results were asked for: existence, places and sizes"
 # as large to 1.0 at once.
 PLAY_ROUNDS = 5
 
+# Most doubt of the tip that an offset makes, in radii. What stands off by more is a frame; and a tip that is said 10 %
+# too large lies two of these off
+MOST_TIP_DOUBT = 0.05
+
 # Told the share of a stage that is done, 0 to 1
 Share = Callable[[float], None]
 
@@ -176,6 +180,12 @@ class Work:
             self.settings = replace(self.settings, tip_sd=self.log.tip_sd)
         if self.given is not None:
             self.base = self.given
+
+    @property
+    def tip_sd(self) -> float:
+        """Standard deviation of the tip's radius, m: an offset of the base that was taken off may be the ball's."""
+        offset = min(abs(self.base.offset), MOST_TIP_DOUBT * self.trace.tip_radius)
+        return float(np.hypot(self.settings.tip_sd, offset))
 
     @property
     def tolerances(self) -> tuple[Tolerance, ...]:
@@ -524,7 +534,7 @@ def refined_all(work: Work, share: Share) -> None:
         work.settings.seed,
         base=work.base,
         noise=work.detections.noise,
-        tip_sd=work.settings.tip_sd,
+        tip_sd=work.tip_sd,
         confirm=work.stages.is_forced("long chain") or (None if work.stages.quick else False),
         progress=share,
     )
@@ -535,7 +545,7 @@ def refined_all(work: Work, share: Share) -> None:
             work.settings.seed,
             base=work.base,
             noise=work.along.noise,
-            tip_sd=work.settings.tip_sd,
+            tip_sd=work.tip_sd,
             confirm=None if work.stages.quick else False,
         )
         work.features = (*work.features, *beside)
@@ -793,7 +803,7 @@ def _provenance(work: Work) -> dict[str, Any]:
         "software": f"explore3d {__version__}",
         "scene": work.scene.title if work.scene else None,
         "tip_radius": log.trace.tip_radius,
-        "tip_sd": work.settings.tip_sd,
+        "tip_sd": work.tip_sd,
         "tip_sd_assumed": log.tip_sd_assumed,
         "timed": log.timed,
         "form": asdict(log.form),

@@ -88,6 +88,11 @@ class Base:
         """True of a given mesh and of a base that predicted further sweeps: what it does not explain is a feature."""
         return self.kind == "mesh" or self.missed is not None
 
+    @property
+    def level_was_felt(self) -> bool:
+        """True of a base that lies as high as it was felt, by whatever tip: fitted, or an offset was taken off."""
+        return self.kind != "mesh" or self.offset != 0.0
+
     def beyond(self, bare: FloatArray, tip_radius: float) -> BoolArray:
         """(N,) True of places that a fit has added beyond what was felt: nobody knows of a body there.
 

@@ -100,7 +100,7 @@ def better_section(first: PosteriorProblem, around: Surroundings, rng: np.random
     if not posed:
         return None
     if around.tip_sd > 0.0:
-        posed = [with_free_tip(each, around.tip_sd, around.base.kind != "mesh") for each in posed]
+        posed = [with_free_tip(each, around.tip_sd, around.base.level_was_felt) for each in posed]
     weighed = roughly_weighed((first.under(around.noise), *posed))
     evidence, families = [each for each, _ in weighed], [each for _, each in weighed]
     least = float(np.log(1.0 / UNLIKELY_FAMILY))

@@ -183,7 +183,7 @@ def _rough(first: PosteriorProblem, around: Surroundings) -> list[PosteriorProbl
 
 def _felt(problem: PosteriorProblem, around: Surroundings) -> PosteriorProblem:
     """The problem with the tip's radius as a parameter, if that is doubtful."""
-    return with_free_tip(problem, around.tip_sd, around.base.kind != "mesh") if around.tip_sd > 0.0 else problem
+    return with_free_tip(problem, around.tip_sd, around.base.level_was_felt) if around.tip_sd > 0.0 else problem
 
 
 def _likeliest(problems: Sequence[PosteriorProblem], rng: np.random.Generator, confirm: bool | None) -> Solution:
@@ -260,7 +260,7 @@ def pose_problem(feature: Feature, around: Surroundings) -> PosteriorProblem:
         MappingError: a kind without one.
     """
     problem = kind_of(feature).problem(feature, around)
-    base_was_felt = around.base.kind != "mesh"
+    base_was_felt = around.base.level_was_felt
     return with_free_tip(problem, around.tip_sd, base_was_felt) if around.tip_sd > 0.0 else problem
 
 
