@@ -184,8 +184,8 @@ class Work:
     @property
     def tip_sd(self) -> float:
         """Standard deviation of the tip's radius, m: an offset of the base that was taken off may be the ball's."""
-        offset = min(abs(self.base.offset), MOST_TIP_DOUBT * self.trace.tip_radius)
-        return float(np.hypot(self.settings.tip_sd, offset))
+        told = self.settings.tip_sd
+        return max(told, min(float(np.hypot(told, self.base.offset)), MOST_TIP_DOUBT * self.trace.tip_radius))
 
     @property
     def tolerances(self) -> tuple[Tolerance, ...]:
