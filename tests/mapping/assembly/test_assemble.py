@@ -126,6 +126,7 @@ def test_a_ridge_at_a_slant_to_a_raster_is_one_ridge_with_its_ends(slope):
     assert np.linalg.norm(ends - line[:, :2], axis=1).max() < 1.5e-3
 
 
+@pytest.mark.slow
 def test_a_tee_is_a_junction():
     found = features(ridges([[0.01, -0.035, RADIUS], [0.01, 0.035, RADIUS]], [[0.01, 0, RADIUS], [0.05, 0.02, RADIUS]]))
     assert {f.kind for f in found} == {"ridge"}

@@ -80,6 +80,7 @@ def test_the_same_row_again_tells_no_slant_of_a_wide_detail(seed: int) -> None:
 
 
 @pytest.mark.parametrize("degrees", [18.0, pytest.param(10.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_a_wire_that_rows_cross_at_a_slant_is_no_wider_for_that(degrees: float) -> None:
     """The paper's wire, square to it felt over 7.2 mm: at 18 degrees each row feels it over 23 mm; at 10 over 41, but
     for those at its ends, which alone show something short."""

@@ -232,6 +232,7 @@ def test_a_tip_of_unknown_radius_widens_the_wire_and_nothing_else():
     np.testing.assert_allclose((radius + free.draws("tip radius")).mean(), 13e-3, atol=0.05e-3)
 
 
+@pytest.mark.slow
 def test_the_length_of_all_likely_families_under_a_tip_of_unknown_radius():
     # a wire's section is hardly felt: several families stay likely, each with the free tip about its shape
     trace = record(CROSSINGS + SLIDES, wire(ENDS))

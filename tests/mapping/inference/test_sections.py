@@ -76,6 +76,7 @@ def test_a_height_that_grows_along_a_line_is_remarked_upon() -> None:
     assert found.evidence.log_odds is not None and found.evidence.log_odds > 100.0
 
 
+@pytest.mark.slow
 def test_two_edges_that_face_each_other_are_one_bar() -> None:
     x, y = places(5)
     trace = swept(bar(y, 0.4e-3, 2e-3), x, y)

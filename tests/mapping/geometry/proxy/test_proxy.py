@@ -184,6 +184,7 @@ def test_a_ridge_ends_between_square_and_round(end: float, height: float, radius
     assert np.abs(felt[:, 2] - r - np.maximum(height - fall, 0.0)).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_random_jumps_never_bring_it_inside() -> None:
     bump = BumpOfRevolution(15.0).mesh(3.0, rings=40, sectors=60)
     body = Surface(1e-3 * bump.vertices, bump.faces)

@@ -67,6 +67,7 @@ def test_a_cosine_groove_has_its_width_and_length_and_no_remark() -> None:
     np.testing.assert_allclose(drawn, felt(np.abs(across[:, 1])), atol=10e-6)
 
 
+@pytest.mark.slow
 def test_a_cosine_pit_has_its_width_and_no_remark() -> None:
     feet, sweep = lines(3e-3, 13)
     trace = swept(np.hypot(feet[:, 0], feet[:, 1]), feet, sweep)
