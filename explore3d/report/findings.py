@@ -232,11 +232,16 @@ def dropped_warning(analysis: Analysis) -> list[str]:
 
 
 def tip_sentence(analysis: Analysis) -> list[str]:
-    """What was assumed of the tip, if its doubt was not stated."""
+    """What was assumed of the tip, if its doubt was not stated, or if heights that are off all over may be its own."""
     provenance, radius = analysis.model.provenance, analysis.trace.tip_radius
+    sd = float(provenance.get("tip_sd", 0.0))
+    if analysis.deviation is not None and "offset" in analysis.deviation.causes and sd > 0.0:
+        return [
+            f"Heights that are off all over may be the tip's: widths and heights carry ± {length_text(sd, 2)} "
+            f"({100 * sd / radius:.2g} %) of doubt of its radius."
+        ]
     if not provenance.get("tip_sd_assumed"):
         return []
-    sd = float(provenance["tip_sd"])
     return [
         f"The tip's radius is {length_text(radius)} as stated; how far that can be trusted nobody stated (--tip-sd "
         f"does): ± {length_text(sd, 2)} ({100 * sd / radius:.2g} %) is assumed. Widths and heights carry that doubt."

@@ -7,6 +7,7 @@ import pytest
 
 from explore3d.analysis import Stages, build_model
 from explore3d.log import Log
+from explore3d.report.findings import summary
 from mapping import Surface, Trace
 from mapping.base import Base
 from mapping.geometry.templates.shapes import cap_height
@@ -33,6 +34,7 @@ def test_a_wire_under_a_tip_that_is_said_too_large(said: float) -> None:
     analysis = build_model(log, None, plate(), Stages())
     assert analysis.deviation is not None and "offset" in analysis.deviation.causes
     assert analysis.model.provenance["tip_sd"] == pytest.approx(0.05 * said * TIP, rel=0.06)
+    assert any("may be the tip's" in line for line in summary(analysis))
     (wire,) = analysis.model.features
     assert wire.kind == "ridge"
     assert wire.height.low < HEIGHT < wire.height.high < 1.1 * HEIGHT
