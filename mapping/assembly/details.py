@@ -21,9 +21,10 @@ from mapping.inference.kinds import kind_made_of, sizes_of
 # and 3.0 say the same.
 WIDEST_SPOT = 2.6
 # Twice the log-likelihood by which one detail more must explain the heights better: it has four parameters, and both
-# that make a line of a spot are asked LINE_OVER_SPOT_GAIN. Of 144 dots on 18 simulated plates (2.5 mm apart; balls of 1.5
-# and 2.5 mm; rows 0.25 to 0.5 mm apart, turned by 0 to 29 degrees) 139 are bumps within 0.1 mm of their place before
-# anything is weighed; a quarter and a half of this cost say 139, too, with a few more pieces, twice 138 and four times 137
+# that make a line of a spot are asked LINE_OVER_SPOT_GAIN. Of 144 dots on 18 simulated plates (2.5 mm apart; balls of
+# 1.5 and 2.5 mm; rows 0.25 to 0.5 mm apart, turned by 0 to 29 degrees) 139 are bumps within 0.1 mm of their place
+# before anything is weighed; a quarter and a half of this cost say 139, too, with a few more pieces, twice 138 and four
+# times 137
 DETAIL_COST = 2.0 * LINE_OVER_SPOT_GAIN
 # Lower than this share of the highest a top is the flank of what lies beside the group: crossings link down to half of
 # the lower one (`Inspection.denies`). On the same plates 0.3 tells 138 dots and six pieces more, 0.7 tells 139 and five
