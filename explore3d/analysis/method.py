@@ -51,7 +51,7 @@ from mapping.estimate.deviation import Deviation, UnclimbedLevel, explain, felt_
 from mapping.estimate.envelope import RefutedTip, estimate_surface, refuted_by_lines, refuted_tip
 from mapping.geometry.curvature import principal_curvatures
 from mapping.geometry.mesh import distances
-from mapping.inference import refine_all
+from mapping.inference.joint import refine_all
 from mapping.inference.kinds import kind_of
 from mapping.model import Judgement, ObjectModel, Tolerance, dropped_crossings, dropped_features, judged
 

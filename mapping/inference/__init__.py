@@ -1,4 +1,4 @@
-"""Inference: the posterior of one feature, and of all together."""
+"""Inference: the posterior of one feature; that of all together has its own room."""
 
 from typing import TYPE_CHECKING
 
@@ -14,20 +14,25 @@ if TYPE_CHECKING:
         pose_problem as pose_problem,
         refine as refine,
         sample_posterior as sample_posterior,
+        settle as settle,
         solve as solve,
         solve_problem as solve_problem,
     )
-    from mapping.inference.joint import refine_all as refine_all
     from mapping.inference.kind_odds import as_broken as as_broken, as_bump as as_bump
     from mapping.inference.pooled_residual import POOLED_SPLINES as POOLED_SPLINES
-    from mapping.inference.summary import describe as describe
+    from mapping.inference.summary import (
+        describe as describe,
+        described_at as described_at,
+        with_open_ends as with_open_ends,
+    )
+    from mapping.inference.trace_noise import noise_of_trace as noise_of_trace
 
 _PUBLIC = {
     "evidence": ("log_evidence", "log_evidence_of_nothing"),
-    "feature_posterior": ("Solution", "pose_problem", "refine", "sample_posterior", "solve", "solve_problem"),
-    "joint": ("refine_all",),
+    "feature_posterior": ("Solution", "pose_problem", "refine", "sample_posterior", "settle", "solve", "solve_problem"),
     "kind_odds": ("as_broken", "as_bump"),
     "pooled_residual": ("POOLED_SPLINES",),
-    "summary": ("describe",),
+    "summary": ("describe", "described_at", "with_open_ends"),
+    "trace_noise": ("noise_of_trace",),
 }
 doorway(__name__, _PUBLIC)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,13 +34,16 @@ from mapping.inference.sampler import (
     sample_ensemble,
     walkers_for,
 )
-from mapping.inference.summary import describe, with_ends_of_all
+from mapping.inference.summary import describe, described_at, with_ends_of_all
 from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise
 
 KEPT_DRAWS = 1000
 # Draws of which the best begins the search for the optimum
 FEW_BEGINNINGS = 200
+
+# A posterior that holds the neighbours, made one that does not
+Widened = Callable[[PosteriorProblem, Posterior, np.random.Generator], Posterior]
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +110,10 @@ def refine(
     others: Sequence[Feature] = (),
     tip_sd: float = 0.0,
     confirm: bool | None = True,
+    widened: Widened | None = None,
 ) -> Feature:
-    """The feature with posterior, intervals and axis from the draws; arguments as for `sample_posterior`.
+    """The feature with posterior, intervals and axis from the draws; arguments as for `sample_posterior`, and what
+    makes draws of such that hold the others: None, these are known.
 
     Kinds without a closed form (edges) come back as they are, with a note; so does, with no
     evidence, a feature without any sample near it.
@@ -124,7 +129,9 @@ def refine(
         nothing = replace(feature.evidence, log_odds=0.0)
         return replace(feature, evidence=nothing, notes=(*feature.notes, f"no posterior: {error}"))
     families = [(share, each.problem, each.posterior) for share, each in [(1.0, solution), *solution.likely]]
-    found = with_ends_of_all(averaged(describe(solution.problem, solution.posterior, base), families), families)
+    if widened is not None:
+        families = [(share, problem, widened(problem, posterior, rng)) for share, problem, posterior in families]
+    found = with_ends_of_all(averaged(describe(solution.problem, families[0][2], base), families), families)
     pooled = solution.pooled or _pooled(solution, noise.rounded(trace.resolution))
     found = with_remark(found, pooled, raised=solution.problem.misfit > 0.0)
     odds = odds_against_nothing(solution)
@@ -242,10 +249,7 @@ def settle(feature: Feature, around: Surroundings) -> Feature:
         problem = pose_problem(feature, around)
     except EmptyWindowError:
         return feature
-    best = find_optima(problem.target, problem.beginnings[:1])[0]
-    shape, nan = problem.target.shape, float("nan")
-    optimum = Posterior(shape.names, shape.units, best[None], nan, nan, "not needed", "only the optimum was asked for")
-    return describe(problem, optimum, around.base)
+    return described_at(find_optima(problem.target, problem.beginnings[:1])[0], problem, around.base)
 
 
 def odds_against_nothing(solution: Solution) -> float:

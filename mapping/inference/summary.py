@@ -31,6 +31,13 @@ def describe(problem: PosteriorProblem, posterior: Posterior, base: Base) -> Fea
     return replace(feature, posterior=full, notes=tuple(dict.fromkeys(notes)))
 
 
+def described_at(theta: FloatArray, problem: PosteriorProblem, base: Base) -> Feature:
+    """The feature that parameters (P,) of the problem's shape describe, without intervals."""
+    shape, nan = problem.target.shape, float("nan")
+    one = Posterior(shape.names, shape.units, theta[None], nan, nan, "not needed", "only the optimum was asked for")
+    return describe(problem, one, base)
+
+
 def _warnings(posterior: Posterior) -> tuple[str, ...]:
     if posterior.trusted:
         return ()

@@ -13,7 +13,6 @@ from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
 from mapping.inference import describe
 from mapping.inference.configuration.configuration import Configuration, Part, as_bar, fitted, part_of
-from mapping.inference.configuration.joined_shape import OneOfMany
 from mapping.inference.configuration.neighbourhood import (
     NEIGHBOURHOOD_REACH,
     PARTS_OF_BIN,
@@ -26,7 +25,7 @@ from mapping.inference.configuration.neighbourhood import (
 from mapping.inference.configuration.proposals import PEAK_SDS, PROPOSALS, Proposal, apart_of, as_far_as_felt, dense
 from mapping.inference.configuration.search import CROWDED, Account, searched
 from mapping.inference.configuration.told import in_words
-from mapping.inference.families import MEETING_REACH, PosteriorProblem, RidgeShape, Surroundings, TwinShape
+from mapping.inference.families import MEETING_REACH, OneOfMany, PosteriorProblem, RidgeShape, Surroundings, TwinShape
 from mapping.inference.kinds import kind_of, sizes_of
 from mapping.inference.likelihood import Nuisance
 from mapping.inference.sampler import root_of
@@ -134,7 +133,8 @@ def _improved(
     if (adds and not found.best.fits) or (
         set(found.accepted) <= CHOSEN_LATER and found.best.kinds == found.start.kinds
     ):
-        return [_with_odds(feature, odds if found.best.fits else (), noted) for feature in group], found.best
+        felt = [_felt_by_runs(feature, found.start.runs(k)) for k, feature in enumerate(group)]
+        return [_with_odds(feature, odds if found.best.fits else (), noted) for feature in felt], found.best
     algorithms = group[0].evidence.algorithms if group else ()
     features = [_with_odds(feature, odds, noted) for feature in _described(found.best, around, algorithms)]
     return _meeting(features, around.trace.tip_radius), found.best
@@ -326,6 +326,13 @@ def _told(found: Account) -> tuple[tuple[str, float], ...]:
     """What the neighbourhood may consist of, in words, with the probability of each; the most probable first."""
     told = [(in_words(kinds), share) for kinds, share in found.shares if share > TOLD_SHARE]
     return tuple(told) if len(told) > 1 else ()
+
+
+def _felt_by_runs(feature: Feature, runs: int) -> Feature:
+    """A spot with the runs of sweeps that felt it: where spots are felt together few see a crossing in each of them."""
+    if kind_of(feature).line:
+        return feature
+    return replace(feature, evidence=replace(feature.evidence, crossings=max(feature.evidence.crossings, runs)))
 
 
 def _with_odds(feature: Feature, odds: tuple[tuple[str, float], ...], noted: tuple[str, ...]) -> Feature:

@@ -13,15 +13,16 @@ from mapping import Feature, FloatArray
 from mapping.geometry.mesh import distances
 from mapping.geometry.templates import crest_trace
 from mapping.inference.configuration.common_deviation import Deviation, Fitted, common_deviation
-from mapping.inference.configuration.joined_shape import JoinedShape, stands_out
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood
 from mapping.inference.curves import HIGHEST_DEGREE
 from mapping.inference.families import (
+    JoinedShape,
     RidgeShape,
     StepShape,
     TwinShape,
     bell_beside,
     bell_ridge_beside,
+    stands_out,
     trapezoid_beside,
     twin_beside,
 )

@@ -125,19 +125,30 @@ class PosteriorProblem:
 
 def window_for(crest: FloatArray, normals: FloatArray, sizes: Sizes, around: Surroundings) -> Window:
     """The bins near a crest polyline (K, 3) on the base, lifted by the caller to the ball's centre, m; its normals."""
-    width = sizes.half_width / WINDOW_BINS_PER_HALF_WIDTH
+    return window_of_all(crest, normals, [sizes], around)
+
+
+def window_of_all(crest: FloatArray, normals: FloatArray, sizes: Sequence[Sizes], around: Surroundings) -> Window:
+    """The bins near the crests of some features (K, 3), lifted to the ball's centre, m; their normals: wide enough for
+    the widest of them, and fine enough for the narrowest."""
+    samples = gather(around.trace, around.base, crest, normals, max(_reach(each, around) for each in sizes))
+    narrowest = min(each.half_width for each in sizes)
+    width = narrowest / WINDOW_BINS_PER_HALF_WIDTH
+    precise = around.noise.sd <= PRECISE * max(each.height for each in sizes)
+    most, smooth_over = (2 * MOST_BINS, 0.0) if precise else (MOST_BINS, narrowest)
+    window = bin_samples(samples, width, around.noise.sd, smooth_over, around.noise.levels)
+    if len(window) > most:
+        coarser = min(width * len(window) / most, narrowest / 8.0)
+        window = bin_samples(samples, coarser, around.noise.sd, smooth_over, around.noise.levels)
+    return window
+
+
+def _reach(sizes: Sizes, around: Surroundings) -> float:
+    """How far from its crest a feature's window reaches, m."""
     # beside a wide detail the base is told within as much as beside a thin one of its height: what stands farther off
     # is another's
     thin = float((2.0 * around.trace.tip_radius * sizes.height) ** 0.5)
-    reach = min(WINDOW_REACH * sizes.half_width, sizes.half_width + WINDOW_REACH * thin) + 2.0 * sizes.position_sd
-    samples = gather(around.trace, around.base, crest, normals, reach)
-    precise = around.noise.sd <= PRECISE * sizes.height
-    most, smooth_over = (2 * MOST_BINS, 0.0) if precise else (MOST_BINS, sizes.half_width)
-    window = bin_samples(samples, width, around.noise.sd, smooth_over, around.noise.levels)
-    if len(window) > most:
-        coarser = min(width * len(window) / most, sizes.half_width / 8.0)
-        window = bin_samples(samples, coarser, around.noise.sd, smooth_over, around.noise.levels)
-    return window
+    return min(WINDOW_REACH * sizes.half_width, sizes.half_width + WINDOW_REACH * thin) + 2.0 * sizes.position_sd
 
 
 def _likelihood(

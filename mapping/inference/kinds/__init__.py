@@ -25,7 +25,11 @@ if TYPE_CHECKING:
         Traced as Traced,
     )
     from mapping.inference.kinds.points import PointKind as PointKind, PointShape as PointShape, Seen as Seen
-    from mapping.inference.kinds.posterior_density import height_prior as height_prior, place_prior as place_prior
+    from mapping.inference.kinds.posterior_density import (
+        felt_together as felt_together,
+        height_prior as height_prior,
+        place_prior as place_prior,
+    )
 
 _PUBLIC = {
     "bump": ("bump_shape",),
@@ -43,6 +47,6 @@ _PUBLIC = {
     ),
     "lines": ("LineKind", "LineShape", "Parameters", "Traced"),
     "points": ("PointKind", "PointShape", "Seen"),
-    "posterior_density": ("height_prior", "place_prior"),
+    "posterior_density": ("felt_together", "height_prior", "place_prior"),
 }
 doorway(__name__, _PUBLIC)

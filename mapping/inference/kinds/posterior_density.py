@@ -26,13 +26,18 @@ def pose(
     beside = None
     near = [other for other in around.others if other is not feature]
     if near:
-        traces = [feature_trace(other, window.feet, window.normals, around.trace.tip_radius) for other in near]
-        highest, lowest = np.max(traces, axis=0), np.min(traces, axis=0)
-        beside = np.where(highest > 0.0, highest, lowest)
+        tip = around.trace.tip_radius
+        beside = felt_together(np.array([feature_trace(other, window.feet, window.normals, tip) for other in near]))
         if type(shape) is GrooveShape:
             laid = [_laid(other, window, around) for other in near if _is_upright(other)]
             shape = replace(shape, crossed=tuple(each for each in laid if each is not None))
     return PosteriorProblem.posed(feature, sizes, shape, window, around, beginnings, beside)
+
+
+def felt_together(traces: FloatArray) -> FloatArray:
+    """(n,) heights that features leave together beside another one, from those (M, n) that each leaves alone, m."""
+    highest, lowest = np.max(traces, axis=0), np.min(traces, axis=0)
+    return np.asarray(np.where(highest > 0.0, highest, lowest))
 
 
 def _is_upright(other: Feature) -> bool:

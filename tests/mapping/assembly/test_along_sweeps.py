@@ -8,7 +8,7 @@ from mapping import FloatArray
 from mapping.assembly import AlongSweeps, along_sweeps
 from mapping.base import LaidTrace, fit_base
 from mapping.detection import detect
-from mapping.inference import refine_all
+from mapping.inference.joint import refine_all
 from mapping.trace import Trace
 
 TIP, PITCH, ROWS, WHITE = 3e-3, 1e-3, 31, 10e-6

@@ -10,7 +10,7 @@ from mapping import BoolArray, FloatArray, Trace
 from mapping.assembly import assemble
 from mapping.base import fit_base
 from mapping.detection import detect
-from mapping.inference import refine_all
+from mapping.inference.joint import refine_all
 
 TIP, WHITE, HALF_LENGTH, DEEP = 3e-3, 5e-6, 12e-3, 0.15e-3
 SPACING = 5e-6  # of the rim's places: a ball 0.5 mm inside it is held 1 nm higher between two of them

@@ -13,7 +13,7 @@ from mapping.assembly import assemble
 from mapping.base import fit_base
 from mapping.detection import detect
 from mapping.geometry.templates.shapes import cap_height
-from mapping.inference import refine_all
+from mapping.inference.joint import refine_all
 
 TIP, FINE, SAMPLING, PITCH = 2e-6, 0.125e-6, 8, 15e-6
 Form = Callable[[FloatArray, FloatArray], FloatArray]

@@ -14,7 +14,7 @@ from mapping.assembly.free.outline import of_all_scales, outlined
 from mapping.assembly.free.sizes import sizes_of_section
 from mapping.base import SweepHeights, fit_base
 from mapping.detection import detect
-from mapping.inference import refine_all
+from mapping.inference.joint import refine_all
 from mapping.instrument import Noise
 
 TIP, FINE, SAMPLING = 2e-6, 0.04e-6, 25

@@ -13,8 +13,9 @@ from mapping.assembly import assemble
 from mapping.base import Base
 from mapping.detection import detect
 from mapping.geometry.templates import cap_height
-from mapping.inference import refine, refine_all
+from mapping.inference import refine
 from mapping.inference.evidence import probabilities
+from mapping.inference.joint import refine_all
 from mapping.inference.pooled_residual import PooledResidual, with_remark
 from mapping.instrument import Noise
 

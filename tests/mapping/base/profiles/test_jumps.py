@@ -11,7 +11,7 @@ from mapping.base import fit_base
 from mapping.base.profiles.jumps import possible_jumps
 from mapping.detection import detect
 from mapping.geometry.templates import step_height
-from mapping.inference import refine_all
+from mapping.inference.joint import refine_all
 
 TIP = 2e-6
 X = 1e-6 * np.arange(8000)

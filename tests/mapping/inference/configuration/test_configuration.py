@@ -24,11 +24,10 @@ from mapping.detection import detect
 from mapping.inference.configuration import Places, in_words, numbers_in, share_as_told
 from mapping.inference.configuration.account import ENDED_EARLY, IN_BLOCKS, accounted
 from mapping.inference.configuration.configuration import Configuration, Part, as_bar, fitted, part_of
-from mapping.inference.configuration.joined_shape import JoinedShape
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
 from mapping.inference.configuration.proposals import smoother, straight_lines
 from mapping.inference.configuration.search import searched
-from mapping.inference.families import Surroundings
+from mapping.inference.families import JoinedShape, Surroundings
 from mapping.instrument import Noise
 
 SLOW_PAIRS = [pytest.param(body, marks=pytest.mark.slow) for body in ("flat bar", "acute crossing", "wire over a step")]

@@ -10,7 +10,7 @@ from recorded_features import TIP, UP, D, feature, plate
 
 from mapping.feature import Details, Feature, Interval
 from mapping.geometry.mesh.polyline import arclengths
-from mapping.inference.junctions import brought_together, meetings
+from mapping.inference.joint.junctions import brought_together, meetings
 
 HALF_WIDTH = 3.7e-3
 

@@ -10,9 +10,9 @@ import numpy as np
 from mapping import Details, Feature, FloatArray, Interval
 from mapping.base import Base, onto_base
 from mapping.geometry.mesh import arclengths, nearest_on
+from mapping.inference import with_open_ends
 from mapping.inference.families import MEETING_REACH, touches
 from mapping.inference.kinds import kind_of
-from mapping.inference.summary import with_open_ends
 
 # A course is known no better than this share of the half-width; places that settle the meeting place
 LEAST_SD, MEETING_ROUNDS = 1e-3, 5

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapping import Feature, Trace
+from mapping import Feature, Interval, Trace
 from mapping.base import Base
 from mapping.geometry.mesh import distances
+from mapping.inference import noise_of_trace, refine, settle
 from mapping.inference.families import Surroundings
-from mapping.inference.feature_posterior import refine, settle
-from mapping.inference.junctions import Meeting, brought_together, meetings
+from mapping.inference.joint.junctions import Meeting, brought_together, meetings
+from mapping.inference.joint.neighbours import MOST_TOGETHER, NeighboursDoubt, laid_together
 from mapping.inference.kinds import sizes_of
-from mapping.inference.trace_noise import noise_of_trace
 from mapping.instrument import Noise
 
 # What fewer crossings show may be false, and would explain a part of a true neighbour's trace and be supported by it
@@ -35,10 +35,11 @@ def refine_all(
 ) -> tuple[Feature, ...]:
     """The features with their posteriors, each beside the others as well as they are known by then.
 
-    Where the disturbances of two that several sweeps saw overlap, both are laid out first by the optima of their
-    posteriors: what is a neighbour's and what its own depends on both. What fewer sweeps saw is judged beside them, and
-    counts as their neighbour only if it is likely then. Lines that meet end in one place, which the courses of all of
-    them tell. Free sections are measured already, and come back as they are.
+    Where the disturbances of some that several sweeps saw overlap, they are laid out first where they are likeliest
+    together: what is a neighbour's and what its own depends on both, and what is not known of one is doubt of the
+    other. What fewer sweeps saw is judged beside them, and counts as their neighbour only if it is likely then. Lines
+    that meet end in one place, which the courses of all of them tell. Free sections are measured already, and come back
+    as they are.
 
     Args:
         features: as detected.
@@ -59,17 +60,34 @@ def refine_all(
     beside = _beside(features, half_widths)
     certain = [k for k, feature in enumerate(features) if feature.evidence.crossings >= FEWEST_CERTAIN_CROSSINGS]
     doubtful = [k for k in range(len(features)) if k not in certain]
-    known = list(features)
-    for k in certain:
-        if beside[k].intersection(certain):
-            around = Surroundings(trace, base, noise, [known[m] for m in certain if m != k], tip_sd)
-            known[k] = settle(features[k], around)
+    known, doubts = list(features), dict[int, NeighboursDoubt]()
+    for group in _groups(certain, [features[k] for k in certain], tip):
+        rest = [known[m] for m in certain if m not in group]
+        around = Surroundings(trace, base, noise, rest, tip_sd)
+        together = laid_together([features[k] for k in group], around)
+        if together is None:
+            for k in group:
+                beside_it = [known[m] for m in certain if m != k]
+                known[k] = settle(features[k], replace(around, others=beside_it))
+            continue
+        for number, k in enumerate(group):
+            known[k], doubts[k] = together.features[number], together.doubt_beside(number)
     known = brought_together(known, met, half_widths, base, tip)
     detected = _begun_at(features, known, met)
 
     def refined(k: int, others: Sequence[int]) -> Feature:
         near, rng = [known[m] for m in others if m != k], np.random.default_rng([seed, k])
-        return refine(detected[k], trace, rng, base=base, noise=noise, others=near, tip_sd=tip_sd, confirm=confirm)
+        return refine(
+            detected[k],
+            trace,
+            rng,
+            base=base,
+            noise=noise,
+            others=near,
+            tip_sd=tip_sd,
+            confirm=confirm,
+            widened=doubts[k].widened if k in doubts else None,
+        )
 
     for done, k in enumerate([*certain, *doubtful]):
         known[k] = refined(k, certain if k in certain else range(len(features)))
@@ -78,8 +96,8 @@ def refine_all(
     for k in certain:
         if beside[k].intersection(true, doubtful):
             known[k] = refined(k, true)
-    together = brought_together(known, met, half_widths, base, tip)
-    return tuple(sorted([*measured, *together], key=lambda feature: -feature.evidence.snr) if measured else together)
+    found = brought_together(known, met, half_widths, base, tip)
+    return tuple(sorted([*measured, *found], key=lambda feature: -feature.evidence.snr) if measured else found)
 
 
 def _with_tip_doubt(feature: Feature, tip_sd: float) -> Feature:
@@ -97,6 +115,27 @@ def _beside(features: Sequence[Feature], half_widths: Sequence[float]) -> list[s
         }
         for k, feature in enumerate(features)
     ]
+
+
+def _groups(numbers: Sequence[int], features: Sequence[Feature], tip: float) -> list[list[int]]:
+    """The numbers of features whose disturbances touch, as wide as they may be, directly or by others between them, in
+    blocks of MOST_TOGETHER that lie nearest together; none of one alone."""
+    wide = [replace(feature, width=Interval(*(feature.width.high,) * 3)) for feature in features]
+    reach = np.array([sizes_of(feature, tip).half_width for feature in wide])
+    gap = np.array([[float(distances(one.axis, other.axis).min()) for other in features] for one in features])
+    gap = np.minimum(gap, gap.T) - reach - reach[:, None]
+    left, groups = list(range(len(features))), list[list[int]]()
+    while left:
+        group = [left.pop(0)]
+        while left and len(group) < MOST_TOGETHER:
+            nearest = min(left, key=lambda k: float(gap[k, group].min()))
+            if gap[nearest, group].min() >= 0.0:
+                break
+            left.remove(nearest)
+            group.append(nearest)
+        if len(group) > 1:
+            groups.append(sorted(numbers[k] for k in group))
+    return groups
 
 
 def _begun_at(detected: Sequence[Feature], known: Sequence[Feature], met: Sequence[Meeting]) -> list[Feature]:
