@@ -12,13 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapping import Details, Feature, FloatArray, Support
+from mapping import Details, Feature, FloatArray, Support, length_text
 from mapping.assembly.free import CORE, WIDER_THAN_CREST, FreeSection, free_spot, mean_sizes
 from mapping.assembly.lines import FULL_HEIGHT, ONE_POINT, mean_point, merged
 from mapping.assembly.linking import Branch, Inspection, Inspections, LineEnd, branches, ended_length, groups
 from mapping.base import LaidTrace
 from mapping.detection import Crossing, Detections
 from mapping.geometry.mesh import distances
+from mapping.geometry.templates import SHAPE_ERROR
+from mapping.inference import REMARKED_CHANCE
 from mapping.inference.kinds import kind_made_of
 
 # Places to the core of a section, which has to be felt for a sweep to deny it; 6 are alike
@@ -28,6 +30,8 @@ PLACES_PER_CORE = 3.0
 END_PITCHES = 3.0
 # Legs of an axis that tell its direction at an end: over 24 rasters (seeds 100 to 105) 2 and 8 are alike
 LAST_LEGS = 4
+# Sections by which it is asked whether a line is the same all along: two may differ for any reason
+FEWEST_VARYING = 3
 # Half of a 90 % interval of what is equally probable over a stretch of one
 UNIFORM_HALF_90 = 0.45
 
@@ -156,8 +160,34 @@ def _line(
         position_sd=float(np.median([c.position_sd for c in crossings])),
         notes=notes,
         junction=line.junction,
-        details=Details(top=sizes.top, free_section=True),
+        details=Details(top=sizes.top, free_section=True, misfit=_varying(whole, line.axis, square)),
     )
+
+
+def _varying(group: Sequence[FreeSection], axis: FloatArray, square: FloatArray) -> str | None:
+    """What is to be said of a line whose width, or height, is not the same all along it; None if it may be.
+
+    Sections of one line differ by their noise, by where their samples lie and by SHAPE_ERROR. Where lines meet, or
+    something wide narrows, they differ by more. Those near an end are cut by it: the middle half is asked.
+    """
+    from scipy.special import gammaincc
+
+    at = np.array([np.linalg.norm(axis - section.crossing.point, axis=1).argmin() for section in group])
+    order = np.argsort(at, kind="stable")
+    middle = order[len(order) // 4 : len(order) - len(order) // 4]
+    if len(middle) < FEWEST_VARYING:
+        return None
+    sizes = [group[k].sizes.across(float(square[k])) for k in middle]
+    widths, heights = (np.array([getattr(each, name) for each in sizes]) for name in ("width", "height"))
+    between = np.array([group[k].piece.spacing for k in middle]) / np.sqrt(6.0)  # of two sides that are walls
+    doubts = np.hypot([each.width_sd for each in sizes], between), np.array([each.height_sd for each in sizes])
+    for name, values, doubt in zip(("width", "height"), (widths, heights), doubts, strict=True):
+        weight = 1.0 / (doubt**2 + (SHAPE_ERROR * values) ** 2)
+        excess = float((weight * (values - np.average(values, weights=weight)) ** 2).sum())
+        if gammaincc(0.5 * (len(values) - 1), 0.5 * excess) < REMARKED_CHANCE:
+            least, most = (length_text(value, 2) for value in (values.min(), values.max()))
+            return f"its {name} varies along it: single sweeps show {least} to {most}"
+    return None
 
 
 def _whole(group: list[FreeSection], line: Branch) -> list[FreeSection]:

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
         solve_problem as solve_problem,
     )
     from mapping.inference.kind_odds import as_broken as as_broken, as_bump as as_bump
-    from mapping.inference.pooled_residual import POOLED_SPLINES as POOLED_SPLINES
+    from mapping.inference.pooled_residual import (
+        POOLED_SPLINES as POOLED_SPLINES,
+        REMARKED_CHANCE as REMARKED_CHANCE,
+    )
     from mapping.inference.summary import (
         describe as describe,
         described_at as described_at,
@@ -31,7 +34,7 @@ _PUBLIC = {
     "evidence": ("log_evidence", "log_evidence_of_nothing"),
     "feature_posterior": ("Solution", "pose_problem", "refine", "sample_posterior", "settle", "solve", "solve_problem"),
     "kind_odds": ("as_broken", "as_bump"),
-    "pooled_residual": ("POOLED_SPLINES",),
+    "pooled_residual": ("POOLED_SPLINES", "REMARKED_CHANCE"),
     "summary": ("describe", "described_at", "with_open_ends"),
     "trace_noise": ("noise_of_trace",),
 }

@@ -68,6 +68,20 @@ def test_a_wide_line_is_one_with_the_sizes_of_its_mean_section(
     assert abs(found.width.median - width) < 1.0e-6
     assert abs(found.length.median - 121e-6) < PITCH
     assert not found.length.censored and found.evidence.crossings >= 7
+    assert found.details.misfit is None
+
+
+def test_a_line_that_widens_or_rises_says_so() -> None:
+    def widening(x: FloatArray, y: FloatArray) -> FloatArray:
+        return np.maximum(0.0, 1e-6 * (1.0 - (x / (12e-6 + 0.05 * y)) ** 2)) * (np.abs(y) < 90e-6)
+
+    def rising(x: FloatArray, y: FloatArray) -> FloatArray:
+        return np.maximum(0.0, (1.5e-6 + 0.012 * y) * (1.0 - (x / 12e-6) ** 2)) * (np.abs(y) < 90e-6)
+
+    for form, name in ((widening, "width"), (rising, "height")):
+        (found,) = felt(form, 11, 30e-9)
+        assert found.kind == "ridge" and found.details.free_section
+        assert f"its {name} varies along it" in found.details.misfit
 
 
 @pytest.mark.parametrize("seed", range(4))
