@@ -227,9 +227,14 @@ class Ways:
         """True if ball and stem stay free on a way (K, 3), and so far off the body (m) but for its ends."""
         path, approach = resampled(path, approach, FREE_SPACING * self.tip_radius)
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-        off = np.where(np.minimum(along, along[-1] - along) > ENDS * self.tip_radius, room, 0.0)
-        height = self.base.foot(path, self.tip_radius).height + FREE_SINKING * self.tip_radius
-        return bool((height >= off).all() and (self.carrier.clearance(path, approach) >= off).all())
+        inner = np.minimum(along, along[-1] - along) > ENDS * self.tip_radius
+        roomy = replace(self.carrier, radius=self.carrier.radius + room)
+        return bool(
+            self.carrier.ball_is_free(path[~inner]).all()
+            and self.carrier.ball_is_free(path[inner], room - FREE_SINKING * self.tip_radius).all()
+            and self.carrier.is_free(path[~inner], approach[~inner]).all()
+            and roomy.is_free(path[inner], approach[inner]).all()
+        )
 
     @cached_property
     def _detour(self) -> Detour:

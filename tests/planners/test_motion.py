@@ -29,6 +29,7 @@ R = 0.003
 MESHES = Path(__file__).resolve().parents[2] / "assets" / "meshes"
 BODY = load_mesh(MESHES / "l_bracket.ply", "m")
 BASE = Base(BODY)
+ABOVE = np.array([0.0, 0.0, 1.0])
 DOWN, LEFT = np.array([0.0, -1.0, 0.0]), np.array([-1.0, 0.0, 0.0])
 EMPTY = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), R)
 
@@ -243,3 +244,29 @@ def test_a_steep_wall_holds_a_ball_up_far_though_it_sinks_into_it_a_little() -> 
     assert up == pytest.approx([0.3e-3 / np.sin(np.radians(10.0)), 0.0], rel=1e-6)
     gentle = np.array([-np.sin(np.radians(40.0)), -np.cos(np.radians(40.0)), 0.0])
     assert held_up(place[:1], gentle[None], BASE, R) == pytest.approx([0.3e-3 / np.sin(np.radians(40.0))], rel=1e-6)
+
+
+def shelf(height: float) -> Base:
+    """A floor with its top at z = 0, and the edge of a thin sheet at x = 0 over it, m."""
+    from trimesh.creation import box
+
+    floor, sheet = box(extents=(0.1, 0.1, 0.01)), box(extents=(0.05, 0.1, 1e-4))
+    floor.apply_translation([0.0, 0.0, -0.005])
+    sheet.apply_translation([0.025, 0.0, height])
+    return Base(
+        Surface(np.concatenate([floor.vertices, sheet.vertices]), np.concatenate([floor.faces, sheet.faces + 8]))
+    )
+
+
+@pytest.mark.parametrize("height", R * np.linspace(2.6, 6.0, 8))
+def test_a_stem_passes_a_sharp_edge_without_sinking_into_it(height: float) -> None:
+    base, beside = shelf(height), R * np.linspace(-0.7, -0.3, 81)
+    carrier, limits = Carrier.of(base, R), Limits.of(finger().workspace, base, R)
+    centers = np.column_stack([beside, np.zeros(81), np.full(81, 0.98 * R)])
+    free = carrier.is_free(centers, np.tile(-ABOVE, (81, 1)))
+    assert (-beside[free]).min() > (0.5 - 0.04) * R
+    # and from where it says that it can draw back it may
+    sweeps = [Move(np.stack([at - [0.0, 1e-3, 0.0], at]), -ABOVE) for at in centers]
+    left = [move for move in sweeps if can_be_left(move, carrier)]
+    away = [Move(move.path[-1:] + 0.5 * R * ABOVE, -ABOVE, purpose="travel") for move in left]
+    assert left and not any(map(limits.violation, away, left))
