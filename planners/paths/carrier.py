@@ -9,6 +9,7 @@ import numpy as np
 
 from mapping import BoolArray, FloatArray
 from mapping.base import Base
+from planners.paths.felt_details import FeltDetails
 from planners.paths.room import Room, room_about
 
 # Where along its axis the stem is looked at, in tip radii: it begins where one half as thick leaves the ball's shadow,
@@ -35,6 +36,7 @@ class Carrier:
         tip_radius: of the ball, m.
         radius, length: of the stem, m, measured from the ball's centre.
         backing: so far the ball must be able to draw back along the stem, m.
+        felt: what is known to stand out of the body; None: nothing is.
     """
 
     base: Base
@@ -42,11 +44,22 @@ class Carrier:
     radius: float
     length: float
     backing: float = 0.0
+    felt: FeltDetails | None = None
 
     @classmethod
-    def of(cls, base: Base, tip_radius: float) -> Carrier:
+    def of(cls, base: Base, tip_radius: float, felt: FeltDetails | None = None) -> Carrier:
         """A stem half as thick as the ball and three balls long."""
-        return cls(base, tip_radius, 0.5 * tip_radius, 6.0 * tip_radius)
+        return cls(base, tip_radius, 0.5 * tip_radius, 6.0 * tip_radius, felt=felt)
+
+    def height(self, places: FloatArray, radius: float) -> FloatArray:
+        """(N,) how far balls of a radius (m) at places (N, 3) are off the body and what stands out of it, m.
+
+        Exact where it is less than a tip radius.
+        """
+        height = self.base.foot(places, radius).height
+        if self.felt is None:
+            return height
+        return np.minimum(height, self.felt.distance(places, radius + self.tip_radius) - radius)
 
     def clearance(self, path: FloatArray, approach: FloatArray) -> FloatArray:
         """(K,) distance of the stem's surface from the body at ball centres (K, 3) and approaches (K, 3), m.
@@ -62,15 +75,15 @@ class Carrier:
         back = self._back
         stem = path[:, None, :] - back[None, :, None] * approach[:, None, :]
         middle = len(back) // 2
-        known = self.base.foot(stem[:, middle], self.radius).height
+        known = self.height(stem[:, middle], self.radius)
         height = known[:, None] - np.abs(back - back[middle])
         ask = height < 0
         ask[:, middle] = False
-        height[ask] = self.base.foot(stem[ask], self.radius).height
+        height[ask] = self.height(stem[ask], self.radius)
         least = height.min(axis=1)
         if self.backing > 0:
             drawn = path - self.backing * approach
-            ball = self.base.foot(drawn, self.tip_radius).height + FREE_SINKING * self.tip_radius
+            ball = self.height(drawn, self.tip_radius) + FREE_SINKING * self.tip_radius
             least = np.minimum(least, np.minimum(ball, replace(self, backing=0.0).clearance(drawn, approach)))
         return np.asarray(least)
 
@@ -102,6 +115,10 @@ class Carrier:
             free[left[blocked]] = False
             if len(blocked):
                 left, bound = np.delete(left, blocked), np.delete(bound, blocked, axis=0)
+        if self.felt is not None and len(left):
+            stem = path[left, None, :] - back[:, None] * approach[left, None, :]
+            off = self.felt.distance(stem.reshape(-1, 3), self.radius).reshape(len(left), -1)
+            free[left] = (off >= self.radius).all(axis=1)
         if self.backing > 0:
             left = np.flatnonzero(free)
             drawn = path[left] - self.backing * approach[left]
@@ -121,11 +138,18 @@ class Carrier:
         FREE_SINKING tip radii."""
         far = self.tip_radius + (-FREE_SINKING * self.tip_radius if room is None else room)
         if self.room is None:
-            return np.asarray(self.base.foot(places, far).height >= 0.0)
+            return self._clear(self.base.foot(places, far).height >= 0.0, places, far)
         least, most = self.room.bounds(places)
         free, ask = least >= far, np.flatnonzero((least < far) & (most >= far))
         free[ask] = self.base.foot(places[ask], far).height >= 0.0
-        return np.asarray(free)
+        return self._clear(free, places, far)
+
+    def _clear(self, free: BoolArray, places: FloatArray, far: float) -> BoolArray:
+        """(N,) what is free of the body, and so far (m) off what stands out of it, too."""
+        if self.felt is not None:
+            ask = np.flatnonzero(free)
+            free[ask] = self.felt.distance(places[ask], far) >= far
+        return free
 
     def turned(self, path: FloatArray, approach: FloatArray, most: float, may: BoolArray | None = None) -> FloatArray:
         """The approaches (K, 3), turned where the stem would touch the body, as little and as evenly as will do.

@@ -13,6 +13,7 @@ from mapping import BoolArray, FloatArray, IntArray
 from mapping.base import Base
 from mapping.geometry.contact import BallContact
 from planners.paths.carrier import FREE_SINKING, Carrier
+from planners.paths.felt_details import DETAIL_ROOM
 
 # The sensor's field about its axis (paper, section 4)
 FIELD = float(np.radians(75.0))
@@ -26,8 +27,6 @@ PRESSED = 0.5
 RIDDEN = float(np.radians(65.0))
 # Room between the ball and a wall beside its way, in tip radii: poses and meshes are not better known
 WALL_ROOM = 0.03
-# Room for ball and stem where there is any: a detail that is not known yet may stand out by as much, in tip radii
-DETAIL_ROOM = 1.0 / 6.0
 # Waypoints are looked at so close together, and stretches shorter than that are not worth a sweep, in tip radii
 SOUND_SPACING, SHORTEST_PART = 0.2, 0.3
 # How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)

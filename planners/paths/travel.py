@@ -16,8 +16,9 @@ from mapping.detection import face_samples
 from planners import Outcome, Parted, Plan, Refused
 from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
 from planners.paths.detour import Detour
+from planners.paths.felt_details import DETAIL_ROOM, FeltDetails
 from planners.paths.room import room_about
-from planners.paths.sound import BACK_OFF_DISTANCE, DETAIL_ROOM, can_be_left, resampled, sound_parts
+from planners.paths.sound import BACK_OFF_DISTANCE, can_be_left, resampled, sound_parts
 
 # Places of a way lie at most so far apart where it is looked whether it is free, in tip radii
 FREE_SPACING = 0.25
@@ -54,12 +55,13 @@ def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
     return np.stack([before.path[-1] - first * before.approach[-1], after.path[0] - last * after.approach[0]])
 
 
-def sunk(path: FloatArray, base: Base, tip_radius: float) -> float:
-    """How deep a ball on a polyline (K, 3) may sink into the base at the deepest, m; 0 where it stays free.
+def sunk(path: FloatArray, carrier: Carrier) -> float:
+    """How deep a ball on a polyline (K, 3) may sink into the body at the deepest, m; 0 where it stays free.
 
     It is looked at every FREE_SPACING tip radii: round an edge it may sink FREE_SPACING^2 / 8 of them deeper between.
     """
-    lowest = float(base.foot(dense(path, FREE_SPACING * tip_radius), tip_radius).height.min())
+    tip_radius = carrier.tip_radius
+    lowest = float(carrier.height(dense(path, FREE_SPACING * tip_radius), tip_radius).min())
     return max(0.0, FREE_SPACING**2 / 8.0 * tip_radius - lowest) if lowest < 0.0 else 0.0
 
 
@@ -103,6 +105,8 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
         for part in parts:
             answer, travelled, done = yield from _reached(part, before, ways)
             before = done or travelled or before
+            if ways.felt is not None:
+                ways.felt.learn(answer, part.speed)
             if done is not None:
                 felt.append(answer)
                 made.extend([done] if travelled is None else [travelled, done])
@@ -152,6 +156,7 @@ class Ways:
         tip_radius: m.
         low, high: (3,) corners of where the tip's centre may go, m.
         speed: of travel, m/s.
+        felt: what is known to stand out of the body; what the sweeps feel is added to it. None: nothing is kept.
 
     The ways are the shortest over a roadmap of free space: a grid where there is room, and places off the surface
     where the ball fits but the grid is too coarse (Kavraki et al., Probabilistic roadmaps, 1996, with places that
@@ -163,6 +168,7 @@ class Ways:
     low: FloatArray
     high: FloatArray
     speed: float
+    felt: FeltDetails | None = None
 
     def make_ready(self) -> None:
         """Make the roadmaps before the finger waits for them, for a body that is to be felt from more than one side."""
@@ -181,7 +187,7 @@ class Ways:
     @cached_property
     def carrier(self) -> Carrier:
         """The stem behind the ball."""
-        return Carrier.of(self.base, self.tip_radius)
+        return Carrier.of(self.base, self.tip_radius, self.felt)
 
     def round(self, before: Move, after: Move) -> Move | None:
         """The travel between two moves; None where the straight way is free, or where no way was found.
@@ -255,7 +261,7 @@ class Ways:
         for directions in (away[None], self.carrier.lattice):
             steps = start + along[:, None] * directions[:, None, :]
             inside = ((steps >= self.low) & (steps <= self.high)).all(axis=2)
-            height = self.base.foot(steps.reshape(-1, 3), self.tip_radius).height.reshape(inside.shape)
+            height = self.carrier.height(steps.reshape(-1, 3), self.tip_radius).reshape(inside.shape)
             roomy = (height >= self._room) & inside
             sinks = np.minimum.accumulate(height, axis=1) < -MOST_SINKING * self.tip_radius
             step = np.where((roomy & ~sinks).any(axis=1), (roomy & ~sinks).argmax(axis=1), len(along))
