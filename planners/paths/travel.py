@@ -35,6 +35,8 @@ OUT_DISTANCE = 6.0
 # and how many neighbours of each are tried
 NEAR_LIFTS = (0.2, 0.5)
 MOST_NEAR_PLACES, NEAR_NEIGHBOURS = 2000, 10
+# Waypoints that are asked at once whether they can be reached straight
+STRAIGHT_AT_ONCE = 8
 # Nodes about a place that may be reached straight, the nearest of all
 NODES_TRIED = 24
 # Where along a way it is looked whether there is room, the middle first: what is blocked there needs no second look
@@ -194,24 +196,31 @@ class Ways:
 
         What is not known yet may stand out of the body: a way keeps off it where one can.
         """
-        straight, way = way_between(before, after, self.tip_radius), None
+        straight = way_between(before, after, self.tip_radius)
+        nodes, near = None, None
         for room in (DETAIL_ROOM * self.tip_radius, 0.0):
             if self._sound(*straight, room):
                 return None
-            for found in (self._near, self._far):
-                way = found(before, after, room)
-                if way is not None and self._sound(way.path, way.approach, room):
-                    return way
-        return self._near(before, after, 0.0)
+            nodes = self._over_roadmap(before, after) if nodes is None else nodes
+            near = self._near(before, after, nodes, room) if len(nodes) else None
+            if near is not None and self._sound(near.path, near.approach, room):
+                return near
+            far = self._far(before, after, room)
+            if far is not None and self._sound(far.path, far.approach, room):
+                return far
+        return near
 
-    def _near(self, before: Move, after: Move, room: float) -> Move | None:
-        """The shortest way of the ball between two moves, the stem turned as it goes; None if there is none."""
-        straight, begun, ended = gap(before, after, self.tip_radius), before.approach[-1], after.approach[0]
-        first, last = self._out(straight[0], -begun), self._out(straight[1], -ended)
+    def _over_roadmap(self, before: Move, after: Move) -> FloatArray:
+        """Waypoints (K, 3) of the ball's shortest way between two moves over the roadmap; none if there is none."""
+        begin, stop = gap(before, after, self.tip_radius)
+        first, last = self._out(begin, -before.approach[-1]), self._out(stop, -after.approach[0])
         between = self._between(first[-1], last[-1])
-        if between is None:
-            return None
-        path = dense(self._shortened(np.concatenate([first, between, last[::-1]]), room), self.tip_radius)
+        return np.zeros((0, 3)) if between is None else np.concatenate([first, between, last[::-1]])
+
+    def _near(self, before: Move, after: Move, nodes: FloatArray, room: float) -> Move:
+        """The way of the ball along waypoints (K, 3) between two moves, shortened, the stem turned as it goes."""
+        begun, ended = before.approach[-1], after.approach[0]
+        path = dense(self._shortened(nodes, room), self.tip_radius)
         wanted = -self.base.foot(path, self.tip_radius).normals
         wanted[0], wanted[-1] = begun, ended
         approach = replace(self.carrier, radius=self.carrier.radius + room).turned(path, wanted, np.pi)
@@ -401,11 +410,20 @@ class Ways:
 
     def _shortened(self, path: FloatArray, room: float) -> FloatArray:
         """The path without the waypoints that a straight way can leave out."""
-        kept, here = [0], 0
-        while here < len(path) - 1:
-            onward = len(path) - 1
-            while onward > here + 1 and not self.free(path[[here, onward]], room):
-                onward -= 1
-            kept.append(onward)
-            here = onward
+        kept = [0]
+        while kept[-1] < len(path) - 1:
+            kept.append(self._farthest(path, kept[-1], room))
         return path[kept]
+
+    def _farthest(self, path: FloatArray, here: int, room: float) -> int:
+        """The farthest waypoint that can be reached straight from one of them; the next one if none can."""
+        beyond = np.arange(len(path) - 1, here + 1, -1)
+        # a few at once: asking for each by itself takes longer than the asking
+        for some in np.split(beyond, np.arange(STRAIGHT_AT_ONCE, len(beyond), STRAIGHT_AT_ONCE)):
+            ways = [dense(path[[here, onward]], FREE_SPACING * self.tip_radius) for onward in some]
+            free = self.carrier.ball_is_free(np.concatenate([np.zeros((0, 3)), *ways]), room or None)
+            starts = np.cumsum([0, *(len(way) for way in ways)])
+            for onward, start, stop in zip(some, starts[:-1], starts[1:], strict=True):
+                if free[start:stop].all():
+                    return int(onward)
+        return here + 1
