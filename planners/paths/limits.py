@@ -129,8 +129,11 @@ class Limits:
         return Carrier(base, self.tip_radius, self.stem_radius, self.stem_length, felt=self.felt)
 
     def _way(self, before: Move, move: Move, base: Base) -> str | None:
-        """Ball and stem on their way from the end of one move to the beginning of the next."""
-        deepest = sunk(gap(before, move, self.tip_radius), self._carrier(base))
+        """Ball and stem on their way from the end of one move to the beginning of the next, as the model has it.
+
+        A finger backs off from where it was felt to rest, which details make farther out than it was commanded to.
+        """
+        deepest = sunk(gap(before, move, self.tip_radius), replace(self._carrier(base), felt=None))
         if deepest > MOST_SINKING * self.tip_radius:
             return f"the way from the move before sinks {length_text(deepest)} into the body"
         way = way_between(before, move, self.tip_radius)

@@ -18,7 +18,7 @@ from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
 from planners.paths.detour import Detour
 from planners.paths.felt_details import DETAIL_ROOM, FeltDetails
 from planners.paths.room import room_about
-from planners.paths.sound import BACK_OFF_DISTANCE, can_be_left, resampled, sound_parts
+from planners.paths.sound import BACK_OFF_DISTANCE, can_be_left, resampled, resting_at_its_ends, sound_parts
 
 # Places of a way lie at most so far apart where it is looked whether it is free, in tip radii
 FREE_SPACING = 0.25
@@ -37,6 +37,8 @@ NEAR_LIFTS = (0.2, 0.5)
 MOST_NEAR_PLACES, NEAR_NEIGHBOURS = 2000, 10
 # Waypoints that are asked at once whether they can be reached straight
 STRAIGHT_AT_ONCE = 8
+# Samples whose mean tells where a sweep ended
+LAST_SAMPLES = 8
 # Nodes about a place that may be reached straight, the nearest of all
 NODES_TRIED = 24
 # Where along a way it is looked whether there is room, the middle first: what is blocked there needs no second look
@@ -103,10 +105,12 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
         parts = [move]
         if check is not None and move.purpose == "sweep" and (check(move) or not can_be_left(move, ways.carrier)):
             parts = sound_parts(move, ways.carrier) or [move]
+        if check is not None and move.purpose == "sweep":
+            parts = [resting_at_its_ends(part, ways.carrier) for part in parts]
         felt, made = [], []
         for part in parts:
             answer, travelled, done = yield from _reached(part, before, ways)
-            before = done or travelled or before
+            before = _as_felt(done, answer, ways.carrier) if done is not None else travelled or before
             if ways.felt is not None:
                 ways.felt.learn(answer, part.speed)
             if done is not None:
@@ -128,6 +132,19 @@ def _same_way(one: Move, other: Move) -> bool:
         np.array_equal(one.path[::turn], other.path) and np.array_equal(one.approach[::turn], other.approach)
         for turn in (1, -1)
     )
+
+
+def _as_felt(move: Move, felt: Trace, carrier: Carrier) -> Move:
+    """A sweep that ends where the ball was felt to rest, if that lies farther out: from there a finger backs off."""
+    if move.purpose != "sweep" or not len(felt):
+        return move
+    end, back = move.path[-1], -move.approach[-1]
+    off = felt.centers[-LAST_SAMPLES:].mean(axis=0) - end
+    lift = float(off @ back)
+    if lift <= 0.0 or np.linalg.norm(off - lift * back) > FREE_SPACING * felt.tip_radius:  # it left the body before
+        return move
+    rested = replace(move, path=np.concatenate([move.path[:-1], (end + lift * back)[None]]))
+    return rested if can_be_left(rested, carrier) else move
 
 
 def _reached(

@@ -22,7 +22,7 @@ from planners.paths.detour import Detour
 from planners.paths.felt_details import DETAIL_ROOM, FeltDetails
 from planners.paths.limits import Limits
 from planners.paths.reach import reachable
-from planners.paths.sound import can_be_left, held_up, sound_parts
+from planners.paths.sound import can_be_left, held_up, resting_at_its_ends, sound_parts
 from planners.paths.travel import Ways, dense, gap, routed
 from planners.plan import Outcome, Parted, Plan, Refused, executed
 
@@ -273,7 +273,8 @@ def test_a_stem_passes_a_sharp_edge_without_sinking_into_it(height: float) -> No
     assert left and not any(map(limits.violation, away, left))
 
 
-def test_a_way_keeps_out_of_what_a_sweep_felt() -> None:
+def flat_and_hill() -> tuple[Surface, Surface]:
+    """A plate of 40 x 40 mm, and the same with a hill 2.4 mm high in its middle."""
     x, y = np.meshgrid(np.linspace(-20e-3, 20e-3, 121), np.linspace(-20e-3, 20e-3, 121), indexing="ij")
     corner = np.arange(120)[:, None] * 121 + np.arange(120)
     a, b, c, d = (each.ravel() for each in (corner, corner + 121, corner + 122, corner + 1))
@@ -282,6 +283,11 @@ def test_a_way_keeps_out_of_what_a_sweep_felt() -> None:
         Surface(np.column_stack([x.ravel(), y.ravel(), height.ravel()]), faces)
         for height in (np.zeros_like(x), 2.4e-3 * np.exp(-0.5 * (x**2 + y**2) / 3e-3**2))
     )
+    return flat, hill
+
+
+def test_a_way_keeps_out_of_what_a_sweep_felt() -> None:
+    flat, hill = flat_and_hill()
     base, down = Base(flat), np.array([0.0, 0.0, -1.0])
     over, left, right = (
         sweep([start, y, 2.94], [stop, y, 2.94], down) for start, stop, y in ((-12, 12, 0), (-12, -6, 0), (6, 12, 0))
@@ -332,3 +338,18 @@ def test_a_plan_is_told_where_the_ball_ran_into_something() -> None:
     drive(plan(), finger().execute, empty=EMPTY)
     assert isinstance(answers[0], Refused) and answers[0].touching is not None
     assert 5e-3 < answers[0].touching[0] < 6e-3 + R
+
+
+def test_a_sweep_ends_where_the_other_wall_of_a_corner_holds_the_ball_up() -> None:
+    slope = np.radians(25.0)
+    corners = 1e-3 * np.array([[-30, -20, 0], [0, -20, 0], [30, -20, 0], [-30, 20, 0], [0, 20, 0], [30, 20, 0]])
+    corners[:, 2] = np.abs(corners[:, 0]) * np.tan(slope)
+    base = Base(Surface(corners, [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]))
+    along, up = np.array([np.cos(slope), 0.0, -np.sin(slope)]), np.array([np.sin(slope), 0.0, np.cos(slope)])
+    path = np.array([[-12e-3], [-0.5e-3]]) * along + 0.98 * R * up
+    move, carrier = Move(path, -up), Carrier.of(base, R)
+    assert base.foot(path[-1:], R).height[0] < -0.2 * R
+    ended = resting_at_its_ends(move, carrier)
+    assert np.array_equal(ended.path[0], path[0])
+    assert -0.03 * R < base.foot(ended.path[-1:], R).height[0] < 0.0
+    assert np.linalg.norm(np.cross(ended.path[-1] - path[-1], up)) < 1e-9
