@@ -5,6 +5,7 @@ Everything follows from the numbers below, so a second run writes the same bytes
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -255,6 +256,13 @@ SOLIDS: dict[str, tuple[Solid, FloatArray, FloatArray]] = {
     "double_ring": (double_ring, np.array([-0.046, -0.028, -0.010]), np.array([0.046, 0.028, 0.010])),
     "folds": (folds, np.array([-0.032, -0.036, -0.038]), np.array([0.037, 0.032, 0.038])),
 }
+# Where fins begin and end, mm, with gaps between them of 4 mm, into which a tip of 3 mm does not fit, 10 and 12 mm
+HEAT_SINK: Sizes = {
+    "fins": ((0.0, 6.0), (10.0, 16.0), (26.0, 32.0), (44.0, 50.0)),
+    "foot": 8e-3,
+    "tall": 24e-3,
+    "long": 44e-3,
+}
 LEVEL_SET_SPACING = 2e-3
 BODY_TIP_RADIUS = 3e-3
 
@@ -262,11 +270,25 @@ BODY_TIP_RADIUS = 3e-3
 def make_bodies() -> None:
     """Closed bodies with concave parts, each alone and with details laid on at places of chance."""
     meshes = {name: level_set(solid, low, high, LEVEL_SET_SPACING) for name, (solid, low, high) in SOLIDS.items()}
-    for name, mesh in (meshes | {"holed_plate": holed_plate(**PLATE_WITH_HOLE)}).items():
+    meshes |= {"holed_plate": holed_plate(**PLATE_WITH_HOLE), "heat_sink": heat_sink()}
+    for name, mesh in meshes.items():
         details = drawn_details(Surface(*mesh), BODY_TIP_RADIUS, np.random.default_rng(BODY_BUILDING_SEEDS[0]))
         write_mesh(f"bodies/{name}", mesh)
         write_mesh(f"bodies/{name}_with_details", laid_on(mesh, details))
         write_truth(name, [laid_truth(each) for each in details])
+
+
+def heat_sink() -> Mesh:
+    """A foot with fins along z that stand on it, inner corners and edges sharp."""
+    sides = 1e-3 * np.array(HEAT_SINK["fins"])
+    x = np.concatenate([np.linspace(a, b, 4)[:-1] for a, b in pairwise(sides.ravel())] + [sides[-1, -1:]])
+    y = np.concatenate(
+        [np.linspace(0.0, HEAT_SINK["foot"], 4)[:-1], np.linspace(HEAT_SINK["foot"], HEAT_SINK["tall"], 7)]
+    )
+    middle_x, middle_y = 0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1])
+    in_fin = ((middle_x[:, None] > sides[:, 0]) & (middle_x[:, None] < sides[:, 1])).any(axis=1)
+    solid = in_fin[:, None] | (middle_y < HEAT_SINK["foot"])[None, :]
+    return extruded(x, y, np.linspace(-0.5, 0.5, 15) * HEAT_SINK["long"], solid)
 
 
 def laid_truth(detail: Detail) -> dict[str, object]:

@@ -1,5 +1,12 @@
 """Errors of the hw package."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mapping import FloatArray
+
 
 class FingerError(RuntimeError):
     """A finger that cannot be opened, refuses a move, or lost its connection; says what to do."""
@@ -10,7 +17,16 @@ class LinkError(FingerError):
 
 
 class StoppedError(FingerError):
-    """The finger was stopped while it moved, by a limit, an alarm or the operator; says by which and what to do."""
+    """The finger was stopped while it moved, by a limit, an alarm or the operator; says by which and what to do.
+
+    Args:
+        why: the sentence.
+        touching: (3,) centre of the ball where it ran into something, m; None: it did not, or nobody knows.
+    """
+
+    def __init__(self, why: str, touching: FloatArray | None = None) -> None:
+        super().__init__(why)
+        self.touching = touching
 
 
 class NotFeltError(StoppedError):

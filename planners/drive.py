@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import islice
 
-from hw import FingerError, Move
+from hw import FingerError, Move, StoppedError
 from mapping import Trace, TraceError
 from planners.plan import Outcome, Plan, Refused
 
@@ -47,12 +47,13 @@ def drive(
             last = record[-1][0] if record else None
             reason = check(move, last) if check else None
             forbidden = forbidden + 1 if reason else 0
-            trace = None
+            trace = touching = None
             if reason is None:
                 try:
                     trace, refused = execute(move), 0
                 except (FingerError, TraceError) as error:
                     reason, refused = str(error), refused + 1
+                    touching = error.touching if isinstance(error, StoppedError) else None
             if trace is None:
                 if refused_move:
                     refused_move(move, reason or "")
@@ -61,7 +62,8 @@ def drive(
                 if refused >= MOST_REFUSALS or forbidden >= FORBIDDEN or (not record and empty is None):
                     plan.close()
                     return record, Outcome("finger refuses", f"{_moves(max(refused, forbidden))} refused: {reason}")
-                trace = Refused.because(reason or "", (empty if empty is not None else record[-1][1]).tip_radius)
+                tip_radius = (empty if empty is not None else record[-1][1]).tip_radius
+                trace = Refused.because(reason or "", tip_radius, touching)
             else:
                 record.append((move, trace))
             move = plan.send(trace)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hw import Move
-from mapping import Trace
+from mapping import FloatArray, Trace
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,17 @@ class Refused(Trace):
 
     Args:
         reason: one sentence.
+        touching: (3,) centre of the ball where it ran into something, m; None: it did not.
     """
 
     reason: str = ""
+    touching: FloatArray | None = None
 
     @classmethod
-    def because(cls, reason: str, tip_radius: float) -> Refused:
+    def because(cls, reason: str, tip_radius: float, touching: FloatArray | None = None) -> Refused:
         """Refused for a reason, by a finger with that tip radius (m)."""
-        return cls(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), tip_radius, reason=reason)
+        nothing = np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
+        return cls(*nothing, tip_radius, reason=reason, touching=touching)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from mapping.arrays import FloatArray
 from mapping.surface import Surface
 
 ASSETS = Path(__file__).parents[1] / "assets"
-BODIES = ("bowl", "double_ring", "folds", "holed_plate", "vase")
+BODIES = ("bowl", "double_ring", "folds", "heat_sink", "holed_plate", "vase")
 NAMES = ("bump_of_revolution", "empty_plate", "mug", "step", "wire_on_plate", *BODIES)
 
 
@@ -169,7 +169,8 @@ def test_the_mug_s_details_are_where_the_truth_says() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "genus"), [("bowl", 0), ("folds", 0), ("holed_plate", 1), ("vase", 1), ("double_ring", 2)]
+    ("name", "genus"),
+    [("bowl", 0), ("folds", 0), ("holed_plate", 1), ("vase", 1), ("double_ring", 2), ("heat_sink", 0)],
 )
 def test_a_body_is_closed_and_has_its_handles(name: str, genus: int) -> None:
     for surface in (scene(name).object_surface(), known(name)):

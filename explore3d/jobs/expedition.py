@@ -22,7 +22,7 @@ from mapping.base import Base
 from mapping.geometry.mesh import asked_part
 from planners import Outcome, Plan, Spent, drive, within
 from planners.explore import Discover, Explore, Locate, SurveyCount
-from planners.paths import Limits, Ways, routed
+from planners.paths import FeltDetails, Limits, Ways, routed
 
 if TYPE_CHECKING:
     from explore3d.scene import Scene
@@ -264,8 +264,9 @@ class Explorer:
         return Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), self.tip_radius)
 
     def limits(self, base: Base | None) -> Limits:
-        """What every move must keep to."""
-        return Limits.of(self.workspace, base, self.tip_radius)
+        """What every move must keep to: off the base, and off what the moves feel to stand out of it."""
+        felt = None if base is None else FeltDetails(base, self.tip_radius)
+        return Limits.of(self.workspace, base, self.tip_radius, felt)
 
     def prepared(
         self, plan: Plan, base: Base | None, spent: Spent, seconds: float, limits: Limits | None = None
@@ -278,10 +279,10 @@ class Explorer:
         plan = within(plan, spent, seconds)
         if base is None:
             return plan
-        space = self.workspace
-        ways = Ways(base, self.tip_radius, space.low, space.high, space.max_speed)
+        space, limits = self.workspace, limits or self.limits(base)
+        ways = Ways(base, self.tip_radius, space.low, space.high, space.max_speed, limits.felt)
         ways.make_ready()
-        return routed(plan, ways, (limits or self.limits(base)).violation)
+        return routed(plan, ways, limits.violation)
 
     def carry_out(
         self, plan: Plan, base: Base | None, execute: Execute, event: Event = unheard, seconds: float = np.inf

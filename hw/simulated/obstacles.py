@@ -65,8 +65,12 @@ class Obstacles:
         depth = radius - self.nearest.query(points).distance
         hit = depth > YIELDS * self.tip_radius
         if hit.any():
-            where = place_text(centers[hit.argmax()], self.tip_radius)
-            raise StoppedError(f"{what} runs into the body with the ball at {where}; the finger has drawn back")
+            center = centers[hit.argmax()]
+            where = place_text(center, self.tip_radius)
+            raise StoppedError(
+                f"{what} runs into the body with the ball at {where}; the finger has drawn back",
+                center if points is centers else None,
+            )
 
 
 def pressed_from(

@@ -6,6 +6,7 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from planners.paths.carrier import Carrier as Carrier
+    from planners.paths.felt_details import FeltDetails as FeltDetails
     from planners.paths.isolines import Isoline as Isoline, isolines as isolines
     from planners.paths.limits import Limits as Limits
     from planners.paths.pressed_path import (
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "carrier": ("Carrier",),
+    "felt_details": ("FeltDetails",),
     "isolines": ("Isoline", "isolines"),
     "limits": ("Limits",),
     "pressed_path": ("PRESS", "pressed_sweep", "thinned", "touched_points"),

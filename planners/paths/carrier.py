@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from mapping import BoolArray, FloatArray
 from mapping.base import Base
+from planners.paths.felt_details import FeltDetails
 from planners.paths.room import Room, room_about
 
-# Places along the stem's axis that are looked at; the first lies where a stem half as thick leaves the ball's shadow
-STEM_PLACES, STEM_START = 6, 1.5
-# Which of them are asked first whether the stem is free: the middle tells most of the others, then those that it tells
-# least
-STEM_ORDER = (3, 0, 5, 1, 4, 2)
+# Where along its axis the stem is looked at, in tip radii: it begins where one half as thick leaves the ball's shadow,
+# and a sharp edge between two places sinks at most 0.5 - sqrt(0.5^2 - 0.1875^2) = 0.037 into it (0.28 with places 0.9
+# apart). Drawn back it is looked at in the same places: who finds that a place can be left may leave it
+STEM_START, STEM_PLACES_APART = 1.5, 0.375
 # How far a ball may sink into the base on its way through free space, in tip radii; a way that is planned keeps 0.02
 # free of that even between places a quarter of a radius apart (0.25^2 / 8 = 0.008)
 MOST_SINKING, FREE_SINKING = 0.05, 0.02
@@ -36,6 +36,7 @@ class Carrier:
         tip_radius: of the ball, m.
         radius, length: of the stem, m, measured from the ball's centre.
         backing: so far the ball must be able to draw back along the stem, m.
+        felt: what is known to stand out of the body; None: nothing is.
     """
 
     base: Base
@@ -43,35 +44,48 @@ class Carrier:
     radius: float
     length: float
     backing: float = 0.0
+    felt: FeltDetails | None = None
 
     @classmethod
-    def of(cls, base: Base, tip_radius: float) -> Carrier:
+    def of(cls, base: Base, tip_radius: float, felt: FeltDetails | None = None) -> Carrier:
         """A stem half as thick as the ball and three balls long."""
-        return cls(base, tip_radius, 0.5 * tip_radius, 6.0 * tip_radius)
+        return cls(base, tip_radius, 0.5 * tip_radius, 6.0 * tip_radius, felt=felt)
+
+    def height(self, places: FloatArray, radius: float) -> FloatArray:
+        """(N,) how far balls of a radius (m) at places (N, 3) are off the body and what stands out of it, m.
+
+        Exact where it is less than a tip radius.
+        """
+        height = self.base.foot(places, radius).height
+        if self.felt is None:
+            return height
+        return np.minimum(height, self.felt.distance(places, radius + self.tip_radius) - radius)
 
     def clearance(self, path: FloatArray, approach: FloatArray) -> FloatArray:
         """(K,) distance of the stem's surface from the body at ball centres (K, 3) and approaches (K, 3), m.
 
-        With `backing` the stem is so much longer, and the room that the ball drawn back has may be less than its own.
+        With `backing` that of the stem drawn back counts, too, and the room that the ball has there.
 
         No place is nearer to the body than the stem's middle by more than it lies from it: where that leaves a place
         free, the body is not asked, and a free stem's distance is this bound from below. In the open the middle tells
-        all six.
+        of all places.
         """
         if self.length <= 0:
             return np.full(len(path), np.inf)
-        back = np.linspace(STEM_START * self.tip_radius, self.length + self.backing, STEM_PLACES)
+        back = self._back
         stem = path[:, None, :] - back[None, :, None] * approach[:, None, :]
-        middle = STEM_PLACES // 2
-        known = self.base.foot(stem[:, middle], self.radius).height
+        middle = len(back) // 2
+        known = self.height(stem[:, middle], self.radius)
         height = known[:, None] - np.abs(back - back[middle])
         ask = height < 0
         ask[:, middle] = False
-        height[ask] = self.base.foot(stem[ask], self.radius).height
+        height[ask] = self.height(stem[ask], self.radius)
+        least = height.min(axis=1)
         if self.backing > 0:
-            drawn = self.base.foot(path - self.backing * approach, self.tip_radius).height
-            height[:, 0] = np.minimum(height[:, 0], drawn + FREE_SINKING * self.tip_radius)
-        return np.asarray(height.min(axis=1))
+            drawn = path - self.backing * approach
+            ball = self.height(drawn, self.tip_radius) + FREE_SINKING * self.tip_radius
+            least = np.minimum(least, np.minimum(ball, replace(self, backing=0.0).clearance(drawn, approach)))
+        return np.asarray(least)
 
     def is_free(self, path: FloatArray, approach: FloatArray) -> BoolArray:
         """(K,) True where the `clearance` is not negative.
@@ -82,8 +96,8 @@ class Carrier:
         free = np.ones(len(path), dtype=bool)
         if self.length <= 0:
             return free
-        back = np.linspace(STEM_START * self.tip_radius, self.length + self.backing, STEM_PLACES)
-        left, bound = np.arange(len(path)), np.full((len(path), STEM_PLACES), -np.inf)
+        back = self._back
+        left, bound = np.arange(len(path)), np.full((len(path), len(back)), -np.inf)
         if self.room is not None:
             stem = path[:, None, :] - back[:, None] * approach[:, None, :]
             least, most = (each.reshape(bound.shape) for each in self.room.bounds(stem.reshape(-1, 3)))
@@ -91,7 +105,7 @@ class Carrier:
             free[(most < self.radius).any(axis=1)] = False
             left = np.flatnonzero(free)
             bound = bound[left]
-        for k in STEM_ORDER:
+        for k in _farthest_first(len(back)):
             which = np.flatnonzero(bound[:, k] < 0)
             if not len(which):
                 continue
@@ -101,20 +115,41 @@ class Carrier:
             free[left[blocked]] = False
             if len(blocked):
                 left, bound = np.delete(left, blocked), np.delete(bound, blocked, axis=0)
+        if self.felt is not None and len(left):
+            stem = path[left, None, :] - back[:, None] * approach[left, None, :]
+            off = self.felt.distance(stem.reshape(-1, 3), self.radius).reshape(len(left), -1)
+            free[left] = (off >= self.radius).all(axis=1)
         if self.backing > 0:
-            free[left] = self.ball_is_free(path[left] - self.backing * approach[left])
+            left = np.flatnonzero(free)
+            drawn = path[left] - self.backing * approach[left]
+            free[left] = self.ball_is_free(drawn)
+            left, drawn = left[free[left]], drawn[free[left]]
+            free[left] = replace(self, backing=0.0).is_free(drawn, approach[left])
         return free
+
+    @property
+    def _back(self) -> FloatArray:
+        """(S,) how far behind the ball's centre the stem is looked at, m."""
+        begin, spacing = STEM_START * self.tip_radius, STEM_PLACES_APART * self.tip_radius
+        return np.linspace(begin, self.length, max(2, 1 + int(np.ceil((self.length - begin) / spacing - 1e-9))))
 
     def ball_is_free(self, places: FloatArray, room: float | None = None) -> BoolArray:
         """(N,) True where a ball at the places (N, 3) is so far off the body (m); None: sinks no deeper into it than
         FREE_SINKING tip radii."""
         far = self.tip_radius + (-FREE_SINKING * self.tip_radius if room is None else room)
         if self.room is None:
-            return np.asarray(self.base.foot(places, far).height >= 0.0)
+            return self._clear(self.base.foot(places, far).height >= 0.0, places, far)
         least, most = self.room.bounds(places)
         free, ask = least >= far, np.flatnonzero((least < far) & (most >= far))
         free[ask] = self.base.foot(places[ask], far).height >= 0.0
-        return np.asarray(free)
+        return self._clear(free, places, far)
+
+    def _clear(self, free: BoolArray, places: FloatArray, far: float) -> BoolArray:
+        """(N,) what is free of the body, and so far (m) off what stands out of it, too."""
+        if self.felt is not None:
+            ask = np.flatnonzero(free)
+            free[ask] = self.felt.distance(places[ask], far) >= far
+        return free
 
     def turned(self, path: FloatArray, approach: FloatArray, most: float, may: BoolArray | None = None) -> FloatArray:
         """The approaches (K, 3), turned where the stem would touch the body, as little and as evenly as will do.
@@ -155,6 +190,16 @@ class Carrier:
     def lattice(self) -> FloatArray:
         """(M, 3) unit vectors spread evenly over the sphere."""
         return spread_evenly(LATTICE_DIRECTIONS)
+
+
+@lru_cache
+def _farthest_first(count: int) -> tuple[int, ...]:
+    """The numbers below a count, from the middle on, each as far as can be from those before it."""
+    order = [count // 2]
+    while len(order) < count:
+        off = np.abs(np.arange(count)[:, None] - order).min(axis=1)
+        order.append(int(off.argmax()))
+    return tuple(order)
 
 
 def _course(cost: FloatArray, choices: FloatArray) -> list[int]:

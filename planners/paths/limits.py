@@ -11,6 +11,7 @@ from hw import Move, Workspace
 from mapping import FloatArray, length_text
 from mapping.base import Base
 from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
+from planners.paths.felt_details import FeltDetails
 from planners.paths.sound import FIELD, PRESSED, held_up, resampled
 from planners.paths.travel import gap, sunk, way_between
 
@@ -30,6 +31,7 @@ class Limits:
         field: largest angle between the finger's axis and the base's normal in a sweep, rad.
         stem_radius: of the straight stem behind the ball, m.
         stem_length: of the stem that is checked, m.
+        felt: what is known to stand out of the model; None: nothing is.
     """
 
     workspace: Workspace
@@ -38,11 +40,12 @@ class Limits:
     field: float = FIELD
     stem_radius: float = 0.0
     stem_length: float = 0.0
+    felt: FeltDetails | None = None
 
     @classmethod
-    def of(cls, workspace: Workspace, base: Base | None, tip_radius: float) -> Limits:
+    def of(cls, workspace: Workspace, base: Base | None, tip_radius: float, felt: FeltDetails | None = None) -> Limits:
         """Limits with a stem half as thick as the ball and three balls long."""
-        return cls(workspace, base, tip_radius, stem_radius=0.5 * tip_radius, stem_length=6.0 * tip_radius)
+        return cls(workspace, base, tip_radius, stem_radius=0.5 * tip_radius, stem_length=6.0 * tip_radius, felt=felt)
 
     def violation(self, move: Move, before: Move | None = None) -> str | None:
         """What is wrong with the move, and the way to it from the one before it, as a sentence; None if nothing is."""
@@ -103,7 +106,7 @@ class Limits:
             if highest <= PRESSED * self.tip_radius:
                 return None
             return f"another part of the body is in the sweep's way and holds the ball up by {length_text(highest)}"
-        deepest = sunk(move.path, base, self.tip_radius)
+        deepest = sunk(move.path, self._carrier(base))
         if deepest <= MOST_SINKING * self.tip_radius:
             return None
         return f"the way through free space sinks {length_text(deepest)} into the body"
@@ -115,16 +118,22 @@ class Limits:
         return self._stem_sinks("the stem behind the ball", path, approach, base)
 
     def _stem_sinks(self, what: str, path: FloatArray, approach: FloatArray, base: Base) -> str | None:
-        carrier = Carrier(base, self.tip_radius, self.stem_radius, self.stem_length)
+        carrier = self._carrier(base)
         allowed = FREE_SINKING * self.tip_radius
         if replace(carrier, radius=self.stem_radius - allowed).is_free(path, approach).all():
             return None
         clearance = float(carrier.clearance(path, approach).min())
         return f"{what} sinks {length_text(-clearance)} into the body" if clearance < -allowed else None
 
+    def _carrier(self, base: Base) -> Carrier:
+        return Carrier(base, self.tip_radius, self.stem_radius, self.stem_length, felt=self.felt)
+
     def _way(self, before: Move, move: Move, base: Base) -> str | None:
-        """Ball and stem on their way from the end of one move to the beginning of the next."""
-        deepest = sunk(gap(before, move, self.tip_radius), base, self.tip_radius)
+        """Ball and stem on their way from the end of one move to the beginning of the next, as the model has it.
+
+        A finger backs off from where it was felt to rest, which details make farther out than it was commanded to.
+        """
+        deepest = sunk(gap(before, move, self.tip_radius), replace(self._carrier(base), felt=None))
         if deepest > MOST_SINKING * self.tip_radius:
             return f"the way from the move before sinks {length_text(deepest)} into the body"
         way = way_between(before, move, self.tip_radius)

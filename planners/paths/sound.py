@@ -13,6 +13,8 @@ from mapping import BoolArray, FloatArray, IntArray
 from mapping.base import Base
 from mapping.geometry.contact import BallContact
 from planners.paths.carrier import FREE_SINKING, Carrier
+from planners.paths.felt_details import DETAIL_ROOM
+from planners.paths.pressed_path import PRESS
 
 # The sensor's field about its axis (paper, section 4)
 FIELD = float(np.radians(75.0))
@@ -26,8 +28,6 @@ PRESSED = 0.5
 RIDDEN = float(np.radians(65.0))
 # Room between the ball and a wall beside its way, in tip radii: poses and meshes are not better known
 WALL_ROOM = 0.03
-# Room for ball and stem where there is any: a detail that is not known yet may stand out by as much, in tip radii
-DETAIL_ROOM = 1.0 / 6.0
 # Waypoints are looked at so close together, and stretches shorter than that are not worth a sweep, in tip radii
 SOUND_SPACING, SHORTEST_PART = 0.2, 0.3
 # How far a finger backs off before it goes elsewhere, in tip radii (hw.probing.grbl_finger does the same)
@@ -63,6 +63,26 @@ def sound_parts(move: Move, carrier: Carrier) -> list[Move]:
     stretches = (part for run in runs(free) for part in _left(path[run], approach[run], leaving))
     parts = (replace(move, path=part[0], approach=part[1]) for part in stretches if len(part[0]) > 1)
     return [part for part in parts if part.length >= SHORTEST_PART * tip]
+
+
+def resting_at_its_ends(move: Move, carrier: Carrier) -> Move:
+    """A sweep whose ends are commanded to where the model holds the ball up; itself if it is not held up there,
+    or if it could not be left from there or would lean on another wall than it is pressed against.
+
+    In an inner corner a path that is pressed against one wall may run up to half a radius beneath where the other lets
+    the ball come. What it feels is the same; but from there a finger backs off, and comes to there.
+    """
+    ends = np.array([0, -1])
+    held = held_up(move.path[ends], move.approach[ends], carrier.base, carrier.tip_radius)
+    lift = held - PRESS * carrier.tip_radius
+    if (lift <= WALL_ROOM * carrier.tip_radius).all() or (held > PRESSED * carrier.tip_radius).any():
+        return move  # it rests there already, or what holds it up is a wall
+    path = move.path.copy()
+    path[ends] -= np.maximum(lift, 0.0)[:, None] * move.approach[ends]
+    raised = replace(move, path=path)
+    normals = carrier.base.foot(path[ends], carrier.tip_radius).normals
+    in_field = -np.einsum("ij,ij->i", normals, move.approach[ends]) >= np.cos(FIELD)
+    return raised if in_field.all() and can_be_left(raised, carrier) else move
 
 
 def can_be_left(move: Move, carrier: Carrier) -> bool:

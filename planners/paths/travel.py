@@ -16,8 +16,9 @@ from mapping.detection import face_samples
 from planners import Outcome, Parted, Plan, Refused
 from planners.paths.carrier import FREE_SINKING, MOST_SINKING, Carrier
 from planners.paths.detour import Detour
+from planners.paths.felt_details import DETAIL_ROOM, FeltDetails
 from planners.paths.room import room_about
-from planners.paths.sound import BACK_OFF_DISTANCE, DETAIL_ROOM, can_be_left, resampled, sound_parts
+from planners.paths.sound import BACK_OFF_DISTANCE, can_be_left, resampled, resting_at_its_ends, sound_parts
 
 # Places of a way lie at most so far apart where it is looked whether it is free, in tip radii
 FREE_SPACING = 0.25
@@ -34,6 +35,10 @@ OUT_DISTANCE = 6.0
 # and how many neighbours of each are tried
 NEAR_LIFTS = (0.2, 0.5)
 MOST_NEAR_PLACES, NEAR_NEIGHBOURS = 2000, 10
+# Waypoints that are asked at once whether they can be reached straight
+STRAIGHT_AT_ONCE = 8
+# Samples whose mean tells where a sweep ended
+LAST_SAMPLES = 8
 # Nodes about a place that may be reached straight, the nearest of all
 NODES_TRIED = 24
 # Where along a way it is looked whether there is room, the middle first: what is blocked there needs no second look
@@ -54,12 +59,13 @@ def gap(before: Move, after: Move, tip_radius: float) -> FloatArray:
     return np.stack([before.path[-1] - first * before.approach[-1], after.path[0] - last * after.approach[0]])
 
 
-def sunk(path: FloatArray, base: Base, tip_radius: float) -> float:
-    """How deep a ball on a polyline (K, 3) may sink into the base at the deepest, m; 0 where it stays free.
+def sunk(path: FloatArray, carrier: Carrier) -> float:
+    """How deep a ball on a polyline (K, 3) may sink into the body at the deepest, m; 0 where it stays free.
 
     It is looked at every FREE_SPACING tip radii: round an edge it may sink FREE_SPACING^2 / 8 of them deeper between.
     """
-    lowest = float(base.foot(dense(path, FREE_SPACING * tip_radius), tip_radius).height.min())
+    tip_radius = carrier.tip_radius
+    lowest = float(carrier.height(dense(path, FREE_SPACING * tip_radius), tip_radius).min())
     return max(0.0, FREE_SPACING**2 / 8.0 * tip_radius - lowest) if lowest < 0.0 else 0.0
 
 
@@ -99,10 +105,14 @@ def routed(plan: Plan, ways: Ways, check: Callable[[Move], str | None] | None = 
         parts = [move]
         if check is not None and move.purpose == "sweep" and (check(move) or not can_be_left(move, ways.carrier)):
             parts = sound_parts(move, ways.carrier) or [move]
+        if check is not None and move.purpose == "sweep":
+            parts = [resting_at_its_ends(part, ways.carrier) for part in parts]
         felt, made = [], []
         for part in parts:
             answer, travelled, done = yield from _reached(part, before, ways)
-            before = done or travelled or before
+            before = _as_felt(done, answer, ways.carrier) if done is not None else travelled or before
+            if ways.felt is not None:
+                ways.felt.learn(answer, part.speed)
             if done is not None:
                 felt.append(answer)
                 made.extend([done] if travelled is None else [travelled, done])
@@ -122,6 +132,19 @@ def _same_way(one: Move, other: Move) -> bool:
         np.array_equal(one.path[::turn], other.path) and np.array_equal(one.approach[::turn], other.approach)
         for turn in (1, -1)
     )
+
+
+def _as_felt(move: Move, felt: Trace, carrier: Carrier) -> Move:
+    """A sweep that ends where the ball was felt to rest, if that lies farther out: from there a finger backs off."""
+    if move.purpose != "sweep" or not len(felt):
+        return move
+    end, back = move.path[-1], -move.approach[-1]
+    off = felt.centers[-LAST_SAMPLES:].mean(axis=0) - end
+    lift = float(off @ back)
+    if lift <= 0.0 or np.linalg.norm(off - lift * back) > FREE_SPACING * felt.tip_radius:  # it left the body before
+        return move
+    rested = replace(move, path=np.concatenate([move.path[:-1], (end + lift * back)[None]]))
+    return rested if can_be_left(rested, carrier) else move
 
 
 def _reached(
@@ -152,6 +175,7 @@ class Ways:
         tip_radius: m.
         low, high: (3,) corners of where the tip's centre may go, m.
         speed: of travel, m/s.
+        felt: what is known to stand out of the body; what the sweeps feel is added to it. None: nothing is kept.
 
     The ways are the shortest over a roadmap of free space: a grid where there is room, and places off the surface
     where the ball fits but the grid is too coarse (Kavraki et al., Probabilistic roadmaps, 1996, with places that
@@ -163,6 +187,7 @@ class Ways:
     low: FloatArray
     high: FloatArray
     speed: float
+    felt: FeltDetails | None = None
 
     def make_ready(self) -> None:
         """Make the roadmaps before the finger waits for them, for a body that is to be felt from more than one side."""
@@ -181,31 +206,38 @@ class Ways:
     @cached_property
     def carrier(self) -> Carrier:
         """The stem behind the ball."""
-        return Carrier.of(self.base, self.tip_radius)
+        return Carrier.of(self.base, self.tip_radius, self.felt)
 
     def round(self, before: Move, after: Move) -> Move | None:
         """The travel between two moves; None where the straight way is free, or where no way was found.
 
         What is not known yet may stand out of the body: a way keeps off it where one can.
         """
-        straight, way = way_between(before, after, self.tip_radius), None
+        straight = way_between(before, after, self.tip_radius)
+        nodes, near = None, None
         for room in (DETAIL_ROOM * self.tip_radius, 0.0):
             if self._sound(*straight, room):
                 return None
-            for found in (self._near, self._far):
-                way = found(before, after, room)
-                if way is not None and self._sound(way.path, way.approach, room):
-                    return way
-        return self._near(before, after, 0.0)
+            nodes = self._over_roadmap(before, after) if nodes is None else nodes
+            near = self._near(before, after, nodes, room) if len(nodes) else None
+            if near is not None and self._sound(near.path, near.approach, room):
+                return near
+            far = self._far(before, after, room)
+            if far is not None and self._sound(far.path, far.approach, room):
+                return far
+        return near
 
-    def _near(self, before: Move, after: Move, room: float) -> Move | None:
-        """The shortest way of the ball between two moves, the stem turned as it goes; None if there is none."""
-        straight, begun, ended = gap(before, after, self.tip_radius), before.approach[-1], after.approach[0]
-        first, last = self._out(straight[0], -begun), self._out(straight[1], -ended)
+    def _over_roadmap(self, before: Move, after: Move) -> FloatArray:
+        """Waypoints (K, 3) of the ball's shortest way between two moves over the roadmap; none if there is none."""
+        begin, stop = gap(before, after, self.tip_radius)
+        first, last = self._out(begin, -before.approach[-1]), self._out(stop, -after.approach[0])
         between = self._between(first[-1], last[-1])
-        if between is None:
-            return None
-        path = dense(self._shortened(np.concatenate([first, between, last[::-1]]), room), self.tip_radius)
+        return np.zeros((0, 3)) if between is None else np.concatenate([first, between, last[::-1]])
+
+    def _near(self, before: Move, after: Move, nodes: FloatArray, room: float) -> Move:
+        """The way of the ball along waypoints (K, 3) between two moves, shortened, the stem turned as it goes."""
+        begun, ended = before.approach[-1], after.approach[0]
+        path = dense(self._shortened(nodes, room), self.tip_radius)
         wanted = -self.base.foot(path, self.tip_radius).normals
         wanted[0], wanted[-1] = begun, ended
         approach = replace(self.carrier, radius=self.carrier.radius + room).turned(path, wanted, np.pi)
@@ -227,9 +259,14 @@ class Ways:
         """True if ball and stem stay free on a way (K, 3), and so far off the body (m) but for its ends."""
         path, approach = resampled(path, approach, FREE_SPACING * self.tip_radius)
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-        off = np.where(np.minimum(along, along[-1] - along) > ENDS * self.tip_radius, room, 0.0)
-        height = self.base.foot(path, self.tip_radius).height + FREE_SINKING * self.tip_radius
-        return bool((height >= off).all() and (self.carrier.clearance(path, approach) >= off).all())
+        inner = np.minimum(along, along[-1] - along) > ENDS * self.tip_radius
+        roomy = replace(self.carrier, radius=self.carrier.radius + room)
+        return bool(
+            self.carrier.ball_is_free(path[~inner]).all()
+            and self.carrier.ball_is_free(path[inner], room - FREE_SINKING * self.tip_radius).all()
+            and self.carrier.is_free(path[~inner], approach[~inner]).all()
+            and roomy.is_free(path[inner], approach[inner]).all()
+        )
 
     @cached_property
     def _detour(self) -> Detour:
@@ -250,7 +287,7 @@ class Ways:
         for directions in (away[None], self.carrier.lattice):
             steps = start + along[:, None] * directions[:, None, :]
             inside = ((steps >= self.low) & (steps <= self.high)).all(axis=2)
-            height = self.base.foot(steps.reshape(-1, 3), self.tip_radius).height.reshape(inside.shape)
+            height = self.carrier.height(steps.reshape(-1, 3), self.tip_radius).reshape(inside.shape)
             roomy = (height >= self._room) & inside
             sinks = np.minimum.accumulate(height, axis=1) < -MOST_SINKING * self.tip_radius
             step = np.where((roomy & ~sinks).any(axis=1), (roomy & ~sinks).argmax(axis=1), len(along))
@@ -390,11 +427,20 @@ class Ways:
 
     def _shortened(self, path: FloatArray, room: float) -> FloatArray:
         """The path without the waypoints that a straight way can leave out."""
-        kept, here = [0], 0
-        while here < len(path) - 1:
-            onward = len(path) - 1
-            while onward > here + 1 and not self.free(path[[here, onward]], room):
-                onward -= 1
-            kept.append(onward)
-            here = onward
+        kept = [0]
+        while kept[-1] < len(path) - 1:
+            kept.append(self._farthest(path, kept[-1], room))
         return path[kept]
+
+    def _farthest(self, path: FloatArray, here: int, room: float) -> int:
+        """The farthest waypoint that can be reached straight from one of them; the next one if none can."""
+        beyond = np.arange(len(path) - 1, here + 1, -1)
+        # a few at once: asking for each by itself takes longer than the asking
+        for some in np.split(beyond, np.arange(STRAIGHT_AT_ONCE, len(beyond), STRAIGHT_AT_ONCE)):
+            ways = [dense(path[[here, onward]], FREE_SPACING * self.tip_radius) for onward in some]
+            free = self.carrier.ball_is_free(np.concatenate([np.zeros((0, 3)), *ways]), room or None)
+            starts = np.cumsum([0, *(len(way) for way in ways)])
+            for onward, start, stop in zip(some, starts[:-1], starts[1:], strict=True):
+                if free[start:stop].all():
+                    return int(onward)
+        return here + 1

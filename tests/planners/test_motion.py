@@ -19,16 +19,18 @@ from planners.budget import Spent, within
 from planners.drive import drive
 from planners.paths.carrier import Carrier
 from planners.paths.detour import Detour
+from planners.paths.felt_details import DETAIL_ROOM, FeltDetails
 from planners.paths.limits import Limits
 from planners.paths.reach import reachable
-from planners.paths.sound import can_be_left, held_up, sound_parts
-from planners.paths.travel import Ways, routed
+from planners.paths.sound import can_be_left, held_up, resting_at_its_ends, sound_parts
+from planners.paths.travel import Ways, dense, gap, routed
 from planners.plan import Outcome, Parted, Plan, Refused, executed
 
 R = 0.003
 MESHES = Path(__file__).resolve().parents[2] / "assets" / "meshes"
 BODY = load_mesh(MESHES / "l_bracket.ply", "m")
 BASE = Base(BODY)
+ABOVE = np.array([0.0, 0.0, 1.0])
 DOWN, LEFT = np.array([0.0, -1.0, 0.0]), np.array([-1.0, 0.0, 0.0])
 EMPTY = Trace(np.zeros(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64), R)
 
@@ -243,3 +245,111 @@ def test_a_steep_wall_holds_a_ball_up_far_though_it_sinks_into_it_a_little() -> 
     assert up == pytest.approx([0.3e-3 / np.sin(np.radians(10.0)), 0.0], rel=1e-6)
     gentle = np.array([-np.sin(np.radians(40.0)), -np.cos(np.radians(40.0)), 0.0])
     assert held_up(place[:1], gentle[None], BASE, R) == pytest.approx([0.3e-3 / np.sin(np.radians(40.0))], rel=1e-6)
+
+
+def shelf(height: float) -> Base:
+    """A floor with its top at z = 0, and the edge of a thin sheet at x = 0 over it, m."""
+    from trimesh.creation import box
+
+    floor, sheet = box(extents=(0.1, 0.1, 0.01)), box(extents=(0.05, 0.1, 1e-4))
+    floor.apply_translation([0.0, 0.0, -0.005])
+    sheet.apply_translation([0.025, 0.0, height])
+    return Base(
+        Surface(np.concatenate([floor.vertices, sheet.vertices]), np.concatenate([floor.faces, sheet.faces + 8]))
+    )
+
+
+@pytest.mark.parametrize("height", R * np.linspace(2.6, 6.0, 8))
+def test_a_stem_passes_a_sharp_edge_without_sinking_into_it(height: float) -> None:
+    base, beside = shelf(height), R * np.linspace(-0.7, -0.3, 81)
+    carrier, limits = Carrier.of(base, R), Limits.of(finger().workspace, base, R)
+    centers = np.column_stack([beside, np.zeros(81), np.full(81, 0.98 * R)])
+    free = carrier.is_free(centers, np.tile(-ABOVE, (81, 1)))
+    assert (-beside[free]).min() > (0.5 - 0.04) * R
+    # and from where it says that it can draw back it may
+    sweeps = [Move(np.stack([at - [0.0, 1e-3, 0.0], at]), -ABOVE) for at in centers]
+    left = [move for move in sweeps if can_be_left(move, carrier)]
+    away = [Move(move.path[-1:] + 0.5 * R * ABOVE, -ABOVE, purpose="travel") for move in left]
+    assert left and not any(map(limits.violation, away, left))
+
+
+def flat_and_hill() -> tuple[Surface, Surface]:
+    """A plate of 40 x 40 mm, and the same with a hill 2.4 mm high in its middle."""
+    x, y = np.meshgrid(np.linspace(-20e-3, 20e-3, 121), np.linspace(-20e-3, 20e-3, 121), indexing="ij")
+    corner = np.arange(120)[:, None] * 121 + np.arange(120)
+    a, b, c, d = (each.ravel() for each in (corner, corner + 121, corner + 122, corner + 1))
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    flat, hill = (
+        Surface(np.column_stack([x.ravel(), y.ravel(), height.ravel()]), faces)
+        for height in (np.zeros_like(x), 2.4e-3 * np.exp(-0.5 * (x**2 + y**2) / 3e-3**2))
+    )
+    return flat, hill
+
+
+def test_a_way_keeps_out_of_what_a_sweep_felt() -> None:
+    flat, hill = flat_and_hill()
+    base, down = Base(flat), np.array([0.0, 0.0, -1.0])
+    over, left, right = (
+        sweep([start, y, 2.94], [stop, y, 2.94], down) for start, stop, y in ((-12, 12, 0), (-12, -6, 0), (6, 12, 0))
+    )
+    complaints: list[str] = []
+    for keep in (False, True):
+        touch = SimulatedFinger(object=hill, tip_radius=R, rate=500.0)
+        felt = FeltDetails(base, R) if keep else None
+        limits = Limits.of(touch.workspace, base, R, felt)
+        ways = Ways(base, R, touch.workspace.low, touch.workspace.high, 0.07, felt)
+
+        def plan() -> Plan:
+            for move in (over, left, right):  # noqa: UP028  a plan is sent what each move felt
+                yield move
+            return Outcome("done")
+
+        record, _ = drive(
+            routed(plan(), ways, limits.violation), touch.execute, check=limits.violation, note=complaints.append
+        )
+        moves = [move for move, _ in record]
+        # the way between the sweeps beside the hill, as commanded or, where nothing was, straight
+        between = moves[-2].path if moves[-2].purpose == "travel" else gap(*moves[-2:], R)
+        free = Base(hill).foot(dense(between, 0.1 * R), R).height.min() >= -0.05 * R
+        assert free == keep
+    assert not complaints
+
+
+def test_where_a_ball_ran_into_something_no_way_leads_again() -> None:
+    base = Base(BODY)
+    felt = FeltDetails(base, R)
+    ways = Ways(base, R, BODY.bounds[0] - 6 * R, BODY.bounds[1] + 6 * R, 0.07, felt)
+    first, then = sweep([50, 8.94, 20], [40, 8.94, 20], DOWN), sweep([20, 8.94, 20], [25, 8.94, 20], DOWN)
+    assert ways.round(first, then) is None
+    between = 1e-3 * np.array([30, 10.44, 20])
+    felt.learn(Refused.because("the travel: the ball runs into the body", R, between), 0.07)
+    way = ways.round(first, then)
+    assert way is not None
+    assert np.linalg.norm(dense(way.path, 0.1 * R) - between, axis=1).min() > DETAIL_ROOM * R / 2
+
+
+def test_a_plan_is_told_where_the_ball_ran_into_something() -> None:
+    answers: list[Trace] = []
+
+    def plan() -> Plan:
+        answers.append((yield sweep([40, 12, 20], [3, 12, 20], DOWN, purpose="travel")))
+        return Outcome("done")
+
+    drive(plan(), finger().execute, empty=EMPTY)
+    assert isinstance(answers[0], Refused) and answers[0].touching is not None
+    assert 5e-3 < answers[0].touching[0] < 6e-3 + R
+
+
+def test_a_sweep_ends_where_the_other_wall_of_a_corner_holds_the_ball_up() -> None:
+    slope = np.radians(25.0)
+    corners = 1e-3 * np.array([[-30, -20, 0], [0, -20, 0], [30, -20, 0], [-30, 20, 0], [0, 20, 0], [30, 20, 0]])
+    corners[:, 2] = np.abs(corners[:, 0]) * np.tan(slope)
+    base = Base(Surface(corners, [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]))
+    along, up = np.array([np.cos(slope), 0.0, -np.sin(slope)]), np.array([np.sin(slope), 0.0, np.cos(slope)])
+    path = np.array([[-12e-3], [-0.5e-3]]) * along + 0.98 * R * up
+    move, carrier = Move(path, -up), Carrier.of(base, R)
+    assert base.foot(path[-1:], R).height[0] < -0.2 * R
+    ended = resting_at_its_ends(move, carrier)
+    assert np.array_equal(ended.path[0], path[0])
+    assert -0.03 * R < base.foot(ended.path[-1:], R).height[0] < 0.0
+    assert np.linalg.norm(np.cross(ended.path[-1] - path[-1], up)) < 1e-9

@@ -17,7 +17,7 @@ from mapping import Surface
 
 # Seeds of the details' places and of the noise: those that the planner was built with, and those that are reported
 BODY_BUILDING_SEEDS, BODY_REPORTED_SEEDS = (1, 2, 3), (102, 103, 104)
-SHIPPED_BODIES = ("l_bracket", "vase", "bowl", "holed_plate", "double_ring", "folds")
+SHIPPED_BODIES = ("l_bracket", "vase", "bowl", "holed_plate", "double_ring", "folds", "heat_sink")
 # Bodies that other people published, which do not come with the program; each is made so long, m
 FILED_BODIES = {"bunny": "bunny.off", "spot": "spot.obj", "fandisk": "fandisk.off"}
 FILED_LENGTH = 0.07

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -128,6 +129,11 @@ class Blocks:
         if not len(steep):
             return np.ones(len(self), dtype=bool)
         return np.asarray(cKDTree(steep).query(self.points)[0] > distance)
+
+    @cached_property
+    def smooth_as_felt(self) -> BoolArray:
+        """(B,) as `smooth` says of the heights as they are: asked at every turn."""
+        return self.smooth(self.height)
 
     def smooth(self, height: FloatArray, drifting: bool = False) -> BoolArray:
         """(B,) True for the blocks of the largest part of the surface that no steep place divides.

@@ -126,13 +126,13 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
         base = replace(base, offset=base.offset + level)
         seen = Blocks.of(LaidTrace.of(trace, base))
     missed = base.foot(_unfelt(commanded, trace), tip)
-    parts = parts_of(seen, seen.height, seen.smooth(seen.height), tip, missed)
+    parts = parts_of(seen, seen.height, seen.smooth_as_felt, tip, missed)
     before, now = base, base
     found: list[_Explanation] = []
     lines: list[Drift | SteadyDrift] = []
     for _ in range(MOST_ROUNDS):
         whole = ~_covered(parts, seen.points)
-        keep = seen.smooth(seen.height) & whole
+        keep = seen.smooth_as_felt & whole
         # where more of the surface agrees with the model than hangs together beside it, that is a plateau
         flat = whole & (np.abs(seen.height) <= FAR_OFF * seen.noise)
         plateau = seen.weight[flat].sum() > seen.weight[keep].sum()
@@ -154,7 +154,7 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
         else:
             break
         seen = Blocks.of(LaidTrace.of(trace, now))
-        parts = parts_of(seen, seen.height, seen.smooth(seen.height), tip, missed)
+        parts = parts_of(seen, seen.height, seen.smooth_as_felt, tip, missed)
     deviation = _deviation(before, now, blocks, seen, found, lines, parts, tip)
     if not found and not lines and not parts and not level and not deviation.beyond_repair:
         return None
@@ -181,7 +181,7 @@ def felt_enough(trace: Trace, base: Base) -> bool:
     blocks, tip = Blocks.of(LaidTrace.of(trace, base)), trace.tip_radius
     if len(blocks) < FEWEST_BLOCKS:
         return False
-    keep = blocks.smooth(blocks.height)
+    keep = blocks.smooth_as_felt
     return _told(blocks, keep, tip) or _agrees(blocks, blocks.height, keep, tip)
 
 
@@ -527,7 +527,7 @@ def _deviation(
     for part in parts:
         if np.isfinite(part.height):
             heights[part.covers(now.surface.vertices)] += part.height
-    keep = seen.smooth(seen.height)
+    keep = seen.smooth_as_felt
     left_over = unexplained(seen, seen.height, departure(seen.noise, tip), tip)
     middle = RigidFrame.of(before.surface).middle
     old, new = Pose.of(before), Pose.of(now)
@@ -538,7 +538,7 @@ def _deviation(
         shift, turn = there - middle, Pose.angle(new.rotation @ back.T)
     bends = [step for step in found if step.field is not None]
     bent = sum(step.field.columns(blocks.points, blocks.normals) @ step.smooth for step in bends if step.field)
-    smooth = blocks.smooth(blocks.height)
+    smooth = blocks.smooth_as_felt
     return Deviation(
         base=now,
         causes=tuple(named),

@@ -91,12 +91,15 @@ class SmoothField:
 
 def spread(points: FloatArray, spacing: float, most: int) -> FloatArray:
     """Some of the places (N, 3), each the farthest from those before it, until none is farther than the spacing (m)."""
-    chosen = [0]
-    distance = np.linalg.norm(points - points[0], axis=1)
-    while len(chosen) < most and distance.max() > spacing:
-        chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return np.asarray(points[chosen])
+    chosen, farthest = [0], 0
+    square = np.full(len(points), np.inf)
+    while True:
+        off = points - points[farthest]
+        np.minimum(square, np.einsum("ij,ij->i", off, off), out=square)
+        farthest = int(square.argmax())
+        if len(chosen) >= most or square[farthest] <= spacing**2:
+            return np.asarray(points[chosen])
+        chosen.append(farthest)
 
 
 def _kernel(points: FloatArray, knots: FloatArray, length: float) -> FloatArray:

@@ -42,8 +42,10 @@ def unexplained(blocks: Blocks, height: FloatArray, within: float, tip: float) -
     starts, counts = _stretches(blocks, side)
     # a sweep beside the top of a detail stands off as far as the top makes it, however low it runs itself; what the
     # sweep's end cuts off is as wide as it was felt
-    near = cKDTree(blocks.points).query_ball_point(blocks.points, WIDE_PART * tip)
-    tallest = np.array([height[each].max() for each in near])
+    one, other = cKDTree(blocks.points).query_pairs(WIDE_PART * tip, output_type="ndarray").T
+    tallest = height.copy()
+    np.maximum.at(tallest, one, height[other])
+    np.maximum.at(tallest, other, height[one])
     lengths, top = counts * blocks.step, np.maximum.reduceat(tallest, starts)
     off = side[starts] != 0.0
     wide = lengths >= np.where(off, WIDE_PART * tip + 2.0 * beside(top, tip), AGREEING_STRETCH * tip)
