@@ -78,7 +78,7 @@ class _Whitened:
             seen = dtrmm(1.0, self.root.T, shapes.T, lower=0, trans_a=1, overwrite_b=1).T
         else:
             seen = shapes @ self.root.T
-        information = np.maximum(np.vecdot(seen, seen), np.finfo(float).tiny)
+        information = np.maximum(np.einsum("ij,ij->i", seen, seen), np.finfo(float).tiny)
         height = seen @ self.values / information
         return height * np.abs(height) * information, height, information
 
