@@ -113,37 +113,44 @@ def further(p, d, radius):  # type: ignore[no-untyped-def]
 
 
 @borrowing
-def settle(rows, order, near, kept, hit, o, d, ball):  # type: ignore[no-untyped-def]
+def settle(rows, order, near, steps, kept, hit, o, d, ball):  # type: ignore[no-untyped-def]
     """(triangle, step, kept): which of the near triangles stops the ball first, and how much further along d than o.
 
     Of those that differ by rounding it is the face of the lowest number: no order of search can change that.
-    near[:kept] shrinks to the triangles within reach.
+    near[:kept] shrinks to the triangles within reach. steps: room for as many numbers as `near` has.
     """
     radius, reach, graze = ball
-    least = further(closest(rows, hit, o), d, radius)
-    least = 0.0 if least == inf else least
-    stay = 0
+    own, least, stay = nan, inf, 0
     for i in range(kept):
         p = closest(rows, near[i], o)
+        step = further(p, d, radius)
+        if near[i] == hit:
+            own = step
         if dot(p, p) <= reach * reach:
-            near[stay] = near[i]
+            near[stay], steps[stay] = near[i], step
             stay += 1
-            least = min(least, further(p, d, radius))
+            least = min(least, step)
+    if own != own:
+        own = further(closest(rows, hit, o), d, radius)
+    least = min(least, 0.0 if own == inf else own)
     first = -1
     for i in range(stay):
         lower = first < 0 or order[near[i]] < order[first]
-        if lower and further(closest(rows, near[i], o), d, radius) <= least + 0.25 * graze:
+        if lower and steps[i] <= least + 0.25 * graze:
             first = near[i]
     return first if first >= 0 else hit, least, stay
 
 
 @borrowing
-def count_contacts(rows, near, kept, first, o, ball, points):  # type: ignore[no-untyped-def]
-    """Number of distinct places of the near triangles that a ball at o touches, `first` (relative to o) among them."""
+def count_contacts(rows, near, kept, touched, first, o, ball, points):  # type: ignore[no-untyped-def]
+    """Number of distinct places of the near triangles that a ball at o touches, `first` (relative to o), that of the
+    triangle `touched`, among them."""
     apart = DISTINCT_CONTACT_GAP * ball[0]
     found = 1
     points[0, 0], points[0, 1], points[0, 2] = first
     for i in range(kept):
+        if near[i] == touched:
+            continue
         p = closest(rows, near[i], o)
         new = found < MOST_DISTINCT_CONTACTS and dot(p, p) <= ball[1] * ball[1]
         for j in range(found):
@@ -192,11 +199,8 @@ def first_contacts(  # type: ignore[no-untyped-def]
 
     `size` is the radius of a sphere around the body.
     """
-    stack, near, places = (
-        np.empty(STACK, np.int32),
-        np.empty(len(rows), np.int32),
-        np.empty((MOST_DISTINCT_CONTACTS, 3)),
-    )
+    stack, places = np.empty(STACK, np.int32), np.empty((MOST_DISTINCT_CONTACTS, 3))
+    near, steps = np.empty(len(rows), np.int32), np.empty(len(rows))
     apart, late = np.empty(WIDTH, np.float32), np.empty(WIDTH, np.float32)
     guess = -1
     for q in range(len(origins)):
@@ -215,12 +219,12 @@ def first_contacts(  # type: ignore[no-untyped-def]
             state[q], distance[q] = OVERLAPS, 0.0
         elif hit >= 0:
             o, guess, state[q] = moved(o, t, d), hit, TOUCHES
-            i, more, kept = settle(rows, order, near, kept, hit, o, d, ball)
+            i, more, kept = settle(rows, order, near, steps, kept, hit, o, d, ball)
             o = moved(o, more, d)
             p = closest(rows, i, o)
             n, at = scaled(-1.0 / sqrt(dot(p, p)), p), moved(o, 1.0, p)
             for k in range(3):
                 where[q, 0, k], where[q, 1, k], where[q, 2, k] = o[k], at[k], n[k]
             feature[q] = feature_of(rows, i, o, p, ball[2])
-            count[q] = count_contacts(rows, near, kept, p, o, ball, places)
+            count[q] = count_contacts(rows, near, kept, i, p, o, ball, places)
             distance[q] = max(start + t + more, 0.0)

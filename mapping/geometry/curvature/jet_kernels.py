@@ -15,18 +15,24 @@ INDEPENDENT_SHARE = 0.75
 # curvature's, and five standard deviations of it are 25 / 2.
 CERTAIN_GAP = 12.5
 
+# Numbers that one instruction takes at once: new rows are filled up with zeros to a multiple of it
+FILLED_UP_TO = 4
 LEAST_SQUARED_ERROR = 1e-28  # squared error of a curvature that is never undercut, for bodies of about unit size
 
 
 @njit(cache=True)
 def _design(u, v, z, first, last, scale, degree, out):  # type: ignore[no-untyped-def]
-    """Columns ordered by degree (so that one QR serves every degree) and the heights, in units of the scale."""
-    count = last - first
-    for i in range(count):
+    """Columns ordered by degree (so that one QR serves every degree) and the heights behind them, in units of the
+    scale; how many rows they fill, zeros at the end among them."""
+    points, heights = last - first, TERMS_OF_DEGREE[degree // 2 - 1]
+    count = -(-points // FILLED_UP_TO) * FILLED_UP_TO
+    for i in range(points):
         out[0, i] = 1.0
         out[1, i] = u[first + i] / scale
         out[2, i] = v[first + i] / scale
-        out[MONOMIALS, i] = z[first + i] / scale
+        out[heights, i] = z[first + i] / scale
+    for i in range(points, count):
+        out[0, i], out[1, i], out[2, i], out[heights, i] = 0.0, 0.0, 0.0, 0.0
     column = 3
     for d in range(2, degree + 1):
         for p in range(d):
@@ -35,72 +41,106 @@ def _design(u, v, z, first, last, scale, degree, out):  # type: ignore[no-untype
         for i in range(count):
             out[column + d, i] = out[2, i] * out[column - 1, i]
         column += d + 1
+    return count
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
 def _absorb(triangle, rows, count, columns):  # type: ignore[no-untyped-def]
     """Fold new rows into R and the rotated heights by reflections that leave R's zeros alone.
 
-    Row j of either array holds column j of the least-squares problem, so that the inner loops run along memory. Four
-    columns at a time take part in a reflection: its own is then read once for all of them.
+    Row j of either array holds column j of the least-squares problem, and row `columns` the heights, so that the inner
+    loops run along memory. Two reflections are applied together, to four columns at a time: what is read then serves
+    several products (Schreiber and Van Loan 1989).
 
     Returns:
         sum of squares of the part of the new heights that no column explains.
     """
-    for j in range(columns):
-        norm = 0.0
+    for j in range(0, columns, 2):
+        k = j + 1
+        one = _reflection(triangle, rows, count, j)
+        both = 0.0
         for i in range(count):
-            norm += rows[j, i] * rows[j, i]
-        if norm == 0.0:
-            continue
-        norm = np.sqrt(norm + triangle[j, j] * triangle[j, j])
-        alpha = -norm if triangle[j, j] > 0 else norm
-        head = triangle[j, j] - alpha
-        tau = -1.0 / (alpha * head)
-        triangle[j, j] = alpha
-        others = columns - j  # those behind j, and the heights, which stand for the one after the last
-        done = 0
-        while done + 4 <= others:
-            c = j + 1 + done
-            last = c + 3 if done + 4 < others else MONOMIALS
-            dot0, dot1, dot2, dot3 = 0.0, 0.0, 0.0, 0.0
+            both += rows[j, i] * rows[k, i]
+        share = _reflected(triangle, k, j, one, both)
+        for i in range(count):
+            rows[k, i] -= share * rows[j, i]
+        if k == columns:
+            break
+        other = _reflection(triangle, rows, count, k)
+        both = 0.0
+        for i in range(count):
+            both += rows[j, i] * rows[k, i]
+        c = k + 1
+        while c + 3 <= columns:
+            p0, p1, p2, p3, q0, q1, q2, q3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for i in range(count):
-                own = rows[j, i]
-                dot0 += own * rows[c, i]
-                dot1 += own * rows[c + 1, i]
-                dot2 += own * rows[c + 2, i]
-                dot3 += own * rows[last, i]
-            dot0 = (dot0 + head * triangle[c, j]) * tau
-            dot1 = (dot1 + head * triangle[c + 1, j]) * tau
-            dot2 = (dot2 + head * triangle[c + 2, j]) * tau
-            dot3 = (dot3 + head * triangle[last, j]) * tau
-            triangle[c, j] -= dot0 * head
-            triangle[c + 1, j] -= dot1 * head
-            triangle[c + 2, j] -= dot2 * head
-            triangle[last, j] -= dot3 * head
+                p, q = rows[j, i], rows[k, i]
+                a, b, x, y = rows[c, i], rows[c + 1, i], rows[c + 2, i], rows[c + 3, i]
+                p0 += p * a
+                p1 += p * b
+                p2 += p * x
+                p3 += p * y
+                q0 += q * a
+                q1 += q * b
+                q2 += q * x
+                q3 += q * y
+            p0, q0 = _twice_reflected(triangle, c, j, one, other, both, p0, q0)
+            p1, q1 = _twice_reflected(triangle, c + 1, j, one, other, both, p1, q1)
+            p2, q2 = _twice_reflected(triangle, c + 2, j, one, other, both, p2, q2)
+            p3, q3 = _twice_reflected(triangle, c + 3, j, one, other, both, p3, q3)
             for i in range(count):
-                rows[c, i] -= dot0 * rows[j, i]
+                p, q = rows[j, i], rows[k, i]
+                rows[c, i] -= p0 * p + q0 * q
+                rows[c + 1, i] -= p1 * p + q1 * q
+                rows[c + 2, i] -= p2 * p + q2 * q
+                rows[c + 3, i] -= p3 * p + q3 * q
+            c += 4
+        while c <= columns:
+            p, q = 0.0, 0.0
             for i in range(count):
-                rows[c + 1, i] -= dot1 * rows[j, i]
+                p += rows[j, i] * rows[c, i]
+                q += rows[k, i] * rows[c, i]
+            p, q = _twice_reflected(triangle, c, j, one, other, both, p, q)
             for i in range(count):
-                rows[c + 2, i] -= dot2 * rows[j, i]
-            for i in range(count):
-                rows[last, i] -= dot3 * rows[j, i]
-            done += 4
-        while done < others:
-            c = j + 1 + done if done + 1 < others else MONOMIALS
-            dot0 = 0.0
-            for i in range(count):
-                dot0 += rows[j, i] * rows[c, i]
-            dot0 = (dot0 + head * triangle[c, j]) * tau
-            triangle[c, j] -= dot0 * head
-            for i in range(count):
-                rows[c, i] -= dot0 * rows[j, i]
-            done += 1
+                rows[c, i] -= p * rows[j, i] + q * rows[k, i]
+            c += 1
     rest = 0.0
     for i in range(count):
-        rest += rows[MONOMIALS, i] * rows[MONOMIALS, i]
+        rest += rows[columns, i] * rows[columns, i]
     return rest
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _reflection(triangle, rows, count, j):  # type: ignore[no-untyped-def]
+    """(head, tau) of the reflection by the vector of `head` in R's row j and rows[j] in the new ones, which makes zeros
+    of the latter's column j. Zeros where they are that already."""
+    square = 0.0
+    for i in range(count):
+        square += rows[j, i] * rows[j, i]
+    if square == 0.0:
+        return 0.0, 0.0
+    norm = np.sqrt(square + triangle[j, j] * triangle[j, j])
+    alpha = -norm if triangle[j, j] > 0 else norm
+    head = triangle[j, j] - alpha
+    triangle[j, j] = alpha
+    return head, -1.0 / (alpha * head)
+
+
+@njit(cache=True, inline="always")
+def _reflected(triangle, c, j, reflection, product):  # type: ignore[no-untyped-def]
+    """How many of the vector of column j a reflection takes off column c, whose new rows have that product with it."""
+    head, tau = reflection
+    share = (product + head * triangle[c, j]) * tau
+    triangle[c, j] -= share * head
+    return share
+
+
+@njit(cache=True, inline="always")
+def _twice_reflected(triangle, c, j, one, other, both, p, q):  # type: ignore[no-untyped-def]
+    """The same of the reflections of columns j and j + 1, one after the other; `both` is the product of their vectors
+    in the new rows, p and q are the column's with either."""
+    first = _reflected(triangle, c, j, one, p)
+    return first, _reflected(triangle, c, j + 1, other, q - first * both)
 
 
 @njit(cache=True)
@@ -118,10 +158,10 @@ def _determined(triangle, columns, ratio):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _solve(triangle, columns, coefficients):  # type: ignore[no-untyped-def]
-    """Coefficients of the nested fit."""
+def _solve(triangle, heights, columns, coefficients):  # type: ignore[no-untyped-def]
+    """Coefficients of the nested fit of so many columns; `heights` is the row of the heights."""
     for j in range(columns):
-        coefficients[j] = triangle[MONOMIALS, j]
+        coefficients[j] = triangle[heights, j]
     for c in range(columns - 1, -1, -1):
         coefficients[c] /= triangle[c, c]
         for j in range(c):
@@ -251,7 +291,7 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
     slopes = np.zeros((count, len(sizes), options, 2))
     widest, columns = neighbours.shape[1], TERMS_OF_DEGREE[options - 1]
     place = np.empty((3, widest))
-    rows = np.empty((MONOMIALS + 1, widest))
+    rows = np.empty((MONOMIALS + 1, widest + FILLED_UP_TO))
     triangle = np.empty((MONOMIALS + 1, MONOMIALS))
     coefficients, inverse, variances = np.zeros(MONOMIALS), np.zeros((3, MONOMIALS)), np.zeros(options)
     ends = np.zeros(len(sizes), dtype=np.int64)
@@ -268,13 +308,13 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
             if last == first:
                 continue
             reach = _reach(place, first, last, reach)
-            _design(place[0], place[1], place[2], first, last, scale, degree, rows)
-            rest += _absorb(triangle, rows, last - first, columns)
+            filled = _design(place[0], place[1], place[2], first, last, scale, degree, rows)
+            rest += _absorb(triangle, rows, filled, columns)
             first, over, before, known = last, rest, columns, False
             for d in range(options - 1, -1, -1):
                 terms = TERMS_OF_DEGREE[d]
                 for j in range(terms, before):
-                    over += triangle[MONOMIALS, j] ** 2
+                    over += triangle[columns, j] ** 2
                 before = terms
                 if last < terms + SPARE_POINTS[d] or reach == 0.0:
                     continue
@@ -284,7 +324,7 @@ def fit_jets(points, normals, neighbours, chosen, bends, alike, sizes, degree): 
                     _variances(triangle, terms, inverse, variances)
                     known = True
                 factors[m, s, d] = np.sqrt(variances[d]) / (scale * scale)
-                _solve(triangle, terms, coefficients)
+                _solve(triangle, columns, terms, coefficients)
                 _weingarten(coefficients, scale, bends[m] * scale, operators[m, s, d])
                 slopes[m, s, d] = coefficients[1:3]
                 rests[m, s, d] = np.sqrt(over / (last - terms)) * scale

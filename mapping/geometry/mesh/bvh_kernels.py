@@ -261,19 +261,19 @@ def push_lanes(leaves, boxes, links, stack, waiting, start, end, d, length, reac
     else:
         leaf_tests(leaves, node, end, d, reach, apart)
     bottom, square = waiting - 1, F4(reach * reach)
-    end_of_lanes = bottom
-    for lane in range(lanes):  # without a branch, which nobody could predict
-        stack[end_of_lanes] = lane
-        end_of_lanes += apart[lane] <= square
+    end_of_lanes = np.uint64(bottom)  # what cannot be below 0 is not looked at for that
+    for k in range(lanes):  # without a branch, which nobody could predict
+        stack[end_of_lanes] = k
+        end_of_lanes += np.uint64(apart[k] <= square)
     waiting = bottom
-    for i in range(bottom, end_of_lanes):
-        lane = stack[i]
+    for i in range(bottom, np.int64(end_of_lanes)):
+        lane = np.uint64(stack[i])
         if apart[lane] < F4(0.0) and passes(leaves, boxes, node, lane, start, end, d, length, reach):
             continue
         place = waiting
         while step > 0 and place > bottom and late[stack[place - 1] - child] < late[lane]:
             stack[place] = stack[place - 1]
             place -= 1
-        stack[place] = child + step * lane
+        stack[place] = child + step * np.int64(lane)
         waiting += 1
     return waiting

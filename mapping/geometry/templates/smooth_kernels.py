@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from mapping import FloatArray
-from mapping.geometry.templates.course_kernels import about_course
+from mapping.geometry.templates.course_kernels import lay_about_course
 
 # Places of the table of the trace: between them it errs by 1e-5 of the height or less where the trace is smooth.
 TABLE_PLACES = 500
@@ -107,19 +107,26 @@ def smooth_trace(
         rho0, t0, slope0 = rho, t, slope
 
 
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "nsz", "reassoc"})
+def _range(values):  # type: ignore[no-untyped-def]
+    """The least and the largest of values (N,) that are all numbers: nothing is rounded, so in any order."""
+    low, high = np.inf, -np.inf
+    for i in range(len(values)):
+        low, high = min(low, values[i]), max(high, values[i])
+    return low, high
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
 def _means(
     away: FloatArray, toward: FloatArray, height: float, half: float, taper: float, tip: float, out: FloatArray
 ) -> None:
-    """Mean heights (n,) over nodes (n, q) `away` from the middle, where the base bends by `toward`, 1/m, towards it."""
-    bins, nodes = away.shape
+    """Mean heights (n,) over nodes (n, q), one after the other, `away` (n q,) from the middle, where the base bends by
+    `toward` (n q,), 1/m, towards it."""
+    bins, nodes = len(out), len(away) // len(out)
     # a hollow base as tight as the ball has no trace of its own
     least = -0.999 / tip
-    low, high, far = np.inf, -np.inf, 1e-3 * tip
-    for i in range(bins):
-        for q in range(nodes):
-            low, high, far = min(low, toward[i, q]), max(high, toward[i, q]), max(far, away[i, q])
-    low, high = max(low, least), max(high, least)
+    low, high = _range(toward)
+    low, high, far = max(low, least), max(high, least), max(_range(away)[1], 1e-3 * tip)
     bends = TABLE_BENDS if (high - low) * tip > 1e-6 else 1
     gap = (high - low) / (bends - 1) if bends > 1 else 1.0
     table, spacing = np.zeros((bends, TABLE_PLACES)), far / (TABLE_PLACES - 2)
@@ -130,11 +137,14 @@ def _means(
                 table[b, k] = 0.0  # on the base
     for i in range(bins):
         total = 0.0
-        for q in range(nodes):
-            place = away[i, q] / spacing
+        for q in range(i * nodes, (i + 1) * nodes):
+            place = away[q] / spacing
             k = min(int(place), TABLE_PLACES - 2)
             x = place - k
-            way = min(max((toward[i, q] - low) / gap, 0.0), bends - 1.0)
+            if bends == 1:
+                total += table[0, k] + x * (table[0, k + 1] - table[0, k])
+                continue
+            way = min(max((toward[q] - low) / gap, 0.0), bends - 1.0)
             b = int(way)
             felt = table[b, k] + x * (table[b, k + 1] - table[b, k])
             if b + 1 < bends:
@@ -166,18 +176,20 @@ def smooth_line_heights(
     Args:
         heights (negative of grooves), halves, tapers: (W,) m, m, and 1: see `smooth_trace`.
     """
-    walkers, bins = out.shape
-    nodes = s.shape[1]
-    away, toward = np.empty((bins, nodes)), np.empty((bins, nodes))
-    for w in range(walkers):
-        for i in range(bins):
-            for q in range(nodes):
-                place, aside, stretch = about_course(s, lateral, basis, courses[w], i, q)
-                beyond = stretch * max(ends[w, 0] - place, place - ends[w, 1], 0.0)
-                square = aside * aside + beyond * beyond
-                turned = beyond * beyond / square if square > 0.0 else 0.0
-                away[i, q] = np.sqrt(square)
-                toward[i, q] = (1.0 - turned) * bend[i, q] + turned * bend_along[i, q]
+    count, modes = s.size, basis.shape[1]
+    place, aside, stretch = np.empty(count), np.empty(count), np.empty(count)
+    away, toward = np.empty(count), np.empty(count)
+    s, lateral, basis = s.reshape(count), lateral.reshape(count), basis.reshape((2, modes, count))
+    bend, bend_along = bend.reshape(count), bend_along.reshape(count)
+    for w in range(len(out)):
+        lay_about_course(s, lateral, basis, courses[w], place, aside, stretch)
+        start, end = ends[w]
+        for i in range(count):
+            beyond = stretch[i] * max(start - place[i], place[i] - end, 0.0)
+            square = aside[i] * aside[i] + beyond * beyond
+            turned = beyond * beyond / square if square > 0.0 else 0.0
+            away[i] = np.sqrt(square)
+            toward[i] = (1.0 - turned) * bend[i] + turned * bend_along[i]
         _means(away, toward, heights[w], halves[w], tapers[w], tip, out[w])
 
 
@@ -194,17 +206,17 @@ def smooth_point_heights(
     out: FloatArray,
 ) -> None:
     """Heights (W, n) of W bells, or smooth pits of negative heights; the first arguments as for `pit_heights`."""
-    walkers, bins = out.shape
-    nodes = x.shape[1]
-    away, toward = np.empty((bins, nodes)), np.empty((bins, nodes))
-    for w in range(walkers):
-        for i in range(bins):
-            for q in range(nodes):
-                along, across = x[i, q] - places[w, 0], y[i, q] - places[w, 1]
-                square = along * along + across * across
-                share = along * along / square if square > 0.0 else 0.5
-                away[i, q] = np.sqrt(square)
-                toward[i, q] = share * bends[0] + (1.0 - share) * bends[1]
+    count = x.size
+    x, y = x.reshape(count), y.reshape(count)
+    away, toward = np.empty(count), np.empty(count)
+    for w in range(len(out)):
+        middle_x, middle_y = places[w]
+        for i in range(count):
+            along, across = x[i] - middle_x, y[i] - middle_y
+            square = along * along + across * across
+            share = along * along / square if square > 0.0 else 0.5
+            away[i] = np.sqrt(square)
+            toward[i] = share * bends[0] + (1.0 - share) * bends[1]
         _means(away, toward, heights[w], halves[w], tapers[w], tip, out[w])
 
 
