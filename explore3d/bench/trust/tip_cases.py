@@ -76,6 +76,7 @@ def run_tip_case(case: TipCase) -> dict[str, Any]:
         told(analysis, cpu)
         | {"said": said, "level": level.sd, "offset": tip.offset(said)}
         | {"causes": [] if deviation is None else list(deviation.causes)}
+        | {"yields": None if analysis.yielding is None else analysis.yielding.record()}
         | {"told_offset": 0.0 if deviation is None else deviation.offset}
         | {"refuted": None if refuted is None else refuted.largest}
         | against_truth(analysis, path, truth, [wire.axis for wire in wires])
@@ -84,9 +85,14 @@ def run_tip_case(case: TipCase) -> dict[str, Any]:
 
 def tip_line(record: dict[str, Any]) -> str:
     """What one recording came to."""
-    causes = ", ".join(record["causes"]) or "nothing"
+    causes = ", ".join(_named(record)) or "nothing"
     inside = ", ".join(f"{name} {sum(v)}/{len(v)}" for name, v in record["inside"].items())
     return f"{causes} named, {record['found']} wires found, {record['invented']} invented, inside: {inside}"
+
+
+def _named(record: dict[str, Any]) -> list[str]:
+    """What the analysis says that is not as told."""
+    return [*(["yielding"] if record["yields"] else []), *record["causes"]]
 
 
 def tip_table(records: Sequence[dict[str, Any]]) -> str:
@@ -106,7 +112,7 @@ def _row(tip: str, records: Sequence[dict[str, Any]]) -> tuple[str, ...]:
         tip,
         str(len(records)),
         f"{np.mean([each['offset'] / each['said'] for each in records]):+.3f}",
-        share_text((sum("offset" in each["causes"] for each in surely), len(surely))),
+        share_text((sum(bool({"offset", "yielding"} & {*_named(each)}) for each in surely), len(surely))),
         share_text((sum(each["refuted"] is not None for each in records), len(records))),
         share_text((found, found + missed)),
         rate_text((sum(each["invented"] for each in records), metres), MOST_FEATURES / MOST_TIMES_ASKED),
