@@ -45,6 +45,8 @@ from explore3d.analysis.method import (
     why_no_standard_heights,
     why_no_surface,
     why_no_time_curve,
+    why_no_yielding,
+    yielded,
 )
 from explore3d.analysis.result import Analysis
 from explore3d.analysis.savings import with_savings
@@ -66,6 +68,7 @@ def _never(work: Work) -> bool:
 METHOD = (
     MethodStage("base fit", why_no_fit, fitted),
     MethodStage("pose", why_no_pose, placed, possible=lambda work: work.scene is not None and work.base.kind == "mesh"),
+    MethodStage("yielding", why_no_yielding, yielded, possible=lambda work: work.trace.force is not None),
     MethodStage("deviation", why_no_deviation, deviated, possible=lambda work: work.base.kind == "mesh"),
     MethodStage("", None, kept_over_base),
     MethodStage("", None, made_sound),
@@ -132,6 +135,7 @@ def _result(work: Work) -> Analysis:
         inspected=work.inspected,
         account=work.account,
         path=work.path,
+        yielding=work.yielding,
         deviation=work.deviation,
         refuted_tip=work.refuted_tip,
         sparse=work.sparse,

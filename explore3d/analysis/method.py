@@ -47,7 +47,16 @@ from mapping.detection.path import (
     with_doubt,
     without_backlash,
 )
-from mapping.estimate.deviation import Deviation, UnclimbedLevel, explain, felt_enough, left_standing, unclimbed_levels
+from mapping.estimate.deviation import (
+    Deviation,
+    UnclimbedLevel,
+    Yielding,
+    explain,
+    felt_enough,
+    left_standing,
+    unclimbed_levels,
+    yielding,
+)
 from mapping.estimate.envelope import RefutedTip, estimate_surface, refuted_by_lines, refuted_tip
 from mapping.geometry.curvature import principal_curvatures
 from mapping.geometry.mesh import distances
@@ -67,7 +76,7 @@ BELIEVED = 1.25
 NOISE_FREE = 2e-8
 
 # What is left out where what may be a feature is none: taken for form, or too wide
-ABSORBED, PART, DEVIATION_MAP = "part of the form", "part of the trace", "deviation map"
+ABSORBED, PART, DEVIATION_MAP, YIELDING = "part of the form", "part of the trace", "deviation map", "yielding"
 # What is said of a model that nothing speaks against because nothing could
 TOO_LITTLE_FELT = "too little was felt to hold the model against it: a wrong one would not be named"
 # What a stage could not do although it was needed
@@ -130,6 +139,7 @@ class Work:
         inspections: the heights of the trace that the features were assembled from.
         sound: the trace under sound sweep numbers; None for a log that was searched while it was read.
         path: what became of the recorded path.
+        yielding: what the finger yields by, put back; None if nothing is known of it.
         deviation: what the given model gets wrong; None if nothing is known to be.
         judgements: what became of the tolerances.
         apart: samples left out for that.
@@ -162,6 +172,7 @@ class Work:
     inspections: Inspections | None = None
     sound: SoundSweeps | None = None
     path: PathLedger | None = None
+    yielding: Yielding | None = None
     deviation: Deviation | None = None
     apart: int = 0
     refuted_tip: RefutedTip | None = None
@@ -293,6 +304,28 @@ def placed(work: Work, share: Share) -> None:
         return
     reason = "the object would stand further off its model than the scene allows"
     work.stages.left_out.append(LeftOut("pose", reason))
+
+
+def why_no_yielding(work: Work) -> str | None:
+    """Only where forces were recorded can it be told what a finger yields by."""
+    return None if work.log.detections or work.trace.force is None else ""
+
+
+def yielded(work: Work, share: Share) -> None:
+    """The trace where the tip was, by what pressed on it; a base that was fitted is fitted to that."""
+    work.trace = LaidTrace.of(work.trace, work.base)
+    work.yielding = yielding(work.trace)
+    if work.yielding is None:
+        work.stages.left_out.append(LeftOut(YIELDING, "the heights do not follow the recorded forces"))
+        return
+    work.trace = work.yielding.without(work.trace)
+    if work.before is not None:
+        _, base, mark = work.before
+        work.before = work.trace, base, mark
+        said = work.stages.left_out
+        said[mark:] = [each for each in said[mark:] if each.stage != ABSORBED]
+    if work.given is None or _was_found(work.given):
+        fitted(work, share)
 
 
 def why_no_deviation(work: Work) -> str | None:
@@ -578,6 +611,14 @@ def believed(work: Work, share: Share) -> None:
     if work.backlash is not None:
         tip = work.trace.tip_radius
         work.features = tuple(_doubted(feature, work.backlash, tip) for feature in work.features)
+    if work.yielding is not None:
+        work.features = tuple(_pressed(feature, work.yielding, work.laid) for feature in work.features)
+
+
+def _pressed(feature: Feature, finger: Yielding, trace: Trace) -> Feature:
+    """The feature with what its height may be off by where the finger pressed otherwise on it than on the ground."""
+    sd = finger.height_sd(trace, feature.axis, feature.height.median)
+    return replace(feature, height=feature.height.with_doubt(sd))
 
 
 def _doubted(feature: Feature, play: Backlash, tip_radius: float) -> Feature:
@@ -716,6 +757,7 @@ def modelled(work: Work, share: Share) -> None:
     path = {} if work.path is None else {"path": work.path.record()}
     rough = {} if work.roughness is None else {"roughness": work.roughness.record()}
     deviation = {} if work.deviation is None else {"deviation": work.deviation.record()}
+    yields = {} if work.yielding is None else {"yielding": work.yielding.record()}
     refuted = {} if work.refuted_tip is None else {"refuted_tip": work.refuted_tip.record()}
     sparse = {} if work.sparse is None else {"sparse_samples": work.sparse.record()}
     behind = {} if work.backlash is None else {"backlash": work.backlash.record()}
@@ -728,6 +770,7 @@ def modelled(work: Work, share: Share) -> None:
         | {"inspection": work.inspected.record()}
         | surface
         | path
+        | yields
         | deviation
         | refuted
         | sparse

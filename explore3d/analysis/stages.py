@@ -18,6 +18,7 @@ OPTIONAL_STAGES = (
     "dynamics",
     "base fit",
     "pose",
+    "yielding",
     "deviation",
     "algorithms 1 and 2",
     "injected crests",

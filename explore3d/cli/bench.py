@@ -414,6 +414,28 @@ def trust(
 
 
 @bench.command()
+def tips(
+    store: Store,
+    of: Annotated[
+        str, typer.Option("--set", help="building, or reported: seeds and scales that nothing was built with.")
+    ] = "building",
+    tips: Annotated[str | None, typer.Option(help="What the tip really is, separated by commas; all.")] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Recordings of each tip; three wires lie under each.")] = 30,
+    seconds: Annotated[float, typer.Option(help="Stop after this long; the same command goes on.")] = float("inf"),
+) -> None:
+    """Is it named that a tip is not as said, are wires found, and do their sizes hold? As a table of Markdown.
+
+    Example: explore3d bench tips --store tips.jsonl --tips "5 % larger,worn" --seeds 2
+    """
+    from explore3d.bench.trust import TRUST_SETS, WRONG_TIPS, bench_tips, tip_line, tip_table, trust_records
+
+    _names(of, "--set", list(TRUST_SETS))
+    for each in bench_tips(of, _names(tips, "--tips", list(WRONG_TIPS)), seeds, store, seconds):
+        print(f"{each['tip']}, {each['number']}: {tip_line(each)}", flush=True)
+    print(tip_table([each for each in trust_records(store) if each["of"] == of]))
+
+
+@bench.command()
 def sections(
     store: Store,
     bodies: Annotated[str | None, typer.Option(help="Sections, separated by commas; all if left out.")] = None,

@@ -148,6 +148,7 @@ def _shares_text(account: tuple[tuple[str, float], ...]) -> str:
 def warnings(analysis: Analysis) -> list[str]:
     """What a reader must know before believing the rest, a sentence each."""
     return [
+        *yielding_sentence(analysis),
         *deviation_warning(analysis),
         *path_warning(analysis),
         *form_warnings(analysis),
@@ -174,6 +175,11 @@ def tip_warning(analysis: Analysis) -> list[str]:
             f"right ({where})?"
         )
     return told
+
+
+def yielding_sentence(analysis: Analysis) -> list[str]:
+    """What the finger yields by, where recorded forces tell it."""
+    return [] if analysis.yielding is None else [f"By the recorded forces {analysis.yielding.sentence()}."]
 
 
 def deviation_warning(analysis: Analysis) -> list[str]:

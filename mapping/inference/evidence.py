@@ -22,6 +22,7 @@ from mapping.inference.families import (
     ShoulderedShape,
     Surroundings,
     TrapezoidShape,
+    WornTipShape,
     with_free_tip,
     with_nominal_tip,
 )
@@ -128,6 +129,7 @@ def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, P
         feature: as its most probable family describes it.
         likely: weight, problem and posterior of each family, the most probable one first.
     """
+    feature = replace(feature, notes=(*feature.notes, *_worn_note(likely)))
     kind, shapes = kind_of(feature), [_shape(problem) for _, problem, _ in likely]
     if len(likely) == 1 and not isinstance(shapes[0], BellRidgeShape | TrapezoidShape):
         return feature
@@ -165,9 +167,26 @@ def averaged(feature: Feature, likely: Sequence[tuple[float, PosteriorProblem, P
     return replace(feature, height=interval, width=width, notes=(*feature.notes, note))
 
 
+def _worn_note(likely: Sequence[tuple[float, PosteriorProblem, Posterior]]) -> tuple[str, ...]:
+    """That the tip is most probably worn, and how probable that is; nothing where it is not."""
+    worn = [(share, each.target.shape) for share, each, _ in likely if isinstance(each.target.shape, WornTipShape)]
+    probability = sum(share for share, _ in worn) / sum(share for share, _, _ in likely)
+    if probability < 0.5:
+        return ()
+    depth, across = worn[0][1].depth, worn[0][1].across
+    return (
+        f"it was felt by a tip that is worn flat, by {length_text(depth, 2)}, which is {length_text(across, 2)} across "
+        f"(probability {100 * probability:.0f} %)",
+    )
+
+
 def name_of(problem: PosteriorProblem) -> str:
     """What people call a problem's section."""
-    shape = _shape(problem)
+    worn = isinstance(problem.target.shape, WornTipShape)
+    return f"{_section_name(_shape(problem))}{' under a worn tip' if worn else ''}"
+
+
+def _section_name(shape: Shape) -> str:
     if isinstance(shape, BellShape | BellRidgeShape):
         return "bell"
     if isinstance(shape, ShoulderedShape):

@@ -19,7 +19,13 @@ from mapping.inference.evidence import (
     probabilities,
     roughly_weighed,
 )
-from mapping.inference.families import PosteriorProblem, Surroundings, with_free_tip, with_nominal_tip
+from mapping.inference.families import (
+    PosteriorProblem,
+    Surroundings,
+    with_free_tip,
+    with_nominal_tip,
+    with_worn_tip,
+)
 from mapping.inference.kinds import kind_of
 from mapping.inference.model_error import account_for_misfit
 from mapping.inference.pooled_residual import PooledResidual, pooled_residual, with_remark
@@ -179,10 +185,16 @@ def _rough(first: PosteriorProblem, around: Surroundings) -> list[PosteriorProbl
     """
     first = at_optima(first)
     nominal = with_nominal_tip(first)
-    rivals = kind_of(first.feature).rivals(nominal, first.beginnings[0, : len(nominal.target.shape.names)])
-    if not rivals:
+    kind = kind_of(first.feature)
+    rivals = [*kind.rivals(nominal, first.beginnings[0, : len(nominal.target.shape.names)])]
+    if around.base.offset < 0.0 and first.feature.height.median > 0.0 and not kind.sided:
+        # what stands the ball too low on the ground may be worn off it, and is then missing on every crest
+        worn = [with_worn_tip(each, -around.base.offset) for each in (nominal, *rivals)]
+    else:
+        worn = []
+    if not rivals and not worn:
         return [first]
-    families = roughly_weighed((first, *(_felt(each, around) for each in rivals)))
+    families = roughly_weighed((first, *(_felt(each, around) for each in rivals), *worn))
     weighed = sorted(families, key=lambda each: -each[0])
     least = weighed[0][0] + np.log(UNLIKELY_FAMILY) - ROUGH_EVIDENCE
     return [problem for evidence, problem in weighed if evidence > least]

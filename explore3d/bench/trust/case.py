@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, astuple, dataclass, fields, replace
 from math import ceil
 from pathlib import Path as File
@@ -114,16 +114,24 @@ def bench_trust(
     of: str, laws: Sequence[str], bodies: Sequence[str], bare: int, wired: int, store: File, seconds: float = np.inf
 ) -> Iterator[dict[str, Any]]:
     """Run what is not yet in the store and append it there, until so many seconds have passed; yields new records."""
+    yield from finished(list(cases(of, laws, bodies, bare, wired)), run_trust_case, store, seconds)
+
+
+def finished(
+    asked: Sequence[Any], run: Callable[[Any], dict[str, Any]], store: File, seconds: float
+) -> Iterator[dict[str, Any]]:
+    """Run cases, all of one dataclass, that are not yet in a store and append them there, until so many seconds have
+    passed; yields the new records, which hold the fields of their cases."""
     begin = perf_counter()
     if store.exists() and len(whole := _whole_lines(store)) < len(store.read_text()):
         write_whole(store, whole)
-    done = {tuple(each[name.name] for name in fields(Case)) for each in trust_records(store)}
-    for case in cases(of, laws, bodies, bare, wired):
+    done = {tuple(each[name.name] for name in fields(asked[0])) for each in trust_records(store)}
+    for case in asked:
         if astuple(case) in done:
             continue
         if perf_counter() - begin > seconds:
             return
-        record = asdict(case) | run_trust_case(case)
+        record = asdict(case) | run(case)
         with store.open("a") as file:
             file.write(json.dumps(record) + "\n")
         yield record
@@ -158,9 +166,9 @@ def run_trust_case(case: Case) -> dict[str, Any]:
     begin = process_time()
     analysis = build_model(Log(trace), None, base, Stages())
     seconds = process_time() - begin
-    record = _common(analysis, seconds) | {"tip": tip, "level": float(level), "length": float(length)}
+    record = told(analysis, seconds) | {"tip": tip, "level": float(level), "length": float(length)}
     if case.wires:
-        return record | _against_truth(analysis, path, truth, crests)
+        return record | against_truth(analysis, path, truth, crests)
     laid = LaidTrace.of(analysis.trace, analysis.base)
     often = detect(laid, analysis.base, false_alarms_per_metre=COUNTED_RATE)
     record |= {"often": len(often.crossings), "often_metres": often.inspected_length}
@@ -169,7 +177,8 @@ def run_trust_case(case: Case) -> dict[str, Any]:
     return record
 
 
-def _common(analysis: Analysis, seconds: float) -> dict[str, Any]:
+def told(analysis: Analysis, seconds: float) -> dict[str, Any]:
+    """What an analysis says, whatever the truth."""
     found, deviation = analysis.detections, analysis.deviation
     warnings = [*found.remarks, *(why for why in found.left_out if "limit is computed" not in why)]
     warnings += [] if deviation is None else [deviation.sentence()]
@@ -223,10 +232,10 @@ def _recovery(analysis: Analysis, laid: LaidTrace, rng: np.random.Generator) -> 
     return {"put": len(put), "put_found": count}
 
 
-def _against_truth(
+def against_truth(
     analysis: Analysis, path: Path, truth: Sequence[TrueFeature], crests: Sequence[FloatArray]
 ) -> dict[str, Any]:
-    """How many wires were found and whether their intervals hold them.
+    """How many wires were found, whether their intervals hold them, and by which shares their heights are off.
 
     Where the analysis took the object for moved, a wire lies where it lies on the object.
     """
@@ -258,6 +267,7 @@ def _against_truth(
         "missed": statuses.count("missed"),
         "invented": statuses.count("invented"),
         "inside": inside,
+        "height_errors": [row.height_error / row.true.height for row in found if row.true],
     }
 
 

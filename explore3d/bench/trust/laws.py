@@ -87,11 +87,12 @@ def _heights(errors: Callable[[Path, Level, np.random.Generator], FloatArray]) -
     return record
 
 
-def _white(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
+def white(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
+    """(N,) white noise of the level, m."""
     return level.sd * rng.standard_normal(len(path.sweep))
 
 
-def _shared(path: Path, length: float, rng: np.random.Generator) -> FloatArray:
+def shared(path: Path, length: float, rng: np.random.Generator) -> FloatArray:
     """(N,) Ornstein-Uhlenbeck noise of unit variance over a length, m, anew on each sweep."""
     from scipy.signal import lfilter
 
@@ -103,12 +104,12 @@ def _shared(path: Path, length: float, rng: np.random.Generator) -> FloatArray:
 
 
 def _ou(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
-    return 0.5 * _white(path, level, rng) + level.sd * _shared(path, level.length, rng)
+    return 0.5 * white(path, level, rng) + level.sd * shared(path, level.length, rng)
 
 
 def _two_ou(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
-    near, far = (_shared(path, factor * level.length, rng) for factor in (0.3, 3.0))
-    return 0.5 * _white(path, level, rng) + level.sd * (0.5 * near + 0.7 * far)
+    near, far = (shared(path, factor * level.length, rng) for factor in (0.3, 3.0))
+    return 0.5 * white(path, level, rng) + level.sd * (0.5 * near + 0.7 * far)
 
 
 def _colour(exponent: float) -> Callable[[Path, Level, np.random.Generator], FloatArray]:
@@ -137,11 +138,11 @@ def _along(path: Path, rng: np.random.Generator) -> FloatArray:
 
 
 def _level_by_sweep(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
-    return _white(path, level, rng) * _by_sweep(path, rng)
+    return white(path, level, rng) * _by_sweep(path, rng)
 
 
 def _level_along(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
-    return _white(path, level, rng) * _along(path, rng)
+    return white(path, level, rng) * _along(path, rng)
 
 
 def _mixed(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
@@ -150,7 +151,7 @@ def _mixed(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
 
 def _tones(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
     tones = [np.sin(2 * np.pi * (hertz * path.t + rng.random())) for hertz in (8.0, 50.0)]
-    return np.asarray(_white(path, level, rng) + 0.5 * level.sd * np.sum(tones, axis=0))
+    return np.asarray(white(path, level, rng) + 0.5 * level.sd * np.sum(tones, axis=0))
 
 
 def _resonance(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
@@ -160,7 +161,7 @@ def _resonance(path: Path, level: Level, rng: np.random.Generator) -> FloatArray
     turn = 2 * np.pi * 60.0 * path.spacing / FINGER_SPEED
     keep = np.exp(-turn / 30.0)
     rung = lfilter([1.0], [1.0, -2 * keep * np.cos(turn), keep**2], rng.standard_normal(len(path.sweep)))
-    return np.asarray(_white(path, level, rng) + level.sd * rung / rung.std())
+    return np.asarray(white(path, level, rng) + level.sd * rung / rung.std())
 
 
 def _student(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
@@ -168,7 +169,7 @@ def _student(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
 
 
 def _spikes(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
-    height = _white(path, level, rng)
+    height = white(path, level, rng)
     hit = rng.random(len(height)) < 1e-3
     height[hit] += 20.0 * level.sd * rng.standard_normal(int(hit.sum()))
     return height
@@ -176,7 +177,7 @@ def _spikes(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
 
 def _bursts(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
     """Runs of 10 to 40 samples, two a metre, 10 to 30 levels off."""
-    height = _white(path, level, rng)
+    height = white(path, level, rng)
     for begin in rng.integers(0, len(height) - 40, int(2.0 * len(height) * path.spacing)):
         height[begin : begin + rng.integers(10, 40)] += level.sd * rng.uniform(10, 30) * rng.choice([-1.0, 1.0])
     return height
@@ -184,7 +185,7 @@ def _bursts(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
 
 def _stuck(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
     """Runs of 10 to 60 samples, three a metre, in which the height does not change."""
-    height = _white(path, level, rng)
+    height = white(path, level, rng)
     for begin in rng.integers(0, len(height) - 60, int(3.0 * len(height) * path.spacing)):
         height[begin : begin + rng.integers(10, 60)] = height[begin]
     return height
@@ -193,13 +194,13 @@ def _stuck(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
 def _linear_drift(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
     # also while the finger is on its way from sweep to sweep: by the samples' count it would be a tilt of a plate
     far = 20.0 * level.sd * rng.choice([-1.0, 1.0])
-    return np.asarray(_white(path, level, rng) + far * path.t / path.t[-1])
+    return np.asarray(white(path, level, rng) + far * path.t / path.t[-1])
 
 
 def _random_walk(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
     """A walk that comes two levels far over the length of a sweep of forty tips."""
     steps = 2.0 * level.sd * np.sqrt(path.spacing / (40.0 * path.tip_radius))
-    return np.asarray(_white(path, level, rng) + steps * np.cumsum(rng.standard_normal(len(path.sweep))))
+    return np.asarray(white(path, level, rng) + steps * np.cumsum(rng.standard_normal(len(path.sweep))))
 
 
 def _lines(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
@@ -207,7 +208,7 @@ def _lines(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
         rng.normal(0.0, 3.0) + rng.normal(0.0, 3.0) * np.linspace(-1.0, 1.0, part.stop - part.start)
         for part in path.parts
     ]
-    return _white(path, level, rng) + level.sd * np.concatenate(own)
+    return white(path, level, rng) + level.sd * np.concatenate(own)
 
 
 def _backlash(path: Path, level: Level, rng: np.random.Generator) -> Recorded:
@@ -215,7 +216,7 @@ def _backlash(path: Path, level: Level, rng: np.random.Generator) -> Recorded:
     from explore3d.bench.trust.play_kernels import play
 
     centers = play(path.centers, path.sweep, 0.5 * level.sd)
-    return np.arange(len(path.sweep)), centers + _white(path, level, rng)[:, None] * path.normals
+    return np.arange(len(path.sweep)), centers + white(path, level, rng)[:, None] * path.normals
 
 
 def _stick_slip(path: Path, level: Level, rng: np.random.Generator) -> Recorded:
@@ -233,7 +234,7 @@ def _encoder(share: float) -> Callable[[Path, Level, np.random.Generator], Recor
     """White noise, and every coordinate in steps of a share of it."""
 
     def record(path: Path, level: Level, rng: np.random.Generator) -> Recorded:
-        centers = path.centers + _white(path, level, rng)[:, None] * path.normals
+        centers = path.centers + white(path, level, rng)[:, None] * path.normals
         step = share * level.sd
         return np.arange(len(centers)), step * np.round(centers / step)
 
@@ -246,14 +247,14 @@ def _gaps(path: Path, level: Level, rng: np.random.Generator) -> Recorded:
     for begin in rng.integers(0, len(kept), int(3.0 * len(kept) * path.spacing)):
         kept[begin : begin + int(rng.uniform(0.5, 2.0) * path.tip_radius / path.spacing)] = False
     index = np.flatnonzero(kept)
-    return index, (path.centers + _white(path, level, rng)[:, None] * path.normals)[index]
+    return index, (path.centers + white(path, level, rng)[:, None] * path.normals)[index]
 
 
 def _rates(path: Path, level: Level, rng: np.random.Generator) -> Recorded:
     """Of every other sweep one sample in five."""
     kept = (path.sweep % 2 == 0) | (np.arange(len(path.sweep)) % 5 == 0)
     index = np.flatnonzero(kept)
-    return index, (path.centers + _white(path, level, rng)[:, None] * path.normals)[index]
+    return index, (path.centers + white(path, level, rng)[:, None] * path.normals)[index]
 
 
 def _rough(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
@@ -261,11 +262,11 @@ def _rough(path: Path, level: Level, rng: np.random.Generator) -> FloatArray:
     from scipy.ndimage import gaussian_filter1d
 
     rough = gaussian_filter1d(rng.standard_normal(len(path.sweep)), level.length / path.spacing)
-    return np.asarray(_white(path, level, rng) + 0.5 * level.sd * rough / rough.std())
+    return np.asarray(white(path, level, rng) + 0.5 * level.sd * rough / rough.std())
 
 
 LAWS: dict[str, Law] = {
-    "white": Law("white noise", _heights(_white)),
+    "white": Law("white noise", _heights(white)),
     "ou": Law("Ornstein-Uhlenbeck noise and half as much white noise", _heights(_ou)),
     "1/f^0.5": Law("power by 1/f^0.5 over the recording", _heights(_colour(0.5))),
     "1/f": Law("power by 1/f over the recording", _heights(_colour(1.0))),

@@ -86,6 +86,40 @@ def free_form(size: float) -> Body:
     return _star(lambda ways: size / 0.045 * blob(ways), blob_normals, size)
 
 
+@dataclass(frozen=True, eq=False)
+class Wire:
+    """A round wire that lies on a body.
+
+    Args:
+        axis: (K, 3) where it touches the body, m.
+        up: (K, 3) directions out of the body there.
+        diameter: m.
+    """
+
+    axis: FloatArray
+    up: FloatArray
+    diameter: float
+
+    @property
+    def mesh(self) -> Mesh:
+        """With round ends."""
+        middle = self.axis + 0.5 * self.diameter * self.up
+        return tube(middle, self.up, 0.5 * self.diameter, WIRE_SIDES, WIRE_SIDES // 4)
+
+
+def wires_on(body: Body, tip_radius: float, draw: tuple[int, ...]) -> list[Wire]:
+    """Wires across some of the sweeps over a body; `draw` is the seed of their places, lengths and diameters."""
+    rng, wires = np.random.default_rng(draw), []
+    for share in WIRE_PLACES:
+        diameter = tip_radius * rng.uniform(*WIRE_DIAMETERS)
+        place = (share + rng.uniform(-0.05, 0.05) - 0.5) * PATH_LENGTH
+        low, high = SWEEP_PITCH * tip_radius * np.array([rng.uniform(-4.5, -2.5), rng.uniform(1.5, 4.5)])
+        across = np.linspace(low, high, 321)
+        axis, up = body.at(place + rng.uniform(-0.3, 0.3) * across, across)
+        wires.append(Wire(axis, up, diameter))
+    return wires
+
+
 TRUST_BODIES: dict[str, Callable[[float], Body]] = {
     "plane": plane,
     "cylinder": cylinder,
@@ -124,24 +158,16 @@ def wired_path(
     stands over the facets: the round body's own surface is up to 2 um over them where its radius is 45 mm.
 
     Args:
-        draw: seed of their places, lengths and diameters.
+        draw: seed of the wires (see `wires_on`).
     """
     body, surface = _body(name, size)
-    rng = np.random.default_rng(draw)
-    base, wires, truth, crests = Base(surface), [], [], []
-    for share in WIRE_PLACES:
-        diameter = tip_radius * rng.uniform(*WIRE_DIAMETERS)
-        place = (share + rng.uniform(-0.05, 0.05) - 0.5) * PATH_LENGTH
-        low, high = SWEEP_PITCH * tip_radius * np.array([rng.uniform(-4.5, -2.5), rng.uniform(1.5, 4.5)])
-        across = np.linspace(low, high, 321)
-        lean = rng.uniform(-0.3, 0.3)
-        axis, up = body.at(place + lean * across, across)
-        wires.append(tube(axis + 0.5 * diameter * up, up, 0.5 * diameter, WIRE_SIDES, WIRE_SIDES // 4))
-        crest = base.foot(axis + (diameter + tip_radius) * up, tip_radius)
+    base, drawn, truth, crests = Base(surface), wires_on(body, tip_radius, draw), [], []
+    for wire in drawn:
+        crest = base.foot(wire.axis + (wire.diameter + tip_radius) * wire.up, tip_radius)
         height = float(crest.height.mean())
-        truth.append(TrueFeature("ridge", base.foot(axis, tip_radius).points, height, diameter))
+        truth.append(TrueFeature("ridge", base.foot(wire.axis, tip_radius).points, height, wire.diameter))
         crests.append(crest.points)
-    path, _ = _felt(body, joined(body.mesh, *wires), base, tip_radius)
+    path, _ = _felt(body, joined(body.mesh, *(wire.mesh for wire in drawn)), base, tip_radius)
     return path, base, tuple(truth), tuple(crests)
 
 

@@ -77,15 +77,15 @@ class Verdict:
         cells = [
             self.name,
             f"{self.often[1]:.0f}",
-            _rate_text(self.often, COUNTED_RATE),
-            _rate_text(self.seldom, AnalysisSettings().false_alarms_per_metre),
-            _rate_text(self.features, MOST_FEATURES / MOST_TIMES_ASKED),
-            _share_text(self.warned),
+            rate_text(self.often, COUNTED_RATE),
+            rate_text(self.seldom, AnalysisSettings().false_alarms_per_metre),
+            rate_text(self.features, MOST_FEATURES / MOST_TIMES_ASKED),
+            share_text(self.warned),
             f"{self.limit:.2g}",
-            _share_text(self.recovered),
-            _share_text(self.found),
-            _rate_text(self.invented, MOST_FEATURES / MOST_TIMES_ASKED),
-            *(_share_text(self.inside[name]) for name in TRUE_VALUES),
+            share_text(self.recovered),
+            share_text(self.found),
+            rate_text(self.invented, MOST_FEATURES / MOST_TIMES_ASKED),
+            *(share_text(self.inside[name]) for name in TRUE_VALUES),
             f"{self.cpu:.2f}",
         ]
         return tuple(cells)
@@ -141,7 +141,7 @@ def poisson_range(count: int, metres: float) -> tuple[float, float]:
     return low / metres, 0.5 * float(chi2.ppf(0.95, 2 * count + 2)) / metres
 
 
-def _rate_text(rate: tuple[int, float], asked: float) -> str:
+def rate_text(rate: tuple[int, float], asked: float) -> str:
     """The rate, its 90 % range, and a mark where all of that is more than may be."""
     count, metres = rate
     if not metres:
@@ -151,7 +151,8 @@ def _rate_text(rate: tuple[int, float], asked: float) -> str:
     return f"{count / metres:.2g} ({low:.2g}–{high:.2g}){mark}"
 
 
-def _share_text(share: tuple[int, int]) -> str:
+def share_text(share: tuple[int, int]) -> str:
+    """Successes of trials, in per cent."""
     return f"{100 * share[0] / share[1]:.0f} % of {share[1]}" if share[1] else "–"
 
 
@@ -218,14 +219,14 @@ def write_trust(records: Sequence[dict[str, Any]], of: str, out: Path) -> tuple[
                 f"`explore3d bench trust --set {of} --store trust.jsonl --out trust` makes this page.",
                 scales,
                 HOW_TO_READ_IT,
-                _markdown(VERDICT_HEAD, rows),
+                markdown(VERDICT_HEAD, rows),
                 "## Bodies and tips",
                 "All laws together.",
-                _markdown(head_of_bodies, by_body),
+                markdown(head_of_bodies, by_body),
                 "## Warnings",
-                _markdown(("law", "what is said, share of bare recordings"), warned),
+                markdown(("law", "what is said, share of bare recordings"), warned),
                 "## Laws",
-                _markdown(("law", "what it is"), laws),
+                markdown(("law", "what it is"), laws),
             ]
         )
         + "\n",
@@ -259,6 +260,7 @@ def _usual_warnings(records: Sequence[dict[str, Any]], law: str) -> str:
     return ", ".join(f"{kind} {100 * share:.0f} %" for kind, share in shares.items() if share)
 
 
-def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)

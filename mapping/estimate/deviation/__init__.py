@@ -12,11 +12,13 @@ if TYPE_CHECKING:
         UnclimbedLevel as UnclimbedLevel,
         unclimbed_levels as unclimbed_levels,
     )
+    from mapping.estimate.deviation.yielding import Yielding as Yielding, yielding as yielding
 
 _PUBLIC = {
     "explain": ("explain", "felt_enough"),
     "left_standing": ("LeftStanding", "left_standing"),
     "result": ("CAUSES", "Deviation", "Part"),
     "unclimbed": ("UnclimbedLevel", "unclimbed_levels"),
+    "yielding": ("Yielding", "yielding"),
 }
 doorway(__name__, _PUBLIC)

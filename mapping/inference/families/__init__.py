@@ -55,6 +55,7 @@ if TYPE_CHECKING:
         trapezoid_beside as trapezoid_beside,
     )
     from mapping.inference.families.twin import TwinShape as TwinShape, twin_beside as twin_beside
+    from mapping.inference.families.worn_tip import WornTipShape as WornTipShape, with_worn_tip as with_worn_tip
 
 _PUBLIC = {
     "bell": (
@@ -103,5 +104,6 @@ _PUBLIC = {
         "trapezoid_beside",
     ),
     "twin": ("TwinShape", "twin_beside"),
+    "worn_tip": ("WornTipShape", "with_worn_tip"),
 }
 doorway(__name__, _PUBLIC)

@@ -11,6 +11,7 @@ import numpy as np
 
 from mapping import FloatArray
 from mapping.inference.families.problem import PosteriorProblem
+from mapping.inference.families.worn_tip import WornTipShape
 from mapping.inference.likelihood import Normal, Prior, Shape
 
 # A tip is at least this share of its nominal radius.
@@ -100,8 +101,10 @@ def with_free_tip(problem: PosteriorProblem, sd: float, base_was_felt: bool = Fa
 
 
 def with_nominal_tip(problem: PosteriorProblem) -> PosteriorProblem:
-    """The problem as the nominal tip feels it; the same if the tip was not free."""
+    """The problem as the nominal tip feels it; the same if the tip was neither free nor worn."""
     shape = problem.target.shape
+    if isinstance(shape, WornTipShape):
+        return replace(problem, target=replace(problem.target, shape=shape.felt))
     if not isinstance(shape, FreeTipShape):
         return problem
     return replace(problem, target=replace(problem.target, shape=shape.felt), beginnings=problem.beginnings[:, :-1])

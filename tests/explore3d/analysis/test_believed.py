@@ -28,6 +28,7 @@ def test_an_account_that_counts_what_was_dropped_is_not_told() -> None:
         detections=SimpleNamespace(crossings=()),
         trace=SimpleNamespace(tip_radius=1e-3),
         backlash=None,
+        yielding=None,
         stages=SimpleNamespace(left_out=[]),
     )
     believed(work, lambda share: None)  # type: ignore[arg-type]

@@ -7,7 +7,7 @@ import pytest
 
 from explore3d.bench.scenes.exploring import BenchScene
 from explore3d.bench.scenes.wrong_models import wrong_model
-from explore3d.bench.wrong_models import _astray
+from explore3d.bench.wrong_models import _astray, wrong_model_run
 from mapping import Surface
 from mapping.base import Base
 from mapping.base.pose import Pose
@@ -52,3 +52,9 @@ def test_an_object_is_placed_off_its_model_as_far_as_is_said() -> None:
     assert np.linalg.norm(moved.mean(axis=0) - still.mean(axis=0)) == pytest.approx(3e-3, rel=1e-6)
     rotation = np.linalg.lstsq(still - still.mean(axis=0), moved - moved.mean(axis=0), rcond=None)[0].T
     assert np.degrees(Pose.angle(rotation)) == pytest.approx(2.0, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_wire_whose_few_crossings_are_not_quite_on_one_course_is_not_parted() -> None:
+    found = wrong_model_run(wrong_model("cylinder", "dent", 2), "dent", 2)
+    assert found["named"] and (found["found"], found["invented"]) == (1, 0)
