@@ -25,7 +25,8 @@ from mapping.inference.configuration.neighbourhood import (
 from mapping.inference.configuration.proposals import PEAK_SDS, PROPOSALS, Proposal, apart_of, as_far_as_felt, dense
 from mapping.inference.configuration.search import CROWDED, Account, searched
 from mapping.inference.configuration.told import in_words
-from mapping.inference.families import MEETING_REACH, OneOfMany, PosteriorProblem, RidgeShape, Surroundings, TwinShape
+from mapping.inference.families import MEETING_REACH, PosteriorProblem, RidgeShape, Surroundings, TwinShape
+from mapping.inference.joint import OneOfMany
 from mapping.inference.kinds import kind_of, sizes_of
 from mapping.inference.likelihood import Nuisance
 from mapping.inference.sampler import root_of

@@ -18,7 +18,8 @@ import numpy as np
 
 from mapping import BoolArray, Feature, FloatArray
 from mapping.geometry.mesh import spline_design
-from mapping.inference.families import JoinedShape, TwinShape, stands_out
+from mapping.inference.families import TwinShape
+from mapping.inference.joint import JoinedShape, stands_out
 from mapping.inference.kinds import kind_of, sizes_of
 from mapping.inference.likelihood import LogPosterior, Shape
 from mapping.inference.sampler import linearised

@@ -16,16 +16,15 @@ from mapping.inference.configuration.common_deviation import Deviation, Fitted, 
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood
 from mapping.inference.curves import HIGHEST_DEGREE
 from mapping.inference.families import (
-    JoinedShape,
     RidgeShape,
     StepShape,
     TwinShape,
     bell_beside,
     bell_ridge_beside,
-    stands_out,
     trapezoid_beside,
     twin_beside,
 )
+from mapping.inference.joint import JoinedShape, stands_out
 from mapping.inference.kinds import LineKind, PointKind, kind_of, sizes_of
 from mapping.inference.likelihood import LogPosterior, Shape
 from mapping.inference.sampler import Laplace, find_optima, laplace

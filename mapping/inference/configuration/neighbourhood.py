@@ -12,7 +12,8 @@ from mapping import BoolArray, Feature, FloatArray, IntArray
 from mapping.base import over_levels
 from mapping.detection import Crossing
 from mapping.geometry.mesh import distances
-from mapping.inference.families import JoinedShape, Sizes, Surroundings, tells_of_line
+from mapping.inference.families import Sizes, Surroundings, tells_of_line
+from mapping.inference.joint import JoinedShape
 from mapping.inference.kinds import kind_of, sizes_of
 from mapping.inference.likelihood import Likelihood, Nuisance, Shape, Window, build_likelihood
 from mapping.instrument import Noise

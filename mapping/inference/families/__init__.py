@@ -18,11 +18,6 @@ if TYPE_CHECKING:
     from mapping.inference.families.bump import BumpShape as BumpShape, Spot as Spot, spot_at as spot_at
     from mapping.inference.families.free_tip import with_free_tip as with_free_tip, with_nominal_tip as with_nominal_tip
     from mapping.inference.families.groove import Crossing as Crossing, GrooveShape as GrooveShape
-    from mapping.inference.families.joined_shape import (
-        JoinedShape as JoinedShape,
-        OneOfMany as OneOfMany,
-        stands_out as stands_out,
-    )
     from mapping.inference.families.line_ends import tells_of_line as tells_of_line
     from mapping.inference.families.pit import PitShape as PitShape
     from mapping.inference.families.problem import (
@@ -71,7 +66,6 @@ _PUBLIC = {
     "bump": ("BumpShape", "Spot", "spot_at"),
     "free_tip": ("with_free_tip", "with_nominal_tip"),
     "groove": ("Crossing", "GrooveShape"),
-    "joined_shape": ("JoinedShape", "OneOfMany", "stands_out"),
     "line_ends": ("tells_of_line",),
     "pit": ("PitShape",),
     "problem": (

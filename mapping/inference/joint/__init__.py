@@ -5,7 +5,12 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from mapping.inference.joint.joined_shape import (
+        JoinedShape as JoinedShape,
+        OneOfMany as OneOfMany,
+        stands_out as stands_out,
+    )
     from mapping.inference.joint.refinement import refine_all as refine_all
 
-_PUBLIC = {"refinement": ("refine_all",)}
+_PUBLIC = {"joined_shape": ("JoinedShape", "OneOfMany", "stands_out"), "refinement": ("refine_all",)}
 doorway(__name__, _PUBLIC)

@@ -17,7 +17,8 @@ import numpy as np
 from mapping import EmptyWindowError, Feature, FloatArray, Posterior
 from mapping.geometry.mesh import arclengths, resample
 from mapping.inference import described_at
-from mapping.inference.families import MODEL_FLOOR, JoinedShape, PosteriorProblem, Surroundings, window_of_all
+from mapping.inference.families import MODEL_FLOOR, PosteriorProblem, Surroundings, window_of_all
+from mapping.inference.joint.joined_shape import JoinedShape
 from mapping.inference.kinds import LineKind, PointKind, feature_trace, felt_together, kind_of, sizes_of
 from mapping.inference.likelihood import LogPosterior, Nuisance, Shape, Window, build_likelihood
 from mapping.inference.sampler import find_optima, laplace, linearised, root_of

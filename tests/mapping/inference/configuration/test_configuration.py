@@ -27,7 +27,8 @@ from mapping.inference.configuration.configuration import Configuration, Part, a
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
 from mapping.inference.configuration.proposals import smoother, straight_lines
 from mapping.inference.configuration.search import searched
-from mapping.inference.families import JoinedShape, Surroundings
+from mapping.inference.families import Surroundings
+from mapping.inference.joint import JoinedShape
 from mapping.instrument import Noise
 
 SLOW_PAIRS = [pytest.param(body, marks=pytest.mark.slow) for body in ("flat bar", "acute crossing", "wire over a step")]

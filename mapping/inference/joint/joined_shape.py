@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 
 from mapping import FloatArray, IntArray
-from mapping.inference.families.groove import Crossing, GrooveShape
-from mapping.inference.families.step import StepShape
-from mapping.inference.families.twin import TwinShape
+from mapping.inference.families import Crossing, GrooveShape, StepShape, TwinShape
 from mapping.inference.likelihood import LogPosterior, Prior, Shape
 
 # Places along a line at which it is asked on which side of a step it lies; between two of them the side changes where
