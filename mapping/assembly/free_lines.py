@@ -30,7 +30,8 @@ PLACES_PER_CORE = 3.0
 END_PITCHES = 3.0
 # Legs of an axis that tell its direction at an end: over 24 rasters (seeds 100 to 105) 2 and 8 are alike
 LAST_LEGS = 4
-# Sections by which it is asked whether a line is the same all along: two may differ for any reason
+# Sections by which it is asked whether a line is the same all along: of two the scatter has one degree of freedom, and
+# tells no change along the line from one section that is off
 FEWEST_VARYING = 3
 # Half of a 90 % interval of what is equally probable over a stretch of one
 UNIFORM_HALF_90 = 0.45

@@ -15,7 +15,7 @@ INDEPENDENT_SHARE = 0.75
 # curvature's, and five standard deviations of it are 25 / 2.
 CERTAIN_GAP = 12.5
 
-# Numbers that one instruction takes at once: new rows are filled up with zeros to a multiple of it
+# Numbers of 8 bytes that one instruction of 32 bytes takes at once: new rows are filled up with zeros to a multiple
 FILLED_UP_TO = 4
 LEAST_SQUARED_ERROR = 1e-28  # squared error of a curvature that is never undercut, for bodies of about unit size
 

@@ -23,10 +23,11 @@ from mapping.inference.kinds import LineKind, PointKind, feature_trace, felt_tog
 from mapping.inference.likelihood import LogPosterior, Nuisance, Shape, Window, build_likelihood
 from mapping.inference.sampler import find_optima, laplace, linearised, root_of
 
-# More features than that are laid out in blocks: the time of a search grows with the square of their number, and is
-# about a CPU second for so many
+# More features than that are laid out in blocks: the time of a search grows with the square of their number. Eight
+# domes on 3,000 bins, begun with no width, took 0.8 to 2.4 s; the configurations are weighed in blocks of ten, too
 MOST_TOGETHER = 10
-# Points of a crest, in half-widths of what it disturbs: distances from it are known to an eighth of that in square
+# Points of a crest, in half-widths w of what it disturbs: half-way between two of them a place at the window's edge,
+# 3 w away, seems farther off than it is by (w / 8)^2 / (6 w) = 0.003 w
 CREST_SPACING = 0.25
 
 
