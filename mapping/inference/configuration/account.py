@@ -73,17 +73,27 @@ def accounted(
     settled: list[list[Feature]] = [[feature] for feature in features if _weighed(feature)]
     for again in range(LOOKS):
         origin = {id(feature): k for k, known in enumerate(settled) for feature in known}
-        found: list[list[Feature]] = []
-        for group, own in _groups([feature for known in settled for feature in known], open_to, tip):
-            if again and len({origin[id(feature)] for feature in group}) < 2:
-                found.append(group)
+        blocks = [
+            block
+            for group, own in _groups([feature for known in settled for feature in known], open_to, tip)
+            for block in _blocks(group, own, [origin[id(feature)] for feature in group] if again else [], tip)
+        ]
+        settled = [block.features for block in blocks]
+        felt = list(settled)  # the same where they are likeliest, as they are held beside others
+        open_blocks = [k for k, block in enumerate(blocks) if not again or len(block.origins) > 1]
+        for k in open_blocks:
+            beside = _beside(k, felt, blocks[k], tip)
+            if beside and (opened := _opened(blocks[k], beside, places, around, false_alarms_per_metre)):
+                felt[k] = _described(opened[1], around)
+        for k in open_blocks:
+            opened = _opened(blocks[k], _beside(k, felt, blocks[k], tip), places, around, false_alarms_per_metre)
+            if opened is None:
                 continue
-            for block in _blocks(group, own, [origin[id(feature)] for feature in group] if again else [], tip):
-                improved, best = _improved(block, places, around, false_alarms_per_metre, proposals)
-                left = [spot for spot in left if best is None or not _explains(best, spot)]
-                divided = again and bool(block.beside)
-                found.append([_noted(feature, (IN_BLOCKS,)) for feature in improved] if divided else improved)
-        settled = found
+            improved, best = _improved(blocks[k], *opened, around, proposals)
+            left = [spot for spot in left if not _explains(best, spot)]
+            noted = again and blocks[k].cut
+            settled[k] = [_noted(feature, (IN_BLOCKS,)) for feature in improved] if noted else improved
+            felt[k] = _described(best, around) if len(blocks) > 1 else improved
     return [*rest, *(feature for group in settled for feature in group)], left
 
 
@@ -93,36 +103,56 @@ class _Block:
 
     Args:
         features, crossings: which.
-        beside: features that reach into it, of the same neighbourhood.
+        origins: the blocks that all of its neighbourhood was weighed in before.
+        cut: True if it is not the whole of its neighbourhood.
     """
 
     features: list[Feature]
     crossings: list[Crossing]
-    beside: list[Feature]
+    origins: frozenset[int]
+    cut: bool = False
+
+
+def _beside(number: int, felt: Sequence[Sequence[Feature]], block: _Block, tip: float) -> list[Feature]:
+    """What of the other blocks disturbs places that a block, the one of a number, is weighed on."""
+    others = [feature for m, known in enumerate(felt) if m != number for feature in known]
+    return [feature for feature in others if _reaches_into(feature, block, tip)]
+
+
+def _opened(
+    block: _Block, beside: Sequence[Feature], places: Places, around: Surroundings, false_alarms_per_metre: float
+) -> tuple[list[Part], Configuration] | None:
+    """A block as the rules left it, and the same where it is likeliest; None if too few places tell of it, or a feature
+    has no family there.
+
+    What lies beside the block and reaches into its places is held: left out, its flanks would be a misfit of the
+    block's own, and be told as more details.
+    """
+    place = neighbourhood(block.features, block.crossings, places, around, false_alarms_per_metre)
+    if place is None:
+        return None
+    place = _holding(beside, place)
+    try:
+        parts = [_begun(feature, place) for feature in block.features]
+        start = fitted(parts, place)
+    except MappingError:  # a feature over whose axis the base does not go on has no family here
+        return None
+    assert start is not None
+    return parts, start
 
 
 def _improved(
     block: _Block,
-    places: Places,
+    parts: list[Part],
+    start: Configuration,
     around: Surroundings,
-    false_alarms_per_metre: float,
     proposals: Sequence[Proposal],
-) -> tuple[list[Feature], Configuration | None]:
+) -> tuple[list[Feature], Configuration]:
     """The features of one block, as they are or better, and the configuration of the highest odds."""
-    group, crossings = block.features, block.crossings
-    place = neighbourhood(group, crossings, places, around, false_alarms_per_metre)
-    if place is None:
-        return group, None
-    place = _holding(block.beside, place)
-    try:
-        parts = [_begun(feature, place) for feature in group]
-        start = fitted(parts, place)
-    except MappingError:  # a feature over whose axis the base does not go on has no family here
-        return group, None
-    assert start is not None
+    group = block.features
     if _is_plain(start):
         return group, start
-    points = [c.point for c in crossings if c.kind == "convex"]
+    points = [c.point for c in block.crossings if c.kind == "convex"]
     points += [
         point for feature in group if kind_of(feature).line and kind_of(feature).sign > 0 for point in feature.axis
     ]
@@ -226,11 +256,10 @@ def _blocks(features: list[Feature], crossings: list[Crossing], origins: Sequenc
         tip: radius, m.
     """
     if len(features) <= CROWDED:
-        return [_Block(features, crossings, [])]
+        return [_Block(features, crossings, frozenset(origins))]
     reach = np.array([sizes_of(feature, tip).half_width for feature in features])
-    gap = np.array([[float(distances(one.axis, other.axis).min()) for other in features] for one in features])
-    apart = np.minimum(gap, gap.T)
-    gap = apart - reach - reach[:, None]  # less than 0 where disturbances touch
+    apart = np.array([[float(distances(one.axis, other.axis).min()) for other in features] for one in features])
+    gap = np.minimum(apart, apart.T) - reach - reach[:, None]  # less than 0 where disturbances touch
     strength = np.array([feature.evidence.snr for feature in features])
     met = [any(gap[k, m] < 0.0 and origins[m] != own for m in range(len(gap))) for k, own in enumerate(origins)]
     order = list(np.lexsort((-strength, ~np.array(met, dtype=bool)))) if met else list(np.argsort(-strength))
@@ -247,15 +276,22 @@ def _blocks(features: list[Feature], crossings: list[Crossing], origins: Sequenc
     for crossing in crossings:
         away = [float(distances(crossing.point[None], feature.axis)[0]) for feature in features] - reach
         own[of_block[int(np.argmin(away))]].append(crossing)
-    windows = apart < NEIGHBOURHOOD_REACH * (reach + reach[:, None])
     return [
-        _Block(
-            [features[k] for k in block],
-            felt,
-            [features[m] for m in range(len(features)) if m not in block and windows[m, block].any()],
-        )
+        _Block([features[k] for k in block], felt, frozenset(origins), cut=True)
         for block, felt in zip(blocks, own, strict=True)
     ]
+
+
+def _reaches_into(feature: Feature, block: _Block, tip: float) -> bool:
+    """True if a feature disturbs places that a block is weighed on."""
+    reach = sizes_of(feature, tip).half_width
+    windows = [(one.axis, sizes_of(one, tip).half_width) for one in block.features]
+    windows += [(crossing.point[None], thin_half_width(crossing, tip)) for crossing in block.crossings]
+    return any(
+        min(distances(feature.axis, axis).min(), distances(axis, feature.axis).min())
+        < reach + NEIGHBOURHOOD_REACH * half_width
+        for axis, half_width in windows
+    )
 
 
 def _felt_by(crossing: Crossing, feature: Feature, tip: float) -> bool:
@@ -269,7 +305,7 @@ def _felt_by(crossing: Crossing, feature: Feature, tip: float) -> bool:
     return bool(distances(crossing.point[None], axis)[0] < reach)
 
 
-def _described(best: Configuration, around: Surroundings, algorithms: tuple[int, ...]) -> list[Feature]:
+def _described(best: Configuration, around: Surroundings, algorithms: tuple[int, ...] = ()) -> list[Feature]:
     """Each part as a feature: beside the others, with intervals from the Gaussian at the optimum."""
     parts = [
         one

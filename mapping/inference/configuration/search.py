@@ -20,6 +20,8 @@ CROWDED, CROWDED_PLACES = 10, 1000
 # benches' plates and the shipped scenes have 5 details at most: twice as many, for what is proposed beside them, are
 # not bounded any earlier.
 MOST_FITTED = 40
+# So many fits a detail are tried where nothing improves them: 26 to 29 of two domes of braille, 42 of three, 62 of four
+FITS_OF_DETAIL = 16
 # Of such fits so many a detail are spent on joining pieces of a line, beyond them: 40 of 10 details, and 80 of 5, which
 # is every pair of them and every pair that is left after that. With both, less than 10 CPU s a detail: 2.9 where 39
 # details and 112 crossings felt each other, 6 in a row of twelve touching wires
@@ -68,7 +70,7 @@ def searched(
         proposals: the generators that are asked, in order.
     """
     place, best, accepted, idle = start.place, start, list[str](), 0
-    left, bounded = MOST_FITTED - max(1.0, _cost(parts, place)), False
+    left, bounded = MOST_FITTED - _cost(parts, place), False
     visited = {start.kinds: start}
     if REMOVE in proposals:
         # what the others explain as well is no piece of anything; these trials cost less than any other
@@ -87,8 +89,7 @@ def searched(
                 bounded = True
                 break
             other = fitted(other_parts, place)
-            cost = _cost(other_parts, place)
-            left, joins = left - max(1.0, cost), joins - cost
+            left, joins = left - _cost(other_parts, place), joins - _work(other_parts, place)
             if other is not None and other.log_odds > best.log_odds + WORTH:
                 best, joined, joining = other, laid(other_parts, place), True
         if joining:
@@ -100,8 +101,9 @@ def searched(
             found = best
             for proposed in _yielded(proposal, best, points):
                 if left <= 0.0 and proposal is not REMOVE:  # what does not pay for itself goes, however many there are
+                    bounded = True
                     break
-                left -= max(1.0, _cost(proposed, best.place))
+                left -= _cost(proposed, best.place)
                 other = fitted(proposed, best.place, best)
                 if other is None:
                     continue
@@ -118,7 +120,7 @@ def searched(
                 break
     order = sorted(visited.values(), key=lambda each: -each.log_odds)
     likely = [each for each in order if each.log_odds > order[0].log_odds - NEGLIGIBLE_ODDS]
-    return Account(start, order[0], tuple(likely), tuple(accepted), bounded or left <= 0.0)
+    return Account(start, order[0], tuple(likely), tuple(accepted), bounded)
 
 
 def _without_idle(start: Configuration) -> tuple[Configuration, list[int]]:
@@ -135,6 +137,11 @@ def _without_idle(start: Configuration) -> tuple[Configuration, list[int]]:
 
 
 def _cost(parts: Sequence[Part], place: Neighbourhood) -> float:
+    """What fitting a configuration takes of MOST_FITTED: its work, or its share of the fits of so many details."""
+    return max(min(1.0, MOST_FITTED / (FITS_OF_DETAIL * max(len(parts), 1))), _work(parts, place))
+
+
+def _work(parts: Sequence[Part], place: Neighbourhood) -> float:
     """Of fitting a configuration, in those of CROWDED details on CROWDED_PLACES."""
     rows, shapes = len(parts) / CROWDED, (len(parts) + len(place.held)) / CROWDED
     return rows * shapes * len(place.window) / CROWDED_PLACES

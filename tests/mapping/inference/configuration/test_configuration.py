@@ -113,6 +113,31 @@ def test_more_details_than_are_weighed_at_once_are_weighed_beside_each_other(mon
     assert all(ENDED_EARLY in each.notes for each in assemble(detect(trace, base), trace, base, faint=False))
 
 
+def test_what_others_leave_beside_a_detail_is_none_of_its_own() -> None:
+    """Four domes of braille whose disturbances do not touch, and reach into the places that each is weighed on."""
+    tip, height, foot = 1.5e-3, 0.48e-3, 0.8e-3
+    across = np.linspace(-foot, foot, 401)
+    dome = np.sqrt(np.maximum(((foot**2 + height**2) / (2.0 * height)) ** 2 - across**2, 0.0))
+    dome -= dome[0]
+    away = np.linspace(0.0, 2e-3, 401)
+    gap = away[:, None] - across
+    ball = np.where(np.abs(gap) < tip, np.sqrt(np.maximum(tip**2 - gap**2, 0.0)) - tip, -np.inf)
+    felt = np.maximum((dome + ball).max(axis=1), 0.0)
+    domes = 1.25e-3 * np.array([[-1.4, -1.4], [1.4, -1.4], [-1.4, 1.4], [1.4, 1.4]]) + 0.03e-3
+    x, rows = np.arange(-4.5e-3, 4.5e-3, 80e-6), np.arange(-4.5e-3, 4.5e-3, 0.3e-3)
+    sweep = np.repeat(np.arange(len(rows)), len(x))
+    plane = np.column_stack([np.tile(x, len(rows)), rows[sweep]])
+    near = np.linalg.norm(plane[:, None] - domes, axis=2).min(axis=1)
+    z = tip + np.interp(near, away, felt) + 4e-6 * np.random.default_rng(8).standard_normal(len(near))
+    trace = Trace(1e-3 * np.arange(len(z)), np.column_stack([plane, z]), sweep, tip)
+    corners = 0.1 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    base = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
+    features = assemble(detect(trace, base), trace, base, faint=False)
+    assert [feature.kind for feature in features] == ["bump"] * 4
+    assert all(abs(feature.height.median / height - 1.0) < 0.02 for feature in features)
+    assert not any(ENDED_EARLY in feature.notes for feature in features)
+
+
 def test_a_line_laid_as_it_was_felt_is_asked_for_fewer_bends() -> None:
     body = "flat bar"
     (bar,) = (_true(true) for true in classified_body(body, FIRST_BUILT_WITH).truth)
