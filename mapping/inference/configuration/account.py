@@ -26,7 +26,7 @@ from mapping.inference.configuration.proposals import PEAK_SDS, PROPOSALS, Propo
 from mapping.inference.configuration.search import CROWDED, Account, searched
 from mapping.inference.configuration.told import in_words
 from mapping.inference.families import MEETING_REACH, PosteriorProblem, RidgeShape, Surroundings, TwinShape
-from mapping.inference.joint import OneOfMany
+from mapping.inference.joint import OneOfMany, blocks_of, gaps
 from mapping.inference.kinds import kind_of, sizes_of
 from mapping.inference.likelihood import Nuisance
 from mapping.inference.sampler import root_of
@@ -224,12 +224,8 @@ def _groups(
             i = parent[i]
         return i
 
-    for i, j in itertools.combinations(range(len(features)), 2):
-        touching = min(
-            distances(features[i].axis, features[j].axis).min(), distances(features[j].axis, features[i].axis).min()
-        )
-        if touching < reach[i] + reach[j]:
-            parent[root(j)] = root(i)
+    for i, j in np.argwhere(np.triu(gaps(features, reach) < 0.0, 1)):
+        parent[root(j)] = root(i)
     for n, own in enumerate(near):
         for k in own:
             parent[root(len(features) + n)] = root(k)
@@ -258,19 +254,11 @@ def _blocks(features: list[Feature], crossings: list[Crossing], origins: Sequenc
     if len(features) <= CROWDED:
         return [_Block(features, crossings, frozenset(origins))]
     reach = np.array([sizes_of(feature, tip).half_width for feature in features])
-    apart = np.array([[float(distances(one.axis, other.axis).min()) for other in features] for one in features])
-    gap = np.minimum(apart, apart.T) - reach - reach[:, None]  # less than 0 where disturbances touch
+    gap = gaps(features, list(reach))
     strength = np.array([feature.evidence.snr for feature in features])
     met = [any(gap[k, m] < 0.0 and origins[m] != own for m in range(len(gap))) for k, own in enumerate(origins)]
     order = list(np.lexsort((-strength, ~np.array(met, dtype=bool)))) if met else list(np.argsort(-strength))
-    blocks = list[list[int]]()
-    while order:
-        block = [order.pop(0)]
-        while order and len(block) < CROWDED:
-            nearest = order[int(np.argmin(gap[np.ix_(block, order)].min(axis=0)))]
-            order.remove(nearest)
-            block.append(nearest)
-        blocks.append(block)
+    blocks = blocks_of(gap, order, CROWDED)
     of_block = {k: number for number, block in enumerate(blocks) for k in block}
     own: list[list[Crossing]] = [[] for _ in blocks]
     for crossing in crossings:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from mapping.inference.joint.blocks import blocks_of as blocks_of, gaps as gaps
     from mapping.inference.joint.joined_shape import (
         JoinedShape as JoinedShape,
         OneOfMany as OneOfMany,
@@ -12,5 +13,9 @@ if TYPE_CHECKING:
     )
     from mapping.inference.joint.refinement import refine_all as refine_all
 
-_PUBLIC = {"joined_shape": ("JoinedShape", "OneOfMany", "stands_out"), "refinement": ("refine_all",)}
+_PUBLIC = {
+    "blocks": ("blocks_of", "gaps"),
+    "joined_shape": ("JoinedShape", "OneOfMany", "stands_out"),
+    "refinement": ("refine_all",),
+}
 doorway(__name__, _PUBLIC)

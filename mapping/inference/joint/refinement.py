@@ -9,9 +9,9 @@ import numpy as np
 
 from mapping import Feature, Interval, Trace
 from mapping.base import Base
-from mapping.geometry.mesh import distances
 from mapping.inference import noise_of_trace, refine, settle
 from mapping.inference.families import Surroundings
+from mapping.inference.joint.blocks import blocks_of, gaps
 from mapping.inference.joint.junctions import Meeting, brought_together, meetings
 from mapping.inference.joint.neighbours import MOST_TOGETHER, NeighboursDoubt, laid_together
 from mapping.inference.kinds import sizes_of
@@ -107,35 +107,17 @@ def _with_tip_doubt(feature: Feature, tip_sd: float) -> Feature:
 
 def _beside(features: Sequence[Feature], half_widths: Sequence[float]) -> list[set[int]]:
     """For each feature the numbers of those whose disturbances touch its own."""
-    return [
-        {
-            m
-            for m, other in enumerate(features)
-            if m != k and distances(feature.axis, other.axis).min() < half_widths[k] + half_widths[m]
-        }
-        for k, feature in enumerate(features)
-    ]
+    touches = gaps(features, half_widths) < 0.0
+    return [set(np.flatnonzero(own).tolist()) - {k} for k, own in enumerate(touches)]
 
 
 def _groups(numbers: Sequence[int], features: Sequence[Feature], tip: float) -> list[list[int]]:
     """The numbers of features whose disturbances touch, as wide as they may be, directly or by others between them, in
     blocks of MOST_TOGETHER that lie nearest together; none of one alone."""
     wide = [replace(feature, width=Interval(*(feature.width.high,) * 3)) for feature in features]
-    reach = np.array([sizes_of(feature, tip).half_width for feature in wide])
-    gap = np.array([[float(distances(one.axis, other.axis).min()) for other in features] for one in features])
-    gap = np.minimum(gap, gap.T) - reach - reach[:, None]
-    left, groups = list(range(len(features))), list[list[int]]()
-    while left:
-        group = [left.pop(0)]
-        while left and len(group) < MOST_TOGETHER:
-            nearest = min(left, key=lambda k: float(gap[k, group].min()))
-            if gap[nearest, group].min() >= 0.0:
-                break
-            left.remove(nearest)
-            group.append(nearest)
-        if len(group) > 1:
-            groups.append(sorted(numbers[k] for k in group))
-    return groups
+    gap = gaps(wide, [sizes_of(feature, tip).half_width for feature in wide])
+    blocks = blocks_of(gap, range(len(features)), MOST_TOGETHER)
+    return [sorted(numbers[k] for k in block) for block in blocks if len(block) > 1]
 
 
 def _begun_at(detected: Sequence[Feature], known: Sequence[Feature], met: Sequence[Meeting]) -> list[Feature]:

@@ -1,0 +1,43 @@
+"""Blocks: a crowd of features cut into parts that are worked out at once, each of those that lie nearest together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mapping import Feature, FloatArray
+from mapping.geometry.mesh import distances
+
+
+def gaps(features: Sequence[Feature], reach: Sequence[float]) -> FloatArray:
+    """(N, N) distances between what features disturb, m; less than 0 where that touches.
+
+    Args:
+        features: which.
+        reach: (N,) half-widths of what they disturb, m.
+    """
+    apart = np.array([[float(distances(one.axis, other.axis).min()) for other in features] for one in features])
+    apart = apart.reshape(len(features), len(features))
+    return np.asarray(np.minimum(apart, apart.T) - np.add.outer(reach, reach))
+
+
+def blocks_of(gap: FloatArray, order: Sequence[int], most: int) -> list[list[int]]:
+    """Numbers cut into blocks: each grows from the first one left by whatever is nearest to it and touches it.
+
+    Args:
+        gap: (N, N) between what they disturb, m.
+        order: of them, those first that blocks begin with.
+        most: numbers in a block.
+    """
+    left, blocks = list(order), list[list[int]]()
+    while left:
+        block = [left.pop(0)]
+        while left and len(block) < most:
+            nearest = min(left, key=lambda k: float(gap[k, block].min()))
+            if gap[nearest, block].min() >= 0.0:
+                break
+            left.remove(nearest)
+            block.append(nearest)
+        blocks.append(block)
+    return blocks
