@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -33,6 +33,9 @@ from mapping.inference.sampler import root_of
 
 # A line that was found reaches what was a neighbourhood of its own: both are looked at once more, together
 LOOKS = 2
+# Rounds in which all blocks are laid out beside the others before anything is proposed: in the first they are held as
+# the rules left them, 2 % off in height, and in the second so near that no dome of braille misfits by its neighbours
+LAID_ROUNDS = 2
 # What is less likely than this is not told
 TOLD_SHARE = 0.01
 # Proposals that change what the posterior weighs once more
@@ -70,34 +73,39 @@ def accounted(
     rest, left = [feature for feature in features if not _weighed(feature)], list(alone)
     tip = around.trace.tip_radius
     open_to = [c for c in crossings if not any(_felt_by(c, feature, tip) for feature in rest)]
-    settled: list[list[Feature]] = [[feature] for feature in features if _weighed(feature)]
+    known = [_Block([feature], [], frozenset()) for feature in features if _weighed(feature)]
     for again in range(LOOKS):
-        origin = {id(feature): k for k, known in enumerate(settled) for feature in known}
+        origin = {id(feature): k for k, block in enumerate(known) for feature in block.features}
         blocks = [
             block
-            for group, own in _groups([feature for known in settled for feature in known], open_to, tip)
-            for block in _blocks(group, own, [origin[id(feature)] for feature in group] if again else [], tip)
+            for group, own in _groups([feature for block in known for feature in block.features], open_to, tip)
+            for block in _blocks(group, own, [origin[id(feature)] for feature in group], tip, again > 0)
         ]
-        settled = [block.features for block in blocks]
-        felt = list(settled)  # the same where they are likeliest, as they are held beside others
-        open_blocks = [k for k, block in enumerate(blocks) if not again or len(block.origins) > 1]
-        for k in open_blocks:
-            beside = _beside(k, felt, blocks[k], tip)
-            if beside and (opened := _opened(blocks[k], beside, places, around, false_alarms_per_metre)):
-                felt[k] = _described(opened[1], around)
-        for k in open_blocks:
-            opened = _opened(blocks[k], _beside(k, felt, blocks[k], tip), places, around, false_alarms_per_metre)
-            if opened is None:
+        for block in blocks:
+            block.explained = all(known[k].explained for k in block.origins)
+        weighed = [block for block in blocks if not again or len(block.origins) > 1]
+        for _ in range(LAID_ROUNDS):
+            for block in weighed:
+                _lay(block, _beside(block, blocks, tip), places, around, false_alarms_per_metre)
+                if block.laid and len(blocks) > 1:
+                    block.felt = _described(block.laid[1], around)
+        for block in weighed:
+            block.explained = block.laid is None or block.laid[1].fits
+        for block in weighed:
+            _lay(block, _beside(block, blocks, tip, explained=True), places, around, false_alarms_per_metre)
+            if block.laid is None:
                 continue
-            improved, best = _improved(blocks[k], *opened, around, proposals)
+            improved, best = _improved(block, *block.laid, around, proposals)
             left = [spot for spot in left if not _explains(best, spot)]
-            noted = again and blocks[k].cut
-            settled[k] = [_noted(feature, (IN_BLOCKS,)) for feature in improved] if noted else improved
-            felt[k] = _described(best, around) if len(blocks) > 1 else improved
-    return [*rest, *(feature for group in settled for feature in group)], left
+            noted = again and block.cut
+            block.features = [_noted(feature, (IN_BLOCKS,)) for feature in improved] if noted else improved
+            block.explained = best.fits
+            block.felt = _described(best, around) if len(blocks) > 1 else improved
+        known = blocks
+    return [*rest, *(feature for block in known for feature in block.features)], left
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Block:
     """What is weighed together.
 
@@ -105,40 +113,62 @@ class _Block:
         features, crossings: which.
         origins: the blocks that all of its neighbourhood was weighed in before.
         cut: True if it is not the whole of its neighbourhood.
+        explained: True if what it holds leaves no more than noise, as far as that was asked.
+        felt: its features where they are likeliest by now, as they are held beside others.
+        beside: what was held beside it when it was laid out; None: it was not yet.
+        laid: its parts as the rules left them, and the same where they are likeliest; None if too few places tell of
+            it, or a feature has no family there.
     """
 
     features: list[Feature]
     crossings: list[Crossing]
     origins: frozenset[int]
     cut: bool = False
+    explained: bool = True
+    felt: list[Feature] = field(default_factory=list)
+    beside: list[Feature] | None = None
+    laid: tuple[list[Part], Configuration] | None = None
 
 
-def _beside(number: int, felt: Sequence[Sequence[Feature]], block: _Block, tip: float) -> list[Feature]:
-    """What of the other blocks disturbs places that a block, the one of a number, is weighed on."""
-    others = [feature for m, known in enumerate(felt) if m != number for feature in known]
-    return [feature for feature in others if _reaches_into(feature, block, tip)]
+def _beside(block: _Block, blocks: Sequence[_Block], tip: float, *, explained: bool = False) -> list[Feature]:
+    """What of the other blocks disturbs places that a block is weighed on.
+
+    Args:
+        block: the one.
+        blocks: all of them.
+        tip: radius, m.
+        explained: True for those alone that leave no more than noise, and those of the same crowd. What is not
+            understood itself, as a ridge laid over both rims of a groove, hides what lies between it and others.
+    """
+    others = [other for other in blocks if other is not block]
+    if explained:
+        others = [other for other in others if other.explained or (other.cut and other.origins == block.origins)]
+    felt = [feature for other in others for feature in other.felt or other.features]
+    return [feature for feature in felt if _reaches_into(feature, block, tip)]
 
 
-def _opened(
-    block: _Block, beside: Sequence[Feature], places: Places, around: Surroundings, false_alarms_per_metre: float
-) -> tuple[list[Part], Configuration] | None:
-    """A block as the rules left it, and the same where it is likeliest; None if too few places tell of it, or a feature
-    has no family there.
+def _lay(
+    block: _Block, beside: list[Feature], places: Places, around: Surroundings, false_alarms_per_metre: float
+) -> None:
+    """Lay a block out where it is likeliest beside others, unless it lies there.
 
     What lies beside the block and reaches into its places is held: left out, its flanks would be a misfit of the
     block's own, and be told as more details.
     """
+    if block.beside is not None and not block.beside and not beside:
+        return
+    block.beside, block.laid = beside, None
     place = neighbourhood(block.features, block.crossings, places, around, false_alarms_per_metre)
     if place is None:
-        return None
+        return
     place = _holding(beside, place)
     try:
         parts = [_begun(feature, place) for feature in block.features]
         start = fitted(parts, place)
     except MappingError:  # a feature over whose axis the base does not go on has no family here
-        return None
+        return
     assert start is not None
-    return parts, start
+    block.laid = parts, start
 
 
 def _improved(
@@ -242,22 +272,26 @@ def _groups(
     return list(groups.values())
 
 
-def _blocks(features: list[Feature], crossings: list[Crossing], origins: Sequence[int], tip: float) -> list[_Block]:
+def _blocks(
+    features: list[Feature], crossings: list[Crossing], origins: Sequence[int], tip: float, again: bool
+) -> list[_Block]:
     """A neighbourhood as one block, or cut into blocks of CROWDED details that lie nearest together.
 
     Args:
         features, crossings: of the neighbourhood.
-        origins: the blocks that the features were weighed in before; none: they were not. Blocks grow from where those
-            met, so that what was cut is weighed together.
+        origins: the blocks that the features were in before.
         tip: radius, m.
+        again: True if they were weighed in these. Blocks grow from where those met, so that what was cut is weighed
+            together.
     """
     if len(features) <= CROWDED:
         return [_Block(features, crossings, frozenset(origins))]
     reach = np.array([sizes_of(feature, tip).half_width for feature in features])
     gap = gaps(features, list(reach))
     strength = np.array([feature.evidence.snr for feature in features])
-    met = [any(gap[k, m] < 0.0 and origins[m] != own for m in range(len(gap))) for k, own in enumerate(origins)]
-    order = list(np.lexsort((-strength, ~np.array(met, dtype=bool)))) if met else list(np.argsort(-strength))
+    known = np.array(origins)
+    met = again & ((gap < 0.0) & (known != known[:, None])).any(axis=1)
+    order = [int(k) for k in np.lexsort((-strength, ~met))]
     blocks = blocks_of(gap, order, CROWDED)
     of_block = {k: number for number, block in enumerate(blocks) for k in block}
     own: list[list[Crossing]] = [[] for _ in blocks]
