@@ -9,6 +9,12 @@ if TYPE_CHECKING:
     from mapping.inference.curves.chart import Chart as Chart, chart_along as chart_along
     from mapping.inference.curves.curve_modes import CurveModes as CurveModes
     from mapping.inference.curves.development import normals_along as normals_along, smooth_on_base as smooth_on_base
+    from mapping.inference.curves.mouth import (
+        Mouth as Mouth,
+        laid_beyond as laid_beyond,
+        mouths_of as mouths_of,
+        opened as opened,
+    )
     from mapping.inference.curves.smooth_axis import HIGHEST_DEGREE as HIGHEST_DEGREE, smooth_axis as smooth_axis
 
 _PUBLIC = {
@@ -16,6 +22,7 @@ _PUBLIC = {
     "chart": ("Chart", "chart_along"),
     "curve_modes": ("CurveModes",),
     "development": ("normals_along", "smooth_on_base"),
+    "mouth": ("Mouth", "laid_beyond", "mouths_of", "opened"),
     "smooth_axis": ("HIGHEST_DEGREE", "smooth_axis"),
 }
 doorway(__name__, _PUBLIC)

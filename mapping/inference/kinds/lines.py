@@ -36,6 +36,9 @@ from mapping.inference.sampler import find_optima
 SAG = 0.005
 MOST_LEGS = 300
 HIGHEST_MODE = 8
+# An end may lie so many half-widths beyond an edge of the body, where all places say the same: the line is open there.
+# One that was felt to go on to as near to an edge as the ball feels it is open as likely as not
+OPEN = 1.0
 # After so many degrees in a row that are no better than a lower one, no higher one is tried.
 FUTILE_DEGREES = 2
 
@@ -186,7 +189,7 @@ class LineKind(Kind):
         modes = _modes(chart, ends, degree, spare, crossings, sizes)
         laterals, along = _laterals(modes, degree, len(window), crossings, sizes), Parameters()
         if self.has_ends and not chart.closed:
-            along = _ends(ends, _end_limits(axis, chart, ends, feature, sizes, around), sizes)
+            along = _ends(ends, _end_limits(axis, chart, ends, feature, sizes, around), chart, sizes)
         return self.shape(Traced(window, chart, modes, sizes, tip, laterals, along)), degree
 
     def _chart(
@@ -287,7 +290,10 @@ def _crest(chart: Chart, tip_radius: float, sizes: Sizes, rises: tuple[float, ..
 def _end_limits(
     axis: FloatArray, chart: Chart, ends: FloatArray, feature: Feature, sizes: Sizes, around: Surroundings
 ) -> list[tuple[float, float]]:
-    """Places between which the beginning and the end of an open line lie, m along the chart."""
+    """Places between which the beginning and the end of an open line lie, m along the chart.
+
+    One that lies beyond an edge of the body is open there.
+    """
     low, high = float(chart.s[0]), float(chart.s[-1])
     middle = min(max(float(ends.mean()), low + 1e-3 * (high - low)), high - 1e-3 * (high - low))
     limits = []
@@ -297,15 +303,29 @@ def _end_limits(
             reach = MEETING_REACH * sizes.half_width
             at = float(np.clip(ends[k], least + 0.1 * reach, most - 0.1 * reach))
             least, most = max(least, at - reach), min(most, at + reach)
+        beyond = OPEN * sizes.half_width
+        if chart.walls[0] is not None and least == low:
+            least -= beyond
+        if chart.walls[1] is not None and most == high:
+            most += beyond
         limits.append((least, most))
     return limits
 
 
-def _ends(places: FloatArray, limits: list[tuple[float, float]], sizes: Sizes) -> Parameters:
-    """Parameters of the two ends: where they were detected (2,), anywhere within their limits, m along the chart."""
+def _ends(places: FloatArray, limits: list[tuple[float, float]], chart: Chart, sizes: Sizes) -> Parameters:
+    """Parameters of the two ends: where they were detected (2,), anywhere within their limits, m along the chart.
+
+    One that was detected within a half-width of an edge of the body begins as open.
+    """
+    (lowest, _), (_, highest) = limits
+    first, last = float(places.min()), float(places.max())
+    if chart.walls[0] is not None and first < chart.s[0] + sizes.half_width:
+        first = 0.5 * (lowest + min(float(chart.s[0]), first))
+    if chart.walls[1] is not None and last > chart.s[-1] - sizes.half_width:
+        last = 0.5 * (highest + max(float(chart.s[-1]), last))
     return Parameters(
         tuple(Uniform(*limit) for limit in limits),
-        (float(places.min()), float(places.max())),
+        (first, last),
         (0.1 * sizes.half_width,) * 2,
     )
 
