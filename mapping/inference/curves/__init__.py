@@ -6,6 +6,7 @@ from mapping.doorway import doorway
 
 if TYPE_CHECKING:
     from mapping.inference.curves.axis_kernels import axes_about as axes_about
+    from mapping.inference.curves.body_edge import up_to_edges as up_to_edges
     from mapping.inference.curves.chart import Chart as Chart, chart_along as chart_along
     from mapping.inference.curves.curve_modes import CurveModes as CurveModes
     from mapping.inference.curves.development import normals_along as normals_along, smooth_on_base as smooth_on_base
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "axis_kernels": ("axes_about",),
+    "body_edge": ("up_to_edges",),
     "chart": ("Chart", "chart_along"),
     "curve_modes": ("CurveModes",),
     "development": ("normals_along", "smooth_on_base"),

@@ -17,6 +17,7 @@ from mapping.inference.curves import (
     normals_along,
     smooth_axis,
     smooth_on_base,
+    up_to_edges,
 )
 from mapping.inference.families import (
     MEETING_REACH,
@@ -128,6 +129,7 @@ class LineKind(Kind):
         tip = around.trace.tip_radius
         sizes = sizes_of(feature, tip)
         axis, normals, crossings = _axis_of(feature, sizes, around)
+        axis, normals = _on_one_face(axis, normals, around)
         course = self._chart(axis, normals, sizes, crossings, HIGHEST_DEGREE, around, bends=False)
         rises = (0.0, sizes.height, -sizes.height) if self.sided else (0.0,)
         window = window_for(*_crest(course, tip, sizes, rises), sizes, around)
@@ -174,7 +176,7 @@ class LineKind(Kind):
             most, least: degrees that its course may have.
             overlooked: True if an open course has one bend more, of a size that its degree leaves out.
         """
-        axis, normals, crossings = feature.axis, feature.normals, feature.evidence.crossings
+        (axis, normals), crossings = _on_one_face(feature.axis, feature.normals, around), feature.evidence.crossings
         tip, sizes = around.trace.tip_radius, sizes_of(feature, around.trace.tip_radius)
         if window.flat:  # nothing to unroll, and nothing bends
             line, degree = smooth_axis(axis, sizes.position_sd, most, least)
@@ -263,6 +265,15 @@ def _axis_of(feature: Feature, sizes: Sizes, around: Surroundings) -> tuple[Floa
         raise EmptyWindowError(f"a single sample lies near the {feature.kind}: it tells no direction of the sweep")
     half = 0.5 * sizes.half_width * across / max(float(np.linalg.norm(across)), np.finfo(float).tiny)
     return np.stack([axis[0] - half, axis[0] + half]), np.repeat(normals[:1], 2, axis=0), 1
+
+
+def _on_one_face(axis: FloatArray, normals: FloatArray, around: Surroundings) -> tuple[FloatArray, FloatArray]:
+    """A detected axis without what was felt of it over an edge of the body: the feet of all balls that roll over that
+    lie on it, wherever beside the line they are."""
+    if np.array_equal(axis[0], axis[-1]):
+        return axis, normals
+    kept = up_to_edges(axis, normals, around.base, around.trace.tip_radius)
+    return kept.line, kept.lift
 
 
 def _modes(chart: Chart, ends: FloatArray, degree: int, spare: int, crossings: int, sizes: Sizes) -> CurveModes:

@@ -43,6 +43,15 @@ def test_an_axis_that_was_drawn_down_the_wall_ends_at_the_edge() -> None:
     assert laid.walls[0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
 
 
+def test_what_was_felt_along_the_edge_is_no_part_of_the_course_and_does_not_tilt_it() -> None:
+    line = 1e-3 * np.array([[0.0, 0.0, 0.0], [0.0, 10.0, 0.0], [0.0, 20.0, 0.0], [1.5, 20.0, 0.0]])
+    leaning = np.array([0.0, 0.6, 0.8])
+    laid = up_to_edges(line, np.stack([UP, UP, leaning, leaning]), box(), TIP)
+    assert laid.line[-1] == pytest.approx([0.0, 0.020, 0.0], abs=1e-9)
+    assert laid.lift[-1] == pytest.approx(UP)
+    assert len(laid.line) < len(line) + 1 and (laid.line[:, 0] == 0.0).all()
+
+
 def test_a_course_that_meets_no_edge_goes_on() -> None:
     laid = chart([-5.0, 0.0, 0.0], [5.0, 0.0, 0.0])
     assert laid.walls == (None, None)
