@@ -10,7 +10,7 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Interval, Posterior
 from mapping.base import Base, onto_base
-from mapping.inference.curves import Chart
+from mapping.inference.curves import Chart, ends_on_face
 from mapping.inference.families import PosteriorProblem, with_nominal_tip
 from mapping.inference.kinds import LineShape, PointShape, kind_of
 
@@ -74,7 +74,7 @@ def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Poste
     low, high = float(chart.s[0]), float(chart.s[-1])
     if has_ends:
         ends = _ends(problem)
-        low, high = np.median(on_chart(draws[:, ends], chart), axis=0).tolist()
+        low, high = np.median(on_face(draws, ends, shape), axis=0).tolist()
     count = AXIS_POINTS if (chart.closed or len(chart.s) > 8 or modes.degree > 1) else 2
     s = np.linspace(low, high, count)
     points, laterals, normals, bend = chart.at(s)
@@ -92,7 +92,7 @@ def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Poste
     # Along the axis: how well it is known across itself, and its two ends along itself (first, last).
     known: dict[str, Any] = {"axis_sd": courses.std(axis=0)}
     if has_ends:
-        spans = np.quantile(on_chart(draws[:, ends], chart), [0.05, 0.95], axis=0) - [low, high]
+        spans = np.quantile(on_face(draws, ends, shape), [0.05, 0.95], axis=0) - [low, high]
         known |= {"end_intervals": spans.T, "ends_seen": seen}
     return replace(
         problem.feature,
@@ -113,9 +113,9 @@ def _ends(problem: PosteriorProblem) -> list[int]:
     return [names.index("start"), names.index("end")]
 
 
-def on_chart(ends: FloatArray, chart: Chart) -> FloatArray:
-    """Places of ends (S, 2) along a chart, m: of lines that are open at an edge of the body at that edge."""
-    return np.clip(ends, chart.s[0], chart.s[-1])
+def on_face(draws: FloatArray, columns: Sequence[int], shape: LineShape) -> FloatArray:
+    """(S, 2) places along the chart of the ends of draws (S, P), m; where they are open at an edge of the body, its."""
+    return ends_on_face(shape.chart, shape.modes, draws[:, : shape.modes.count], draws[:, columns])
 
 
 def _length(
@@ -128,7 +128,7 @@ def _length(
     """The length, and what is to be said of it; the likeliest draw and `explored`, None of a line without ends."""
     chart = shape.chart
     some = draws[:: max(1, len(draws) // FEW_DRAWS)]
-    ends = np.tile(chart.s[[0, -1]], (len(some), 1)) if seen is None else on_chart(some[:, _ends(problem)], chart)
+    ends = np.tile(chart.s[[0, -1]], (len(some), 1)) if seen is None else on_face(some, _ends(problem), shape)
     interval = _of_smooth(Interval.from_draws(_lengths(shape, some, ends)), chart)
     if chart.closed:
         return interval, []
@@ -184,9 +184,9 @@ def with_ends_of_all(feature: Feature, likely: Sequence[tuple[float, PosteriorPr
         shape: Any = problem.target.shape
         columns, draws = _ends(problem), posterior.samples[:, : len(shape.names)]
         if not places:
-            middle = np.median(on_chart(draws[:, columns], shape.chart), axis=0)
+            middle = np.median(on_face(draws, columns, shape), axis=0)
         some = draws[np.linspace(0, len(draws) - 1, round(FEW_DRAWS * share / total)).astype(np.int64)]
-        ends = on_chart(some[:, columns], shape.chart)
+        ends = on_face(some, columns, shape)
         places.append(ends - middle)
         lengths.append(_lengths(shape, some, ends))
     spans = np.quantile(np.concatenate(places), [0.05, 0.95], axis=0)

@@ -16,7 +16,7 @@ from mapping import BoolArray, Feature, FloatArray, Interval, MappingError, Supp
 from mapping.geometry.mesh import arclengths, distances, nearest_on
 from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_bell, as_twin, laid, part_of
 from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, Neighbourhood
-from mapping.inference.curves import HIGHEST_DEGREE
+from mapping.inference.curves import HIGHEST_DEGREE, ends_on_face
 from mapping.inference.families import BellRidgeShape, BumpShape, GrooveShape, RidgeShape, TrapezoidShape, TwinShape
 from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 
@@ -431,8 +431,10 @@ def axis_of(part: Part) -> FloatArray:
         return np.asarray(spot.spot.lifted(place, np.zeros(1)))
     line: Any = shape
     names = list(line.names)
-    ends = (theta[names.index("start")], theta[names.index("end")]) if "start" in names else (
-        line.modes.middle - line.modes.reach, line.modes.middle + line.modes.reach)  # fmt: skip
+    ends = line.modes.middle + line.modes.reach * np.array([-1.0, 1.0])
+    if "start" in names:
+        first = names.index("start")
+        ends = ends_on_face(line.chart, line.modes, theta[None, : line.modes.count], theta[None, first : first + 2])[0]
     s = np.linspace(*ends, 2 if line.modes.degree < 2 and len(line.chart.s) < 9 else 33)
     points, laterals, _, _ = line.chart.at(s)
     return np.asarray(points + line.modes.lateral(theta[None, : line.modes.count], s)[0][:, None] * laterals)

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from mapping.inference.curves.development import normals_along as normals_along, smooth_on_base as smooth_on_base
     from mapping.inference.curves.mouth import (
         Mouth as Mouth,
+        edges_along as edges_along,
+        ends_on_face as ends_on_face,
         laid_beyond as laid_beyond,
         mouths_of as mouths_of,
         opened as opened,
@@ -24,7 +26,7 @@ _PUBLIC = {
     "chart": ("Chart", "chart_along"),
     "curve_modes": ("CurveModes",),
     "development": ("normals_along", "smooth_on_base"),
-    "mouth": ("Mouth", "laid_beyond", "mouths_of", "opened"),
+    "mouth": ("Mouth", "edges_along", "ends_on_face", "laid_beyond", "mouths_of", "opened"),
     "smooth_axis": ("HIGHEST_DEGREE", "smooth_axis"),
 }
 doorway(__name__, _PUBLIC)

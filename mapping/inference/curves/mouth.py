@@ -20,6 +20,8 @@ Outline = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 RIM_BESIDE = 0.5
 # A foot no farther before the edge lies on it, in tip radii
 ROUNDING = 1e-9
+# Sine of the angle at which a course must meet an edge to cross it
+CROSSING_SINE = 0.1
 # An end of a line that goes on, m
 EVERYWHERE = 1e300
 
@@ -88,10 +90,11 @@ class Mouth:
             sign * modes.slopes(place)[:, 0],
         )
 
-    def short(self, ends: FloatArray) -> FloatArray:
-        """(W,) by how much lines with ends (W, 2) along the chart end before the edge, m; 0 of those that are open."""
+    def short(self, courses: FloatArray, ends: FloatArray) -> FloatArray:
+        """(W,) by how much lines of courses (W, m) with ends (W, 2) along the chart end before the edge, m; 0 of those
+        that are open."""
         before = ends[:, 0] - self.place if self.first else self.place - ends[:, 1]
-        return np.maximum(before, 0.0)
+        return np.maximum(before + _farther(courses @ self.basis, courses @ self.slopes, self.wall), 0.0)
 
     def felt(
         self, courses: FloatArray, across: FloatArray, up: FloatArray, tip: float, *, beyond: bool = False
@@ -128,7 +131,8 @@ def laid_beyond(
     """
     for mouth in mouths:
         first = names.index("start")
-        short, courses = mouth.short(theta[:, first : first + 2]), theta[:, : len(mouth.basis)]
+        courses = theta[:, : len(mouth.basis)]
+        short = mouth.short(courses, theta[:, first : first + 2])
         across, up = outline(short)
         for rows, beyond in ((short == 0.0, False), (short > 0.0, True)):
             if rows.any() and (fades or not beyond):
@@ -145,12 +149,41 @@ def mouths_of(window: Window, chart: Chart, modes: CurveModes, tip: float) -> tu
     return tuple(mouth for mouth in both if mouth is not None)
 
 
-def opened(chart: Chart, ends: FloatArray) -> FloatArray:
-    """Ends (W, 2) along a chart, those beyond an edge of the body EVERYWHERE: the line does not end on this face."""
-    places = np.ascontiguousarray(ends)
-    for k, (end, wall) in enumerate(zip(chart.s[[0, -1]], chart.walls, strict=True)):
+def opened(chart: Chart, modes: CurveModes, courses: FloatArray, ends: FloatArray) -> FloatArray:
+    """Ends (W, 2) along a chart; EVERYWHERE those before which courses (W, m) cross an edge of the body: the line does
+    not end on this face."""
+    if all(wall is None for wall in chart.walls):
+        return np.ascontiguousarray(ends)
+    edges = edges_along(chart, modes, courses)
+    first = np.where(ends[:, 0] <= edges[:, 0], -EVERYWHERE, ends[:, 0])
+    return np.column_stack([first, np.where(ends[:, 1] >= edges[:, 1], EVERYWHERE, ends[:, 1])])
+
+
+def edges_along(chart: Chart, modes: CurveModes, courses: FloatArray) -> FloatArray:
+    """(W, 2) places along a chart at which courses (W, m) cross the edges of the body at its ends, m; where there is
+    none, infinitely far out."""
+    places = np.tile([-np.inf, np.inf], (len(courses), 1))
+    for end, (sign, wall) in enumerate(zip((-1.0, 1.0), chart.walls, strict=True)):
         if wall is not None:
-            beyond = ends[:, k] <= end if k == 0 else ends[:, k] >= end
-            places = places.copy()
-            places[beyond, k] = -EVERYWHERE if k == 0 else EVERYWHERE
+            at = chart.s[[-end]]
+            aside, slope = courses @ modes.basis(at)[:, 0], sign * (courses @ modes.slopes(at)[:, 0])
+            faced = np.array([sign * chart.tangents[-end] @ wall, chart.laterals[-end] @ wall])
+            places[:, end] = at + sign * _farther(aside, slope, faced)
     return places
+
+
+def ends_on_face(chart: Chart, modes: CurveModes, courses: FloatArray, ends: FloatArray) -> FloatArray:
+    """Ends (W, 2) along a chart, m; of courses (W, m) that are open at an edge of the body at that edge."""
+    edges = edges_along(chart, modes, courses)
+    return np.clip(ends, edges[:, :1], edges[:, 1:])
+
+
+def _farther(aside: FloatArray, slope: FloatArray, wall: FloatArray) -> FloatArray:
+    """(W,) by how much farther out than the chart its courses meet an edge that they cross at a slant, m.
+
+    Args:
+        aside, slope: (W,) of the course beside the chart there, m, and its change for each metre out.
+        wall: of the outward normal of the wall first the parts along the chart and beside it.
+    """
+    out = wall[0] + slope * wall[1]
+    return np.where(out > CROSSING_SINE, -aside * wall[1] / np.maximum(out, CROSSING_SINE), 0.0)

@@ -111,7 +111,11 @@ class BellRidgeShape:
 
         first = self.modes.count
         closed = np.tile([-1e300, 1e300], (len(theta), 1))
-        ends = closed if self.chart.closed else opened(self.chart, theta[:, first : first + 2])
+        ends = (
+            closed
+            if self.chart.closed
+            else opened(self.chart, self.modes, theta[:, : self.modes.count], theta[:, first : first + 2])
+        )
         courses = np.ascontiguousarray(theta[:, :first])
         section = [np.ascontiguousarray(each) for each in (theta[:, -3], np.exp(theta[:, -2]), theta[:, -1])]
         out = np.empty((len(theta), len(self.window)))

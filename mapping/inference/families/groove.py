@@ -71,7 +71,7 @@ class GrooveShape:
         courses = np.ascontiguousarray(theta[:, : self.modes.count])
         ends = np.tile([-1e300, 1e300], (len(theta), 1))
         if not self.chart.closed:
-            ends = opened(self.chart, theta[:, -4:-2])
+            ends = opened(self.chart, self.modes, courses, theta[:, -4:-2])
         return courses, ends, np.exp(theta[:, -2]), np.exp(theta[:, -1])
 
     @cached_property

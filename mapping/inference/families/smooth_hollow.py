@@ -44,7 +44,11 @@ class SmoothGrooveShape(GrooveShape):
 
         first = self.modes.count
         closed = np.tile([-1e300, 1e300], (len(theta), 1))
-        ends = closed if self.chart.closed else opened(self.chart, theta[:, first : first + 2])
+        ends = (
+            closed
+            if self.chart.closed
+            else opened(self.chart, self.modes, theta[:, : self.modes.count], theta[:, first : first + 2])
+        )
         courses = np.ascontiguousarray(theta[:, :first])
         out, section = np.empty((len(theta), len(self.window))), smooth_section(theta)
         smooth_line_heights(*self.places, courses, ends, *section, self.tip_radius, out)

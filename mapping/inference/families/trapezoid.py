@@ -59,7 +59,7 @@ class TrapezoidShape:
         ends, rounded = np.tile([-1e300, 1e300], (len(theta), 1)), np.zeros(len(theta))
         if "start" in self.names:
             first = self.names.index("start")
-            ends = opened(self.chart, theta[:, first : first + 2])
+            ends = opened(self.chart, self.modes, theta[:, : self.modes.count], theta[:, first : first + 2])
         courses = np.ascontiguousarray(theta[:, : self.modes.count])
         height, top, run = self.parts(theta)
         up, half = np.column_stack([height, np.zeros(len(theta))]), 0.5 * top
@@ -107,7 +107,7 @@ class ShoulderedShape(TrapezoidShape):
         height, top, shoulder = self.parts(theta)
         if not self.chart.closed:
             first = self.modes.count
-            ends = opened(self.chart, theta[:, first + 1 : first + 3])
+            ends = opened(self.chart, self.modes, theta[:, :first], theta[:, first + 1 : first + 3])
             rounded = 0.5 * top * rounding_of(theta[:, first])
         courses = np.ascontiguousarray(theta[:, : self.modes.count])
         out = np.empty((len(theta), len(self.window)))

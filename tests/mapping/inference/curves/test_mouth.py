@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mapping import FloatArray
-from mapping.inference.curves import Chart, CurveModes
+from mapping.inference.curves import Chart, CurveModes, edges_along
 from mapping.inference.families import BellRidgeShape, GrooveShape, RidgeShape, SmoothGrooveShape, TrapezoidShape
 from mapping.inference.likelihood import Window
 
@@ -164,3 +164,14 @@ def test_where_it_ends_beyond_the_edge_makes_no_difference() -> None:
     theta = np.array([[0.0, 0.0, -20e-3, end, np.log(0.8e-3), np.log(DEPTH), -0.4] for end in (20.1e-3, 22e-3)])
     one, other = groove.templates(theta)
     assert (one == other).all()
+
+
+def test_a_course_beside_its_chart_meets_an_edge_that_cuts_at_a_slant_elsewhere() -> None:
+    way = outwards(50.0)
+    chart, modes = out_along(way)
+    aside, heading = 0.4e-3, 0.05
+    first, last = edges_along(chart, modes, np.array([[aside, heading]]))[0]
+    points, laterals, _, _ = chart.at(np.array([last]))
+    met = points[0] + modes.lateral(np.array([[aside, heading]]), np.array([last]))[0, 0] * laterals[0]
+    assert first == -np.inf
+    assert met[0] == pytest.approx(0.0, abs=1e-12) and abs(last - 20e-3) > 0.3e-3
