@@ -53,7 +53,7 @@ def mouth_heights(
             it, m.
         ways: (n, 3) directions from there to the ball's centre, in the same frame.
         wall: (3,) outward unit normal of the wall, in the same frame.
-        bend: curvature of the base across the line, 1/m, positive where it bulges outward.
+        bend: curvature of the base along the edge, 1/m, positive where it bulges outward.
         aside, slopes: (W,) where the course meets the edge beside the chart, m, and by how much it goes aside for each
             metre out.
         across, up: (W, J) half of the section, which is the same on both sides: distances from the middle outwards and
@@ -88,14 +88,18 @@ def mouth_heights(
                 if abs(v) < outer + tip:
                     for j in range(2 * slices):
                         k = j // 2
-                        at = across[w, k] if j % 2 == 0 else -across[w, k]
+                        # heights stand on the base, which leans the more the farther along the edge
+                        at = across[w, k] * (1.0 + bend * up[w, k])
+                        at = at if j % 2 == 0 else -at
                         beside = v - at
                         if beside * beside > tip * tip:
                             continue
-                        place = aside[w] + at * way_x
-                        high = up[w, k] - 0.5 * bend * place * place
                         # the corner lies in the wall, whose plane the edge's point of the chart is in
-                        corner = -((aside[w] * wall[1]) + at * wall_v + high * wall[2]) / wall_u
+                        corner = -(aside[w] * wall[1] + at * wall_v) / wall_u
+                        out_x, out_y = corner * way_x - at * way_y, aside[w] + corner * way_y + at * way_x
+                        square = bend * (out_x * out_x + out_y * out_y)
+                        high = up[w, k] * (1.0 - 0.5 * bend * square) - 0.5 * square
+                        corner -= high * wall[2] / wall_u
                         over, beyond = z - high, u - corner
                         felt = _exit(
                             n_v * n_v + n_z * n_z, beside * n_v + over * n_z, beside * beside + over * over - tip * tip

@@ -435,7 +435,7 @@ def axis_of(part: Part) -> FloatArray:
     if "start" in names:
         first = names.index("start")
         ends = ends_on_face(line.chart, line.modes, theta[None, : line.modes.count], theta[None, first : first + 2])[0]
-    s = np.linspace(*ends, 2 if line.modes.degree < 2 and len(line.chart.s) < 9 else 33)
+    s = np.linspace(ends[0], ends[1], 2 if line.modes.degree < 2 and len(line.chart.s) < 9 else 33)
     points, laterals, _, _ = line.chart.at(s)
     return np.asarray(points + line.modes.lateral(theta[None, : line.modes.count], s)[0][:, None] * laterals)
 

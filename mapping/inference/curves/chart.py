@@ -27,6 +27,7 @@ class Chart:
         closed: True if the curve returns to its beginning (last point equals the first).
         walls: outward normals of the walls behind the sharp edges of the body at which the curve begins and ends; None
             where it comes to no edge.
+        edge_bends: curvatures of the base along these edges, 1/m, as `bend`.
     """
 
     s: FloatArray
@@ -38,6 +39,7 @@ class Chart:
     bend_along: FloatArray
     closed: bool
     walls: tuple[Wall, Wall] = (None, None)
+    edge_bends: tuple[float, float] = (0.0, 0.0)
 
     @property
     def length(self) -> float:
@@ -142,7 +144,12 @@ def chart_along(
     if bends:
         bend = _bend(points, laterals, up, base, tip_radius, reach)
         bend_along = _bend_along(points, s, tangents, up, reach, closed)
-    return Chart(s, points, tangents, laterals, up, bend, bend_along, closed, walls)
+    edge_bends = [0.0, 0.0]
+    for end, wall in enumerate(walls):
+        if wall is not None and bends:
+            along = np.cross(wall, up[-end])[None]
+            edge_bends[end] = float(_bend(points[[-end]], along, up[[-end]], base, tip_radius, reach)[0])
+    return Chart(s, points, tangents, laterals, up, bend, bend_along, closed, walls, (edge_bends[0], edge_bends[1]))
 
 
 def _resampled(axis: FloatArray, normals: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:

@@ -39,7 +39,7 @@ class Mouth:
         points, ways: (M, 3) where they lie, m, and directions to the ball, in the frame of the edge: out along the
             chart, beside it, and over the base.
         wall: (3,) outward unit normal of the wall in that frame.
-        bend: curvature of the base across the chart there, 1/m.
+        bend: curvature of the base along the edge, 1/m.
         basis, slopes: (m,) lateral modes at the edge, and their change per metre out.
     """
 
@@ -75,8 +75,10 @@ class Mouth:
         # the mean of a few feet lies off the body by some of their scatter
         points = points[bins] - np.maximum(out[bins], 0.0)[:, None] * wall
         place = chart.s[[end]]
-        bend = float(chart.bend[end])
-        points[:, 2] = np.minimum(points[:, 2], -0.5 * bend * points[:, 1] ** 2)
+        bend = chart.edge_bends[end]
+        on_edge = np.arange(len(bins)) < len(beyond)
+        sag = 0.5 * bend * (points[:, 0] ** 2 + points[:, 1] ** 2)
+        points[on_edge, 2] = np.minimum(points, -sag[:, None])[on_edge, 2]
         return cls(
             first,
             float(place[0]),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mapping import FloatArray
+from mapping.geometry.templates import mouth_heights
 from mapping.inference.curves import Chart, CurveModes, edges_along
 from mapping.inference.families import BellRidgeShape, GrooveShape, RidgeShape, SmoothGrooveShape, TrapezoidShape
 from mapping.inference.likelihood import Window
@@ -175,3 +176,29 @@ def test_a_course_beside_its_chart_meets_an_edge_that_cuts_at_a_slant_elsewhere(
     met = points[0] + modes.lateral(np.array([[aside, heading]]), np.array([last]))[0, 0] * laterals[0]
     assert first == -np.inf
     assert met[0] == pytest.approx(0.0, abs=1e-12) and abs(last - 20e-3) > 0.3e-3
+
+
+def test_a_mouth_on_an_edge_that_bends_is_felt_as_it_is() -> None:
+    radius, half, across = 15e-3, 1.5e-3, np.linspace(0.0, 1.5e-3, 41)
+    up = -0.4e-3 * np.cos(0.5 * np.pi * across / half) ** 2
+    # the end of a round bar, z < 0, with a groove along it; its outline in plan, by close points
+    arc = np.linspace(-8e-3, 8e-3, 16001)
+    rim = radius - np.where(np.abs(arc) < half, 0.4e-3 * np.cos(0.5 * np.pi * arc / half) ** 2, 0.0)
+    outline = rim[:, None] * np.column_stack([np.cos(arc / radius), np.sin(arc / radius)])
+    turn, beside = (each.ravel() for each in np.meshgrid(np.radians([0.0, 30.0, 60.0]), np.linspace(-2e-3, 2e-3, 17)))
+    out = np.column_stack([np.cos(beside / radius), np.sin(beside / radius)])
+    low, high = np.full(len(turn), -1e-3), np.full(len(turn), 1e-3)
+    for _ in range(30):
+        reach = TIP + 0.5 * (low + high)
+        in_plan = (radius + reach * np.cos(turn))[:, None] * out
+        flat = np.linalg.norm(in_plan[:, None] - outline, axis=2).min(axis=1)
+        inside = np.hypot(flat, reach * np.sin(turn)) < TIP
+        low, high = np.where(inside, reach - TIP, low), np.where(inside, high, reach - TIP)
+    # in the frame of the edge: out along the bar, beside, and out of its side
+    points = np.column_stack([0.0 * turn, radius * out[:, 1], radius * (out[:, 0] - 1.0)])
+    ways = np.column_stack([np.sin(turn), np.cos(turn) * out[:, 1], np.cos(turn) * out[:, 0]])
+    felt, nothing = np.empty((1, len(turn))), np.zeros(1)
+    wall = np.array([1.0, 0.0, 0.0])
+    mouth_heights(points[:, None], ways, wall, 1.0 / radius, nothing, nothing, across[None], up[None], TIP, felt)
+    assert low.min() < -0.15e-3
+    assert np.abs(felt[0] - low).max() < 2e-6
