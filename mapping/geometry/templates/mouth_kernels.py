@@ -10,6 +10,8 @@ from numba import njit
 
 from mapping import FloatArray
 
+# Share of the distance on a plane from which what stands on a base is touched, for one that is as hollow as half a ball
+BESIDE_CRESTS = 1.5
 # Squared sine of the angle between two directions that are taken for one
 ALONG_THE_EDGE = 1e-12
 
@@ -74,6 +76,8 @@ def mouth_heights(
         down_u, down_z = wall[2] / down, -wall_u / down
         outer = across[w, slices - 1]
         hollow = up[w, 0] < 0.0
+        # a ball on the base touches what stands H over it from sqrt(2 r H) beside; on a hollow base from farther
+        reach = outer if hollow else outer + min(BESIDE_CRESTS * np.sqrt(2.0 * tip * up[w, 0]), tip)
         for i in range(bins):
             n_u, n_v = ways[i, 0] * way_x + ways[i, 1] * way_y, ways[i, 1] * way_x - ways[i, 0] * way_y
             n_z = ways[i, 2]
@@ -83,9 +87,11 @@ def mouth_heights(
                 x, y, z = points[i, q, 0], points[i, q, 1] - aside[w], points[i, q, 2]
                 u, v = x * way_x + y * way_y, y * way_x - x * way_y
                 best = -np.inf
-                if not hollow or abs(v) >= outer:
+                # where the base under the ball is left it rests on that, and no slice of a hollow holds it higher
+                deepest = up[w, 0] - 0.5 * bend * (x * x + points[i, q, 1] * points[i, q, 1])
+                if not hollow or abs(v) >= outer or z <= deepest:
                     best = 0.0
-                if abs(v) < outer + tip:
+                if abs(v) < reach and not (hollow and z <= deepest):
                     for j in range(2 * slices):
                         k = j // 2
                         # heights stand on the base, which leans the more the farther along the edge
