@@ -114,7 +114,10 @@ def joined(now: Configuration) -> Iterator[Parts]:
             whole = _straight_through(np.concatenate(lines))
             like = max(first, second, key=lambda part: kind_of(part.feature).line).feature
             like = replace(like, kind=kind_made_of(made_of, line=True).name)
-            yield [*rest, _line(like, whole, now.place)]
+            line = _line(like, whole, now.place)
+            yield [*rest, line]
+            if any(isinstance(part.shape, SmoothGrooveShape) for part in (first, second)):
+                yield [*rest, as_smooth([*rest, line], len(rest), now.place)]
             if min(len(line) for line in lines) == 1:  # a sweep that passes beyond an end feels it, too
                 short = _shortened(whole, lines[0 if len(lines[0]) == 1 else 1][0], like, now.place)
                 yield [*rest, _line(like, short, now.place)]
