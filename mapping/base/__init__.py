@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from mapping.base.pose import Pose as Pose, estimate_pose as estimate_pose
     from mapping.base.profiles import SHORTEST_LEVEL as SHORTEST_LEVEL, Form as Form
     from mapping.base.projection import (
+        WALL_COSINE as WALL_COSINE,
         between_walls as between_walls,
         on_walls as on_walls,
         onto_base as onto_base,
@@ -41,7 +42,7 @@ _PUBLIC = {
     "laid_trace": ("LaidSweep", "LaidTrace"),
     "pose": ("Pose", "estimate_pose"),
     "profiles": ("SHORTEST_LEVEL", "Form"),
-    "projection": ("between_walls", "on_walls", "onto_base"),
+    "projection": ("WALL_COSINE", "between_walls", "on_walls", "onto_base"),
     "terraces": ("over_levels",),
 }
 doorway(__name__, _PUBLIC)

@@ -20,6 +20,7 @@ import numpy as np
 
 from mapping import Feature, FloatArray, length_text
 from mapping.geometry.mesh import spline_design
+from mapping.inference.curves import ends_on_face
 from mapping.inference.families import PRECISE, PosteriorProblem, with_nominal_tip
 from mapping.inference.kinds import kind_of
 from mapping.inference.likelihood import LogPosterior
@@ -126,7 +127,8 @@ def _section(problem: PosteriorProblem, theta: FloatArray) -> tuple[FloatArray, 
         low, high = float(shape.chart.s[0]), float(shape.chart.s[-1])
         if "start" in shape.names:
             first = shape.names.index("start")
-            low, high = float(theta[first]), float(theta[first + 1])
+            ends = theta[None, first : first + 2]
+            low, high = ends_on_face(shape.chart, shape.modes, theta[None, : shape.modes.count], ends)[0].tolist()
             margin = problem.sizes.radius  # over which an end may be rounded
             inside &= (s > low + margin) & (s < high - margin)
         places = np.clip(2.0 * (s - low) / max(high - low, 1e-300) - 1.0, -1.0, 1.0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from mapping import Feature, FloatArray, Interval, Posterior
 from mapping.base import Base, onto_base
-from mapping.inference.curves import Chart
+from mapping.inference.curves import Chart, ends_on_face
 from mapping.inference.families import PosteriorProblem, with_nominal_tip
 from mapping.inference.kinds import LineShape, PointShape, kind_of
 
@@ -74,7 +74,7 @@ def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Poste
     low, high = float(chart.s[0]), float(chart.s[-1])
     if has_ends:
         ends = _ends(problem)
-        low, high = (float(np.median(draws[:, column])) for column in ends)
+        low, high = np.median(on_face(draws, ends, shape), axis=0).tolist()
     count = AXIS_POINTS if (chart.closed or len(chart.s) > 8 or modes.degree > 1) else 2
     s = np.linspace(low, high, count)
     points, laterals, normals, bend = chart.at(s)
@@ -92,7 +92,7 @@ def _describe_line(problem: PosteriorProblem, shape: LineShape, posterior: Poste
     # Along the axis: how well it is known across itself, and its two ends along itself (first, last).
     known: dict[str, Any] = {"axis_sd": courses.std(axis=0)}
     if has_ends:
-        spans = np.quantile(draws[:, ends], [0.05, 0.95], axis=0) - [low, high]
+        spans = np.quantile(on_face(draws, ends, shape), [0.05, 0.95], axis=0) - [low, high]
         known |= {"end_intervals": spans.T, "ends_seen": seen}
     return replace(
         problem.feature,
@@ -113,6 +113,11 @@ def _ends(problem: PosteriorProblem) -> list[int]:
     return [names.index("start"), names.index("end")]
 
 
+def on_face(draws: FloatArray, columns: Sequence[int], shape: LineShape) -> FloatArray:
+    """(S, 2) places along the chart of the ends of draws (S, P), m; where they are open at an edge of the body, its."""
+    return ends_on_face(shape.chart, shape.modes, draws[:, : shape.modes.count], draws[:, columns])
+
+
 def _length(
     problem: PosteriorProblem,
     shape: LineShape,
@@ -123,7 +128,7 @@ def _length(
     """The length, and what is to be said of it; the likeliest draw and `explored`, None of a line without ends."""
     chart = shape.chart
     some = draws[:: max(1, len(draws) // FEW_DRAWS)]
-    ends = np.tile(chart.s[[0, -1]], (len(some), 1)) if seen is None else some[:, _ends(problem)]
+    ends = np.tile(chart.s[[0, -1]], (len(some), 1)) if seen is None else on_face(some, _ends(problem), shape)
     interval = _of_smooth(Interval.from_draws(_lengths(shape, some, ends)), chart)
     if chart.closed:
         return interval, []
@@ -179,10 +184,11 @@ def with_ends_of_all(feature: Feature, likely: Sequence[tuple[float, PosteriorPr
         shape: Any = problem.target.shape
         columns, draws = _ends(problem), posterior.samples[:, : len(shape.names)]
         if not places:
-            middle = np.median(draws[:, columns], axis=0)
+            middle = np.median(on_face(draws, columns, shape), axis=0)
         some = draws[np.linspace(0, len(draws) - 1, round(FEW_DRAWS * share / total)).astype(np.int64)]
-        places.append(some[:, columns] - middle)
-        lengths.append(_lengths(shape, some, some[:, columns]))
+        ends = on_face(some, columns, shape)
+        places.append(ends - middle)
+        lengths.append(_lengths(shape, some, ends))
     spans = np.quantile(np.concatenate(places), [0.05, 0.95], axis=0)
     details = replace(feature.details, end_intervals=spans.T)
     line: Any = with_nominal_tip(likely[0][1]).target.shape
@@ -202,15 +208,23 @@ def explored(problem: PosteriorProblem, best: FloatArray) -> tuple[bool, bool]:
     """For the first and the last end: True if the data say that the axis does not go on.
 
     The best of the draws is moved out to the limit of the end's prior; if the density hardly drops, nothing was
-    measured that could have shown the end, and the length is only bounded from below (a censored value).
+    measured that could have shown the end, and the length is only bounded from below (a censored value). No line goes
+    on beyond an edge of the body: where the data say that it goes on to there, its end was seen.
     """
     target = problem.target
-    at_limit = np.tile(best, (3, 1))
-    columns = _ends(problem)
-    at_limit[1, columns[0]] = target.low[columns[0]]
-    at_limit[2, columns[1]] = target.high[columns[1]]
-    value = target.log_density(at_limit)
-    return bool(value[0] - value[1] > UNSEEN), bool(value[0] - value[2] > UNSEEN)
+    shape: Any = target.shape
+    columns, chart = _ends(problem), shape.chart
+    limits = np.array([target.low[columns[0]], target.high[columns[1]]])
+    # as far before an edge as the limit is beyond
+    before = 2.0 * chart.s[[0, -1]] - limits
+    tried = np.tile(best, (5, 1))
+    for end, column in enumerate(columns):
+        tried[1 + end, column], tried[3 + end, column] = limits[end], before[end]
+    value = target.log_density(tried)
+    ended, goes_to_edge = value[0] - value[1:3] > UNSEEN, value[0] - value[3:] > UNSEEN
+    at_edge = np.array([wall is not None for wall in chart.walls])
+    first, last = ended | (at_edge & goes_to_edge)
+    return bool(first), bool(last)
 
 
 def demanded(problem: PosteriorProblem, best: FloatArray, seen: tuple[bool, bool]) -> tuple[float, float]:

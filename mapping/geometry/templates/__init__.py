@@ -15,6 +15,14 @@ if TYPE_CHECKING:
         pit_heights as pit_heights,
         step_heights as step_heights,
     )
+    from mapping.geometry.templates.mouth_kernels import mouth_heights as mouth_heights
+    from mapping.geometry.templates.outlines import (
+        flat_outline as flat_outline,
+        round_outline as round_outline,
+        shouldered_outline as shouldered_outline,
+        smooth_outline as smooth_outline,
+        upright_outline as upright_outline,
+    )
     from mapping.geometry.templates.section_kernels import section_heights as section_heights
     from mapping.geometry.templates.shapes import (
         cap_height as cap_height,
@@ -44,6 +52,8 @@ _PUBLIC = {
     "chain_kernels": ("chain_heights",),
     "crossing_kernels": ("crossing_heights",),
     "hollow_kernels": ("groove_heights", "pit_heights", "step_heights"),
+    "mouth_kernels": ("mouth_heights",),
+    "outlines": ("flat_outline", "round_outline", "shouldered_outline", "smooth_outline", "upright_outline"),
     "section_kernels": ("section_heights",),
     "shapes": (
         "cap_height",

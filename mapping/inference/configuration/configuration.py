@@ -21,6 +21,8 @@ from mapping.inference.families import (
     TwinShape,
     bell_beside,
     bell_ridge_beside,
+    smooth_beginnings,
+    smooth_groove_beside,
     trapezoid_beside,
     twin_beside,
 )
@@ -209,6 +211,23 @@ def as_bell(part: Part, half: float) -> Part:
     else:
         bell = bell_beside(crest, sizes)
     return Part(part.feature, bell, np.concatenate([known, [np.log(half), bell.start[-1]]]))
+
+
+def as_smooth(parts: Sequence[Part], k: int, place: Neighbourhood) -> Part:
+    """The k-th of some parts, an upright groove, as one whose walls run out; of several sections the one that is
+    likeliest beside the others begins."""
+    part, level = parts[k], len(place.levels) - 1
+    upright: Any = part.shape
+    sizes = sizes_of(part.feature, upright.tip_radius)
+    smooth = smooth_groove_beside(upright, sizes)
+    begun = smooth_beginnings(upright, part.start[None], sizes)
+    target = LogPosterior(place.joined([*(each.shape for each in parts[:k]), smooth,
+                                        *(each.shape for each in parts[k + 1 :])]), place.levels[level][0])  # fmt: skip
+    before, behind = (
+        np.concatenate([np.zeros(0), *(each.start for each in some)]) for some in (parts[:k], parts[k + 1 :])
+    )
+    rows = [np.concatenate([before, start, behind]) for start in begun]
+    return Part(part.feature, smooth, begun[int(np.argmax(target.log_density(np.array(rows))))])
 
 
 def as_twin(part: Part, place: Neighbourhood, gap: float) -> Part:

@@ -14,10 +14,27 @@ import numpy as np
 
 from mapping import BoolArray, Feature, FloatArray, Interval, MappingError, Support
 from mapping.geometry.mesh import arclengths, distances, nearest_on
-from mapping.inference.configuration.configuration import Configuration, Part, as_bar, as_bell, as_twin, laid, part_of
+from mapping.inference.configuration.configuration import (
+    Configuration,
+    Part,
+    as_bar,
+    as_bell,
+    as_smooth,
+    as_twin,
+    laid,
+    part_of,
+)
 from mapping.inference.configuration.neighbourhood import NEIGHBOURHOOD_REACH, Neighbourhood
-from mapping.inference.curves import HIGHEST_DEGREE
-from mapping.inference.families import BellRidgeShape, BumpShape, GrooveShape, RidgeShape, TrapezoidShape, TwinShape
+from mapping.inference.curves import HIGHEST_DEGREE, ends_on_face
+from mapping.inference.families import (
+    BellRidgeShape,
+    BumpShape,
+    GrooveShape,
+    RidgeShape,
+    SmoothGrooveShape,
+    TrapezoidShape,
+    TwinShape,
+)
 from mapping.inference.kinds import kind_made_of, kind_of, sizes_of
 
 Parts = list[Part]
@@ -57,13 +74,15 @@ MOST_DRAWN_THROUGH = 60
 
 
 def sections(now: Configuration) -> Iterator[Parts]:
-    """Another section of a line that is wider than a wire of its height: round, flat, running out, or two in one; and a
-    bump whose flank runs out."""
+    """Another section of a line that is wider than a wire of its height: round, flat, running out, or two in one; a
+    bump whose flank runs out, and a groove whose walls do."""
     for k, part in enumerate(now.parts):
         if isinstance(part.shape, BumpShape):
             half = sizes_of(part.feature, now.place.around.trace.tip_radius).half_width
             for share in SKIRTS:
                 yield [*now.parts[:k], as_bell(part, share * half), *now.parts[k + 1 :]]
+        if type(part.shape) is GrooveShape:
+            yield [*now.parts[:k], as_smooth(now.parts, k, now.place), *now.parts[k + 1 :]]
         ridge = _ridge_of(part, now.place)
         if ridge is None or now.as_narrow_as_wires[k]:
             continue
@@ -95,7 +114,10 @@ def joined(now: Configuration) -> Iterator[Parts]:
             whole = _straight_through(np.concatenate(lines))
             like = max(first, second, key=lambda part: kind_of(part.feature).line).feature
             like = replace(like, kind=kind_made_of(made_of, line=True).name)
-            yield [*rest, _line(like, whole, now.place)]
+            line = _line(like, whole, now.place)
+            yield [*rest, line]
+            if any(isinstance(part.shape, SmoothGrooveShape) for part in (first, second)):
+                yield [*rest, as_smooth([*rest, line], len(rest), now.place)]
             if min(len(line) for line in lines) == 1:  # a sweep that passes beyond an end feels it, too
                 short = _shortened(whole, lines[0 if len(lines[0]) == 1 else 1][0], like, now.place)
                 yield [*rest, _line(like, short, now.place)]
@@ -187,7 +209,7 @@ def between(now: Configuration) -> Iterator[Parts]:
             single = apart_of(part)
             hollow = _hollow(axis_of(single[0]), axis_of(single[1]), part.feature, now.place)
             yield [*now.parts[:k], *single, hollow, *now.parts[k + 1 :]]
-        if isinstance(part.shape, GrooveShape):
+        if type(part.shape) is GrooveShape:
             axis, width = axis_of(part), float(np.exp(part.start[-2]))
             aside = 0.5 * width * _lateral(part)
             height = 0.3 * abs(part.feature.height.median)
@@ -294,6 +316,8 @@ def _alike(part: Part, axis: FloatArray, place: Neighbourhood, most: int = HIGHE
         return as_bar(line, place, float(shape.parts(part.start[None])[1][0]))
     if isinstance(shape, BellRidgeShape):
         return as_bell(line, float(np.exp(part.start[-2])))
+    if isinstance(shape, SmoothGrooveShape):
+        return as_smooth([line], 0, place)
     return line
 
 
@@ -431,9 +455,11 @@ def axis_of(part: Part) -> FloatArray:
         return np.asarray(spot.spot.lifted(place, np.zeros(1)))
     line: Any = shape
     names = list(line.names)
-    ends = (theta[names.index("start")], theta[names.index("end")]) if "start" in names else (
-        line.modes.middle - line.modes.reach, line.modes.middle + line.modes.reach)  # fmt: skip
-    s = np.linspace(*ends, 2 if line.modes.degree < 2 and len(line.chart.s) < 9 else 33)
+    ends = line.modes.middle + line.modes.reach * np.array([-1.0, 1.0])
+    if "start" in names:
+        first = names.index("start")
+        ends = ends_on_face(line.chart, line.modes, theta[None, : line.modes.count], theta[None, first : first + 2])[0]
+    s = np.linspace(ends[0], ends[1], 2 if line.modes.degree < 2 and len(line.chart.s) < 9 else 33)
     points, laterals, _, _ = line.chart.at(s)
     return np.asarray(points + line.modes.lateral(theta[None, : line.modes.count], s)[0][:, None] * laterals)
 

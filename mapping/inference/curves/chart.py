@@ -11,6 +11,7 @@ import numpy as np
 
 from mapping import EmptyWindowError, FloatArray, IntArray
 from mapping.base import Base, between_walls, onto_base
+from mapping.inference.curves.body_edge import Wall, up_to_edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +25,9 @@ class Chart:
         bend, bend_along: (K,) normal curvatures of the base across and along the curve, 1/m, positive where it bulges
             outward.
         closed: True if the curve returns to its beginning (last point equals the first).
+        walls: outward normals of the walls behind the sharp edges of the body at which the curve begins and ends; None
+            where it comes to no edge.
+        edge_bends: curvatures of the base along these edges, 1/m, as `bend`.
     """
 
     s: FloatArray
@@ -34,6 +38,8 @@ class Chart:
     bend: FloatArray
     bend_along: FloatArray
     closed: bool
+    walls: tuple[Wall, Wall] = (None, None)
+    edge_bends: tuple[float, float] = (0.0, 0.0)
 
     @property
     def length(self) -> float:
@@ -107,21 +113,23 @@ def chart_along(
         base: the global model.
         tip_radius: radius of the fingertip, m: feet are sought from this high above.
         spacing: wanted distance of the chart's points, m.
-        extension: length added at both ends of an open curve, m; less where the base ends, or a wall
-            begins.
+        extension: length added at both ends of an open curve, m; less where the base ends, a wall begins, or an edge of
+            the body is crossed.
         reach: distance over which the bends of the base are measured, m.
         bends: False for a trial of the course alone: the base is not asked how it bends across, and taken for flat.
 
     Raises:
-        EmptyWindowError: the line does not lie over the base, or turns back on itself.
+        EmptyWindowError: the line does not lie over the base, turns back on itself, or has no length.
     """
     closed = len(axis) > 3 and bool(np.array_equal(axis[0], axis[-1]))
     line, lift = _resampled(axis, normals, spacing)
     if not closed and extension > 0.0:
         line, lift = _extended(line, lift, spacing, extension)
+    walls: tuple[Wall, Wall] = (None, None)
     if not closed:
         reached = between_walls(line, lift, base, tip_radius)
-        line, lift = line[reached], lift[reached]
+        on_face = up_to_edges(line[reached], lift[reached], base, tip_radius)
+        line, lift, walls = on_face.line, on_face.lift, on_face.walls
     points, up = onto_base(line, lift, base, tip_radius, smooth=int(0.5 * reach / spacing))
     if not closed:
         keep = _on_base(points - line, up, 0.1 * reach)
@@ -136,13 +144,20 @@ def chart_along(
     if bends:
         bend = _bend(points, laterals, up, base, tip_radius, reach)
         bend_along = _bend_along(points, s, tangents, up, reach, closed)
-    return Chart(s, points, tangents, laterals, up, bend, bend_along, closed)
+    edge_bends = [0.0, 0.0]
+    for end, wall in enumerate(walls):
+        if wall is not None and bends:
+            along = np.cross(wall, up[-end])[None]
+            edge_bends[end] = float(_bend(points[[-end]], along, up[[-end]], base, tip_radius, reach)[0])
+    return Chart(s, points, tangents, laterals, up, bend, bend_along, closed, walls, (edge_bends[0], edge_bends[1]))
 
 
 def _resampled(axis: FloatArray, normals: FloatArray, spacing: float) -> tuple[FloatArray, FloatArray]:
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(axis, axis=0), axis=1))])
     keep = np.concatenate([[True], np.diff(s) > 0.0])
     s, axis, normals = s[keep], axis[keep], normals[keep]
+    if len(s) < 2:
+        raise EmptyWindowError("all points of its axis are one")
     even = np.linspace(0.0, s[-1], max(2, int(np.ceil(s[-1] / spacing)) + 1))
     both = [np.column_stack([np.interp(even, s, values[:, i]) for i in range(3)]) for values in (axis, normals)]
     return both[0], both[1] / np.linalg.norm(both[1], axis=1, keepdims=True)

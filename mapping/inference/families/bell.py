@@ -4,13 +4,14 @@ and beyond."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping import FloatArray
-from mapping.inference.curves import Chart, CurveModes
+from mapping.geometry.templates import smooth_outline
+from mapping.inference.curves import Chart, CurveModes, Mouth, laid_beyond, mouths_of, opened
 from mapping.inference.families.bump import BumpShape, Spot
 from mapping.inference.families.nodes import bin_nodes, line_nodes
 from mapping.inference.families.problem import Sizes
@@ -110,12 +111,23 @@ class BellRidgeShape:
 
         first = self.modes.count
         closed = np.tile([-1e300, 1e300], (len(theta), 1))
-        ends = closed if self.chart.closed else np.ascontiguousarray(theta[:, first : first + 2])
+        ends = (
+            closed
+            if self.chart.closed
+            else opened(self.chart, self.modes, theta[:, : self.modes.count], theta[:, first : first + 2])
+        )
         courses = np.ascontiguousarray(theta[:, :first])
-        section = (np.ascontiguousarray(each) for each in (theta[:, -3], np.exp(theta[:, -2]), theta[:, -1]))
+        section = [np.ascontiguousarray(each) for each in (theta[:, -3], np.exp(theta[:, -2]), theta[:, -1])]
         out = np.empty((len(theta), len(self.window)))
         smooth_line_heights(*self._places, courses, ends, *section, self.tip_radius, out)
+        outline = partial(smooth_outline, *section)
+        laid_beyond(self.mouths, out, theta, self.names, self.tip_radius, outline, fades=True)
         return out
+
+    @cached_property
+    def mouths(self) -> tuple[Mouth, ...]:
+        """Where edges of the body cut it off."""
+        return mouths_of(self.window, self.chart, self.modes, self.tip_radius)
 
     @cached_property
     def _places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:

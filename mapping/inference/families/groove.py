@@ -10,7 +10,8 @@ from typing import Self
 import numpy as np
 
 from mapping import FloatArray, IntArray
-from mapping.inference.curves import Chart, CurveModes
+from mapping.geometry.templates import upright_outline
+from mapping.inference.curves import Chart, CurveModes, Mouth, laid_beyond, mouths_of, opened
 from mapping.inference.families.nodes import bin_nodes, line_nodes
 from mapping.inference.families.ridge import rounding_of
 from mapping.inference.likelihood import Prior, Window
@@ -57,6 +58,9 @@ class GrooveShape:
         rounded = np.zeros(len(theta)) if self.chart.closed else 0.5 * width * rounding_of(theta[:, -5])
         out = np.empty((len(theta), len(self.window)))
         groove_heights(*self.places, courses, ends, rounded, width, depth, self.tip_radius, out)
+        laid_beyond(
+            self.mouths, out, theta, self.names, self.tip_radius, lambda _: upright_outline(0.5 * width, -depth)
+        )
         if self.crossed:
             taken = [self.taken(theta), *(groove.taken(known) for groove, known in self.crossed)]
             out += self._crossing.heights(taken, self.tip_radius)
@@ -67,13 +71,18 @@ class GrooveShape:
         courses = np.ascontiguousarray(theta[:, : self.modes.count])
         ends = np.tile([-1e300, 1e300], (len(theta), 1))
         if not self.chart.closed:
-            ends = np.ascontiguousarray(theta[:, -4:-2])
+            ends = opened(self.chart, self.modes, courses, theta[:, -4:-2])
         return courses, ends, np.exp(theta[:, -2]), np.exp(theta[:, -1])
 
     @cached_property
     def places(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """Where the nodes of the window lie, as of `line_nodes`."""
         return line_nodes(self.window, self.chart, self.modes)
+
+    @cached_property
+    def mouths(self) -> tuple[Mouth, ...]:
+        """Where edges of the body cut it off."""
+        return mouths_of(self.window, self.chart, self.modes, self.tip_radius)
 
     @cached_property
     def _crossing(self) -> Crossing:

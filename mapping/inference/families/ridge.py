@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from mapping import FloatArray, IntArray
-from mapping.inference.curves import Chart, CurveModes
+from mapping.geometry.templates import round_outline
+from mapping.inference.curves import Chart, CurveModes, Mouth, laid_beyond, mouths_of
 from mapping.inference.likelihood import Prior, Window
 
 # A bin looks at the legs of the chart within this share of a tip radius of the one nearest to the ball's centre: an
@@ -71,7 +72,14 @@ class RidgeShape:
             self.tip_radius,
             out,
         )
+        height = np.ascontiguousarray(theta[:, -2])
+        laid_beyond(self.mouths, out, theta, self.names, self.tip_radius, lambda _: round_outline(height, radius))
         return out
+
+    @cached_property
+    def mouths(self) -> tuple[Mouth, ...]:
+        """Where edges of the body cut it off."""
+        return mouths_of(self.window, self.chart, self.modes, self.tip_radius)
 
     def chains(self, theta: FloatArray, lift: FloatArray) -> FloatArray:
         """(W, K, 3) axes at `lift` (W,) over the base, m; vertices beyond an end stand at the end."""

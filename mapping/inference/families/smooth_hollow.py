@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from mapping import FloatArray
+from mapping.geometry.templates import smooth_outline
+from mapping.inference.curves import laid_beyond, opened
 from mapping.inference.families.groove import GrooveShape
 from mapping.inference.families.pit import PitShape
 from mapping.inference.families.problem import Sizes
@@ -41,10 +44,16 @@ class SmoothGrooveShape(GrooveShape):
 
         first = self.modes.count
         closed = np.tile([-1e300, 1e300], (len(theta), 1))
-        ends = closed if self.chart.closed else np.ascontiguousarray(theta[:, first : first + 2])
+        ends = (
+            closed
+            if self.chart.closed
+            else opened(self.chart, self.modes, theta[:, : self.modes.count], theta[:, first : first + 2])
+        )
         courses = np.ascontiguousarray(theta[:, :first])
-        out = np.empty((len(theta), len(self.window)))
-        smooth_line_heights(*self.places, courses, ends, *smooth_section(theta), self.tip_radius, out)
+        out, section = np.empty((len(theta), len(self.window))), smooth_section(theta)
+        smooth_line_heights(*self.places, courses, ends, *section, self.tip_radius, out)
+        outline = partial(smooth_outline, *section)
+        laid_beyond(self.mouths, out, theta, self.names, self.tip_radius, outline, fades=True)
         return out
 
 

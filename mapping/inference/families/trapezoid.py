@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from mapping import FloatArray
-from mapping.geometry.templates import contact_half_width, width_of_cap
-from mapping.inference.curves import Chart, CurveModes
+from mapping.geometry.templates import contact_half_width, flat_outline, shouldered_outline, width_of_cap
+from mapping.inference.curves import Chart, CurveModes, Mouth, laid_beyond, mouths_of, opened
 from mapping.inference.families.nodes import line_nodes
 from mapping.inference.families.problem import Sizes
 from mapping.inference.families.ridge import RidgeShape, rounding_of
@@ -59,7 +59,7 @@ class TrapezoidShape:
         ends, rounded = np.tile([-1e300, 1e300], (len(theta), 1)), np.zeros(len(theta))
         if "start" in self.names:
             first = self.names.index("start")
-            ends = np.ascontiguousarray(theta[:, first : first + 2])
+            ends = opened(self.chart, self.modes, theta[:, : self.modes.count], theta[:, first : first + 2])
         courses = np.ascontiguousarray(theta[:, : self.modes.count])
         height, top, run = self.parts(theta)
         up, half = np.column_stack([height, np.zeros(len(theta))]), 0.5 * top
@@ -68,7 +68,13 @@ class TrapezoidShape:
         out = np.empty((len(theta), len(self.window)))
         corners = np.column_stack([half, half + run])
         section_heights(*self._places, courses, ends, rounded, corners, up, np.zeros_like(half), self.tip_radius, out)
+        laid_beyond(self.mouths, out, theta, self.names, self.tip_radius, lambda _: flat_outline(height, half, run))
         return out
+
+    @cached_property
+    def mouths(self) -> tuple[Mouth, ...]:
+        """Where edges of the body cut it off."""
+        return mouths_of(self.window, self.chart, self.modes, self.tip_radius)
 
     def parts(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(W,) heights, widths of the top, and runs of a flank, m."""
@@ -101,12 +107,14 @@ class ShoulderedShape(TrapezoidShape):
         height, top, shoulder = self.parts(theta)
         if not self.chart.closed:
             first = self.modes.count
-            ends = np.ascontiguousarray(theta[:, first + 1 : first + 3])
+            ends = opened(self.chart, self.modes, theta[:, :first], theta[:, first + 1 : first + 3])
             rounded = 0.5 * top * rounding_of(theta[:, first])
         courses = np.ascontiguousarray(theta[:, : self.modes.count])
         out = np.empty((len(theta), len(self.window)))
         edge, up = 0.5 * top[:, None], np.ascontiguousarray(height[:, None])
         section_heights(*self._places, courses, ends, rounded, edge, up, shoulder, self.tip_radius, out)
+        outline = shouldered_outline(height, 0.5 * top, shoulder)
+        laid_beyond(self.mouths, out, theta, self.names, self.tip_radius, lambda _: outline)
         return out
 
 

@@ -17,6 +17,7 @@ from mapping.inference.curves import (
     normals_along,
     smooth_axis,
     smooth_on_base,
+    up_to_edges,
 )
 from mapping.inference.families import (
     MEETING_REACH,
@@ -36,6 +37,9 @@ from mapping.inference.sampler import find_optima
 SAG = 0.005
 MOST_LEGS = 300
 HIGHEST_MODE = 8
+# An end may lie so many half-widths beyond an edge of the body, where all places say the same: the line is open there.
+# One that was felt to go on to as near to an edge as the ball feels it is open as likely as not
+OPEN = 1.0
 # After so many degrees in a row that are no better than a lower one, no higher one is tried.
 FUTILE_DEGREES = 2
 
@@ -125,6 +129,7 @@ class LineKind(Kind):
         tip = around.trace.tip_radius
         sizes = sizes_of(feature, tip)
         axis, normals, crossings = _axis_of(feature, sizes, around)
+        axis, normals = _on_one_face(axis, normals, around)
         course = self._chart(axis, normals, sizes, crossings, HIGHEST_DEGREE, around, bends=False)
         rises = (0.0, sizes.height, -sizes.height) if self.sided else (0.0,)
         window = window_for(*_crest(course, tip, sizes, rises), sizes, around)
@@ -171,7 +176,7 @@ class LineKind(Kind):
             most, least: degrees that its course may have.
             overlooked: True if an open course has one bend more, of a size that its degree leaves out.
         """
-        axis, normals, crossings = feature.axis, feature.normals, feature.evidence.crossings
+        (axis, normals), crossings = _on_one_face(feature.axis, feature.normals, around), feature.evidence.crossings
         tip, sizes = around.trace.tip_radius, sizes_of(feature, around.trace.tip_radius)
         if window.flat:  # nothing to unroll, and nothing bends
             line, degree = smooth_axis(axis, sizes.position_sd, most, least)
@@ -186,7 +191,7 @@ class LineKind(Kind):
         modes = _modes(chart, ends, degree, spare, crossings, sizes)
         laterals, along = _laterals(modes, degree, len(window), crossings, sizes), Parameters()
         if self.has_ends and not chart.closed:
-            along = _ends(ends, _end_limits(axis, chart, ends, feature, sizes, around), sizes)
+            along = _ends(ends, _end_limits(axis, chart, ends, feature, sizes, around), chart, sizes)
         return self.shape(Traced(window, chart, modes, sizes, tip, laterals, along)), degree
 
     def _chart(
@@ -262,6 +267,15 @@ def _axis_of(feature: Feature, sizes: Sizes, around: Surroundings) -> tuple[Floa
     return np.stack([axis[0] - half, axis[0] + half]), np.repeat(normals[:1], 2, axis=0), 1
 
 
+def _on_one_face(axis: FloatArray, normals: FloatArray, around: Surroundings) -> tuple[FloatArray, FloatArray]:
+    """A detected axis without what was felt of it over an edge of the body: the feet of all balls that roll over that
+    lie on it, wherever beside the line they are."""
+    if np.array_equal(axis[0], axis[-1]):
+        return axis, normals
+    kept = up_to_edges(axis, normals, around.base, around.trace.tip_radius)
+    return kept.line, kept.lift
+
+
 def _modes(chart: Chart, ends: FloatArray, degree: int, spare: int, crossings: int, sizes: Sizes) -> CurveModes:
     if chart.closed:
         # Offsets of a ring whose coordinates have a degree have harmonics one higher: an ellipse differs from a
@@ -287,7 +301,10 @@ def _crest(chart: Chart, tip_radius: float, sizes: Sizes, rises: tuple[float, ..
 def _end_limits(
     axis: FloatArray, chart: Chart, ends: FloatArray, feature: Feature, sizes: Sizes, around: Surroundings
 ) -> list[tuple[float, float]]:
-    """Places between which the beginning and the end of an open line lie, m along the chart."""
+    """Places between which the beginning and the end of an open line lie, m along the chart.
+
+    One that lies beyond an edge of the body is open there.
+    """
     low, high = float(chart.s[0]), float(chart.s[-1])
     middle = min(max(float(ends.mean()), low + 1e-3 * (high - low)), high - 1e-3 * (high - low))
     limits = []
@@ -297,15 +314,29 @@ def _end_limits(
             reach = MEETING_REACH * sizes.half_width
             at = float(np.clip(ends[k], least + 0.1 * reach, most - 0.1 * reach))
             least, most = max(least, at - reach), min(most, at + reach)
+        beyond = OPEN * sizes.half_width
+        if chart.walls[0] is not None and least == low:
+            least -= beyond
+        if chart.walls[1] is not None and most == high:
+            most += beyond
         limits.append((least, most))
     return limits
 
 
-def _ends(places: FloatArray, limits: list[tuple[float, float]], sizes: Sizes) -> Parameters:
-    """Parameters of the two ends: where they were detected (2,), anywhere within their limits, m along the chart."""
+def _ends(places: FloatArray, limits: list[tuple[float, float]], chart: Chart, sizes: Sizes) -> Parameters:
+    """Parameters of the two ends: where they were detected (2,), anywhere within their limits, m along the chart.
+
+    One that was detected within a half-width of an edge of the body begins as open.
+    """
+    (lowest, _), (_, highest) = limits
+    first, last = float(places.min()), float(places.max())
+    if chart.walls[0] is not None and first < chart.s[0] + sizes.half_width:
+        first = 0.5 * (lowest + min(float(chart.s[0]), first))
+    if chart.walls[1] is not None and last > chart.s[-1] - sizes.half_width:
+        last = 0.5 * (highest + max(float(chart.s[-1]), last))
     return Parameters(
         tuple(Uniform(*limit) for limit in limits),
-        (float(places.min()), float(places.max())),
+        (first, last),
         (0.1 * sizes.half_width,) * 2,
     )
 

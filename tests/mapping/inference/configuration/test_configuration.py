@@ -27,7 +27,7 @@ from mapping.inference.configuration.configuration import Configuration, Part, a
 from mapping.inference.configuration.neighbourhood import PARTS_OF_BIN, Neighbourhood, neighbourhood, window_of
 from mapping.inference.configuration.proposals import smoother, straight_lines
 from mapping.inference.configuration.search import searched
-from mapping.inference.families import Surroundings
+from mapping.inference.families import SmoothGrooveShape, Surroundings
 from mapping.inference.joint import JoinedShape
 from mapping.instrument import Noise
 
@@ -285,6 +285,31 @@ def test_places_without_a_sample_between_others_end_no_run() -> None:
 def test_what_only_bounds_a_hollow_is_no_ridge() -> None:
     """A hollow that runs out like a cosine, and under a noise that hides its form: crests of no height along its rims
     hold the ball as its flanks do, and are no features."""
+    for seed in (1, 4):
+        trace, base = _cosine_groove(30e-6, seed)
+        assert [feature.kind for feature in assemble(detect(trace, base), trace, base, faint=False)] == ["groove"]
+
+
+def test_a_groove_whose_walls_run_out_is_asked_as_such_before_anything_is_put_beside_it() -> None:
+    trace, base = _cosine_groove(10e-6, 2)
+    up = np.tile([0.0, 0.0, 1.0], (len(trace), 1))
+    axis, size = 1e-3 * np.array([[0.0, -5.0, 0.0], [0.0, 5.0, 0.0]]), Interval(-0.33e-3, -0.35e-3, -0.3e-3)
+    width, length = Interval(3e-3, 2e-3, 4e-3), Interval(10e-3, 9e-3, 11e-3)
+    groove = Feature("groove", axis, up[:2], size, width, length, Support(99.0, 11), True, 2e-5)
+    feet, height = trace.centers * [1.0, 1.0, 0.0], trace.centers[:, 2] - trace.tip_radius
+    places = Places(feet, up, height, np.ones(len(trace), dtype=np.int64), trace.sweep, 20e-6)
+    place = neighbourhood([groove], [], places, Surroundings(trace, base, Noise(10e-6, 0.0, 1e-3)), 0.01)
+    assert place is not None
+    part = part_of(groove, place)
+    start = fitted([part], place)
+    assert start is not None
+    found = searched(start, [part], np.zeros((0, 3)))
+    assert found.best.kinds == ("groove",) and found.best.log_odds > start.log_odds + 10.0
+    assert isinstance(found.best.parts[0].shape, SmoothGrooveShape)
+
+
+def _cosine_groove(noise: float, seed: int) -> tuple[Trace, Base]:
+    """Rows over a cosine groove 10.4 mm long on a plate, felt across it by brute force."""
     tip, depth, width, sweeps = 3e-3, 0.5e-3, 3.5e-3, 16
     x, fine = np.arange(-8e-3, 8e-3, 20e-6), np.arange(-12e-3, 12e-3, 10e-6)
     ground = -0.5 * depth * (1.0 + np.cos(np.pi * np.clip(np.abs(fine) / (0.5 * width), 0.0, 1.0)))
@@ -292,10 +317,9 @@ def test_what_only_bounds_a_hollow_is_no_ridge() -> None:
     ball = np.where(np.abs(aside) < tip, np.sqrt(np.maximum(tip**2 - aside**2, 0.0)), -np.inf)
     felt = (ground + ball).max(axis=1) - tip
     corners = 0.1 * np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    base, sweep = Base(Surface(corners, [[0, 1, 2], [0, 2, 3]])), np.repeat(np.arange(sweeps), len(x))
+    sweep = np.repeat(np.arange(sweeps), len(x))
     y = 1e-3 * (sweep - 0.5 * (sweeps - 1))
     z = tip + np.where(np.abs(y) < 5.2e-3, np.tile(felt, sweeps), 0.0)
-    for seed in (1, 4):
-        noise = 30e-6 * np.random.default_rng(seed).standard_normal(len(z))
-        trace = Trace(1e-3 * np.arange(len(z)), np.column_stack([np.tile(x, sweeps), y, z + noise]), sweep, tip)
-        assert [feature.kind for feature in assemble(detect(trace, base), trace, base, faint=False)] == ["groove"]
+    z += noise * np.random.default_rng(seed).standard_normal(len(z))
+    trace = Trace(1e-3 * np.arange(len(z)), np.column_stack([np.tile(x, sweeps), y, z]), sweep, tip)
+    return trace, Base(Surface(corners, [[0, 1, 2], [0, 2, 3]]))
