@@ -12,6 +12,8 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from explore3d.bench.scenes import BODY_BUILDING_SEEDS, drawn_details
+from explore3d.scene.mesh_files import load_mesh
 from explore3d.scene.scene import Scene, load_scene
 from mapping.arrays import FloatArray
 from mapping.surface import Surface
@@ -43,8 +45,23 @@ def test_the_script_makes_exactly_what_is_shipped(tmp_path: Path) -> None:
     made = sorted(path.relative_to(tmp_path / "assets") for path in (tmp_path / "assets" / "meshes").rglob("*.ply"))
     assert made == shipped
     for path in shipped:
+        assert (ASSETS / path).stat().st_size < 1_600_000
+        again, here = load_mesh(tmp_path / "assets" / path), load_mesh(ASSETS / path)
+        np.testing.assert_array_equal(again.faces, here.faces, path.name)
         # another processor's sine may differ in the last digit
-        assert len((tmp_path / "assets" / path).read_bytes()) == (ASSETS / path).stat().st_size < 1_600_000
+        np.testing.assert_allclose(again.vertices, here.vertices, rtol=0, atol=1e-12, err_msg=path.name)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_details_are_drawn_where_the_scene_of_a_body_has_them(name: str) -> None:
+    """Whatever places are drawn by must not change: the shipped meshes would be of other details than their script's.
+
+    The script itself takes longer, and is run by the slow test above.
+    """
+    drawn = drawn_details(known(name), 3e-3, np.random.default_rng(BODY_BUILDING_SEEDS[0]))
+    assert [each.kind for each in drawn] == [truth.kind for truth in scene(name).truth]
+    for each, truth in zip(drawn, scene(name).truth, strict=True):
+        np.testing.assert_allclose(each.course, truth.axis, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", NAMES)

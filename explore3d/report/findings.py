@@ -324,9 +324,14 @@ def warning_lines(analysis: Analysis) -> list[str]:
 
 
 def swept_part(analysis: Analysis) -> str:
-    """'' on the 21 % of the surface that was swept'' where the sweeps did not come near all of it, else ''."""
+    """'' on the 21 % of the surface that was swept'' where the sweeps did not come near all of it, else ''.
+
+    Where a scene's account leaves out what the finger cannot reach, it is a share of the rest, and said to be.
+    """
     share = swept_share(analysis.inspected, analysis.account, analysis.base)
-    return "" if share == 1.0 else f" on the {100 * share:.0f} % of the surface that was swept"
+    whole = analysis.account is None or f"{100 * analysis.account.unreachable:.0f}" == "0"
+    surface = "surface" if whole else "reachable surface"
+    return "" if share == 1.0 else f" on the {100 * share:.0f} % of the {surface} that was swept"
 
 
 def tolerance_lines(analysis: Analysis) -> list[str]:

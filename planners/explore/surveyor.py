@@ -12,7 +12,7 @@ from hw import Move
 from mapping import FloatArray, Trace, length_text
 from mapping.base import LaidTrace
 from mapping.detection import Coverage, detect, expected_limit
-from mapping.estimate.deviation import Deviation, explain
+from mapping.estimate.deviation import Deviation, explain, lay_out
 from mapping.instrument import Noise, StatedNoise
 from planners import Outcome, Plan, executed
 from planners.explore.found import Found
@@ -72,6 +72,7 @@ class Surveyor:
         felt: by each sweep that felt anything.
         commanded: paths of the ball's centre (K, 3) that were carried out, m.
         limit: least height that the sweeps detect one by one, m.
+        metres: length of all lines that are laid out, m.
         count: kept up as it goes.
     """
 
@@ -87,6 +88,7 @@ class Surveyor:
     felt: list[Trace] = field(init=False, default_factory=list)
     commanded: list[FloatArray] = field(init=False, default_factory=list)
     limit: float = field(init=False, default=0.0)
+    metres: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
         self.visible = self.survey.visible if self.expected is None else self._visible_for(self.expected)
@@ -124,6 +126,7 @@ class Surveyor:
     def _laid_out(self) -> Iterator[Move]:
         """The sweeps; what ball and stem can make of a line is worked out before it, not of all at once."""
         lines = deque(self.survey.lines(self.visible))
+        self.metres = sum(line.length for line in lines)
         while lines:
             ahead = deque(self.survey.pressed(lines.popleft()))
             while ahead:
@@ -138,7 +141,8 @@ class Surveyor:
     def deviation(self) -> Deviation | None:
         """What all that was felt shows to be wrong with the model, None if nothing."""
         base = self.survey.base
-        return explain(LaidTrace.together(self.felt, base), base, self.commanded) if self.felt else None
+        felt = LaidTrace.together(self.felt, base) if self.felt else None
+        return None if felt is None else explain(felt, base, self.commanded, self.metres)
 
     def look_again(self, deviation: Deviation) -> None:
         """What was found on a wrong model is forgotten, and looked for on the corrected one; not where parts differ."""
@@ -190,8 +194,9 @@ class Surveyor:
         return float(np.clip(VISIBLE_HEIGHT_MARGIN * limit / smallest, LEAST_VISIBLE_SHARE, MOST_VISIBLE_SHARE))
 
     def _detect(self, waiting: list[Trace]) -> None:
+        laid = LaidTrace.together(waiting, self.survey.base)
         felt = detect(
-            LaidTrace.together(waiting, self.survey.base),
+            laid,
             self.survey.base,
             noise=self.found.noise,
             stated=self.stated,
@@ -201,4 +206,5 @@ class Surveyor:
         self.limit = felt.detection_limit
         self.found.reported = float(np.sqrt(felt.threshold**2 + 2.0 * np.log(CANDIDATES / REPORTABLE)))
         self.found.crossings.extend(felt.crossings)
+        lay_out(laid, self.metres)
         waiting.clear()

@@ -27,8 +27,6 @@ ENDS = 1.0
 # Of the grid on which ways round the body are looked for, in tip radii; and its most nodes along an axis
 GRID_SPACING, MOST_GRID_NODES = 0.75, 40
 ROOM = 4.0
-# Most ways are hardly longer than straight ones: the others are looked for in a second search
-SHORT_WAY = 1.5
 # How far out of a narrow place a straight way is looked for, in tip radii
 OUT_DISTANCE = 6.0
 # Places off the surface where the grid is too coarse: how high over contact, in tip radii; how many of each at most;
@@ -190,7 +188,11 @@ class Ways:
     felt: FeltDetails | None = None
 
     def make_ready(self) -> None:
-        """Make the roadmaps before the finger waits for them, for a body that is to be felt from more than one side."""
+        """Make what would keep the finger waiting: roadmaps, for a body that is to be felt from more than one side."""
+        from planners.paths.roadmap_kernels import shortest_way
+
+        starts = np.zeros(2, dtype=np.int32)
+        shortest_way(starts, starts[:0], np.zeros(0), np.zeros((1, 3)), 0, 0)  # compiled
         areas = self.base.surface.face_areas
         if np.linalg.norm(areas @ self.base.surface.face_normals) < ONE_SIDED * areas.sum():
             _ = self._graph
@@ -394,24 +396,14 @@ class Ways:
 
     def _between(self, start: FloatArray, stop: FloatArray) -> FloatArray | None:
         """Nodes (K, 3) of the shortest way over the grid, or None."""
-        from scipy.sparse.csgraph import dijkstra
+        from planners.paths.roadmap_kernels import shortest_way
 
         points, graph = self._graph
         source, target = self._node(start), self._node(stop)
         if source is None or target is None:
             return None
-        straight = float(np.linalg.norm(points[target] - points[source]))
-        for limit in (SHORT_WAY * straight + ROOM * self.tip_radius, np.inf):
-            lengths, befores = dijkstra(graph, indices=np.array([source]), return_predecessors=True, limit=limit)
-            if np.isfinite(lengths[0, target]):
-                break
-        else:
-            return None
-        previous = befores[0]
-        route = [target]
-        while route[-1] != source:
-            route.append(int(previous[route[-1]]))
-        return np.asarray(points[route[::-1]])
+        way = shortest_way(graph.indptr, graph.indices, graph.data, points, source, target)
+        return np.asarray(points[way]) if len(way) else None
 
     def _node(self, place: FloatArray) -> int | None:
         """The nearest node that can be reached straight, or None."""

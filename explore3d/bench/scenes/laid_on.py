@@ -10,7 +10,6 @@ import numpy as np
 from explore3d.analysis import TrueFeature
 from explore3d.bench.scenes.bodies import Mesh
 from mapping import BoolArray, FloatArray, IntArray, Surface
-from mapping.detection import face_samples
 from mapping.geometry.mesh import NearestPoint, nearest_on
 
 # Longest edge within a detail, in widths of it, where its section bulges, which is where the ball touches: at the crest
@@ -192,10 +191,9 @@ class _Ground:
 
         self.tip_radius = tip_radius
         self.nearest = NearestPoint(body)
-        samples = face_samples(body, 0.25 * SMOOTH_ROOM)
-        self.places = samples.points
-        self.normals = body.face_normals[samples.owner]
-        weights = body.face_areas[samples.owner] * samples.share
+        self.places, face = _places(body, 0.25 * SMOOTH_ROOM)
+        self.normals = body.face_normals[face]
+        weights = body.face_areas[face] / np.bincount(face)[face]
         self.share = np.cumsum(weights) / weights.sum()
         self.tree = cKDTree(self.places)
 
@@ -227,3 +225,25 @@ class _Ground:
             return None
         mean = near.mean(axis=0)
         return np.asarray(mean / np.linalg.norm(mean))
+
+
+def _places(body: Surface, spacing: float) -> tuple[FloatArray, IntArray]:
+    """Points (N, 3) all over a body whose faces are cut into cells of their own shape, two in each, and their faces.
+
+    Every place of chance follows from their order. The program has samplers of its own, which may change; what lies on
+    the bodies must not.
+    """
+    corners = body.vertices[body.faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    parts = np.ceil(longest / spacing).astype(np.int64)
+    points, face = [], []
+    for n in np.unique(parts):
+        alike = np.flatnonzero(parts == n)
+        i, j = np.divmod(np.arange(n * n), n)
+        flip = i + j >= n
+        u = np.where(flip, n - i - 1 / 3, i + 1 / 3) / n
+        v = np.where(flip, n - j - 1 / 3, j + 1 / 3) / n
+        weights = np.column_stack([1 - u - v, u, v])
+        points.append(np.einsum("sk,fkx->fsx", weights, corners[alike]).reshape(-1, 3))
+        face.append(np.repeat(alike, n * n))
+    return np.concatenate(points), np.concatenate(face)

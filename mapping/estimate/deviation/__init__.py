@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from mapping.doorway import doorway
 
 if TYPE_CHECKING:
+    from mapping.estimate.deviation.blocks import lay_out as lay_out
     from mapping.estimate.deviation.explain import explain as explain, felt_enough as felt_enough
     from mapping.estimate.deviation.left_standing import LeftStanding as LeftStanding, left_standing as left_standing
     from mapping.estimate.deviation.result import CAUSES as CAUSES, Deviation as Deviation, Part as Part
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from mapping.estimate.deviation.yielding import Yielding as Yielding, yielding as yielding
 
 _PUBLIC = {
+    "blocks": ("lay_out",),
     "explain": ("explain", "felt_enough"),
     "left_standing": ("LeftStanding", "left_standing"),
     "result": ("CAUSES", "Deviation", "Part"),

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from mapping import BoolArray, FloatArray, IntArray
-from mapping.base import LaidTrace, SweepHeights
+from mapping.base import LaidSweep, LaidTrace, SweepHeights
 from mapping.instrument import MAD_TO_SD
 
 # Width of a bin in tip radii, and bins in a block: a crest of 0.06 tip radii spans three blocks under its whole width
@@ -79,14 +79,17 @@ class Blocks:
     noise: float
 
     @classmethod
-    def of(cls, laid: LaidTrace) -> Blocks:
-        """The blocks of all sweeps over the base that they are laid on."""
+    def of(cls, laid: LaidTrace, metres: float | None = None) -> Blocks:
+        """The blocks of all sweeps over the base that they are laid on.
+
+        Args:
+            metres: length of all sweeps that was foretold where they were laid out beforehand (see `lay_out`); None:
+                as long as they are.
+        """
         tip = laid.tip_radius
         sweeps = [sweep for sweep in laid.laid_sweeps if len(sweep.trace) > 1]
-        lengths = [float(sweep.arclength[-1]) for sweep in sweeps]
-        spacing = max(BIN * tip, sum(lengths) / (BINS_PER_BLOCK * MOST_DEVIATION_BLOCKS))
-        apart = [length / (len(sweep.trace) - 1) for length, sweep in zip(lengths, sweeps, strict=True)]
-        profiles = [p for sweep, step in zip(sweeps, apart, strict=True) for p in sweep.heights(max(spacing, step))]
+        spacing = _bins(sum(float(sweep.arclength[-1]) for sweep in sweeps) if metres is None else metres, tip)
+        profiles = [profile for sweep in sweeps for profile in _binned(sweep, spacing)]
         profiles = [p for p in profiles if len(p.height) >= FEWEST_BINS]
         # of samples far apart a block takes as many as its length does: a longer one would be wider than a feature
         each = [max(1, round(BINS_PER_BLOCK * spacing / p.spacing)) for p in profiles]
@@ -174,6 +177,27 @@ class Blocks:
         graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
         label = connected_components(graph, directed=False)[1]
         return np.asarray(label == np.bincount(label).argmax())
+
+
+def lay_out(laid: LaidTrace, metres: float) -> None:
+    """Lay sweeps out in the bins that `Blocks.of` will ask for once all are felt, so that it need not do it at once.
+
+    Args:
+        metres: length of all sweeps, as far as it can be foretold.
+    """
+    for sweep in laid.laid_sweeps:
+        if len(sweep.trace) > 1:
+            _binned(sweep, _bins(metres, laid.tip_radius))
+
+
+def _bins(metres: float, tip: float) -> float:
+    """Width of the bins of so many metres of sweeps, m."""
+    return max(BIN * tip, metres / (BINS_PER_BLOCK * MOST_DEVIATION_BLOCKS))
+
+
+def _binned(sweep: LaidSweep, spacing: float) -> tuple[SweepHeights, ...]:
+    """A sweep's heights in bins of a width (m), or as wide as its samples are apart."""
+    return sweep.heights(max(spacing, float(sweep.arclength[-1]) / (len(sweep.trace) - 1)))
 
 
 def _grouped(

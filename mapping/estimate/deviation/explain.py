@@ -96,7 +96,9 @@ class _Explanation:
         return np.asarray(self.offset + rigid + self.drift * _elapsed(blocks)[:, 0] + smooth)
 
 
-def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> Deviation | None:
+def explain(
+    trace: Trace, base: Base, commanded: Sequence[FloatArray] = (), metres: float | None = None
+) -> Deviation | None:
     """What is wrong with the model at long wavelengths; None if what was felt agrees with it.
 
     The heights of blocks of half a tip radius over the model are explained by nothing, or by an offset, a pose, a
@@ -111,10 +113,11 @@ def explain(trace: Trace, base: Base, commanded: Sequence[FloatArray] = ()) -> D
         base: the model as given or as it was moved.
         commanded: paths (K, 3) of the ball's centre along which the sweeps were to go, m: where one was and nothing was
             felt, the body is not; none: not known.
+        metres: length of all sweeps as it was foretold where they were laid out beforehand (see `lay_out`).
     """
     if base.kind != "mesh":
         return None
-    given, blocks = base, Blocks.of(LaidTrace.of(trace, base))
+    given, blocks = base, Blocks.of(LaidTrace.of(trace, base), metres)
     if len(blocks) < FEWEST_BLOCKS:
         return None
     tip = trace.tip_radius
@@ -252,12 +255,20 @@ def _unfelt(commanded: Sequence[FloatArray], trace: Trace) -> FloatArray:
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
         where = np.arange(0.0, along[-1], spacing)
         dense.append(np.column_stack([np.interp(where, along, path[:, k]) for k in range(3)]))
-    places = np.concatenate(dense)
-    for every in (FEW_SAMPLES, 1):  # nearly all places lie beside one of a few samples; the others ask all samples
-        if len(places):
-            distance, _ = cKDTree(trace.centers[::every]).query(places, distance_upper_bound=trace.tip_radius)
-            places = places[~np.isfinite(distance)]
-    return places
+    places, centers, tip = np.concatenate(dense), trace.centers, trace.tip_radius
+    if not len(places):
+        return places
+    # nearly all places lie beside one of a few samples
+    few = centers[::FEW_SAMPLES]
+    places = places[~np.isfinite(cKDTree(few).query(places, distance_upper_bound=tip)[0])]
+    if not len(places):
+        return places
+    # the others ask those samples alone whose run of so many could come near one of them
+    run = np.arange(len(centers)) // FEW_SAMPLES
+    reach = np.maximum.reduceat(np.linalg.norm(centers - few[run], axis=1), FEW_SAMPLES * np.arange(len(few))) + tip
+    close = cKDTree(places).query(few, distance_upper_bound=float(reach.max()))[0] <= reach
+    distance = cKDTree(centers[close[run]]).query(places, distance_upper_bound=tip)[0]
+    return places[~np.isfinite(distance)]
 
 
 def _agrees(blocks: Blocks, height: FloatArray, keep: BoolArray, tip: float) -> bool:

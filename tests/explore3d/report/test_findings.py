@@ -126,6 +126,14 @@ def test_no_sentence_speaks_of_a_surface_that_was_not_swept() -> None:
     assert "where a sweep crosses it on the 21 % of the surface that was swept. So" in last
 
 
+def test_where_a_part_is_out_of_reach_the_share_is_of_the_rest() -> None:
+    told = analysis()
+    told.account = SimpleNamespace(unswept=0.03, unreachable=0.301, warning=str, sentence=str)
+    assert summary(told)[0] == "no features found on the 97 % of the reachable surface that was swept"
+    told.account.unreachable = 0.003  # which no other sentence shows
+    assert summary(told)[0] == "no features found on the 97 % of the surface that was swept"
+
+
 def test_each_feature_has_a_line_with_its_intervals() -> None:
     found = analysis(
         feature("ridge-1", True, Interval(80e-3, 79.9e-3, 80.1e-3)),

@@ -50,6 +50,32 @@ def test_a_statement_that_the_samples_contradict_gives_way(factor):
         assert (np.abs(off(told) - off(alone)) < 1.5 * own).all()
 
 
+def mostly_white(seed: int, correlated: float, count: int) -> NoiseFit:
+    """Fit to white noise of 0.03 mm with so much that is correlated over 1 mm, m, of which a sixth is stated."""
+    from scipy.signal import lfilter
+
+    rng, step, white = np.random.default_rng(seed), 75e-6, 3e-5
+    decay = np.exp(-step / 1e-3)
+    kicks = rng.standard_normal(count) * np.sqrt(1 - decay**2)
+    height = correlated * lfilter([1.0], [1.0, -decay], kicks) + white * rng.standard_normal(count)
+    steps = np.full(count, step)
+    steps[0] = -step
+    stated = StatedNoise(Noise(white, white / 6.0, 1e-3))
+    return fit_noise([Blocks(height, steps, 1.0)], estimate_noise(height, step * np.arange(count)), stated)
+
+
+def test_what_is_stated_is_kept_where_the_path_is_too_short_to_show_it():
+    """It decides how much a filter as wide as a crest lets through: 1.2 times as much as without."""
+    fits = [mostly_white(seed, 5e-6, 2400) for seed in range(12)]
+    widths, truth = np.array([1e-3, 2e-3, 4e-3]), Noise(3e-5, 5e-6, 1e-3)
+    ratio = np.array([fit.noise.cap_sd(widths, 75e-6) for fit in fits]) / truth.cap_sd(widths, 75e-6)
+    assert (np.abs(ratio - 1.0) < 0.1).all()
+
+
+def test_what_is_stated_is_given_up_where_the_path_would_show_it():
+    assert all(mostly_white(seed, 0.0, 100_000).noise.correlated < 1e-6 for seed in range(3))
+
+
 def test_what_is_not_stated_is_measured():
     alone = fitted(0, None)
     told = fitted(0, StatedNoise(Noise(0.0)))

@@ -354,6 +354,12 @@ def test_a_bump_that_is_not_there_costs_two_sweeps() -> None:
     assert outcome.reason == "lost" and len(record) == 2
 
 
+class Line(int):
+    """A line that is known by its number."""
+
+    length = 2.0
+
+
 def test_a_survey_is_worked_out_as_it_goes_and_knows_how_long_it_is():
     pressed = list[int]()
 
@@ -362,7 +368,7 @@ def test_a_survey_is_worked_out_as_it_goes_and_knows_how_long_it_is():
         yield from {4: [], 5: [5, 50], 9: []}.get(line, [line])  # one in two parts, two not at all
 
     surveyor = Surveyor(
-        SimpleNamespace(visible=0.35, lines=lambda visible: iter(range(10)), pressed=press), Found(R), 1.0
+        SimpleNamespace(visible=0.35, lines=lambda visible: map(Line, range(10)), pressed=press), Found(R), 1.0
     )
     moves, known, planned = list[int](), list[int](), list[int | None]()
     for move in surveyor._laid_out():
@@ -373,3 +379,4 @@ def test_a_survey_is_worked_out_as_it_goes_and_knows_how_long_it_is():
     assert moves == [0, 1, 2, 3, 5, 50, 6, 7, 8] and surveyor.count.planned == surveyor.count.made == 9
     assert known == [1, 2, 3, 4, 6, 6, 7, 8, 9]  # no line before its time
     assert planned == [10] * 9  # one line more gives none, one line fewer is in two parts
+    assert surveyor.metres == 20.0

@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from mapping import FloatArray, Surface, Trace
 from mapping.base import Base, LaidTrace
-from mapping.estimate.deviation import explain, felt_enough
+from mapping.estimate.deviation import explain, felt_enough, lay_out
+from mapping.estimate.deviation.blocks import Blocks
 from mapping.estimate.deviation.drift import SteadyDrift
 from mapping.estimate.deviation.explain import FEW_SAMPLES, _robust, _unfelt
 
@@ -367,3 +368,16 @@ def test_what_speaks_for_a_model_is_told_from_what_says_nothing() -> None:
     lifted = Trace(few.t, few.centers + np.array([0.0, 0.0, 0.4e-3]), few.sweep, TIP)
     assert explain(lifted, model()) is None
     assert not felt_enough(lifted, model())
+
+
+def test_sweeps_that_were_laid_out_one_by_one_are_not_laid_out_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    trace, base = felt(), model()
+    whole = Blocks.of(LaidTrace.of(trace, base))
+    parts = [LaidTrace(part, base) for _, part in trace.sweeps()]
+    metres = sum(float(part.laid_sweeps[0].arclength[-1]) for part in parts)
+    for part in parts:
+        lay_out(part, metres)
+    monkeypatch.setattr("mapping.base.laid_trace.height_profiles", None)
+    again = Blocks.of(LaidTrace.together(parts, base), metres)
+    np.testing.assert_array_equal(again.height, whole.height)
+    np.testing.assert_array_equal(again.points, whole.points)
