@@ -608,11 +608,13 @@ def circle(
 @bench.command()
 def scaling(
     store: Store,
-    axes: Annotated[str | None, typer.Option(help="samples, triangles, features, separated by commas; all.")] = None,
+    axes: Annotated[
+        str | None, typer.Option(help="samples, triangles, features, surface, separated by commas; all.")
+    ] = None,
     huge: Annotated[bool, typer.Option("--huge", help="Up to 1e8 samples: 2 GB of disk, many minutes.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="The three smallest sizes of each.")] = False,
 ) -> None:
-    """Time and memory against the number of samples, triangles and features, and the exponents that fit.
+    """Time and memory against samples, triangles, features and swept samples, and the exponents that fit.
 
     Example: explore3d bench scaling --store scaling.jsonl --axes samples --quick
     """
