@@ -83,8 +83,8 @@ def measure(axis: str, size: int) -> Cost:
         return Cost(axis, size, seconds, _peak(), {}, count)
     if axis == "surface":
         _surface(1_000)
-        seconds, meshing, holes = _surface(size)
-        return Cost(axis, size, seconds, _peak(), {"meshing all samples": meshing}, holes)
+        seconds, memory, meshing, holes = _surface(size)
+        return Cost(axis, size, seconds, memory, {"meshing all samples": meshing}, holes)
     with tempfile.TemporaryDirectory() as folder:
         _analysed(Path(folder), "warm", 30_000, 1)
         given = (size, 4) if axis == "samples" else (LOG_OF_FEATURES, size)
@@ -118,20 +118,20 @@ def _contacts(triangles: int) -> tuple[float, int]:
     return perf_counter() - begin, int((found.count > 0).sum())
 
 
-def _surface(samples: int) -> tuple[float, float, int]:
-    """The surface under sweeps: seconds, seconds of meshing every sample, holes of the estimated mesh.
+def _surface(samples: int) -> tuple[float, int, float, int]:
+    """The surface under sweeps: seconds, peak memory until then, seconds of meshing every sample, holes of the mesh.
 
     Rows are about as long as all of them lie apart, so that the plate grows both ways.
     """
     trace = corrugated_sweeps(samples, max(4, round(np.sqrt(samples * SWEPT_STEP / SWEPT_PITCH))))
     begin = process_time()
     estimate = estimate_surface(trace)
-    seconds = process_time() - begin
+    seconds, memory = process_time() - begin, _peak()
     holes = _borders(estimate.surface.faces) - 1 if estimate.surface is not None else -1
     del estimate
     up, begin = np.tile([0.0, 0.0, 1.0], (len(trace), 1)), process_time()
     sweep_faces(trace.centers, trace.sweep, up)
-    return seconds, process_time() - begin, holes
+    return seconds, memory, process_time() - begin, holes
 
 
 def corrugated_sweeps(samples: int, rows: int) -> Trace:
